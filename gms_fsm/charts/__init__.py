@@ -1,0 +1,6 @@
+"""Friction models as charts: each module is a page of data with its reference."""
+
+from gms_fsm.charts.gms import GMS_ELEMENT, LAWS, SLIP_LAWS, gms_element
+from gms_fsm.charts.lugre import LUGRE
+
+__all__ = ["GMS_ELEMENT", "LAWS", "LUGRE", "SLIP_LAWS", "gms_element"]

@@ -1,0 +1,81 @@
+"""The Generalized Maxwell Slip element: all switching of the model is on this page.
+
+This file does not know how it will be run. It says when an element sticks, when it slips, and what
+its deflection does meanwhile; Fig. 2b and 2c of the paper beside it show nothing more.
+
+References
+----------
+K. Roffi, "State Transition Block Diagram of the Generalized Maxwell Slip Friction Model",
+arXiv 2512.03049 (2025), eq. (1)-(4), Fig. 2. Its figures print no guard text; the guards below are
+our reading of its Section II-D.
+F. Al-Bender, V. Lampaert, J. Swevers, "The Generalized Maxwell-Slip Model: A Novel Model for
+Friction Simulation and Compensation", IEEE Trans. Automatic Control 50 (2005), for the signed law.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+from gms_fsm.chart import Chart, State, Transition
+from gms_fsm.errors import ParameterError
+
+__all__ = ["GMS_ELEMENT", "LAWS", "SLIP_LAWS", "Law", "gms_element"]
+
+Law = Literal["published", "signed"]
+LAWS: tuple[Law, ...] = get_args(Law)
+
+SLIP_LAWS = {
+    "published": "sgn(v) * C * (1 - z / s)",  # (1) verbatim; unstable about z = +s for v < 0
+    "signed": "C * (sgn(v) - z / s)",  # s carries the sign of v (Al-Bender et al.)
+}
+
+
+def gms_element(law: Law) -> Chart:
+    """Return the chart of one GMS element under a slip law.
+
+    Parameters
+    ----------
+    law : {"published", "signed"}
+        ``"published"`` is eq. (1) of the paper as printed, ``"signed"`` the law of Al-Bender,
+        Lampaert and Swevers (2005). They agree for v > 0. There is no default on purpose.
+
+    Returns
+    -------
+    Chart
+        States stick and slip; edges break_away_forward, break_away_backward, arrest.
+
+    Raises
+    ------
+    ParameterError
+        If the law is neither.
+
+    Examples
+    --------
+    >>> gms_element("signed").guard_text("arrest")
+    '|v| <= v_c && |z| < s'
+    """
+    if law not in LAWS:
+        raise ParameterError(
+            f"law is {law!r}; it must be 'published' (eq. (1) of the paper as printed) or "
+            "'signed' (Al-Bender et al. 2005)"
+        )
+    return Chart(
+        name=f"GMS element, {law} law",
+        inputs=("v", "s"),  # s = weight * Stribeck curve, supplied by the model
+        variables=("z",),
+        parameters=("k", "sigma", "C", "v_c"),
+        states=(
+            State("stick", flow={"z": "v"}),
+            State("slip", flow={"z": SLIP_LAWS[law]}),
+        ),
+        transitions=(
+            Transition("break_away_forward", "stick", "slip", guard="z >= s and v > v_c"),
+            Transition("break_away_backward", "stick", "slip", guard="z <= -s and v < -v_c"),
+            Transition("arrest", "slip", "stick", guard="abs(v) <= v_c and abs(z) < s"),
+        ),
+        outputs={"F": "k * z + sigma * dz"},  # (3)
+        reference="arXiv 2512.03049 (2025)",
+    )
+
+
+GMS_ELEMENT = {law: gms_element(law) for law in LAWS}

@@ -1,0 +1,115 @@
+"""Every error of the product, in one hierarchy.
+
+A user's mistake is a `GMSError`: its text says what is wrong, where, with which value, and what to
+do. The command line prints that text and exits with code 2; Python callers can catch the one base.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gms_fsm.trace import Trace
+
+
+class GMSError(Exception):
+    """Base of every error this package raises on purpose."""
+
+
+class ExpressionError(GMSError, ValueError):
+    """A text of the expression language cannot be read.
+
+    Parameters
+    ----------
+    reason : str
+        What is wrong.
+    text : str
+        The whole offending text.
+    column : int
+        Where it goes wrong, counted from 1.
+    allowed : str
+        What would be allowed there.
+    where : str, optional
+        Whose text it is, for example ``guard of 'arrest'``.
+
+    Examples
+    --------
+    >>> print(ExpressionError("unknown name 'u'", "z > u", 5, "names: v, z"))
+    column 5: unknown name 'u'; allowed: names: v, z
+        z > u
+            ^
+    """
+
+    def __init__(self, reason: str, text: str, column: int, allowed: str, where: str = "") -> None:
+        self.reason = reason
+        self.text = text
+        self.column = column
+        self.allowed = allowed
+        self.where = where
+        head = f"{where}, column {column}" if where else f"column {column}"
+        # A very long text is cut around the column, so that a message stays a message.
+        start = max(0, column - 61)
+        shown = text[start : start + 120].replace("\n", " ").replace("\t", " ")
+        super().__init__(
+            f"{head}: {reason}; allowed: {allowed}\n    {shown}\n    {' ' * (column - 1 - start)}^"
+        )
+
+    def at(self, where: str) -> ExpressionError:
+        """Return the same error with its owner named."""
+        return ExpressionError(self.reason, self.text, self.column, self.allowed, where)
+
+
+class ChartError(GMSError, ValueError):
+    """A chart contradicts itself: an unknown state, a missing flow, a name used twice."""
+
+
+class ParameterError(GMSError, ValueError):
+    """A parameter breaks its rule; the text names the parameter, the value and the rule."""
+
+
+class SignalError(GMSError, ValueError):
+    """An input signal cannot be used: not finite, not in time order, too short."""
+
+
+class TraceFileError(GMSError, ValueError):
+    """A trace file is damaged, incomplete or not a trace."""
+
+
+class OutputError(GMSError, OSError):
+    """An output folder or file cannot be written."""
+
+
+class MissingExtraError(GMSError, ImportError):
+    """An optional dependency is not installed; the text says which extra brings it."""
+
+
+class SimulationError(GMSError, RuntimeError):
+    """A run could not go on; `trace` holds all that was computed up to there.
+
+    Parameters
+    ----------
+    message : str
+        What happened, where, with which values, and what to try.
+    trace : Trace
+        The part of the run before the error.
+    """
+
+    def __init__(self, message: str, trace: Trace) -> None:
+        super().__init__(message)
+        self.trace = trace
+
+
+class LivelockError(SimulationError):
+    """States switch again and again while time stands still."""
+
+
+class StepSizeError(SimulationError):
+    """The step size fell under the resolution of the clock."""
+
+
+class NotFiniteError(SimulationError):
+    """A signal or a flow returned NaN or infinity."""
+
+
+class SignalEndError(SimulationError):
+    """A sampled signal ends before the run does."""

@@ -1,0 +1,767 @@
+"""The expression language: text -> checked tree -> every other spelling.
+
+All physics and all switching of this package is written as short texts (``z >= s and v > v_c``).
+Here such a text becomes a tree that can be evaluated, printed as Python or as Stateflow text, and
+split into its atomic comparisons. Nothing is ever handed to `eval`: the text is parsed with `ast`
+and only nodes on an allow-list survive; code is generated from the checked tree alone.
+
+Grammar: numbers, declared names, ``pi``, ``+ - * / **``, ``< <= > >=`` (chains are split),
+``and or not``, ``abs exp sqrt sgn min max sin cos tanh``. ``==`` on floats is refused.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from gms_fsm.errors import ExpressionError
+
+__all__ = [
+    "MATLAB_LIKE",
+    "PYTHON",
+    "Binary",
+    "Both",
+    "Call",
+    "Comparison",
+    "Condition",
+    "Either",
+    "Literal",
+    "Name",
+    "Negative",
+    "Not",
+    "Number",
+    "Relation",
+    "Spelling",
+    "Value",
+    "clauses",
+    "evaluate",
+    "names_in",
+    "parse_condition",
+    "parse_value",
+    "rough_points",
+    "spell",
+    "split",
+    "substitute",
+]
+
+LONGEST_TEXT = 10_000  # characters; a chart's text is a line, not a program
+DEEPEST_TREE = 60  # levels; keeps every recursive reader far from Python's own limit
+LARGEST_PRODUCT_POWER = 8  # x**8 and below are printed as products
+
+
+# --------------------------------------------------------------------------- the tree
+@dataclass(frozen=True)
+class Number:
+    """A finite constant."""
+
+    value: float
+
+
+@dataclass(frozen=True)
+class Name:
+    """A declared name."""
+
+    id: str
+
+
+@dataclass(frozen=True)
+class Negative:
+    """``-operand``."""
+
+    operand: Value
+
+
+@dataclass(frozen=True)
+class Binary:
+    """``left op right`` with op one of ``+ - * / **``."""
+
+    op: str
+    left: Value
+    right: Value
+
+
+@dataclass(frozen=True)
+class Call:
+    """``function(*arguments)``."""
+
+    function: str
+    arguments: tuple[Value, ...]
+
+
+@dataclass(frozen=True)
+class Relation:
+    """One atomic comparison, ``left op right`` with op one of ``< <= > >=``."""
+
+    op: str
+    left: Value
+    right: Value
+
+
+@dataclass(frozen=True)
+class Not:
+    """``not operand``."""
+
+    operand: Condition
+
+
+@dataclass(frozen=True)
+class Both:
+    """``a and b and ...``."""
+
+    operands: tuple[Condition, ...]
+
+
+@dataclass(frozen=True)
+class Either:
+    """``a or b or ...``."""
+
+    operands: tuple[Condition, ...]
+
+
+Value: TypeAlias = Number | Name | Negative | Binary | Call
+Condition: TypeAlias = Relation | Not | Both | Either
+Node: TypeAlias = Value | Condition
+
+
+# --------------------------------------------------------------------------- functions
+def sgn(u: float) -> float:
+    """Sign of u with sgn(0) = 0.
+
+    >>> sgn(-2.5), sgn(0.0), sgn(1e-300)
+    (-1.0, 0.0, 1.0)
+    """
+    if u > 0.0:
+        return 1.0
+    if u < 0.0:
+        return -1.0
+    return 0.0
+
+
+# Scalar functions on purpose: numpy's array exp differs from math.exp in the last bit now and then,
+# and the readable and the compiled engine have to agree bit for bit.
+FUNCTIONS: Mapping[str, Callable[..., float]] = {
+    "abs": abs,
+    "exp": math.exp,
+    "sqrt": math.sqrt,
+    "sgn": sgn,
+    "min": min,
+    "max": max,
+    "sin": math.sin,
+    "cos": math.cos,
+    "tanh": math.tanh,
+}
+NAMESPACE: Mapping[str, Callable[..., float]] = {**FUNCTIONS, "pow": math.pow}  # of printed code
+CONSTANTS: Mapping[str, float] = {"pi": math.pi}
+ROUGH = ("sgn", "abs", "min", "max")  # functions whose flow has a corner or a jump
+
+_OPERATORS: Mapping[type[ast.operator], str] = {
+    ast.Add: "+",
+    ast.Sub: "-",
+    ast.Mult: "*",
+    ast.Div: "/",
+    ast.Pow: "**",
+}
+_COMPARISONS: Mapping[type[ast.cmpop], str] = {
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
+}
+_GRAMMAR = "numbers, names, + - * / **, < <= > >=, and or not, " + " ".join(FUNCTIONS) + " pi"
+
+
+# --------------------------------------------------------------------------- reading
+def parse_value(text: str, names: Iterable[str]) -> Value:
+    """Read a text that stands for a number.
+
+    Parameters
+    ----------
+    text : str
+        For example ``"C * (sgn(v) - z / s)"``.
+    names : iterable of str
+        The names that may occur.
+
+    Returns
+    -------
+    Value
+        The checked tree.
+
+    Raises
+    ------
+    ExpressionError
+        With the text, the column and what would be allowed.
+
+    Examples
+    --------
+    >>> parse_value("2 * v", ["v"])
+    Binary(op='*', left=Number(value=2.0), right=Name(id='v'))
+    """
+    return _Reader(text, names).value(_tree(text), 0)
+
+
+def parse_condition(text: str, names: Iterable[str]) -> Condition:
+    """Read a text that is true or false, such as a guard.
+
+    Parameters
+    ----------
+    text : str
+        For example ``"abs(v) <= v_c and abs(z) < s"``.
+    names : iterable of str
+        The names that may occur.
+
+    Returns
+    -------
+    Condition
+        The checked tree; a chain ``a < b < c`` is split at once.
+
+    Raises
+    ------
+    ExpressionError
+        With the text, the column and what would be allowed.
+
+    Examples
+    --------
+    >>> spell(parse_condition("0 < v < 1", ["v"]))
+    '0.0 < v and v < 1.0'
+    """
+    return _Reader(text, names).condition(_tree(text), 0)
+
+
+def _tree(text: str) -> ast.expr:
+    if not isinstance(text, str):
+        raise ExpressionError(
+            f"expected a text, got {type(text).__name__}", repr(text), 1, "a text in quotes"
+        )
+    if len(text) > LONGEST_TEXT:
+        raise ExpressionError(
+            f"the text has {len(text)} characters",
+            text,
+            LONGEST_TEXT + 1,
+            f"at most {LONGEST_TEXT} characters",
+        )
+    for mark in ("#", "\\", "\0", ";"):
+        if mark in text:
+            raise ExpressionError(f"unexpected {mark!r}", text, text.index(mark) + 1, _GRAMMAR)
+    flat = "".join(" " if c.isspace() else c for c in text)  # same length: columns stay true
+    lead = len(flat) - len(flat.lstrip())
+    if lead == len(flat):
+        raise ExpressionError("the text is empty", text, 1, _GRAMMAR)
+    try:
+        body = ast.parse(flat[lead:], mode="eval").body
+    except SyntaxError as error:
+        column = max(1, min((error.offset or 1) + lead, len(text) + 1))
+        reason = "the text ends too early" if column > len(text) else "cannot be read from here"
+        raise ExpressionError(reason, text, column, _GRAMMAR) from None
+    except (ValueError, RecursionError, MemoryError):
+        raise ExpressionError("cannot be read (nested too deeply)", text, 1, _GRAMMAR) from None
+    raw = flat[lead:].encode()
+    for node in ast.walk(body):
+        if isinstance(node, ast.expr):  # ast counts bytes, a reader counts characters
+            node.col_offset = lead + len(raw[: node.col_offset].decode(errors="ignore"))
+    return body
+
+
+class _Reader:
+    """Turns `ast` nodes into our own, refusing everything that is not on the list."""
+
+    def __init__(self, text: str, names: Iterable[str]) -> None:
+        self.text = text
+        self.names = tuple(dict.fromkeys(names))
+
+    def refuse(self, reason: str, node: ast.expr, allowed: str = _GRAMMAR) -> ExpressionError:
+        return ExpressionError(reason, self.text, node.col_offset + 1, allowed)
+
+    def deeper(self, node: ast.expr, depth: int) -> int:
+        if depth >= DEEPEST_TREE:
+            raise self.refuse(
+                "nested too deeply", node, f"at most {DEEPEST_TREE} levels of nesting"
+            )
+        return depth + 1
+
+    def value(self, node: ast.expr, depth: int) -> Value:
+        depth = self.deeper(node, depth)
+        match node:
+            case ast.Constant(value=bool()):
+                raise self.refuse(f"{node.value!r} is not a number", node)
+            case ast.Constant(value=int() | float() as number):
+                try:
+                    real = float(number)
+                except OverflowError:
+                    real = math.inf
+                if not math.isfinite(real):
+                    raise self.refuse("the number is too large", node, "finite numbers")
+                return Number(real)
+            case ast.Name(id=name):
+                if name in self.names:
+                    return Name(name)
+                if name in CONSTANTS:
+                    return Number(CONSTANTS[name])
+                if name in FUNCTIONS:
+                    raise self.refuse(f"the function {name!r} needs (...)", node, f"{name}(...)")
+                known = ", ".join(self.names) or "none"
+                raise self.refuse(f"unknown name {name!r}", node, f"the names {known}, and pi")
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                return Negative(self.value(operand, depth))
+            case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+                return self.value(operand, depth)
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
+                return Binary(
+                    _OPERATORS[type(op)], self.value(left, depth), self.value(right, depth)
+                )
+            case ast.Call(func=ast.Name(id=function), args=arguments, keywords=[]):
+                return self.call(node, function, arguments, depth)
+            case ast.Compare() | ast.BoolOp() | ast.UnaryOp(op=ast.Not()):
+                raise self.refuse("a comparison stands where a number is needed", node)
+        raise self.refuse(f"{_plain(node)} is not part of the language", node)
+
+    def call(self, node: ast.expr, function: str, arguments: list[ast.expr], depth: int) -> Call:
+        if function not in FUNCTIONS:
+            raise self.refuse(
+                f"unknown function {function!r}", node, "the functions " + ", ".join(FUNCTIONS)
+            )
+        several = function in ("min", "max")
+        if (len(arguments) < 2) if several else (len(arguments) != 1):
+            wanted = "two or more arguments" if several else "one argument"
+            raise self.refuse(f"{function} got {len(arguments)} arguments", node, wanted)
+        values = [self.value(argument, depth) for argument in arguments]
+        result = Call(function, (values[0],)) if not several else None
+        if result is None:  # min(a, b, c) is min(min(a, b), c): one corner at a time
+            result = Call(function, (values[0], values[1]))
+            for value in values[2:]:
+                result = Call(function, (result, value))
+        return result
+
+    def condition(self, node: ast.expr, depth: int) -> Condition:
+        depth = self.deeper(node, depth)
+        match node:
+            case ast.Compare(left=left, ops=ops, comparators=comparators):
+                sides = [left, *comparators]
+                parts: list[Condition] = []
+                for i, op in enumerate(ops):
+                    if type(op) not in _COMPARISONS:
+                        raise self.refuse(
+                            "only < <= > >= compare floats (== and != almost never hold)",
+                            sides[i + 1],
+                            "< <= > >=, for example a <= x <= b",
+                        )
+                    parts.append(
+                        Relation(
+                            _COMPARISONS[type(op)],
+                            self.value(sides[i], depth),
+                            self.value(sides[i + 1], depth),
+                        )
+                    )
+                return parts[0] if len(parts) == 1 else Both(tuple(parts))
+            case ast.BoolOp(op=op, values=values):
+                operands = tuple(self.condition(value, depth) for value in values)
+                return Both(operands) if isinstance(op, ast.And) else Either(operands)
+            case ast.UnaryOp(op=ast.Not(), operand=operand):
+                return Not(self.condition(operand, depth))
+            case ast.Constant() | ast.Name() | ast.BinOp() | ast.UnaryOp() | ast.Call():
+                raise self.refuse(
+                    "a number stands where a comparison is needed", node, "for example v > v_c"
+                )
+        raise self.refuse(f"{_plain(node)} is not part of the language", node)
+
+
+def _plain(node: ast.expr) -> str:
+    words = {
+        ast.Attribute: "an attribute (.)",
+        ast.Subscript: "an index ([ ])",
+        ast.Lambda: "lambda",
+        ast.IfExp: "if ... else",
+        ast.NamedExpr: "an assignment (:=)",
+        ast.JoinedStr: "an f-string",
+        ast.Call: "this call",
+        ast.Constant: f"the constant {getattr(node, 'value', None)!r}",
+    }
+    return words.get(type(node), type(node).__name__)
+
+
+# --------------------------------------------------------------------------- spelling
+@dataclass(frozen=True)
+class Spelling:
+    """How a tree is written: the words of the logic and how functions and powers look.
+
+    Parameters
+    ----------
+    both, either, negation : str
+        The words for and, or, not, with their spaces.
+    bars : bool
+        Write ``|u|`` for ``abs(u)``.
+    products : bool
+        Write small integer powers as products, and other powers as ``pow(a, b)``.
+    """
+
+    both: str
+    either: str
+    negation: str
+    bars: bool
+    products: bool
+
+
+PYTHON = Spelling(" and ", " or ", "not ", bars=False, products=True)
+MATLAB_LIKE = Spelling(" && ", " || ", "!", bars=True, products=False)
+
+_LEVEL = {"or": 1, "and": 2, "not": 3, "<": 4, "+": 5, "-": 5, "*": 6, "/": 6, "neg": 7, "**": 8}
+_ATOM = 9
+
+
+def spell(node: Node, spelling: Spelling = PYTHON, rename: Mapping[str, str] | None = None) -> str:
+    """Write a tree as text.
+
+    Parameters
+    ----------
+    node : Node
+        A value or a condition.
+    spelling : Spelling
+        `PYTHON` for generated code (a small integer power is printed as a product, so that the
+        readable and the compiled engine round alike), `MATLAB_LIKE` for charts.
+    rename : mapping, optional
+        Names to write differently, for example ``{"k": "k[i]"}``.
+
+    Returns
+    -------
+    str
+        The text, with no more parentheses than needed.
+
+    Examples
+    --------
+    >>> guard = parse_condition("abs(v) <= v_c and not z >= s", ["v", "v_c", "z", "s"])
+    >>> spell(guard, MATLAB_LIKE)
+    '|v| <= v_c && !(z >= s)'
+    >>> spell(parse_value("(v / v_s)**2", ["v", "v_s"]))
+    'v / v_s * (v / v_s)'
+    """
+    return _spell(node, spelling, rename or {})[0]
+
+
+def _number(value: float, spelling: Spelling) -> str:
+    if spelling.products:
+        return repr(value)  # always with a point or an exponent: 1/2 stays one half everywhere
+    return f"{value:g}" if float(f"{value:g}") == value else repr(value)
+
+
+def _spell(node: Node, spelling: Spelling, rename: Mapping[str, str]) -> tuple[str, int]:
+    def part(child: Node, level: int) -> str:
+        text, own = _spell(child, spelling, rename)
+        return text if own >= level else f"({text})"
+
+    match node:
+        case Number(value):
+            return _number(value, spelling), _ATOM if value >= 0 else _LEVEL["neg"]
+        case Name(name):
+            return rename.get(name, name), _ATOM
+        case Negative(operand):
+            return "-" + part(operand, _LEVEL["neg"] + 1), _LEVEL["neg"]
+        case Binary("**", base, exponent):
+            return _power(base, exponent, spelling, rename)
+        case Binary(op, left, right):
+            level = _LEVEL[op]
+            # The right side of + and * is bracketed too: floats do not associate, and the text
+            # has to say which order is computed.
+            return f"{part(left, level)} {op} {part(right, level + 1)}", level
+        case Call("abs", (argument,)) if spelling.bars:
+            return f"|{part(argument, 0)}|", _ATOM
+        case Call(function, arguments):
+            return f"{function}({', '.join(part(a, 0) for a in arguments)})", _ATOM
+        case Relation(op, left, right):
+            return f"{part(left, _LEVEL['+'])} {op} {part(right, _LEVEL['+'])}", _LEVEL["<"]
+        case Not(operand):
+            inner = part(operand, _ATOM if spelling.negation == "!" else _LEVEL["not"])
+            return spelling.negation + inner, _LEVEL["not"]
+        case Both(operands):
+            return spelling.both.join(part(o, _LEVEL["and"] + 1) for o in operands), _LEVEL["and"]
+        case Either(operands):
+            return spelling.either.join(part(o, _LEVEL["or"] + 1) for o in operands), _LEVEL["or"]
+
+
+def _power(
+    base: Value, exponent: Value, spelling: Spelling, rename: Mapping[str, str]
+) -> tuple[str, int]:
+    inner, level = _spell(base, spelling, rename)
+    if not spelling.products:
+        power, power_level = _spell(exponent, spelling, rename)
+        power = power if power_level == _ATOM else f"({power})"
+        return f"{inner if level == _ATOM else f'({inner})'}^{power}", _LEVEL["**"]
+    whole = _whole_power(exponent)
+    if whole is None:
+        return f"pow({inner}, {_spell(exponent, spelling, rename)[0]})", _ATOM
+    if whole == 0:
+        return "1.0", _ATOM
+    first = inner if level >= _LEVEL["*"] else f"({inner})"
+    other = inner if level > _LEVEL["*"] else f"({inner})"
+    product = " * ".join([first] + [other] * (abs(whole) - 1))
+    if whole < 0:
+        return f"1.0 / ({product})", _LEVEL["/"]
+    return product, level if whole == 1 else _LEVEL["*"]
+
+
+def _whole_power(exponent: Value) -> int | None:
+    sign = 1.0
+    while isinstance(exponent, Negative):
+        sign, exponent = -sign, exponent.operand
+    if not isinstance(exponent, Number) or not exponent.value.is_integer():
+        return None
+    whole = int(sign * exponent.value)
+    return whole if abs(whole) <= LARGEST_PRODUCT_POWER else None
+
+
+# --------------------------------------------------------------------------- readers of the tree
+def evaluate(node: Node, values: Mapping[str, float]) -> float | bool:
+    """Compute a tree, rounding exactly as the generated code does.
+
+    Parameters
+    ----------
+    node : Node
+        A value or a condition.
+    values : mapping of str to float
+        A number for every name in the tree.
+
+    Returns
+    -------
+    float or bool
+        The number, or the truth.
+
+    Examples
+    --------
+    >>> evaluate(parse_condition("z >= s and v > 0", "zsv"), {"z": 1.0, "s": 1.0, "v": 0.1})
+    True
+    """
+    match node:
+        case Number(value):
+            return value
+        case Name(name):
+            return values[name]
+        case Negative(operand):
+            return -evaluate(operand, values)
+        case Binary("**", base, exponent):
+            return _evaluate_power(evaluate(base, values), exponent, values)
+        case Binary(op, left, right):
+            a, b = evaluate(left, values), evaluate(right, values)
+            if op == "+":
+                return a + b
+            if op == "-":
+                return a - b
+            return a * b if op == "*" else a / b
+        case Call(function, arguments):
+            return FUNCTIONS[function](*(evaluate(a, values) for a in arguments))
+        case Relation(op, left, right):
+            return _compare(op, evaluate(left, values), evaluate(right, values))
+        case Not(operand):
+            return not evaluate(operand, values)
+        case Both(operands):
+            return all(evaluate(o, values) for o in operands)
+        case Either(operands):
+            return any(evaluate(o, values) for o in operands)
+
+
+def _compare(op: str, a: float, b: float) -> bool:
+    if op == "<":
+        return a < b
+    if op == "<=":
+        return a <= b
+    return a > b if op == ">" else a >= b
+
+
+def _evaluate_power(base: float, exponent: Value, values: Mapping[str, float]) -> float:
+    whole = _whole_power(exponent)
+    if whole is None:
+        return math.pow(base, evaluate(exponent, values))
+    product = 1.0 if whole == 0 else base
+    for _ in range(abs(whole) - 1):
+        product *= base
+    return 1.0 / product if whole < 0 else product
+
+
+def _children(node: Node) -> tuple[Node, ...]:
+    match node:
+        case Negative(operand) | Not(operand):
+            return (operand,)
+        case Binary(_, left, right) | Relation(_, left, right):
+            return (left, right)
+        case Call(_, arguments):
+            return arguments
+        case Both(operands) | Either(operands):
+            return operands
+    return ()
+
+
+def _walk(node: Node) -> Iterator[Node]:
+    for child in _children(node):
+        yield from _walk(child)
+    yield node
+
+
+def names_in(node: Node) -> frozenset[str]:
+    """Return the names a tree depends on.
+
+    >>> sorted(names_in(parse_value("k * z + pi", ["k", "z"])))
+    ['k', 'z']
+    """
+    return frozenset(n.id for n in _walk(node) if isinstance(n, Name))
+
+
+def clauses(condition: Condition) -> tuple[Condition, ...]:
+    """Return the parts of a conjunction, or the condition alone.
+
+    >>> [spell(c) for c in clauses(parse_condition("z >= s and v > 0", "zsv"))]
+    ['z >= s', 'v > 0.0']
+    """
+    return condition.operands if isinstance(condition, Both) else (condition,)
+
+
+# --------------------------------------------------------------------------- atomic comparisons
+@dataclass(frozen=True)
+class Comparison:
+    """The one relation behind ``z >= s`` and ``z < s``: its margin is ``left - right``.
+
+    True where the margin is positive, and, unless `strict`, also where it is zero. In IEEE
+    arithmetic the sign of ``left - right`` is exactly the raw comparison.
+    """
+
+    left: Value
+    right: Value
+    strict: bool
+
+
+@dataclass(frozen=True)
+class Literal:
+    """A comparison that has to be true (or, with `holds` False, false)."""
+
+    comparison: Comparison
+    holds: bool
+
+    @property
+    def relation(self) -> Relation:
+        """The literal as ordinary text would write it."""
+        strict = self.comparison.strict
+        op = (">" if strict else ">=") if self.holds else ("<=" if strict else "<")
+        return Relation(op, self.comparison.left, self.comparison.right)
+
+
+Split: TypeAlias = "Literal | tuple[str, tuple[Split, ...]]"
+
+
+def split(condition: Condition, holds: bool = True) -> Split:
+    """Split a condition into comparisons joined by ``"both"`` and ``"either"`` only.
+
+    ``abs(u) <= c`` becomes ``u <= c`` and ``u >= -c`` (a root finder on ``c - abs(u)`` steps over
+    a narrow window, two monotone margins do not), negations move down to the comparisons, and
+    ``z < s`` and ``z >= s`` become the same `Comparison`.
+
+    Parameters
+    ----------
+    condition : Condition
+        A checked condition.
+    holds : bool
+        False to split its negation.
+
+    Returns
+    -------
+    Literal or (str, tuple)
+        A literal, or ``("both" | "either", parts)``.
+
+    Examples
+    --------
+    >>> word, parts = split(parse_condition("abs(v) <= c", ["v", "c"]))
+    >>> word, [spell(p.relation) for p in parts]
+    ('both', ['v <= c', 'v >= -c'])
+    """
+    match condition:
+        case Not(operand):
+            return split(operand, not holds)
+        case Both(operands) | Either(operands):
+            word = "both" if isinstance(condition, Both) == holds else "either"
+            parts: list[Split] = []
+            for operand in operands:
+                part = split(operand, holds)
+                if isinstance(part, Literal) or part[0] != word:
+                    parts.append(part)
+                else:  # a conjunction inside a conjunction
+                    parts.extend(part[1])
+            return word, tuple(parts)
+        case Relation(op, Call("abs", (inner,)), bound):
+            below = op in ("<", "<=")
+            other = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}[op]
+            two = (Relation(op, inner, bound), Relation(other, inner, Negative(bound)))
+            return split(Both(two) if below else Either(two), holds)
+        case Relation(op, left, Call("abs", (inner,))):
+            mirrored = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}[op]
+            return split(Relation(mirrored, Call("abs", (inner,)), left), holds)
+        case Relation(op, left, right):
+            positive = op in (">", ">=")
+            strict = op in (">", "<=")  # a <= b is the negation of a > b
+            return Literal(Comparison(left, right, strict), positive == holds)
+
+
+# --------------------------------------------------------------------------- corners and jumps
+def rough_points(value: Value) -> tuple[Value, ...]:
+    """Return each u whose sign decides a corner or a jump of `value`, innermost first.
+
+    ``sgn(u)`` and ``abs(u)`` turn at u = 0, ``min(a, b)`` and ``max(a, b)`` at a - b = 0.
+
+    Parameters
+    ----------
+    value : Value
+        A flow or a signal.
+
+    Returns
+    -------
+    tuple of Value
+        Without repetition.
+
+    Examples
+    --------
+    >>> [spell(u) for u in rough_points(parse_value("sgn(v) + max(v, 2)", ["v"]))]
+    ['v', 'v - 2.0']
+    """
+    found = [_turning(n) for n in _walk(value) if isinstance(n, Call) and n.function in ROUGH]
+    return tuple(dict.fromkeys(found))
+
+
+def _turning(call: Call) -> Value:
+    if call.function in ("sgn", "abs"):
+        return call.arguments[0]
+    return Binary("-", call.arguments[0], call.arguments[1])
+
+
+def substitute(value: Value, sign_names: Mapping[Value, str]) -> tuple[Value, dict[str, Call]]:
+    """Replace every rough call by a name, to be computed beforehand from a held sign.
+
+    Parameters
+    ----------
+    value : Value
+        A flow or a signal.
+    sign_names : mapping of Value to str
+        For each of its `rough_points` the name that holds its sign.
+
+    Returns
+    -------
+    smooth : Value
+        The tree with names in place of the calls.
+    calls : dict of str to Call
+        For each such name the call it stands for, in the order they must be computed; arguments
+        are already smooth.
+    """
+    calls: dict[str, Call] = {}
+
+    def smooth(node: Value) -> Value:
+        match node:
+            case Negative(operand):
+                return Negative(smooth(operand))
+            case Binary(op, left, right):
+                return Binary(op, smooth(left), smooth(right))
+            case Call(function, arguments):
+                inner = Call(function, tuple(smooth(a) for a in arguments))
+                if function not in ROUGH:
+                    return inner
+                name = f"{function}_{sign_names[_turning(node)]}"
+                calls.setdefault(name, inner)
+                return Name(name)
+        return node
+
+    return smooth(value), calls

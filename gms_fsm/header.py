@@ -1,0 +1,183 @@
+"""What a trace file says of the run it holds, validated when read. Reading executes nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from gms_fsm.chart import Chart, State, Transition
+from gms_fsm.errors import SignalError
+from gms_fsm.models import ChartModel, Model
+from gms_fsm.parameters import Stribeck
+from gms_fsm.rigs import Prescribed, PulledSlider, Rig, Slider
+from gms_fsm.signals import Corners, Formula, Function, Signal
+
+__all__ = ["Header"]
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ChartRecord(_Record):
+    """A chart's texts."""
+
+    name: str
+    inputs: tuple[str, ...]
+    variables: tuple[str, ...]
+    parameters: tuple[str, ...]
+    states: tuple[State, ...]
+    transitions: tuple[Transition, ...]
+    outputs: dict[str, str]
+    reference: str
+
+
+class ModelRecord(_Record):
+    """A model's numbers."""
+
+    title: str
+    n: int
+    chart: ChartRecord
+    values: dict[str, float | list[float]]
+    weights: list[float]
+    stribeck: Stribeck
+    sigma_2: float
+
+
+class FormulaRecord(_Record):
+    """An expression signal."""
+
+    kind: Literal["formula"] = "formula"
+    text: str
+
+
+class CornersRecord(_Record):
+    """Ramps or a record."""
+
+    kind: Literal["corners"] = "corners"
+    times: list[float]
+    values: list[float]
+    held: bool
+
+
+class FunctionRecord(_Record):
+    """A Python function, which no file can hold."""
+
+    kind: Literal["function"] = "function"
+
+
+SignalRecord = Annotated[
+    FormulaRecord | CornersRecord | FunctionRecord, Field(discriminator="kind")
+]
+
+
+class RigRecord(_Record):
+    """A rig's numbers and signals."""
+
+    title: str
+    acceleration: str | None
+    numbers: dict[str, float]
+    signals: dict[str, SignalRecord]
+
+    @property
+    def prescribed(self) -> bool:
+        """Whether v is given."""
+        return self.acceleration is None
+
+
+class Header(_Record):
+    """All of it."""
+
+    format: Literal["gms-fsm trace 1"] = "gms-fsm trace 1"
+    model: ModelRecord
+    rig: RigRecord
+    settings: dict[str, str | float | None]
+
+    @classmethod
+    def of(cls, model: Model, rig: Rig, settings: Mapping[str, str | float | None]) -> Header:
+        """Describe a run."""
+        chart = model.chart
+        return cls(
+            model=ModelRecord(
+                title=model.title,
+                n=model.n,
+                chart=ChartRecord(
+                    **{name: getattr(chart, name) for name in ChartRecord.model_fields}
+                ),
+                values={
+                    name: float(value) if np.ndim(value) == 0 else np.asarray(value).tolist()
+                    for name, value in model.values.items()
+                },
+                weights=model.weights.tolist(),
+                stribeck=model.stribeck,
+                sigma_2=model.sigma_2,
+            ),
+            rig=RigRecord(
+                title=rig.title,
+                acceleration=rig.acceleration,
+                numbers=dict(rig.numbers),
+                signals={name: _signal_record(signal) for name, signal in rig.signals.items()},
+            ),
+            settings=dict(settings),
+        )
+
+    def to_model(self) -> ChartModel:
+        """Return a model that computes the same."""
+        record = self.model
+        return ChartModel(
+            Chart(**{name: getattr(record.chart, name) for name in ChartRecord.model_fields}),
+            {
+                name: np.array(value) if isinstance(value, list) else value
+                for name, value in record.values.items()
+            },
+            n=record.n,
+            stribeck=record.stribeck,
+            sigma_2=record.sigma_2,
+            weights=np.array(record.weights),
+            title=record.title,
+        )
+
+    def to_rig(self) -> Rig:
+        """Return a rig that moves the same; a Python function is replaced by one that says so."""
+        signals = {name: _signal(name, record) for name, record in self.rig.signals.items()}
+        numbers = self.rig.numbers
+        if self.rig.title == Prescribed.title:
+            return Prescribed(signals["v"])
+        if self.rig.title == Slider.title:
+            return Slider(numbers["mass"], signals["F_a"])
+        if self.rig.title == PulledSlider.title:
+            return PulledSlider(**numbers)
+        raise ValueError(f"unknown rig {self.rig.title!r}")
+
+
+def _signal_record(signal: Signal) -> FormulaRecord | CornersRecord | FunctionRecord:
+    match signal:
+        case Formula(text=text):
+            return FormulaRecord(text=text)
+        case Corners(times=times, values=values, held=held):
+            return CornersRecord(times=times.tolist(), values=values.tolist(), held=held)
+        case _:
+            return FunctionRecord()
+
+
+def _signal(name: str, record: FormulaRecord | CornersRecord | FunctionRecord) -> Signal:
+    match record:
+        case FormulaRecord(text=text):
+            return Formula(text)
+        case CornersRecord(times=times, values=values, held=held):
+            return Corners(np.array(times), np.array(values), held)
+        case _:
+            return Function(_lost(name))
+
+
+def _lost(name: str) -> Callable[[float], float]:
+    def missing(_: float) -> float:
+        raise SignalError(
+            f"{name!r} was a Python function, which a trace file cannot hold; sample before "
+            "saving, or run with t_eval"
+        )
+
+    return missing

@@ -1,0 +1,245 @@
+"""The elements as `transitions` machines, and the generated if-else in their place.
+
+One `transitions.Machine` serves n element objects. The driver asks a table read from that machine
+(its transitions and the guards that are their conditions) and fires through it, so that callbacks
+registered by a user (``on_enter_slip``, ``after`` ...) run, once a firing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+from transitions import Machine
+
+from gms_fsm.chart import Chart
+from gms_fsm.errors import ChartError, ParameterError
+from gms_fsm.expression import PYTHON, Condition, names_in, spell
+from gms_fsm.generated import load
+from gms_fsm.models import Model
+from gms_fsm.program import Program
+
+__all__ = ["Element", "ElementMachines", "Engine", "IfElse"]
+
+
+class Element:
+    """One Maxwell element: the model object of its machine.
+
+    Callbacks find here what they need: ``t`` [s], ``x`` [m], ``v`` [m/s], the threshold ``s``, each
+    variable (``z`` [m]) and each parameter (``k``, ``sigma``, ``C``, ``v_c``) of the chart, the
+    current ``state`` and the element's ``index`` counted from 0. Derive from it to give elements
+    methods that `transitions` calls by name, such as ``on_enter_slip(self, event)``.
+    """
+
+    # No __slots__ and no generated __eq__: transitions fails on the first and registers equal
+    # models only once.
+    state: str
+    index: int
+    t: float
+    x: float
+    v: float
+    s: float
+
+
+class Guard:
+    """A guard as a condition of `transitions`: callable on its event, or asked directly."""
+
+    def __init__(self, edge: str, condition: Condition) -> None:
+        names = {name: f"element.{name}" for name in names_in(condition)}
+        self.text = spell(condition, PYTHON)
+        source = f"def holds(element):\n    return {spell(condition, PYTHON, names)}\n"
+        self.holds: Callable[[Element], bool] = load(f"guard {edge}", source)["holds"]
+
+    def __call__(self, event: Any) -> bool:
+        return self.holds(event.model)
+
+    def __repr__(self) -> str:
+        return f"<guard {self.text}>"
+
+
+class ElementMachines:
+    """n elements of a model, each in a state of one shared `transitions.Machine`.
+
+    Parameters
+    ----------
+    model : Model
+        What the elements are.
+    element : type, optional
+        Class of the element objects, `Element` or derived from it.
+
+    Attributes
+    ----------
+    machine : transitions.Machine
+        Add callbacks here: ``machines.machine.on_enter_slip(callback)``. With
+        ``send_event=True`` a callback gets the event; ``event.model`` is the `Element`.
+    elements : list of Element
+        The model objects, one an element.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> machines = ElementMachines(model)
+    >>> slips = []
+    >>> machines.machine.on_enter_slip(lambda event: slips.append(event.model.index))
+    >>> trace = simulate(model, Prescribed("0.2"), 3.0, engine=machines)
+    >>> slips, machines.elements[0].state
+    ([0, 1, 2, 3], 'slip')
+    """
+
+    def __init__(self, model: Model, element: type[Element] = Element) -> None:
+        chart = model.chart
+        self.model = model
+        self.guards = {edge: Guard(edge, guard) for edge, guard in chart.guards.items()}
+        self.elements = [_new_element(element, model, i) for i in range(model.n)]
+        self.machine = Machine(
+            model=self.elements,
+            states=[state.name for state in chart.states],
+            transitions=[
+                {
+                    "trigger": edge.name,
+                    "source": edge.source,
+                    "dest": edge.target,
+                    "conditions": [self.guards[edge.name]],
+                }
+                for edge in chart.transitions
+            ],
+            initial=chart.default_state.name,
+            auto_transitions=False,
+            send_event=True,
+        )
+
+    def table(self, chart: Chart) -> list[list[tuple[int, Guard]]]:
+        """Read the machine: for each state its edges and guards, highest priority first.
+
+        Parameters
+        ----------
+        chart : Chart
+            The chart the machine was made from.
+
+        Returns
+        -------
+        list of list of (int, Guard)
+            Edge index and guard, by state index.
+
+        Raises
+        ------
+        ChartError
+            If the machine has edges or conditions that are not in the chart.
+        """
+        table: list[list[tuple[int, Guard]]] = []
+        for state in chart.states:
+            rows = []
+            for index, edge in enumerate(chart.transitions):
+                for transition in self.machine.get_transitions(edge.name, source=state.name):
+                    conditions = [c.func for c in transition.conditions]
+                    if conditions != [self.guards[edge.name]] or transition.dest != edge.target:
+                        raise ChartError(
+                            f"edge {edge.name!r}: the machine was given conditions {conditions} "
+                            f"or the target {transition.dest!r}, which chart {chart.name!r} does "
+                            "not know; write them in the chart's guard, it is the only truth"
+                        )
+                    rows.append((index, self.guards[edge.name]))
+            table.append(rows)
+        known = {edge.name for edge in chart.transitions}
+        for trigger in self.machine.get_triggers(*self.machine.states):
+            if trigger not in known:
+                raise ChartError(
+                    f"the machine has a trigger {trigger!r} that chart {chart.name!r} does not "
+                    "know; add a Transition to the chart"
+                )
+        return table
+
+
+def _new_element(kind: type[Element], model: Model, index: int) -> Element:
+    if not (isinstance(kind, type) and issubclass(kind, Element)):
+        raise ParameterError(f"element is {kind!r}; it must be a class derived from Element")
+    element = kind()
+    element.index = index
+    for name, value in model.values.items():
+        setattr(element, name, float(value if isinstance(value, float | int) else value[index]))
+    return element
+
+
+# --------------------------------------------------------------------------- engines
+class Engine(Protocol):
+    """What the driver asks and fires; satisfies `integrators.Switch`."""
+
+    mode: list[int]
+
+    def ask(self, t: float, y: list[float]) -> Sequence[tuple[int, int]]:
+        """Return (element, edge) for each element with an enabled edge."""
+
+    def fire(self, machine: int, edge: int, t: float, y: list[float]) -> None:
+        """Take an edge."""
+
+
+class MachineEngine:
+    """Asks and fires the `transitions` machines."""
+
+    def __init__(self, machines: ElementMachines, program: Program, mode: list[int]) -> None:
+        self.machines, self.program = machines, program
+        self.chart = machines.model.chart
+        self.mode = mode
+        self.table = machines.table(self.chart)
+        n = len(mode)
+        self.seen = [0.0] * (2 + (2 + len(self.chart.variables)) * n)
+        self.places = [
+            (variable, program.first + j * n) for j, variable in enumerate(self.chart.variables)
+        ]
+        for element, state in zip(machines.elements, mode, strict=True):
+            machines.machine.set_state(self.chart.states[state].name, element)
+
+    def _show(self, i: int, t: float, y: list[float]) -> Element:
+        """Put the present values at hand of element i."""
+        element, seen = self.machines.elements[i], self.seen
+        element.t, element.x, element.v, element.s = t, y[0], seen[0], seen[2 + i]
+        for variable, base in self.places:
+            setattr(element, variable, y[base + i])
+        return element
+
+    def ask(self, t: float, y: list[float]) -> list[tuple[int, int]]:
+        """Return (element, edge) for each element with an enabled edge."""
+        self.program.functions["observe"](t, y, self.mode, self.program.p, self.seen)
+        wanted = []
+        for i, state in enumerate(self.mode):
+            element = self._show(i, t, y)
+            for edge, guard in self.table[state]:
+                if guard.holds(element):
+                    wanted.append((i, edge))
+                    break
+        return wanted
+
+    def fire(self, machine: int, edge: int, t: float, y: list[float]) -> None:
+        """Trigger the edge through `transitions`, so that callbacks run."""
+        row = self.chart.transitions[edge]
+        element = self.machines.elements[machine]
+        # The trigger evaluates the guard once more, on the values it was asked with; assignments
+        # come after, as in Stateflow, where the whole set was chosen before any of them.
+        if not getattr(element, row.name)():
+            raise ChartError(
+                f"element {machine + 1}: edge {row.name!r} was enabled at t = {t!r} s but a "
+                "callback changed the element's values before it fired; callbacks may only look"
+            )
+        self.program.functions["act"](edge, machine, t, y, self.mode, self.program.p)
+        self.mode[machine] = self.chart.state_index(element.state)
+
+
+class IfElse:
+    """Asks the generated if-else text, the paper's Fig. 2c."""
+
+    def __init__(self, chart: Chart, program: Program, mode: list[int]) -> None:
+        self.program = program
+        self.mode = mode
+        self.targets = [chart.state_index(edge.target) for edge in chart.transitions]
+        self.edges = [-1] * len(mode)
+
+    def ask(self, t: float, y: list[float]) -> list[tuple[int, int]]:
+        """Return (element, edge) for each element with an enabled edge."""
+        self.program.functions["switch"](t, y, self.mode, self.program.p, self.edges)
+        return [(i, edge) for i, edge in enumerate(self.edges) if edge >= 0]
+
+    def fire(self, machine: int, edge: int, t: float, y: list[float]) -> None:
+        """Assign and switch."""
+        self.program.functions["act"](edge, machine, t, y, self.mode, self.program.p)
+        self.mode[machine] = self.targets[edge]

@@ -1,0 +1,260 @@
+"""Friction models: a chart, the numbers it needs, and what the elements share.
+
+A model says nothing of how it is run or what it is mounted on.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gms_fsm.chart import SUPPLIED, Chart
+from gms_fsm.charts.gms import GMS_ELEMENT, Law, gms_element
+from gms_fsm.charts.lugre import LUGRE
+from gms_fsm.errors import ParameterError
+from gms_fsm.parameters import FloatArray, GMSParameters, Stribeck, checked_array, checked_scalar
+
+__all__ = ["GMS", "ChartModel", "LuGre", "Model"]
+
+
+class Model(Protocol):
+    """What a simulation needs to know of a friction model."""
+
+    @property
+    def title(self) -> str:
+        """Name and law, for figures and summaries."""
+
+    @property
+    def chart(self) -> Chart:
+        """The chart every element runs."""
+
+    @property
+    def n(self) -> int:
+        """Number of elements."""
+
+    @property
+    def values(self) -> Mapping[str, float | FloatArray]:
+        """For each parameter of the chart one number, or one an element, shape (n,)."""
+
+    @property
+    def weights(self) -> FloatArray:
+        """Threshold weights, shape (n,), m/N: ``s_i = weights[i] * s(v)``."""
+
+    @property
+    def stribeck(self) -> Stribeck:
+        """The common Stribeck curve."""
+
+    @property
+    def sigma_2(self) -> float:
+        """Viscous friction, Ns/m."""
+
+
+@dataclass(frozen=True, eq=False)
+class GMS:
+    """A bank of Generalized Maxwell Slip elements in parallel.
+
+    ``F = sum(k_i z_i + sigma_i dz_i/dt) + sigma_2 v``, eq. (3) and (4).
+
+    Parameters
+    ----------
+    parameters : GMSParameters
+        The numbers.
+    law : {"published", "signed"}
+        The slip law; see `gms_fsm.charts.gms`. There is no default: the two differ for v < 0.
+
+    Raises
+    ------
+    ParameterError
+        If the law is neither.
+
+    Warns
+    -----
+    UserWarning
+        If the published law is used with F_s = F_c: such an element never arrests.
+
+    Examples
+    --------
+    >>> GMS(GMSParameters.paper("stick-slip"), law="published").title
+    'GMS, 4 elements, published law'
+    """
+
+    parameters: GMSParameters
+    law: Law = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.parameters, GMSParameters):
+            raise ParameterError(
+                f"parameters is {self.parameters!r}; it must be a GMSParameters, for example "
+                "GMSParameters.paper('stick-slip')"
+            )
+        gms_element(self.law)
+        if self.law == "published" and self.stribeck.F_s == self.stribeck.F_c:
+            warnings.warn(
+                f"published law with F_s = F_c = {self.stribeck.F_c!r} N: a slipping element stays "
+                "exactly on |z| = s, where the law is at rest, and never arrests; use law='signed' "
+                "or F_s > F_c",
+                stacklevel=3,
+            )
+
+    @property
+    def title(self) -> str:
+        """Name and law."""
+        plural = "element" if self.n == 1 else "elements"
+        return f"GMS, {self.n} {plural}, {self.law} law"
+
+    @property
+    def chart(self) -> Chart:
+        """The chart of one element."""
+        return GMS_ELEMENT[self.law]
+
+    @property
+    def n(self) -> int:
+        """Number of elements."""
+        return self.parameters.n
+
+    @property
+    def values(self) -> Mapping[str, float | FloatArray]:
+        """The chart's parameters."""
+        p = self.parameters
+        return {"k": p.k, "sigma": p.sigma, "C": p.C, "v_c": p.v_c}
+
+    @property
+    def weights(self) -> FloatArray:
+        """Threshold weights, shape (n,), m/N."""
+        return self.parameters.weights
+
+    @property
+    def stribeck(self) -> Stribeck:
+        """The Stribeck curve."""
+        return self.parameters.stribeck
+
+    @property
+    def sigma_2(self) -> float:
+        """Viscous friction, Ns/m."""
+        return self.parameters.sigma_2
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LuGre:
+    """The LuGre model: one bristle, one state, no edges.
+
+    ``dz = v - sigma_0 |v| z / s(v)``, ``F = sigma_0 z + sigma_1 dz + sigma_2 v``.
+
+    Parameters
+    ----------
+    sigma_0 : float
+        Bristle stiffness, N/m, > 0.
+    sigma_1 : float
+        Bristle damping, Ns/m, >= 0.
+    sigma_2 : float
+        Viscous friction, Ns/m, >= 0.
+    stribeck : Stribeck
+        The curve.
+
+    Examples
+    --------
+    >>> LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4, stribeck=Stribeck(1, 1.5, 1e-3)).n
+    1
+    """
+
+    sigma_0: float
+    sigma_1: float
+    sigma_2: float
+    stribeck: Stribeck
+
+    def __post_init__(self) -> None:
+        for name, rule in (("sigma_0", "> 0"), ("sigma_1", ">= 0"), ("sigma_2", ">= 0")):
+            object.__setattr__(self, name, checked_scalar(name, getattr(self, name), rule))
+        if not isinstance(self.stribeck, Stribeck):
+            raise ParameterError(f"stribeck is {self.stribeck!r}; it must be a Stribeck")
+
+    title = "LuGre"
+    chart = LUGRE
+    n = 1
+
+    @property
+    def values(self) -> Mapping[str, float | FloatArray]:
+        """The chart's parameters."""
+        return {"sigma_0": self.sigma_0, "sigma_1": self.sigma_1}
+
+    @property
+    def weights(self) -> FloatArray:
+        """One weight of 1: LuGre uses s(v) itself."""
+        return np.ones(1)
+
+
+@dataclass(frozen=True, eq=False)
+class ChartModel:
+    """Any chart run as a bank of n elements: your own reading of the guards, your own states.
+
+    Parameters
+    ----------
+    chart : Chart
+        The element's chart.
+    values : mapping
+        For each parameter of the chart a number, or an array of shape (n,).
+    n : int
+        Number of elements.
+    stribeck : Stribeck
+        The curve behind the input ``s``.
+    sigma_2 : float
+        Viscous friction, Ns/m, >= 0.
+    weights : array_like, shape (n,), optional
+        Threshold weights, m/N; 1 when left out.
+    title : str, optional
+        For figures; the chart's name when left out.
+
+    Raises
+    ------
+    ParameterError
+        If a value is missing, unknown, not finite or of the wrong length, or the chart wants an
+        input that no model supplies.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts import gms_element
+    >>> ChartModel(gms_element("signed"), {"k": 1, "sigma": 0, "C": 1, "v_c": 1e-6}, n=2,
+    ...            stribeck=Stribeck(1, 1.5, 1e-3)).title
+    'GMS element, signed law'
+    """
+
+    chart: Chart
+    values: Mapping[str, float | FloatArray]
+    n: int = field(kw_only=True)
+    stribeck: Stribeck = field(kw_only=True)
+    sigma_2: float = field(default=0.0, kw_only=True)
+    weights: FloatArray = field(default=None, kw_only=True)  # type: ignore[arg-type]
+    title: str = field(default="", kw_only=True)
+
+    def __post_init__(self) -> None:
+        if self.n < 1:
+            raise ParameterError(f"n is {self.n}; a bank has at least one element")
+        for name in self.chart.inputs:
+            if name not in SUPPLIED:
+                raise ParameterError(
+                    f"chart {self.chart.name!r} wants the input {name!r}; "
+                    f"a model supplies {', '.join(SUPPLIED)}"
+                )
+        wanted, given = set(self.chart.parameters), set(self.values)
+        if wanted != given:
+            raise ParameterError(
+                f"chart {self.chart.name!r} has the parameters {sorted(wanted)}; missing values: "
+                f"{sorted(wanted - given) or 'none'}, unknown: {sorted(given - wanted) or 'none'}"
+            )
+        checked = {name: _number_or_array(name, v, self.n) for name, v in self.values.items()}
+        object.__setattr__(self, "values", checked)
+        object.__setattr__(self, "sigma_2", checked_scalar("sigma_2", self.sigma_2, ">= 0"))
+        weights: ArrayLike = np.ones(self.n) if self.weights is None else self.weights
+        object.__setattr__(self, "weights", checked_array("weights", weights, self.n, "> 0"))
+        object.__setattr__(self, "title", self.title or self.chart.name)
+
+
+def _number_or_array(name: str, value: float | FloatArray, n: int) -> float | FloatArray:
+    if np.ndim(value) == 0:
+        return checked_scalar(name, float(value), "finite")
+    return checked_array(name, value, n, "finite")

@@ -1,0 +1,669 @@
+"""The generated program: a chart on a rig, lowered to if-else text one can read and step through.
+
+This is the paper's Fig. 2c made from its Fig. 2b: one reader of the chart, with no rule of its own.
+The text holds no numbers of the user's; parameters arrive as arguments, so that one text serves
+every parameter set and every number of elements, in Python and, compiled, elsewhere.
+
+The functions of a program
+--------------------------
+``flow``       dy/dt with every state frozen and every sign held (located crossings)
+``flow_live``  the same with sgn, abs, min, max as they stand (for guards looked at once a step)
+``switch``     for each element the first edge whose guard holds, or -1
+``act``        the assignments of an edge (nothing for the charts shipped here)
+``observe``    v, F, and per element s, F_i, dz
+``arm``        which comparisons to watch until the next stop, and the signs to hold
+``margins``    the watched comparisons as numbers that change sign where the comparison does
+
+What ``arm`` watches: a guard that is false stays false as long as one false comparison of it (of
+each arm, for ``or``) stays false. The first one in the text is the witness; when it turns true the
+driver stops, asks, and arms again. So nothing is watched that cannot change a state: not z - s
+while slipping toward it, not v_c while sticking below s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gms_fsm.errors import SignalError
+from gms_fsm.expression import (
+    Binary,
+    Call,
+    Comparison,
+    Literal,
+    Name,
+    Negative,
+    Node,
+    Number,
+    Split,
+    Value,
+    names_in,
+    parse_value,
+    rough_points,
+    spell,
+    split,
+    substitute,
+)
+from gms_fsm.generated import load
+from gms_fsm.models import Model
+from gms_fsm.parameters import as_floats
+from gms_fsm.rigs import Rig
+from gms_fsm.signals import Corners, Formula, Function, Signal, piecewise_linear
+
+__all__ = ["Program", "lower"]
+
+Arguments = tuple[list[float], list[list[float]], list[tuple[list[float], list[float]]]]
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A model on a rig as generated functions and the arrays they take.
+
+    Parameters
+    ----------
+    source : str
+        The text of all functions.
+    functions : mapping of str to callable
+        By name, see the module's text.
+    p : tuple
+        (shared numbers, one list an own parameter, corner tables): the last argument of all
+        functions.
+    size : int
+        Length of the state vector ``y = (x, [v,] variables...)``.
+    first : int
+        Index in y of the first element's first variable; element i's variable j is at
+        ``first + j * n + i``.
+    held : int
+        How many signs are held.
+    strict : list of bool
+        For each relation whether its margin must be positive (or may be zero) to be true.
+    relations : list of str
+        Each relation in words, for messages.
+    knots, jumps : list of float
+        Times [s] where a signal has a corner, and where it jumps.
+    """
+
+    source: str
+    functions: Mapping[str, Callable[..., Any]]
+    p: Arguments
+    size: int
+    first: int
+    held: int
+    strict: list[bool]
+    relations: list[str]
+    knots: list[float]
+    jumps: list[float]
+
+
+def lower(model: Model, rig: Rig) -> Program:
+    """Generate the program of a model on a rig.
+
+    Parameters
+    ----------
+    model : Model
+        What rubs.
+    rig : Rig
+        What it is mounted on.
+
+    Returns
+    -------
+    Program
+        Text, functions and arrays.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed
+    >>> program = lower(GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.1*t"))
+    >>> "if z >= s and v > v_c:" in program.source
+    True
+    """
+    writer = _Lowering(model, rig)
+    source = writer.source()
+    callables = {
+        f"{name}_signal": _guarded(name, signal)
+        for name, signal in rig.signals.items()
+        if isinstance(signal, Function)
+    }
+    namespace = load(
+        f"{model.chart.name}, {rig.title}",
+        source,
+        {"piecewise_linear": piecewise_linear, **callables},
+    )
+    corners = [s for s in rig.signals.values() if isinstance(s, Corners)]
+    return Program(
+        source=source,
+        functions={name: namespace[name] for name in _FUNCTION_NAMES},
+        p=writer.arguments(),
+        size=writer.first + model.n * len(model.chart.variables),
+        first=writer.first,
+        held=len(writer.shared_rough) + model.n * len(writer.own_rough),
+        strict=writer.expand(
+            [r.strict for r in writer.shared_relations], [r.strict for r in writer.own_relations]
+        ),
+        relations=writer.relation_names(),
+        knots=sorted({float(t) for s in corners for t in s.times}),
+        jumps=sorted({float(t) for s in corners for t in s.jumps}),
+    )
+
+
+_DIP = "v dip"  # not an identifier, so no chart can have a name like it
+_FUNCTION_NAMES = ("flow", "flow_live", "switch", "act", "observe", "arm", "margins")
+
+
+def _guarded(name: str, signal: Function) -> Callable[[float], float]:
+    def sampled(t: float) -> float:
+        try:
+            return float(signal.call(t))
+        except Exception as error:
+            raise SignalError(
+                f"signal {name!r}: the function raised {type(error).__name__} at t = {t!r} s: "
+                f"{error}"
+            ) from error
+
+    return sampled
+
+
+class _Lowering:
+    """Collects names, signs and relations of a model on a rig, then writes the functions."""
+
+    def __init__(self, model: Model, rig: Rig) -> None:
+        self.model, self.rig, self.chart = model, rig, model.chart
+        self.prescribed = rig.acceleration is None
+        self.first = 1 if self.prescribed else 2
+        self.stribeck = parse_value(model.stribeck.text, ["F_c", "F_s", "v_s", "v"])
+        self.acceleration = (
+            None
+            if rig.acceleration is None
+            else parse_value(rig.acceleration, ["t", "x", "v", "F", *rig.signals, *rig.numbers])
+        )
+        self._collect_numbers()
+        self._collect_rough()
+        self._collect_relations()
+
+    # ------------------------------------------------------------------ collecting
+    def _collect_numbers(self) -> None:
+        curve = self.model.stribeck
+        self.shared: dict[str, float] = {
+            "F_c": curve.F_c, "F_s": curve.F_s, "v_s": curve.v_s, "v_dip": curve.dip,
+            "sigma_2": self.model.sigma_2, **self.rig.numbers,
+        }  # fmt: skip
+        self.own: dict[str, list[float]] = {"weight": as_floats(self.model.weights)}
+        taken = set(self.shared) | set(self.rig.signals) | {f"{s}_signal" for s in self.rig.signals}
+        taken |= {"weights"}
+        # A chart may call its own parameter F_c or mass: it gets a name of its own in the text.
+        self.rename: dict[str, str] = {_DIP: "v_dip"}
+        chart_names = (*self.chart.variables, *self.chart.parameters)
+        for name in chart_names:
+            local = name
+            while local in taken or (local != name and local in chart_names):
+                local += "_"
+            taken.add(local)
+            self.rename[name] = local
+        self.locals = taken
+        for name in self.chart.parameters:
+            value = self.model.values[name]
+            if np.ndim(value) == 0:
+                self.shared[self.rename[name]] = float(value)
+            else:
+                self.own[self.rename[name]] = as_floats(value)  # type: ignore[arg-type]
+                self.rename[name] += "[i]"
+
+    def is_shared(self, node: Node) -> bool:
+        """Tell whether a tree of the chart has one value for all elements."""
+        return all(
+            name in ("t", "x", "v") or self.rename.get(name) in self.shared
+            for name in names_in(node)
+        )
+
+    def _collect_rough(self) -> None:
+        # Where a flow or a signal has a corner or a jump, the driver stops and a sign is held.
+        self.signal_rough: list[Value] = []
+        for signal in self.rig.signals.values():
+            if isinstance(signal, Formula):
+                self.signal_rough += rough_points(signal.tree)
+        self.state_rough = {
+            state.name: tuple(
+                dict.fromkeys(
+                    u
+                    for variable in self.chart.variables
+                    for u in rough_points(self.chart.flows[state.name, variable])
+                )
+            )
+            for state in self.chart.states
+        }
+        found = [u for rough in self.state_rough.values() for u in rough]
+        self.shared_rough = list(
+            dict.fromkeys([*self.signal_rough, *(u for u in found if self.is_shared(u))])
+        )
+        self.own_rough = list(dict.fromkeys(u for u in found if not self.is_shared(u)))
+        self.sign_names: dict[Value, str] = {}
+        for number, u in enumerate([*self.shared_rough, *self.own_rough]):
+            label = u.id if isinstance(u, Name) else str(number)
+            while any(f"{f}_{label}" in self.locals for f in ("sgn", "abs", "min", "max")):
+                label += "_"
+            self.sign_names[u] = label
+
+    def _collect_relations(self) -> None:
+        zero = Number(0.0)
+        wanted: list[Comparison] = []
+        for edge in self.chart.transitions:
+            wanted += _comparisons(split(self.chart.guards[edge.name]))
+        for u in [*self.shared_rough, *self.own_rough]:
+            wanted += [Comparison(u, zero, strict=True), Comparison(u, zero, strict=False)]
+        if "s" in self.chart.inputs:
+            wanted += self.landmarks()
+        wanted = list(dict.fromkeys(wanted))
+        own = [r for r in wanted if not (self.is_shared(r.left) and self.is_shared(r.right))]
+        self.own_relations = own
+        self.shared_relations = [r for r in wanted if r not in own]
+
+    def landmarks(self) -> list[Comparison]:
+        """Where s(v) starts to change fast: a large step would jump the whole dip unseen."""
+        v, dip = Name("v"), Name(_DIP)
+        return [Comparison(v, dip, strict=True), Comparison(v, Negative(dip), strict=True)]
+
+    # ------------------------------------------------------------------ arrays
+    def arguments(self) -> Arguments:
+        tables = [
+            (as_floats(s.times), as_floats(s.values))
+            for s in self.rig.signals.values()
+            if isinstance(s, Corners)
+        ]
+        return list(self.shared.values()), list(self.own.values()), tables
+
+    def expand(self, shared: Sequence[Any], own: Sequence[Any]) -> list[Any]:
+        """Lay out values a relation: the shared ones, then each own one n times."""
+        return [*shared, *(value for value in own for _ in range(self.model.n))]
+
+    def relation_names(self) -> list[str]:
+        def text(comparison: Comparison) -> str:
+            return spell(Literal(comparison, True).relation)
+
+        own = [
+            f"{text(r)} of element {i + 1}" for r in self.own_relations for i in range(self.model.n)
+        ]
+        return [*(text(r) for r in self.shared_relations), *own]
+
+    def relation_index(self, comparison: Comparison) -> str:
+        if comparison in self.shared_relations:
+            return str(self.shared_relations.index(comparison))
+        return self._element_index(len(self.shared_relations), self.own_relations.index(comparison))
+
+    def held_index(self, u: Value) -> str:
+        if u in self.shared_rough:
+            return str(self.shared_rough.index(u))
+        return self._element_index(len(self.shared_rough), self.own_rough.index(u))
+
+    @staticmethod
+    def _element_index(base: int, row: int) -> str:
+        """Index of element i in row `row` of length n behind `base` shared places."""
+        block = {0: "", 1: " + n"}.get(row, f" + {row} * n")
+        return f"{base}{block} + i"
+
+    def y_index(self, variable: str) -> str:
+        return self._element_index(self.first, self.chart.variables.index(variable))
+
+    # ------------------------------------------------------------------ the text
+    def source(self) -> str:
+        states = ", ".join(self.state_constant(s.name) for s in self.chart.states)
+        lines = [
+            f"# {_one_line(self.model.chart.name)}, {_one_line(self.rig.title)}",
+            "# Generated from the chart; parameters are arguments: one text for every set of them.",
+            "",
+            f"{states} = {_tuple(range(len(self.chart.states)))}  # states",
+        ]
+        if self.chart.transitions:
+            edges = ", ".join(self.edge_constant(t.name) for t in self.chart.transitions)
+            lines.append(f"{edges} = {_tuple(range(len(self.chart.transitions)))}  # edges")
+        for part in (
+            self.write_switch(),
+            self.write_act(),
+            self.write_flow(live=False),
+            self.write_flow(live=True),
+            self.write_observe(),
+            self.write_arm(),
+            self.write_margins(),
+        ):
+            lines += ["", "", *part]
+        return "\n".join(lines) + "\n"
+
+    def state_constant(self, state: str) -> str:
+        return self._constant("IN", state)
+
+    def edge_constant(self, edge: str) -> str:
+        return self._constant("TAKE", edge)
+
+    def _constant(self, kind: str, name: str) -> str:
+        # STICK reads best, but a state called c must not become the parameter C.
+        plain = name.upper()
+        everything = {n.upper() for n in (*self.locals, *self.sign_names.values())}
+        return f"{kind}_{plain}" if plain in everything | {"S", "F"} else plain
+
+    def spell(self, node: Node) -> str:
+        return spell(node, rename=self.rename)
+
+    def function(
+        self, signature: str, doc: str, body: list[str], *, live: bool = True
+    ) -> list[str]:
+        """Put a function together: signature, the names its body uses, then the body."""
+        used = _words(body)
+        lines = [f"def {signature}:", f'    """{doc}"""']
+        front: list[str] = []
+        if "S" in used:
+            front.append(f"S = {spell(self.stribeck)}  # (2)")
+            used |= _words(front)
+        if "v" in used:
+            front.insert(0, "v = y[1]") if not self.prescribed else None
+            used |= {"v"}
+        signals: list[str] = []
+        tables = 0
+        for name, signal in self.rig.signals.items():
+            if name in used:
+                signals += self.signal_lines(name, signal, tables, live)
+            tables += isinstance(signal, Corners)
+        if "x" in used:
+            front.insert(0, "x = y[0]")
+        used |= _words(signals)
+        setup: list[str] = []
+        needed = [(j, name) for j, name in enumerate(self.shared) if name in used]
+        arrays = [(j, name) for j, name in enumerate(self.own) if name in used]
+        if needed or arrays or "tables" in used:
+            setup.append("shared, own, tables = p")
+        setup += [f"{name} = shared[{j}]" for j, name in needed]
+        setup += [f"{name} = own[{j}]" for j, name in arrays]
+        if "n" in used:
+            setup.append("n = len(mode)")
+        return lines + ["    " + line for line in [*setup, *signals, *front, *body]]
+
+    def signal_lines(self, name: str, signal: Signal, table: int, live: bool) -> list[str]:
+        if isinstance(signal, Function):
+            return [f"{name} = {name}_signal(t)"]
+        if isinstance(signal, Corners):
+            return [f"{name} = piecewise_linear(t, tables[{table}][0], tables[{table}][1])"]
+        smooth, calls = substitute(signal.tree, self.sign_names)
+        return [*self.rough_lines(calls, live), f"{name} = {spell(smooth)}"]
+
+    def rough_lines(self, calls: Mapping[str, Call], live: bool) -> list[str]:
+        """Assign the rough calls of a flow: from the held signs, or live."""
+        lines = []
+        labels = {label: u for u, label in self.sign_names.items()}
+        for name, call in calls.items():
+            if live:
+                lines.append(f"{name} = {self.spell(call)}")
+                continue
+            sign = f"held[{self.held_index(labels[name.partition('_')[2]])}]"
+            a = self.spell(call.arguments[0])
+            product = self.spell(Binary("*", Name(sign), call.arguments[0]))
+            match call.function:
+                case "sgn":
+                    lines.append(f"{name} = {sign}")
+                case "abs":
+                    lines.append(f"{name} = {product}")
+                case "min":
+                    b = self.spell(call.arguments[1])
+                    lines.append(f"{name} = {a} if {sign} <= 0.0 else {b}")
+                case _:
+                    b = self.spell(call.arguments[1])
+                    lines.append(f"{name} = {a} if {sign} >= 0.0 else {b}")
+        return lines
+
+    def element_values(self, used: Iterable[str]) -> list[str]:
+        """Assign the element's own variables and threshold, as far as they are used."""
+        words = set(used)
+        lines = [
+            f"{self.rename[variable]} = y[{self.y_index(variable)}]"
+            for variable in self.chart.variables
+            if self.rename[variable] in words
+        ]
+        return lines + (["s = weight[i] * S"] if "s" in words else [])
+
+    def by_state(self, branches: Mapping[str, list[str]]) -> list[str]:
+        """Write an if-else over the element's state."""
+        filled = [(s.name, branches[s.name] or ["pass"]) for s in self.chart.states]
+        if len(filled) == 1:
+            return branches[filled[0][0]]
+        lines = []
+        for number, (state, body) in enumerate(filled):
+            word = "if" if number == 0 else "elif"
+            last = number == len(filled) - 1
+            head = "else" if last else f"{word} mode[i] == {self.state_constant(state)}"
+            note = f"  # {self.state_constant(state)}" if last else ""
+            lines += [f"{head}:{note}", *_indented(body)]
+        return lines
+
+    # ------------------------------------------------------------------ the functions
+    def write_switch(self) -> list[str]:
+        branches = {}
+        for state in self.chart.states:
+            lines: list[str] = []
+            for number, (_, edge) in enumerate(self.chart.leaving(state.name)):
+                word = "if" if number == 0 else "elif"
+                lines += [
+                    f"{word} {self.spell(self.chart.guards[edge.name])}:",
+                    f"    edge = {self.edge_constant(edge.name)}  # {state.name} -> {edge.target}",
+                ]
+            branches[state.name] = lines
+        inner = self.by_state(branches) if self.chart.transitions else []
+        body = [
+            "for i in range(n):",
+            *_indented([*self.element_values(_words(inner)), "edge = -1", *inner, "out[i] = edge"]),
+        ]
+        return self.function(
+            "switch(t, y, mode, p, out)",
+            "out[i] = the first edge of element i whose guard holds, or -1.",
+            body,
+        )
+
+    def write_act(self) -> list[str]:
+        targets = {s.name: s for s in self.chart.states}
+        lines: list[str] = []
+        for edge in self.chart.transitions:
+            # Stateflow's order: exit of the source, action of the edge, entry of the target.
+            steps = [
+                *self.chart.assignments["exit", targets[edge.source].name].items(),
+                *self.chart.assignments["action", edge.name].items(),
+                *self.chart.assignments["entry", targets[edge.target].name].items(),
+            ]
+            if not steps:
+                continue
+            lines.append(f"{'elif' if lines else 'if'} edge == {self.edge_constant(edge.name)}:")
+            for variable, tree in steps:
+                local = self.rename[variable]
+                lines += _indented(
+                    [f"{local} = {self.spell(tree)}", f"y[{self.y_index(variable)}] = {local}"]
+                )
+        body = [*self.element_values(_words(lines)), *lines] or ["pass  # no edge assigns anything"]
+        return self.function(
+            "act(edge, i, t, y, mode, p)", "Do the assignments of an edge of element i.", body
+        )
+
+    def write_flow(self, live: bool) -> list[str]:
+        shared_calls: dict[str, Call] = {}
+        branches = {}
+        for state in self.chart.states:
+            lines: list[str] = []
+            for variable in self.chart.variables:
+                smooth, calls = substitute(self.chart.flows[state.name, variable], self.sign_names)
+                labels = {label: u for u, label in self.sign_names.items()}
+                own = {}
+                for name, call in calls.items():
+                    if labels[name.partition("_")[2]] in self.shared_rough:
+                        shared_calls.setdefault(name, call)
+                    else:
+                        own[name] = call
+                lines += self.rough_lines(own, live)
+                lines.append(f"d{self.rename[variable]} = {self.spell(smooth)}")
+            branches[state.name] = lines
+        inner = self.by_state(branches)
+        if not self.prescribed:
+            inner.append(f"F += {self.force()}")  # (3)
+        inner += [f"dy[{self.y_index(v)}] = d{self.rename[v]}" for v in self.chart.variables]
+        body = [
+            *self.rough_lines(shared_calls, live),
+            *([] if self.prescribed else ["F = 0.0"]),
+            "for i in range(n):",
+            *_indented([*self.element_values(_words(inner)), *inner]),
+        ]
+        if self.acceleration is not None:
+            body += ["F += sigma_2 * v  # (4)", "dy[0] = v",
+                     f"dy[1] = {spell(self.acceleration)}"]  # fmt: skip
+        else:
+            body.append("dy[0] = v")
+        name, doc = (
+            ("flow_live", "dy = dy/dt, all states frozen, corners and jumps evaluated live.")
+            if live
+            else ("flow", "dy = dy/dt, all states frozen and all signs held.")
+        )
+        return self.function(f"{name}(t, y, mode, held, p, dy)", doc, body, live=live)
+
+    def force(self) -> str:
+        rename = {**self.rename, **{"d" + v: "d" + self.rename[v] for v in self.chart.variables}}
+        return spell(self.chart.forces["F"], rename=rename)
+
+    def write_observe(self) -> list[str]:
+        branches = {
+            state.name: [
+                f"d{self.rename[v]} = {self.spell(self.chart.flows[state.name, v])}"
+                for v in self.chart.variables
+            ]
+            for state in self.chart.states
+        }
+        threshold = "s" if "s" in self.chart.inputs else "weight[i] * S"
+        inner = [
+            *self.by_state(branches),
+            f"F_i = {self.force()}  # (3)",
+            "F += F_i",
+            f"out[{self._element_index(2, 0)}] = {threshold}",
+            f"out[{self._element_index(2, 1)}] = F_i",
+            *(
+                f"out[{self._element_index(2, 2 + j)}] = d{self.rename[v]}"
+                for j, v in enumerate(self.chart.variables)
+            ),
+        ]
+        body = [
+            "F = 0.0",
+            "for i in range(n):",
+            *_indented([*self.element_values(_words(inner)), *inner]),
+            "out[0] = v",
+            "out[1] = F + sigma_2 * v  # (4)",
+        ]
+        return self.function(
+            "observe(t, y, mode, p, out)",
+            "out = v, F, then for all elements s, F_i and the derivatives.",
+            body,
+        )
+
+    def write_arm(self) -> list[str]:
+        always = [r for u in self.signal_rough for r in self._sign_relations(u)]
+        if "s" in self.chart.inputs:
+            always += self.landmarks()
+        body = [f"watch[{self.relation_index(r)}] = 1" for r in dict.fromkeys(always)]
+        body += [f"held[{self.held_index(u)}] = sgn({self.spell(u)})" for u in self.shared_rough]
+        branches = {}
+        for state in self.chart.states:
+            lines = []
+            for u in self.state_rough[state.name]:
+                if u in self.own_rough:
+                    lines.append(f"held[{self.held_index(u)}] = sgn({self.spell(u)})")
+                lines += [f"watch[{self.relation_index(r)}] = 1" for r in self._sign_relations(u)]
+            for _, edge in self.chart.leaving(state.name):
+                lines.append(f"# {edge.name}: {self.spell(self.chart.guards[edge.name])}")
+                lines += self.witness(split(self.chart.guards[edge.name]))
+            branches[state.name] = lines
+        inner = self.by_state(branches)
+        if any(branches.values()):
+            body += ["for i in range(n):",
+                     *_indented([*self.element_values(_words(inner)), *inner])]  # fmt: skip
+        return self.function(
+            "arm(t, y, mode, p, held, watch)",
+            "Hold the signs and mark the comparisons that keep every false guard false.",
+            body or ["pass"],
+        )
+
+    def _sign_relations(self, u: Value) -> list[Comparison]:
+        return [Comparison(u, Number(0.0), strict=True), Comparison(u, Number(0.0), strict=False)]
+
+    def witness(self, part: Split) -> list[str]:
+        """Write: if this part is false, watch what keeps it false."""
+        if isinstance(part, Literal):
+            negated = Literal(part.comparison, not part.holds).relation
+            return [f"if {self.spell(negated)}:",
+                    f"    watch[{self.relation_index(part.comparison)}] = 1"]  # fmt: skip
+        word, parts = part
+        if word == "either":
+            return [line for each in parts for line in self.witness(each)]
+        lines: list[str] = []
+        for each in parts:
+            other = "el" if lines else ""
+            if isinstance(each, Literal):
+                first, *rest = self.witness(each)
+                lines += [other + first, *rest]
+            else:
+                lines += [f"{other}if not ({self.truth(each)}):", *_indented(self.witness(each))]
+        return lines
+
+    def truth(self, part: Split) -> str:
+        """Spell a split condition; brackets everywhere, as it is only read by machines."""
+        if isinstance(part, Literal):
+            return self.spell(part.relation)
+        word, parts = part
+        return (" and " if word == "both" else " or ").join(
+            self.truth(q) if isinstance(q, Literal) else f"({self.truth(q)})" for q in parts
+        )
+
+    def write_margins(self) -> list[str]:
+        shared = [self.margin_lines(r) for r in self.shared_relations]
+        own = [line for r in self.own_relations for line in self.margin_lines(r)]
+        body = [line for lines in shared for line in lines]
+        if own:
+            body += ["for i in range(n):", *_indented([*self.element_values(_words(own)), *own])]
+        return self.function(
+            "margins(t, y, mode, p, watch, out)",
+            "For each watched comparison left - right.",
+            body or ["pass"],
+        )
+
+    def margin_lines(self, comparison: Comparison) -> list[str]:
+        index = self.relation_index(comparison)
+        margin = self.spell(comparison.left)
+        if comparison.right != Number(0.0):
+            right = spell(comparison.right, rename=self.rename)
+            simple = isinstance(comparison.right, Name | Number | Negative)
+            margin = f"{margin} - {right if simple else f'({right})'}"
+        return [f"if watch[{index}]:", f"    out[{index}] = {margin}"]
+
+
+def _comparisons(part: Split) -> list[Comparison]:
+    if isinstance(part, Literal):
+        return [part.comparison]
+    return [c for each in part[1] for c in _comparisons(each)]
+
+
+def _words(lines: Iterable[str]) -> set[str]:
+    """Return the identifiers in lines of code (comments left out)."""
+    found: set[str] = set()
+    for line in lines:
+        word = ""
+        for c in line.partition("#")[0] + " ":
+            if c == "_" or c.isalnum():
+                word += c
+            elif word:
+                found.add(word)
+                word = ""
+    return found
+
+
+def _indented(lines: Iterable[str]) -> list[str]:
+    return ["    " + line for line in lines]
+
+
+def _tuple(numbers: Iterable[int]) -> str:
+    return ", ".join(str(number) for number in numbers)
+
+
+def _one_line(text: str) -> str:
+    """Return text fit for a comment: a line break would end it."""
+    return "".join(c if c.isprintable() else " " for c in text)

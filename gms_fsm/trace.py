@@ -1,0 +1,574 @@
+"""A finished run: rows, micro-steps, the transition log, and what it was made from.
+
+m firings at one time give m + 1 rows: micro-step 0 before, then one after each firing. With wanted
+times (`t_eval`) the rows are exactly those times, right-continuous; the log is always complete.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import zipfile
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gms_fsm.errors import MissingExtraError, OutputError, TraceFileError
+from gms_fsm.header import Header
+from gms_fsm.models import Model
+from gms_fsm.parameters import FloatArray
+from gms_fsm.program import Program, lower
+from gms_fsm.rigs import Rig
+
+if TYPE_CHECKING:
+    import pandas
+
+__all__ = ["Rows", "Trace", "written_whole"]
+
+_NUMBERS = ("z", "v", "s", "F_before", "F_after")
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Times, micro-steps, states y and modes, row by row."""
+
+    t: FloatArray
+    microstep: NDArray[np.int64]
+    y: FloatArray
+    mode: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return int(self.t.size)
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """What a simulation returns.
+
+    Attributes
+    ----------
+    t : ndarray, shape (rows,), s
+    microstep : ndarray of int, shape (rows,)
+    x, v : ndarray, shape (rows,), m and m/s
+    z : ndarray, shape (rows, n), m
+        The chart's first variable.
+    states : ndarray of str, shape (rows, n)
+    s : ndarray, shape (rows, n)
+        Thresholds ``w_i s(v)``, m.
+    F : ndarray, shape (rows,), N
+    F_elements : ndarray, shape (rows, n), N
+    transitions : numpy.recarray
+        Records with ``t, element`` (from 0), ``edge, source, target, z, v, s, F_before, F_after``.
+    model, rig
+        What ran. After `load` a generic `ChartModel`.
+    settings : dict
+        Method, tolerances, engine and so on.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    >>> trace = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"),
+    ...                  Prescribed("0.2"), 3.0)
+    >>> str(trace.transitions.edge[0]), round(float(trace.transitions.t[0]), 9)
+    ('break_away_forward', 2.0)
+    """
+
+    rows: Rows
+    stops: Rows  # both sides of every stop, kept where `rows` holds wanted times only
+    transitions: Any
+    model: Model
+    rig: Rig
+    settings: Mapping[str, str | float | None]
+    stored: Mapping[str, FloatArray] = field(default_factory=dict, repr=False)
+
+    def __repr__(self) -> str:
+        return (
+            f"<Trace: {self.model.title}; {self.rig.title}; {len(self.rows)} rows, "
+            f"{len(self.transitions)} transitions>"
+        )
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    # ------------------------------------------------------------------ columns
+    @property
+    def t(self) -> FloatArray:
+        """Time, shape (rows,), s."""
+        return self.rows.t
+
+    @property
+    def microstep(self) -> NDArray[np.int64]:
+        """Micro-step of each row, shape (rows,)."""
+        return self.rows.microstep
+
+    @property
+    def x(self) -> FloatArray:
+        """Position, shape (rows,), m."""
+        return self.rows.y[:, 0]
+
+    @property
+    def n(self) -> int:
+        """Number of elements."""
+        return self.model.n
+
+    @property
+    def z(self) -> FloatArray:
+        """The first variable of every element (the deflection), shape (rows, n), m."""
+        return self.variable(self.model.chart.variables[0])
+
+    def variable(self, name: str) -> FloatArray:
+        """Return a variable of the chart, shape (rows, n).
+
+        Parameters
+        ----------
+        name : str
+            One of ``model.chart.variables``.
+
+        Returns
+        -------
+        ndarray, shape (rows, n)
+            Its values.
+        """
+        start = self._first + self.model.chart.variables.index(name) * self.n
+        block: FloatArray = self.rows.y[:, start : start + self.n]
+        return block
+
+    @property
+    def states(self) -> NDArray[np.str_]:
+        """Active state of every element, shape (rows, n)."""
+        return np.array([s.name for s in self.model.chart.states])[self.rows.mode]
+
+    @property
+    def v(self) -> FloatArray:
+        """Velocity, shape (rows,), m/s."""
+        return self._observed["v"]
+
+    @property
+    def s(self) -> FloatArray:
+        """Thresholds, shape (rows, n), m."""
+        return self._observed["s"]
+
+    @property
+    def F(self) -> FloatArray:
+        """Friction force, shape (rows,), N."""
+        return self._observed["F"]
+
+    @property
+    def F_elements(self) -> FloatArray:
+        """Force of each element, shape (rows, n), N."""
+        return self._observed["F_elements"]
+
+    @property
+    def dz(self) -> FloatArray:
+        """Rate of the first variable under the row's states, shape (rows, n), m/s."""
+        return self._observed["dz"]
+
+    @property
+    def _first(self) -> int:
+        return int(self.rows.y.shape[1]) - self.n * len(self.model.chart.variables)
+
+    @cached_property
+    def program(self) -> Program:
+        """The generated program behind the run."""
+        return lower(self.model, self.rig)
+
+    @cached_property
+    def _observed(self) -> Mapping[str, FloatArray]:
+        # Row by row with scalar functions: the very numbers the run saw.
+        if self.stored:
+            return self.stored
+        n, program = self.n, self.program
+        observe = program.functions["observe"]
+        out = [0.0] * (2 + (2 + len(self.model.chart.variables)) * n)
+        table = np.empty((len(self.rows), len(out)))
+        modes = self.rows.mode.tolist()
+        for row, (t, y) in enumerate(zip(self.rows.t.tolist(), self.rows.y.tolist(), strict=True)):
+            observe(t, y, modes[row], program.p, out)
+            table[row] = out
+        return {
+            "v": table[:, 0],
+            "F": table[:, 1],
+            "s": table[:, 2 : 2 + n],
+            "F_elements": table[:, 2 + n : 2 + 2 * n],
+            "dz": table[:, 2 + 2 * n : 2 + 3 * n],
+        }
+
+    # ------------------------------------------------------------------ sampling
+    def sample(self, times: ArrayLike) -> Trace:
+        """Return the run at other times, interpolated inside arcs and never across an event.
+
+        Cubic Hermite between neighbouring rows, with one-sided slopes from the flow; on an event
+        the value after it. For full accuracy on a dense grid ask `simulate` for it by `t_eval`.
+
+        Parameters
+        ----------
+        times : array_like, shape (m,)
+            s, within the run.
+
+        Returns
+        -------
+        Trace
+            With exactly these rows, in this order, and the same transitions.
+
+        Raises
+        ------
+        ValueError
+            If a time lies outside the run.
+        SignalError
+            If the trace comes from a file and its signal was a Python function.
+        """
+        wanted = np.atleast_1d(np.asarray(times, dtype=np.float64))
+        table = _merged(self.rows, self.stops)
+        if wanted.ndim != 1 or wanted.size == 0:
+            raise ValueError(f"times has shape {wanted.shape}; give a flat, non-empty list")
+        outside = wanted[~((wanted >= table.t[0]) & (wanted <= table.t[-1]))]
+        if outside.size:
+            raise ValueError(
+                f"time {outside[0]!r} s lies outside the run, {table.t[0]!r} to {table.t[-1]!r} s"
+            )
+        left = np.searchsorted(table.t, wanted, side="right") - 1
+        y = np.array([self._between(table, int(i), t) for i, t in zip(left, wanted, strict=True)])
+        rows = Rows(wanted, np.zeros(wanted.size, dtype=np.int64), y, table.mode[left])
+        return Trace(rows, _merged(table, rows), self.transitions, self.model, self.rig,
+                     self.settings)  # fmt: skip
+
+    def _between(self, table: Rows, i: int, t: float) -> FloatArray:
+        t0 = table.t[i]
+        if t == t0 or i + 1 == len(table):
+            return np.asarray(table.y[i])
+        program, mode = self.program, table.mode[i].tolist()
+        t1, y0, y1 = table.t[i + 1], table.y[i], table.y[i + 1]
+        # Signs as they hold inside the interval; at its ends they may just be turning.
+        held = [0.0] * program.held
+        inside = (0.5 * (y0 + y1)).tolist()
+        program.functions["arm"](
+            float(0.5 * (t0 + t1)), inside, mode, program.p, held, [0] * len(program.strict)
+        )
+        slopes = []
+        for time, y in ((t0, y0), (t1, y1)):
+            dy = [0.0] * program.size
+            program.functions["flow"](float(time), y.tolist(), mode, held, program.p, dy)
+            slopes.append(np.array(dy))
+        h = t1 - t0
+        theta = (t - t0) / h
+        rise = y1 - y0
+        bend = h * slopes[0] - rise
+        twist = rise - h * slopes[1] - bend
+        value: FloatArray = y0 + theta * (rise + (1 - theta) * (bend + theta * twist))
+        return value
+
+    # ------------------------------------------------------------------ files
+    def save(self, path: str | Path) -> Path:
+        """Write the trace to ``.npz``, or to ``.csv`` with the log beside it.
+
+        The file is written whole or not at all. CSV numbers are printed so that they read back
+        equal; the log goes to ``<name>.transitions.csv``.
+
+        Parameters
+        ----------
+        path : str or Path
+            Ends in ``.npz`` or ``.csv``.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        OutputError
+            If the folder cannot be written or the ending is another.
+        """
+        path = Path(path)
+        if path.suffix == ".npz":
+            table = _merged(self.rows, self.stops)
+            arrays = {
+                **{f"rows_{name}": value for name, value in vars(self.rows).items()},
+                **{f"stops_{name}": value for name, value in vars(table).items()},
+                **{f"observed_{name}": value for name, value in self._observed.items()},
+                "transitions": np.asarray(self.transitions),
+                "header": np.array(self._header().model_dump_json()),
+            }
+            return written_whole(path, lambda file: np.savez_compressed(file, **arrays))
+        if path.suffix == ".csv":
+            written_whole(_log_path(path), lambda file: file.write(self.transitions_csv().encode()))
+            return written_whole(path, lambda file: file.write(self._rows_csv().encode()))
+        raise OutputError(f"{path}: a trace is saved as .npz or .csv, not {path.suffix!r}")
+
+    @classmethod
+    def load(cls, path: str | Path) -> Trace:
+        """Read a trace written by `save`.
+
+        Parameters
+        ----------
+        path : str or Path
+            The ``.npz`` or ``.csv`` file.
+
+        Returns
+        -------
+        Trace
+            With equal arrays.
+
+        Raises
+        ------
+        TraceFileError
+            If the file is missing, damaged, or not a trace; nothing in it is executed.
+        """
+        path = Path(path)
+        reader = {".npz": cls._load_npz, ".csv": cls._load_csv}.get(path.suffix)
+        if reader is None:
+            raise TraceFileError(f"{path}: a trace ends in .npz or .csv, not {path.suffix!r}")
+        try:
+            return reader(path)
+        except TraceFileError:
+            raise
+        except FileNotFoundError as error:
+            raise TraceFileError(f"{error.filename}: no such file") from None
+        except (OSError, EOFError, KeyError, IndexError, zipfile.BadZipFile) as error:
+            raise TraceFileError(f"{path}: not a complete trace file ({error})") from None
+        except ValueError as error:  # numpy, json, pydantic, and our own checks
+            raise TraceFileError(f"{path}: damaged trace file ({error})") from None
+
+    @classmethod
+    def _load_npz(cls, path: Path) -> Trace:
+        with np.load(path, allow_pickle=False) as file:
+            header = Header.model_validate_json(str(file["header"]))
+            tables = {
+                kind: Rows(*(file[f"{kind}_{name}"] for name in ("t", "microstep", "y", "mode")))
+                for kind in ("rows", "stops")
+            }
+            stored = {
+                name: file[f"observed_{name}"] for name in ("v", "F", "s", "F_elements", "dz")
+            }
+            log = file["transitions"].view(np.recarray)
+        return cls._checked(header, tables["rows"], tables["stops"], log, stored)
+
+    @classmethod
+    def _checked(
+        cls, header: Header, rows: Rows, stops: Rows, log: Any, stored: Mapping[str, FloatArray]
+    ) -> Trace:
+        model = header.to_model()
+        n, m = model.n, len(rows)
+        wanted = {"v": (m,), "F": (m,), "s": (m, n), "F_elements": (m, n), "dz": (m, n)}
+        shapes = {name: (value.shape, wanted[name]) for name, value in stored.items()}
+        for kind, table in (("rows", rows), ("stops", stops)):
+            shapes[f"{kind} y"] = (table.y.shape[:1], table.t.shape)
+            shapes[f"{kind} mode"] = (table.mode.shape, (len(table), n))
+            shapes[f"{kind} microstep"] = (table.microstep.shape, table.t.shape)
+            if table.mode.size and not (
+                0 <= table.mode.min() <= table.mode.max() < len(model.chart.states)
+            ):
+                raise TraceFileError(f"{kind}: a state number is not a state of the chart")
+        for name, (found, shape) in shapes.items():
+            if found != shape:
+                raise TraceFileError(f"{name} has shape {found}, expected {shape}")
+        if set(log.dtype.names or ()) != set(_log_dtype(8).names or ()):
+            raise TraceFileError("the transition log has other columns than a trace has")
+        return cls(rows, stops, log, model, header.to_rig(), header.settings, stored)
+
+    def _header(self) -> Header:
+        return Header.of(self.model, self.rig, self.settings)
+
+    # ------------------------------------------------------------------ tables
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Return the rows as flat columns; elements are numbered from 1 in the names.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (rows,)
+            ``t, microstep, x, v, F, z1.., state1.., s1.., F1..``.
+        """
+        table: dict[str, NDArray[Any]] = {
+            "t": self.t, "microstep": self.microstep, "x": self.x, "v": self.v, "F": self.F,
+        }  # fmt: skip
+        for i in range(self.n):
+            table |= {
+                f"{name}{i + 1}": self.variable(name)[:, i] for name in self.model.chart.variables
+            }
+        for name, values in (
+            ("state", self.states), ("s", self.s), ("F", self.F_elements), ("dz", self.dz),
+        ):  # fmt: skip
+            table |= {f"{name}{i + 1}": values[:, i] for i in range(self.n)}
+        return table
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the rows as a pandas DataFrame, one column a quantity and element.
+
+        Returns
+        -------
+        pandas.DataFrame
+            See `columns`.
+
+        Raises
+        ------
+        MissingExtraError
+            If pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise MissingExtraError(
+                'to_pandas needs pandas; install it with: pip install "gms-fsm[pandas]"'
+            ) from None
+        return pandas.DataFrame(self.columns())
+
+    def transitions_csv(self) -> str:
+        """Return the transition log as CSV text; elements counted from 1, as texts do.
+
+        Returns
+        -------
+        str
+            With a head line.
+        """
+        names = self.transitions.dtype.names
+        rows = ([_cell(name, value) for name, value in zip(names, record, strict=True)]
+                for record in self.transitions.tolist())  # fmt: skip
+        return _csv(names, rows)
+
+    def _rows_csv(self) -> str:
+        table = self.columns()
+        rows = zip(*(column.tolist() for column in table.values()), strict=True)
+        head = json.dumps(json.loads(self._header().model_dump_json()))
+        return f"# {head}\n" + _csv(table, ([_cell("", v) for v in row] for row in rows))
+
+    @classmethod
+    def _load_csv(cls, path: Path) -> Trace:
+        with path.open(encoding="utf-8", newline="") as file:
+            first = file.readline()
+            if not first.startswith("# {"):
+                raise TraceFileError(f"{path}: line 1 must be '# ' and the trace's header")
+            header = Header.model_validate_json(first[2:])
+            table = _read_columns(file, path, 2)
+        with _log_path(path).open(encoding="utf-8", newline="") as file:
+            log = _read_columns(file, _log_path(path), 1)
+        model = header.to_model()
+        states = [s.name for s in model.chart.states]
+
+        def number(name: str) -> FloatArray:
+            return np.array([float(cell) for cell in table[name]])
+
+        def block(name: str) -> FloatArray:
+            return np.array([number(f"{name}{i + 1}") for i in range(model.n)]).T
+
+        y = [number("x")] if header.rig.prescribed else [number("x"), number("v")]
+        for name in model.chart.variables:
+            y += list(block(name).T)
+        mode = [[states.index(c) for c in table[f"state{i + 1}"]] for i in range(model.n)]
+        rows = Rows(
+            number("t"),
+            np.array([int(c) for c in table["microstep"]], dtype=np.int64),
+            np.array(y).T,
+            np.array(mode, dtype=np.int64).T,
+        )
+        records = [
+            (float(t), int(e) - 1, *rest[:3], *(float(c) for c in rest[3:]))
+            for t, e, *rest in zip(*(log[name] for name in _LOG_NAMES), strict=True)
+        ]
+        observed = {"v": number("v"), "F": number("F"), "s": block("s"), "dz": block("dz"),
+                    "F_elements": block("F")}  # fmt: skip
+        return cls._checked(header, rows, rows, log_of(records), observed)
+
+
+# --------------------------------------------------------------------------- helpers
+_LOG_NAMES = ("t", "element", "edge", "source", "target", *_NUMBERS)
+
+
+def _log_dtype(width: int) -> np.dtype[Any]:
+    kinds = {"t": "f8", "element": "i8", **dict.fromkeys(("edge", "source", "target"), f"U{width}")}
+    return np.dtype([(name, kinds.get(name, "f8")) for name in _LOG_NAMES])
+
+
+def log_of(records: Iterable[tuple[Any, ...]]) -> Any:
+    """Return firings as a record array with the columns of `Trace.transitions`."""
+    rows = list(records)
+    width = max([1, *(len(text) for row in rows for text in row[2:5])])
+    return np.array(rows, dtype=_log_dtype(width)).view(np.recarray)
+
+
+def _merged(rows: Rows, stops: Rows) -> Rows:
+    """Merge two tables in time order; rows that both have are kept once."""
+    if rows is stops or not len(stops):
+        return rows
+    t = np.concatenate([rows.t, stops.t])
+    microstep = np.concatenate([rows.microstep, stops.microstep])
+    # A wanted row on an event holds the values after it: sort it behind the micro-steps.
+    rank = np.concatenate([np.ones(len(rows)), np.zeros(len(stops))])
+    order = np.lexsort((microstep, rank, t))
+    return Rows(
+        t[order],
+        microstep[order],
+        np.concatenate([rows.y, stops.y])[order],
+        np.concatenate([rows.mode, stops.mode])[order],
+    )
+
+
+def written_whole(path: Path, write: Callable[[IO[bytes]], object]) -> Path:
+    """Write a file through a temporary one beside it: the old file or the new, never a half.
+
+    Parameters
+    ----------
+    path : Path
+        Where it goes.
+    write : callable
+        ``write(file)`` fills the open binary file.
+
+    Returns
+    -------
+    Path
+        The same path.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be written.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with temporary.open("wb") as file:
+            write(file)
+        os.replace(temporary, path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True) if temporary.parent.is_dir() else None
+        raise OutputError(
+            f"cannot write {path}: {error.strerror or error}; choose another folder or make room"
+        ) from None
+    return path
+
+
+def _log_path(path: Path) -> Path:
+    return path.with_name(f"{path.stem}.transitions.csv")
+
+
+def _cell(name: str, value: Any) -> str:
+    if name == "element":
+        return str(value + 1)
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+def _csv(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(head)
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def _read_columns(file: IO[str], path: Path, line: int) -> dict[str, list[str]]:
+    reader = csv.reader(file)
+    head = next(reader, None)
+    if not head:
+        raise TraceFileError(f"{path}: line {line} must name the columns")
+    rows = list(reader)
+    for number, row in enumerate(rows, start=line + 1):
+        if len(row) != len(head):
+            raise TraceFileError(
+                f"{path}: line {number} has {len(row)} cells, the head line has {len(head)}"
+            )
+    return {name: [row[j] for row in rows] for j, name in enumerate(head)}

@@ -1,0 +1,113 @@
+"""Step sizes: where to start, how to go on.
+
+References
+----------
+E. Hairer, S. P. Norsett, G. Wanner, *Solving Ordinary Differential Equations I*, II.4 (starting
+step) and Hairer & Wanner II, IV.2 (PI control).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from integrators.steps import Flow, Vector
+
+__all__ = ["error_norm", "next_factor", "retry_factor", "starting_step"]
+
+SAFETY = 0.9
+LEAST, MOST = 0.2, 10.0  # a step shrinks or grows by no more than this
+INFINITY = float("inf")
+
+
+def error_norm(error: Vector, y: Vector, y_new: Vector, rtol: float, atol: float) -> float:
+    """Return the largest component error in units of its tolerance; infinity if not finite.
+
+    The maximum, not the mean: one component in trouble among many at rest has to count.
+
+    >>> error_norm([1e-6], [0.0], [1.0], rtol=1e-6, atol=0.0)
+    1.0
+    """
+    worst = 0.0
+    for j in range(len(y)):
+        size = max(abs(y[j]), abs(y_new[j]))
+        ratio = abs(error[j]) / (atol + rtol * size)
+        if not ratio < INFINITY:
+            return INFINITY
+        if ratio > worst:
+            worst = ratio
+    return worst
+
+
+def next_factor(error: float, error_before: float, order: int) -> float:
+    """Return the growth after an accepted step (PI control).
+
+    >>> next_factor(1e-12, 1.0, 5)
+    10.0
+    """
+    error = max(error, 1e-10)
+    factor: float = SAFETY * error ** (-0.7 / order) * error_before ** (0.4 / order)
+    return min(MOST, max(LEAST, factor))
+
+
+def retry_factor(error: float, order: int) -> float:
+    """Return the shrinkage after a rejected step.
+
+    >>> retry_factor(float("inf"), 5)
+    0.2
+    """
+    if not error < INFINITY:
+        return LEAST
+    factor: float = SAFETY * error ** (-1.0 / order)
+    return max(LEAST, factor)
+
+
+def starting_step(
+    flow: Flow,
+    t: float,
+    y: Vector,
+    f: Vector,
+    mode: list[int],
+    held: Vector,
+    p: Any,
+    order: int,
+    rtol: float,
+    atol: float,
+    longest: float,
+    y_try: Vector,
+    f_try: Vector,
+) -> float:
+    """Return the usual starting step, from the size of y, y' and y''.
+
+    Parameters
+    ----------
+    flow, t, y, f, mode, held, p
+        The system at the start.
+    order : int
+        Exponent of the step's error.
+    rtol, atol : float
+        Tolerances.
+    longest : float
+        Upper bound.
+    y_try, f_try : list of float
+        Scratch.
+
+    Returns
+    -------
+    float
+        A step, > 0.
+    """
+    d0 = error_norm(y, y, y, rtol, atol)
+    d1 = error_norm(f, y, y, rtol, atol)
+    if not d1 < INFINITY:
+        return longest
+    h = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
+    h = min(h, longest)
+    for j in range(len(y)):
+        y_try[j] = y[j] + h * f[j]
+    flow(t + h, y_try, mode, held, p, f_try)
+    for j in range(len(y)):
+        f_try[j] = (f_try[j] - f[j]) / h
+    d2 = error_norm(f_try, y, y, rtol, atol)
+    steepest = max(d1, d2)
+    better = max(1e-6, h * 1e-3) if steepest <= 1e-15 else (0.01 / steepest) ** (1.0 / order)
+    return min(100.0 * h, better, longest)

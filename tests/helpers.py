@@ -1,0 +1,63 @@
+"""Shared cases of the tests: the models and rigs whose results are known, and small readers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gms_fsm import GMS, GMSParameters, Prescribed, PulledSlider, Slider, Stribeck, Trace
+
+SINE = "0.2*sin(2*pi*t/20)"
+FIG4_SINE = "0.15*sin(2*pi*t/25)"
+FIG3_FORCE = "min(0.25*t, max(0.25, 0.75 - 0.125*t)) + 0.1*sin(2*pi*2*(max(t, 4) - 4))"
+
+
+def stick_slip(law: str) -> GMS:
+    """Table I, stick-slip column."""
+    return GMS(GMSParameters.paper("stick-slip"), law=law)  # type: ignore[arg-type]
+
+
+def open_loop() -> Prescribed:
+    """The sine whose period no step divides."""
+    return Prescribed(SINE)
+
+
+def pulled_mass(k: np.ndarray | None = None) -> tuple[GMS, PulledSlider]:
+    """The stick-slip rig: a mass pulled through a spring, 72 transitions in 60 s."""
+    k = np.array([40.0, 30.0, 20.0, 10.0]) if k is None else k
+    parameters = GMSParameters(
+        k,
+        [0.4, 0.3, 0.2, 0.1],
+        [0.02] * 4,
+        sigma_2=0.4,
+        stribeck=Stribeck(F_c=1.0, F_s=1.5, v_s=0.05),
+        v_c=1e-6,
+        weights=1 / (4 * k),
+    )
+    return GMS(parameters, law="signed"), PulledSlider(1.0, 2.0, 0.1)
+
+
+def non_drifting(law: str, *, slipping: bool = False) -> tuple[GMS, Slider]:
+    """Fig. 3; with `slipping` the weights are 0.25/k, so that element 1 breaks away."""
+    parameters = GMSParameters.paper("non-drifting")
+    if slipping:
+        parameters = parameters.with_weights(0.25 / parameters.k)
+    return GMS(parameters, law=law), Slider(1.0, FIG3_FORCE)  # type: ignore[arg-type]
+
+
+def one_element(
+    law: str, *, F_c: float = 1.0, F_s: float = 1.5, v_s: float = 0.05, C: float = 0.1,
+    v_c: float = 1e-6, sigma: float = 0.1, k: float = 1.0,
+) -> GMS:  # fmt: skip
+    """One element with everything at hand."""
+    parameters = GMSParameters(
+        [k], [sigma], [C], sigma_2=0.0, stribeck=Stribeck(F_c, F_s, v_s), v_c=v_c
+    )
+    return GMS(parameters, law=law)  # type: ignore[arg-type]
+
+
+def same_bits(a: Trace, b: Trace) -> None:
+    """Assert that two traces are equal to the last bit."""
+    for name in ("t", "microstep", "x", "v", "z", "F", "F_elements", "states"):
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
+    for name in a.transitions.dtype.names:
+        np.testing.assert_array_equal(a.transitions[name], b.transitions[name], err_msg=name)
