@@ -252,7 +252,8 @@ def _tree(text: str) -> ast.expr:
     try:
         body = ast.parse(flat[lead:], mode="eval").body
     except SyntaxError as error:
-        column = max(1, min((error.offset or 1) + lead, len(text) + 1))
+        # Python reports offset 0 where it reached the end and wanted more.
+        column = min(error.offset + lead, len(text) + 1) if error.offset else len(text) + 1
         reason = "the text ends too early" if column > len(text) else "cannot be read from here"
         raise ExpressionError(reason, text, column, _GRAMMAR) from None
     except (ValueError, RecursionError, MemoryError):

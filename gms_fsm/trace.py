@@ -9,9 +9,8 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
 import zipfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -21,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.errors import MissingExtraError, OutputError, TraceFileError
+from gms_fsm.files import written_whole
 from gms_fsm.header import Header
 from gms_fsm.models import Model
 from gms_fsm.parameters import FloatArray
@@ -30,7 +30,7 @@ from gms_fsm.rigs import Rig
 if TYPE_CHECKING:
     import pandas
 
-__all__ = ["Rows", "Trace", "written_whole"]
+__all__ = ["Rows", "Trace"]
 
 _NUMBERS = ("z", "v", "s", "F_before", "F_after")
 
@@ -238,6 +238,25 @@ class Trace:
         rows = Rows(wanted, np.zeros(wanted.size, dtype=np.int64), y, table.mode[left])
         return Trace(rows, _merged(table, rows), self.transitions, self.model, self.rig,
                      self.settings)  # fmt: skip
+
+    def refined(self, points: int) -> Trace:
+        """Return the rows with evenly spaced samples between them, for smooth curves.
+
+        Parameters
+        ----------
+        points : int
+            How many samples over the whole run.
+
+        Returns
+        -------
+        Trace
+            All rows of this trace, micro-steps included, and the samples.
+        """
+        even = self.sample(np.linspace(self.t[0], self.t[-1], points)).rows
+        inner = ~np.isin(even.t, self.t)
+        between = Rows(*(column[inner] for column in vars(even).values()))
+        rows = _merged(between, self.rows)
+        return Trace(rows, rows, self.transitions, self.model, self.rig, self.settings)
 
     def _between(self, table: Rows, i: int, t: float) -> FloatArray:
         t0 = table.t[i]
@@ -507,39 +526,6 @@ def _merged(rows: Rows, stops: Rows) -> Rows:
         np.concatenate([rows.y, stops.y])[order],
         np.concatenate([rows.mode, stops.mode])[order],
     )
-
-
-def written_whole(path: Path, write: Callable[[IO[bytes]], object]) -> Path:
-    """Write a file through a temporary one beside it: the old file or the new, never a half.
-
-    Parameters
-    ----------
-    path : Path
-        Where it goes.
-    write : callable
-        ``write(file)`` fills the open binary file.
-
-    Returns
-    -------
-    Path
-        The same path.
-
-    Raises
-    ------
-    OutputError
-        If the folder cannot be written.
-    """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with temporary.open("wb") as file:
-            write(file)
-        os.replace(temporary, path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True) if temporary.parent.is_dir() else None
-        raise OutputError(
-            f"cannot write {path}: {error.strerror or error}; choose another folder or make room"
-        ) from None
-    return path
 
 
 def _log_path(path: Path) -> Path:

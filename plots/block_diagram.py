@@ -1,0 +1,257 @@
+"""Draw the block diagram of the whole friction model, Fig. 2a of the paper, for any n.
+
+Velocity goes through the Stribeck curve into the chart of the elements; the chart gives each
+element's force F_i and deflection rate dz_i; integrators turn the rates into deflections and feed
+them back; the forces and the viscous part add up to F. All positions are fixed here, in points, so
+Graphviz only draws: an automatic layout does not keep ports and wires in order.
+
+In the SVG, blocks have the classes ``block`` and ``integrator``, the lines the class ``wire``.
+
+References
+----------
+K. Roffi, "State Transition Block Diagram of the Generalized Maxwell Slip Friction Model",
+arXiv 2512.03049 (2025), Fig. 2a, eq. (2)-(4).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import graphviz
+
+from gms_fsm.errors import ParameterError
+from plots.style import (
+    BLUE,
+    BLUE_TINT,
+    INK,
+    PANEL,
+    PAPER,
+    SANS,
+    TEXT_GREY,
+    VERMILION,
+    VERMILION_TINT,
+)
+
+__all__ = ["block_diagram"]
+
+Point = tuple[float, float]
+
+# Columns from left to right and rows of the first element, in points; y points up.
+X_INPUT, X_BRANCH, X_STRIBECK, X_LEFT_LANE = 20, 72, 150, 228
+X_CHART_LEFT, X_CHART_RIGHT, X_INTEGRATOR, X_RIGHT_LANE = 250, 400, 480, 524
+Y_VISCOUS, Y_TITLE, Y_CHART_TOP, Y_VELOCITY, Y_STRIBECK, Y_NOTE = 167, 133, 121, 95, 59, 32
+Y_FORCE, Y_RATE, Y_DEFLECTION = 85, 59, 21
+# From one element to the next: its two outputs, its z port, its feedback line.
+ELEMENT, PORT, LANE = 60, 30, 12
+SUM_WIDTH, MARGIN = 36, 22
+
+INTEGRATOR = (
+    '<<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="0">'
+    '<TR><TD SIDES="B" BORDER="1">1</TD></TR><TR><TD><I>s</I></TD></TR></TABLE>>'
+)
+
+
+def block_diagram(elements: int = 4) -> graphviz.Digraph:
+    """Draw the block diagram of a GMS model.
+
+    Parameters
+    ----------
+    elements : int, optional
+        How many elements the model has; they are counted from 1 in the picture.
+
+    Returns
+    -------
+    graphviz.Digraph
+        The picture as a Graphviz graph; `plots.render.render` writes it to a file.
+
+    Raises
+    ------
+    ParameterError
+        If `elements` is not a whole number of at least 1.
+
+    Examples
+    --------
+    >>> graph = block_diagram(2)
+    >>> graph.engine, sum("class=integrator" in line for line in graph.body)
+    ('neato', 2)
+    """
+    if elements < 1 or elements % 1 != 0:
+        raise ParameterError(
+            f"elements is {elements!r}; a model has a whole number of elements, at least 1"
+        )
+    graph = graphviz.Digraph(
+        name="block diagram",
+        engine="neato",
+        graph_attr={
+            "layout": "neato",  # so that the DOT text alone says how it is drawn
+            "inputscale": "72",  # positions are points, not inches
+            "splines": "line",
+            "outputorder": "nodesfirst",
+            "bgcolor": PAPER,
+            "pad": "0.2",
+        },
+        node_attr={
+            "fontname": SANS,
+            "fontsize": "12",
+            "fontcolor": INK,
+            "color": INK,
+            "fixedsize": "true",
+            "margin": "0",
+        },
+        edge_attr={"color": INK, "arrowsize": "0.7", "penwidth": "1.1"},
+    )
+    last = int(elements) - 1
+    x_sum = X_RIGHT_LANE + last * LANE + 100
+    y_bottom = min(Y_RATE - last * ELEMENT, Y_DEFLECTION - last * PORT) - 32
+    _chart(graph, int(elements), y_bottom)
+    _velocity(graph)
+    _sum(graph, x_sum, top=Y_VISCOUS + MARGIN, bottom=Y_FORCE - last * ELEMENT - MARGIN)
+    _viscous_path(graph, x_sum)
+    for i in range(elements):
+        _element(graph, i, x_sum, y_bottom, lane=(last - i) * LANE)
+    return graph
+
+
+def _chart(graph: graphviz.Digraph, n: int, y_bottom: float) -> None:
+    middle = (X_CHART_LEFT + X_CHART_RIGHT) / 2
+    _block(
+        graph,
+        "chart",
+        (middle, (Y_CHART_TOP + y_bottom) / 2),
+        (X_CHART_RIGHT - X_CHART_LEFT, Y_CHART_TOP - y_bottom),
+        "",
+        style="rounded,filled",
+        fillcolor=PANEL,
+    )
+    count = f' <FONT COLOR="{TEXT_GREY}">&#215; {n}</FONT>' if n > 1 else ""
+    title = f"<B>GMS element chart</B>{count}"
+    _label(graph, "chart-title", (middle, Y_TITLE), title, width=150)
+    for name, text, y in (("v", "<I>v</I>", Y_VELOCITY), ("s", "<I>s</I>(<I>v</I>)", Y_STRIBECK)):
+        _joint(graph, f"chart-{name}", (X_CHART_LEFT, y))
+        _label(graph, f"chart-{name}-name", (X_CHART_LEFT + 20, y), text)
+
+
+def _velocity(graph: graphviz.Digraph) -> None:
+    """Draw the input and where it goes: chart and Stribeck curve."""
+    soft = {"style": "rounded,filled", "fillcolor": BLUE_TINT, "color": BLUE}
+    _block(graph, "v", (X_INPUT, Y_VELOCITY), (44, 24), "<<I>v</I>>", **soft)
+    _block(graph, "stribeck", (X_STRIBECK, Y_STRIBECK), (86, 40), "<<I>s</I>(<I>v</I>)>")
+    note = f'<FONT POINT-SIZE="9" COLOR="{TEXT_GREY}">Stribeck, eq. (2)</FONT>'
+    _label(graph, "stribeck-note", (X_STRIBECK, Y_NOTE), note, width=86)
+    graph.node(
+        "branch", "", id="branch", pos=_pos((X_BRANCH, Y_VELOCITY)), shape="point", width="0.07"
+    )
+    _wire(graph, "velocity", "v", [], "branch", arrow="none")
+    _wire(graph, "velocity-chart", "branch", [], "chart-v")
+    _wire(graph, "velocity-stribeck", "branch", [(X_BRANCH, Y_STRIBECK)], "stribeck")
+    _wire(graph, "threshold", "stribeck", [], "chart-s")
+
+
+def _sum(graph: graphviz.Digraph, x: float, top: float, bottom: float) -> None:
+    y = (top + bottom) / 2
+    sigma = '<<FONT POINT-SIZE="16">&#931;</FONT>>'
+    _block(graph, "sum", (x, y), (SUM_WIDTH, top - bottom), sigma)
+    soft = {"style": "rounded,filled", "fillcolor": VERMILION_TINT, "color": VERMILION}
+    _block(graph, "F", (x + 82, y), (44, 24), "<<I>F</I>>", **soft)
+    _wire(graph, "friction", "sum", [], "F")
+
+
+def _summand(graph: graphviz.Digraph, name: str, x_sum: float, y: float) -> None:
+    _joint(graph, name, (x_sum - SUM_WIDTH / 2, y))
+    _label(graph, f"{name}-sign", (x_sum - SUM_WIDTH / 2 + 7, y), "+", width=10)
+
+
+def _viscous_path(graph: graphviz.Digraph, x_sum: float) -> None:
+    label = '<<FONT POINT-SIZE="11">&#963;<SUB>2</SUB></FONT>>'
+    at = (X_INTEGRATOR, Y_VISCOUS)
+    _block(graph, "sigma_2", at, (46, 46), label, shape="triangle", orientation="-90")
+    _summand(graph, "sum-viscous", x_sum, Y_VISCOUS)
+    _wire(graph, "velocity-viscous", "branch", [(X_BRANCH, Y_VISCOUS)], "sigma_2")
+    _wire(graph, "viscous", "sigma_2", [], "sum-viscous")
+
+
+def _element(graph: graphviz.Digraph, i: int, x_sum: float, y_bottom: float, lane: float) -> None:
+    """Draw what belongs to element i: its ports, its integrator and its wires."""
+    number = i + 1
+    y_force, y_rate = Y_FORCE - i * ELEMENT, Y_RATE - i * ELEMENT
+    y_deflection = Y_DEFLECTION - i * PORT
+    for name, at, inwards, colour in (
+        ("z", (X_CHART_LEFT, y_deflection), 20, BLUE),
+        ("F", (X_CHART_RIGHT, y_force), -20, INK),
+        ("dz", (X_CHART_RIGHT, y_rate), -20, INK),
+    ):
+        port = f"chart-{name}{number}"
+        _joint(graph, port, at, colour)
+        text = f'<FONT COLOR="{colour}"><I>{name}</I><SUB>{number}</SUB></FONT>'
+        _label(graph, f"{port}-name", (at[0] + inwards, at[1]), text)
+
+    _summand(graph, f"sum-F{number}", x_sum, y_force)
+    _wire(graph, f"force{number}", f"chart-F{number}", [], f"sum-F{number}")
+
+    integrator = f"integrator{number}"
+    kind = {"class": "integrator"}
+    _block(graph, integrator, (X_INTEGRATOR, y_rate), (40, 36), INTEGRATOR, **kind)
+    _wire(graph, f"rate{number}", f"chart-dz{number}", [], integrator)
+    # The first element's feedback is the outermost, so that the feedback lines never cross.
+    right, left, below = X_RIGHT_LANE + lane, X_LEFT_LANE - lane, y_bottom - 16 - lane
+    corners = [(right, y_rate), (right, below), (left, below), (left, y_deflection)]
+    _wire(graph, f"deflection{number}", integrator, corners, f"chart-z{number}", colour=BLUE)
+
+
+# --------------------------------------------------------------------------- parts
+def _block(
+    graph: graphviz.Digraph, name: str, at: Point, size: Point, label: str, **look: str
+) -> None:
+    plain = {"class": "block", "shape": "box", "style": "filled", "fillcolor": PAPER}
+    graph.node(name, label, id=name, pos=_pos(at), **_size(size), **(plain | look))
+
+
+def _label(graph: graphviz.Digraph, name: str, at: Point, text: str, width: float = 40) -> None:
+    graph.node(name, f"<{text}>", id=name, pos=_pos(at), shape="plaintext", **_size((width, 18)))
+
+
+def _joint(graph: graphviz.Digraph, name: str, at: Point, colour: str = INK) -> None:
+    """Mark where wires end or turn, with a square of a wire's width: corners have no notch."""
+    graph.node(
+        name,
+        "",
+        id=name,
+        pos=_pos(at),
+        shape="box",
+        style="filled",
+        fillcolor=colour,
+        penwidth="0",
+        **_size((1.1, 1.1)),
+    )
+
+
+def _wire(
+    graph: graphviz.Digraph,
+    name: str,
+    start: str,
+    corners: Sequence[Point],
+    end: str,
+    colour: str = INK,
+    arrow: str = "forward",
+) -> None:
+    stops = [start, *(f"{name}-corner{k}" for k in range(1, len(corners) + 1)), end]
+    for stop, corner in zip(stops[1:], corners, strict=False):  # the last stop is no corner
+        _joint(graph, stop, corner, colour)
+    for k, (here, there) in enumerate(pairwise(stops), start=1):
+        graph.edge(
+            here,
+            there,
+            id=f"{name}-{k}",
+            **{"class": "wire"},
+            color=colour,
+            dir=arrow if there == end else "none",
+        )
+
+
+def _pos(at: Point) -> str:
+    return f"{at[0]:g},{at[1]:g}!"
+
+
+def _size(size: Point) -> dict[str, str]:
+    return {"width": f"{size[0] / 72:.4f}", "height": f"{size[1] / 72:.4f}"}

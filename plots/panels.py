@@ -1,0 +1,212 @@
+"""Single panels: each takes an Axes and a Trace, draws, and returns its artists."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm.errors import MissingExtraError
+from gms_fsm.trace import Trace
+from plots.style import (
+    BLUE,
+    BLUE_TINT,
+    ELEMENT_COLOURS,
+    ELEMENT_DASHES,
+    HATCHES,
+    INK,
+    LINE_GREY,
+    VERMILION,
+    VERMILION_TINT,
+)
+
+try:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+except ImportError:
+    raise MissingExtraError(
+        'figures need matplotlib; install it with: pip install "gms-fsm[plots]"'
+    ) from None
+
+__all__ = ["deflections", "force", "hysteresis", "residual", "ribbons", "velocity"]
+
+Artists = list[Artist]
+
+
+def velocity(ax: Axes, trace: Trace) -> Artists:
+    """Draw v(t).
+
+    Parameters
+    ----------
+    ax : Axes
+        Where.
+    trace : Trace
+        What.
+
+    Returns
+    -------
+    list of Artist
+        The line.
+    """
+    ax.set(xlabel="t [s]", ylabel="v [m/s]")
+    return list(ax.plot(trace.t, trace.v, color=INK))
+
+
+def force(ax: Axes, trace: Trace) -> Artists:
+    """Draw the friction force F(t); at a transition both one-sided values are drawn.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where.
+    trace : Trace
+        What.
+
+    Returns
+    -------
+    list of Artist
+        The line.
+    """
+    ax.set(xlabel="t [s]", ylabel="F [N]")
+    return list(ax.plot(trace.t, trace.F, color=INK))
+
+
+def deflections(ax: Axes, trace: Trace) -> Artists:
+    """Draw z_i(t) of every element.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where.
+    trace : Trace
+        What.
+
+    Returns
+    -------
+    list of Artist
+        One line an element.
+    """
+    ax.set(xlabel="t [s]", ylabel="z [m]")
+    lines: Artists = []
+    for i in range(trace.n):
+        lines += ax.plot(
+            trace.t,
+            trace.z[:, i],
+            color=ELEMENT_COLOURS[i % len(ELEMENT_COLOURS)],
+            linestyle=ELEMENT_DASHES[i % len(ELEMENT_DASHES)],
+            label=f"$z_{{{i + 1}}}$",
+        )
+    return lines
+
+
+def hysteresis(ax: Axes, trace: Trace, phases: Sequence[tuple[str, float]] = ()) -> Artists:
+    """Draw F against x, in phases.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where; x is shown in mm.
+    trace : Trace
+        What.
+    phases : sequence of (str, float), optional
+        Names and end times [s] of parts drawn in colours of their own; one part when left out.
+
+    Returns
+    -------
+    list of Artist
+        One line a phase.
+    """
+    ax.set(xlabel="x [mm]", ylabel="F [N]")
+    looks = ((BLUE, "-"), (VERMILION, "-"), (LINE_GREY, "-"))
+    begin = -np.inf
+    lines: Artists = []
+    for number, (name, end) in enumerate(phases or [("", np.inf)]):
+        part = (trace.t >= begin) & (trace.t <= end)
+        colour, dash = looks[number % len(looks)]
+        lines += ax.plot(
+            1e3 * trace.x[part], trace.F[part], color=colour, linestyle=dash, label=name,
+            zorder=3 - number % 3, linewidth=1.6 if number < 2 else 0.9,
+        )  # fmt: skip
+        begin = end
+    return lines
+
+
+def ribbons(ax: Axes, trace: Trace) -> Artists:
+    """Draw the active state of every element as a ribbon, like a logic analyser.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where.
+    trace : Trace
+        What.
+
+    Returns
+    -------
+    list of Artist
+        One collection a state and element.
+    """
+    names = [state.name for state in trace.model.chart.states]
+    fills = (BLUE_TINT, VERMILION_TINT, "#D9F0E7", "#F6E3EE", "#FBF0D5")
+    edges = (BLUE, VERMILION, "#009E73", "#CC79A7", "#E69F00")
+    drawn: Artists = []
+    for i in range(trace.n):
+        mode = trace.rows.mode[:, i]
+        starts = np.concatenate([[0], np.flatnonzero(np.diff(mode)) + 1])
+        ends = np.append(trace.t[starts[1:]], trace.t[-1])
+        for state, name in enumerate(names):
+            spans = [
+                (trace.t[a], b - trace.t[a])
+                for a, b in zip(starts, ends, strict=True)
+                if mode[a] == state
+            ]
+            drawn.append(
+                ax.broken_barh(
+                    spans,
+                    (i + 0.6, 0.8),
+                    facecolor=fills[state % len(fills)],
+                    edgecolor=edges[state % len(edges)],
+                    hatch=HATCHES[state % len(HATCHES)],
+                    linewidth=0.6,
+                    label=name if i == 0 else None,
+                )
+            )
+    ax.set(
+        xlabel="t [s]",
+        ylim=(trace.n + 0.5, 0.5),
+        yticks=range(1, trace.n + 1),
+        yticklabels=[f"E{i + 1}" for i in range(trace.n)],
+        xlim=(trace.t[0], trace.t[-1]),
+    )
+    return drawn
+
+
+def residual(
+    ax: Axes, times: NDArray[np.float64], difference: NDArray[np.float64], floor: float = 1e-12
+) -> Artists:
+    """Draw the size of a difference of forces on a logarithmic scale.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where.
+    times : ndarray, shape (m,), s
+        When.
+    difference : ndarray, shape (m,), N
+        What; smaller values than `floor` are drawn at the floor.
+    floor : float
+        N.
+
+    Returns
+    -------
+    list of Artist
+        The line.
+    """
+    ax.set(
+        xlabel="t [s]",
+        ylabel="|difference of F| [N]",
+        yscale="log",
+        xlim=(times[0], times[-1]),
+    )
+    return list(ax.plot(times, np.maximum(np.abs(difference), floor), color=INK, linewidth=0.8))

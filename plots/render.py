@@ -1,0 +1,126 @@
+"""Write a Graphviz picture to a file, with whatever Graphviz there is.
+
+First the program ``dot`` on PATH, then the Python package pygraphviz, whose wheels bring the
+Graphviz libraries along. Without either, the DOT text is written instead, with a warning that says
+how to get pictures: a missing drawing program must not stop a computation.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import warnings
+from pathlib import Path
+
+import graphviz
+
+from gms_fsm.errors import OutputError, ParameterError
+from gms_fsm.files import written_whole
+
+__all__ = ["render"]
+
+PICTURES = (".svg", ".png", ".pdf")
+TEXTS = (".dot", ".gv")
+PNG_DPI = "144"  # twice a screen point: crisp on dense displays
+
+
+def render(graph: graphviz.Digraph, path: str | Path) -> Path:
+    """Write a picture; the format is the path's suffix.
+
+    Parameters
+    ----------
+    graph : graphviz.Digraph
+        For example from `plots.statechart.statechart`.
+    path : str or Path
+        Ends with ``.svg``, ``.png`` or ``.pdf`` for a picture, ``.dot`` or ``.gv`` for the DOT
+        text. The folder has to exist. A file of that name is replaced as a whole or not at all.
+
+    Returns
+    -------
+    Path
+        The file really written: where there is no Graphviz, the DOT text beside `path`.
+
+    Raises
+    ------
+    ParameterError
+        If the suffix is another one.
+    OutputError
+        If the folder cannot be written, or if Graphviz cannot draw the graph.
+
+    Warns
+    -----
+    UserWarning
+        If there is no Graphviz, neither program nor package.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from gms_fsm.charts import LUGRE
+    >>> from plots.statechart import statechart
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     render(statechart(LUGRE), Path(folder, "lugre.dot")).name
+    'lugre.dot'
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in PICTURES + TEXTS:
+        raise ParameterError(
+            f"path is {str(path)!r}; its suffix must be one of {', '.join(PICTURES)} for a "
+            f"picture or {', '.join(TEXTS)} for the DOT text"
+        )
+    picture = None if suffix in TEXTS else _draw(graph, suffix[1:])
+    if picture is not None:
+        written_whole(path, lambda file: file.write(picture))
+    elif suffix in TEXTS:
+        written_whole(path, lambda file: file.write(graph.source.encode()))
+    else:
+        path = path.with_suffix(".dot")
+        written_whole(path, lambda file: file.write(graph.source.encode()))
+        warnings.warn(
+            f"No Graphviz was found, so the DOT text was written to {path}: install Graphviz "
+            '(program dot) or run `pip install "gms-fsm[render]"` to get pictures.',
+            stacklevel=2,
+        )
+    return path
+
+
+def _draw(graph: graphviz.Digraph, form: str) -> bytes | None:
+    """Return the picture, or None if there is no Graphviz."""
+    picture = _by_program(graph, form)
+    if picture is None:
+        picture = _by_package(graph, form)
+    if picture is not None and form == "pdf":
+        # The same chart gives the same file: the date is the only thing that would change.
+        picture = re.sub(rb"(/CreationDate \(D:)\d{14}", rb"\g<1>19700101000000", picture)
+    return picture
+
+
+def _by_program(graph: graphviz.Digraph, form: str) -> bytes | None:
+    program = shutil.which("dot")
+    if program is None:
+        return None
+    command = [program, f"-K{graph.engine}", f"-T{form}"]
+    if form == "png":
+        command.append(f"-Gdpi={PNG_DPI}")
+    done = subprocess.run(command, input=graph.source.encode(), capture_output=True, check=False)
+    if done.returncode != 0:
+        message = done.stderr.decode(errors="replace").strip()
+        raise OutputError(f"Graphviz ({program}) cannot draw this graph: {message}")
+    picture: bytes = done.stdout
+    return picture
+
+
+def _by_package(graph: graphviz.Digraph, form: str) -> bytes | None:
+    try:
+        import pygraphviz
+    except ImportError:
+        return None
+    try:
+        drawing = pygraphviz.AGraph(string=graph.source)
+        if form == "png":
+            drawing.graph_attr["dpi"] = PNG_DPI
+        picture: bytes = drawing.draw(format=form, prog=graph.engine)
+    except (ValueError, OSError) as error:
+        raise OutputError(f"Graphviz (pygraphviz) cannot draw this graph: {error}") from None
+    return picture

@@ -1,0 +1,144 @@
+"""`gms-fsm paper` writes all it promises, and its claims are measured, not known by heart."""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from gms_fsm import Trace, paper
+from gms_fsm.errors import OutputError, SimulationError
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Write the whole reproduction once."""
+    pytest.importorskip("matplotlib", reason="the figures need the extra 'plots'")
+    pytest.importorskip("pygraphviz", reason="the charts need Graphviz, extra 'render'")
+    place = tmp_path_factory.mktemp("paper")
+    seen: dict[str, list[float]] = {}
+    files = paper.write(place, progress=lambda name, done: seen.setdefault(name, []).append(done))
+    assert files[0] == place / "claims.md"
+    assert all(path.is_file() for path in files)
+    for name, steps in seen.items():  # a bar that runs backward or never ends is no progress
+        assert steps == sorted(steps), name
+        assert steps[-1] == pytest.approx(1.0), name
+    return place
+
+
+def cells(folder: Path, claim: str) -> list[str]:
+    rows = [line for line in (folder / "claims.md").read_text().splitlines() if claim in line]
+    assert len(rows) == 1, claim
+    return [cell.strip() for cell in re.split(r"(?<!\\)\|", rows[0])[1:-1]]
+
+
+@pytest.mark.parametrize(
+    ("claim", "measured", "verdict"),
+    [
+        ("linearly elastic", r"line of 111\.\d N/m", "holds"),
+        ("hysteresis when the force falls", r"\d+\.\d to \d+\.\d mN above", "holds only as"),
+        ("GMS is bounded", r"between 1\.769 and 2\.732 mm", "holds only as"),
+        ("where elements slip", r"between 15\.48 and 16\.44 mm", "holds"),
+        ("LuGre drifts steadily", r"0\.60 mm at 2 s, 5\.63 mm at 30 s", "holds"),
+        ("no GMS transition fires", r"^0 transitions", "holds"),
+        ("break-away near t = 5 s", r"t = 4\.9128 s", "holds"),
+        ("one break-away peak first", r"^1 peak", "holds"),
+        (
+            "several break-away peaks later",
+            r"2 at 32\.64–35\.04",
+            "holds only with s\\(v\\) unsigned",
+        ),
+        (
+            "the force is not symmetric",
+            r"-3\.08, -2\.00, -0\.68, -0\.40",
+            "holds only with s\\(v\\)",
+        ),
+        ("LuGre is uniform", r"0\.42\d+ to 0\.42\d+", "holds"),
+        ("a residual of about 1e-3 N", r"fig4: 0 of \d+", "differs: the implementations are ident"),
+        (
+            "spikes at the transitions",
+            r"42 of 50 transitions lost",
+            "holds only with guards looked",
+        ),
+        ("residual of about 1e-4 N", r"\|dF\\\| \d\.\de-0\d N", "differs: identical under one"),
+    ],
+)
+def test_every_claim_has_a_measured_figure_and_a_verdict(
+    folder: Path, claim: str, measured: str, verdict: str
+) -> None:
+    _, _, found, judged = cells(folder, claim)
+    assert re.search(measured, found), found
+    assert re.fullmatch(rf"\*\*{verdict}.*\*\*", judged), judged
+
+
+def test_claims_say_what_we_chose_and_how_far_the_engines_agree(folder: Path) -> None:
+    text = (folder / "claims.md").read_text()
+    assert paper.FORCE in text
+    assert paper.VELOCITY in text
+    assert re.search(r"\*\*0 of \d{5} numbers differ\*\*", text)
+    assert "eigenvalue +C/s" in text
+
+
+def test_figures_are_whole_and_small(folder: Path) -> None:
+    names = ["fig3", "fig3_slipping", "fig4", "fig4_laws", "residual", "chart_element",
+             "chart_bank", "block_diagram", "chart_lugre"]  # fmt: skip
+    for name in names:
+        png = (folder / f"{name}.png").read_bytes()
+        assert png.startswith(b"\x89PNG")
+        assert png.endswith(b"IEND\xaeB`\x82")
+        svg = folder / f"{name}.svg"
+        assert svg.stat().st_size < 1_000_000
+        assert ElementTree.parse(svg).getroot().tag.endswith("svg")
+
+
+def test_figure_4_has_the_panels_of_the_paper(folder: Path) -> None:
+    # Matplotlib draws text as paths, with the text itself in a comment.
+    for name, letters in (("fig3", "abcd"), ("fig4", "abcdef")):
+        text = (folder / f"{name}.svg").read_text()
+        for letter in letters:
+            assert f"<!-- {letter}) " in text, (name, letter)
+
+
+def test_traces_and_logs_are_there_and_agree(folder: Path) -> None:
+    for experiment in paper.experiments():
+        trace = Trace.load(folder / "traces" / f"{experiment.name}.npz")
+        assert trace.t[-1] == experiment.t_end
+        with (folder / "transitions" / f"{experiment.name}.csv").open() as file:
+            log = list(csv.DictReader(file))
+        assert [float(row["t"]) for row in log] == trace.transitions.t.tolist()
+        assert [int(row["element"]) - 1 for row in log] == trace.transitions.element.tolist()
+    chart, ifelse = (
+        Trace.load(folder / "traces" / f"fig4_{name}.npz") for name in ("chart", "ifelse")
+    )
+    np.testing.assert_array_equal(chart.F, ifelse.F)
+
+
+def test_a_folder_that_cannot_be_written_is_said_before_anything_runs(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    begun: list[str] = []
+    with pytest.raises(OutputError, match="choose another folder"):
+        paper.write(tmp_path / "file" / "out", progress=lambda name, _: begun.append(name))
+    assert not begun
+
+
+def test_a_run_that_fails_leaves_its_part(tmp_path: Path) -> None:
+    with pytest.raises(SimulationError, match=r"written to .*partial\.npz"):
+        paper.write(tmp_path, force="0.1*sqrt(3 - t)")
+    assert 2.9 < Trace.load(tmp_path / "partial.npz").t[-1] <= 3.0
+
+
+def test_a_run_that_fails_leaves_the_runs_before_it(tmp_path: Path) -> None:
+    with pytest.raises(SimulationError, match="fig4_chart"):
+        paper.write(tmp_path, velocity="0.1*sqrt(3 - t)")
+    assert Trace.load(tmp_path / "traces" / "fig3_chart.npz").t[-1] == paper.FIG3_END
+
+
+def test_own_signals_are_used_and_not_judged() -> None:
+    text = paper.claims_text(paper.run("0.1*t", "0.1*sin(t)"), "0.1*t", "0.1*sin(t)")
+    assert "F_a = 0.1*t" in text
+    assert "Not judged" in text
+    assert "| claim |" not in text
