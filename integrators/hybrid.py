@@ -299,6 +299,7 @@ def run(
     if out.every_step:
         yield Arc([t], [list(y)], tuple(switch.mode))
     fresh = True
+    jumps = [s for s in system.jumps if options.located and s <= t_end]
     while True:
         microstep = 0
         while wanted := switch.ask(t, y):
@@ -311,8 +312,9 @@ def run(
                 break
         if t >= t_end:
             break
-        jumps = system.jumps if options.located else []
-        t_stop = min([s for s in jumps if s > t] + [t_end])
+        # A step that ends on a jump would see the value behind it: stop one clock tick before.
+        jump = min((s for s in jumps if s > t), default=math.inf)
+        t_stop = min(math.nextafter(jump, -math.inf), t_end)
         try:
             if options.located:
                 _arm(ws, t, y)
@@ -340,6 +342,11 @@ def run(
             raise StepTooSmall("step size under the clock's resolution", t, y)
         if status == kernel.NOT_FINITE:
             raise NotFinite("NaN or infinity", t, y)
+        if status == kernel.REACHED and t < t_end:
+            t = jump
+            yield Stop(t, list(y), tuple(switch.mode))
+            if out.every_step:
+                yield Arc([t], [list(y)], tuple(switch.mode))
         if status == kernel.CROSSED:
             clock.count_relations(t, y)
             yield Stop(t, list(y), tuple(switch.mode))
