@@ -60,6 +60,10 @@ class State:
     entry: Mapping[str, str] = field(default_factory=dict)
     exit: Mapping[str, str] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        for each in ("flow", "entry", "exit"):  # nobody else keeps a hand on a frozen chart
+            object.__setattr__(self, each, dict(getattr(self, each)))
+
 
 @dataclass(frozen=True)
 class Transition:
@@ -87,6 +91,9 @@ class Transition:
     target: str
     guard: str
     actions: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "actions", dict(self.actions))
 
 
 @dataclass(frozen=True)
@@ -147,6 +154,7 @@ class Chart:
     def __post_init__(self) -> None:
         for each in ("inputs", "variables", "parameters", "states", "transitions"):
             object.__setattr__(self, each, tuple(getattr(self, each)))
+        object.__setattr__(self, "outputs", dict(self.outputs))
         self._check_names()
         symbols = self.inputs + self.variables + self.parameters
         here = f"chart {self.name!r}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import json
 import sys
 import warnings
 from pathlib import Path
@@ -15,10 +16,13 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 import gms_fsm
 from gms_fsm import paper
 from gms_fsm.errors import GMSError
+from gms_fsm.live import LiveView
 from gms_fsm.models import GMS, Model
 from gms_fsm.parameters import GMSParameters
 from gms_fsm.program import lower
+from gms_fsm.report import run_scenario, velocity_note
 from gms_fsm.rigs import Prescribed, PulledSlider, Rig, Slider
+from gms_fsm.scenario import Scenario, load_scenario
 
 __all__ = ["app", "main"]
 
@@ -86,6 +90,39 @@ def paper_command(
 
         files = paper.write(output, force, velocity, show)
     typer.echo(f"{len(files)} files in {output}; start with {files[0]}")
+
+
+@app.command("run")
+def run_command(
+    scenario: Annotated[Path, typer.Argument(help="A scenario file, TOML.", show_default=False)],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Folder for what is written; out/<name> if left out."),
+    ] = None,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Change a key, for example --set model.law=published."),
+    ] = None,
+    live: Annotated[
+        bool, typer.Option("--live", help="Show every element's state while it runs.")
+    ] = False,
+) -> None:
+    """Run a scenario; write trace, transition log, overview figure and summary."""
+    loaded = load_scenario(scenario, overrides or [])
+    folder = Path("out") / scenario.stem if output is None else output
+    start, end = loaded.arguments["t_start"], loaded.arguments["t_end"]
+    with LiveView(Console(stderr=True), start, end, detail=live) as view:
+        trace, files = run_scenario(loaded, folder, view)
+    if loaded.motion is not None and (note := velocity_note(trace, loaded.motion)):
+        _plain_warning(note)
+    typer.echo(f"{len(trace.transitions)} transitions; {len(files)} files in {folder}")
+    typer.echo(f"start with {files[0]}")
+
+
+@app.command("schema")
+def schema_command() -> None:
+    """Print the JSON schema of scenario files, for editors."""
+    typer.echo(json.dumps(Scenario.model_json_schema(), indent=2))
 
 
 @app.command("code")

@@ -113,3 +113,15 @@ class NotFiniteError(SimulationError):
 
 class SignalEndError(SimulationError):
     """A sampled signal ends before the run does."""
+
+
+class UnitError(GMSError, ValueError):
+    """A unit is unknown, or measures something else."""
+
+
+class RecordError(GMSError, ValueError):
+    """A measured record cannot be used; the text names file, row and column."""
+
+
+class ScenarioError(GMSError, ValueError):
+    """A scenario file is wrong; the text names file, key, value and rule."""

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import ast
 import math
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -49,7 +50,9 @@ __all__ = [
 
 LONGEST_TEXT = 10_000  # characters; a chart's text is a line, not a program
 DEEPEST_TREE = 60  # levels; keeps every recursive reader far from Python's own limit
-LARGEST_PRODUCT_POWER = 8  # x**8 and below are printed as products
+LARGEST_PRODUCT_POWER = 8  # x**8 and below are printed as products ...
+LARGEST_PRODUCT = 64  # ... unless the text would grow beyond this many parts
+MOST_ARGUMENTS = 50  # of min and max
 
 
 # --------------------------------------------------------------------------- the tree
@@ -242,15 +245,20 @@ def _tree(text: str) -> ast.expr:
             LONGEST_TEXT + 1,
             f"at most {LONGEST_TEXT} characters",
         )
-    for mark in ("#", "\\", "\0", ";"):
-        if mark in text:
-            raise ExpressionError(f"unexpected {mark!r}", text, text.index(mark) + 1, _GRAMMAR)
+    for column, mark in enumerate(text, start=1):
+        if mark in "#\\\0;" or "\ud800" <= mark <= "\udfff":
+            reason = (
+                f"unexpected {mark!a}" if mark < "\ud800" else "half a character cannot be read"
+            )
+            raise ExpressionError(reason, text, column, _GRAMMAR)
     flat = "".join(" " if c.isspace() else c for c in text)  # same length: columns stay true
     lead = len(flat) - len(flat.lstrip())
     if lead == len(flat):
         raise ExpressionError("the text is empty", text, 1, _GRAMMAR)
     try:
-        body = ast.parse(flat[lead:], mode="eval").body
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # "1and v" is a warning to Python, a mistake here
+            body = ast.parse(flat[lead:], mode="eval").body
     except SyntaxError as error:
         # Python reports offset 0 where it reached the end and wanted more.
         column = min(error.offset + lead, len(text) + 1) if error.offset else len(text) + 1
@@ -327,12 +335,14 @@ class _Reader:
         if (len(arguments) < 2) if several else (len(arguments) != 1):
             wanted = "two or more arguments" if several else "one argument"
             raise self.refuse(f"{function} got {len(arguments)} arguments", node, wanted)
+        if len(arguments) > MOST_ARGUMENTS:
+            raise self.refuse(
+                f"{function} got {len(arguments)} arguments", node, f"at most {MOST_ARGUMENTS}"
+            )
         values = [self.value(argument, depth) for argument in arguments]
-        result = Call(function, (values[0],)) if not several else None
-        if result is None:  # min(a, b, c) is min(min(a, b), c): one corner at a time
-            result = Call(function, (values[0], values[1]))
-            for value in values[2:]:
-                result = Call(function, (result, value))
+        result = Call(function, tuple(values[:2]))
+        for value in values[2:]:  # min(a, b, c) is min(min(a, b), c): one corner at a time
+            result = Call(function, (result, value))
         return result
 
     def condition(self, node: ast.expr, depth: int) -> Condition:
@@ -369,6 +379,13 @@ class _Reader:
 
 
 def _plain(node: ast.expr) -> str:
+    match node:
+        case ast.Constant(value=value) if value is not ...:
+            return f"the constant {value!r}"
+        case ast.BinOp(op=op) | ast.UnaryOp(op=op):
+            signs = {"Mod": "%", "FloorDiv": "//", "MatMult": "@", "BitAnd": "&", "BitOr": "|",
+                     "BitXor": "^", "LShift": "<<", "RShift": ">>", "Invert": "~"}  # fmt: skip
+            return f"the operator {signs.get(type(op).__name__, type(op).__name__.lower())}"
     words = {
         ast.Attribute: "an attribute (.)",
         ast.Subscript: "an index ([ ])",
@@ -377,9 +394,13 @@ def _plain(node: ast.expr) -> str:
         ast.NamedExpr: "an assignment (:=)",
         ast.JoinedStr: "an f-string",
         ast.Call: "this call",
-        ast.Constant: f"the constant {getattr(node, 'value', None)!r}",
+        ast.Tuple: "a comma",
+        ast.Starred: "a star",
+        ast.Await: "await",
+        ast.Yield: "yield",
+        ast.YieldFrom: "yield",
     }
-    return words.get(type(node), type(node).__name__)
+    return words.get(type(node), "a bracket like this")
 
 
 # --------------------------------------------------------------------------- spelling
@@ -488,17 +509,41 @@ def _power(
         power, power_level = _spell(exponent, spelling, rename)
         power = power if power_level == _ATOM else f"({power})"
         return f"{inner if level == _ATOM else f'({inner})'}^{power}", _LEVEL["**"]
-    whole = _whole_power(exponent)
+    whole = _product_power(base, exponent)
     if whole is None:
         return f"pow({inner}, {_spell(exponent, spelling, rename)[0]})", _ATOM
     if whole == 0:
         return "1.0", _ATOM
+    if whole == 1:
+        return inner, level
     first = inner if level >= _LEVEL["*"] else f"({inner})"
     other = inner if level > _LEVEL["*"] else f"({inner})"
     product = " * ".join([first] + [other] * (abs(whole) - 1))
     if whole < 0:
         return f"1.0 / ({product})", _LEVEL["/"]
-    return product, level if whole == 1 else _LEVEL["*"]
+    return product, _LEVEL["*"]
+
+
+def _product_power(base: Value, exponent: Value) -> int | None:
+    """Return the power if it is computed as a product, else None (it is computed by pow)."""
+    whole = _whole_power(exponent)
+    if whole is None or abs(whole) * _parts(base) > LARGEST_PRODUCT:
+        return None
+    return whole
+
+
+def _parts(node: Value) -> int:
+    """Count the names and numbers of a value as printed, powers as products."""
+    match node:
+        case Binary("**", base, exponent):
+            return _parts(base) * max(1, abs(_product_power(base, exponent) or 1))
+        case Negative(operand):
+            return _parts(operand)
+        case Binary(_, left, right):
+            return _parts(left) + _parts(right)
+        case Call(_, arguments):
+            return sum(_parts(argument) for argument in arguments)
+    return 1
 
 
 def _whole_power(exponent: Value) -> int | None:
@@ -540,7 +585,7 @@ def evaluate(node: Node, values: Mapping[str, float]) -> float | bool:
         case Negative(operand):
             return -evaluate(operand, values)
         case Binary("**", base, exponent):
-            return _evaluate_power(evaluate(base, values), exponent, values)
+            return _evaluate_power(base, exponent, values)
         case Binary(op, left, right):
             a, b = evaluate(left, values), evaluate(right, values)
             if op == "+":
@@ -568,13 +613,15 @@ def _compare(op: str, a: float, b: float) -> bool:
     return a > b if op == ">" else a >= b
 
 
-def _evaluate_power(base: float, exponent: Value, values: Mapping[str, float]) -> float:
-    whole = _whole_power(exponent)
+def _evaluate_power(base: Value, exponent: Value, values: Mapping[str, float]) -> float:
+    whole = _product_power(base, exponent)
     if whole is None:
-        return math.pow(base, evaluate(exponent, values))
-    product = 1.0 if whole == 0 else base
+        return math.pow(evaluate(base, values), evaluate(exponent, values))
+    if whole == 0:
+        return 1.0
+    product = factor = evaluate(base, values)
     for _ in range(abs(whole) - 1):
-        product *= base
+        product *= factor
     return 1.0 / product if whole < 0 else product
 
 
@@ -685,6 +732,8 @@ def split(condition: Condition, holds: bool = True) -> Split:
                 else:  # a conjunction inside a conjunction
                     parts.extend(part[1])
             return word, tuple(parts)
+        case Relation(op, Call("abs", (Call("abs") as inner,)), bound):
+            return split(Relation(op, inner, bound), holds)  # ||u|| is |u|
         case Relation(op, Call("abs", (inner,)), bound):
             below = op in ("<", "<=")
             other = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}[op]

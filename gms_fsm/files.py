@@ -64,11 +64,13 @@ def written_whole(path: Path, write: Callable[[IO[bytes]], object]) -> Path:
     """
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        with temporary.open("wb") as file:
-            write(file)
-        os.replace(temporary, path)
+        try:
+            with temporary.open("wb") as file:
+                write(file)
+            os.replace(temporary, path)
+        finally:  # also when the writer itself fails, or is interrupted
+            temporary.unlink(missing_ok=True)
     except OSError as error:
-        temporary.unlink(missing_ok=True) if temporary.parent.is_dir() else None
         raise OutputError(
             f"cannot write {path}: {error.strerror or error}; choose another folder or make room"
         ) from None

@@ -77,15 +77,14 @@ SignalRecord = Annotated[
 class RigRecord(_Record):
     """A rig's numbers and signals."""
 
-    title: str
-    acceleration: str | None
+    kind: Literal["Prescribed", "Slider", "PulledSlider"]
     numbers: dict[str, float]
     signals: dict[str, SignalRecord]
 
     @property
     def prescribed(self) -> bool:
         """Whether v is given."""
-        return self.acceleration is None
+        return self.kind == "Prescribed"
 
 
 class Header(_Record):
@@ -116,8 +115,7 @@ class Header(_Record):
                 sigma_2=model.sigma_2,
             ),
             rig=RigRecord(
-                title=rig.title,
-                acceleration=rig.acceleration,
+                kind=type(rig).__name__,
                 numbers=dict(rig.numbers),
                 signals={name: _signal_record(signal) for name, signal in rig.signals.items()},
             ),
@@ -144,13 +142,13 @@ class Header(_Record):
         """Return a rig that moves the same; a Python function is replaced by one that says so."""
         signals = {name: _signal(name, record) for name, record in self.rig.signals.items()}
         numbers = self.rig.numbers
-        if self.rig.title == Prescribed.title:
-            return Prescribed(signals["v"])
-        if self.rig.title == Slider.title:
-            return Slider(numbers["mass"], signals["F_a"])
-        if self.rig.title == PulledSlider.title:
-            return PulledSlider(**numbers)
-        raise ValueError(f"unknown rig {self.rig.title!r}")
+        match self.rig.kind:
+            case "Prescribed":
+                return Prescribed(signals["v"])
+            case "Slider":
+                return Slider(numbers["mass"], signals["F_a"])
+            case "PulledSlider":
+                return PulledSlider(**numbers)
 
 
 def _signal_record(signal: Signal) -> FormulaRecord | CornersRecord | FunctionRecord:

@@ -18,6 +18,7 @@ from gms_fsm.expression import PYTHON, Condition, names_in, spell
 from gms_fsm.generated import load
 from gms_fsm.models import Model
 from gms_fsm.program import Program
+from integrators import NotFinite
 
 __all__ = ["Element", "ElementMachines", "Engine", "IfElse"]
 
@@ -140,6 +141,13 @@ class ElementMachines:
                             "not know; write them in the chart's guard, it is the only truth"
                         )
                     rows.append((index, self.guards[edge.name]))
+            found = [index for index, _ in rows]
+            for index, edge in chart.leaving(state.name):
+                if found.count(index) != 1:
+                    raise ChartError(
+                        f"the machine has the edge {edge.name!r} {found.count(index)} times, chart "
+                        f"{chart.name!r} has it once; change the chart, it is the only truth"
+                    )
             table.append(rows)
         known = {edge.name for edge in chart.transitions}
         for trigger in self.machine.get_triggers(*self.machine.states):
@@ -154,6 +162,11 @@ class ElementMachines:
 def _new_element(kind: type[Element], model: Model, index: int) -> Element:
     if not (isinstance(kind, type) and issubclass(kind, Element)):
         raise ParameterError(f"element is {kind!r}; it must be a class derived from Element")
+    if kind.__eq__ is not object.__eq__:
+        raise ParameterError(
+            f"{kind.__name__} compares by value, so that transitions would take all elements for "
+            "one; use @dataclass(eq=False)"
+        )
     element = kind()
     element.index = index
     for name, value in model.values.items():
@@ -172,6 +185,16 @@ class Engine(Protocol):
 
     def fire(self, machine: int, edge: int, t: float, y: list[float]) -> None:
         """Take an edge."""
+
+
+def act(
+    program: Program, edge: int, machine: int, t: float, y: list[float], mode: list[int]
+) -> None:
+    """Do the assignments of an edge."""
+    try:
+        program.functions["act"](edge, machine, t, y, mode, program.p)
+    except (ArithmeticError, ValueError) as error:
+        raise NotFinite(f"an assignment of an edge: {error}", t, y) from None
 
 
 class MachineEngine:
@@ -221,7 +244,7 @@ class MachineEngine:
                 f"element {machine + 1}: edge {row.name!r} was enabled at t = {t!r} s but a "
                 "callback changed the element's values before it fired; callbacks may only look"
             )
-        self.program.functions["act"](edge, machine, t, y, self.mode, self.program.p)
+        act(self.program, edge, machine, t, y, self.mode)
         self.mode[machine] = self.chart.state_index(element.state)
 
 
@@ -241,5 +264,5 @@ class IfElse:
 
     def fire(self, machine: int, edge: int, t: float, y: list[float]) -> None:
         """Assign and switch."""
-        self.program.functions["act"](edge, machine, t, y, self.mode, self.program.p)
+        act(self.program, edge, machine, t, y, self.mode)
         self.mode[machine] = self.targets[edge]

@@ -232,8 +232,12 @@ class ChartModel:
     title: str = field(default="", kw_only=True)
 
     def __post_init__(self) -> None:
-        if self.n < 1:
-            raise ParameterError(f"n is {self.n}; a bank has at least one element")
+        if not isinstance(self.n, int) or self.n < 1:
+            raise ParameterError(
+                f"n is {self.n!r}; a bank has a whole number of elements, at least one"
+            )
+        if not isinstance(self.stribeck, Stribeck):
+            raise ParameterError(f"stribeck is {self.stribeck!r}; it must be a Stribeck")
         for name in self.chart.inputs:
             if name not in SUPPLIED:
                 raise ParameterError(
@@ -256,5 +260,5 @@ class ChartModel:
 
 def _number_or_array(name: str, value: float | FloatArray, n: int) -> float | FloatArray:
     if np.ndim(value) == 0:
-        return checked_scalar(name, float(value), "finite")
+        return checked_scalar(name, value, "finite")  # type: ignore[arg-type]
     return checked_array(name, value, n, "finite")

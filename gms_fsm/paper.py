@@ -26,7 +26,7 @@ from gms_fsm.models import GMS, LuGre, Model
 from gms_fsm.parameters import FloatArray, GMSParameters
 from gms_fsm.rigs import Prescribed, Rig, Slider
 from gms_fsm.signals import Formula
-from gms_fsm.simulate import simulate
+from gms_fsm.simulate import Moment, simulate
 from gms_fsm.trace import Trace
 
 __all__ = ["FORCE", "VELOCITY", "Claim", "Experiment", "judge", "run", "write"]
@@ -155,9 +155,9 @@ def run_one(experiment: Experiment, progress: Progress | None = None) -> Trace:
         The run.
     """
 
-    def reached(t: float) -> None:
+    def reached(moment: Moment) -> None:
         if progress is not None:
-            progress(experiment.name, t / experiment.t_end)
+            progress(experiment.name, moment.t / experiment.t_end)
 
     arguments = (experiment.model, experiment.rig, experiment.t_end)
     if experiment.paper_settings:

@@ -41,10 +41,10 @@ def checked_array(name: str, values: ArrayLike, n: int | None, rule: str) -> Flo
         raise ParameterError(f"{name} is {values!r}; it must be a list of numbers") from None
     if array.ndim != 1 or array.size == 0:
         raise ParameterError(
-            f"{name} has shape {array.shape}; it must be a list with one number an element"
+            f"{name} has shape {array.shape}; it must be a flat list of numbers, not empty"
         )
     if n is not None and array.size != n:
-        raise ParameterError(f"{name} has {array.size} entries; k has {n}, so it must have {n} too")
+        raise ParameterError(f"{name} has {array.size} entries, but there are {n} elements")
     for i, value in enumerate(array):
         checked_scalar(f"{name}[{i}] (element {i + 1})", float(value), rule)
     array.setflags(write=False)

@@ -28,6 +28,7 @@ from typing import Any
 
 import numpy as np
 
+from gms_fsm.chart import RESERVED
 from gms_fsm.errors import SignalError
 from gms_fsm.expression import (
     Binary,
@@ -182,6 +183,7 @@ class _Lowering:
         self._collect_numbers()
         self._collect_rough()
         self._collect_relations()
+        self._collect_constants()
 
     # ------------------------------------------------------------------ collecting
     def _collect_numbers(self) -> None:
@@ -192,7 +194,7 @@ class _Lowering:
         }  # fmt: skip
         self.own: dict[str, list[float]] = {"weight": as_floats(self.model.weights)}
         taken = set(self.shared) | set(self.rig.signals) | {f"{s}_signal" for s in self.rig.signals}
-        taken |= {"weights"}
+        taken |= {"F_i", "len", "range", "piecewise_linear", "v_dip"}  # of the text itself
         # A chart may call its own parameter F_c or mass: it gets a name of its own in the text.
         self.rename: dict[str, str] = {_DIP: "v_dip"}
         chart_names = (*self.chart.variables, *self.chart.parameters)
@@ -263,7 +265,8 @@ class _Lowering:
     def landmarks(self) -> list[Comparison]:
         """Where s(v) starts to change fast: a large step would jump the whole dip unseen."""
         v, dip = Name("v"), Name(_DIP)
-        return [Comparison(v, dip, strict=True), Comparison(v, Negative(dip), strict=True)]
+        # Mirror images of each other, so that a mirrored run stops at mirrored places.
+        return [Comparison(v, dip, strict=True), Comparison(Negative(dip), v, strict=True)]
 
     # ------------------------------------------------------------------ arrays
     def arguments(self) -> Arguments:
@@ -331,16 +334,24 @@ class _Lowering:
         return "\n".join(lines) + "\n"
 
     def state_constant(self, state: str) -> str:
-        return self._constant("IN", state)
+        return self.constants["state", state]
 
     def edge_constant(self, edge: str) -> str:
-        return self._constant("TAKE", edge)
+        return self.constants["edge", edge]
 
-    def _constant(self, kind: str, name: str) -> str:
-        # STICK reads best, but a state called c must not become the parameter C.
-        plain = name.upper()
-        everything = {n.upper() for n in (*self.locals, *self.sign_names.values())}
-        return f"{kind}_{plain}" if plain in everything | {"S", "F"} else plain
+    def _collect_constants(self) -> None:
+        # STICK reads best, but a state called c must not become the parameter C, nor the edge
+        # Home the state home.
+        taken = {*self.locals, *RESERVED}
+        self.constants: dict[tuple[str, str], str] = {}
+        names = [("state", s.name) for s in self.chart.states]
+        names += [("edge", t.name) for t in self.chart.transitions]
+        for kind, name in names:
+            constant = name.upper()
+            while constant in taken or not constant.isidentifier():
+                constant += "_"
+            taken.add(constant)
+            self.constants[kind, name] = constant
 
     def spell(self, node: Node) -> str:
         return spell(node, rename=self.rename)

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from numbers import Real
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -165,25 +166,35 @@ def as_signal(given: SignalLike) -> Signal:
     >>> as_signal(([0, 1, 2], [0.0, 0.1, 0.0])).held
     False
     """
-    if isinstance(given, Formula | Corners | Function):
-        return given
-    if isinstance(given, str):
-        return Formula(given)
-    if isinstance(given, int | float) and not isinstance(given, bool):
-        return Corners([-1.0, 0.0], [given, given], held=True)  # type: ignore[arg-type]
-    if callable(given):
-        return Function(given)
-    if isinstance(given, tuple) and len(given) == 2 and not isinstance(given[0], tuple):
-        return Corners(given[0], given[1], held=False)  # type: ignore[arg-type]
-    if isinstance(given, list | np.ndarray | tuple):
+    form: Any = given
+    if isinstance(form, Formula | Corners | Function):
+        return form
+    if isinstance(form, str):
+        return Formula(form)
+    if isinstance(form, bool):
+        raise SignalError(f"signal: {form!r} is not a signal; give a number, say 1.0")
+    if isinstance(form, Real | np.generic):
+        level = float(form)
+        return Corners(np.array([-1.0, 0.0]), np.array([level, level]), held=True)
+    if callable(form):
+        return Function(form)
+    pair = form if isinstance(form, tuple) and len(form) == 2 else ()
+    if pair and all(isinstance(part, tuple) and len(part) == 2 for part in pair):
+        raise SignalError(
+            f"signal: {form!r} can be read as two ramp corners and as a record of two samples; "
+            "give a list [(t, value), (t, value)] or arrays (times, values)"
+        )
+    if pair:
+        return Corners(pair[0], pair[1], held=False)
+    if isinstance(form, list | np.ndarray | tuple):
         try:
-            corners = np.array(given, dtype=np.float64)
+            corners = np.array(form, dtype=np.float64)
         except (TypeError, ValueError):
             corners = np.empty(0)
         if corners.ndim == 2 and corners.shape[1] == 2:
             return Corners(corners[:, 0], corners[:, 1], held=True)
     raise SignalError(
-        f"signal: {given!r} is not a signal; give an expression of t in quotes, a list of "
+        f"signal: {form!r} is not a signal; give an expression of t in quotes, a list of "
         "(t, value) pairs, a pair (times, values), or a function of t"
     )
 

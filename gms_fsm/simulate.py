@@ -20,6 +20,7 @@ from gms_fsm.errors import (
     SimulationError,
     StepSizeError,
 )
+from gms_fsm.expression import rough_points
 from gms_fsm.machines import ElementMachines, IfElse, MachineEngine
 from gms_fsm.models import Model
 from gms_fsm.parameters import as_floats, checked_array, checked_scalar
@@ -29,7 +30,7 @@ from gms_fsm.signals import Corners
 from gms_fsm.trace import Rows, Trace, log_of
 from integrators import Arc, Firing, HybridError, Livelock, NotFinite, Options, StepTooSmall
 
-__all__ = ["simulate"]
+__all__ = ["Moment", "simulate"]
 
 
 def simulate(
@@ -47,7 +48,7 @@ def simulate(
     engine: str | ElementMachines = "machines",
     t_eval: ArrayLike | None = None,
     initial: Mapping[str, Any] | None = None,
-    progress: Callable[[float], object] | None = None,
+    progress: Callable[[Moment], object] | None = None,
 ) -> Trace:
     """Run a friction model on a rig.
 
@@ -86,7 +87,7 @@ def simulate(
         Any of ``z`` (n,) [m], ``states`` (n,) names, ``v`` [m/s] (not with a prescribed velocity)
         and ``x`` [m].
     progress : callable, optional
-        Called with the time reached [s], now and then.
+        Called now and then with the `Moment` reached.
 
     Returns
     -------
@@ -116,7 +117,7 @@ def simulate(
     options = _options(method, step, rtol, atol, max_step, events, t_eval, t_start, t_end)
     last = _covered(rig, t_start, t_end)
     program = lower(model, rig)
-    y, mode = _initial(model, rig, initial or {})
+    y, mode = _initial(model, rig, {} if initial is None else initial)
     switch: MachineEngine | IfElse
     if isinstance(engine, ElementMachines):
         if engine.model is not model:
@@ -153,9 +154,16 @@ def simulate(
     recorder.start(t_start, y, mode)
     try:
         for happening in integrators.run(system, switch, t_start, y, last, options):
-            reached = recorder.take(happening)
+            try:
+                recorder.take(happening)
+            except ArithmeticError as error:  # of an output at a firing
+                raise NotFiniteError(
+                    f"the force cannot be computed at t = {happening.t!r} s: {error}; the run up "
+                    "to there is kept in .trace",
+                    recorder.trace(),
+                ) from None
             if progress is not None:
-                progress(reached)
+                progress(Moment(recorder))
     except HybridError as error:
         raise _explained(error, recorder, model, mode) from None
     except SignalError as error:
@@ -203,8 +211,15 @@ def _options(
         step = checked_scalar("step", step, "> 0")
     checked_scalar("rtol", rtol, "> 0")
     checked_scalar("atol", atol, "> 0")
-    if not max_step > 0:
-        raise ParameterError(f"max_step is {max_step!r}; it must be > 0")
+    if max_step != math.inf:
+        max_step = checked_scalar("max_step", max_step, "> 0")
+    tick = 16.0 * math.ulp(max(abs(t_start), abs(t_end)))
+    for name, length in (("step", step), ("max_step", max_step)):
+        if length is not None and length <= tick:
+            raise ParameterError(
+                f"{name} is {length!r} s, under the resolution of the clock ({tick:.2g} s here); "
+                "give a longer one"
+            )
     if events not in ("located", "step"):
         raise ParameterError(f"events is {events!r}; it must be 'located' or 'step'")
     if events == "step" and step is None and not math.isfinite(max_step):
@@ -213,12 +228,11 @@ def _options(
         )
     times = None
     if t_eval is not None:
-        wanted = np.asarray(t_eval, dtype=np.float64)
-        if wanted.ndim != 1 or not np.isfinite(wanted).all():
-            raise ParameterError("t_eval must be a flat list of finite times")
-        if wanted.size == 0 or wanted[0] < t_start or wanted[-1] > t_end:
+        wanted = checked_array("t_eval", t_eval, None, "finite")
+        for outside in wanted[(wanted < t_start) | (wanted > t_end)][:1]:
             raise ParameterError(
-                f"t_eval must lie within t_start = {t_start!r} and t_end = {t_end!r}"
+                f"t_eval has {float(outside)!r}, outside of t_start = {t_start!r} to "
+                f"t_end = {t_end!r}"
             )
         if (np.diff(wanted) <= 0).any():
             i = int(np.flatnonzero(np.diff(wanted) <= 0)[0])
@@ -249,6 +263,10 @@ def _initial(model: Model, rig: Rig, initial: Mapping[str, Any]) -> tuple[list[f
     """Build the state vector and the modes."""
     chart, n = model.chart, model.n
     known = ("x", "v", *chart.variables, "states")
+    if not isinstance(initial, Mapping):
+        raise ParameterError(
+            f"initial is {initial!r}; it must be a mapping, for example {{'x': 0}}"
+        )
     for name in initial:
         if name not in known:
             raise ParameterError(
@@ -268,8 +286,8 @@ def _initial(model: Model, rig: Rig, initial: Mapping[str, Any]) -> tuple[list[f
                 f"initial[{name!r}] has {values.size} entries; the model has {n} elements"
             )
         y += as_floats(values)
-    names: Sequence[str] = initial.get("states", [chart.default_state.name] * n)
-    if isinstance(names, str) or len(names) != n:
+    names: Any = initial.get("states", [chart.default_state.name] * n)
+    if isinstance(names, str) or np.ndim(names) != 1 or len(names) != n:
         raise ParameterError(f"initial['states'] is {names!r}; it must list {n} state names")
     return y, [chart.state_index(str(name)) for name in names]
 
@@ -315,30 +333,33 @@ class _Recorder:
         self.rows = _Columns([], [], [], [])
         self.stops = _Columns([], [], [], [])
         self.log: list[tuple[Any, ...]] = []
+        self.latest: tuple[float, list[float], tuple[int, ...]]
         self.size = 2 + (2 + len(model.chart.variables)) * model.n
 
     def start(self, t: float, y: list[float], mode: list[int]) -> None:
         """Keep the initial state as the first stop."""
+        self.latest = (t, y, tuple(mode))
         if self.wanted:
             self.stops.add(t, 0, list(y), tuple(mode))
 
-    def take(self, happening: Arc | Firing | integrators.Stop) -> float:
-        """Keep one happening; return its time."""
+    def take(self, happening: Arc | Firing | integrators.Stop) -> None:
+        """Keep one happening."""
         match happening:
             case Arc(t=times, y=states, mode=mode):
                 self.rows.t.extend(times)
                 self.rows.microstep.extend([0] * len(times))
                 self.rows.y.extend(states)
                 self.rows.mode.extend([mode] * len(times))
-                return times[-1]
+                self.latest = (times[-1], states[-1], mode)
             case Firing():
                 side = self.stops if self.wanted else self.rows
                 side.add(happening.t, happening.microstep, happening.y, happening.mode)
                 self.log.append(self._record(happening))
+                self.latest = (happening.t, happening.y, happening.mode)
             case integrators.Stop(t=t, y=y, mode=mode):
                 if self.wanted:
                     self.stops.add(t, 0, y, mode)
-        return happening.t
+                self.latest = (t, y, mode)
 
     def _record(self, firing: Firing) -> tuple[Any, ...]:
         chart, i = self.model.chart, firing.machine
@@ -365,6 +386,33 @@ class _Recorder:
         rows = self.rows.rows(size, n)
         stops = self.stops.rows(size, n) if self.wanted else rows
         return Trace(rows, stops, log_of(self.log), self.model, self.rig, self.settings)
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """The latest row of a running simulation; computed only when asked."""
+
+    _recorder: _Recorder
+
+    @property
+    def t(self) -> float:
+        """Time, s."""
+        return self._recorder.latest[0]
+
+    @property
+    def states(self) -> list[str]:
+        """Active state of each element."""
+        states = self._recorder.model.chart.states
+        return [states[mode].name for mode in self._recorder.latest[2]]
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """``v`` [m/s] and ``F`` [N]; ``z`` and ``s`` [m], one an element."""
+        recorder, n = self._recorder, self._recorder.model.n
+        t, y, mode = recorder.latest
+        seen = recorder.observe(t, y, mode)
+        first = recorder.program.first
+        return {"v": seen[0], "F": seen[1], "z": y[first : first + n], "s": seen[2 : 2 + n]}
 
 
 # --------------------------------------------------------------------------- explaining
@@ -409,7 +457,7 @@ def _explained(
     rough = [
         i
         for i, state in enumerate(mode)
-        if any(("sgn" in text or "abs" in text) for text in chart.states[state].flow.values())
+        if any(rough_points(chart.flows[chart.states[state].name, u]) for u in chart.variables)
     ]
     i = rough[0] if rough else 0
     state = chart.states[mode[i]]

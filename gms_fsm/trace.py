@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -190,8 +189,11 @@ class Trace:
         table = np.empty((len(self.rows), len(out)))
         modes = self.rows.mode.tolist()
         for row, (t, y) in enumerate(zip(self.rows.t.tolist(), self.rows.y.tolist(), strict=True)):
-            observe(t, y, modes[row], program.p, out)
-            table[row] = out
+            try:
+                observe(t, y, modes[row], program.p, out)
+                table[row] = out
+            except (ArithmeticError, ValueError):  # the last row of a run that could not go on
+                table[row] = np.nan
         return {
             "v": table[:, 0],
             "F": table[:, 1],
@@ -350,14 +352,17 @@ class Trace:
             raise
         except FileNotFoundError as error:
             raise TraceFileError(f"{error.filename}: no such file") from None
-        except (OSError, EOFError, KeyError, IndexError, zipfile.BadZipFile) as error:
-            raise TraceFileError(f"{path}: not a complete trace file ({error})") from None
-        except ValueError as error:  # numpy, json, pydantic, and our own checks
-            raise TraceFileError(f"{path}: damaged trace file ({error})") from None
+        except Exception as error:
+            # A damaged file can fail anywhere inside zipfile, zlib, numpy, csv or pydantic, and
+            # each has errors of its own; whatever it is, it is the file's fault.
+            reason = str(error).partition("\n")[0][:200] or type(error).__name__
+            raise TraceFileError(
+                f"{path}: damaged or incomplete trace file ({type(error).__name__}: {reason})"
+            ) from None
 
     @classmethod
     def _load_npz(cls, path: Path) -> Trace:
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
             header = Header.model_validate_json(str(file["header"]))
             tables = {
                 kind: Rows(*(file[f"{kind}_{name}"] for name in ("t", "microstep", "y", "mode")))
@@ -374,22 +379,24 @@ class Trace:
         cls, header: Header, rows: Rows, stops: Rows, log: Any, stored: Mapping[str, FloatArray]
     ) -> Trace:
         model = header.to_model()
-        n, m = model.n, len(rows)
-        wanted = {"v": (m,), "F": (m,), "s": (m, n), "F_elements": (m, n), "dz": (m, n)}
-        shapes = {name: (value.shape, wanted[name]) for name, value in stored.items()}
+        n, m = model.n, rows.t.size
+        size = (1 if header.rig.prescribed else 2) + n * len(model.chart.variables)
         for kind, table in (("rows", rows), ("stops", stops)):
-            shapes[f"{kind} y"] = (table.y.shape[:1], table.t.shape)
-            shapes[f"{kind} mode"] = (table.mode.shape, (len(table), n))
-            shapes[f"{kind} microstep"] = (table.microstep.shape, table.t.shape)
-            if table.mode.size and not (
-                0 <= table.mode.min() <= table.mode.max() < len(model.chart.states)
-            ):
-                raise TraceFileError(f"{kind}: a state number is not a state of the chart")
-        for name, (found, shape) in shapes.items():
-            if found != shape:
-                raise TraceFileError(f"{name} has shape {found}, expected {shape}")
-        if set(log.dtype.names or ()) != set(_log_dtype(8).names or ()):
+            count = table.t.size
+            _expect(f"{kind} t", table.t, (count,), "f")
+            _expect(f"{kind} microstep", table.microstep, (count,), "i")
+            _expect(f"{kind} y", table.y, (count, size), "f")
+            _expect(f"{kind} mode", table.mode, (count, n), "i")
+            if not (np.diff(table.t) >= 0).all() or not np.isfinite(table.t).all():
+                raise TraceFileError(f"{kind} t: times must be finite and must not go backward")
+            if count and not 0 <= table.mode.min() <= table.mode.max() < len(model.chart.states):
+                raise TraceFileError(f"{kind} mode: a number is not a state of the chart")
+        for name, value in stored.items():
+            _expect(name, value, (m, n) if name in ("s", "F_elements", "dz") else (m,), "f")
+        if log.ndim != 1 or log.dtype != _log_dtype(_text_width(log.dtype)):
             raise TraceFileError("the transition log has other columns than a trace has")
+        if log.size and not 0 <= log.element.min() <= log.element.max() < n:
+            raise TraceFileError("the transition log names an element that the model has not")
         return cls(rows, stops, log, model, header.to_rig(), header.settings, stored)
 
     def _header(self) -> Header:
@@ -407,14 +414,12 @@ class Trace:
         table: dict[str, NDArray[Any]] = {
             "t": self.t, "microstep": self.microstep, "x": self.x, "v": self.v, "F": self.F,
         }  # fmt: skip
-        for i in range(self.n):
-            table |= {
-                f"{name}{i + 1}": self.variable(name)[:, i] for name in self.model.chart.variables
-            }
-        for name, values in (
-            ("state", self.states), ("s", self.s), ("F", self.F_elements), ("dz", self.dz),
-        ):  # fmt: skip
-            table |= {f"{name}{i + 1}": values[:, i] for i in range(self.n)}
+        variables = self.model.chart.variables
+        blocks = [(name, self.variable(name)) for name in variables]
+        blocks += [("state", self.states), ("s", self.s), ("F", self.F_elements)]  # type: ignore[list-item]
+        blocks.append((f"d{variables[0]}", self.dz))
+        for name, values in blocks:
+            table |= {_column(name, i): values[:, i] for i in range(self.n)}
         return table
 
     def to_pandas(self) -> pandas.DataFrame:
@@ -474,12 +479,12 @@ class Trace:
             return np.array([float(cell) for cell in table[name]])
 
         def block(name: str) -> FloatArray:
-            return np.array([number(f"{name}{i + 1}") for i in range(model.n)]).T
+            return np.array([number(_column(name, i)) for i in range(model.n)]).T
 
         y = [number("x")] if header.rig.prescribed else [number("x"), number("v")]
         for name in model.chart.variables:
             y += list(block(name).T)
-        mode = [[states.index(c) for c in table[f"state{i + 1}"]] for i in range(model.n)]
+        mode = [[states.index(c) for c in table[_column("state", i)]] for i in range(model.n)]
         rows = Rows(
             number("t"),
             np.array([int(c) for c in table["microstep"]], dtype=np.int64),
@@ -490,8 +495,10 @@ class Trace:
             (float(t), int(e) - 1, *rest[:3], *(float(c) for c in rest[3:]))
             for t, e, *rest in zip(*(log[name] for name in _LOG_NAMES), strict=True)
         ]
-        observed = {"v": number("v"), "F": number("F"), "s": block("s"), "dz": block("dz"),
-                    "F_elements": block("F")}  # fmt: skip
+        observed = {
+            "v": number("v"), "F": number("F"), "s": block("s"), "F_elements": block("F"),
+            "dz": block(f"d{model.chart.variables[0]}"),
+        }  # fmt: skip
         return cls._checked(header, rows, rows, log_of(records), observed)
 
 
@@ -502,6 +509,19 @@ _LOG_NAMES = ("t", "element", "edge", "source", "target", *_NUMBERS)
 def _log_dtype(width: int) -> np.dtype[Any]:
     kinds = {"t": "f8", "element": "i8", **dict.fromkeys(("edge", "source", "target"), f"U{width}")}
     return np.dtype([(name, kinds.get(name, "f8")) for name in _LOG_NAMES])
+
+
+def _text_width(dtype: np.dtype[Any]) -> int:
+    fields: Mapping[str, Any] = dtype.fields or {}
+    return int(fields["edge"][0].itemsize) // 4 if "edge" in fields else 1
+
+
+def _expect(name: str, array: Any, shape: tuple[int, ...], kind: str) -> None:
+    """Refuse an array from a file that is not what a trace holds."""
+    if not isinstance(array, np.ndarray) or array.shape != shape or array.dtype.kind != kind:
+        found = getattr(array, "shape", None), str(getattr(array, "dtype", type(array).__name__))
+        wanted = shape, {"f": "float", "i": "integer"}[kind]
+        raise TraceFileError(f"{name} is {found}, a trace has {wanted}")
 
 
 def log_of(records: Iterable[tuple[Any, ...]]) -> Any:
@@ -526,6 +546,11 @@ def _merged(rows: Rows, stops: Rows) -> Rows:
         np.concatenate([rows.y, stops.y])[order],
         np.concatenate([rows.mode, stops.mode])[order],
     )
+
+
+def _column(name: str, i: int) -> str:
+    """Return the column's name of element i: z1, but z1_1 for a variable that is called z1."""
+    return f"{name}{'_' if name[-1].isdigit() or name[-1] == '_' else ''}{i + 1}"
 
 
 def _log_path(path: Path) -> Path:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from integrators.crossings import NO_CHANGE, Margins, Watched, first_change
+from integrators.crossings import NO_CHANGE, Margins, Watched, copy_margins, first_change
 from integrators.step_size import error_norm, next_factor, retry_factor
 from integrators.steps import (
     Coefficients,
@@ -24,6 +24,7 @@ __all__ = ["Control", "Output", "Work", "advance"]
 
 # Why the kernel came back.
 REACHED, CROSSED, FULL, TOO_SMALL, NOT_FINITE = 0, 1, 2, 3, 4
+REDO = 0.9  # a crossing before this fraction of an adaptive step has the step done again
 # Places in Output.cursor.
 ROW, NEXT_TIME, NEXT_KNOT = 0, 1, 2
 
@@ -47,6 +48,7 @@ class Output(NamedTuple):
     rows_t: Vector  # shape (capacity,)
     rows_y: list[Vector]  # shape (capacity, m)
     cursor: list[int]  # [rows written, next wanted time, next knot]
+    reached: Vector  # [time of the last accepted step]
 
 
 class Work(NamedTuple):
@@ -111,7 +113,7 @@ def advance(
     mode, held, p
         Frozen, handed on to the system.
     w : Watched
-        Relations; ``w.low`` holds the margins at t.
+        Relations; ``w.start`` holds the margins at t.
     out, work
         Buffers.
     most_steps : int
@@ -128,6 +130,7 @@ def advance(
     cursor = out.cursor
     infinity = float("inf")
     rejected = False
+    redone = False
     while True:
         if t >= t_stop:
             return REACHED, t, h, error_before
@@ -150,6 +153,8 @@ def advance(
             limit = min(limit, knots[cursor[NEXT_KNOT]])
         if t_new + control.resolution >= limit:
             t_new = limit
+        if not t_new > t:
+            return TOO_SMALL, t, h, error_before
         h_now = t_new - t
 
         take_step(flow, method, t, y, f, t_new, mode, held, p, work.k, work.y_new, work.f_new)
@@ -192,8 +197,17 @@ def advance(
                 interpolate, work.dense, margins, t, t_new, work.y_new, mode, p, w,
                 control.resolution,
             )  # fmt: skip
+        if theta < REDO and not fixed and not redone:
+            # The stages lay behind the crossing and may have jumped what comes before it: the step
+            # up to the crossing is done for its own sake.
+            h = theta * h_now
+            redone = True
+            continue
+        redone = False
         if theta < 1.0:
             t_new = t + theta * h_now
+        else:
+            copy_margins(w, w.end, w.start)
         # Rows at wanted times are right-continuous: a time that falls on a stop is written
         # after it, when the states have switched.
         while cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] < t_new:
@@ -210,6 +224,7 @@ def advance(
                 y[j] = work.y_new[j]
                 f[j] = work.f_new[j]
         t = t_new
+        out.reached[0] = t
         most_steps -= 1
         if out.every_step:
             put_row(out, t, y)

@@ -6,6 +6,10 @@ place is bracketed until both ends are one clock tick apart and the *right* end 
 raw comparison has changed, so whoever asks next just evaluates it. Half-open on the left: a margin
 that starts at zero does not fire again.
 
+Before a place is believed to be the first, the step up to it is searched for a change that is
+undone again: an interval counts as quiet only where start, middle and end show each margin to be
+monotone, or farther from a change than its curvature could carry it; else it is halved.
+
 Roads not taken: a root finder on the margin stops at a place where the comparison is not yet true
 (margin -5e-17); a bracket by sign fails when the arc starts on the zero; one relation after another
 misses what becomes true and false again before the first of them.
@@ -18,10 +22,11 @@ from typing import Any, NamedTuple
 
 from integrators.steps import Vector
 
-__all__ = ["NO_CHANGE", "Margins", "Watched", "any_changed", "first_change"]
+__all__ = ["DEEPEST", "NO_CHANGE", "Margins", "Watched", "any_changed", "first_change", "watched"]
 
 Margins = Callable[..., Any]  # margins(t, y, mode, p, watch, out) -> None, fills watched entries
 NO_CHANGE = 2.0
+DEEPEST = 8  # halvings of a step: windows down to 1/256 of it are searched for
 
 
 class Watched(NamedTuple):
@@ -31,11 +36,44 @@ class Watched(NamedTuple):
     active: list[int]  # indices of the flagged ones
     truth: list[bool]  # truth at the arc's start, shape (r,)
     strict: list[bool]  # shape (r,)
-    low: Vector  # margins at the left end of the bracket, shape (r,)
-    high: Vector  # ... at the right end
-    middle: Vector
+    start: Vector  # margins at the step's start, shape (r,)
+    end: Vector  # ... at its end
+    low: Vector  # ... at the left end of the bracket
+    high: Vector  # ... at its right end
     probe: Vector
+    rights: list[Vector]  # right ends of the intervals still to search, shape (DEEPEST + 2, r)
+    places: Vector  # where these are, shape (DEEPEST + 2,)
+    depths: list[int]  # how often they were halved, shape (DEEPEST + 2,)
     y_probe: Vector  # shape (m,)
+
+
+def watched(strict: list[bool], size: int) -> Watched:
+    """Return room to watch relations, none of them flagged yet.
+
+    Parameters
+    ----------
+    strict : list of bool, shape (r,)
+        For each relation whether zero is false.
+    size : int
+        Length of the state vector.
+
+    Returns
+    -------
+    Watched
+        With scratch for all of them.
+    """
+    r = len(strict)
+
+    def vector() -> Vector:
+        return [0.0] * r
+
+    return Watched(
+        [0] * r, [], [False] * r, strict, vector(), vector(), vector(), vector(), vector(),
+        rights=[vector() for _ in range(DEEPEST + 2)],
+        places=[0.0] * (DEEPEST + 2),
+        depths=[0] * (DEEPEST + 2),
+        y_probe=[0.0] * size,
+    )  # fmt: skip
 
 
 def any_changed(w: Watched, margin: Vector) -> bool:
@@ -45,6 +83,12 @@ def any_changed(w: Watched, margin: Vector) -> bool:
         if (g > 0.0 or (g == 0.0 and not w.strict[r])) != w.truth[r]:
             return True
     return False
+
+
+def copy_margins(w: Watched, source: Vector, target: Vector) -> None:
+    """Copy the active margins."""
+    for r in w.active:
+        target[r] = source[r]
 
 
 def first_change(
@@ -61,7 +105,7 @@ def first_change(
 ) -> float:
     """Return the fraction of the step at which a watched truth first differs.
 
-    Expects ``w.low`` filled with the margins at t; on `NO_CHANGE` it holds those at t_new.
+    Expects ``w.start`` filled with the margins at t; on `NO_CHANGE` ``w.end`` holds those at t_new.
 
     Parameters
     ----------
@@ -86,15 +130,40 @@ def first_change(
         In (0, 1], or `NO_CHANGE`.
     """
     h = t_new - t
-    margins(t_new, y_new, mode, p, w.watch, w.high)
-    high = 1.0
-    if not any_changed(w, w.high):
-        high = _look_inside(interpolate, dense, margins, t, h, mode, p, w)
+    margins(t_new, y_new, mode, p, w.watch, w.end)
+    found = NO_CHANGE
+    quiet = 1.0  # the step up to here is to be searched; its margins are in rights[0]
+    copy_margins(w, w.end, w.rights[0])
+    if any_changed(w, w.end):
+        copy_margins(w, w.start, w.low)
+        copy_margins(w, w.end, w.high)
+        quiet, found = _bracket(interpolate, dense, margins, t, h, 0.0, 1.0, mode, p, w, resolution)
+        copy_margins(w, w.low, w.rights[0])
+    while quiet > 0.0:
+        low, high = _search(interpolate, dense, margins, t, h, quiet, mode, p, w)
         if high == NO_CHANGE:
-            for r in w.active:
-                w.low[r] = w.high[r]
-            return NO_CHANGE
-    low = 0.0
+            break
+        quiet, found = _bracket(
+            interpolate, dense, margins, t, h, low, high, mode, p, w, resolution
+        )
+        copy_margins(w, w.low, w.rights[0])
+    return found
+
+
+def _bracket(
+    interpolate: Callable[..., Any],
+    dense: Any,
+    margins: Margins,
+    t: float,
+    h: float,
+    low: float,
+    high: float,
+    mode: list[int],
+    p: Any,
+    w: Watched,
+    resolution: float,
+) -> tuple[float, float]:
+    """Close the bracket (low unchanged, high changed; margins in w.low, w.high)."""
     tolerance = max(resolution / h, 4e-16)
     halve = False
     while high - low > tolerance:
@@ -114,50 +183,64 @@ def first_change(
         margins(t + guess * h, w.y_probe, mode, p, w.watch, w.probe)
         if any_changed(w, w.probe):
             high = guess
-            for r in w.active:
-                w.high[r] = w.probe[r]
+            copy_margins(w, w.probe, w.high)
         else:
             low = guess
-            for r in w.active:
-                w.low[r] = w.probe[r]
+            copy_margins(w, w.probe, w.low)
         halve = high - low > 0.5 * width
-    return high
+    return low, high
 
 
-def _look_inside(
+def _search(
     interpolate: Callable[..., Any],
     dense: Any,
     margins: Margins,
     t: float,
     h: float,
+    quiet: float,
     mode: list[int],
     p: Any,
     w: Watched,
-) -> float:
-    """Look for a change that is undone before the step's end; return a place inside it.
+) -> tuple[float, float]:
+    """Search [0, quiet], unchanged at both ends, for a change inside.
 
-    Margins at the start, the middle and the end make a parabola; where its peak comes near a
-    change (over half the remaining way), the margins are looked at there too.
+    Returns an unchanged place and a changed one right of it, with their margins in w.low and
+    w.high, or `NO_CHANGE`.
     """
-    interpolate(dense, 0.5, w.y_probe)
-    margins(t + 0.5 * h, w.y_probe, mode, p, w.watch, w.middle)
-    if any_changed(w, w.middle):
-        for r in w.active:
-            w.high[r] = w.middle[r]
-        return 0.5
+    low = 0.0
+    copy_margins(w, w.start, w.low)
+    w.places[0] = quiet
+    w.depths[0] = 0
+    top = 0
+    while top >= 0:
+        right, depth = w.places[top], w.depths[top]
+        middle = 0.5 * (low + right)
+        interpolate(dense, middle, w.y_probe)
+        margins(t + middle * h, w.y_probe, mode, p, w.watch, w.probe)
+        if any_changed(w, w.probe):
+            copy_margins(w, w.probe, w.high)
+            return low, middle
+        if depth >= DEEPEST or _is_quiet(w, w.low, w.probe, w.rights[top]):
+            low = right
+            copy_margins(w, w.rights[top], w.low)
+            top -= 1
+        else:  # left half first: the earliest change counts
+            w.depths[top] = depth + 1
+            top += 1
+            w.places[top] = middle
+            w.depths[top] = depth + 1
+            copy_margins(w, w.probe, w.rights[top])
+    return 0.0, NO_CHANGE
+
+
+def _is_quiet(w: Watched, left: Vector, middle: Vector, right: Vector) -> bool:
+    """Tell whether no margin can have changed between three unchanged places."""
     for r in w.active:
-        sign = -1.0 if w.truth[r] else 1.0  # of a margin that runs toward a change
-        a, m, b = sign * w.low[r], sign * w.middle[r], sign * w.high[r]
-        curve = 2.0 * (a - 2.0 * m + b)
-        slope = 4.0 * m - 3.0 * a - b
-        if curve >= 0.0 or slope <= 0.0 or slope >= -2.0 * curve:
-            continue  # no peak inside
-        theta = -slope / (2.0 * curve)
-        if a + 0.5 * slope * theta > 0.5 * max(a, m, b):
-            interpolate(dense, theta, w.y_probe)
-            margins(t + theta * h, w.y_probe, mode, p, w.watch, w.probe)
-            if any_changed(w, w.probe):
-                for q in w.active:
-                    w.high[q] = w.probe[q]
-                return theta
-    return NO_CHANGE
+        sign = -1.0 if w.truth[r] else 1.0  # of a margin that is negative while unchanged
+        a, m, b = sign * left[r], sign * middle[r], sign * right[r]
+        first, second = m - a, b - m
+        bend = abs(second - first)
+        monotone = first * second > 0.0 and bend < min(abs(first), abs(second))
+        if not monotone and max(a, m, b) + bend >= 0.0 and bend > 0.0:
+            return False
+    return True

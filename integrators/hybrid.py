@@ -14,7 +14,7 @@ from typing import Any, Protocol
 
 from integrators import advance as kernel
 from integrators.advance import Control, Output, Work, put_row
-from integrators.crossings import Margins, Watched
+from integrators.crossings import Margins, Watched, watched
 from integrators.step_size import starting_step
 from integrators.steps import Coefficients, Dense, Flow, Vector, coefficients
 from integrators.tableaux import Tableau
@@ -132,7 +132,7 @@ class Arc:
 
 @dataclass(frozen=True, eq=False)
 class Stop:
-    """A located crossing; whether an edge is taken there is not yet known."""
+    """A place where an arc ends: a crossing, either side of a jump, the end of the run."""
 
     t: float
     y: Vector
@@ -302,7 +302,7 @@ def run(
     jumps = [s for s in system.jumps if options.located and s <= t_end]
     while True:
         microstep = 0
-        while wanted := switch.ask(t, y):
+        while wanted := _ask(switch, t, y):
             for machine, edge in wanted:
                 microstep += 1
                 yield _fire(switch, machine, edge, t, y, microstep)
@@ -333,16 +333,19 @@ def run(
                     yield _take_rows(out, switch)
                 if not options.located:
                     break
-        except (ArithmeticError, ValueError) as error:
-            # math.exp and math.sqrt raise where IEEE arithmetic would give inf or nan.
+        except Exception as error:
+            t = max(t, out.reached[0])
             if out.cursor[kernel.ROW]:
                 yield _take_rows(out, switch)
-            raise NotFinite(f"{type(error).__name__}: {error}", t, y) from None
+            if _is_arithmetic(error):
+                raise NotFinite(f"{type(error).__name__}: {error}", t, y) from None
+            raise
         if status == kernel.TOO_SMALL:
             raise StepTooSmall("step size under the clock's resolution", t, y)
         if status == kernel.NOT_FINITE:
             raise NotFinite("NaN or infinity", t, y)
         if status == kernel.REACHED and t < t_end:
+            yield Stop(t, list(y), tuple(switch.mode))
             t = jump
             yield Stop(t, list(y), tuple(switch.mode))
             if out.every_step:
@@ -350,17 +353,19 @@ def run(
         if status == kernel.CROSSED:
             clock.count_relations(t, y)
             yield Stop(t, list(y), tuple(switch.mode))
-    while out.cursor[kernel.NEXT_TIME] < len(out.times):
+    while out.cursor[kernel.NEXT_TIME] < len(out.times) and (
+        out.times[out.cursor[kernel.NEXT_TIME]] <= t
+    ):
         put_row(out, out.times[out.cursor[kernel.NEXT_TIME]], y)
         out.cursor[kernel.NEXT_TIME] += 1
     if out.cursor[kernel.ROW]:
         yield _take_rows(out, switch)
+    yield Stop(t, list(y), tuple(switch.mode))
 
 
 def _workspace(
     system: System, switch: Switch, size: int, options: Options, resolution: float
 ) -> Workspace:
-    relations = len(system.strict)
     times = options.times
     capacity = ROWS_AT_ONCE if times is None else len(times)
     return Workspace(
@@ -368,23 +373,14 @@ def _workspace(
         flow=system.flow if options.located else system.flow_live,
         mode=switch.mode,
         held=[0.0] * system.held,
-        w=Watched(
-            watch=[0] * relations,
-            active=[],
-            truth=[False] * relations,
-            strict=system.strict,
-            low=[0.0] * relations,
-            high=[0.0] * relations,
-            middle=[0.0] * relations,
-            probe=[0.0] * relations,
-            y_probe=[0.0] * size,
-        ),
+        w=watched(system.strict, size),
         out=Output(
             times=times or [],
             every_step=times is None,
             rows_t=[0.0] * capacity,
             rows_y=[[0.0] * size for _ in range(capacity)],
             cursor=[0, 0, 0],
+            reached=[-math.inf],
         ),
         knots=system.knots if options.located else [],
         resolution=resolution,
@@ -407,6 +403,20 @@ def _stepper(options: Options, size: int, t: float, resolution: float) -> Steppe
     return ExplicitStepper(options.method, control, size)
 
 
+def _is_arithmetic(error: Exception) -> bool:
+    """Tell whether an error is math's way to say inf or nan (exp, sqrt and / raise in Python)."""
+    return isinstance(error, ArithmeticError) or type(error) is ValueError
+
+
+def _ask(switch: Switch, t: float, y: Vector) -> Sequence[tuple[int, int]]:
+    try:
+        return switch.ask(t, y)
+    except Exception as error:
+        if _is_arithmetic(error):
+            raise NotFinite(f"a guard, {type(error).__name__}: {error}", t, y) from None
+        raise
+
+
 def _arm(ws: Workspace, t: float, y: Vector) -> None:
     """Hold signs, choose what to watch, remember its truth."""
     system, w = ws.system, ws.w
@@ -414,9 +424,9 @@ def _arm(ws: Workspace, t: float, y: Vector) -> None:
         w.watch[r] = 0
     system.arm(t, y, ws.mode, system.p, ws.held, w.watch)
     w.active[:] = [r for r, flag in enumerate(w.watch) if flag]
-    system.margins(t, y, ws.mode, system.p, w.watch, w.low)
+    system.margins(t, y, ws.mode, system.p, w.watch, w.start)
     for r in w.active:
-        g = w.low[r]
+        g = w.start[r]
         w.truth[r] = g > 0.0 or (g == 0.0 and not w.strict[r])
 
 

@@ -1,6 +1,6 @@
 """The same outer loop over any `scipy.integrate.OdeSolver`: RK45, DOP853, Radau, BDF, LSODA.
 
-For stiff systems (strong bristle damping on a light mass). The solver chooses its steps; crossings
+For stiff systems. The solver chooses its steps; crossings
 are located on its own dense output.
 """
 
@@ -20,11 +20,12 @@ from integrators.advance import (
     NEXT_TIME,
     NOT_FINITE,
     REACHED,
+    REDO,
     ROW,
     TOO_SMALL,
     put_row,
 )
-from integrators.crossings import NO_CHANGE, first_change
+from integrators.crossings import NO_CHANGE, copy_margins, first_change
 
 if TYPE_CHECKING:
     from integrators.hybrid import Options, Workspace
@@ -100,15 +101,17 @@ class SciPyStepper:
         """Step until t_stop, a crossing, a full buffer or most_steps steps."""
         out = ws.out
         cursor = out.cursor
+        redone, ahead = False, math.inf
         while True:
             if t >= t_stop:
                 return REACHED, t
             if most_steps <= 0 or (out.every_step and cursor[ROW] >= len(out.rows_t)):
                 return FULL, t
             try:
-                solver = self._solver_to(self._limit(t, t_stop, ws), t, y, ws)
+                limit = min(self._limit(t, t_stop, ws), ahead)
+                solver = self._solver_to(limit, t, y, ws)
                 solver.step()
-            except (ArithmeticError, ValueError, np.linalg.LinAlgError):
+            except (ArithmeticError, np.linalg.LinAlgError):
                 return NOT_FINITE, t
             if solver.status == "failed":
                 return TOO_SMALL, t
@@ -127,8 +130,16 @@ class SciPyStepper:
                     interpolate, dense, ws.system.margins, t, t_new, y_new, ws.mode, ws.system.p,
                     ws.w, ws.resolution,
                 )  # fmt: skip
+            if theta < REDO and not redone and theta * (t_new - t) > 1e3 * ws.resolution:
+                # As in the kernel: the solver's stages lay behind the crossing.
+                self.solver, redone = None, True
+                ahead = t + theta * (t_new - t)
+                continue
+            redone, ahead = False, math.inf
             if theta < 1.0:
                 t_new = t + theta * (t_new - t)
+            else:
+                copy_margins(ws.w, ws.w.end, ws.w.start)
             while cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] < t_new:
                 put_row(out, out.times[cursor[NEXT_TIME]],
                         dense(out.times[cursor[NEXT_TIME]]).tolist())  # fmt: skip
@@ -138,6 +149,7 @@ class SciPyStepper:
             else:
                 y[:] = y_new
             t = t_new
+            out.reached[0] = t
             most_steps -= 1
             if out.every_step:
                 put_row(out, t, y)

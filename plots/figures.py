@@ -6,6 +6,7 @@ Figures are made without pyplot: no global state, no display.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from gms_fsm.errors import MissingExtraError
 from gms_fsm.files import written_whole
 from gms_fsm.trace import Trace
 from plots import panels
-from plots.style import INK, LINE_GREY, RC, TEXT_GREY
+from plots.style import BLUE, INK, LINE_GREY, RC, TEXT_GREY, VERMILION
 
 try:
     from matplotlib import rc_context
@@ -26,7 +27,7 @@ except ImportError:
         'figures need matplotlib; install it with: pip install "gms-fsm[plots]"'
     ) from None
 
-__all__ = ["compare_laws", "figure_3", "figure_4", "residuals", "save"]
+__all__ = ["Measured", "compare_laws", "figure_3", "figure_4", "overview", "residuals", "save"]
 
 SMOOTH = 2000  # points a curve
 FIG3_PHASES = (("rising", 2.0), ("falling", 4.0), ("oscillating", np.inf))
@@ -195,6 +196,89 @@ def compare_laws(runs: Mapping[str, Trace]) -> Figure:
         )
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     return figure
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A measured friction beside a run.
+
+    Parameters
+    ----------
+    t, x, F : ndarray, shape (m,)
+        s, m, N.
+    """
+
+    t: NDArray[np.float64]
+    x: NDArray[np.float64]
+    F: NDArray[np.float64]
+
+
+def overview(trace: Trace, measured: Measured | None = None, *, title: str = "") -> Figure:
+    """Draw a run at a glance: motion, force, states, hysteresis, friction against velocity.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run.
+    measured : Measured, optional
+        Drawn beside the model.
+    title : str
+        Of the figure; the model and its law are added.
+
+    Returns
+    -------
+    Figure
+        On the left over time (long records: the last three cycles), on the right F against x and v.
+    """
+    smooth = trace.refined(SMOOTH)
+    begin = _window(smooth)
+    with rc_context(RC):
+        figure = Figure(figsize=(11.0, 6.6), layout="constrained")
+        grid = figure.add_gridspec(6, 2, width_ratios=(1.5, 1))
+        time = [figure.add_subplot(grid[rows, 0]) for rows in (slice(0, 2), slice(2, 4))]
+        states = figure.add_subplot(grid[4:6, 0], sharex=time[0])
+        loop, portrait = (figure.add_subplot(grid[rows, 1]) for rows in (slice(0, 3), slice(3, 6)))
+        panels.velocity(time[0], smooth)
+        panels.force(time[1], smooth)
+        panels.ribbons(states, smooth)
+        panels.hysteresis(loop, smooth)
+        panels.portrait(portrait, smooth)
+        if measured is not None:
+            time[1].lines[0].set(color=BLUE, label="model", zorder=3)
+            time[1].plot(measured.t, measured.F, color=VERMILION, linewidth=1.0, label="measured")
+            time[1].legend(loc="upper right", ncols=2)
+            loop.lines[0].set(linewidth=0.9, zorder=3, label="model", rasterized=True)
+            loop.plot(
+                1e3 * measured.x, measured.F, color=VERMILION, linewidth=0.5, alpha=0.7,
+                label="measured", rasterized=True,
+            )  # fmt: skip
+            loop.legend(loc="upper left")
+        if trace.model.chart.transitions:
+            states.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=5)
+        for ax in (*time, states):
+            ax.set_xlim(begin, trace.t[-1])
+        for ax in time:
+            ax.set_xlabel("")
+            ax.tick_params(labelbottom=False)
+        part = "" if begin == trace.t[0] else f" (last {trace.t[-1] - begin:.3g} s)"
+        time[0].set_title(f"velocity{part}")
+        time[1].set_title(f"friction{part}")
+        loop.set_title("hysteresis")
+        portrait.set_title("friction against velocity")
+        figure.suptitle(f"{title}: {trace.model.title}" if title else trace.model.title,
+                        x=0.01, ha="left")  # fmt: skip
+    return figure
+
+
+def _window(trace: Trace) -> float:
+    """Return where the time axes begin: all of a short run, the last three cycles of a long one."""
+    quiet = 0.05 * np.abs(trace.v).max()
+    signs = np.sign(trace.v) * (np.abs(trace.v) > quiet)
+    moving = np.flatnonzero(signs)
+    turns = moving[1:][np.diff(signs[moving]) != 0]
+    if turns.size <= 12:
+        return float(trace.t[0])
+    return float(trace.t[turns[-7]])
 
 
 def residuals(

@@ -29,7 +29,15 @@ except ImportError:
         'figures need matplotlib; install it with: pip install "gms-fsm[plots]"'
     ) from None
 
-__all__ = ["deflections", "force", "hysteresis", "residual", "ribbons", "velocity"]
+__all__ = [
+    "deflections",
+    "force",
+    "hysteresis",
+    "portrait",
+    "residual",
+    "ribbons",
+    "velocity",
+]
 
 Artists = list[Artist]
 
@@ -130,6 +138,35 @@ def hysteresis(ax: Axes, trace: Trace, phases: Sequence[tuple[str, float]] = ())
         )  # fmt: skip
         begin = end
     return lines
+
+
+def portrait(ax: Axes, trace: Trace) -> Artists:
+    """Draw F against v; rows with more elements away from their default state are darker.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where.
+    trace : Trace
+        What.
+
+    Returns
+    -------
+    list of Artist
+        The line and the points.
+    """
+    ax.set(xlabel="v [m/s]", ylabel="F [N]")
+    away = (trace.rows.mode != 0).sum(axis=1)
+    line = ax.plot(trace.v, trace.F, color=LINE_GREY, linewidth=0.5, rasterized=True)
+    points = ax.scatter(
+        trace.v, trace.F, c=away, s=5, cmap="viridis_r", vmin=0, vmax=max(1, trace.n),
+        zorder=3, linewidths=0, rasterized=True,
+    )  # fmt: skip
+    if trace.model.chart.transitions:
+        name = trace.model.chart.states[0].name
+        bar = ax.figure.colorbar(points, ax=ax, ticks=range(trace.n + 1))
+        bar.set_label(f"elements not in {name}")
+    return [*line, points]
 
 
 def ribbons(ax: Axes, trace: Trace) -> Artists:

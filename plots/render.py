@@ -78,8 +78,9 @@ def render(graph: graphviz.Digraph, path: str | Path) -> Path:
         path = path.with_suffix(".dot")
         written_whole(path, lambda file: file.write(graph.source.encode()))
         warnings.warn(
-            f"No Graphviz was found, so the DOT text was written to {path}: install Graphviz "
-            '(program dot) or run `pip install "gms-fsm[render]"` to get pictures.',
+            # The same words each time, so that Python says them once a run, not once a picture.
+            "No Graphviz was found, so charts are written as DOT text: install Graphviz (program "
+            'dot) or run `pip install "gms-fsm[render]"` to get pictures.',
             stacklevel=2,
         )
     return path

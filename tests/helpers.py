@@ -61,3 +61,9 @@ def same_bits(a: Trace, b: Trace) -> None:
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
     for name in a.transitions.dtype.names:
         np.testing.assert_array_equal(a.transitions[name], b.transitions[name], err_msg=name)
+
+
+def event_sequence(trace: Trace) -> list[tuple[int, str]]:
+    """Which element took which edge, in order."""
+    log = trace.transitions
+    return list(zip(log.element.tolist(), log.edge.tolist(), strict=True))

@@ -1,0 +1,317 @@
+"""Runs a scenario and writes what a person wants to know of it."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gms_fsm.errors import GMSError, MissingExtraError, ScenarioError, SimulationError
+from gms_fsm.files import output_folder, written_whole
+from gms_fsm.models import GMS
+from gms_fsm.parameters import FloatArray
+from gms_fsm.records import Motion, Record
+from gms_fsm.scenario import Loaded
+from gms_fsm.simulate import Moment, simulate
+from gms_fsm.trace import Trace
+
+__all__ = ["Comparison", "compare", "dwell_times", "run_scenario", "summary_text"]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A model's friction against the measured one.
+
+    Parameters
+    ----------
+    rows : int
+        How many rows count.
+    rmse : float
+        Root mean square of the difference, N.
+    r2 : float
+        Coefficient of determination: 1 - sum of squared differences / that about the mean.
+    """
+
+    rows: int
+    rmse: float
+    r2: float
+
+
+def compare(trace: Trace, record: Record) -> Comparison | None:
+    """Compare a run with its record on the rows that count.
+
+    Parameters
+    ----------
+    trace : Trace
+        A run over the record's motion.
+    record : Record
+        With a column ``force``.
+
+    Returns
+    -------
+    Comparison or None
+        None if the record has no force.
+    """
+    times, measured = measured_force(record)
+    if not times.size:
+        return None
+    inside = (times >= trace.t[0]) & (times <= trace.t[-1])
+    times, measured = times[inside], measured[inside]
+    same = times.size == len(trace) and bool((times == trace.t).all())
+    difference = measured - (trace.F if same else trace.sample(times).F)
+    spread = measured - measured.mean()
+    r2 = 1.0 - float(difference @ difference) / float(spread @ spread)
+    return Comparison(times.size, float(np.sqrt(np.mean(difference**2))), r2)
+
+
+def measured_force(record: Record) -> tuple[FloatArray, FloatArray]:
+    """Return times [s] and forces [N] of the rows that count; empty without a force column."""
+    if "force" not in record.columns:
+        return np.empty(0), np.empty(0)
+    return record.columns["time"][record.chosen], record.columns["force"][record.chosen]
+
+
+def dwell_times(trace: Trace) -> FloatArray:
+    """Return how long each element was in each state.
+
+    Parameters
+    ----------
+    trace : Trace
+        A run; its transition log is complete whatever its rows are.
+
+    Returns
+    -------
+    ndarray, shape (n, states), s
+        Rows add up to the run's length.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    >>> trace = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"),
+    ...                  Prescribed("0.2"), 3.0)
+    >>> dwell_times(trace)[0].round(9).tolist()
+    [2.0, 1.0]
+    """
+    states = [state.name for state in trace.model.chart.states]
+    total = np.zeros((trace.n, len(states)))
+    begin, end = trace.stops.t[0], trace.stops.t[-1]
+    begin, end = min(begin, trace.t[0]), max(end, trace.t[-1])
+    first = trace.stops if trace.stops.t[0] <= trace.t[0] else trace.rows
+    for i in range(trace.n):
+        since, state = begin, int(first.mode[0, i])
+        for record in trace.transitions[trace.transitions.element == i]:
+            total[i, states.index(record.source)] += record.t - since
+            since, state = record.t, states.index(record.target)
+        total[i, state] += end - since
+    return total
+
+
+def run_scenario(
+    loaded: Loaded, folder: str | Path, progress: Callable[[Moment], object] | None = None
+) -> tuple[Trace, list[Path]]:
+    """Run a scenario and write trace, log, figure and summary.
+
+    Parameters
+    ----------
+    loaded : Loaded
+        From `gms_fsm.scenario.load_scenario`.
+    folder : str or Path
+        Made where missing, before anything is run.
+    progress : callable, optional
+        Handed to `simulate`.
+
+    Returns
+    -------
+    (Trace, list of Path)
+        The run, and the files, ``summary.md`` first.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be written.
+    SimulationError
+        If the run cannot go on; its part so far is written to ``partial.npz``.
+    ScenarioError
+        If `simulate` refuses an argument.
+    """
+    folder = output_folder(folder)
+    try:
+        trace = simulate(loaded.model, loaded.rig, progress=progress, **loaded.arguments)
+    except SimulationError as error:
+        kept = error.trace.save(folder / "partial.npz")
+        error.args = (f"{loaded.path}: {error}; written to {kept}",)
+        raise
+    except GMSError as error:
+        raise ScenarioError(f"{loaded.path}: {error}") from None
+    log = trace.transitions_csv().encode()
+    text = summary_text(loaded, trace).encode()
+    files = [
+        written_whole(folder / "summary.md", lambda file: file.write(text)),
+        trace.save(folder / "trace.npz"),
+        written_whole(folder / "transitions.csv", lambda file: file.write(log)),
+    ]
+    if loaded.scenario.output.csv:
+        files.append(trace.save(folder / "trace.csv"))
+    try:
+        files += _draw(loaded, trace, folder)
+    except MissingExtraError as error:
+        warnings.warn(f"no figure was drawn: {error}", stacklevel=2)
+    return trace, files
+
+
+def _draw(loaded: Loaded, trace: Trace, folder: Path) -> list[Path]:
+    from plots import figures
+
+    measured = None
+    if loaded.record is not None and loaded.motion is not None and "force" in loaded.record.columns:
+        times, force = measured_force(loaded.record)
+        position = loaded.motion.position[loaded.record.chosen]
+        measured = figures.Measured(times, position, force)
+    figure = figures.overview(trace, measured, title=loaded.title)
+    return [
+        figures.save(figure, folder / f"overview.{ending}")
+        for ending in loaded.scenario.output.figures
+    ]
+
+
+# --------------------------------------------------------------------------- the summary
+def summary_text(loaded: Loaded, trace: Trace) -> str:
+    """Write the summary of a run.
+
+    Parameters
+    ----------
+    loaded : Loaded
+        The scenario.
+    trace : Trace
+        Its run.
+
+    Returns
+    -------
+    str
+        Markdown: what ran, what each element did, how it compares with the measurement, and what
+        the measurement cannot tell.
+    """
+    settings = ", ".join(
+        f"{name} = {value}" for name, value in trace.settings.items() if value is not None
+    )
+    lines = [
+        f"# {loaded.title}",
+        "",
+        *([loaded.scenario.notes.strip(), ""] if loaded.scenario.notes.strip() else []),
+        f"- model: {trace.model.title}",
+        f"- rig: {trace.rig.title}",
+        f"- parameters: {_parameters(trace)}",
+        f"- run: {settings}",
+        f"- result: {len(trace)} rows, {len(trace.transitions)} transitions, F from "
+        f"{trace.F.min():.4g} to {trace.F.max():.4g} N",
+        "",
+        *_element_table(trace),
+    ]
+    if loaded.record is not None and loaded.motion is not None:
+        lines += ["", *_measurement(loaded.record, loaded.motion, trace)]
+    return "\n".join(lines) + "\n"
+
+
+def _parameters(trace: Trace) -> str:
+    curve = dataclasses.asdict(trace.model.stribeck)
+    numbers = {**trace.model.values, **curve, "sigma_2": trace.model.sigma_2}
+    shown = [f"{name} = {_number(value)}" for name, value in numbers.items()]
+    return ", ".join([*shown, f"weights = {_number(trace.model.weights)} m/N"])
+
+
+def _number(value: float | FloatArray) -> str:
+    if np.ndim(value) == 0:
+        return f"{float(value):.6g}"
+    return "[" + ", ".join(f"{float(v):.6g}" for v in np.asarray(value)) + "]"
+
+
+def _element_table(trace: Trace) -> list[str]:
+    chart = trace.model.chart
+    edges = [edge.name for edge in chart.transitions]
+    dwell, log = dwell_times(trace), trace.transitions
+    head = ["element", *(f"{s.name} [s]" for s in chart.states), *edges]
+    rows = [
+        [
+            str(i + 1),
+            *(f"{seconds:.4g}" for seconds in dwell[i]),
+            *(str(int(((log.element == i) & (log.edge == edge)).sum())) for edge in edges),
+        ]
+        for i in range(trace.n)
+    ]
+    return ["| " + " | ".join(row) + " |" for row in [head, ["---"] * len(head), *rows]]
+
+
+def _measurement(record: Record, motion: Motion, trace: Trace) -> list[str]:
+    lines = [f"## Against the measurement ({record.path.name})", ""]
+    comparison = compare(trace, record)
+    if comparison is None:
+        lines.append("- the record has no force: nothing to compare with")
+    else:
+        lines.append(
+            f"- **R² = {comparison.r2:.4f}, RMSE = {comparison.rmse:.4g} N** on {comparison.rows} "
+            "rows (parameters as given; nothing was fitted)"
+        )
+    lines += [f"- {note}" for note in (*record.notes, *motion.notes)]
+    doubts = what_it_cannot_tell(trace, motion)
+    if doubts:
+        lines += ["", "### What this record cannot tell", "", *(f"- {doubt}" for doubt in doubts)]
+    return lines
+
+
+def velocity_note(trace: Trace, motion: Motion) -> str:
+    """Return a warning if v_c is lost in the velocity noise of a record, else an empty text."""
+    v_c = trace.model.values.get("v_c")
+    if v_c is None or motion.standstill == 0.0 or float(np.min(v_c)) >= motion.standstill:
+        return ""
+    return (
+        f"v_c = {float(np.min(v_c)):.3g} m/s is below the velocity noise at standstill, "
+        f"{motion.standstill:.2g} m/s (standard deviation): arrests happen by chance; "
+        f"v_c = {motion.fitting_v_c():.2g} m/s would fit this record"
+    )
+
+
+def what_it_cannot_tell(trace: Trace, motion: Motion) -> list[str]:
+    """Return what a record says nothing about, each with the reason.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run over it.
+    motion : Motion
+        Its motion.
+
+    Returns
+    -------
+    list of str
+        Sentences; empty if nothing stands out.
+    """
+    doubts = []
+    speed = np.abs(motion.velocity)
+    moving = speed[speed > 0.1 * np.quantile(speed, 0.99)]
+    slow, fast = (float(q) for q in np.quantile(moving, [0.2, 0.95]))
+    if fast < 3.0 * slow:
+        doubts.append(
+            f"the Stribeck curve: there is one speed only ({1e3 * slow:.2g} to {1e3 * fast:.2g} "
+            "mm/s while it moves), so F_s, v_s and sigma_2 cannot be told from F_c"
+        )
+        if isinstance(trace.model, GMS):
+            doubts.append(
+                "C: at constant speed an element in slip rests at z = w s(v) whatever C is; only "
+                "changes of speed during slip would show it"
+            )
+    note = velocity_note(trace, motion)
+    if note:
+        doubts.append(note)
+    sigma = trace.model.values.get("sigma")
+    if sigma is not None:
+        viscous = float(np.sum(sigma)) * fast
+        if viscous < 0.01 * float(np.abs(trace.F).max()):
+            doubts.append(
+                f"sigma_i: at this speed all bristle damping makes {1e3 * viscous:.2g} mN, under "
+                f"1 % of the friction"
+            )
+    return doubts

@@ -1,0 +1,298 @@
+"""User callbacks run exactly once per firing, with the values of that instant at hand.
+
+Nothing is called between firings; the machines end in the states of the last row; and the chart
+stays the only truth: a machine that was given other edges or conditions is refused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gms_fsm import GMS, Element, ElementMachines, Prescribed, Trace, simulate
+from gms_fsm.errors import ChartError, ParameterError
+from tests.helpers import one_element, open_loop, pulled_mass, same_bits, stick_slip
+
+Call = tuple[str, float, int, str, float, float, float]
+T_END = 61.0
+
+
+def _note(kind: str, calls: list[Call]) -> Any:
+    def callback(event: Any) -> None:
+        e = event.model
+        calls.append((kind, e.t, e.index, event.event.name, e.z, e.v, e.s))
+
+    return callback
+
+
+def _logged(trace: Trace, kind: str, *, target: str = "", source: str = "") -> list[Call]:
+    return [
+        (kind, float(r.t), int(r.element), str(r.edge), float(r.z), float(r.v), float(r.s))
+        for r in trace.transitions
+        if target in ("", r.target) and source in ("", r.source)
+    ]
+
+
+@pytest.fixture(scope="module")
+def model() -> GMS:
+    return stick_slip("signed")
+
+
+@pytest.mark.parametrize(
+    ("register", "selection"),
+    [
+        ("on_enter_slip", {"target": "slip"}),
+        ("on_enter_stick", {"target": "stick"}),
+        ("on_exit_stick", {"source": "stick"}),
+        ("on_exit_slip", {"source": "slip"}),
+    ],
+)
+def test_entering_and_leaving_a_state_calls_once(
+    model: GMS, register: str, selection: dict[str, str]
+) -> None:
+    machines, calls = ElementMachines(model), []
+    getattr(machines.machine, register)(_note(register, calls))
+    trace = simulate(model, open_loop(), T_END, engine=machines)
+    assert len(calls) == 24
+    assert calls == _logged(trace, register, **selection)
+
+
+@pytest.mark.parametrize(
+    "place", ["prepare_event", "before_state_change", "after_state_change", "finalize_event"]
+)
+def test_machine_wide_callbacks_run_once_per_firing(model: GMS, place: str) -> None:
+    machines, calls = ElementMachines(model), []
+    setattr(machines.machine, place, [_note(place, calls)])
+    trace = simulate(model, open_loop(), T_END, engine=machines)
+    assert len(trace.transitions) == 48
+    assert calls == _logged(trace, place)
+
+
+@pytest.mark.parametrize("place", ["prepare", "before", "after"])
+def test_callbacks_of_one_edge_run_at_its_firings_only(model: GMS, place: str) -> None:
+    machines, calls = ElementMachines(model), []
+    (edge,) = machines.machine.get_transitions("arrest", "slip", "stick")
+    edge.add_callback(place, _note(place, calls))
+    trace = simulate(model, open_loop(), T_END, engine=machines)
+    arrests = [call for call in _logged(trace, place) if call[3] == "arrest"]
+    assert 0 < len(arrests) < len(trace.transitions)
+    assert calls == arrests
+
+
+def test_the_order_at_one_firing_is_that_of_transitions(model: GMS) -> None:
+    machines, order = ElementMachines(model), []
+    machine = machines.machine
+    for edge in machine.get_transitions():
+        edge.add_callback("before", lambda event: order.append(("before", event.model.state)))
+        edge.add_callback("after", lambda event: order.append(("after", event.model.state)))
+    for state in ("stick", "slip"):
+        for kind in ("exit", "enter"):
+            getattr(machine, f"on_{kind}_{state}")(
+                lambda event, kind=kind: order.append((kind, event.model.state))
+            )
+    simulate(model, Prescribed("0.2"), 3.0, engine=machines)
+    one = [("before", "stick"), ("exit", "stick"), ("enter", "slip"), ("after", "slip")]
+    assert order == one * 4
+
+
+def test_methods_of_an_element_class_are_called_by_name(model: GMS) -> None:
+    calls: list[Call] = []
+
+    class Noisy(Element):
+        def on_enter_slip(self, event: Any) -> None:
+            _note("enter", calls)(event)
+            assert event.model is self
+            assert self.state == "slip"
+
+        def on_exit_slip(self, event: Any) -> None:
+            _note("exit", calls)(event)
+
+    machines = ElementMachines(model, Noisy)
+    assert all(type(e) is Noisy for e in machines.elements)
+    trace = simulate(model, open_loop(), T_END, engine=machines)
+    for kind, selection in (("enter", {"target": "slip"}), ("exit", {"source": "slip"})):
+        assert [c for c in calls if c[0] == kind] == _logged(trace, kind, **selection)
+
+
+def test_elements_keep_what_their_class_adds_and_know_their_parameters() -> None:
+    class Counting(Element):
+        def __init__(self) -> None:
+            self.hits = 0
+
+        def on_enter_slip(self, event: Any) -> None:
+            self.hits += 1
+
+    model, rig = pulled_mass()
+    machines = ElementMachines(model, Counting)
+    trace = simulate(model, rig, 20.0, engine=machines)
+    for i, element in enumerate(machines.elements):
+        wanted = np.sum((trace.transitions.element == i) & (trace.transitions.target == "slip"))
+        assert element.hits == wanted > 0  # type: ignore[attr-defined]
+        assert element.index == i
+        for name, values in model.values.items():
+            assert getattr(element, name) == (values if np.ndim(values) == 0 else values[i])
+
+
+def test_an_element_class_that_compares_by_value_is_refused(model: GMS) -> None:
+    """Transitions registers equal models once only."""
+
+    @dataclass
+    class Equal(Element):
+        hits: int = 0
+
+    with pytest.raises(ParameterError, match=r"Equal compares by value.*eq=False"):
+        ElementMachines(model, Equal)
+
+
+def test_an_element_class_may_be_a_dataclass(model: GMS) -> None:
+    @dataclass(eq=False)
+    class Counting(Element):
+        hits: int = 0
+
+        def on_enter_slip(self, event: Any) -> None:
+            self.hits += 1
+
+    machines = ElementMachines(model, Counting)
+    simulate(model, Prescribed("0.2"), 3.0, engine=machines)
+    assert [element.hits for element in machines.elements] == [1, 1, 1, 1]  # type: ignore[attr-defined]
+
+
+def test_a_run_without_firings_calls_nothing(model: GMS) -> None:
+    machines, calls = ElementMachines(model), []
+    for place in ("prepare_event", "before_state_change", "after_state_change", "finalize_event"):
+        setattr(machines.machine, place, [_note(place, calls)])
+    trace = simulate(model, Prescribed("0.01*sin(t)"), 20.0, engine=machines)
+    assert len(trace.transitions) == 0
+    assert calls == []
+
+
+def test_at_the_call_the_rows_before_are_not_yet_past(model: GMS) -> None:
+    machines, times = ElementMachines(model), []
+    machines.machine.on_enter_slip(lambda event: times.append(event.model.t))
+    trace = simulate(model, open_loop(), T_END, engine=machines, t_eval=[0.0, T_END])
+    slips = trace.transitions.target == "slip"
+    assert times == trace.transitions.t[slips].tolist()
+
+
+def test_watching_changes_nothing(model: GMS) -> None:
+    machines = ElementMachines(model)
+    machines.machine.on_enter_slip(lambda event: None)
+    same_bits(
+        simulate(model, open_loop(), T_END, engine=machines), simulate(model, open_loop(), T_END)
+    )
+
+
+def test_machines_end_in_the_states_of_the_last_row_and_start_anew(model: GMS) -> None:
+    machines = ElementMachines(model)
+    for t_end in (7.0, 3.0, T_END):
+        trace = simulate(model, open_loop(), t_end, engine=machines)
+        assert [e.state for e in machines.elements] == trace.states[-1].tolist()
+        same_bits(trace, simulate(model, open_loop(), t_end))
+
+
+def test_every_element_starts_in_its_own_state(model: GMS) -> None:
+    machines, calls = ElementMachines(model), []
+    for register in ("on_enter_slip", "on_exit_slip", "on_enter_stick", "on_exit_stick"):
+        getattr(machines.machine, register)(_note(register, calls))
+    states = ["stick", "slip", "slip", "stick"]
+    trace = simulate(
+        model, Prescribed("0.1"), 0.5, engine=machines,
+        initial={"states": states, "z": [0.0, 0.1, 0.2, 0.3]},
+    )  # fmt: skip
+    assert trace.states[0].tolist() == states
+    assert trace.z[0].tolist() == [0.0, 0.1, 0.2, 0.3]
+    assert calls == [], "being put into the initial state is no firing"
+
+
+# --------------------------------------------------------------------------- one truth
+def test_a_condition_of_the_users_is_refused(model: GMS) -> None:
+    for target in (True, False):
+        machines = ElementMachines(model)
+        (edge,) = machines.machine.get_transitions("arrest", "slip", "stick")
+        edge.conditions.append(type(edge.conditions[0])(lambda event: False, target=target))
+        with pytest.raises(ChartError, match=r"'arrest'.*chart's guard"):
+            simulate(model, open_loop(), 20.0, engine=machines)
+
+
+@pytest.mark.parametrize(
+    ("trigger", "source", "dest"),
+    [
+        ("panic", "slip", "stick"),
+        ("panic", "*", "stick"),
+        ("arrest", "slip", "stick"),
+        ("arrest", "stick", "slip"),
+        ("break_away_forward", "slip", "slip"),
+    ],
+)
+def test_an_edge_of_the_users_is_refused(model: GMS, trigger: str, source: str, dest: str) -> None:
+    machines = ElementMachines(model)
+    machines.machine.add_transition(trigger, source, dest)
+    with pytest.raises(ChartError, match=trigger):
+        simulate(model, open_loop(), 20.0, engine=machines)
+
+
+def test_a_missing_edge_is_refused(model: GMS) -> None:
+    machines = ElementMachines(model)
+    machines.machine.remove_transition("arrest")
+    with pytest.raises(ChartError, match="arrest"):
+        simulate(model, open_loop(), 20.0, engine=machines)
+
+
+def test_another_target_is_refused(model: GMS) -> None:
+    machines = ElementMachines(model)
+    (edge,) = machines.machine.get_transitions("arrest", "slip", "stick")
+    edge.dest = "slip"
+    with pytest.raises(ChartError, match="arrest"):
+        simulate(model, open_loop(), 20.0, engine=machines)
+
+
+def test_a_callback_that_changes_the_values_before_the_guard_is_refused(model: GMS) -> None:
+    machines = ElementMachines(model)
+
+    def stop(event: Any) -> None:
+        event.model.v = 0.0
+
+    machines.machine.prepare_event = [stop]
+    with pytest.raises(ChartError, match=r"element 1: edge 'break_away_forward'.*only look"):
+        simulate(model, open_loop(), 20.0, engine=machines)
+
+
+def test_what_a_callback_writes_afterwards_does_not_reach_the_run(model: GMS) -> None:
+    machines = ElementMachines(model)
+
+    def scribble(event: Any) -> None:
+        event.model.z, event.model.v, event.model.t = 1e9, 1e9, 1e9
+
+    machines.machine.on_enter_slip(scribble)
+    same_bits(
+        simulate(model, open_loop(), T_END, engine=machines), simulate(model, open_loop(), T_END)
+    )
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError, ValueError, KeyError])
+def test_an_error_of_a_callback_reaches_the_user_as_it_is(
+    model: GMS, error: type[Exception]
+) -> None:
+    machines = ElementMachines(model)
+
+    def fail(event: Any) -> None:
+        raise error("mine")
+
+    machines.machine.on_enter_slip(fail)
+    with pytest.raises(error, match="mine") as caught:
+        simulate(model, open_loop(), 20.0, engine=machines)
+    assert type(caught.value) is error
+
+
+def test_machines_of_another_model_are_refused(model: GMS) -> None:
+    with pytest.raises(ParameterError, match="another model"):
+        simulate(model, open_loop(), 20.0, engine=ElementMachines(one_element("signed")))
+
+
+@pytest.mark.parametrize("kind", [dict, Element(), "Element", None])
+def test_what_is_no_element_class_is_refused(model: GMS, kind: Any) -> None:
+    with pytest.raises(ParameterError, match="class derived from Element"):
+        ElementMachines(model, kind)

@@ -1,0 +1,367 @@
+"""A run that cannot go on says what happened and what to try, and keeps what it had.
+
+Before a run every argument is checked: the message has the value and the rule. During a run the
+error carries the rows and transitions up to there in ``.trace``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.integrate
+
+from gms_fsm import (
+    GMS,
+    Chart,
+    ChartModel,
+    GMSParameters,
+    Prescribed,
+    Slider,
+    State,
+    Stribeck,
+    Trace,
+    Transition,
+    simulate,
+)
+from gms_fsm.charts import gms_element
+from gms_fsm.errors import (
+    ChartError,
+    GMSError,
+    LivelockError,
+    NotFiniteError,
+    ParameterError,
+    SimulationError,
+    StepSizeError,
+)
+from tests.helpers import one_element, open_loop, pulled_mass, stick_slip
+
+CURVE = Stribeck(1.0, 1.5, 1e-3)
+
+
+# --------------------------------------------------------------------------- before the run
+def _wrong(argument: str, value: Any, *words: str) -> Any:
+    return pytest.param({argument: value}, words, id=f"{argument}={value!r}"[:40])
+
+
+ARGUMENTS = [
+    _wrong("t_end", 0.0, "t_end is 0.0", "t_start is 0.0", "later"),
+    _wrong("t_end", -1.0, "t_end is -1.0", "later"),
+    _wrong("t_end", float("nan"), "t_end is nan", "finite"),
+    _wrong("t_end", float("inf"), "t_end is inf", "finite"),
+    _wrong("t_end", "long", "t_end is 'long'", "a number"),
+    _wrong("t_end", None, "t_end is None", "a number"),
+    _wrong("t_start", 1.0, "t_start is 1.0", "later"),
+    _wrong("t_start", "now", "t_start is 'now'", "a number"),
+    _wrong("method", "rk5", "'rk5'", "euler", "heun", "rk4", "bs23", "dp45", "OdeSolver"),
+    _wrong("method", 5, "method is 5", "dp45", "OdeSolver"),
+    _wrong("method", None, "method is None", "dp45"),
+    _wrong("method", dict, "dict", "OdeSolver"),
+    _wrong("method", "rk4", "'rk4'", "step=", "'dp45'"),
+    _wrong("method", "heun", "'heun'", "step=", "'dp45'"),
+    _wrong("method", "euler", "'euler'", "step=", "'dp45'"),
+    _wrong("step", 0, "step is 0.0", "> 0"),
+    _wrong("step", -0.1, "step is -0.1", "> 0"),
+    _wrong("step", float("nan"), "step is nan", "finite"),
+    _wrong("step", "big", "step is 'big'", "a number"),
+    _wrong("rtol", 0, "rtol is 0.0", "> 0"),
+    _wrong("rtol", -1e-6, "rtol is -1e-06", "> 0"),
+    _wrong("rtol", "fine", "rtol is 'fine'", "a number"),
+    _wrong("atol", 0, "atol is 0.0", "> 0"),
+    _wrong("atol", float("nan"), "atol is nan", "finite"),
+    _wrong("max_step", 0, "max_step is 0", "> 0"),
+    _wrong("max_step", -1, "max_step is -1", "> 0"),
+    _wrong("max_step", float("nan"), "max_step is nan"),
+    _wrong("max_step", "x", "max_step is 'x'"),
+    _wrong("max_step", None, "max_step is None"),
+    _wrong("events", "never", "events is 'never'", "'located'", "'step'"),
+    _wrong("events", None, "events is None", "'located'", "'step'"),
+    _wrong("events", "step", "events='step'", "step=", "max_step"),
+    _wrong("engine", "turbo", "engine is 'turbo'", "'machines'", "'ifelse'"),
+    _wrong("engine", None, "engine is None", "'machines'"),
+    _wrong("t_eval", [], "t_eval"),
+    _wrong("t_eval", [0.0, 2.0], "t_eval", "2.0", "t_end = 1.0"),
+    _wrong("t_eval", [-0.5, 0.5], "t_eval", "-0.5", "t_start = 0.0"),
+    _wrong("t_eval", [0.1, 0.5, 0.2], "t_eval[1] = 0.5", "t_eval[2] = 0.2", "increase"),
+    _wrong("t_eval", [0.1, 0.5, 0.5], "t_eval[1] = 0.5", "t_eval[2] = 0.5", "increase"),
+    _wrong("t_eval", [0.1, float("nan")], "t_eval", "finite"),
+    _wrong("t_eval", 0.5, "t_eval", "flat list"),
+    _wrong("t_eval", [[0.1, 0.2]], "t_eval", "flat list"),
+    _wrong("t_eval", ["a"], "t_eval", "a"),
+    _wrong("t_eval", "often", "t_eval", "often"),
+    _wrong("initial", {"q": [1]}, "'q'", "'x', 'v', 'z', 'states'"),
+    _wrong("initial", {"z": [1.0]}, "initial['z'] has 1 entries", "4 elements"),
+    _wrong("initial", {"z": [1.0] * 5}, "initial['z'] has 5 entries", "4 elements"),
+    _wrong("initial", {"z": 1.0}, "initial['z'] has shape ()"),
+    _wrong("initial", {"z": [[0.0] * 4]}, "initial['z'] has shape (1, 4)"),
+    _wrong("initial", {"z": [0, 0, float("nan"), 0]}, "initial['z'][2]", "nan", "finite"),
+    _wrong("initial", {"z": ["a"] * 4}, "initial['z']", "numbers"),
+    _wrong("initial", {"v": 1.0}, "'v' = 1.0", "prescribes the velocity"),
+    _wrong("initial", {"x": "far"}, "initial['x'] is 'far'", "a number"),
+    _wrong("initial", {"states": "stick"}, "initial['states'] is 'stick'", "4 state names"),
+    _wrong("initial", {"states": ["stick"] * 3}, "initial['states']", "4 state names"),
+    _wrong("initial", {"states": None}, "initial['states'] is None", "4 state names"),
+    _wrong("initial", {"states": 4}, "initial['states'] is 4", "4 state names"),
+    _wrong("initial", {"states": ["stick"] * 3 + ["glue"]}, "'glue'", "'stick', 'slip'"),
+    _wrong("initial", {"states": [0, 0, 0, 0]}, "'0'", "'stick', 'slip'"),
+    _wrong("initial", 5, "initial", "5"),
+    _wrong("initial", [1.0] * 4, "initial"),
+]
+
+
+@pytest.mark.parametrize(("changes", "words"), ARGUMENTS)
+def test_a_wrong_argument_is_refused_with_its_value_and_rule(
+    changes: dict[str, Any], words: tuple[str, ...]
+) -> None:
+    arguments = {"t_end": 1.0, **changes}
+    with pytest.raises((ParameterError, ChartError)) as caught:
+        simulate(stick_slip("signed"), Prescribed("0.2"), **arguments)
+    for word in words:
+        assert word in str(caught.value)
+    assert not isinstance(caught.value, SimulationError)
+
+
+@pytest.mark.parametrize("argument", ["step", "max_step"])
+def test_steps_under_the_resolution_of_the_clock_are_refused(argument: str) -> None:
+    class TooMany(Exception):
+        pass
+
+    def watch(_: object) -> None:
+        calls.append(0)
+        if len(calls) > 20:
+            raise TooMany("it would never end")
+
+    calls: list[int] = []
+    # Ten ticks of the clock, so that counting through them ends.
+    with pytest.raises(GMSError, match=rf"{argument}|resolution of the clock"):
+        simulate(
+            stick_slip("signed"), Prescribed("0.2"), 1.0 + 1e-14, t_start=1.0, progress=watch,
+            **{argument: 1e-20},
+        )  # fmt: skip
+
+
+# --------------------------------------------------------------------------- during the run
+def _failed(error: type[SimulationError], *args: Any, **options: Any) -> SimulationError:
+    with pytest.raises(error) as caught:
+        simulate(*args, **options)
+    assert isinstance(caught.value.trace, Trace)
+    assert "kept" in str(caught.value)
+    return caught.value
+
+
+def _broken(*edges: Transition, law: str = "signed") -> ChartModel:
+    sound = gms_element(law)  # type: ignore[arg-type]
+    chart = Chart(
+        "broken", sound.inputs, sound.variables, sound.parameters, sound.states, edges,
+        sound.outputs,
+    )  # fmt: skip
+    return ChartModel(
+        chart, {"k": 1, "sigma": 0.1, "C": 0.1, "v_c": 0.2}, n=2, stribeck=CURVE, weights=[2, 1]
+    )
+
+
+BOTH_WAYS = _broken(
+    Transition("break_away", "stick", "slip", guard="abs(z) >= s and abs(v) <= v_c"),
+    Transition("arrest", "slip", "stick", guard="abs(v) <= v_c and abs(z) < 10 * s"),
+)
+
+
+@pytest.mark.parametrize("engine", ["machines", "ifelse"])
+@pytest.mark.parametrize("rows", [None, [0.0, 1.0, 5.0, 7.0, 20.0]], ids=["steps", "t_eval"])
+def test_guards_that_hold_both_ways_are_a_livelock(engine: str, rows: Any) -> None:
+    error = _failed(LivelockError, BOTH_WAYS, Prescribed("0.15"), 20.0, engine=engine, t_eval=rows)
+    t = 1.0 / 0.15  # s = 1 away from v = 0: element 2 is the first on its threshold
+    for word in [
+        "element 2 switched 100 times",
+        "t = 6.66666666",
+        "stick",
+        "slip",
+        "z = 1,",
+        "s = 1,",
+    ] + ["v = 0.15", "arrest", "abs(v) <= v_c", "guards exclude each other"]:
+        assert word in str(error)
+    trace = error.trace
+    if rows is None:
+        assert trace.t[-1] == pytest.approx(t, abs=1e-9)
+        assert trace.z[0].tolist() == [0.0, 0.0]
+        assert trace.microstep[-1] >= 99
+    else:
+        assert trace.t.tolist() == [0.0, 1.0, 5.0]
+    np.testing.assert_allclose(trace.z[:, 0], 0.15 * trace.t, atol=1e-9)
+    assert 99 <= len(trace.transitions) <= 101
+    assert set(trace.transitions.element.tolist()) == {1}
+    np.testing.assert_allclose(trace.transitions.t, t, atol=1e-9)
+
+
+def test_once_a_step_the_same_chart_flips_but_time_goes_on() -> None:
+    trace = simulate(BOTH_WAYS, Prescribed("0.15"), 8.0, events="step", step=0.01)
+    assert trace.t[-1] == 8.0
+    assert len(trace.transitions) > 50
+
+
+def test_a_self_loop_that_never_turns_false_is_a_livelock() -> None:
+    model = _broken(Transition("again", "stick", "stick", guard="z >= s"))
+    error = _failed(LivelockError, model, Prescribed("0.5"), 5.0)
+    for word in ("element 2", "'again'", "from stick to stick", "z >= s"):
+        assert word in str(error)
+
+
+def test_a_sliding_mode_without_an_edge_is_a_livelock_of_its_comparison() -> None:
+    # v is pushed back to 0 from both sides while nothing can leave slip (|z| >= s).
+    model = one_element("published", F_c=1.0, F_s=1.5, v_s=0.01, C=5.0, sigma=1.0, k=0.1)
+    initial = {"z": [-10.0], "states": ["slip"], "v": 1e-3}
+    with pytest.raises(SimulationError) as caught:
+        simulate(model, Slider(1.0, "0.1*sin(t)"), 200.0, initial=initial)
+    assert isinstance(caught.value, LivelockError)
+    for word in ("changed 100 times", "element 1 is in slip", "sliding mode", "arrest"):
+        assert word in str(caught.value)
+    assert len(caught.value.trace) > 2
+
+
+def _singular(flow: str, n: int = 2) -> ChartModel:
+    chart = Chart(
+        "singular", ("v", "t"), ("z",), ("k",), (State("on", {"z": flow}),), (), {"F": "k * z"}
+    )
+    return ChartModel(chart, {"k": 1.0}, n=n, stribeck=CURVE)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"method": "bs23", "rtol": 1e-4},
+        {"events": "step", "max_step": 0.05},
+        {"method": scipy.integrate.RK45},
+        {"method": scipy.integrate.Radau, "rtol": 1e-4},
+    ],
+    ids=["dp45", "bs23", "events by step", "scipy RK45", "scipy Radau"],
+)
+@pytest.mark.parametrize("rows", [None, [0.0, 0.5, 0.9, 1.5, 2.0]], ids=["steps", "t_eval"])
+def test_a_flow_that_escapes_to_infinity_is_a_step_size_error(
+    options: dict[str, Any], rows: Any
+) -> None:
+    # z' = z^2, z(0) = 1: z = 1/(1 - t) leaves the numbers at t = 1.
+    error = _failed(
+        SimulationError, _singular("z * z"), Prescribed("0"), 2.0, t_eval=rows,
+        initial={"z": [0.1, 1.0]}, **options,
+    )  # fmt: skip
+    assert isinstance(error, StepSizeError | NotFiniteError)
+    trace = error.trace
+    if isinstance(error, StepSizeError):
+        for word in ("step size", "Radau", "rtol", "t = 1.0"):
+            assert word in str(error)
+    if rows is None:
+        assert 0.99 < trace.t[-1] < 1.001
+    else:
+        assert trace.t.tolist() == [0.0, 0.5, 0.9]
+    early = trace.t < 0.95
+    np.testing.assert_allclose(trace.z[early, 1], 1 / (1 - trace.t[early]), rtol=2e-2)
+
+
+@pytest.mark.parametrize(
+    ("flow", "t_break"), [("1 / (1 - t)**2", 1.0), ("1 / (t - 1)", 1.0), ("1 / (k - 1)", 0.0)]
+)
+def test_a_singular_flow_stops_before_it_is_singular(flow: str, t_break: float) -> None:
+    error = _failed(SimulationError, _singular(flow), Prescribed("0"), 2.0)
+    assert isinstance(error, StepSizeError | NotFiniteError)
+    if len(error.trace):
+        assert error.trace.t[-1] <= t_break + 1e-6
+        assert np.isfinite(error.trace.rows.y).all()
+
+
+@pytest.mark.parametrize("step", [0.01, 0.125])
+@pytest.mark.parametrize("events", ["located", "step"])
+def test_with_fixed_steps_infinity_is_not_finite(step: float, events: str) -> None:
+    error = _failed(
+        NotFiniteError, _singular("z * z"), Prescribed("0"), 20.0, initial={"z": [1.0, 1.0]},
+        method="rk4", step=step, events=events,
+    )  # fmt: skip
+    assert "not finite" in str(error)
+    assert 0.9 < error.trace.t[-1] < 10.0
+    assert np.isfinite(error.trace.rows.y).all()
+
+
+@pytest.mark.parametrize("engine", ["machines", "ifelse"])
+@pytest.mark.parametrize("guard", ["1 / (z - z) > 0", "sqrt(-1 - z) > 0", "exp(1e4 + z) > 0"])
+def test_a_guard_that_cannot_be_computed_is_a_simulation_error(guard: str, engine: str) -> None:
+    model = _broken(Transition("go", "stick", "slip", guard=guard))
+    error = _failed(SimulationError, model, Prescribed("0.1"), 1.0, engine=engine)
+    assert len(error.trace) <= 1
+
+
+@pytest.mark.parametrize("engine", ["machines", "ifelse"])
+def test_an_action_that_cannot_be_computed_is_a_simulation_error(engine: str) -> None:
+    model = _broken(
+        Transition("go", "stick", "slip", guard="z >= 0.05", actions={"z": "1 / (z - z)"})
+    )
+    error = _failed(SimulationError, model, Prescribed("0.1"), 1.0, engine=engine)
+    assert error.trace.t[-1] == pytest.approx(0.5, abs=1e-9)
+
+
+def test_an_output_that_cannot_be_computed_is_a_simulation_error() -> None:
+    chart = Chart("loud", ("v",), ("z",), (), (State("on", {"z": "v"}),), (), {"F": "1 / (1 - z)"})
+    model = ChartModel(chart, {}, n=1, stribeck=CURVE)
+    with pytest.raises(GMSError):
+        simulate(model, Prescribed("1"), 2.0, initial={"z": [1.0]})
+
+
+def test_transitions_before_the_failure_are_kept() -> None:
+    model = stick_slip("signed")
+    record = (np.linspace(0, 35, 3501), 0.2 * np.sin(2 * np.pi * np.linspace(0, 35, 3501) / 20))
+    error = _failed(SimulationError, model, Prescribed(record), 61.0)
+    whole = simulate(model, Prescribed(record), 35.0)
+    assert len(whole.transitions) > 8
+    np.testing.assert_array_equal(error.trace.transitions, whole.transitions)
+    np.testing.assert_array_equal(error.trace.F, whole.F)
+    assert error.trace.settings["t_end"] == 61.0
+    assert error.trace.sample([10.0]).z.shape == (1, 4)
+
+
+def test_a_kept_trace_can_be_saved(tmp_path: Any) -> None:
+    error = _failed(LivelockError, BOTH_WAYS, Prescribed("0.15"), 20.0)
+    for name in ("kept.npz", "kept.csv"):
+        loaded = Trace.load(error.trace.save(tmp_path / name))
+        np.testing.assert_array_equal(loaded.z, error.trace.z)
+
+
+def test_a_stop_from_the_progress_callback_is_the_users_own() -> None:
+    class Enough(Exception):
+        pass
+
+    seen: list[float] = []
+
+    def watch(moment: Any) -> None:
+        seen.append(moment.t)
+        if moment.t > 10.0:
+            raise Enough
+
+    with pytest.raises(Enough):
+        simulate(stick_slip("signed"), open_loop(), 61.0, progress=watch)
+    assert seen == sorted(seen)
+    assert seen[-2] <= 10.0 < seen[-1]
+
+
+def test_a_heavy_run_near_the_edge_of_the_parameters_fails_in_words_or_ends() -> None:
+    for k in (1e-8, 1e8):
+        parameters = GMSParameters(
+            [k], [0.0], [1.0], sigma_2=0.0, stribeck=Stribeck(1e-6, 1e6, 1e-9), v_c=1e-12
+        )
+        try:
+            trace = simulate(
+                GMS(parameters, law="signed"), Slider(1e-3, "sin(50*t)"), 0.05, max_step=1e-2
+            )
+        except SimulationError as error:
+            trace = error.trace
+        assert np.isfinite(trace.F).all()
+
+
+def test_initial_states_and_positions_are_the_first_row() -> None:
+    model, rig = pulled_mass()
+    trace = simulate(
+        model, rig, 0.1,
+        initial={"x": 0.5, "v": 0.01, "z": [0, 0.001, 0.002, 0.003], "states": ["slip"] * 4},
+    )  # fmt: skip
+    assert (trace.x[0], trace.v[0]) == (0.5, 0.01)
+    assert trace.z[0].tolist() == [0, 0.001, 0.002, 0.003]
+    assert trace.states[0].tolist() == ["slip"] * 4

@@ -1,0 +1,342 @@
+"""A chart of your own runs like the shipped ones: its texts say everything, whatever its names.
+
+Three states, two variables, actions on entry, exit and edges, `or` and `not` in guards, corners in
+flows: machines and generated if-else agree to the last bit, and both with the closed form.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gms_fsm import (
+    Chart,
+    ChartModel,
+    Prescribed,
+    PulledSlider,
+    Slider,
+    State,
+    Stribeck,
+    Trace,
+    Transition,
+    simulate,
+)
+from gms_fsm.errors import ChartError
+from gms_fsm.rigs import Rig
+from tests.helpers import same_bits
+
+CURVE = Stribeck(F_c=1.0, F_s=1.5, v_s=0.02)
+
+# Stick, creep in pre-sliding, slip with wear w; a reset of z at each arrest.
+WEAR = Chart(
+    "wear",
+    inputs=("v", "s", "t", "x"),
+    variables=("z", "w"),
+    parameters=("k", "C", "v_c", "share"),
+    states=(
+        State("stick", flow={"z": "v", "w": "0"}, entry={"z": "0.5 * z"}),
+        State("creep", flow={"z": "v * (1 - 0.5 * abs(z) / s)", "w": "0"}),
+        State("slip", flow={"z": "C * (sgn(v) - z / s)", "w": "abs(v)"}, exit={"w": "w + 1"}),
+    ),
+    transitions=(
+        Transition("yield_", "stick", "creep", guard="abs(z) >= share * s"),
+        Transition("tear", "creep", "slip", guard="abs(z) >= s and (v > v_c or v < -v_c)"),
+        Transition("heal", "creep", "stick", guard="not abs(z) >= 0.5 * share * s"),
+        Transition("arrest", "slip", "stick", guard="abs(v) <= v_c", actions={"z": "0.8 * z"}),
+    ),
+    outputs={"F": "k * z + 0.1 * dz"},
+)
+
+
+def wear(n: int = 3) -> ChartModel:
+    values = {"k": np.linspace(1, 2, n), "C": 0.3, "v_c": 1e-6, "share": np.linspace(0.5, 0.7, n)}
+    return ChartModel(WEAR, values, n=n, stribeck=CURVE, weights=np.linspace(0.5, 1, n))
+
+
+def both(model: ChartModel, rig: Rig, t_end: float, **options: Any) -> Trace:
+    """Run under machines and under if-else; they must agree to the last bit."""
+    one, other = (
+        simulate(model, rig, t_end, engine=engine, **options) for engine in ("machines", "ifelse")
+    )
+    same_bits(one, other)
+    for name in model.chart.variables:
+        np.testing.assert_array_equal(one.variable(name), other.variable(name))
+    return one
+
+
+def element(
+    flow: str, *, n: int = 1, force: str = "z", parameters: dict[str, Any] | None = None
+) -> ChartModel:
+    """One state, one flow."""
+    parameters = parameters or {}
+    chart = Chart(
+        "one", ("v", "t", "x"), ("z",), tuple(parameters), (State("on", {"z": flow}),), (),
+        {"F": force},
+    )  # fmt: skip
+    return ChartModel(chart, parameters, n=n, stribeck=CURVE)
+
+
+@pytest.mark.parametrize("rig", [Prescribed("0.3*sin(2*pi*t/17)"), PulledSlider(1, 2, 0.1)])
+@pytest.mark.parametrize("options", [{}, {"method": "rk4", "step": 1e-2}], ids=["dp45", "rk4"])
+def test_three_states_and_two_variables(rig: Rig, options: dict[str, Any]) -> None:
+    trace = both(wear(), rig, 40.0, **options)
+    edges = set(trace.transitions.edge.tolist())
+    assert {"yield_", "tear"} <= edges
+    assert trace.variable("w").shape == trace.z.shape == (len(trace), 3)
+    if isinstance(rig, Prescribed):
+        assert "arrest" in edges
+        for i in range(3):
+            arrests = np.sum(
+                (trace.transitions.edge == "arrest") & (trace.transitions.element == i)
+            )
+            slipped = trace.variable("w")[-1, i] - arrests
+            assert arrests >= 1
+            assert 0 < slipped <= 0.3 * 40
+
+
+def test_events_by_step_agree_too() -> None:
+    trace = both(wear(), Prescribed("0.3*sin(2*pi*t/17)"), 20.0, events="step", step=1e-2)
+    assert {"yield_", "tear"} <= set(trace.transitions.edge.tolist())
+
+
+def test_an_arrest_resets_in_stateflows_order() -> None:
+    # exit of the source, action of the edge, entry of the target; one after another.
+    chart = Chart(
+        "order",
+        inputs=("t",),
+        variables=("z", "w"),
+        parameters=(),
+        states=(
+            State("a", {"z": "0", "w": "0"}, exit={"z": "z + 1", "w": "z"}),
+            State("b", {"z": "0", "w": "1"}, entry={"z": "z + 0.5", "w": "w + z"}),
+        ),
+        transitions=(Transition("go", "a", "b", "t >= 1", actions={"z": "10 * z", "w": "w * z"}),),
+        outputs={"F": "z"},
+    )
+    model = ChartModel(chart, {}, n=2, stribeck=CURVE)
+    trace = both(model, Prescribed("0"), 2.0, initial={"z": [2.0, 3.0], "w": [0.0, 0.0]})
+    fired = [row for row in range(len(trace)) if trace.microstep[row] == 2]
+    assert len(fired) == 1
+    for i, z0 in enumerate((2.0, 3.0)):
+        z = w = z0 + 1  # exit: w is the new z
+        z, w = 10 * z, w * (10 * z)  # action
+        z = z + 0.5  # entry
+        w = w + z
+        assert trace.z[fired[0], i] == z
+        assert trace.variable("w")[fired[0], i] == w
+        assert trace.z[-1, i] == z
+        assert trace.variable("w")[-1, i] == pytest.approx(w + 1.0, rel=1e-12)
+    assert trace.transitions.z.tolist() == [2.0, 3.0], "the log shows z before the assignments"
+    assert trace.transitions.F_before[0] == 5.0
+    assert trace.transitions.F_after[0] == 30.5 + 3.0
+
+
+def test_a_bouncing_reset_meets_its_closed_form() -> None:
+    # z' = 1; at z = 1 back to 0: a sawtooth, through a self-loop.
+    chart = Chart(
+        "sawtooth", (), ("z",), ("top",), (State("rise", {"z": "1"}),),
+        (Transition("drop", "rise", "rise", "z >= top", actions={"z": "0"}),), {"F": "z"},
+    )  # fmt: skip
+    model = ChartModel(chart, {"top": [1.0, 0.75]}, n=2, stribeck=CURVE)  # type: ignore[dict-item]
+    trace = both(model, Prescribed("0"), 5.5)
+    for i, top in enumerate((1.0, 0.75)):
+        times = trace.transitions.t[trace.transitions.element == i]
+        np.testing.assert_allclose(times, top * np.arange(1, len(times) + 1), atol=1e-12)
+        assert len(times) == int(5.5 / top)
+        assert trace.z[-1, i] == pytest.approx(5.5 % top, abs=1e-12)
+
+
+def test_or_and_not_fire_where_they_become_true() -> None:
+    guards = {
+        "z > 2 or (t >= 1.5 and not v < 0.3)": 1.5,
+        "z > 0.5 or t > 9": 1.0,
+        "not (z < 1 or t < 1)": 2.0,
+        "not (z < 1 and t < 1)": 1.0,
+        "not not (x >= 0.75)": 1.5,
+        "(z > 0.25 or z > 0.5) and (t > 1.25 or z > 100)": 1.25,
+        "0.5 <= z < 3 and not (t < 1.75 or v > 1)": 1.75,
+        "abs(z - 1) <= 0.5 and abs(t - 2) < 0.5": 1.5,
+        "max(z, t - 1) >= 1 or min(z, -1) > 0": 2.0,
+    }
+    for guard, wanted in guards.items():
+        chart = Chart(
+            "logic", ("v", "t", "x"), ("z",), (), (State("a", {"z": "v"}), State("b", {"z": "v"})),
+            (Transition("e", "a", "b", guard),), {"F": "z"},
+        )  # fmt: skip
+        trace = both(ChartModel(chart, {}, n=1, stribeck=CURVE), Prescribed("0.5"), 4.0)
+        assert trace.transitions.t.tolist() == [pytest.approx(wanted, abs=1e-9)], guard
+
+
+# --------------------------------------------------------------------------- corners and jumps
+def _waves(t: float) -> float:
+    """The integral of |sin| from 0 to t."""
+    whole, rest = divmod(t, math.pi)
+    return 2.0 * whole + 1.0 - math.cos(rest)
+
+
+def _triangle(t: float) -> float:
+    """The integral of sgn(sin) from 0 to t."""
+    rest = t % (2 * math.pi)
+    return rest if rest <= math.pi else 2 * math.pi - rest
+
+
+def _capped(t: float) -> float:
+    """The integral of min(sin, 1/2) from 0 to t < pi."""
+    a = math.pi / 6
+    if t <= a:
+        return 1.0 - math.cos(t)
+    start = 1.0 - math.cos(a)
+    if t <= math.pi - a:
+        return start + 0.5 * (t - a)
+    return start + 0.5 * (math.pi - 2 * a) + math.cos(math.pi - a) - math.cos(t)
+
+
+@pytest.mark.parametrize(
+    ("flow", "t_end", "exact"),
+    [
+        ("abs(v)", 10.0, _waves),
+        ("sgn(v)", 10.0, _triangle),
+        ("sgn(v) * abs(v)", 10.0, lambda t: 1.0 - math.cos(t)),
+        ("max(v, -v)", 10.0, _waves),
+        ("max(v, 0) - min(v, 0)", 10.0, _waves),
+        ("min(v, 0.5)", 3.0, _capped),
+        ("min(2, v, 0.5)", 3.0, _capped),
+        ("abs(sgn(v)) + abs(-abs(v))", 10.0, lambda t: t + _waves(t)),
+    ],
+)
+def test_corners_of_a_flow_are_met_exactly(flow: str, t_end: float, exact: Any) -> None:
+    times = np.linspace(0.0, t_end, 41)
+    trace = both(element(flow), Prescribed("sin(t)"), t_end, t_eval=times, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(trace.z[:, 0], [exact(t) for t in times], atol=2e-8)
+
+
+def test_corners_in_an_elements_own_variable() -> None:
+    # z' = 1 - c |z|, z(0) = -1: exponentials of either sign that join at z = 0.
+    rates = np.array([0.5, 0.25])
+    times = np.linspace(0.0, 8.0, 33)
+    trace = both(
+        element("1 - c * abs(z)", n=2, parameters={"c": rates}), Prescribed("0"), 8.0,
+        t_eval=times, initial={"z": [-1.0, -1.0]}, rtol=1e-9, atol=1e-12,
+    )  # fmt: skip
+    for i, c in enumerate(rates):
+        t0 = -math.log(1 - c) / c
+        before = -1 / c + (1 / c - 1) * np.exp(c * times)
+        after = (1 - np.exp(-c * (times - t0))) / c
+        np.testing.assert_allclose(trace.z[:, i], np.where(times < t0, before, after), atol=2e-8)
+
+
+def test_corners_of_the_signal_are_met_exactly() -> None:
+    times = np.linspace(0.0, 10.0, 41)
+    for text in ("abs(sin(t))", "max(sin(t), -sin(t))", "sgn(sin(t)) * sin(t)"):
+        trace = both(element("v"), Prescribed(text), 10.0, t_eval=times, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(trace.x, [_waves(t) for t in times], atol=2e-8)
+
+
+# --------------------------------------------------------------------------- names
+def _named(parameter: str, variable: str, states: tuple[str, str], edge: str) -> ChartModel:
+    chart = Chart(
+        "names",
+        inputs=("v", "s"),
+        variables=(variable,),
+        parameters=(parameter,),
+        states=(
+            State(states[0], {variable: f"v * {parameter}"}),
+            State(states[1], {variable: f"sgn(v) * 0.1 - {parameter} * {variable} / s"}),
+        ),
+        transitions=(
+            Transition(edge, states[0], states[1], f"{variable} >= s and {parameter} > 0"),
+            Transition("home", states[1], states[0], f"abs(v) < 0.01 or {variable} < 0"),
+        ),
+        outputs={"F": f"{parameter} * {variable} + d{variable}"},
+    )
+    return ChartModel(chart, {parameter: np.array([0.5, 0.75, 1.0])}, n=3, stribeck=CURVE)
+
+
+PLAIN = ("q", "u", ("resting", "moving"), "leave")
+RIGS = [
+    Prescribed("sin(t)"),
+    Prescribed([(0.0, 0.5), (5.0, 0.6)]),
+    Prescribed(lambda t: 0.5),
+    Slider(2.0, [(0, 1), (5, 5.0)]),
+    PulledSlider(1.0, 2.0, 0.5),
+]
+NAMES = (
+    ["F_c", "F_s", "v_s", "v_dip", "sigma_2", "mass", "stiffness", "speed", "weights", "F_a"]
+    + ["F_i", "S_", "n_", "i_", "sgn_v", "abs_v", "sgn_0", "v_signal", "F_a_signal", "len", "range"]
+    + ["piecewise_linear", "float", "switch", "flow", "observe", "margins", "arm", "act", "load"]
+    + [
+        "element",
+        "event",
+        "self",
+        "model",
+        "holds",
+        "inf",
+        "nan",
+        "print",
+        "F_c_",
+        "dF",
+        "ds",
+        "dv",
+    ]
+)
+
+
+@pytest.fixture(scope="module")
+def plain() -> list[Trace]:
+    return [both(_named(*PLAIN), rig, 6.0) for rig in RIGS]
+
+
+def _equal_but_for_names(model: ChartModel, plain: list[Trace]) -> None:
+    for rig, reference in zip(RIGS, plain, strict=True):
+        trace = both(model, rig, 6.0)
+        for column in ("t", "x", "v", "z", "s", "F", "F_elements", "dz"):
+            np.testing.assert_array_equal(getattr(trace, column), getattr(reference, column))
+        np.testing.assert_array_equal(trace.rows.mode, reference.rows.mode)
+        np.testing.assert_array_equal(trace.transitions.t, reference.transitions.t)
+
+
+def test_the_plain_chart_does_something(plain: list[Trace]) -> None:
+    assert all(len(trace.transitions) > 0 for trace in plain)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("kind", ["parameter", "variable"])
+def test_a_name_is_refused_or_changes_nothing(name: str, kind: str, plain: list[Trace]) -> None:
+    parameter, variable, *rest = PLAIN
+    try:
+        if kind == "parameter":
+            model = _named(name, variable, *rest)  # type: ignore[arg-type]
+        else:
+            model = _named(parameter, name, *rest)  # type: ignore[arg-type]
+    except ChartError as error:
+        assert "reserved" in str(error)  # noqa: PT017
+        return
+    _equal_but_for_names(model, plain)
+
+
+@pytest.mark.parametrize(
+    ("states", "edge"),
+    [
+        (("S_", "F_"), "leave"),
+        (("resting", "Resting"), "leave"),
+        (("Q", "U"), "leave"),
+        (("true", "none"), "leave"),
+        (("len", "range"), "float"),
+        (("resting", "in_resting"), "RESTING"),
+        (("resting", "moving"), "Home"),
+        (("resting", "moving"), "Moving"),
+        (("a", "b"), "Q"),
+        (("take_home", "b"), "in_b"),
+    ],
+)
+def test_states_and_edges_may_differ_by_case_only(
+    states: tuple[str, str], edge: str, plain: list[Trace]
+) -> None:
+    try:
+        model = _named("q", "u", states, edge)
+    except ChartError:
+        return
+    _equal_but_for_names(model, plain)

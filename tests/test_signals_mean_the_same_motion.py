@@ -1,0 +1,339 @@
+"""However a motion is given (expression, ramps, record, function), the run is the same.
+
+Jumps are right-continuous, a record has no value outside itself, and what is no signal is refused
+with its value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gms_fsm import Prescribed, SimulationError, Slider, Trace, simulate
+from gms_fsm.errors import ExpressionError, NotFiniteError, SignalEndError, SignalError
+from gms_fsm.signals import Corners, Formula, Function, as_signal, piecewise_linear
+from tests.helpers import pulled_mass, stick_slip
+
+CORNERS = [(0.0, 0.0), (1.0, 0.2), (8.0, 0.2), (10.0, -0.2), (17.0, -0.2), (19.0, 0.1)]
+TIMES, VALUES = (np.array(column) for column in zip(*CORNERS, strict=True))
+TEXT = "min(0.2*t, 0.2) - max(0, min(0.2*(t - 8), 0.4)) + max(0, min(0.15*(t - 17), 0.3))"
+SAME_MOTION: dict[str, Any] = {
+    "expression": TEXT,
+    "ramps": CORNERS,
+    "ramps as tuples": tuple(CORNERS),
+    "ramps as an array": np.array(CORNERS),
+    "record of arrays": (TIMES, VALUES),
+    "record of lists": (TIMES.tolist(), VALUES.tolist()),
+    "fine record": (np.linspace(0, 19, 1901), np.interp(np.linspace(0, 19, 1901), TIMES, VALUES)),
+    "function": lambda t: float(np.interp(t, TIMES, VALUES)),
+    "function of a numpy number": lambda t: np.interp(t, TIMES, VALUES),
+    "signal": Formula(TEXT),
+}
+GRID = np.linspace(0.0, 19.0, 78)
+
+
+def _run(signal: Any, **options: Any) -> Trace:
+    return simulate(
+        stick_slip("signed"),
+        Prescribed(signal),
+        19.0,
+        t_eval=GRID,
+        rtol=1e-8,
+        atol=1e-11,
+        **options,
+    )
+
+
+@pytest.fixture(scope="module")
+def reference() -> Trace:
+    return _run(CORNERS)
+
+
+@pytest.mark.parametrize("given", SAME_MOTION)
+def test_the_same_motion_gives_the_same_run(given: str, reference: Trace) -> None:
+    trace = _run(SAME_MOTION[given])
+    assert len(reference.transitions) > 8
+    assert trace.transitions.edge.tolist() == reference.transitions.edge.tolist()
+    assert trace.transitions.element.tolist() == reference.transitions.element.tolist()
+    # The corners of a function are unknown; only error control meets them.
+    close = 1e-5 if given.startswith("function") else 1e-7
+    np.testing.assert_allclose(trace.transitions.t, reference.transitions.t, atol=10 * close)
+    np.testing.assert_allclose(trace.v, np.interp(GRID, TIMES, VALUES), atol=1e-15)
+    np.testing.assert_allclose(trace.x, reference.x, atol=close)
+    np.testing.assert_allclose(trace.z, reference.z, atol=10 * close)
+    np.testing.assert_array_equal(trace.states, reference.states)
+
+
+def test_the_same_force_gives_the_same_run() -> None:
+    model, _ = pulled_mass()
+    corners = [(0.0, 0.0), (4.0, 2.0), (8.0, -2.0), (12.0, 0.0)]
+    times, values = zip(*corners, strict=True)
+    runs = [
+        simulate(model, Slider(1.0, force), 12.0, t_eval=np.linspace(0, 12, 25), rtol=1e-8)
+        for force in (
+            corners,
+            ([*times], [*values]),
+            "max(min(0.5*t, 6 - t), 0.5*t - 6)",
+            lambda t: float(np.interp(t, times, values)),
+        )
+    ]
+    assert len(runs[0].transitions) > 3
+    for run in runs[1:]:
+        assert run.transitions.edge.tolist() == runs[0].transitions.edge.tolist()
+        np.testing.assert_allclose(run.x, runs[0].x, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "number", [0.1, 1, 0, np.float64(0.1), np.float32(0.5), np.int64(1)], ids=lambda u: repr(u)
+)
+def test_a_number_is_a_constant(number: Any) -> None:
+    trace = simulate(stick_slip("signed"), Prescribed(number), 2.0, t_eval=[0.0, 1.0, 2.0])
+    assert trace.v.tolist() == [float(number)] * 3
+    assert trace.x.tolist() == pytest.approx([0.0, float(number), 2 * float(number)], abs=1e-12)
+
+
+def test_ramps_are_held_before_the_first_and_after_the_last_corner() -> None:
+    trace = simulate(
+        stick_slip("signed"), Prescribed([(1.0, 0.1), (2.0, 0.3)]), 4.0, t_eval=[0, 1, 1.5, 2, 4]
+    )
+    assert trace.v.tolist() == pytest.approx([0.1, 0.1, 0.2, 0.3, 0.3], abs=1e-15)
+    assert trace.x[-1] == pytest.approx(0.1 + 0.2 + 0.6, abs=1e-12)
+
+
+@pytest.mark.parametrize("engine", ["machines", "ifelse"])
+def test_two_corners_at_one_time_are_a_jump_with_the_value_after_it(engine: str) -> None:
+    jump = [(0.0, 0.1), (1.0, 0.1), (1.0, -0.3), (2.0, -0.3)]
+    trace = simulate(
+        stick_slip("signed"), Prescribed(jump), 2.0, t_eval=[0.5, 1.0, 1.5], engine=engine
+    )
+    assert trace.v.tolist() == [0.1, -0.3, -0.3]
+    assert trace.x.tolist() == pytest.approx([0.05, 0.1, -0.05], abs=1e-12)
+    assert trace.z[:, 0].tolist() == pytest.approx([0.05, 0.1, -0.05], abs=1e-12)
+    assert as_signal(jump).jumps.tolist() == [1.0]  # type: ignore[union-attr]
+
+
+def test_a_jump_can_release_an_element_at_once() -> None:
+    jump = [(0.0, 0.5), (1.0, 0.5), (1.0, 0.0), (3.0, 0.0), (3.0, 0.5)]
+    trace = simulate(stick_slip("signed"), Prescribed(jump), 5.0)
+    # z = 0.5 > 0.4 = s at t = 0.8: slip; at rest s is 1.5 and |z| < s: all arrest at the jump; and
+    # at the next jump s falls under z again: all break away there.
+    np.testing.assert_allclose(trace.transitions.t, [0.8] * 4 + [1.0] * 4 + [3.0] * 4, atol=1e-9)
+    assert trace.transitions.edge.tolist() == (
+        ["break_away_forward"] * 4 + ["arrest"] * 4 + ["break_away_forward"] * 4
+    )
+
+
+def test_piecewise_linear_is_numpys_interpolation_between_jumps() -> None:
+    for t in np.linspace(-1.0, 20.0, 211):
+        assert piecewise_linear(t, TIMES.tolist(), VALUES.tolist()) == pytest.approx(
+            float(np.interp(t, TIMES, VALUES)), abs=1e-15
+        )
+    assert piecewise_linear(1.0, [0.0, 1.0, 1.0, 1.0], [0.0, 1.0, 7.0, 9.0]) == 9.0
+
+
+def test_two_functions_on_one_generated_text_stay_apart() -> None:
+    slow, fast = (
+        simulate(stick_slip("signed"), Prescribed(call), 1.0)
+        for call in (lambda t: 0.1, lambda t: 0.3)
+    )
+    assert (slow.v == 0.1).all()
+    assert (fast.v == 0.3).all()
+
+
+def test_a_signal_keeps_its_own_copy() -> None:
+    times, values = np.array([0.0, 1.0]), np.array([0.0, 5.0])
+    signal = as_signal((times, values))
+    assert isinstance(signal, Corners)
+    times[0] = values[0] = 9.0
+    assert (signal.times[0], signal.values[0]) == (0.0, 0.0)
+    with pytest.raises(ValueError, match="read-only"):
+        signal.times[0] = 1.0
+
+
+def test_pairs_are_ramps_and_a_pair_of_columns_is_a_record() -> None:
+    for ramps in ([(0, 1), (0, 5)], [[0, 1], [0, 5]], np.array([[0, 1], [0, 5]])):
+        signal = as_signal(ramps)
+        assert isinstance(signal, Corners)
+        assert (signal.times.tolist(), signal.values.tolist()) == ([0, 0], [1, 5])
+        assert signal.held
+    for record in (([0, 1], [0, 5]), (np.array([0, 1]), [0, 5])):
+        signal = as_signal(record)
+        assert isinstance(signal, Corners)
+        assert (signal.times.tolist(), signal.values.tolist()) == ([0, 1], [0, 5])
+        assert not signal.held
+
+
+def test_a_pair_of_tuples_is_a_record_too() -> None:
+    signal = as_signal(((0, 1, 2), (0.0, 0.1, 0.0)))
+    assert isinstance(signal, Corners)
+    assert (signal.times.tolist(), signal.values.tolist()) == ([0, 1, 2], [0, 0.1, 0])
+    assert not signal.held
+
+
+def test_kinds_are_told_apart() -> None:
+    assert isinstance(as_signal("t"), Formula)
+    assert isinstance(as_signal(abs), Function)
+    assert as_signal(as_signal("t")) == Formula("t")
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (None, ["None is not a signal", "expression of t", "(t, value) pairs", "(times, values)"]),
+        (True, ["True is not a signal"]),
+        ([], ["[] is not a signal"]),
+        ({}, ["{} is not a signal"]),
+        ([0, 1, 2], ["[0, 1, 2] is not a signal"]),
+        ([(0, 1, 2)], ["is not a signal"]),
+        ([(0, 1), (2,)], ["is not a signal"]),
+        ([[0, 1, 2], [0.0, 0.1, 0.0]], ["is not a signal"]),
+        (np.zeros((2, 3)), ["is not a signal"]),
+        (([0, 1, 2], [0, 1]), ["3 times but 2 values"]),
+        (([0], [1]), ["1 point(s)", "at least 2"]),
+        ([(0, 1)], ["1 point(s)", "at least 2"]),
+        (([], []), ["0 point(s)", "at least 2"]),
+        (([0, 2, 1], [0, 0, 0]), ["times[1] = 2.0", "times[2] = 1.0", "sort the rows"]),
+        ([(0, 0), (2, 0), (1, 0)], ["times[1] = 2.0", "times[2] = 1.0"]),
+        (([0, float("nan"), 2], [0, 0, 0]), ["times[1] is nan", "finite"]),
+        (([0, 1], [0, float("inf")]), ["values[1] is inf", "finite"]),
+        (float("nan"), ["nan", "finite"]),
+        (([0, 1], ["a", "b"]), ["['a', 'b'] are not numbers"]),
+        (([[0, 1]], [0, 1]), ["times have shape (1, 2)", "flat list"]),
+        ((0, 1), ["times have shape ()", "flat list"]),
+    ],
+)
+def test_what_is_no_signal_is_refused_with_its_value(given: Any, words: list[str]) -> None:
+    for build in (as_signal, Prescribed, lambda signal: Slider(1.0, signal)):
+        with pytest.raises(SignalError) as caught:
+            build(given)  # type: ignore[operator]
+        for word in words:
+            assert word in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["sin(x)", "t > 1", "t +", "", "t.real", "__import__('os')"])
+def test_an_unreadable_expression_is_an_expression_error_of_the_signal(text: str) -> None:
+    with pytest.raises(ExpressionError, match="signal, column"):
+        Prescribed(text)
+
+
+# --------------------------------------------------------------------------- signals that give out
+def _fails(error: type[SimulationError], signal: Any, t_end: float, **options: Any) -> Any:
+    with pytest.raises(error) as caught:
+        simulate(stick_slip("signed"), Prescribed(signal), t_end, **options)
+    return caught.value
+
+
+@pytest.mark.parametrize("method", [{}, {"method": "rk4", "step": 0.0101}], ids=["dp45", "rk4"])
+@pytest.mark.parametrize("rows", [None, [0.0, 1.5, 2.5, 3.0, 3.5, 5.0]], ids=["steps", "t_eval"])
+def test_a_record_that_ends_early_keeps_the_run_up_to_its_end(rows: Any, method: Any) -> None:
+    record = ([0.0, 1.0, 2.0, 3.0], [0.0, 0.2, 0.2, 0.1])
+    error = _fails(SignalEndError, record, 5.0, t_eval=rows, **method)
+    for word in ("ends at t = 3.0 s", "t_end = 5.0 s", "t_end <= 3.0"):
+        assert word in str(error)
+    whole = simulate(stick_slip("signed"), Prescribed(record), 3.0,
+                     t_eval=None if rows is None else rows[:4], **method)  # fmt: skip
+    assert error.trace.t[-1] == 3.0
+    np.testing.assert_array_equal(error.trace.t, whole.t)
+    np.testing.assert_array_equal(error.trace.z, whole.z)
+
+
+def test_a_record_may_end_exactly_with_the_run() -> None:
+    assert simulate(stick_slip("signed"), Prescribed(([0, 1], [0, 1])), 1.0).t[-1] == 1.0
+
+
+@pytest.mark.parametrize("t_start", [0.0, 0.999, 3.0, 4.0])
+def test_a_record_that_does_not_cover_the_start_is_refused_before_the_run(t_start: float) -> None:
+    rig = Prescribed(([1.0, 2.0, 3.0], [0.0, 0.1, 0.2]))
+    with pytest.raises(SignalError, match=rf"'v' covers 1.0 to 3.0 s.*starts at {t_start} s"):
+        simulate(stick_slip("signed"), rig, 5.0, t_start=t_start)
+
+
+def _broken_after(t_break: float, then: Callable[[float], Any]) -> Callable[[float], Any]:
+    return lambda t: 0.3 if t <= t_break else then(t)
+
+
+def _raise(_: float) -> float:
+    raise RuntimeError("sensor unplugged")
+
+
+BREAKS: dict[str, Callable[[float], Any]] = {
+    "raises": _raise,
+    "nan": lambda t: float("nan"),
+    "inf": lambda t: float("inf"),
+    "string": lambda t: "fast",
+    "none": lambda t: None,
+    "complex": lambda t: 1j,
+    "array": lambda t: np.zeros(3),
+}
+WORDS = {
+    "raises": ["'v'", "RuntimeError", "sensor unplugged"],
+    "string": ["'v'", "fast"],
+    "none": ["'v'"],
+    "complex": ["'v'"],
+    "array": ["'v'"],
+}
+
+
+@pytest.mark.parametrize("how", BREAKS)
+@pytest.mark.parametrize(
+    "options", [{}, {"method": "rk4", "step": 0.01}, {"events": "step", "step": 0.01}],
+    ids=["dp45", "rk4", "step"],
+)  # fmt: skip
+def test_a_function_that_breaks_keeps_the_run_up_to_there(
+    how: str, options: dict[str, Any]
+) -> None:
+    error = _fails(SimulationError, _broken_after(2.0, BREAKS[how]), 5.0, **options)
+    trace = error.trace
+    assert 0.0 < trace.t[-1] <= 2.0 + 1e-9
+    np.testing.assert_allclose(trace.x, 0.3 * trace.t, atol=1e-9)
+    for word in WORDS.get(how, ["not finite"]):
+        assert word in str(error)
+    if options:
+        assert trace.t[-1] > 1.97, "fixed steps reach the last whole step before the break"
+        assert len(trace.transitions) == 4
+    if how in ("nan", "inf"):
+        assert isinstance(error, NotFiniteError)
+
+
+@pytest.mark.parametrize("how", BREAKS)
+def test_the_message_names_the_time_the_trace_ends_at(how: str) -> None:
+    error = _fails(SimulationError, _broken_after(2.0, BREAKS[how]), 5.0)
+    if "at or just after t = " in str(error):
+        named = float(str(error).split("at or just after t = ")[1].split(" s")[0])
+        assert named == error.trace.t[-1]
+    else:
+        assert "at t = " in str(error)
+
+
+@pytest.mark.parametrize("how", ["raises", "string", "none", "nan"])
+def test_a_function_that_never_works_gives_an_error_whose_trace_can_be_read(how: str) -> None:
+    error = _fails(SimulationError, BREAKS[how], 5.0)
+    assert len(error.trace) <= 1
+    assert error.trace.z.shape == (len(error.trace), 4)
+    assert error.trace.v.shape == (len(error.trace),)
+
+
+@pytest.mark.parametrize(
+    ("text", "t_break"),
+    [("0.1*sqrt(2 - t)", 2.0), ("0.01/(2 - t)", 2.0), ("exp(400*t)", 1.775), ("1/0 + t", 0.0)],
+)
+def test_an_expression_that_leaves_the_numbers_keeps_the_run_up_to_there(
+    text: str, t_break: float
+) -> None:
+    error = _fails(SimulationError, text, 5.0)
+    assert isinstance(error, NotFiniteError) or "1/0" not in text
+    assert len(error.trace) >= 1 or t_break == 0.0
+    if len(error.trace):
+        assert error.trace.t[-1] <= t_break + 1e-6
+        assert np.isfinite(error.trace.rows.y).all()
+
+
+@pytest.mark.parametrize("text", ["sqrt(1 - t)", "1/(1 - t)", "exp(1e3*t)"])
+def test_with_fixed_steps_it_is_not_finite(text: str) -> None:
+    error = _fails(NotFiniteError, text, 5.0, method="rk4", step=0.25)
+    assert "not finite" in str(error)
+    assert error.trace.t[0] == 0.0
+    assert error.trace.t[-1] <= 1.0

@@ -1,0 +1,101 @@
+"""Under the signed law the negated input gives the negated answer: (v, z, F) -> (-v, -z, -F)."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gms_fsm import GMS, GMSParameters, Prescribed, PulledSlider, Slider, Stribeck, simulate
+from tests.helpers import FIG4_SINE, SINE, pulled_mass, stick_slip
+
+MIRRORED = {
+    "break_away_forward": "break_away_backward",
+    "break_away_backward": "break_away_forward",
+    "arrest": "arrest",
+}
+
+
+def assert_mirrored(trace, mirror):
+    """Compare two runs row by row."""
+    assert len(trace) == len(mirror)
+    np.testing.assert_allclose(mirror.t, trace.t, rtol=0, atol=1e-12)
+    for name in ("x", "v", "z", "F", "F_elements"):
+        np.testing.assert_allclose(
+            getattr(mirror, name), -getattr(trace, name), rtol=0, atol=1e-12, err_msg=name
+        )
+    np.testing.assert_array_equal(mirror.states, trace.states)
+    assert [MIRRORED[edge] for edge in trace.transitions.edge.tolist()] == (
+        mirror.transitions.edge.tolist()
+    )
+
+
+SIGNALS = [SINE, FIG4_SINE, "0.6*sin(t) + 0.3*sin(2.7*t)", "0.7*cos(t)*exp(-t/20)", "0.05*t - 0.3"]
+
+
+@pytest.mark.parametrize("signal", SIGNALS)
+def test_open_loop(signal):
+    """Formula signals, 30 s, Table I."""
+    model = stick_slip("signed")
+    trace = simulate(model, Prescribed(signal), 30.0)
+    assert len(trace.transitions) > 0
+    assert_mirrored(trace, simulate(model, Prescribed(f"-({signal})"), 30.0))
+
+
+def test_the_published_law_is_not_symmetric():
+    """The comparison can fail: eq. (1) as printed breaks the symmetry by metres."""
+    model = stick_slip("published")
+    a = simulate(model, Prescribed(SINE), 30.0)
+    b = simulate(model, Prescribed(f"-({SINE})"), 30.0)
+    assert np.abs(a.z[-1] + b.z[-1]).max() > 0.1
+
+
+def test_pulled_mass():
+    """Closed loop: the spring's end runs backward."""
+    model, rig = pulled_mass()
+    mirror = PulledSlider(rig.mass, rig.stiffness, -rig.speed)
+    assert_mirrored(simulate(model, rig, 40.0), simulate(model, mirror, 40.0))
+
+
+def test_slider():
+    """Closed loop: a force that makes the elements slip both ways."""
+    model, _ = pulled_mass()
+    force = "2.5*sin(0.7*t)"
+    trace = simulate(model, Slider(1.0, force), 20.0)
+    assert set(trace.transitions.edge) == set(MIRRORED)
+    assert_mirrored(trace, simulate(model, Slider(1.0, f"-({force})"), 20.0))
+
+
+@st.composite
+def cases(draw):
+    """A bank of one to three elements, and ramps."""
+    n = draw(st.integers(1, 3))
+
+    def numbers(low, high):
+        return draw(st.lists(st.floats(low, high), min_size=n, max_size=n))
+
+    F_c = draw(st.floats(0.1, 1.0))
+    parameters = GMSParameters(
+        numbers(0.5, 5),
+        numbers(0, 1),
+        numbers(0.01, 1),
+        sigma_2=draw(st.floats(0, 1)),
+        stribeck=Stribeck(F_c, F_c * draw(st.floats(1.0, 3.0)), draw(st.floats(1e-3, 0.1))),
+        v_c=1e-6,
+        weights=numbers(0.1, 1),
+    )
+    waits = draw(st.lists(st.floats(0.2, 3), min_size=2, max_size=7))
+    speeds = draw(st.lists(st.floats(-0.5, 0.5), min_size=len(waits) + 1, max_size=len(waits) + 1))
+    times = np.concatenate([[0.0], np.cumsum(waits)])
+    return GMS(parameters, law="signed"), times, np.array(speeds)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(cases())
+def test_random_ramps_and_parameters(case):
+    """Any parameters, any ramps, dwells and values on a boundary included."""
+    model, times, speeds = case
+    runs = [
+        simulate(model, Prescribed(list(zip(times, sign * speeds, strict=True))), times[-1])
+        for sign in (1.0, -1.0)
+    ]
+    assert_mirrored(*runs)

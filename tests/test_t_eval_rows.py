@@ -1,0 +1,88 @@
+"""With t_eval the rows are exactly the wanted times, right-continuous, and the run is the same."""
+
+import numpy as np
+import pytest
+
+from gms_fsm import simulate
+from tests.helpers import non_drifting, open_loop, pulled_mass, stick_slip
+
+CASES = {
+    "open loop, signed": (stick_slip("signed"), open_loop(), 31.0),
+    "open loop, published": (stick_slip("published"), open_loop(), 31.0),
+    "pulled mass": (*pulled_mass(), 20.0),
+    "fig. 3, slipping": (*non_drifting("signed", slipping=True), 10.0),
+}
+METHODS = [{}, {"method": "bs23"}, {"method": "rk4", "step": 2.03e-3}]
+cases = pytest.mark.parametrize("case", CASES)
+
+
+@pytest.mark.parametrize("options", METHODS)
+@cases
+def test_rows_are_the_wanted_times(case, options):
+    """Few times, many times, unevenly spread: the rows are these, all micro-steps 0."""
+    model, rig, T = CASES[case]
+    full = simulate(model, rig, T, **options)
+    rng = np.random.default_rng(7)
+    for times in (
+        [T], [0.0], [0.0, T], [0.3 * T, 0.3 * T + 1e-9, 0.7 * T],
+        np.linspace(0, T, 2501), np.sort(rng.uniform(0, T, 300)),
+    ):  # fmt: skip
+        trace = simulate(model, rig, T, t_eval=times, **options)
+        np.testing.assert_array_equal(trace.t, times)
+        assert (trace.microstep == 0).all()
+        np.testing.assert_array_equal(trace.transitions, full.transitions)
+
+
+@pytest.mark.parametrize("options", METHODS)
+@cases
+def test_a_row_on_an_event_is_the_state_after_it(case, options):
+    """Asked for the very time of a transition, the row holds the last micro-step's values."""
+    model, rig, T = CASES[case]
+    full = simulate(model, rig, T, **options)
+    times = np.unique(full.transitions.t)
+    trace = simulate(model, rig, T, t_eval=times, **options)
+    last = np.searchsorted(full.t, times, side="right") - 1
+    for name in ("x", "v", "z", "F", "F_elements", "states"):
+        np.testing.assert_array_equal(getattr(trace, name), getattr(full, name)[last], name)
+    just_before = np.nextafter(times, 0)
+    before = simulate(model, rig, T, t_eval=just_before, **options)
+    first = np.searchsorted(full.t, times, side="left")
+    np.testing.assert_array_equal(before.states, full.states[first])
+    assert (before.states != trace.states).any(axis=1).all()
+    np.testing.assert_allclose(before.z, full.z[first], rtol=0, atol=1e-12)
+
+
+@cases
+def test_rows_on_steps_are_the_steps_rows(case):
+    """The times of the accepted steps give the accepted steps' values."""
+    model, rig, T = CASES[case]
+    full = simulate(model, rig, T)
+    times, last = np.unique(full.t[::-1], return_index=True)
+    last = len(full) - 1 - last
+    trace = simulate(model, rig, T, t_eval=times)
+    np.testing.assert_allclose(trace.z, full.z[last], rtol=0, atol=1e-14)
+    np.testing.assert_array_equal(trace.states, full.states[last])
+
+
+@cases
+def test_rows_between_steps_are_as_good_as_the_steps(case):
+    """Dense output: rows inside steps keep to a run at rtol 1e-12 as closely as its steps do."""
+    model, rig, T = CASES[case]
+    times = np.linspace(0, T, 1501)
+    trace = simulate(model, rig, T, t_eval=times)
+    exact = simulate(model, rig, T, t_eval=times, rtol=1e-12, atol=1e-15)
+    # Rows within the error of an event's place may lie on its other side.
+    near = np.abs(times[:, None] - exact.transitions.t).min(axis=1) < 1e-4
+    assert near.mean() < 0.1
+    assert np.abs(trace.z - exact.z)[~near].max() < 5e-5
+    np.testing.assert_array_equal(trace.states[~near], exact.states[~near])
+
+
+def test_a_transition_at_the_end_is_in_the_last_row():
+    """t_end on a transition: the row at t_end comes after the firing."""
+    model, rig, T = CASES["open loop, signed"]
+    t = float(simulate(model, rig, T).transitions.t[0])
+    full = simulate(model, rig, t)
+    trace = simulate(model, rig, t, t_eval=[0.0, t])
+    assert len(full.transitions) == len(trace.transitions) == 4
+    assert trace.states[-1].tolist() == full.states[-1].tolist() == ["slip"] * 4
