@@ -100,11 +100,12 @@ def figure_3(
             panels.hysteresis(ax, trace.refined(SMOOTH), phases)
             ax.set_title(name)
             peak = int(trace.F.argmax())
+            x_peak = panels.scaled(trace.x, "m")[0] * (trace.x[peak] - trace.x[0])
             if limit is not None and trace.F[peak] > limit:
                 ax.set_ylim(min(0.0, trace.F.min()) - 0.03 * limit, limit)
                 ax.annotate(
                     f"peak {trace.F[peak]:.2f} N\nat t = {trace.t[peak]:.3f} s",
-                    (1e3 * trace.x[peak], limit), (-8, -4), textcoords="offset points",
+                    (x_peak, limit), (-8, -4), textcoords="offset points",
                     ha="right", va="top", color=TEXT_GREY, fontsize=8,
                 )  # fmt: skip
         if len(phases) > 1:
@@ -234,39 +235,37 @@ def overview(trace: Trace, measured: Measured | None = None, *, title: str = "")
     begin = _window(smooth)
     with rc_context(RC):
         figure = Figure(figsize=(11.0, 6.6), layout="constrained")
-        grid = figure.add_gridspec(6, 2, width_ratios=(1.5, 1))
-        time = [figure.add_subplot(grid[rows, 0]) for rows in (slice(0, 2), slice(2, 4))]
-        states = figure.add_subplot(grid[4:6, 0], sharex=time[0])
-        loop, portrait = (figure.add_subplot(grid[rows, 1]) for rows in (slice(0, 3), slice(3, 6)))
+        grid = figure.add_gridspec(1, 2, width_ratios=(1.5, 1))
+        left, right = (figure.add_subfigure(grid[0, column]) for column in (0, 1))
+        time = left.subplots(3, 1, sharex=True)
+        loop, portrait = right.subplots(2, 1)
         panels.velocity(time[0], smooth)
         panels.force(time[1], smooth)
-        panels.ribbons(states, smooth)
+        panels.ribbons(time[2], smooth)
         panels.hysteresis(loop, smooth)
         panels.portrait(portrait, smooth)
         if measured is not None:
             time[1].lines[0].set(color=BLUE, label="model", zorder=3)
             time[1].plot(measured.t, measured.F, color=VERMILION, linewidth=1.0, label="measured")
-            time[1].legend(loc="upper right", ncols=2)
-            loop.lines[0].set(linewidth=0.9, zorder=3, label="model", rasterized=True)
+            time[1].legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, borderaxespad=0.1)
+            x = measured.x - trace.x[0]
+            factor, _ = panels.scaled(trace.x - trace.x[0], "m")
+            loop.lines[0].set(linewidth=0.9, zorder=3, rasterized=True)
             loop.plot(
-                1e3 * measured.x, measured.F, color=VERMILION, linewidth=0.5, alpha=0.7,
-                label="measured", rasterized=True,
-            )  # fmt: skip
-            loop.legend(loc="upper left")
+                factor * x, measured.F, color=VERMILION, linewidth=0.5, alpha=0.7, rasterized=True
+            )
         if trace.model.chart.transitions:
-            states.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=5)
-        for ax in (*time, states):
-            ax.set_xlim(begin, trace.t[-1])
-        for ax in time:
+            time[2].legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=5, borderaxespad=0.1)
+        time[0].set_xlim(begin, trace.t[-1])
+        for ax in time[:2]:
             ax.set_xlabel("")
-            ax.tick_params(labelbottom=False)
-        part = "" if begin == trace.t[0] else f" (last {trace.t[-1] - begin:.3g} s)"
-        time[0].set_title(f"velocity{part}")
-        time[1].set_title(f"friction{part}")
+        part = "" if begin == trace.t[0] else f", last {trace.t[-1] - begin:.3g} s"
+        for ax, name in zip(time, ("velocity", "friction", "active states"), strict=True):
+            ax.set_title(name + part)
         loop.set_title("hysteresis")
         portrait.set_title("friction against velocity")
-        figure.suptitle(f"{title}: {trace.model.title}" if title else trace.model.title,
-                        x=0.01, ha="left")  # fmt: skip
+        head = f"{title}: {trace.model.title}" if title else trace.model.title
+        figure.suptitle(head, x=0.01, ha="left")
     return figure
 
 

@@ -40,6 +40,35 @@ __all__ = [
 ]
 
 Artists = list[Artist]
+SCALES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
+
+
+def scaled(values: NDArray[np.float64], unit: str) -> tuple[float, str]:
+    """Return the factor and the unit in which values read well.
+
+    Parameters
+    ----------
+    values : ndarray
+        In the unit.
+    unit : str
+        For example ``"m/s"``.
+
+    Returns
+    -------
+    (float, str)
+        Factor and prefixed unit.
+
+    Examples
+    --------
+    >>> scaled(np.array([0.0, 2e-4]), "m/s")
+    (1000.0, 'mm/s')
+    """
+    finite = np.abs(values[np.isfinite(values)])
+    largest = float(finite.max()) if finite.size else 0.0
+    for factor, prefix in SCALES:
+        if largest * factor >= 0.1 or largest == 0.0:
+            return factor, prefix + unit
+    return SCALES[-1][0], SCALES[-1][1] + unit
 
 
 def velocity(ax: Axes, trace: Trace) -> Artists:
@@ -57,8 +86,9 @@ def velocity(ax: Axes, trace: Trace) -> Artists:
     list of Artist
         The line.
     """
-    ax.set(xlabel="t [s]", ylabel="v [m/s]")
-    return list(ax.plot(trace.t, trace.v, color=INK))
+    factor, unit = scaled(trace.v, "m/s")
+    ax.set(xlabel="t [s]", ylabel=f"v [{unit}]")
+    return list(ax.plot(trace.t, factor * trace.v, color=INK))
 
 
 def force(ax: Axes, trace: Trace) -> Artists:
@@ -95,12 +125,13 @@ def deflections(ax: Axes, trace: Trace) -> Artists:
     list of Artist
         One line an element.
     """
-    ax.set(xlabel="t [s]", ylabel="z [m]")
+    factor, unit = scaled(trace.z, "m")
+    ax.set(xlabel="t [s]", ylabel=f"z [{unit}]")
     lines: Artists = []
     for i in range(trace.n):
         lines += ax.plot(
             trace.t,
-            trace.z[:, i],
+            factor * trace.z[:, i],
             color=ELEMENT_COLOURS[i % len(ELEMENT_COLOURS)],
             linestyle=ELEMENT_DASHES[i % len(ELEMENT_DASHES)],
             label=f"$z_{{{i + 1}}}$",
@@ -114,7 +145,7 @@ def hysteresis(ax: Axes, trace: Trace, phases: Sequence[tuple[str, float]] = ())
     Parameters
     ----------
     ax : Axes
-        Where; x is shown in mm.
+        Where; x is shown from where the run starts.
     trace : Trace
         What.
     phases : sequence of (str, float), optional
@@ -125,7 +156,9 @@ def hysteresis(ax: Axes, trace: Trace, phases: Sequence[tuple[str, float]] = ())
     list of Artist
         One line a phase.
     """
-    ax.set(xlabel="x [mm]", ylabel="F [N]")
+    x = trace.x - trace.x[0]
+    factor, unit = scaled(x, "m")
+    ax.set(xlabel=f"x [{unit}]", ylabel="F [N]")
     looks = ((BLUE, "-"), (VERMILION, "-"), (LINE_GREY, "-"))
     begin = -np.inf
     lines: Artists = []
@@ -133,7 +166,7 @@ def hysteresis(ax: Axes, trace: Trace, phases: Sequence[tuple[str, float]] = ())
         part = (trace.t >= begin) & (trace.t <= end)
         colour, dash = looks[number % len(looks)]
         lines += ax.plot(
-            1e3 * trace.x[part], trace.F[part], color=colour, linestyle=dash, label=name,
+            factor * x[part], trace.F[part], color=colour, linestyle=dash, label=name,
             zorder=3 - number % 3, linewidth=1.6 if number < 2 else 0.9,
         )  # fmt: skip
         begin = end
@@ -155,11 +188,13 @@ def portrait(ax: Axes, trace: Trace) -> Artists:
     list of Artist
         The line and the points.
     """
-    ax.set(xlabel="v [m/s]", ylabel="F [N]")
+    factor, unit = scaled(trace.v, "m/s")
+    v = factor * trace.v
+    ax.set(xlabel=f"v [{unit}]", ylabel="F [N]")
     away = (trace.rows.mode != 0).sum(axis=1)
-    line = ax.plot(trace.v, trace.F, color=LINE_GREY, linewidth=0.5, rasterized=True)
+    line = ax.plot(v, trace.F, color=LINE_GREY, linewidth=0.5, rasterized=True)
     points = ax.scatter(
-        trace.v, trace.F, c=away, s=5, cmap="viridis_r", vmin=0, vmax=max(1, trace.n),
+        v, trace.F, c=away, s=5, cmap="viridis_r", vmin=0, vmax=max(1, trace.n),
         zorder=3, linewidths=0, rasterized=True,
     )  # fmt: skip
     if trace.model.chart.transitions:
