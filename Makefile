@@ -4,13 +4,13 @@
 #   make lint    formatting, style, types, import contracts
 #   make core    the tests with only the required dependencies
 #   make bench   speed against hand-written SciPy
-#   make docs-pictures   the pictures kept under docs/
+#   make gallery the pictures kept under docs/, shown in docs/gallery.md
 PYTHON ?= python3
 VENV ?= .venv
 RUN := $(VENV)/bin
 PIP := $(RUN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: paper test lint core bench docs-pictures clean
+.PHONY: paper test lint core bench gallery clean
 .DEFAULT_GOAL := test
 
 $(VENV)/bin/python:
@@ -48,7 +48,7 @@ core: .venv-core/stamp
 bench: $(VENV)/dev.stamp
 	$(RUN)/python benchmarks/pulled_mass.py
 
-docs-pictures: $(VENV)/all.stamp
+gallery: $(VENV)/all.stamp
 	$(RUN)/python docs/make_pictures.py
 
 clean:

@@ -1,4 +1,4 @@
-"""Make the pictures kept under docs/images; run it with ``make docs-pictures``."""
+"""Make the pictures kept under docs/images; run it with ``make gallery``."""
 
 from __future__ import annotations
 

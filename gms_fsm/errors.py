@@ -125,3 +125,7 @@ class RecordError(GMSError, ValueError):
 
 class ScenarioError(GMSError, ValueError):
     """A scenario file is wrong; the text names file, key, value and rule."""
+
+
+class SessionError(GMSError, ValueError):
+    """A step-by-step session is asked for something that is not there."""

@@ -6,13 +6,14 @@ Computed on demand from the row with the chart's own trees, so it is what the ru
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from gms_fsm.chart import Transition
+from gms_fsm.chart import Chart, Transition
 from gms_fsm.expression import MATLAB_LIKE, Condition, Relation, clauses, evaluate, spell
 from gms_fsm.trace import Trace
 
-__all__ = ["Clause", "Explanation", "explain", "values_at"]
+__all__ = ["Clause", "Explanation", "explain", "explain_state", "values_at"]
 
 
 @dataclass(frozen=True)
@@ -137,8 +138,32 @@ def explain(trace: Trace, row: int, element: int) -> list[Explanation]:
     before = row - 1 if fired else row
     state = chart.states[int(modes[before])]
     values = values_at(trace, before, element)
+    return explain_state(chart, state.name, values, fired)
+
+
+def explain_state(
+    chart: Chart, state: str, values: Mapping[str, float], fired: str = ""
+) -> list[Explanation]:
+    """Explain the edges that leave a state.
+
+    Parameters
+    ----------
+    chart : Chart
+        The chart.
+    state : str
+        A state's name.
+    values : mapping of str to float
+        A number for every name its guards use.
+    fired : str
+        The edge that was taken, if any.
+
+    Returns
+    -------
+    list of Explanation
+        Highest priority first.
+    """
     found = []
-    for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
+    for priority, (_, edge) in enumerate(chart.leaving(state), start=1):
         guard = chart.guards[edge.name]
         found.append(
             Explanation(
@@ -162,7 +187,7 @@ def _edge_taken(trace: Trace, row: int, element: int) -> str:
     return str(taken.edge) if taken.element == element else ""
 
 
-def _clause(part: Condition, values: dict[str, float]) -> Clause:
+def _clause(part: Condition, values: Mapping[str, float]) -> Clause:
     text, holds = spell(part, MATLAB_LIKE), bool(evaluate(part, values))
     if not isinstance(part, Relation):
         return Clause(text, holds, math.nan, math.nan, math.nan)

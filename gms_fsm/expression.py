@@ -16,7 +16,7 @@ import math
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from gms_fsm.errors import ExpressionError
 
@@ -29,6 +29,7 @@ __all__ = [
     "Comparison",
     "Condition",
     "Either",
+    "InState",
     "Literal",
     "Name",
     "Negative",
@@ -104,6 +105,14 @@ class Relation:
 
 
 @dataclass(frozen=True)
+class InState:
+    """``state(element) == name``, elements counted from 1: of breakpoints, never of guards."""
+
+    element: int
+    state: str
+
+
+@dataclass(frozen=True)
 class Not:
     """``not operand``."""
 
@@ -125,7 +134,7 @@ class Either:
 
 
 Value: TypeAlias = Number | Name | Negative | Binary | Call
-Condition: TypeAlias = Relation | Not | Both | Either
+Condition: TypeAlias = Relation | InState | Not | Both | Either
 Node: TypeAlias = Value | Condition
 
 
@@ -205,7 +214,9 @@ def parse_value(text: str, names: Iterable[str]) -> Value:
     return _Reader(text, names).value(_tree(text), 0)
 
 
-def parse_condition(text: str, names: Iterable[str]) -> Condition:
+def parse_condition(
+    text: str, names: Iterable[str], states: Iterable[str] = (), elements: int = 0
+) -> Condition:
     """Read a text that is true or false, such as a guard.
 
     Parameters
@@ -214,6 +225,10 @@ def parse_condition(text: str, names: Iterable[str]) -> Condition:
         For example ``"abs(v) <= v_c and abs(z) < s"``.
     names : iterable of str
         The names that may occur.
+    states : iterable of str, optional
+        State names that ``state(i) == name`` may ask for (breakpoints do, guards do not).
+    elements : int, optional
+        How many elements there are; i counts from 1.
 
     Returns
     -------
@@ -230,7 +245,7 @@ def parse_condition(text: str, names: Iterable[str]) -> Condition:
     >>> spell(parse_condition("0 < v < 1", ["v"]))
     '0.0 < v and v < 1.0'
     """
-    return _Reader(text, names).condition(_tree(text), 0)
+    return _Reader(text, names, states, elements).condition(_tree(text), 0)
 
 
 def _tree(text: str) -> ast.expr:
@@ -276,9 +291,12 @@ def _tree(text: str) -> ast.expr:
 class _Reader:
     """Turns `ast` nodes into our own, refusing everything that is not on the list."""
 
-    def __init__(self, text: str, names: Iterable[str]) -> None:
+    def __init__(
+        self, text: str, names: Iterable[str], states: Iterable[str] = (), elements: int = 0
+    ) -> None:
         self.text = text
         self.names = tuple(dict.fromkeys(names))
+        self.states, self.elements = tuple(states), elements
 
     def refuse(self, reason: str, node: ast.expr, allowed: str = _GRAMMAR) -> ExpressionError:
         return ExpressionError(reason, self.text, node.col_offset + 1, allowed)
@@ -348,6 +366,10 @@ class _Reader:
     def condition(self, node: ast.expr, depth: int) -> Condition:
         depth = self.deeper(node, depth)
         match node:
+            case ast.Compare(
+                left=ast.Call(func=ast.Name(id="state")) as call, ops=[op], comparators=[name]
+            ) if self.states:
+                return self.in_state(call, op, name)
             case ast.Compare(left=left, ops=ops, comparators=comparators):
                 sides = [left, *comparators]
                 parts: list[Condition] = []
@@ -376,6 +398,23 @@ class _Reader:
                     "a number stands where a comparison is needed", node, "for example v > v_c"
                 )
         raise self.refuse(f"{_plain(node)} is not part of the language", node)
+
+    def in_state(self, call: ast.Call, op: ast.cmpop, name: ast.expr) -> Condition:
+        match call.args:
+            case [ast.Constant(value=int() as element)] if 1 <= element <= self.elements:
+                pass
+            case _:
+                raise self.refuse(
+                    "state(...) takes an element's number",
+                    call,
+                    f"state(1) to state({self.elements})",
+                )
+        if not isinstance(name, ast.Name) or name.id not in self.states:
+            raise self.refuse("unknown state", name, "the states " + ", ".join(self.states))
+        if not isinstance(op, ast.Eq | ast.NotEq):
+            raise self.refuse("states are compared by == or !=", name, "state(1) == slip")
+        found = InState(element, name.id)
+        return found if isinstance(op, ast.Eq) else Not(found)
 
 
 def _plain(node: ast.expr) -> str:
@@ -492,6 +531,8 @@ def _spell(node: Node, spelling: Spelling, rename: Mapping[str, str]) -> tuple[s
             return f"{function}({', '.join(part(a, 0) for a in arguments)})", _ATOM
         case Relation(op, left, right):
             return f"{part(left, _LEVEL['+'])} {op} {part(right, _LEVEL['+'])}", _LEVEL["<"]
+        case InState(element, state):
+            return f"state({element}) == {state}", _LEVEL["<"]
         case Not(operand):
             inner = part(operand, _ATOM if spelling.negation == "!" else _LEVEL["not"])
             return spelling.negation + inner, _LEVEL["not"]
@@ -557,7 +598,7 @@ def _whole_power(exponent: Value) -> int | None:
 
 
 # --------------------------------------------------------------------------- readers of the tree
-def evaluate(node: Node, values: Mapping[str, float]) -> float | bool:
+def evaluate(node: Node, values: Mapping[str, Any]) -> float | bool:
     """Compute a tree, rounding exactly as the generated code does.
 
     Parameters
@@ -565,7 +606,7 @@ def evaluate(node: Node, values: Mapping[str, float]) -> float | bool:
     node : Node
         A value or a condition.
     values : mapping of str to float
-        A number for every name in the tree.
+        A number for every name in the tree; for ``state(1)`` under that key a state's name.
 
     Returns
     -------
@@ -581,7 +622,7 @@ def evaluate(node: Node, values: Mapping[str, float]) -> float | bool:
         case Number(value):
             return value
         case Name(name):
-            return values[name]
+            return float(values[name])
         case Negative(operand):
             return -evaluate(operand, values)
         case Binary("**", base, exponent):
@@ -597,6 +638,8 @@ def evaluate(node: Node, values: Mapping[str, float]) -> float | bool:
             return FUNCTIONS[function](*(evaluate(a, values) for a in arguments))
         case Relation(op, left, right):
             return _compare(op, evaluate(left, values), evaluate(right, values))
+        case InState(element, state):
+            return bool(values[f"state({element})"] == state)
         case Not(operand):
             return not evaluate(operand, values)
         case Both(operands):
@@ -720,6 +763,8 @@ def split(condition: Condition, holds: bool = True) -> Split:
     ('both', ['v <= c', 'v >= -c'])
     """
     match condition:
+        case InState():
+            raise TypeError("a guard depends on values, not on states")
         case Not(operand):
             return split(operand, not holds)
         case Both(operands) | Either(operands):

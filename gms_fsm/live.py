@@ -39,6 +39,7 @@ class LiveView:
         self.detail = detail
         self.names: list[str] = []
         self.next_frame = 0.0
+        self.latest: Moment | None = None
         self.bar = Progress(
             TextColumn("t = {task.completed:.2f} s"), BarColumn(), TimeElapsedColumn(),
             console=console,
@@ -57,10 +58,13 @@ class LiveView:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        if self.latest is not None:
+            self.show(self.latest)  # the end is always drawn
         self.live.__exit__(kind, error, trace)
 
     def __call__(self, moment: Moment) -> None:
         """Draw, if it is time to."""
+        self.latest = moment
         now = time.monotonic()
         if now < self.next_frame:
             return

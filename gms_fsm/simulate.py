@@ -30,7 +30,7 @@ from gms_fsm.signals import Corners
 from gms_fsm.trace import Rows, Trace, log_of
 from integrators import Arc, Firing, HybridError, Livelock, NotFinite, Options, StepTooSmall
 
-__all__ = ["Moment", "simulate"]
+__all__ = ["Moment", "Run", "simulate"]
 
 
 def simulate(
@@ -110,29 +110,143 @@ def simulate(
     >>> len(trace.transitions)
     48
     """
-    t_start = checked_scalar("t_start", t_start, "finite")
-    t_end = checked_scalar("t_end", t_end, "finite")
-    if t_end <= t_start:
-        raise ParameterError(f"t_end is {t_end!r}, t_start is {t_start!r}; t_end must be later")
-    options = _options(method, step, rtol, atol, max_step, events, t_eval, t_start, t_end)
-    last = _covered(rig, t_start, t_end)
-    program = lower(model, rig)
-    y, mode = _initial(model, rig, {} if initial is None else initial)
-    switch: MachineEngine | IfElse
+    run = Run(
+        model, rig, t_end, t_start=t_start, method=method, step=step, rtol=rtol, atol=atol,
+        max_step=max_step, events=events, engine=engine, t_eval=t_eval, initial=initial,
+    )  # fmt: skip
+    while run.advance():
+        if progress is not None:
+            progress(Moment(run.recorder))
+    return run.trace()
+
+
+class Run:
+    """A simulation under way: what `simulate` drives to its end and a session step by step.
+
+    Parameters are those of `simulate`.
+
+    Parameters
+    ----------
+    model, rig, t_end, t_start, method, step, rtol, atol, max_step, events, engine, t_eval, initial
+        See `simulate`.
+    rows_at_once : int
+        How many steps `advance` takes at most; 1 to stop at every row.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed
+    >>> run = Run(GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.2"), 3.0,
+    ...           rows_at_once=1)
+    >>> run.advance(), len(run.trace())
+    (True, 1)
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        rig: Rig,
+        t_end: float,
+        *,
+        t_start: float = 0.0,
+        method: str | type[Any] = "dp45",
+        step: float | None = None,
+        rtol: float = 1e-6,
+        atol: float = 1e-9,
+        max_step: float = math.inf,
+        events: str = "located",
+        engine: str | ElementMachines = "machines",
+        t_eval: ArrayLike | None = None,
+        initial: Mapping[str, Any] | None = None,
+        rows_at_once: int = integrators.ROWS_AT_ONCE,
+    ) -> None:
+        t_start = checked_scalar("t_start", t_start, "finite")
+        t_end = checked_scalar("t_end", t_end, "finite")
+        if t_end <= t_start:
+            raise ParameterError(f"t_end is {t_end!r}, t_start is {t_start!r}; t_end must be later")
+        options = _options(
+            method, step, rtol, atol, max_step, events, t_eval, t_start, t_end, rows_at_once
+        )
+        self.t_end, self.last = t_end, _covered(rig, t_start, t_end)
+        program = lower(model, rig)
+        y, self.mode = _initial(model, rig, {} if initial is None else initial)
+        switch, engine_name = _engine(engine, model, program, self.mode)
+        settings: dict[str, str | float | None] = {
+            "method": method if isinstance(method, str) else method.__name__,
+            "step": step, "rtol": rtol, "atol": atol,
+            "max_step": max_step if math.isfinite(max_step) else None,
+            "events": events, "engine": engine_name, "t_start": t_start, "t_end": t_end,
+        }  # fmt: skip
+        self.recorder = _Recorder(model, rig, program, settings, wanted=t_eval is not None)
+        self.recorder.start(t_start, y, self.mode)
+        self.happening: Arc | Firing | integrators.Stop | None = None  # the latest
+        self.happenings = integrators.run(_system(program), switch, t_start, y, self.last, options)
+
+    def advance(self) -> bool:
+        """Let the next thing happen.
+
+        Returns
+        -------
+        bool
+            False when the run has reached its end.
+
+        Raises
+        ------
+        SimulationError
+            If it cannot go on.
+        """
+        recorder = self.recorder
+        try:
+            happening = next(self.happenings, None)
+        except HybridError as error:
+            raise _explained(error, recorder, recorder.model, self.mode) from None
+        except SignalError as error:
+            raise SimulationError(
+                f"{error}; the run up to there is kept", recorder.trace()
+            ) from None
+        if happening is None:
+            if self.last < self.t_end:
+                raise SignalEndError(
+                    f"a sampled signal ends at t = {self.last!r} s, before t_end = {self.t_end!r} "
+                    f"s; give a longer record or t_end <= {self.last!r}; the run up to there is "
+                    "kept",
+                    recorder.trace(),
+                )
+            return False
+        self.happening = happening
+        try:
+            recorder.take(happening)
+        except ArithmeticError as error:  # of an output at a firing
+            raise NotFiniteError(
+                f"the force cannot be computed at t = {happening.t!r} s: {error}; the run up to "
+                "there is kept in .trace",
+                recorder.trace(),
+            ) from None
+        return True
+
+    def trace(self) -> Trace:
+        """Return the run so far."""
+        return self.recorder.trace()
+
+
+def _engine(
+    engine: str | ElementMachines, model: Model, program: Program, mode: list[int]
+) -> tuple[MachineEngine | IfElse, str]:
     if isinstance(engine, ElementMachines):
         if engine.model is not model:
             raise ParameterError("engine: these ElementMachines were made for another model")
-        switch, engine_name = MachineEngine(engine, program, mode), "machines"
-    elif engine == "machines":
-        switch, engine_name = MachineEngine(ElementMachines(model), program, mode), engine
-    elif engine == "ifelse":
-        switch, engine_name = IfElse(model.chart, program, mode), engine
-    else:
-        raise ParameterError(
-            f"engine is {engine!r}; it must be 'machines', 'ifelse' or an ElementMachines"
-        )
+        return MachineEngine(engine, program, mode), "machines"
+    if engine == "machines":
+        return MachineEngine(ElementMachines(model), program, mode), engine
+    if engine == "ifelse":
+        return IfElse(model.chart, program, mode), engine
+    raise ParameterError(
+        f"engine is {engine!r}; it must be 'machines', 'ifelse' or an ElementMachines"
+    )
+
+
+def _system(program: Program) -> integrators.System:
     functions = program.functions
-    system = integrators.System(
+    return integrators.System(
         flow=functions["flow"],
         flow_live=functions["flow_live"],
         arm=functions["arm"],
@@ -144,38 +258,6 @@ def simulate(
         knots=program.knots,
         jumps=program.jumps,
     )
-    settings: dict[str, str | float | None] = {
-        "method": method if isinstance(method, str) else method.__name__,
-        "step": step, "rtol": rtol, "atol": atol,
-        "max_step": max_step if math.isfinite(max_step) else None,
-        "events": events, "engine": engine_name, "t_start": t_start, "t_end": t_end,
-    }  # fmt: skip
-    recorder = _Recorder(model, rig, program, settings, wanted=t_eval is not None)
-    recorder.start(t_start, y, mode)
-    try:
-        for happening in integrators.run(system, switch, t_start, y, last, options):
-            try:
-                recorder.take(happening)
-            except ArithmeticError as error:  # of an output at a firing
-                raise NotFiniteError(
-                    f"the force cannot be computed at t = {happening.t!r} s: {error}; the run up "
-                    "to there is kept in .trace",
-                    recorder.trace(),
-                ) from None
-            if progress is not None:
-                progress(Moment(recorder))
-    except HybridError as error:
-        raise _explained(error, recorder, model, mode) from None
-    except SignalError as error:
-        raise SimulationError(f"{error}; the run up to there is kept", recorder.trace()) from None
-    trace = recorder.trace()
-    if last < t_end:
-        raise SignalEndError(
-            f"a sampled signal ends at t = {last!r} s, before t_end = {t_end!r} s; give a longer "
-            f"record or t_end <= {last!r}; the run up to there is kept",
-            trace,
-        )
-    return trace
 
 
 # --------------------------------------------------------------------------- checking
@@ -189,6 +271,7 @@ def _options(
     t_eval: ArrayLike | None,
     t_start: float,
     t_end: float,
+    rows_at_once: int,
 ) -> Options:
     chosen: Any = method
     if isinstance(method, str):
@@ -241,7 +324,7 @@ def _options(
                 "times must increase"
             )
         times = as_floats(wanted)
-    return Options(chosen, step, rtol, atol, max_step, events == "located", times)
+    return Options(chosen, step, rtol, atol, max_step, events == "located", times, rows_at_once)
 
 
 def _covered(rig: Rig, t_start: float, t_end: float) -> float:

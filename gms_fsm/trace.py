@@ -29,7 +29,7 @@ from gms_fsm.rigs import Rig
 if TYPE_CHECKING:
     import pandas
 
-__all__ = ["Rows", "Trace"]
+__all__ = ["Rows", "Trace", "interpolated"]
 
 _NUMBERS = ("z", "v", "s", "F_before", "F_after")
 
@@ -264,26 +264,10 @@ class Trace:
         t0 = table.t[i]
         if t == t0 or i + 1 == len(table):
             return np.asarray(table.y[i])
-        program, mode = self.program, table.mode[i].tolist()
-        t1, y0, y1 = table.t[i + 1], table.y[i], table.y[i + 1]
-        # Signs as they hold inside the interval; at its ends they may just be turning.
-        held = [0.0] * program.held
-        inside = (0.5 * (y0 + y1)).tolist()
-        program.functions["arm"](
-            float(0.5 * (t0 + t1)), inside, mode, program.p, held, [0] * len(program.strict)
-        )
-        slopes = []
-        for time, y in ((t0, y0), (t1, y1)):
-            dy = [0.0] * program.size
-            program.functions["flow"](float(time), y.tolist(), mode, held, program.p, dy)
-            slopes.append(np.array(dy))
-        h = t1 - t0
-        theta = (t - t0) / h
-        rise = y1 - y0
-        bend = h * slopes[0] - rise
-        twist = rise - h * slopes[1] - bend
-        value: FloatArray = y0 + theta * (rise + (1 - theta) * (bend + theta * twist))
-        return value
+        return interpolated(
+            self.program, table.mode[i].tolist(), float(t0), table.y[i], float(table.t[i + 1]),
+            table.y[i + 1], t,
+        )  # fmt: skip
 
     # ------------------------------------------------------------------ files
     def save(self, path: str | Path) -> Path:
@@ -503,6 +487,55 @@ class Trace:
 
 
 # --------------------------------------------------------------------------- helpers
+def interpolated(
+    program: Program,
+    mode: list[int],
+    t0: float,
+    y0: FloatArray,
+    t1: float,
+    y1: FloatArray,
+    t: float,
+) -> FloatArray:
+    """Return the state at t between two rows of one arc: cubic Hermite, slopes from the flow.
+
+    Parameters
+    ----------
+    program : Program
+        Of the run.
+    mode : list of int
+        Active states between the rows.
+    t0, t1 : float
+        Times of the rows, s.
+    y0, y1 : ndarray, shape (m,)
+        Their states.
+    t : float
+        s, from t0 to t1.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        The state.
+    """
+    # Signs as they hold inside the interval; at its ends they may just be turning.
+    held = [0.0] * program.held
+    inside = (0.5 * (y0 + y1)).tolist()
+    program.functions["arm"](
+        0.5 * (t0 + t1), inside, mode, program.p, held, [0] * len(program.strict)
+    )
+    slopes = []
+    for time, y in ((t0, y0), (t1, y1)):
+        dy = [0.0] * program.size
+        program.functions["flow"](time, y.tolist(), mode, held, program.p, dy)
+        slopes.append(np.array(dy))
+    h = t1 - t0
+    theta = (t - t0) / h
+    rise = y1 - y0
+    bend = h * slopes[0] - rise
+    twist = rise - h * slopes[1] - bend
+    value: FloatArray = y0 + theta * (rise + (1 - theta) * (bend + theta * twist))
+    return value
+
+
 _LOG_NAMES = ("t", "element", "edge", "source", "target", *_NUMBERS)
 
 

@@ -6,6 +6,7 @@ indexable numbers (lists in Python, arrays when compiled); a loop over it yields
 
 from integrators.hybrid import (
     MOST_SWITCHES,
+    ROWS_AT_ONCE,
     Arc,
     Firing,
     HybridError,
@@ -28,6 +29,7 @@ __all__ = [
     "METHODS",
     "MOST_SWITCHES",
     "RK4",
+    "ROWS_AT_ONCE",
     "Arc",
     "Firing",
     "HybridError",

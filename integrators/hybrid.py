@@ -36,7 +36,7 @@ __all__ = [
 ]
 
 MOST_SWITCHES = 100  # of one machine, or of one relation, while time stands still
-ROWS_AT_ONCE = 512
+ROWS_AT_ONCE = 512  # a buffer
 
 
 # --------------------------------------------------------------------------- what goes in
@@ -109,6 +109,8 @@ class Options:
         at most one edge each.
     times : list of float, optional
         Wanted rows; every accepted step when left out.
+    rows_at_once : int
+        How many steps an arc that is yielded holds at most.
     """
 
     method: Tableau | type[Any]
@@ -118,6 +120,7 @@ class Options:
     max_step: float
     located: bool
     times: list[float] | None
+    rows_at_once: int = ROWS_AT_ONCE
 
 
 # --------------------------------------------------------------------------- what comes out
@@ -327,7 +330,7 @@ def run(
                 fresh = False
             status = kernel.FULL
             while status == kernel.FULL:
-                steps = ROWS_AT_ONCE if options.located else 1
+                steps = options.rows_at_once if options.located else 1
                 status, t = stepper.advance(t, y, t_stop, ws, steps)
                 if out.cursor[kernel.ROW]:
                     yield _take_rows(out, switch)

@@ -18,7 +18,7 @@ import graphviz
 from gms_fsm.errors import OutputError, ParameterError
 from gms_fsm.files import written_whole
 
-__all__ = ["render"]
+__all__ = ["drawn", "render"]
 
 PICTURES = (".svg", ".png", ".pdf")
 TEXTS = (".dot", ".gv")
@@ -69,7 +69,7 @@ def render(graph: graphviz.Digraph, path: str | Path) -> Path:
             f"path is {str(path)!r}; its suffix must be one of {', '.join(PICTURES)} for a "
             f"picture or {', '.join(TEXTS)} for the DOT text"
         )
-    picture = None if suffix in TEXTS else _draw(graph, suffix[1:])
+    picture = None if suffix in TEXTS else drawn(graph, suffix[1:])
     if picture is not None:
         written_whole(path, lambda file: file.write(picture))
     elif suffix in TEXTS:
@@ -86,8 +86,26 @@ def render(graph: graphviz.Digraph, path: str | Path) -> Path:
     return path
 
 
-def _draw(graph: graphviz.Digraph, form: str) -> bytes | None:
-    """Return the picture, or None if there is no Graphviz."""
+def drawn(graph: graphviz.Digraph, form: str) -> bytes | None:
+    """Return a picture as bytes, or None if there is no Graphviz.
+
+    Parameters
+    ----------
+    graph : graphviz.Digraph
+        What to draw.
+    form : str
+        ``"svg"``, ``"png"``, ``"pdf"`` or another output format of Graphviz.
+
+    Returns
+    -------
+    bytes or None
+        The picture.
+
+    Raises
+    ------
+    OutputError
+        If Graphviz cannot draw the graph.
+    """
     picture = _by_program(graph, form)
     if picture is None:
         picture = _by_package(graph, form)

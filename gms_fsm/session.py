@@ -1,0 +1,960 @@
+"""The step-by-step core: stop a run at a guard, see why, go back, change a value, compare.
+
+No user interface here. A session holds branches; a branch is a run under way, row by row, with a
+cursor. Rows once computed are kept, so going back and forward shows the same bits. A poke makes a
+new branch from the row under the cursor; the branch it came from stays as it is. A run that cannot
+go on is no exception here but an outcome of its branch.
+"""
+
+from __future__ import annotations
+
+import json
+from bisect import bisect_left
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from gms_fsm.errors import ParameterError, SessionError, SimulationError, TraceFileError
+from gms_fsm.explain import Explanation, explain_state
+from gms_fsm.expression import Condition, Value, evaluate, parse_condition, parse_value
+from gms_fsm.files import written_whole
+from gms_fsm.header import Header
+from gms_fsm.models import Model
+from gms_fsm.rigs import Rig
+from gms_fsm.signals import Function
+from gms_fsm.simulate import Run
+from gms_fsm.trace import Rows, Trace, interpolated, log_of
+from integrators import Firing, Stop
+
+__all__ = ["Branch", "Breakpoint", "Comparison", "Here", "Session"]
+
+Kind = Literal["tested", "valid", "fires", "enter", "leave"]
+KINDS: tuple[Kind, ...] = ("tested", "valid", "fires", "enter", "leave")
+LOOKS = 16  # places between two rows at which a condition is tried
+HALVINGS = 60
+
+
+@dataclass(frozen=True)
+class Here:
+    """One row of a branch, with everything a person asks for.
+
+    Parameters
+    ----------
+    row : int
+        Its number in the branch.
+    t, x, v, F : float
+        s, m, m/s, N.
+    microstep : int
+        0 before the firings of this time.
+    z, s, F_elements : tuple of float
+        m, m, N; one an element (z is the chart's first variable).
+    states : tuple of str
+        Active states.
+    located : bool
+        Whether it lies between rows, where a condition became true.
+    """
+
+    row: int
+    t: float
+    microstep: int
+    x: float
+    v: float
+    F: float
+    z: tuple[float, ...]
+    s: tuple[float, ...]
+    F_elements: tuple[float, ...]
+    states: tuple[str, ...]
+    located: bool
+
+
+@dataclass
+class Breakpoint:
+    """Where `Session.proceed` stops.
+
+    Parameters
+    ----------
+    kind : {"tested", "valid", "fires", "enter", "leave"}
+        Guard of an edge asked, guard becoming true, edge taken; state entered or left.
+    name : str
+        The edge's or the state's name.
+    element : int or None
+        Counted from 0; None for all.
+    condition : str
+        Must hold too; empty for none.
+    hits : int
+        Stop at this hit, and at every one after it.
+    seen : int
+        Hits so far.
+    """
+
+    kind: Kind
+    name: str
+    element: int | None = None
+    condition: str = ""
+    hits: int = 1
+    seen: int = 0
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two branches against each other.
+
+    Parameters
+    ----------
+    t : float
+        Until when, s (the shorter of the two).
+    transitions : tuple of int
+        How many each has until then.
+    first_difference : float or None
+        Time of the first transition that differs, s; None if none does.
+    z, F : float
+        Largest differences on common times, m and N.
+    """
+
+    t: float
+    transitions: tuple[int, int]
+    first_difference: float | None
+    z: float
+    F: float
+
+
+class Branch:
+    """A run under way, row by row, behind an unchanged part of its parent.
+
+    Parameters
+    ----------
+    run : Run
+        From where the branch begins.
+    parent : int or None
+        Number of the branch it was poked from.
+    fork : int
+        The parent's row under the cursor then; rows 0 to fork are shared.
+    shared : Branch or None
+        The parent itself.
+    edits : mapping
+        What was poked.
+    fork_at : float or None
+        Time of the poke if it was done between two rows, s.
+    """
+
+    def __init__(
+        self,
+        run: Run,
+        parent: int | None = None,
+        fork: int = -1,
+        shared: Branch | None = None,
+        edits: Mapping[str, Any] | None = None,
+        fork_at: float | None = None,
+    ) -> None:
+        self.run, self.parent, self.fork, self.shared = run, parent, fork, shared
+        self.edits, self.fork_at = dict(edits or {}), fork_at
+        self.outcome = ""  # "" while it goes on, "end", or the message of what stopped it
+        self.cursor = 0
+        self.between: tuple[float, list[float]] | None = None  # a located place behind the cursor
+        self.offset = fork + 1
+        self.stops: set[int] = set()  # rows at which the machines were asked
+        self.firings: list[int] = []  # rows made by firings, own part
+        self.pull()
+
+    # ------------------------------------------------------------------ rows
+    def __len__(self) -> int:
+        return self.offset + len(self.run.recorder.rows.t)
+
+    def pull(self) -> bool:
+        """Compute at least one more row; return whether there is one."""
+        before = len(self)
+        while not self.outcome and len(self) == before:
+            try:
+                if not self.run.advance():
+                    self.outcome = "end"
+                elif isinstance(self.run.happening, Stop):
+                    self.stops.add(len(self) - 1)
+                elif isinstance(self.run.happening, Firing):
+                    self.firings.append(len(self) - 1)
+            except SimulationError as error:
+                self.outcome = str(error)
+        return len(self) > before
+
+    def raw(self, row: int) -> tuple[float, int, list[float], tuple[int, ...]]:
+        """Return time, micro-step, state and modes of a row."""
+        if row < self.offset:
+            assert self.shared is not None
+            return self.shared.raw(row)
+        rows, i = self.run.recorder.rows, row - self.offset
+        return rows.t[i], rows.microstep[i], rows.y[i], rows.mode[i]
+
+    def log(self) -> list[tuple[Any, ...]]:
+        """Return all firings so far, the shared part included."""
+        before: list[tuple[Any, ...]] = []
+        if self.shared is not None:
+            before = [self.shared.fired(row) for row in self.shared.firing_rows(self.offset)]
+        return before + self.run.recorder.log
+
+    def firing_rows(self, end: int) -> list[int]:
+        """Return the rows before `end` that firings made."""
+        before = [] if self.shared is None else self.shared.firing_rows(min(end, self.offset))
+        return before + self.firings[: bisect_left(self.firings, end)]
+
+    def fired(self, row: int) -> tuple[Any, ...]:
+        """Return the log's record of the firing that made a row."""
+        if row < self.offset:
+            assert self.shared is not None
+            return self.shared.fired(row)
+        return self.run.recorder.log[bisect_left(self.firings, row)]
+
+    def trace(self) -> Trace:
+        """Return the branch so far as a trace."""
+        raw = [self.raw(row) for row in range(len(self))]
+        recorder = self.run.recorder
+        n = recorder.model.n
+        rows = Rows(
+            np.array([r[0] for r in raw]),
+            np.array([r[1] for r in raw], dtype=np.int64),
+            np.array([r[2] for r in raw]),
+            np.array([r[3] for r in raw], dtype=np.int64).reshape(len(raw), n),
+        )
+        return Trace(rows, rows, log_of(self.log()), recorder.model, recorder.rig,
+                     recorder.settings)  # fmt: skip
+
+
+class Session:
+    """A simulation one can walk through.
+
+    Parameters
+    ----------
+    model, rig, t_end, **options
+        As for `gms_fsm.simulate` (without ``t_eval`` and ``progress``).
+
+    Attributes
+    ----------
+    branches : list of Branch
+        The first is the run itself; each poke adds one.
+    current : int
+        Number of the branch that is walked.
+    breakpoints : list of Breakpoint
+        Where `proceed` stops.
+    watches : list of str
+        Expressions shown by a user interface.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed
+    >>> session = Session(GMS(GMSParameters.paper("stick-slip"), law="published"),
+    ...                   Prescribed("0.15*sin(2*pi*t/25)"), 100.0)
+    >>> here = session.next_transition()
+    >>> round(here.t, 3), here.states[0]
+    (4.913, 'slip')
+    >>> session.back().microstep
+    0
+    """
+
+    def __init__(self, model: Model, rig: Rig, t_end: float, **options: Any) -> None:
+        for name in ("t_eval", "progress"):
+            if name in options:
+                raise ParameterError(f"{name} does not go with a session: it stops at every row")
+        if not isinstance(options.get("engine", ""), str):
+            raise ParameterError(
+                "engine: every branch of a session makes machines of its own; use 'machines' or "
+                "'ifelse'"
+            )
+        self.model, self.rig, self.t_end, self.options = model, rig, t_end, dict(options)
+        self.branches = [Branch(Run(model, rig, t_end, rows_at_once=1, **options))]
+        self.current = 0
+        self.breakpoints: list[Breakpoint] = []
+        self.watches: list[str] = []
+
+    # ------------------------------------------------------------------ where we are
+    @property
+    def branch(self) -> Branch:
+        """The branch that is walked."""
+        return self.branches[self.current]
+
+    @property
+    def here(self) -> Here:
+        """The row under the cursor."""
+        return self.at(self.branch.cursor)
+
+    def at(self, row: int) -> Here:
+        """Return a row that has been computed.
+
+        Parameters
+        ----------
+        row : int
+            Its number; the row under the cursor may be a located place behind it.
+
+        Returns
+        -------
+        Here
+            The row.
+        """
+        branch = self.branch
+        t, microstep, y, mode = branch.raw(row)
+        located = row == branch.cursor and branch.between is not None
+        if located:
+            assert branch.between is not None
+            (t, y), microstep = branch.between, 0
+        return self._here(row, t, microstep, y, mode, located)
+
+    def _here(
+        self, row: int, t: float, microstep: int, y: list[float], mode: tuple[int, ...],
+        located: bool = False,
+    ) -> Here:  # fmt: skip
+        recorder, n = self.branch.run.recorder, self.model.n
+        seen = recorder.observe(t, y, mode)
+        first = recorder.program.first
+        names = [state.name for state in self.model.chart.states]
+        return Here(
+            row, t, microstep, y[0], seen[0], seen[1], tuple(y[first : first + n]),
+            tuple(seen[2 : 2 + n]), tuple(seen[2 + n : 2 + 2 * n]),
+            tuple(names[m] for m in mode), located,
+        )  # fmt: skip
+
+    # ------------------------------------------------------------------ walking
+    def step(self, count: int = 1) -> Here:
+        """Go forward by rows (micro-steps are rows of their own).
+
+        Parameters
+        ----------
+        count : int
+            How many.
+
+        Returns
+        -------
+        Here
+            Where it stopped: the last row if the run ended before.
+        """
+        branch = self.branch
+        branch.between = None
+        for _ in range(count):
+            if branch.cursor + 1 >= len(branch) and not branch.pull():
+                break
+            branch.cursor += 1
+        return self.here
+
+    def back(self, count: int = 1) -> Here:
+        """Go back by rows.
+
+        Parameters
+        ----------
+        count : int
+            How many.
+
+        Returns
+        -------
+        Here
+            Where it stopped.
+        """
+        branch = self.branch
+        if branch.between is not None:  # from a located place to the row before it
+            branch.between, count = None, count - 1
+        branch.cursor = max(0, branch.cursor - count)
+        return self.here
+
+    def _forward(self) -> Iterator[int]:
+        """Walk forward; yield each new row's number."""
+        branch = self.branch
+        while True:
+            before = branch.cursor
+            self.step()
+            if branch.cursor == before:
+                return
+            yield branch.cursor
+
+    def next_transition(self) -> Here:
+        """Go forward to the next firing (or the end)."""
+        for row in self._forward():
+            if self.branch.raw(row)[1] > 0:
+                break
+        return self.here
+
+    def prev_transition(self) -> Here:
+        """Go back to the firing before (or the start)."""
+        branch = self.branch
+        row = branch.cursor - (branch.between is None)
+        branch.between = None
+        while row > 0 and branch.raw(row)[1] == 0:
+            row -= 1
+        branch.cursor = max(row, 0)
+        return self.here
+
+    def goto(self, t: float) -> Here:
+        """Go to the last row at or before a time.
+
+        Parameters
+        ----------
+        t : float
+            s, not before the start.
+
+        Returns
+        -------
+        Here
+            The row.
+
+        Raises
+        ------
+        SessionError
+            If the time lies before the start, or is no number.
+        """
+        branch = self.branch
+        start = branch.raw(0)[0]
+        if not t >= start:
+            raise SessionError(f"t = {t!r} s lies before the start, {start!r} s")
+        branch.between = None
+        while branch.raw(len(branch) - 1)[0] <= t and branch.pull():
+            pass
+        low, high = 0, len(branch)
+        while high - low > 1:  # rows are in time order
+            middle = (low + high) // 2
+            low, high = (middle, high) if branch.raw(middle)[0] <= t else (low, middle)
+        branch.cursor = low
+        return self.here
+
+    # ------------------------------------------------------------------ conditions
+    @property
+    def names(self) -> list[str]:
+        """What conditions and watches can name; elements counted from 1."""
+        elements = range(1, self.model.n + 1)
+        numbered = [*self.model.chart.variables, "s", "F"]
+        return ["t", "x", "v", "F", "s", *(f"{name}{i}" for name in numbered for i in elements)]
+
+    def parse(self, text: str) -> Condition:
+        """Read a condition such as ``"z1 > 0.3 and state(2) == slip"``.
+
+        Parameters
+        ----------
+        text : str
+            In the expression language; ``s`` is the Stribeck curve at v, ``s1`` element 1's
+            threshold.
+
+        Returns
+        -------
+        Condition
+            Checked.
+
+        Raises
+        ------
+        ExpressionError
+            With column and what is allowed.
+        """
+        states = [state.name for state in self.model.chart.states]
+        return parse_condition(text, self.names, states, self.model.n)
+
+    def values(self, here: Here | None = None) -> dict[str, Any]:
+        """Return a value for every name of a condition, at the cursor if not said otherwise."""
+        here = self.here if here is None else here
+        y = self._state_of(here)
+        found: dict[str, Any] = {
+            "t": here.t, "x": here.x, "v": here.v, "F": here.F,
+            "s": here.s[0] / float(self.model.weights[0]),
+        }  # fmt: skip
+        n, first = self.model.n, self.branch.run.recorder.program.first
+        for i in range(n):
+            for j, name in enumerate(self.model.chart.variables):
+                found[f"{name}{i + 1}"] = y[first + j * n + i]
+            found |= {f"s{i + 1}": here.s[i], f"F{i + 1}": here.F_elements[i],
+                      f"state({i + 1})": here.states[i]}  # fmt: skip
+        return found
+
+    def _state_of(self, here: Here) -> list[float]:
+        if here.located and self.branch.between is not None:
+            return self.branch.between[1]
+        return self.branch.raw(here.row)[2]
+
+    def watch(self, text: str) -> float:
+        """Return the value of an expression at the cursor.
+
+        Parameters
+        ----------
+        text : str
+            For example ``"z1 / s1"``.
+
+        Returns
+        -------
+        float
+            Its value.
+
+        Raises
+        ------
+        ExpressionError
+            If it cannot be read.
+        SessionError
+            If it cannot be computed here (a division by zero).
+        """
+        tree: Value = parse_value(text, self.names)
+        try:
+            return float(evaluate(tree, self.values()))
+        except (ArithmeticError, ValueError) as error:
+            raise SessionError(f"{text!r} cannot be computed here: {error}") from None
+
+    def until(self, condition: str) -> Here:
+        """Go forward to where a condition next becomes true, located between the rows.
+
+        Parameters
+        ----------
+        condition : str
+            See `parse`. If it is true already it must first become false.
+
+        Returns
+        -------
+        Here
+            The place (``located`` is set if it lies between rows), or the end of the run.
+        """
+        tree, branch = self.parse(condition), self.branch
+        truth = self._holds(tree, self.here)
+        begin = branch.between  # a second `until` starts from a located place
+        while True:
+            row = branch.cursor
+            if row + 1 >= len(branch) and not branch.pull():
+                branch.between = None
+                branch.cursor = len(branch) - 1
+                return self.here
+            place, truth = self._first_true(tree, row, begin, truth)
+            begin = None
+            if place is not None:
+                branch.between = place
+                return self.here
+            branch.between = None
+            branch.cursor = row + 1
+            now = self._holds(tree, self.here)
+            if now and not truth:
+                return self.here
+            truth = now
+
+    def _holds(self, tree: Condition, here: Here) -> bool:
+        try:
+            return bool(evaluate(tree, self.values(here)))
+        except (ArithmeticError, ValueError):  # not computable is not true
+            return False
+
+    def _first_true(
+        self, tree: Condition, row: int, begin: tuple[float, list[float]] | None, truth: bool
+    ) -> tuple[tuple[float, list[float]] | None, bool]:
+        """Look between a row and the next for the place where the tree becomes true."""
+        branch = self.branch
+        t0, _, y0, mode = branch.raw(row)
+        t1, microstep, y1, _ = branch.raw(row + 1)
+        start = t0 if begin is None else begin[0]
+        if microstep > 0 or t1 <= start:
+            return None, truth
+        program = branch.run.recorder.program
+        a, b = np.array(y0), np.array(y1)
+
+        def place(t: float) -> tuple[float, list[float]]:
+            y = interpolated(program, list(mode), t0, a, t1, b, t)
+            return t, [float(u) for u in y]
+
+        def true_at(t: float) -> bool:
+            branch.between = place(t)
+            found = self._holds(tree, self._here(row, t, 0, branch.between[1], mode, True))
+            branch.between = None
+            return found
+
+        low = start
+        for look in range(1, LOOKS):
+            t = start + (t1 - start) * look / LOOKS
+            now = true_at(t)
+            if now and not truth:
+                high = t
+                for _ in range(HALVINGS):
+                    middle = 0.5 * (low + high)
+                    if not low < middle < high:
+                        break
+                    low, high = (low, middle) if true_at(middle) else (middle, high)
+                return place(high), True
+            low, truth = t, now
+        # The next row itself is looked at by the caller; the last stretch is searched here.
+        at_end = self._holds(tree, self._here(row + 1, *branch.raw(row + 1)))
+        if at_end and not truth:
+            high = t1
+            for _ in range(HALVINGS):
+                middle = 0.5 * (low + high)
+                if not low < middle < high:
+                    break
+                low, high = (low, middle) if true_at(middle) else (middle, high)
+            if high < t1:
+                return place(high), True
+        return None, truth
+
+    # ------------------------------------------------------------------ breakpoints
+    def break_on(
+        self, kind: str, name: str, element: int | None = None, condition: str = "", hits: int = 1
+    ) -> Breakpoint:
+        """Set a breakpoint.
+
+        Parameters
+        ----------
+        kind : {"tested", "valid", "fires", "enter", "leave"}
+            See `Breakpoint`.
+        name : str
+            An edge (tested, valid, fires) or a state (enter, leave).
+        element : int, optional
+            Counted from 0; all when left out.
+        condition : str, optional
+            Must hold too.
+        hits : int
+            Stop from this hit on.
+
+        Returns
+        -------
+        Breakpoint
+            Also in `breakpoints`.
+
+        Raises
+        ------
+        SessionError
+            If kind, name, element or hits do not exist.
+        ExpressionError
+            If the condition cannot be read.
+        """
+        chart = self.model.chart
+        if kind not in KINDS:
+            raise SessionError(f"breakpoint kind {kind!r}; it must be one of {', '.join(KINDS)}")
+        edges, states = [e.name for e in chart.transitions], [s.name for s in chart.states]
+        known, what = (states, "state") if kind in ("enter", "leave") else (edges, "edge")
+        if name not in known:
+            raise SessionError(f"no {what} {name!r}; there are {', '.join(known) or 'none'}")
+        if element is not None and not 0 <= element < self.model.n:
+            raise SessionError(
+                f"no element {element + 1}; there are {self.model.n}, counted from 1 in text"
+            )
+        if hits < 1:
+            raise SessionError(f"hits is {hits}; it must be at least 1")
+        if condition:
+            self.parse(condition)
+        found = Breakpoint(kind, name, element, condition, hits)
+        self.breakpoints.append(found)
+        return found
+
+    def proceed(self) -> tuple[Here, Breakpoint | None]:
+        """Go forward to the next breakpoint that hits, or the end.
+
+        Returns
+        -------
+        (Here, Breakpoint or None)
+            Where, and which; None at the end of the run.
+        """
+        for row in self._forward():
+            for point in self.breakpoints:
+                if self._hits(point, row):
+                    point.seen += 1
+                    if point.seen >= point.hits:
+                        return self.here, point
+        return self.here, None
+
+    def _hits(self, point: Breakpoint, row: int) -> bool:
+        elements = range(self.model.n) if point.element is None else (point.element,)
+        if not any(self._happens(point, row, i) for i in elements):
+            return False
+        return not point.condition or self._holds(self.parse(point.condition), self.at(row))
+
+    def _happens(self, point: Breakpoint, row: int, i: int) -> bool:
+        chart, branch = self.model.chart, self.branch
+        before, now = branch.raw(row - 1), branch.raw(row)
+        names = [state.name for state in chart.states]
+        moved = now[1] > 0 and self._fired(row)[0] == i
+        match point.kind:
+            case "fires":
+                return moved and self._fired(row)[1] == point.name
+            case "enter":
+                return moved and names[now[3][i]] == point.name
+            case "leave":
+                return moved and names[before[3][i]] == point.name
+        edge = next(e for e in chart.transitions if e.name == point.name)
+        if names[now[3][i]] != edge.source:
+            return False
+        if point.kind == "tested":
+            # The driver asks where an arc ends, and again after every firing. That a row was
+            # such a place is known when the next one is computed.
+            if row + 1 >= len(branch):
+                branch.pull()
+            return row in branch.stops or now[1] > 0
+        guard = chart.guards[point.name]
+        held = names[before[3][i]] == edge.source and bool(
+            evaluate(guard, self._guard_values(row - 1, i))
+        )
+        return not held and bool(evaluate(guard, self._guard_values(row, i)))
+
+    def _fired(self, row: int) -> tuple[int, str]:
+        """Return element and edge of the firing that made a row."""
+        record = self.branch.fired(row)
+        return int(record[1]), str(record[2])
+
+    def _guard_values(self, row: int, i: int) -> dict[str, float]:
+        here = self.at(row)
+        y, n = self._state_of(here), self.model.n
+        first = self.branch.run.recorder.program.first
+        values = {"t": here.t, "x": here.x, "v": here.v, "s": here.s[i]}
+        values |= {name: y[first + j * n + i] for j, name in enumerate(self.model.chart.variables)}
+        for name, value in self.model.values.items():
+            values[name] = float(value if isinstance(value, float | int) else value[i])
+        return values
+
+    def why(self, element: int) -> list[Explanation]:
+        """Explain the edges of an element at the cursor, clause by clause.
+
+        On a row where it fired: the edges of the state it left, with the edge taken marked.
+
+        Parameters
+        ----------
+        element : int
+            Counted from 0.
+
+        Returns
+        -------
+        list of Explanation
+            Highest priority first.
+
+        Raises
+        ------
+        SessionError
+            If there is no such element.
+        """
+        if not 0 <= element < self.model.n:
+            raise SessionError(
+                f"no element {element + 1}; there are {self.model.n}, counted from 1 in text"
+            )
+        here, fired, row = self.here, "", self.branch.cursor
+        if here.microstep > 0 and self._fired(row)[0] == element:
+            fired, row = self._fired(row)[1], row - 1
+            here = self.at(row)
+        values = self._guard_values(row, element)
+        return explain_state(self.model.chart, here.states[element], values, fired)
+
+    # ------------------------------------------------------------------ branches
+    def poke(
+        self,
+        z: Mapping[int, float] | None = None,
+        v: float | None = None,
+        state: Mapping[int, str] | None = None,
+    ) -> int:
+        """Change values at the cursor and go on in a new branch; the present one stays.
+
+        Parameters
+        ----------
+        z : mapping of int to float, optional
+            New deflections [m] by element, counted from 0.
+        v : float, optional
+            New velocity, m/s; not with a prescribed one.
+        state : mapping of int to str, optional
+            New states by element.
+
+        Returns
+        -------
+        int
+            Number of the new branch, which is now the current one.
+
+        Raises
+        ------
+        SessionError
+            If there is nothing to change, no such element, or the run is at its end.
+        ParameterError, ChartError
+            If a value breaks its rule.
+        """
+        here, chart, n = self.here, self.model.chart, self.model.n
+        if not (z or state or v is not None):
+            raise SessionError("nothing to poke; give z, v or state")
+        for element in (*(z or {}), *(state or {})):
+            if not 0 <= element < n:
+                raise SessionError(f"no element {element + 1}; there are {n}, counted from 1")
+        if not here.t < self.t_end:
+            raise SessionError(f"t = {here.t!r} s is the end of the run; go back first")
+        y, first = self._state_of(here), self.branch.run.recorder.program.first
+        initial: dict[str, Any] = {"x": here.x}
+        for j, name in enumerate(chart.variables):
+            initial[name] = list(y[first + j * n : first + (j + 1) * n])
+        for element, value in (z or {}).items():
+            initial[chart.variables[0]][element] = value
+        states = list(here.states)
+        for element, name in (state or {}).items():
+            states[element] = name
+        initial["states"] = states
+        if v is not None:
+            initial["v"] = v
+        elif self.rig.acceleration is not None:
+            initial["v"] = here.v
+        options = {**self.options, "t_start": here.t, "initial": initial}
+        run = Run(self.model, self.rig, self.t_end, rows_at_once=1, **options)
+        edits = {"z": dict(z or {}), "v": v, "state": dict(state or {})}
+        fork = self.branch.cursor
+        at = here.t if here.located else None
+        branch = Branch(run, self.current, fork, self.branch, edits, at)
+        branch.cursor = fork + 1
+        self.branches.append(branch)
+        self.current = len(self.branches) - 1
+        return self.current
+
+    def switch(self, branch: int) -> Here:
+        """Walk another branch, from where its cursor is.
+
+        Parameters
+        ----------
+        branch : int
+            Its number.
+
+        Returns
+        -------
+        Here
+            The row under its cursor.
+
+        Raises
+        ------
+        SessionError
+            If there is no such branch.
+        """
+        if not 0 <= branch < len(self.branches):
+            raise SessionError(f"no branch {branch}; there are 0 to {len(self.branches) - 1}")
+        self.current = branch
+        return self.here
+
+    def compare(self, a: int, b: int) -> Comparison:
+        """Compare two branches as far as both have been computed.
+
+        Parameters
+        ----------
+        a, b : int
+            Branch numbers.
+
+        Returns
+        -------
+        Comparison
+            Transitions, and largest differences of z and F.
+        """
+        for number in (a, b):
+            if not 0 <= number < len(self.branches):
+                raise SessionError(f"no branch {number}; there are 0 to {len(self.branches) - 1}")
+        first, second = self.branches[a].trace(), self.branches[b].trace()
+        t = min(float(first.t[-1]), float(second.t[-1]))
+        logs = [trace.transitions[trace.transitions.t <= t] for trace in (first, second)]
+        differs = None
+        for p, q in zip(*logs, strict=False):
+            if (p.t, p.element, p.edge) != (q.t, q.element, q.edge):
+                differs = float(min(p.t, q.t))
+                break
+        else:
+            shorter = min(len(logs[0]), len(logs[1]))
+            longer = max(logs, key=len)
+            if len(longer) > shorter:
+                differs = float(longer.t[shorter])
+        start = float(first.t[0])
+        times = np.linspace(start, t, 2000)
+        p, q = first.sample(times), second.sample(times)
+        return Comparison(
+            t, (len(logs[0]), len(logs[1])), differs,
+            float(np.abs(p.z - q.z).max()), float(np.abs(p.F - q.F).max()),
+        )  # fmt: skip
+
+    # ------------------------------------------------------------------ files
+    def save(self, path: str | Path) -> Path:
+        """Write the session: what runs, the pokes, cursors, breakpoints and watches.
+
+        Rows are not written; loading computes them again, to the same bits on the same machine.
+
+        Parameters
+        ----------
+        path : str or Path
+            A JSON file.
+
+        Returns
+        -------
+        Path
+            The file, written whole.
+
+        Raises
+        ------
+        SessionError
+            If a signal is a Python function, the method a class, or the engine your own machines.
+        """
+        if any(isinstance(signal, Function) for signal in self.rig.signals.values()):
+            raise SessionError("a signal is a Python function, which a file cannot hold")
+        for name, value in self.options.items():
+            if not isinstance(value, str | int | float | dict | type(None)):
+                raise SessionError(f"the option {name} = {value!r} cannot be written to a file")
+        data = {
+            "format": "gms-fsm session 1",
+            "header": json.loads(Header.of(self.model, self.rig, {}).model_dump_json()),
+            "t_end": self.t_end,
+            "options": {k: _plain(v) for k, v in self.options.items()},
+            "branches": [
+                {"parent": b.parent, "fork": b.fork, "from": b.fork_at, "edits": b.edits,
+                 "cursor": b.cursor, "between": None if b.between is None else b.between[0]}
+                for b in self.branches
+            ],
+            "current": self.current,
+            "breakpoints": [asdict(point) for point in self.breakpoints],
+            "watches": self.watches,
+        }  # fmt: skip
+        text = json.dumps(data, indent=1).encode()
+        return written_whole(Path(path), lambda file: file.write(text))
+
+    @classmethod
+    def load(cls, path: str | Path) -> Session:
+        """Read a session written by `save` and compute its rows again.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        Session
+            With all branches and cursors where they were.
+
+        Raises
+        ------
+        TraceFileError
+            If the file is missing, damaged or something else.
+        """
+        path = Path(path)
+        try:
+            data = json.loads(path.read_text(encoding="utf-8"))
+            if data["format"] != "gms-fsm session 1":
+                raise ValueError(f"format is {data['format']!r}")
+            header = Header.model_validate(data["header"])
+            session = cls(header.to_model(), header.to_rig(), data["t_end"], **data["options"])
+            for number, record in enumerate(data["branches"]):
+                if number > 0:
+                    session.switch(int(record["parent"]))
+                    session._walk_to(int(record["fork"]), record["from"])
+                    edits = record["edits"]
+                    session.poke(
+                        {int(i): value for i, value in edits["z"].items()},
+                        edits["v"],
+                        {int(i): name for i, name in edits["state"].items()},
+                    )
+            for number, record in enumerate(data["branches"]):
+                session.switch(number)
+                session._walk_to(int(record["cursor"]), record["between"])
+            session.switch(int(data["current"]))
+            session.breakpoints = [Breakpoint(**point) for point in data["breakpoints"]]
+            session.watches = [str(text) for text in data["watches"]]
+            return session
+        except FileNotFoundError:
+            raise TraceFileError(f"{path}: no such file") from None
+        except Exception as error:  # whatever a damaged file provokes, it is the file's fault
+            reason = str(error).partition("\n")[0][:200]
+            raise TraceFileError(
+                f"{path}: not a session file ({type(error).__name__}: {reason})"
+            ) from None
+
+    def _walk_to(self, row: int, between: float | None) -> None:
+        branch = self.branch
+        while row >= len(branch) and branch.pull():
+            pass
+        branch.cursor, branch.between = min(row, len(branch) - 1), None
+        if between is not None:
+            t0, _, y0, mode = branch.raw(branch.cursor)
+            t1, _, y1, _ = branch.raw(branch.cursor + 1)
+            program = branch.run.recorder.program
+            y = interpolated(program, list(mode), t0, np.array(y0), t1, np.array(y1), between)
+            branch.between = (between, [float(u) for u in y])
+
+
+def _plain(value: Any) -> Any:
+    """Return arrays inside an option as lists."""
+    if isinstance(value, Mapping):
+        return {name: _plain(each) for name, each in value.items()}
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value

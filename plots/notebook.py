@@ -1,0 +1,54 @@
+"""Charts, models and traces show themselves in a notebook once `plots` is imported.
+
+The core knows nothing of pictures, so the display methods are put on its classes from here.
+"""
+
+from __future__ import annotations
+
+from io import BytesIO
+from typing import Any
+
+from gms_fsm.chart import Chart
+from gms_fsm.errors import MissingExtraError
+from gms_fsm.models import GMS, ChartModel, LuGre, Model
+from gms_fsm.trace import Trace
+from plots.render import drawn
+from plots.statechart import statechart
+
+__all__ = ["register"]
+
+MOST_ELEMENTS = 4  # a larger bank is shown as one element: all are alike
+
+
+def chart_svg(chart: Chart) -> str | None:
+    """Return a chart as SVG, or None where there is no Graphviz (a notebook then shows text)."""
+    picture = drawn(statechart(chart), "svg")
+    return None if picture is None else picture.decode()
+
+
+def model_svg(model: Model) -> str | None:
+    """Return a model's bank of elements as SVG, or None where there is no Graphviz."""
+    picture = drawn(statechart(model.chart, model.n if model.n <= MOST_ELEMENTS else 1), "svg")
+    return None if picture is None else picture.decode()
+
+
+def trace_png(trace: Trace) -> bytes | None:
+    """Return a run's overview as PNG, or None where there is no matplotlib."""
+    try:
+        from plots.figures import overview
+    except MissingExtraError:
+        return None
+    buffer = BytesIO()
+    overview(trace).savefig(buffer, format="png", dpi=100)
+    return buffer.getvalue()
+
+
+def register() -> None:
+    """Put the display methods on the classes."""
+    methods: tuple[tuple[type[Any], str, Any], ...] = (
+        (Chart, "_repr_svg_", chart_svg),
+        *((model, "_repr_svg_", model_svg) for model in (GMS, LuGre, ChartModel)),
+        (Trace, "_repr_png_", trace_png),
+    )
+    for kind, name, method in methods:
+        setattr(kind, name, method)
