@@ -149,7 +149,7 @@ def main() -> None:
         app()
     except GMSError as error:
         Console(stderr=True, soft_wrap=True).print(
-            f"[bold red]error:[/] {_escaped(str(error))}", highlight=False
+            f"[bold red]error:[/] {_escaped(str(error))}", highlight=False, emoji=False
         )
         sys.exit(2)
 
@@ -162,5 +162,5 @@ def _escaped(text: str) -> str:
 
 def _plain_warning(message: Warning | str, *_: object, **__: object) -> None:
     Console(stderr=True, soft_wrap=True).print(
-        f"[bold yellow]note:[/] {_escaped(str(message))}", highlight=False
+        f"[bold yellow]note:[/] {_escaped(str(message))}", highlight=False, emoji=False
     )

@@ -41,15 +41,17 @@ class LiveView:
         self.next_frame = 0.0
         self.latest: Moment | None = None
         self.bar = Progress(
-            TextColumn("t = {task.completed:.2f} s"), BarColumn(), TimeElapsedColumn(),
+            TextColumn("t = {task.fields[t]:.2f} s"), BarColumn(), TimeElapsedColumn(),
             console=console,
         )  # fmt: skip
         self.t_start = t_start
-        self.task = self.bar.add_task("", total=t_end - t_start)
+        self.task = self.bar.add_task("", total=t_end - t_start, t=t_start)
+        self.console = console
         self.live = Live(self.bar, console=console, auto_refresh=False)
 
     def __enter__(self) -> LiveView:
-        self.live.__enter__()
+        if self.console.is_terminal:
+            self.live.__enter__()
         return self
 
     def __exit__(
@@ -58,13 +60,18 @@ class LiveView:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if self.latest is not None:
-            self.show(self.latest)  # the end is always drawn
-        self.live.__exit__(kind, error, trace)
+        if self.console.is_terminal:
+            if self.latest is not None:
+                self.show(self.latest)  # the end is always drawn
+            self.live.__exit__(kind, error, trace)
+        elif self.detail and self.latest is not None:
+            self.console.print(self.table(self.latest))  # a log gets the end only
 
     def __call__(self, moment: Moment) -> None:
         """Draw, if it is time to."""
         self.latest = moment
+        if not self.console.is_terminal:
+            return
         now = time.monotonic()
         if now < self.next_frame:
             return
@@ -73,7 +80,7 @@ class LiveView:
 
     def show(self, moment: Moment) -> None:
         """Draw now."""
-        self.bar.update(self.task, completed=moment.t - self.t_start)
+        self.bar.update(self.task, completed=moment.t - self.t_start, t=moment.t)
         shown = Group(self.table(moment), self.bar) if self.detail else self.bar
         self.live.update(shown, refresh=True)
 

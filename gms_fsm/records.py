@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_smoothing_spline
 
-from gms_fsm.errors import ExpressionError, RecordError
+from gms_fsm.errors import ExpressionError, RecordError, UnitError
 from gms_fsm.expression import evaluate, names_in, parse_condition
 from gms_fsm.parameters import FloatArray
 from gms_fsm.units import convert_numbers, factor
@@ -26,6 +26,7 @@ __all__ = ["Column", "Motion", "Record", "motion_of", "read_record"]
 QUANTITIES = ("time", "position", "velocity", "force", "normal")
 LONGEST_LINE = 100_000  # characters
 LONGEST_FILE = 5_000_000  # rows
+STRETCH = 40  # rows in which standstill is looked for
 GAP = 5.0  # intervals longer than this many median ones are reported
 
 
@@ -192,6 +193,8 @@ def _read_cells(
                 )
             for quantity, place in places.items():
                 try:
+                    if "_" in row[place]:  # 0.0_3 is a number to Python, not to a record
+                        raise ValueError
                     found[quantity].append(float(row[place]))
                 except ValueError:
                     raise RecordError(
@@ -213,7 +216,10 @@ def _chosen(
     try:
         condition = parse_condition(convert_numbers(where), QUANTITIES)
     except ExpressionError as error:
-        raise error.at(f"{path}: where") from None
+        shown = ExpressionError(error.reason, where, error.column, error.allowed)
+        raise RecordError(f"{path}: record.where = {where!r}, {shown}") from None
+    except UnitError as error:
+        raise RecordError(f"{path}: record.where = {where!r}: {error}") from None
     names = sorted(names_in(condition))
     for name in names:
         if name not in values:
@@ -249,8 +255,8 @@ def _check(
         i = int(back[0])
         raise RecordError(
             f"{path}: time does not increase after {_rows(back + first_row)} (row "
-            f"{i + first_row}: {time[i]!r} s, next: {time[i + 1]!r} s); sort the rows and take "
-            "doubles out"
+            f"{i + first_row}: {float(time[i])!r} s, next: {float(time[i + 1])!r} s); sort the "
+            "rows and take doubles out"
         )
     if time.size < 5:
         raise RecordError(f"{path}: only {time.size} rows count; at least 5 are needed")
@@ -332,8 +338,13 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
     """
     time = record.columns["time"]
     if smoothing is not None and not smoothing >= 0.0:
-        raise RecordError(f"smoothing is {smoothing!r} s; it must be >= 0")
+        raise RecordError(f"{record.path}: smoothing is {smoothing!r} s; it must be >= 0")
     interval = float(np.median(np.diff(time)))
+    if smoothing is not None and smoothing > time[-1] - time[0]:
+        raise RecordError(
+            f"{record.path}: smoothing is {smoothing!r} s, longer than the record "
+            f"({time[-1] - time[0]:.6g} s)"
+        )
     if "velocity" in record.columns:
         raw, given = record.columns["velocity"], "velocity"
         tau = 0.0 if smoothing is None else smoothing
@@ -366,12 +377,19 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
 
 
 def _standstill(velocity: FloatArray) -> float:
-    """Return the noise of v where the mean of a stretch is small against the fastest motion."""
+    """Return the scatter of v about a line in stretches where it hardly moves on average."""
     fastest = float(np.quantile(np.abs(velocity), 0.99))
-    length = 20
-    count = velocity.size // length
+    count = velocity.size // STRETCH
     if count == 0 or fastest == 0.0:
         return 0.0
-    stretches = velocity[: count * length].reshape(count, length)
-    still = stretches[np.abs(stretches).max(axis=1) < 0.05 * fastest]
-    return float(np.sqrt(np.mean(still**2))) if still.size else 0.0
+    stretches = velocity[: count * STRETCH].reshape(count, STRETCH)
+    # About a line, so that a slow turn is not taken for noise.
+    place = np.linspace(-1.0, 1.0, STRETCH)
+    slope = stretches @ place / (place @ place)
+    mean = stretches.mean(axis=1)
+    quiet = (np.abs(mean) < 0.05 * fastest) & (np.abs(slope) < 0.1 * fastest)
+    if not quiet.any():
+        return 0.0
+    scatter = (stretches - mean[:, None] - slope[:, None] * place)[quiet]
+    # The median stretch: in some of them the motion starts or ends.
+    return float(np.sqrt(np.median((scatter**2).sum(axis=1)) / (STRETCH - 2)))

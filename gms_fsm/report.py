@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,6 +23,9 @@ from gms_fsm.trace import Trace
 __all__ = ["Comparison", "compare", "dwell_times", "run_scenario", "summary_text"]
 
 
+ONE_SPEED = 2.0  # a plateau has its speeds within this factor; a sine spreads over 2.7
+
+
 @dataclass(frozen=True)
 class Comparison:
     """A model's friction against the measured one.
@@ -33,7 +37,8 @@ class Comparison:
     rmse : float
         Root mean square of the difference, N.
     r2 : float
-        Coefficient of determination: 1 - sum of squared differences / that about the mean.
+        Coefficient of determination: 1 - sum of squared differences / that about the mean; NaN
+        for a constant measurement.
     """
 
     rows: int
@@ -64,7 +69,8 @@ def compare(trace: Trace, record: Record) -> Comparison | None:
     same = times.size == len(trace) and bool((times == trace.t).all())
     difference = measured - (trace.F if same else trace.sample(times).F)
     spread = measured - measured.mean()
-    r2 = 1.0 - float(difference @ difference) / float(spread @ spread)
+    total = float(spread @ spread)
+    r2 = 1.0 - float(difference @ difference) / total if total > 0.0 else math.nan
     return Comparison(times.size, float(np.sqrt(np.mean(difference**2))), r2)
 
 
@@ -143,7 +149,8 @@ def run_scenario(
         trace = simulate(loaded.model, loaded.rig, progress=progress, **loaded.arguments)
     except SimulationError as error:
         kept = error.trace.save(folder / "partial.npz")
-        error.args = (f"{loaded.path}: {error}; written to {kept}",)
+        told = str(error).replace(" is kept in .trace", " is kept")
+        error.args = (f"{loaded.path}: {told}; written to {kept}",)
         raise
     except GMSError as error:
         raise ScenarioError(f"{loaded.path}: {error}") from None
@@ -164,6 +171,8 @@ def run_scenario(
 
 
 def _draw(loaded: Loaded, trace: Trace, folder: Path) -> list[Path]:
+    if not loaded.scenario.output.figures:
+        return []
     from plots import figures
 
     measured = None
@@ -292,8 +301,10 @@ def what_it_cannot_tell(trace: Trace, motion: Motion) -> list[str]:
     doubts = []
     speed = np.abs(motion.velocity)
     moving = speed[speed > 0.1 * np.quantile(speed, 0.99)]
+    if not moving.size:
+        return ["anything: it never moves"]
     slow, fast = (float(q) for q in np.quantile(moving, [0.2, 0.95]))
-    if fast < 3.0 * slow:
+    if fast < ONE_SPEED * slow:
         doubts.append(
             f"the Stribeck curve: there is one speed only ({1e3 * slow:.2g} to {1e3 * fast:.2g} "
             "mm/s while it moves), so F_s, v_s and sigma_2 cannot be told from F_c"

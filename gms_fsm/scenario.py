@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 import os
 import tomllib
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +27,7 @@ from pydantic import (
     model_validator,
 )
 
-from gms_fsm.errors import GMSError, RecordError, ScenarioError, UnitError
+from gms_fsm.errors import GMSError, ParameterError, RecordError, ScenarioError, UnitError
 from gms_fsm.models import GMS, LuGre, Model
 from gms_fsm.parameters import GMSParameters, Stribeck
 from gms_fsm.records import Column, Motion, Record, motion_of, read_record
@@ -37,6 +38,8 @@ __all__ = ["DATA_VARIABLE", "Loaded", "Scenario", "load_scenario"]
 
 DATA_VARIABLE = "GMS_FSM_DATA"
 LARGEST_FILE = 1_000_000  # bytes
+DEEPEST_KEY = 6  # parts
+LONGEST_SHOWN = 120  # characters of a value in a message
 SCIPY_METHODS = ("RK45", "DOP853", "Radau", "BDF", "LSODA")
 
 
@@ -78,7 +81,9 @@ class GMSTable(_Table):
 
     @model_validator(mode="after")
     def _fits(self) -> GMSTable:
-        self.build()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # it is said when the model is built to be used
+            self.build()
         return self
 
     def build(self) -> GMS:
@@ -105,10 +110,13 @@ class GMSTable(_Table):
             if isinstance(self.C, list) or self.weights is not None:
                 raise ValueError("shares go with one number C [N/s] and without weights")
             assert self.C is not None
-            parameters = GMSParameters.from_shares(
-                self.shares, self.k, C=self.C, stribeck=self.stribeck.build(), v_c=self.v_c,
-                sigma=sigma, sigma_2=sigma_2,
-            )  # fmt: skip
+            try:
+                parameters = GMSParameters.from_shares(
+                    self.shares, self.k, C=self.C, stribeck=self.stribeck.build(), v_c=self.v_c,
+                    sigma=sigma, sigma_2=sigma_2,
+                )  # fmt: skip
+            except ParameterError as error:
+                raise ValueError(str(error).replace("alpha", "shares")) from None
         else:
             if not isinstance(self.C, list):
                 raise ValueError("C must be a list, one number [m/s] an element (or give shares)")
@@ -154,6 +162,9 @@ class ColumnTable(_Table):
         return Column(self.column, self.unit, self.sign)
 
 
+Delimiter = Literal["\t", ";", ",", "|", " "]
+
+
 class RecordTable(_Table):
     """A measured motion, with the force measured along with it where there is one."""
 
@@ -165,7 +176,7 @@ class RecordTable(_Table):
     normal: ColumnTable | None = Field(None, description="normal force")
     where: str = Field("", description='which rows count, for example "normal > 4.5 N"')
     smoothing: float | None = Field(None, ge=0, description="time constant of the spline, s")
-    delimiter: str | None = Field(None, min_length=1, max_length=1)
+    delimiter: Delimiter | None = None
 
     def columns(self) -> dict[str, Column]:
         """Return the columns that are given."""
@@ -180,7 +191,7 @@ class SignalRecordTable(_Table):
     file: str
     time: ColumnTable
     value: ColumnTable
-    delimiter: str | None = Field(None, min_length=1, max_length=1)
+    delimiter: Delimiter | None = None
 
 
 def _signal_form(given: Any) -> str:
@@ -433,7 +444,7 @@ def _signal(path: Path, given: SignalField, key: str, quantity: str) -> SignalLi
             return as_signal([(t, value) for t, value in given])
         return as_signal(given)
     except GMSError as error:
-        raise ScenarioError(f"{path}: {key} = {given!r}: {error}") from None
+        raise ScenarioError(f"{path}: {key} = {_shown(given)}: {error}") from None
 
 
 def find_file(scenario: Path, name: str) -> Path:
@@ -461,17 +472,23 @@ def find_file(scenario: Path, name: str) -> Path:
     if os.environ.get(DATA_VARIABLE):
         folders.append(Path(os.environ[DATA_VARIABLE]))
     for folder in folders:
-        place = (folder / wanted).resolve()
+        try:
+            place = (folder / wanted).resolve()
+            there = place.is_file()
+        except (OSError, ValueError) as error:  # too long, or with a null byte
+            raise ScenarioError(
+                f"{scenario}: file = {_shown(name)} is not a file name ({_cut(str(error))})"
+            ) from None
         if wanted.is_absolute() or not place.is_relative_to(folder.resolve()):
             raise ScenarioError(
-                f"{scenario}: file = {name!r} leads outside of the scenario's folder; put "
+                f"{scenario}: file = {_shown(name)} leads outside of the scenario's folder; put "
                 f"the file beside the scenario, or in the folder named by {DATA_VARIABLE}"
             )
-        if place.is_file():
+        if there:
             return folder / wanted
     looked = " and ".join(str(folder) for folder in folders)
     hint = "" if len(folders) > 1 else f" (a data folder can be named by {DATA_VARIABLE})"
-    raise ScenarioError(f"{scenario}: file = {name!r}: no such file in {looked}{hint}")
+    raise ScenarioError(f"{scenario}: file = {_shown(name)}: no such file in {looked}{hint}")
 
 
 # --------------------------------------------------------------------------- reading and explaining
@@ -489,8 +506,8 @@ def _parse(path: Path) -> dict[str, Any]:
         return tomllib.loads(raw.decode("utf-8-sig"))
     except UnicodeDecodeError:
         raise ScenarioError(f"{path}: not UTF-8 text; a scenario is a TOML file") from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise ScenarioError(f"{path}: not valid TOML: {error}") from None
+    except (ValueError, RecursionError) as error:  # a number of 5,000 digits is a ValueError
+        raise ScenarioError(f"{path}: not valid TOML: {_cut(str(error))}") from None
 
 
 def _override(data: dict[str, Any], override: str) -> None:
@@ -498,10 +515,17 @@ def _override(data: dict[str, Any], override: str) -> None:
     parts = [part.strip() for part in key.split(".")]
     if not equals or not all(parts):
         raise ScenarioError(f"--set {override}: give it as key=value, for example run.t_end=10")
+    if "\n" in override:
+        line = override.partition("\n")[0]
+        raise ScenarioError(f"--set {_cut(line)}: one key and one value, on one line")
+    if len(parts) > DEEPEST_KEY:
+        raise ScenarioError(f"--set {_cut(override)}: no key lies this deep")
     try:
         value = tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         value = text.strip()
+    except (ValueError, RecursionError) as error:
+        raise ScenarioError(f"--set {_cut(override)}: {_cut(str(error))}") from None
     table = data
     for part in parts[:-1]:
         table = table.setdefault(part, {})
@@ -522,7 +546,7 @@ def _written_key(loc: tuple[int | str, ...]) -> list[str]:
         tag = (after in ("model", "rig") and part in _TAGS) or (
             after in ("velocity", "force") and part in _FORMS
         )
-        optional = isinstance(part, str) and ("[" in part or part in ("float", "nullable"))
+        optional = after == "C" and part in ("float", "list[float]")
         if not tag and not optional:
             places.append(str(part))
     return places
@@ -534,16 +558,16 @@ def _explained(error: ValidationError, data: dict[str, Any]) -> str:
     # An unknown key is most often the cause of a missing one: say it first.
     first = min(findings, key=lambda f: f["type"] != "extra_forbidden")
     places = _written_key(first["loc"])
-    key = ".".join(places)
+    key = _cut(".".join(places))
     value = first.get("input")
     rest = len(findings) - 1
     more = f" (and {rest} more)" if rest else ""
     kind = first["type"]
     if kind == "extra_forbidden":
         valid = _valid_keys(places[:-1], data)
-        near = difflib.get_close_matches(places[-1], valid, n=1)
+        near = difflib.get_close_matches(places[-1][:LONGEST_SHOWN], valid, n=1)
         hint = f"did you mean {near[0]!r}? " if near else ""
-        return f"{key} = {value!r}: unknown key; {hint}valid here: {', '.join(valid)}{more}"
+        return f"{key} = {_shown(value)}: unknown key; {hint}valid here: {', '.join(valid)}{more}"
     if kind == "missing":
         return f"{key} is missing{more}"
     if kind == "union_tag_not_found":
@@ -552,12 +576,24 @@ def _explained(error: ValidationError, data: dict[str, Any]) -> str:
         allowed = first["ctx"]["expected_tags"]
         return f"{key}.kind = {first['ctx']['tag']!r}: it must be one of {allowed}{more}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
-        return f"{key} = {value!r}: it must be a table, [{key}]{more}"
+        return f"{key} = {_shown(value)}: it must be a table, [{key}]{more}"
     text = first["msg"].removeprefix("Value error, ")
     text = text.replace("Input should be", "it must be")
     if isinstance(value, dict):
         return f"[{key}] {text}{more}" if key else f"{text}{more}"
-    return f"{key} = {value!r}: {text}{more}"
+    return f"{key} = {_shown(value)}: {text}{more}"
+
+
+def _shown(value: Any) -> str:
+    """Return a value as a message can show it."""
+    try:
+        return _cut(repr(value))
+    except RecursionError:
+        return "..."
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + " ..."
 
 
 def _valid_keys(places: list[str], data: dict[str, Any]) -> list[str]:
@@ -569,7 +605,7 @@ def _valid_keys(places: list[str], data: dict[str, Any]) -> list[str]:
             return []
         annotation = kind.model_fields[place].annotation
         table = table.get(place, {}) if isinstance(table, dict) else {}
-        options = [t for t in (*get_args(annotation), annotation) if _is_table(t)]
+        options = _tables_in(annotation)
         wanted = table.get("kind") if isinstance(table, dict) else None
         fitting = [t for t in options if wanted in _kinds(t)]
         if not (fitting or options):
@@ -578,8 +614,11 @@ def _valid_keys(places: list[str], data: dict[str, Any]) -> list[str]:
     return list(kind.model_fields)
 
 
-def _is_table(candidate: Any) -> bool:
-    return isinstance(candidate, type) and issubclass(candidate, BaseModel)
+def _tables_in(annotation: Any) -> list[type[BaseModel]]:
+    """Return the tables an annotation allows, inside unions and annotations too."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [table for part in get_args(annotation) for table in _tables_in(part)]
 
 
 def _kinds(table: type[BaseModel]) -> tuple[Any, ...]:

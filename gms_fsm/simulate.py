@@ -32,6 +32,8 @@ from integrators import Arc, Firing, HybridError, Livelock, NotFinite, Options, 
 
 __all__ = ["Moment", "Run", "simulate"]
 
+LATEST = 1e9  # s; one tick of a double is then 1e-7 s
+
 
 def simulate(
     model: Model,
@@ -161,6 +163,11 @@ class Run:
     ) -> None:
         t_start = checked_scalar("t_start", t_start, "finite")
         t_end = checked_scalar("t_end", t_end, "finite")
+        for name, time in (("t_start", t_start), ("t_end", t_end)):
+            if abs(time) > LATEST:
+                raise ParameterError(
+                    f"{name} is {time!r} s; beyond {LATEST:g} s the clock is too coarse"
+                )
         if t_end <= t_start:
             raise ParameterError(f"t_end is {t_end!r}, t_start is {t_start!r}; t_end must be later")
         options = _options(

@@ -76,17 +76,25 @@ def convert_numbers(text: str) -> str:
     Examples
     --------
     >>> convert_numbers("normal > 4500 mN and time < 3 min")
-    'normal > 4.5 and time < 180.0'
+    'normal > 4.5     and time < 180.0'
     """
-    units = {u: f for table in FACTORS.values() for u, f in table.items()}
+    number_unit = (
+        r"(?<![\w.])(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)\s*([^\W\d]\w*(?:/s)?)"
+    )
 
-    def number(found: re.Match[str]) -> str:
-        value, unit = found.group(1), found.group(2).replace("µ", "u").replace("μ", "u")
-        if unit in ("and", "or", "not"):
-            return found.group(0)
-        if unit not in units:
-            raise UnitError(f"unknown unit {unit!r} in {text!r}; known are {', '.join(units)}")
-        return repr(float(value) * units[unit])
+    def converted(clause: str) -> str:
+        # A unit has to fit the quantity it is compared with.
+        quantities = [q for q in FACTORS if re.search(rf"\b{q}\b", clause)]
 
-    pattern = r"(?<![\w.])(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)\s*([^\W\d]\w*(?:/s)?)"
-    return re.sub(pattern, number, text)
+        def number(found: re.Match[str]) -> str:
+            value, unit = float(found.group(1)), found.group(2)
+            fitting = (
+                quantities or [q for q, units in FACTORS.items() if unit in units] or ["force"]
+            )
+            # As long as what it replaces, where it can be: columns in messages stay true.
+            return repr(value * factor(fitting[0], unit)).ljust(len(found.group(0)))
+
+        return re.sub(number_unit, number, clause)
+
+    parts = re.split(r"(\band\b|\bor\b|\bnot\b)", text)
+    return "".join(p if p in ("and", "or", "not") else converted(p) for p in parts)

@@ -1,0 +1,136 @@
+"""Scenario files of the tests, records to go with them, and the command line in this process."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gms_fsm.cli import main
+
+OPEN_LOOP = """\
+title = "open loop"
+
+[model]
+kind = "GMS"
+law = "signed"
+k = [100.0, 50.0]
+C = [0.1, 0.1]
+v_c = 1e-6
+stribeck = { F_c = 1.0, F_s = 1.5, v_s = 1e-3 }
+
+[rig]
+kind = "prescribed"
+velocity = "0.1*sin(t)"
+
+[run]
+t_end = 1.0
+
+[output]
+figures = []
+"""
+
+MEASURED = """\
+title = "measured"
+
+[model]
+kind = "GMS"
+law = "signed"
+k = [10000.0, 5000.0]
+shares = [0.6, 0.4]
+C = 20.0
+v_c = 1e-4
+stribeck = { F_c = 1.0, F_s = 1.5, v_s = 1e-3 }
+
+[rig]
+kind = "record"
+
+[record]
+file = "own.csv"
+time = { column = "t", unit = "s" }
+position = { column = "x", unit = "mm" }
+force = { column = "F", unit = "N" }
+
+[output]
+figures = []
+"""
+
+
+def table(columns: Iterable[str], *values: np.ndarray) -> str:
+    """Return a CSV table."""
+    rows = (",".join(repr(float(cell)) for cell in row) for row in zip(*values, strict=True))
+    return "\n".join([",".join(columns), *rows]) + "\n"
+
+
+def sine_table(rows: int = 60) -> str:
+    """Return a harmless record for MEASURED: time in s, position in mm, force in N."""
+    t = np.round(np.arange(rows) * 0.01, 2)
+    return table(["t", "x", "F"], t, np.sin(6 * t).round(6), np.cos(6 * t).round(4))
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the command line did."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def message(self) -> str:
+        """What follows ``error:``."""
+        return self.err.partition("error: ")[2]
+
+
+CommandLine = Callable[..., Answer]
+
+
+def command_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> CommandLine:
+    """Return ``gms-fsm`` as a function of its arguments, run in this process."""
+    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.delenv("GMS_FSM_DATA", raising=False)
+
+    def call(*arguments: str | Path) -> Answer:
+        monkeypatch.setattr(sys, "argv", ["gms-fsm", *map(str, arguments)])
+        monkeypatch.setattr("warnings.showwarning", None)  # main() sets its own; put back later
+        capsys.readouterr()
+        try:
+            main()
+            code = 0
+        except SystemExit as end:
+            code = end.code if isinstance(end.code, int) else int(end.code is not None)
+        said = capsys.readouterr()
+        return Answer(code, said.out, said.err)
+
+    return call
+
+
+def changed(text: str, old: str, new: str) -> str:
+    """Return the text with `old` replaced; `old` must be there once."""
+    assert text.count(old) == 1, (text.count(old), old)
+    return text.replace(old, new)
+
+
+def one_message(answer: Answer, *said: str) -> None:
+    """Assert one clear message with exit code 2 that says all of this."""
+    assert answer.code == 2, (answer.code, answer.err)
+    assert "Traceback" not in answer.out + answer.err
+    assert answer.out == ""
+    assert answer.err.count("error:") == 1, answer.err[:2000]
+    for part in said:
+        assert part in answer.message, f"{part!r} is not said in: {answer.message[:2000]}"
+    assert "np.float64" not in answer.message, answer.message
+    assert len(answer.message) < 2000, f"{len(answer.message)} characters are not one message"
+
+
+def nothing_written(folder: Path, given: set[str]) -> None:
+    """Assert that a folder holds what was given, and at most one empty folder ``out`` more."""
+    found = set(folder.rglob("*"))
+    found -= {path for path in found if path.name == "out" and not list(path.iterdir())}
+    assert {str(path.relative_to(folder)) for path in found} == given

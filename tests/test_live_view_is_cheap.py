@@ -1,0 +1,214 @@
+"""The live view shows states, |z|/s, v and F, and draws at most ten frames a second."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from gms_fsm import simulate
+from gms_fsm.live import BETWEEN_FRAMES, LiveView
+from gms_fsm.simulate import Moment
+from tests.helpers import open_loop, pulled_mass, stick_slip
+
+
+class Clock:
+    """A clock that goes on by a fixed time whenever it is read."""
+
+    def __init__(self, tick: float) -> None:
+        self.now, self.tick, self.reads = 100.0, tick, 0
+
+    def __call__(self) -> float:
+        self.reads += 1
+        self.now += self.tick
+        return self.now
+
+
+def screen() -> Console:
+    return Console(record=True, file=io.StringIO(), width=120, force_terminal=True)
+
+
+class Counted(LiveView):
+    """Counts what it is asked and what it draws."""
+
+    asked = drawn = 0
+
+    def __call__(self, moment: Moment) -> None:
+        self.asked += 1
+        super().__call__(moment)
+
+    def show(self, moment: Moment) -> None:
+        self.drawn += 1
+        super().show(moment)
+
+
+def run_with(view: Callable[[Moment], object], t_end: float = 20.0) -> None:
+    model, rig = pulled_mass()
+    simulate(model, rig, t_end, progress=view)
+
+
+@pytest.mark.parametrize("detail", [True, False])
+@pytest.mark.parametrize("tick", [1e-4, 1e-3, 1e-2, 1.0])
+def test_frames_are_bounded_by_the_elapsed_time(
+    tick: float, detail: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = Clock(tick)
+    monkeypatch.setattr("gms_fsm.live.time.monotonic", clock)
+    view = Counted(screen(), 0.0, 20.0, detail=detail)
+    begin = clock.now
+    run_with(view)
+    elapsed = clock.now - begin
+    assert view.asked > 40
+    assert 1 <= view.drawn <= elapsed / BETWEEN_FRAMES + 1
+    assert view.drawn <= view.asked
+
+
+def test_a_standing_clock_gives_one_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = Clock(0.0)
+    monkeypatch.setattr("gms_fsm.live.time.monotonic", clock)
+    view = Counted(screen(), 0.0, 20.0, detail=True)
+    run_with(view)
+    assert view.asked > 40
+    assert view.drawn == 1
+
+
+def test_a_frame_that_takes_long_does_not_call_for_the_next(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The pause is counted from the end of a frame, else a slow terminal eats the whole run."""
+    clock = Clock(0.02)
+    monkeypatch.setattr("gms_fsm.live.time.monotonic", clock)
+
+    class Slow(Counted):
+        def show(self, moment: Moment) -> None:
+            super().show(moment)
+            clock.now += 5.0
+
+    view = Slow(screen(), 0.0, 20.0, detail=True)
+    begin = clock.now
+    run_with(view)
+    drawing = 5.0 * view.drawn
+    assert 1 < view.drawn <= (clock.now - begin - drawing) / BETWEEN_FRAMES + 1
+
+
+def test_between_frames_nothing_of_the_moment_is_computed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    clock = Clock(0.0)
+    monkeypatch.setattr("gms_fsm.live.time.monotonic", clock)
+    view = LiveView(screen(), 0.0, 20.0, detail=True)
+    computed = 0
+    original: Any = Moment.values.fget  # type: ignore[attr-defined]
+
+    def values(moment: Moment) -> dict[str, Any]:
+        nonlocal computed
+        computed += 1
+        result: dict[str, Any] = original(moment)
+        return result
+
+    monkeypatch.setattr(Moment, "values", property(values))
+    run_with(view)
+    assert computed == 1
+
+
+def test_the_view_changes_nothing_of_the_run() -> None:
+    model, rig = pulled_mass()
+    with LiveView(screen(), 0.0, 10.0, detail=True) as view:
+        watched = simulate(model, rig, 10.0, progress=view)
+    plain = simulate(model, rig, 10.0)
+    assert watched.t.tolist() == plain.t.tolist()
+    assert watched.F.tolist() == plain.F.tolist()
+    assert len(watched.transitions) == len(plain.transitions)
+
+
+# --------------------------------------------------------------------------- what is shown
+class Last:
+    """Draws one table of the moment that is the last before a time."""
+
+    def __init__(self, until: float) -> None:
+        self.until, self.text, self.seen = until, "", {}
+        self.states: list[str] = []
+        self.t = 0.0
+
+    def __call__(self, moment: Moment) -> None:
+        if moment.t > self.until:
+            return
+        console = screen()
+        console.print(LiveView(console, 0.0, 10.0, detail=True).table(moment))
+        self.text, self.seen, self.states = console.export_text(), moment.values, moment.states
+        self.t = moment.t
+
+
+def last_table(until: float) -> Last:
+    last = Last(until)
+    simulate(stick_slip("signed"), open_loop(), until, max_step=0.05, progress=last)
+    return last
+
+
+@pytest.mark.parametrize("until", [0.5, 3.9, 6.0, 11.0])
+def test_the_table_shows_state_bar_ratio_v_and_F(until: float) -> None:
+    last = last_table(until)
+    lines = last.text.splitlines()
+    title = lines[0]
+    assert f"t = {last.t:10.4f} s" in title
+    assert f"v = {last.seen['v']:+.6f} m/s" in title
+    assert f"F = {last.seen['F']:+.5f} N" in title
+    for i, state in enumerate(last.states):
+        line = next(line for line in lines if f"E{i + 1}" in line)
+        assert state in line.lower()
+        ratio = abs(last.seen["z"][i]) / last.seen["s"][i]
+        assert f"{ratio:.3f}" in line
+        assert f"{last.seen['z'][i]:+.4e}" in line
+        assert line.count("█") == min(20, round(20 * ratio))
+        assert line.count("█") + line.count("░") == 20
+
+
+def test_both_states_are_met_and_read_differently() -> None:
+    shown = {}
+    for until in (0.5, 3.9, 6.0, 11.0):
+        last = last_table(until)
+        for i, state in enumerate(last.states):
+            line = next(line for line in last.text.splitlines() if f"E{i + 1}" in line)
+            shown.setdefault(state, set()).update(
+                word for word in line.split() if word.lower() == state
+            )
+    assert set(shown) == {"stick", "slip"}
+    for words in shown.values():
+        assert words
+
+
+@pytest.mark.parametrize("detail", [True, False])
+def test_without_live_there_is_a_bar_only(detail: bool) -> None:
+    console = screen()
+    model, rig = pulled_mass()
+    with LiveView(console, 0.0, 5.0, detail=detail) as view:
+        simulate(model, rig, 5.0, progress=view)
+    text = console.export_text()
+    assert ("|z|/s" in text) is detail
+    assert ("E1" in text) is detail
+    assert "t =" in text
+
+
+def test_the_last_frame_shows_the_end_of_the_run() -> None:
+    """A short run ends between two frames; its bar must not stay at the beginning."""
+    console = screen()
+    model, rig = pulled_mass()
+    with LiveView(console, 0.0, 1.0, detail=False) as view:
+        simulate(model, rig, 1.0, progress=view)
+    assert "t = 1.00 s" in console.export_text()
+
+
+def test_the_bar_shows_the_time_of_the_run_not_since_its_start() -> None:
+    console = screen()
+    with LiveView(console, 100.0, 101.0, detail=True) as view:
+        simulate(stick_slip("signed"), open_loop(), 101.0, t_start=100.0, progress=view)
+    times = [
+        float(line.partition("t =")[2].split()[0])
+        for line in console.export_text().splitlines()
+        if "t =" in line
+    ]
+    assert times
+    assert all(100.0 <= time <= 101.0 for time in times), times

@@ -1,0 +1,386 @@
+"""A measured table becomes a motion in SI units, and says how: rows, gaps, smoothing, noise."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import cumulative_trapezoid
+
+from gms_fsm.errors import RecordError, UnitError
+from gms_fsm.records import Column, Motion, Record, motion_of, read_record
+from gms_fsm.units import FACTORS, convert_numbers, factor
+from tests.scenario_files import MEASURED, CommandLine, changed, command_line, table
+
+SI = {
+    "time": Column("t", "s"), "position": Column("x", "m"), "velocity": Column("v", "m/s"),
+    "force": Column("F", "N"), "normal": Column("N", "N"),
+}  # fmt: skip
+
+
+@pytest.fixture
+def gms_fsm(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> CommandLine:
+    return command_line(monkeypatch, capsys)
+
+
+def record_of(**columns: np.ndarray) -> Record:
+    size = len(columns["time"])
+    return Record(Path("made.csv"), columns, np.ones(size, dtype=bool), 2, ())
+
+
+def read(tmp_path: Path, text: str, where: str = "", **columns: Column) -> Record:
+    (tmp_path / "own.csv").write_text(text, encoding="utf-8")
+    return read_record(tmp_path / "own.csv", {"time": SI["time"], **columns}, where)
+
+
+# --------------------------------------------------------------------------- units
+EXPECTED = {
+    "time": {"s": 1, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "min": 60, "h": 3600},
+    "position": {
+        "m": 1, "cm": 0.01, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9,
+        "in": 0.0254,
+    },
+    "velocity": {
+        "m/s": 1, "cm/s": 0.01, "mm/s": 1e-3, "um/s": 1e-6, "µm/s": 1e-6, "μm/s": 1e-6,
+        "nm/s": 1e-9,
+    },
+    "force": {
+        "N": 1, "kN": 1e3, "mN": 1e-3, "uN": 1e-6, "µN": 1e-6, "μN": 1e-6, "lbf": 4.4482216152605,
+    },
+}  # fmt: skip
+EXPECTED["normal"] = EXPECTED["force"]
+UNITS = [(quantity, unit) for quantity, units in EXPECTED.items() for unit in units]
+
+
+def test_no_unit_is_left_untested() -> None:
+    for quantity, units in FACTORS.items():
+        assert set(units) <= set(EXPECTED[quantity])
+
+
+@pytest.mark.parametrize(("quantity", "unit"), UNITS)
+def test_every_unit_reads_as_its_si_value(quantity: str, unit: str, tmp_path: Path) -> None:
+    assert factor(quantity, unit) == EXPECTED[quantity][unit]
+    assert factor(quantity, f" {unit} ") == EXPECTED[quantity][unit]
+    values = np.arange(1.0, 7.0)
+    columns = {quantity: Column("a", unit)}
+    if quantity != "time":
+        columns["time"] = Column("t", "s")
+    text = table(["t", "a"], np.arange(6.0), values)
+    (tmp_path / "own.csv").write_text(text)
+    record = read_record(tmp_path / "own.csv", columns)
+    np.testing.assert_array_equal(record.columns[quantity], EXPECTED[quantity][unit] * values)
+
+
+@pytest.mark.parametrize("quantity", FACTORS)
+@pytest.mark.parametrize("unit", ["furlong", "", "MM", "m/min", "kg", "s^-1", "µ", "mm s"])
+def test_an_unknown_unit_is_an_error(quantity: str, unit: str) -> None:
+    with pytest.raises(UnitError, match="use one of") as caught:
+        factor(quantity, unit)
+    assert repr(unit) in str(caught.value)
+    assert all(known in str(caught.value) for known in FACTORS[quantity])
+
+
+def test_a_unit_of_another_quantity_is_named_as_such() -> None:
+    with pytest.raises(UnitError, match="'N' measures force, not position"):
+        factor("position", "N")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("normal > 4.5 N", "normal > 4.5"),
+        ("normal > 4500 mN", "normal > 4.5"),
+        ("normal > 4.5e6 µN and time < 3 min", "normal > 4.5 and time < 180.0"),
+        ("time > 2ms", "time > 0.002"),
+        ("velocity > 2 mm/s", "velocity > 0.002"),
+        ("velocity > .5 um/s", "velocity > 5e-07"),
+        ("force > 1 and force < 2", "force > 1 and force < 2"),
+        ("time < 1 or time > 2", "time < 1 or time > 2"),
+        ("2 * force > 1", "2 * force > 1"),
+    ],
+)
+def test_numbers_in_a_condition_are_converted(text: str, expected: str) -> None:
+    def words(condition: str) -> list[object]:
+        return [float(w) if w[0] in ".0123456789" else w for w in condition.split()]
+
+    assert words(convert_numbers(text)) == [
+        pytest.approx(word, rel=1e-12) if isinstance(word, float) else word
+        for word in words(expected)
+    ]
+
+
+# --------------------------------------------------------------------------- reading
+def test_sign_turns_a_quantity_around(tmp_path: Path) -> None:
+    text = table(["t", "F"], np.arange(6.0), np.arange(6.0) - 2)
+    record = read(tmp_path, text, force=Column("F", "mN", sign=-1))
+    np.testing.assert_allclose(record.columns["force"], -1e-3 * (np.arange(6.0) - 2))
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+@pytest.mark.parametrize("ending", ["\n", "\r\n"])
+@pytest.mark.parametrize("bom", [b"", b"\xef\xbb\xbf"])
+def test_tables_come_in_many_spellings(
+    delimiter: str, ending: str, bom: bytes, tmp_path: Path
+) -> None:
+    lines = ["t [s]|x, in mm" if delimiter != "," else 't [s]|"x, in mm"']
+    lines += [f" {i}|{i * 0.5} " for i in range(6)]
+    text = ending.join(line.replace("|", delimiter) for line in lines)
+    (tmp_path / "own.txt").write_bytes(bom + text.encode())
+    columns = {"time": Column("t [s]", "s"), "position": Column("x, in mm", "mm")}
+    record = read_record(tmp_path / "own.txt", columns)
+    np.testing.assert_allclose(record.columns["position"], 0.5e-3 * np.arange(6))
+    assert len(record) == 6
+    assert record.first_row == 2
+
+
+def test_other_columns_may_hold_anything(tmp_path: Path) -> None:
+    text = "t,name,x\n" + "".join(f"{i},run {i},{i}\n" for i in range(6))
+    assert len(read(tmp_path, text, position=SI["position"])) == 6
+
+
+# --------------------------------------------------------------------------- selection
+T = np.arange(20.0)
+FORCE = np.where((T >= 5) & (T < 15), 5.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("where", "kept"),
+    [
+        ("", range(20)),
+        ("normal > 4.5 N", range(5, 15)),
+        ("normal > 4500 mN", range(5, 15)),
+        ("normal > 4.5e6 µN", range(5, 15)),
+        ("normal > 4.5", range(5, 15)),
+        ("normal > 4.5 N and time < 10 s", range(5, 10)),
+        ("time < 5 s or time >= 15000 ms", [*range(5), *range(15, 20)]),
+        ("not normal > 4.5 N", [*range(5), *range(15, 20)]),
+        ("4 s <= time <= 9 s", range(4, 10)),
+        ("abs(position - 10 mm) < 2.5 mm", [8, 9, 10, 11, 12]),
+    ],
+)
+def test_where_chooses_rows(where: str, kept: range, tmp_path: Path) -> None:
+    text = table(["t", "x", "N"], T, 1e-3 * T, FORCE)
+    record = read(tmp_path, text, where, position=SI["position"], normal=SI["normal"])
+    first, last = min(kept), max(kept)
+    np.testing.assert_array_equal(record.columns["time"], T[first : last + 1])
+    np.testing.assert_array_equal(record.columns["time"][record.chosen], list(kept))
+    assert record.first_row == first + 2
+    said = " ".join(record.notes)
+    if where:
+        assert f"{len(list(kept))} of 20 rows" in said
+        assert f"rows {first + 2} to {last + 2}" in said
+        assert where in said
+    else:
+        assert record.notes == ()
+
+
+def test_bad_rows_can_be_left_out_at_the_ends_only_for_the_motion(tmp_path: Path) -> None:
+    position, force = 1e-3 * T, FORCE.copy()
+    position[[0, 19]] = np.nan
+    force[0] = np.nan
+    text = table(["t", "x", "F"], T, position, force)
+    columns = {"position": SI["position"], "force": SI["force"]}
+    with pytest.raises(RecordError, match=r"rows 2, 21, column 'x'"):
+        read(tmp_path, text, **columns)
+    assert len(read(tmp_path, text, "1 s <= time <= 18 s", **columns)) == 18
+
+
+def test_force_may_be_missing_between_the_rows_that_count(tmp_path: Path) -> None:
+    force = FORCE.copy()
+    force[10] = np.nan
+    text = table(["t", "x", "F"], T, T, force)
+    columns = {"position": SI["position"], "force": SI["force"]}
+    with pytest.raises(RecordError, match="row 12, column 'F'"):
+        read(tmp_path, text, **columns)
+    record = read(tmp_path, text, "time < 9.5 s or time > 10.5 s", **columns)
+    assert record.chosen.sum() == 19
+    assert len(record) == 20
+
+
+def test_gaps_are_noted_with_row_numbers(tmp_path: Path) -> None:
+    t = np.arange(40) * 0.01
+    t[20:] += 1.0
+    t[30:] += 0.2
+    record = read(tmp_path, table(["t", "x"], t, t), position=SI["position"])
+    (note,) = record.notes
+    assert "2 gap(s)" in note
+    assert "rows 21, 31" in note  # the head line is row 1
+    assert "1.01 s" in note
+    cut = read(tmp_path, table(["t", "x"], t, t), "time > 0.095 s", position=SI["position"])
+    assert "rows 21, 31" in " ".join(cut.notes)
+
+
+def test_an_even_record_has_no_notes(tmp_path: Path) -> None:
+    t = np.arange(40) * 0.01
+    assert read(tmp_path, table(["t", "x"], t, t), position=SI["position"]).notes == ()
+
+
+# --------------------------------------------------------------------------- velocity
+def amplitude(values: np.ndarray, pure: np.ndarray) -> float:
+    """Gain of a filtered sine, away from the ends of the record."""
+    inner = slice(len(pure) // 8, -len(pure) // 8)
+    return float((values[inner] @ pure[inner]) / (pure[inner] @ pure[inner]))
+
+
+@pytest.mark.parametrize("tau", [0.01, 0.02, 0.05])
+@pytest.mark.parametrize("shift", [0.0, 1.0])
+def test_the_smoothing_spline_halves_the_amplitude_where_it_says(tau: float, shift: float) -> None:
+    t = np.arange(8000) * 0.002
+    for omega, gain in ((0.1 / tau, 1.0), (1 / tau, 0.5), (2 / tau, 1 / 17)):
+        pure = np.sin(omega * t)
+        motion = motion_of(record_of(time=t, position=shift + 1e-3 * pure), tau)
+        assert motion.smoothing == tau
+        assert amplitude((motion.position - shift) / 1e-3, pure) == pytest.approx(gain, abs=2e-3)
+        rate = 1e-3 * omega * np.cos(omega * t)
+        assert amplitude(motion.velocity, rate) == pytest.approx(gain, abs=2e-3)
+
+
+def test_the_note_states_time_constant_frequency_and_what_is_left() -> None:
+    rng = np.random.default_rng(1)
+    t = np.arange(4000) * 0.005
+    noise = 2e-6 * rng.standard_normal(t.size)
+    position = 1e-3 * np.sin(0.5 * np.pi * t) + noise
+    (note,) = motion_of(record_of(time=t, position=position), 0.02).notes
+    assert "time constant 0.02 s" in note
+    assert "7.96 Hz" in note  # 1 / (2 pi 0.02 s)
+    left = float(note.partition("leaves ")[2].split()[0])
+    assert left == pytest.approx(2e-6, rel=0.15)
+
+
+def test_left_out_the_smoothing_is_four_intervals() -> None:
+    t = np.arange(400) * 0.005
+    motion = motion_of(record_of(time=t, position=1e-3 * np.sin(t)))
+    assert motion.smoothing == pytest.approx(0.02)
+    assert "0.02 s" in motion.notes[0]
+
+
+@pytest.mark.parametrize("noise", [1e-7, 1e-6, 5e-6])
+def test_the_velocity_of_a_noisy_sine_is_near_the_true_one(noise: float) -> None:
+    rng = np.random.default_rng(3)
+    dt, tau, omega, size = 0.005, 0.02, 0.5 * np.pi, 1e-3
+    t = np.arange(4000) * dt
+    position = size * np.sin(omega * t) + noise * rng.standard_normal(t.size)
+    motion = motion_of(record_of(time=t, position=position), tau)
+    error = (motion.velocity - size * omega * np.cos(omega * t))[50:-50]
+    # White noise through i w / (1 + (w tau)^4): its variance is noise^2 dt sqrt(2) / (16 tau^3)
+    expected = noise * np.sqrt(np.sqrt(2) / 16 * dt / tau**3)
+    assert float(np.std(error)) == pytest.approx(expected, rel=0.15)
+    raw = np.gradient(position, t)[50:-50] - (size * omega * np.cos(omega * t))[50:-50]
+    assert np.std(error) < 0.2 * np.std(raw)
+
+
+def test_without_smoothing_the_spline_goes_through_the_positions() -> None:
+    t = np.arange(400) * 0.005
+    position = 1e-3 * np.sin(8 * t)
+    motion = motion_of(record_of(time=t, position=position), 0.0)
+    np.testing.assert_allclose(motion.position, position, atol=1e-12)
+    np.testing.assert_allclose(motion.velocity[5:-5], 8e-3 * np.cos(8 * t)[5:-5], atol=1e-6)
+
+
+def test_a_measured_velocity_is_taken_as_it_is() -> None:
+    rng = np.random.default_rng(2)
+    t = np.cumsum(rng.uniform(0.005, 0.015, 300))
+    velocity = rng.standard_normal(t.size)
+    motion = motion_of(record_of(time=t, velocity=velocity))
+    np.testing.assert_array_equal(motion.velocity, velocity)
+    np.testing.assert_array_equal(motion.time, t)
+    assert motion.smoothing == 0.0
+    assert motion.notes == ("velocity: as measured",)
+    expected = cumulative_trapezoid(velocity, t, initial=0.0)
+    np.testing.assert_allclose(motion.position, expected, atol=1e-12)
+
+
+def test_a_measured_velocity_can_be_smoothed_and_says_so() -> None:
+    t = np.arange(2000) * 0.005
+    pure = np.sin(t / 0.05)
+    motion = motion_of(record_of(time=t, velocity=pure), 0.05)
+    assert amplitude(motion.velocity, pure) == pytest.approx(0.5, abs=2e-3)
+    assert "0.05 s" in motion.notes[0]
+
+
+@pytest.mark.parametrize("smoothing", [-1.0, float("nan")])
+def test_a_senseless_smoothing_is_refused(smoothing: float) -> None:
+    with pytest.raises(RecordError, match="smoothing"):
+        motion_of(record_of(time=T, position=T), smoothing)
+
+
+def test_a_record_without_motion_is_refused() -> None:
+    with pytest.raises(RecordError, match=r"made\.csv.*position.*velocity"):
+        motion_of(record_of(time=T, force=T))
+
+
+# --------------------------------------------------------------------------- standstill
+def dwelling(noise: float, top: float = 1e-3) -> Motion:
+    """Back and forth with dwells between, white noise on the velocity."""
+    rng = np.random.default_rng(5)
+    cycle = np.repeat([top, 0.0, -top, 0.0], 200)
+    velocity = np.tile(cycle, 6)
+    velocity = velocity + noise * rng.standard_normal(velocity.size)
+    return motion_of(record_of(time=0.01 * np.arange(velocity.size), velocity=velocity))
+
+
+@pytest.mark.parametrize("noise", [1e-7, 1e-6, 5e-6, 1e-5, 1e-4])
+def test_the_noise_at_standstill_is_found(noise: float) -> None:
+    assert dwelling(noise).standstill == pytest.approx(noise, rel=0.15)
+
+
+def test_without_noise_or_dwells_there_is_none() -> None:
+    assert dwelling(0.0).standstill == 0.0
+    assert dwelling(0.0).fitting_v_c() == 0.0
+    steady = motion_of(record_of(time=T, velocity=np.ones(20)))
+    assert steady.standstill == 0.0
+
+
+@pytest.mark.parametrize("per_cycle", [100, 1000, 5000, 50_000])
+def test_a_slow_turn_is_no_noise(per_cycle: int) -> None:
+    """A clean sine never stands still, however densely it is sampled."""
+    phase = 2 * np.pi * np.arange(4 * per_cycle) / per_cycle
+    motion = motion_of(record_of(time=0.001 * np.arange(phase.size), velocity=np.sin(phase)))
+    assert motion.standstill < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("standstill", "expected"),
+    [(1e-6, 3e-6), (1.1e-6, 4e-6), (3e-6, 9e-6), (3.2e-6, 1e-5), (5e-5, 2e-4), (0.0, 0.0)],
+)
+def test_a_fitting_v_c_is_three_times_the_noise_rounded_up(
+    standstill: float, expected: float
+) -> None:
+    motion = Motion(T, T, T, 0.0, standstill)
+    assert motion.fitting_v_c() == pytest.approx(expected, rel=1e-12, abs=0)
+    assert motion.fitting_v_c() >= 3 * standstill * (1 - 1e-12)
+
+
+def _noisy_scenario(tmp_path: Path, v_c: str) -> Path:
+    motion = dwelling(5e-6)
+    text = changed(MEASURED, 'position = { column = "x", unit = "mm" }',
+                   'velocity = { column = "v", unit = "mm/s" }')  # fmt: skip
+    text = changed(text, "v_c = 1e-4", f"v_c = {v_c}")
+    (tmp_path / "noisy.toml").write_text(text)
+    force = np.tanh(motion.velocity / 1e-4)
+    (tmp_path / "own.csv").write_text(
+        table(["t", "v", "F"], motion.time, 1e3 * motion.velocity, force)
+    )
+    return tmp_path / "noisy.toml"
+
+
+def test_the_command_line_warns_of_a_v_c_below_the_noise(
+    gms_fsm: CommandLine, tmp_path: Path
+) -> None:
+    done = gms_fsm("run", _noisy_scenario(tmp_path, "1e-6"), "-o", tmp_path / "out")
+    assert done.code == 0, done.err
+    assert done.err.count("v_c = 1e-06 m/s is below the velocity noise") == 1
+    suggested = f"v_c = {dwelling(5e-6).fitting_v_c():.2g} m/s would fit"
+    assert suggested in done.err
+    summary = (tmp_path / "out" / "summary.md").read_text()
+    assert suggested in summary
+    assert "What this record cannot tell" in summary
+
+
+def test_the_suggested_v_c_is_not_warned_of(gms_fsm: CommandLine, tmp_path: Path) -> None:
+    v_c = repr(dwelling(5e-6).fitting_v_c())
+    done = gms_fsm("run", _noisy_scenario(tmp_path, v_c), "-o", tmp_path / "out")
+    assert done.code == 0, done.err
+    assert "v_c" not in done.err
+    assert "velocity noise" not in (tmp_path / "out" / "summary.md").read_text()
