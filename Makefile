@@ -47,6 +47,8 @@ core: .venv-core/stamp
 
 bench: $(VENV)/dev.stamp
 	$(RUN)/python benchmarks/pulled_mass.py
+	$(RUN)/python benchmarks/live_frames.py
+	$(RUN)/python benchmarks/overview_figure.py
 
 gallery: $(VENV)/all.stamp
 	$(RUN)/python docs/make_pictures.py

@@ -15,7 +15,9 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 
 import gms_fsm
 from gms_fsm import paper
-from gms_fsm.errors import GMSError
+from gms_fsm.charts import LUGRE, gms_element
+from gms_fsm.errors import GMSError, ParameterError
+from gms_fsm.files import output_folder, written_whole
 from gms_fsm.live import LiveView
 from gms_fsm.models import GMS, Model
 from gms_fsm.parameters import GMSParameters
@@ -23,6 +25,7 @@ from gms_fsm.program import lower
 from gms_fsm.report import run_scenario, velocity_note
 from gms_fsm.rigs import Prescribed, PulledSlider, Rig, Slider
 from gms_fsm.scenario import Scenario, load_scenario
+from gms_fsm.trace import Trace
 
 __all__ = ["app", "main"]
 
@@ -123,6 +126,146 @@ def run_command(
 def schema_command() -> None:
     """Print the JSON schema of scenario files, for editors."""
     typer.echo(json.dumps(Scenario.model_json_schema(), indent=2))
+
+
+class ChartName(enum.StrEnum):
+    """Charts that ship."""
+
+    gms = "gms"
+    lugre = "lugre"
+
+
+class Notation(enum.StrEnum):
+    """How guards are written."""
+
+    stateflow = "stateflow"
+    math = "math"
+
+
+class Direction(enum.StrEnum):
+    """Where a chart grows."""
+
+    TB = "TB"
+    LR = "LR"
+
+
+class Theme(enum.StrEnum):
+    """Colours of a chart."""
+
+    light = "light"
+    dark = "dark"
+
+
+@app.command("chart")
+def chart_command(
+    name: Annotated[ChartName, typer.Argument(help="Which chart.", show_default=False)],
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", help="Ends in .svg, .png, .pdf, .dot or .mmd (Mermaid)."),
+    ] = Path("chart.svg"),
+    law: Annotated[LawName | None, typer.Option(help="Slip law of the GMS chart.")] = None,
+    elements: Annotated[int, typer.Option(help="How many elements, as parallel states.")] = 1,
+    notation: Annotated[Notation, typer.Option(help="Spelling.")] = Notation.stateflow,
+    direction: Annotated[Direction, typer.Option(help="Layout.")] = Direction.TB,
+    theme: Annotated[Theme, typer.Option(help="Colours.")] = Theme.light,
+) -> None:
+    """Draw a state chart."""
+    import plots
+    from plots.mermaid import mermaid
+
+    if name == ChartName.gms and law is None:
+        raise ParameterError("chart gms needs --law signed or --law published; they differ")
+    chart = LUGRE if law is None else gms_element(law.value)
+    if output.suffix == ".mmd":
+        text = mermaid(chart).encode()
+        written = written_whole(output, lambda file: file.write(text))
+    else:
+        graph = plots.statechart(
+            chart, elements, notation=notation.value, direction=direction.value, theme=theme.value
+        )
+        written = plots.render(graph, output)
+    typer.echo(str(written))
+
+
+@app.command("blocks")
+def blocks_command(
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Ends in .svg, .png, .pdf or .dot.")
+    ] = Path("blocks.svg"),
+    elements: Annotated[int, typer.Option(help="How many elements.")] = 4,
+) -> None:
+    """Draw the block diagram of the whole model (the paper's Fig. 2a)."""
+    import plots
+
+    typer.echo(str(plots.render(plots.block_diagram(elements), output)))
+
+
+@app.command("plot")
+def plot_command(
+    trace: Annotated[Path, typer.Argument(help="A trace, .npz or .csv.", show_default=False)],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder.")] = Path("figures"),
+) -> None:
+    """Draw a run: overview, and the story of its break-aways."""
+    from plots import figures
+
+    run = Trace.load(trace)
+    folder = output_folder(output)
+    pictures = {"overview": figures.overview(run), "ribbons": figures.ribbons_figure(run)}
+    for name, figure in pictures.items():
+        for ending in ("png", "svg"):
+            typer.echo(str(figures.save(figure, folder / f"{name}.{ending}")))
+
+
+@app.command("animate")
+def animate_command(
+    trace: Annotated[Path, typer.Argument(help="A trace, .npz or .csv.", show_default=False)],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Ends in .gif.")] = Path(
+        "film.gif"
+    ),
+    frames: Annotated[int, typer.Option(help="How many pictures.")] = 200,
+    start: Annotated[float | None, typer.Option(help="From t [s].")] = None,
+    end: Annotated[float | None, typer.Option(help="To t [s].")] = None,
+) -> None:
+    """Make a film of the chart at work, beside the force."""
+    from plots.animation import animate
+
+    run = Trace.load(trace)
+    with Progress(console=Console(stderr=True)) as bar:
+        task = bar.add_task("frames", total=frames)
+        film = animate(
+            run, output, frames=frames, t_start=start, t_end=end,
+            progress=lambda done, _: bar.update(task, completed=done),
+        )  # fmt: skip
+    typer.echo(str(film))
+
+
+@app.command("replay")
+def replay_command(
+    trace: Annotated[Path, typer.Argument(help="A trace, .npz or .csv.", show_default=False)],
+    other: Annotated[Path | None, typer.Argument(help="A second one, beside it.")] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Ends in .html.")] = Path(
+        "replay.html"
+    ),
+) -> None:
+    """Write one HTML file in which a run is stepped, scrubbed and explained."""
+    from plots.replay import write_replay
+
+    second = None if other is None else Trace.load(other)
+    typer.echo(str(write_replay(output, Trace.load(trace), second)))
+
+
+@app.command("debug")
+def debug_command(
+    scenario: Annotated[Path, typer.Argument(help="A scenario file, TOML.", show_default=False)],
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Change a key, for example --set model.law=published."),
+    ] = None,
+) -> None:
+    """Step through a scenario at the terminal: break, why, back, poke, compare."""
+    from gms_fsm.debugger import run_debugger
+
+    raise typer.Exit(run_debugger(load_scenario(scenario, overrides or [])))
 
 
 @app.command("code")

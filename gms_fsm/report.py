@@ -18,7 +18,7 @@ from gms_fsm.parameters import FloatArray
 from gms_fsm.records import Motion, Record
 from gms_fsm.scenario import Loaded
 from gms_fsm.simulate import Moment, simulate
-from gms_fsm.trace import Trace
+from gms_fsm.trace import Trace, dwell_times
 
 __all__ = ["Comparison", "compare", "dwell_times", "run_scenario", "summary_text"]
 
@@ -79,41 +79,6 @@ def measured_force(record: Record) -> tuple[FloatArray, FloatArray]:
     if "force" not in record.columns:
         return np.empty(0), np.empty(0)
     return record.columns["time"][record.chosen], record.columns["force"][record.chosen]
-
-
-def dwell_times(trace: Trace) -> FloatArray:
-    """Return how long each element was in each state.
-
-    Parameters
-    ----------
-    trace : Trace
-        A run; its transition log is complete whatever its rows are.
-
-    Returns
-    -------
-    ndarray, shape (n, states), s
-        Rows add up to the run's length.
-
-    Examples
-    --------
-    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
-    >>> trace = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"),
-    ...                  Prescribed("0.2"), 3.0)
-    >>> dwell_times(trace)[0].round(9).tolist()
-    [2.0, 1.0]
-    """
-    states = [state.name for state in trace.model.chart.states]
-    total = np.zeros((trace.n, len(states)))
-    begin, end = trace.stops.t[0], trace.stops.t[-1]
-    begin, end = min(begin, trace.t[0]), max(end, trace.t[-1])
-    first = trace.stops if trace.stops.t[0] <= trace.t[0] else trace.rows
-    for i in range(trace.n):
-        since, state = begin, int(first.mode[0, i])
-        for record in trace.transitions[trace.transitions.element == i]:
-            total[i, states.index(record.source)] += record.t - since
-            since, state = record.t, states.index(record.target)
-        total[i, state] += end - since
-    return total
 
 
 def run_scenario(

@@ -29,7 +29,7 @@ from gms_fsm.rigs import Rig
 if TYPE_CHECKING:
     import pandas
 
-__all__ = ["Rows", "Trace", "interpolated"]
+__all__ = ["Rows", "Trace", "dwell_times", "interpolated"]
 
 _NUMBERS = ("z", "v", "s", "F_before", "F_after")
 
@@ -487,6 +487,41 @@ class Trace:
 
 
 # --------------------------------------------------------------------------- helpers
+def dwell_times(trace: Trace) -> FloatArray:
+    """Return how long each element was in each state.
+
+    Parameters
+    ----------
+    trace : Trace
+        A run; its transition log is complete whatever its rows are.
+
+    Returns
+    -------
+    ndarray, shape (n, states), s
+        Rows add up to the run's length.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    >>> trace = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"),
+    ...                  Prescribed("0.2"), 3.0)
+    >>> dwell_times(trace)[0].round(9).tolist()
+    [2.0, 1.0]
+    """
+    states = [state.name for state in trace.model.chart.states]
+    total = np.zeros((trace.n, len(states)))
+    begin, end = trace.stops.t[0], trace.stops.t[-1]
+    begin, end = min(begin, trace.t[0]), max(end, trace.t[-1])
+    first = trace.stops if trace.stops.t[0] <= trace.t[0] else trace.rows
+    for i in range(trace.n):
+        since, state = begin, int(first.mode[0, i])
+        for record in trace.transitions[trace.transitions.element == i]:
+            total[i, states.index(record.source)] += record.t - since
+            since, state = record.t, states.index(record.target)
+        total[i, state] += end - since
+    return total
+
+
 def interpolated(
     program: Program,
     mode: list[int],

@@ -7,9 +7,12 @@ and traces show themselves in a notebook.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from plots.block_diagram import block_diagram
+from plots.live_chart import LiveChart, live_statechart
+from plots.mermaid import mermaid
 from plots.notebook import register
 from plots.render import render
 from plots.statechart import statechart
@@ -19,9 +22,45 @@ if TYPE_CHECKING:
 
     from gms_fsm.trace import Trace
 
-__all__ = ["block_diagram", "overview", "render", "statechart"]
+__all__ = [
+    "LiveChart",
+    "animate",
+    "block_diagram",
+    "live_statechart",
+    "mermaid",
+    "overview",
+    "render",
+    "statechart",
+]
 
 register()
+
+
+def animate(trace: Trace, path: str | Path, **options: Any) -> Path:
+    """Make a GIF of the chart at work beside the force; see `plots.animation.animate`.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run.
+    path : str or Path
+        Ends in ``.gif``.
+    **options
+        Of `plots.animation.animate`: elements, frames, t_start, t_end, fps, notation, theme.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    MissingExtraError
+        If matplotlib or Pillow is not installed.
+    """
+    from plots import animation
+
+    return animation.animate(trace, path, **options)
 
 
 def overview(trace: Trace, title: str = "") -> Figure:

@@ -10,34 +10,72 @@ as ``element1-state-slip``.
 from __future__ import annotations
 
 import html
+import math
+import operator
 import re
-from collections.abc import Iterable, Mapping
+import textwrap
+import unicodedata
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from math import ceil, sqrt
 
 import graphviz
 
 from gms_fsm.chart import Chart, State, Transition
 from gms_fsm.errors import ParameterError
-from gms_fsm.expression import MATLAB_LIKE, Both, Condition, Either, Value, spell
-from plots.style import INK, LINE_GREY, MONO, PAPER, SANS, TEXT_GREY
+from gms_fsm.expression import (
+    MATLAB_LIKE,
+    Both,
+    Condition,
+    Either,
+    Spelling,
+    Value,
+    clauses,
+    spell,
+)
+from gms_fsm.trace import Trace, dwell_times
+from plots.style import CHART_THEMES, MONO, SANS, ChartTheme
 
 __all__ = ["statechart"]
 
-# Points of a state's width for every edge that begins or ends there. In a narrower box the edges
-# would leave through the sides and run into each other.
-ROOM_PER_EDGE = 45
+NOTATIONS = ("stateflow", "math")
+DIRECTIONS = {"TB": "top to bottom", "LR": "left to right"}
+
+# Points of a state's side for every edge that begins or ends there. On a shorter side the edges
+# would leave around the corners and run into each other.
+ROOM_PER_EDGE = {"TB": 45, "LR": 16}
+LONGEST_LINE = 52  # characters; longer texts are wrapped
+DOT, TRUE, FALSE, UNKNOWN = "●", "✓", "✗", "?"
 
 
-def statechart(chart: Chart, elements: int = 1) -> graphviz.Digraph:
+def statechart(
+    chart: Chart,
+    elements: int | Sequence[int] = 1,
+    *,
+    notation: str = "stateflow",
+    direction: str = "TB",
+    theme: str = "light",
+    counts: Trace | None = None,
+) -> graphviz.Digraph:
     """Draw a chart: one element, or a bank of elements as parallel states.
 
     Parameters
     ----------
     chart : Chart
         The chart; nothing else decides what is shown.
-    elements : int, optional
-        How many elements. More than one are drawn as parallel (AND) regions in a grid, counted
-        from 1.
+    elements : int or sequence of int, optional
+        How many elements, or which ones, counted from 0. They are drawn as parallel (AND) regions
+        in a grid, and the picture counts from 1; only the number 1 gives a bare chart.
+    notation : {"stateflow", "math"}
+        ``z >= s && v > v_c``, or ``z ≥ s(v) ∧ v > v_c``.
+    direction : {"TB", "LR"}
+        States from top to bottom, or from left to right.
+    theme : {"light", "dark"}
+        Colours; what they tell is told by shapes as well.
+    counts : Trace, optional
+        A run of this chart: how long each element was in each state and how often it took each edge
+        are written on it; an edge never taken is dashed.
 
     Returns
     -------
@@ -47,183 +85,631 @@ def statechart(chart: Chart, elements: int = 1) -> graphviz.Digraph:
     Raises
     ------
     ParameterError
-        If `elements` is not a whole number of at least 1.
+        If an option is not one of those above, or `counts` is the run of another chart.
 
     Examples
     --------
-    >>> from gms_fsm.charts import LUGRE
+    >>> from gms_fsm.charts import GMS_ELEMENT, LUGRE
     >>> sum("class=state" in line for line in statechart(LUGRE).body)
     1
+    >>> "z ≥ s(v)" in statechart(GMS_ELEMENT["signed"], notation="math").source
+    True
     """
-    if elements < 1 or elements % 1 != 0:
+    if counts is not None and counts.model.chart != chart:
         raise ParameterError(
-            f"elements is {elements!r}; a chart has a whole number of elements, at least 1"
+            f"counts is a run of the chart {counts.model.chart.name!r}; it must be one of the "
+            f"chart that is drawn, {chart.name!r}"
         )
-    graph = graphviz.Digraph(
-        name=graphviz.escape(_printable(chart.name)),
-        graph_attr={
-            "fontname": SANS,
-            "bgcolor": PAPER,
-            "pad": "0.15",
-            "nodesep": "0.16",
-            "ranksep": "0.3",
-            "outputorder": "edgesfirst",
-        },
-        node_attr={"fontname": SANS, "shape": "plain"},
-        edge_attr={"color": INK, "arrowsize": "0.7", "penwidth": "1.1"},
-    )
-    if elements == 1:
-        _draw_element(graph, chart, "element1")
-        return graph
-    # Regions do not touch each other: each is laid out alone, hence all alike, and set in a grid.
-    graph.attr(pack="12", packmode=f"array_i{ceil(sqrt(elements))}")
-    for number in range(1, elements + 1):
-        with graph.subgraph(name=f"cluster_{number}") as region:
-            region.attr(
-                id=f"element{number}",
-                **{"class": "region"},
-                label=f"<{_text(f'Element{number}', 13, INK, bold=True)}"
-                f"{_text(f'  AND {number}', 10, TEXT_GREY)}>",
-                labeljust="l",
-                style="dashed,rounded",
-                color=LINE_GREY,
-                margin="12",
+    sheet = Sheet(chart, notation, direction, theme, Tally(counts) if counts else None)
+    numbers = chosen(elements, None if counts is None else counts.n)
+    bare = elements == 1 and (counts is None or counts.n == 1)
+    return sheet.graph(numbers, bare=bare)
+
+
+def chosen(elements: int | Sequence[int], n: int | None = None) -> tuple[int, ...]:
+    """Return the elements to draw, counted from 0.
+
+    Parameters
+    ----------
+    elements : int or sequence of int
+        How many, or which.
+    n : int, optional
+        How many there are.
+
+    Returns
+    -------
+    tuple of int
+        Their numbers, without repetition.
+
+    Raises
+    ------
+    ParameterError
+        If there are no such elements.
+
+    Examples
+    --------
+    >>> chosen(3), chosen([2, 0])
+    ((0, 1, 2), (2, 0))
+    """
+    limit = "" if n is None else f"; the run has {n}, counted from 0"
+    if isinstance(elements, Sequence):
+        numbers = tuple(_whole(number, "elements") for number in elements)
+        if not numbers or min(numbers) < 0 or len(set(numbers)) < len(numbers):
+            raise ParameterError(
+                f"elements is {elements!r}; it must be element numbers counted from 0, at least "
+                f"one and none twice{limit}"
             )
-            _draw_element(region, chart, f"element{number}")
-    return graph
+    else:
+        count = _whole(elements, "elements")
+        if count < 1:
+            raise ParameterError(
+                f"elements is {elements!r}; a chart has a whole number of elements, at least 1"
+            )
+        numbers = tuple(range(count))
+    if n is not None and max(numbers) >= n:
+        raise ParameterError(f"elements is {elements!r}; there is no such element{limit}")
+    return numbers
 
 
-def _draw_element(graph: graphviz.Digraph, chart: Chart, element: str) -> None:
-    dot = f"{element}-default"
-    graph.node(
-        dot,
-        "",
-        id=dot,
-        **{"class": "default"},
-        shape="circle",
-        style="filled",
-        fillcolor=INK,
-        color=INK,
-        width="0.11",
-        fixedsize="true",
+def _whole(number: object, name: str) -> int:
+    try:
+        return operator.index(number)  # type: ignore[arg-type]  # that is what is tried
+    except TypeError:
+        raise ParameterError(
+            f"{name} is {number!r}; a chart has a whole number of elements, at least 1"
+        ) from None
+
+
+def one_of(name: str, value: str, allowed: Iterable[str]) -> str:
+    """Return a value if it is allowed.
+
+    Parameters
+    ----------
+    name : str
+        Of the option.
+    value : str
+        What was given.
+    allowed : iterable of str
+        What may be given.
+
+    Returns
+    -------
+    str
+        The value.
+
+    Raises
+    ------
+    ParameterError
+        If it is another one.
+    """
+    words = tuple(allowed)
+    if value not in words:
+        listed = " or ".join(repr(word) for word in words)
+        raise ParameterError(f"{name} is {value!r}; it must be {listed}")
+    return value
+
+
+# --------------------------------------------------------------------------- notations
+MATH = Spelling(" ∧ ", " ∨ ", "!", bars=True, products=False)  # ! brackets what it negates
+# What differs between the tokens of the two notations; numbers are tokens of their own, so the
+# minus of 1e-06 is not taken for an operator.
+_TOKEN = re.compile(
+    r"(?P<power>\^\d+(?![\w.]))|(?P<number>\d[\d.]*(?:e[+-]?\d+)?)|(?P<name>\w+)|>=|<=|[*!-]"
+)
+_SIGNS = {">=": "≥", "<=": "≤", "*": "·", "-": "−", "!": "¬", "sqrt": "√"}
+_RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+_LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+_GREEK = {
+    unicodedata.name(c).removeprefix("GREEK SMALL LETTER ").lower(): c
+    for c in "αβγδεζηθκμνξρστφχψω"
+}
+
+
+@dataclass(frozen=True)
+class Writer:
+    """Writes the texts of a chart in one notation, always from the checked trees.
+
+    Parameters
+    ----------
+    chart : Chart
+        Whose names are written.
+    notation : {"stateflow", "math"}
+        How.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts import GMS_ELEMENT
+    >>> chart = GMS_ELEMENT["signed"]
+    >>> Writer(chart, "math").text(chart.guards["arrest"])
+    '|v| ≤ v_c ∧ |z| < s(v)'
+    """
+
+    chart: Chart
+    notation: str
+
+    @property
+    def math(self) -> bool:
+        """Whether the notation is that of formulas."""
+        return self.notation == "math"
+
+    def text(self, tree: Value | Condition) -> str:
+        """Write a tree."""
+        if not self.math:
+            return spell(tree, MATLAB_LIKE)
+        chart = self.chart
+        names = {name: _symbol(name) for name in chart.inputs + chart.variables + chart.parameters}
+        if "s" in chart.inputs:
+            names["s"] = "s(v)"  # the threshold that the model supplies depends on the velocity
+        return _TOKEN.sub(_formula_token, spell(tree, MATH, names))
+
+    def rate(self, variable: str) -> str:
+        """Write the time derivative of a variable."""
+        if not self.math:
+            return f"d{variable}"
+        dotted = unicodedata.normalize("NFC", variable + "\u0307")
+        return dotted if len(dotted) == 1 else f"d{_symbol(variable)}/dt"
+
+    def flow(self, variable: str, tree: Value) -> str:
+        """Write a flow."""
+        return f"{self.rate(variable)} = {self.text(tree)}{'' if self.math else ';'}"
+
+    def assignment(self, variable: str, tree: Value) -> str:
+        """Write an assignment."""
+        if self.math:
+            return f"{_symbol(variable)} := {self.text(tree)}"
+        return f"{variable} = {self.text(tree)};"
+
+    @property
+    def words(self) -> Mapping[type, str]:
+        """Between the parts of a conjunction or an alternative."""
+        spelling = MATH if self.math else MATLAB_LIKE
+        return {Both: spelling.both.strip(), Either: spelling.either.strip()}
+
+    def actions(self, trees: Mapping[str, Value]) -> str:
+        """Write the assignments of an edge in one line; empty if there are none."""
+        if not trees:
+            return ""
+        texts = [self.assignment(name, tree) for name, tree in trees.items()]
+        return "/ " + ", ".join(texts) if self.math else "{" + " ".join(texts) + "}"
+
+
+def _symbol(name: str) -> str:
+    """Write a name as formulas do: sigma_0 as σ₀."""
+    head, _, index = name.partition("_")
+    head = _GREEK.get(head, head)
+    if not index:
+        return head if name == name.rstrip("_") else name
+    return head + index.translate(_LOWERED) if index.isdecimal() else f"{head}_{index}"
+
+
+def _formula_token(match: re.Match[str]) -> str:
+    token = match[0]
+    if match["power"]:
+        return token[1:].translate(_RAISED)
+    if match["number"]:
+        if float(token) == math.pi:
+            return "π"
+        digits, _, exponent = token.partition("e")
+        power = f"10{str(int(exponent)).translate(_RAISED)}" if exponent else ""
+        return (power if digits == "1" else f"{digits}·{power}") if power else digits
+    return _SIGNS.get(token, token)
+
+
+# --------------------------------------------------------------------------- counts
+class Tally:
+    """How long each element was in each state, and how often it took each edge.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run; its log is complete whatever its rows are.
+    """
+
+    def __init__(self, trace: Trace) -> None:
+        log = trace.transitions
+        self.states = [state.name for state in trace.model.chart.states]
+        self.firings: Counter[tuple[int, str]] = Counter(
+            zip(log.element.tolist(), log.edge.tolist(), strict=True)
+        )
+        self.dwell = dwell_times(trace)
+
+    def of_state(self, element: int, state: str) -> str:
+        """Write how long a state was active."""
+        seconds, whole = self.dwell[element, self.states.index(state)], self.dwell[element].sum()
+        share = f" ({100 * seconds / whole:.0f} %)" if whole > 0 else ""
+        return f"active {seconds:.4g} s{share}"
+
+    def of_edge(self, element: int, edge: str) -> str:
+        """Write how often an edge was taken."""
+        times = self.firings[element, edge]
+        if not times:
+            return "never taken"
+        return "taken once" if times == 1 else f"taken {times} times"
+
+
+# --------------------------------------------------------------------------- the drawing
+@dataclass(frozen=True)
+class Piece:
+    """One text of a label: Graphviz writes each as one text of the SVG, in this order.
+
+    Parameters
+    ----------
+    text : str
+        What is written.
+    role : str
+        What it is: ``title``, ``dot``, ``word``, ``code``, ``priority``, ``clause``, ``mark``, ...
+    clause : int
+        For a clause and its mark, which clause of the guard; else -1.
+    """
+
+    text: str
+    role: str = "code"
+    clause: int = -1
+
+
+Row = list[Piece]
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A chart and how it is drawn.
+
+    Parameters
+    ----------
+    chart : Chart
+        The chart.
+    notation, direction, theme : str
+        See `statechart`.
+    tally : Tally, optional
+        Counts to be written on it.
+    live : bool
+        Leave room for the dot of the active state and the marks of the clauses.
+    """
+
+    chart: Chart
+    notation: str = "stateflow"
+    direction: str = "TB"
+    theme: str = "light"
+    tally: Tally | None = None
+    live: bool = False
+
+    def __post_init__(self) -> None:
+        one_of("notation", self.notation, NOTATIONS)
+        one_of("direction", self.direction, DIRECTIONS)
+        one_of("theme", self.theme, CHART_THEMES)
+
+    @property
+    def colours(self) -> ChartTheme:
+        """The theme."""
+        return CHART_THEMES[self.theme]
+
+    @property
+    def write(self) -> Writer:
+        """The notation."""
+        return Writer(self.chart, self.notation)
+
+    def graph(
+        self, numbers: Sequence[int], *, bare: bool, values: Sequence[Row] = (), foot: str = ""
+    ) -> graphviz.Digraph:
+        """Draw elements.
+
+        Parameters
+        ----------
+        numbers : sequence of int
+            Counted from 0.
+        bare : bool
+            Draw the one element without its region.
+        values : sequence of Row
+            Written under the title of each element.
+        foot : str
+            Written under the picture.
+
+        Returns
+        -------
+        graphviz.Digraph
+            The picture.
+        """
+        ink = self.colours.ink
+        graph = graphviz.Digraph(
+            name=graphviz.escape(_printable(self.chart.name)),
+            graph_attr={
+                "fontname": SANS,
+                "bgcolor": self.colours.paper,
+                "pad": "0.15",
+                "nodesep": "0.16",
+                "ranksep": "0.3",
+                "rankdir": self.direction,
+                "outputorder": "edgesfirst",
+            },
+            node_attr={"fontname": SANS, "shape": "plain"},
+            edge_attr={"color": ink, "arrowsize": "0.7", "penwidth": "1.1"},
+        )
+        if foot:
+            below = [*values, [Piece(foot, "value")]] if bare else [[Piece(foot, "value")]]
+            graph.attr(label=f"<{self._lines(below)}>", labeljust="l", labelloc="b")
+        if bare:
+            self._draw_element(graph, numbers[0])
+            return graph
+        # Regions do not touch each other: each is laid out alone, hence all alike, and set in a
+        # grid.
+        columns = ceil(sqrt(len(numbers)))
+        order: list[int | None] = list(numbers)
+        if self.direction == "TB":
+            graph.attr(pack="12", packmode=f"array_i{columns}")
+        else:  # Graphviz turns the grid with the layout: its first row comes out at the bottom
+            graph.attr(pack="12", packmode=f"array_ic{columns}")
+            order += [None] * (-len(order) % columns)
+            lines = [order[i : i + columns] for i in range(0, len(order), columns)]
+            order = [number for line in reversed(lines) for number in line]
+        for place, number in enumerate(order, start=1):
+            with graph.subgraph(name=f"cluster_{place}") as region:
+                if number is None:
+                    region.attr(style="invis")
+                    region.node(f"blank{place}", "", style="invis")
+                    continue
+                name = element_id(number)
+                title = [
+                    Piece(f"Element{number + 1}  ", "region"),
+                    Piece(f"AND {number + 1}", "note"),
+                ]
+                region.attr(
+                    id=name,
+                    **{"class": "region"},
+                    label=f"<{self._lines([title, *values]) if values else self._line(title)}>",
+                    labeljust="l",
+                    labelloc="t",
+                    style="dashed,rounded",
+                    color=self.colours.line,
+                    margin="12",
+                )
+                self._draw_element(region, number)
+        return graph
+
+    def _draw_element(self, graph: graphviz.Digraph, number: int) -> None:
+        chart, element, ink = self.chart, element_id(number), self.colours.ink
+        dot = f"{element}-default"
+        graph.node(
+            dot,
+            "",
+            id=dot,
+            **{"class": "default"},
+            shape="circle",
+            style="filled",
+            fillcolor=ink,
+            color=ink,
+            width="0.11",
+            fixedsize="true",
+        )
+        for state in chart.states:
+            name = part_id(element, "state", state.name)
+            graph.node(name, f"<{self._state_box(state, number)}>", id=name, **{"class": "state"})
+        graph.edge(
+            dot,
+            part_id(element, "state", chart.default_state.name),
+            id=f"{element}-default-edge",
+            **{"class": "default"},
+        )
+        for state in chart.states:
+            for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
+                self._draw_edge(graph, number, edge, priority)
+
+    def _draw_edge(
+        self, graph: graphviz.Digraph, number: int, edge: Transition, priority: int
+    ) -> None:
+        element = element_id(number)
+        source = part_id(element, "state", edge.source)
+        target = part_id(element, "state", edge.target)
+        guard = part_id(element, "guard", edge.name)
+        name = part_id(element, "edge", edge.name)
+        box = self._guard_box(edge, priority, number)
+        graph.node(guard, f"<{box}>", id=guard, **{"class": "guard"})
+        before, after, left, right = "nswe" if self.direction == "TB" else "wens"
+        dashed = {}
+        if self.tally is not None and not self.tally.firings[number, edge.name]:
+            dashed = {"style": "dashed"}
+        into = {"id": f"{name}-1", "dir": "none", **dashed}
+        out = {"id": f"{name}-2", **dashed}
+        if edge.source == edge.target:
+            graph.edge(source, f"{guard}:{left}", **into)
+            graph.edge(source, f"{guard}:{right}", dir="back", **out)
+        elif self.chart.state_index(edge.source) < self.chart.state_index(edge.target):
+            graph.edge(source, f"{guard}:{before}", **into)
+            graph.edge(f"{guard}:{after}", target, **out)
+        else:  # against the layout's direction: drawn from target to source, arrow at the tail
+            graph.edge(target, f"{guard}:{before}", dir="back", **out)
+            graph.edge(f"{guard}:{after}", source, **into)
+
+    # ----------------------------------------------------------------- labels
+    def state_rows(self, state: State, number: int) -> list[Row]:
+        """Return what is written in a state's box.
+
+        Parameters
+        ----------
+        state : State
+            The state.
+        number : int
+            The element, from 0.
+
+        Returns
+        -------
+        list of Row
+            The title first.
+        """
+        title = [Piece(state.name[:1].upper() + state.name[1:], "title")]
+        if self.live:
+            title.append(Piece(f" {DOT}", "dot"))
+        write, trees = self.write, self.chart.assignments
+        flows = [write.flow(v, self.chart.flows[state.name, v]) for v in self.chart.variables]
+        rows = [title]
+        for kind, texts in (
+            ("entry", [write.assignment(*item) for item in trees["entry", state.name].items()]),
+            ("during", flows),
+            ("exit", [write.assignment(*item) for item in trees["exit", state.name].items()]),
+        ):
+            head = f"{kind}: "
+            for text in texts:
+                for line in _wrapped(text):
+                    rows.append([Piece(head, "word"), Piece(line)])
+                    head = " " * len(head)
+        if self.tally is not None:
+            rows.append([Piece(self.tally.of_state(number, state.name), "count")])
+        return rows
+
+    def guard_rows(self, edge: Transition, priority: int, number: int) -> list[Row]:
+        """Return what is written on an edge, clause by clause.
+
+        Parameters
+        ----------
+        edge : Transition
+            The edge.
+        priority : int
+            1 is asked first.
+        number : int
+            The element, from 0.
+
+        Returns
+        -------
+        list of Row
+            The first piece of each is the priority, or a blank.
+        """
+        guard = self.chart.guards[edge.name]
+        lines = [
+            (line, clause)
+            for clause, part in enumerate(clauses(guard))
+            for line in self._clause_lines(part, inside=isinstance(guard, Both))
+        ]
+        rows: list[Row] = []
+        for i, (line, clause) in enumerate(lines):
+            last = i + 1 == len(lines) or lines[i + 1][1] != clause
+            row = [Piece("[" if i == 0 else " ", "bracket"), Piece(line, "clause", clause)]
+            if last and self.live:
+                row.append(Piece(TRUE, "mark", clause))
+            if last and i + 1 < len(lines):
+                # The space is a text of its own: some readers of SVG drop one at the beginning.
+                row += [Piece(" ", "bracket"), Piece(self.write.words[Both], "bracket")]
+            if i + 1 == len(lines):
+                row.append(Piece("]", "bracket"))
+            rows.append(row)
+        action = self.write.actions(self.chart.assignments["action", edge.name])
+        rows += [[Piece(line, "action")] for line in _wrapped(action)]
+        if self.tally is not None:
+            taken = bool(self.tally.firings[number, edge.name])
+            text = self.tally.of_edge(number, edge.name)
+            rows.append([Piece(text, "count" if taken else "never")])
+        return [[Piece(str(priority) if i == 0 else " ", "priority"), *row]
+                for i, row in enumerate(rows)]  # fmt: skip
+
+    def _clause_lines(self, part: Condition, inside: bool) -> list[str]:
+        """Return a clause as lines: each alternative begins one, and a long text is wrapped."""
+        if not isinstance(part, Either):
+            text = self.write.text(part)
+            # The brackets that the guard has as one text.
+            return _wrapped(f"({text})" if inside and isinstance(part, Both) else text)
+        texts = [self.write.text(operand) for operand in part.operands]
+        texts = [f"({text})" if isinstance(operand, Either) else text
+                 for text, operand in zip(texts, part.operands, strict=True)]  # fmt: skip
+        texts[:-1] = [f"{text} {self.write.words[Either]}" for text in texts[:-1]]
+        if inside:  # one of several clauses: && binds tighter than ||
+            texts[0], texts[-1] = f"({texts[0]}", f"{texts[-1]})"
+            if sum(map(len, texts)) < LONGEST_LINE:
+                texts = [" ".join(texts)]
+        return [line for text in texts for line in _wrapped(text)]
+
+    def _state_box(self, state: State, number: int) -> str:
+        ends = sum((edge.source, edge.target).count(state.name) for edge in self.chart.transitions)
+        room = ends * ROOM_PER_EDGE[self.direction]
+        title, *rows = (self._line(row) for row in self.state_rows(state, number))
+        size = f'WIDTH="{room}"' if self.direction == "TB" else ""
+        height = 18 * (1 + len(rows))
+        blank = ""
+        if self.direction == "LR" and room > height:
+            blank = f'<TR><TD HEIGHT="{room - height}"></TD></TR>'
+        ink, paper = self.colours.ink, self.colours.paper
+        return (
+            f'<TABLE BORDER="1" COLOR="{ink}" BGCOLOR="{paper}" STYLE="ROUNDED" CELLBORDER="0" '
+            f'CELLSPACING="0" CELLPADDING="3"><TR><TD ALIGN="LEFT" {size}>{title}</TD></TR><HR/>'
+            + "".join(f'<TR><TD ALIGN="LEFT">{row}</TD></TR>' for row in rows)
+            + f"{blank}</TABLE>"
+        )
+
+    def _guard_box(self, edge: Transition, priority: int, number: int) -> str:
+        rows = "".join(
+            f'<TR><TD ALIGN="LEFT">{self._line(row[:1])}</TD>'
+            f'<TD ALIGN="LEFT">{self._line(row[1:])}</TD></TR>'
+            for row in self.guard_rows(edge, priority, number)
+        )
+        return (
+            '<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="1" '
+            f'BGCOLOR="{self.colours.paper}">{rows}</TABLE>'
+        )
+
+    def _lines(self, rows: Iterable[Row]) -> str:
+        cells = "".join(f'<TR><TD ALIGN="LEFT">{self._line(row)}</TD></TR>' for row in rows)
+        return (
+            '<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="1">' + cells + "</TABLE>"
+        )
+
+    def _line(self, row: Iterable[Piece]) -> str:
+        return "".join(self._text(piece) for piece in row)
+
+    def _text(self, piece: Piece) -> str:
+        size, face, bold = {
+            "title": (12, SANS, True),
+            "dot": (12, SANS, False),
+            "region": (13, SANS, True),
+            "note": (10, SANS, False),
+            "count": (9, SANS, False),
+            "never": (9, SANS, True),
+            "priority": (10, MONO, True),
+        }.get(piece.role, (10, MONO, False))
+        soft = piece.role in ("word", "note", "count")
+        colour = self.colours.soft if soft else self.colours.ink
+        words = _escape(piece.text)
+        words = f"<B>{words}</B>" if bold else words
+        return f'<FONT FACE="{face}" POINT-SIZE="{size}" COLOR="{colour}">{words}</FONT>'
+
+
+def _wrapped(text: str) -> list[str]:
+    if len(text) <= LONGEST_LINE:
+        return [text] if text else []
+    # An indent tells that the line goes on; a word longer than the line is not cut.
+    return textwrap.wrap(
+        text,
+        LONGEST_LINE,
+        subsequent_indent="  ",
+        break_long_words=False,
+        break_on_hyphens=False,
     )
-    for state in chart.states:
-        name = _id(element, "state", state.name)
-        graph.node(name, f"<{_state_box(chart, state)}>", id=name, **{"class": "state"})
-    graph.edge(
-        dot,
-        _id(element, "state", chart.default_state.name),
-        id=f"{element}-default-edge",
-        **{"class": "default"},
-    )
-    for state in chart.states:
-        for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
-            _draw_edge(graph, chart, element, edge, priority)
-
-
-def _draw_edge(
-    graph: graphviz.Digraph, chart: Chart, element: str, edge: Transition, priority: int
-) -> None:
-    source = _id(element, "state", edge.source)
-    target = _id(element, "state", edge.target)
-    guard = _id(element, "guard", edge.name)
-    name = _id(element, "edge", edge.name)
-    graph.node(guard, f"<{_guard_box(chart, edge, priority)}>", id=guard, **{"class": "guard"})
-    if edge.source == edge.target:
-        graph.edge(source, f"{guard}:w", id=f"{name}-1", dir="none")
-        graph.edge(source, f"{guard}:e", id=f"{name}-2", dir="back")
-    elif chart.state_index(edge.source) < chart.state_index(edge.target):
-        graph.edge(source, f"{guard}:n", id=f"{name}-1", dir="none")
-        graph.edge(f"{guard}:s", target, id=f"{name}-2")
-    else:  # against the layout's direction: drawn from target to source, with the arrow at the tail
-        graph.edge(target, f"{guard}:n", id=f"{name}-2", dir="back")
-        graph.edge(f"{guard}:s", source, id=f"{name}-1", dir="none")
-
-
-# --------------------------------------------------------------------------- labels
-def _state_box(chart: Chart, state: State) -> str:
-    flow = {f"d{variable}": chart.flows[state.name, variable] for variable in chart.variables}
-    lines = [
-        *_assignment_lines("entry", chart.assignments["entry", state.name]),
-        *_assignment_lines("during", flow),
-        *_assignment_lines("exit", chart.assignments["exit", state.name]),
-    ]
-    ends = sum((edge.source, edge.target).count(state.name) for edge in chart.transitions)
-    title = _text(state.name[:1].upper() + state.name[1:], 12, INK, bold=True)
-    return (
-        f'<TABLE BORDER="1" COLOR="{INK}" BGCOLOR="{PAPER}" STYLE="ROUNDED" CELLBORDER="0" '
-        f'CELLSPACING="0" CELLPADDING="3"><TR><TD ALIGN="LEFT" WIDTH="{ends * ROOM_PER_EDGE}">'
-        f"{title}</TD></TR><HR/>"
-        + "".join(f'<TR><TD ALIGN="LEFT">{line}</TD></TR>' for line in lines)
-        + "</TABLE>"
-    )
-
-
-def _assignment_lines(kind: str, trees: Mapping[str, Value]) -> Iterable[str]:
-    head = f"{kind}: "
-    for name, tree in trees.items():
-        yield _code(head, TEXT_GREY) + _code(f"{name} = {spell(tree, MATLAB_LIKE)};")
-        head = " " * len(head)
-
-
-def _guard_box(chart: Chart, edge: Transition, priority: int) -> str:
-    clauses, word = _clauses(chart.guards[edge.name])
-    heads = ["["] + [" "] * (len(clauses) - 1)
-    tails = [f" {word}"] * (len(clauses) - 1) + ["]"]
-    # Every clause is a text of its own, so that it can be found in the SVG.
-    lines = [
-        _code(head) + _code(clause) + _code(tail)
-        for head, clause, tail in zip(heads, clauses, tails, strict=True)
-    ]
-    actions = chart.assignments["action", edge.name]
-    if actions:
-        texts = (f"{name} = {spell(tree, MATLAB_LIKE)};" for name, tree in actions.items())
-        lines.append(_code("{") + _code(" ".join(texts)) + _code("}"))
-    numbers = [str(priority)] + [" "] * (len(lines) - 1)
-    rows = (
-        f'<TR><TD ALIGN="LEFT">{_code(number, bold=True)}</TD><TD ALIGN="LEFT">{line}</TD></TR>'
-        for number, line in zip(numbers, lines, strict=True)
-    )
-    return (
-        f'<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="1" BGCOLOR="{PAPER}">'
-        + "".join(rows)
-        + "</TABLE>"
-    )
-
-
-def _clauses(guard: Condition) -> tuple[list[str], str]:
-    """Return the lines of a guard, and the word between them."""
-    if not isinstance(guard, Both | Either):
-        return [spell(guard, MATLAB_LIKE)], ""
-    lines = []
-    for operand in guard.operands:
-        text = spell(operand, MATLAB_LIKE)
-        # The brackets that the guard has as one text: && binds tighter than ||.
-        lines.append(f"({text})" if isinstance(operand, (Either, type(guard))) else text)
-    return lines, "&&" if isinstance(guard, Both) else "||"
-
-
-def _text(text: str, size: int, colour: str, face: str = SANS, bold: bool = False) -> str:
-    words = f"<B>{_escape(text)}</B>" if bold else _escape(text)
-    return f'<FONT FACE="{face}" POINT-SIZE="{size}" COLOR="{colour}">{words}</FONT>'
-
-
-def _code(text: str, colour: str = INK, bold: bool = False) -> str:
-    return _text(text, 10, colour, MONO, bold)
 
 
 def _escape(text: str) -> str:
     """Write a text for an HTML label: nothing in it is markup, and an indent stays."""
-    words = html.escape(_printable(text.lstrip(" ")))
+    core = text.strip(" ")
+    words = html.escape(_printable(core))
     # Graphviz 2.43 refuses a bare ] in a label; one backslash would begin an escape sequence.
     words = words.replace("[", "&#91;").replace("]", "&#93;").replace("\\", "&#92;" * 2)
-    return "&#160;" * (len(text) - len(text.lstrip(" "))) + words
+    start = len(text) - len(text.lstrip(" ")) if core else len(text)
+    return "&#160;" * start + words + "&#160;" * (len(text) - start - len(core))
 
 
 def _printable(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in text)
 
 
-def _id(element: str, kind: str, name: str) -> str:
+def element_id(number: int) -> str:
+    """Return the id of an element counted from 0; ids count from 1, as pictures do.
+
+    >>> element_id(0)
+    'element1'
+    """
+    return f"element{number + 1}"
+
+
+def part_id(element: str, kind: str, name: str) -> str:
+    """Return the id of a state, guard or edge.
+
+    >>> part_id("element1", "state", "slip")
+    'element1-state-slip'
+    """
     # Names of a chart are identifiers; whatever else came in here could be read as a port or DOT.
     return f"{element}-{kind}-" + re.sub(r"\W", "_", name)

@@ -6,6 +6,8 @@ apart; text in a colour takes the darker twin, so that it keeps its contrast on 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 BLUE = "#0072B2"
@@ -26,9 +28,15 @@ PANEL = "#F5F7FA"
 SANS = "Helvetica,Arial,Liberation Sans,DejaVu Sans,sans-serif"
 MONO = "DejaVu Sans Mono,Menlo,Consolas,Liberation Mono,monospace"
 
-# Elements are told apart by colour and by dash (Okabe-Ito, readable in grey).
+# Elements are told apart by colour and by dash (Okabe-Ito, readable in grey): seven colours and six
+# dashes repeat after 42 elements only.
 ELEMENT_COLOURS = (BLUE, VERMILION, "#009E73", "#CC79A7", "#E69F00", "#56B4E9", INK)
-ELEMENT_DASHES = ("-", "--", ":", "-.")
+ELEMENT_DASHES: tuple[str | tuple[int, tuple[float, ...]], ...] = (
+    "-", "--", ":", "-.", (0, (7.0, 1.5, 1.0, 1.5, 1.0, 1.5)), (0, (9.0, 4.0)),
+)  # fmt: skip
+# States: the default state is plain, the next ones are hatched as well as coloured.
+STATE_FILLS = ("#CFE3F2", "#F7CDB0", "#CDEBE0", "#F1D9E7", "#FAE8C0")
+STATE_EDGES = (BLUE, VERMILION, "#009E73", "#CC79A7", "#E69F00")
 HATCHES = ("", "////", "....", "xxxx", "\\\\\\\\")
 
 RC: Any = {  # matplotlib types its keys one by one
@@ -38,6 +46,8 @@ RC: Any = {  # matplotlib types its keys one by one
     "axes.titlelocation": "left",
     "axes.spines.top": False,
     "axes.spines.right": False,
+    "axes.formatter.useoffset": False,  # in a zoom "-0.1934" reads better than "-1.9e-1" aside
+    "hatch.linewidth": 0.6,
     "axes.prop_cycle": "cycler('color', ['#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00'])",
     "lines.linewidth": 1.2,
     "legend.frameon": False,
@@ -46,3 +56,41 @@ RC: Any = {  # matplotlib types its keys one by one
     "savefig.dpi": 150,
     "svg.hashsalt": "gms-fsm",  # the same trace gives the same file
 }
+
+
+@dataclass(frozen=True)
+class ChartTheme:
+    """Colours of a statechart; what they tell is told by shape too, so that grey paper shows it.
+
+    Parameters
+    ----------
+    ink, soft, line, pale, paper : str
+        Lines and text, lesser text, regions, what does not matter now, and the ground.
+    active, active_fill : str
+        The active state.
+    fired, holds, fails : str
+        The edge last taken; clauses that are true and that are not.
+    """
+
+    ink: str
+    soft: str
+    line: str
+    pale: str
+    paper: str
+    active: str
+    active_fill: str
+    fired: str
+    holds: str
+    fails: str
+
+
+CHART_THEMES: Mapping[str, ChartTheme] = {
+    "light": ChartTheme(
+        INK, TEXT_GREY, LINE_GREY, PALE_GREY, PAPER,
+        BLUE, BLUE_TINT, VERMILION, TEXT_GREEN, TEXT_GREY,
+    ),
+    "dark": ChartTheme(
+        "#E6E8EB", "#9AA1AB", "#79808A", "#565C66", "#15181D",
+        "#56B4E9", "#12344A", "#FF8A3D", "#3FCB9A", "#9AA1AB",
+    ),
+}  # fmt: skip

@@ -159,14 +159,14 @@ def _points(numbers: str) -> list[Point]:
 Draw = Callable[[Chart, int], dict[str, Drawn]]
 
 
-@pytest.fixture
-def draw(tmp_path: Path) -> Draw:
+@pytest.fixture(params=["TB", "LR"])
+def draw(tmp_path: Path, request: pytest.FixtureRequest) -> Draw:
     """Draw a chart and return what is in the SVG, by id."""
     if shutil.which("dot") is None:
         pytest.importorskip("pygraphviz", reason="drawing needs Graphviz, program or package")
 
     def drawn(chart: Chart, elements: int) -> dict[str, Drawn]:
-        svg = render(statechart(chart, elements), tmp_path / "chart.svg")
+        svg = render(statechart(chart, elements, direction=request.param), tmp_path / "chart.svg")
         groups = [Drawn(g) for g in ElementTree.parse(svg).iter(SVG + "g")]
         by_id = {group.id: group for group in groups}
         assert len(by_id) == len(groups), "ids are unique"

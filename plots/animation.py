@@ -1,0 +1,329 @@
+"""A run as a moving picture: the live chart beside the friction force, as a GIF.
+
+The chart is laid out once by Graphviz and painted by `plots.live_chart`; here matplotlib draws the
+painted SVG, whose few kinds of parts (paths, polygons, circles, texts) it has too. So there is one
+truth about what a row looks like, no program is called per frame, and no converter of SVG is
+needed. The chart is drawn again only when it changes; a cursor moves over the force in every frame.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, cast
+from xml.etree import ElementTree
+
+import numpy as np
+
+from gms_fsm.errors import MissingExtraError, ParameterError
+from gms_fsm.files import written_whole
+from gms_fsm.trace import Trace
+from plots.live_chart import LiveChart
+from plots.statechart import Sheet
+from plots.style import CHART_THEMES, RC, ChartTheme
+
+try:
+    from matplotlib import patches, rc_context
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.colors import to_rgb
+    from matplotlib.figure import Figure
+    from matplotlib.path import Path as Curve
+    from PIL import Image
+except ImportError:
+    raise MissingExtraError(
+        'animations need matplotlib and Pillow; install them with: pip install "gms-fsm[plots]"'
+    ) from None
+
+__all__ = ["animate"]
+
+SMOOTH = 2000  # points of the force curve
+POINTS = 72.0  # an inch
+CURVE_WIDTH, CURVE_HEIGHT = 4.4, 3.4  # inches, of the force and its labels
+DPI = 100
+FASTEST = 50  # frames a second: a GIF counts in hundredths, and readers refuse a single one
+STEPS = 8  # shades of a colour along an edge; many more would be taken for one another
+WIDE = 0.88  # matplotlib's own sans serif is wider than the one the layout was made for
+
+
+def animate(
+    trace: Trace,
+    path: str | Path,
+    *,
+    elements: int | Sequence[int] | None = None,
+    frames: int = 200,
+    t_start: float | None = None,
+    t_end: float | None = None,
+    fps: float = 20.0,
+    notation: str = "stateflow",
+    theme: str = "light",
+    progress: Callable[[int, int], object] | None = None,
+) -> Path:
+    """Write a GIF of the live chart beside F(t) with a moving cursor.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run.
+    path : str or Path
+        Ends in ``.gif``. The folder has to exist; a file of that name is replaced as a whole or not
+        at all.
+    elements : int or sequence of int, optional
+        How many elements, or which ones, counted from 0; all if not given.
+    frames : int
+        How many, at evenly spaced times; at least 2. Neighbours without a visible difference become
+        one frame that is shown longer.
+    t_start, t_end : float, optional
+        s, the part of the run that is shown; the whole run if not given.
+    fps : float
+        Frames a second, at most 50.
+    notation : {"stateflow", "math"}
+        See `plots.statechart.statechart`.
+    theme : {"light", "dark"}
+        Colours.
+    progress : callable, optional
+        Called as ``progress(done, frames)``.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ParameterError
+        If an option is not allowed.
+    OutputError
+        If the folder cannot be written.
+    MissingExtraError
+        If there is no Graphviz, neither program nor package.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    >>> trace = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"),
+    ...                  Prescribed("0.2"), 3.0)
+    >>> animate(trace, "run.gif", frames=1)
+    Traceback (most recent call last):
+    gms_fsm.errors.ParameterError: frames is 1; it must be a whole number of at least 2
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".gif":
+        raise ParameterError(f"path is {str(path)!r}; an animation must end in .gif")
+    if isinstance(frames, bool) or not isinstance(frames, int) or frames < 2:
+        raise ParameterError(f"frames is {frames!r}; it must be a whole number of at least 2")
+    if not 0 < fps <= FASTEST:
+        raise ParameterError(f"fps is {fps!r}; it must be above 0 and at most {FASTEST}")
+    Sheet(trace.model.chart, notation, "TB", theme)  # refuses wrong options before any work
+    first, last = float(trace.t.min()), float(trace.t.max())
+    begin = first if t_start is None else t_start
+    end = last if t_end is None else t_end
+    if not first <= begin < end <= last:
+        raise ParameterError(
+            f"t_start is {begin!r} s and t_end is {end!r} s; they must lie within the run, "
+            f"{first:g} to {last:g} s, in this order"
+        )
+    rows = trace.sample(np.linspace(begin, end, frames))
+    chart = LiveChart(rows, elements, notation=notation, theme=theme)
+    with rc_context(RC):
+        film = _Film(chart, trace.sample(np.linspace(begin, end, SMOOTH)), CHART_THEMES[theme])
+        return written_whole(path, lambda file: _save(film, file, frames, fps, progress))
+
+
+def _save(
+    film: _Film, file: Any, frames: int, fps: float, progress: Callable[[int, int], object] | None
+) -> None:
+    palette = film.palette()
+
+    def pictures() -> Iterator[Image.Image]:
+        for row in range(frames):
+            picture = film.picture(row).quantize(palette=palette, dither=Image.Dither.NONE)
+            if progress is not None:
+                progress(row + 1, frames)
+            yield picture
+
+    each = pictures()
+    next(each).save(
+        file,
+        format="GIF",
+        save_all=True,
+        append_images=each,
+        duration=1000.0 / fps,
+        loop=0,
+        optimize=False,
+    )
+
+
+class _Film:
+    """The picture that moves.
+
+    Parameters
+    ----------
+    chart : LiveChart
+        Of the rows to show.
+    curve : Trace
+        The same part of the run with enough points for a smooth curve.
+    colours : ChartTheme
+        Colours.
+    """
+
+    def __init__(self, chart: LiveChart, curve: Trace, colours: ChartTheme) -> None:
+        self.chart, self.colours = chart, colours
+        left, top, width, height = (float(n) for n in chart.root.get("viewBox", "").split())
+        tall = max(height / POINTS, CURVE_HEIGHT)
+        wide = width / POINTS + CURVE_WIDTH
+        self.figure = Figure(figsize=(wide, tall), dpi=DPI, facecolor=colours.paper)
+        # Half of its methods have no types.
+        self.canvas = cast(Any, FigureCanvasAgg(self.figure))
+        box = (0, (1 - height / POINTS / tall) / 2, width / POINTS / wide, height / POINTS / tall)
+        ax = self.figure.add_axes(box)
+        ax.set(xlim=(left, left + width), ylim=(top + height, top))
+        ax.set_axis_off()
+        chart.paint(0)
+        self.parts = list(_drawn(ax, chart.root))
+        self._draw_force(curve, width / POINTS / wide, wide, tall)
+        self.canvas.draw()
+        self.ground = self.canvas.copy_from_bbox(self.figure.bbox)
+        self.look: object = None
+        self.layer: Any = None
+
+    def _draw_force(self, curve: Trace, start: float, wide: float, tall: float) -> None:
+        colours = self.colours
+        high = max(CURVE_HEIGHT / tall, 0.62)
+        ax = self.figure.add_axes(
+            (start + 0.75 / wide, (1 - high) / 2 + 0.55 / tall, 3.4 / wide, high - 1.0 / tall),
+            facecolor=colours.paper,
+        )
+        ax.plot(curve.t, curve.F, color=colours.ink, linewidth=1.2)
+        ax.margins(x=0)
+        ax.set_xlabel("t [s]", color=colours.ink)
+        ax.set_ylabel("F [N]", color=colours.ink)
+        ax.tick_params(colors=colours.ink)
+        for spine in ax.spines.values():
+            spine.set_color(colours.ink)
+        self.line = ax.axvline(curve.t[0], color=colours.fired, linewidth=1.2, animated=True)
+        (self.point,) = ax.plot([], [], "o", color=colours.fired, markersize=6, animated=True)
+        self.clock = ax.set_title("", color=colours.ink, animated=True)
+
+    def picture(self, row: int) -> Image.Image:
+        """Return the picture of a row of the chart's run."""
+        chart, trace = self.chart, self.chart.trace
+        look = chart.look(row)
+        if look != self.look:
+            chart.paint(row)
+            self.canvas.restore_region(self.ground)
+            for part in self.parts:
+                part.update()
+                part.draw(self.figure)
+            self.look, self.layer = look, self.canvas.copy_from_bbox(self.figure.bbox)
+        self.canvas.restore_region(self.layer)
+        t, force = float(trace.t[row]), float(trace.F[row])
+        self.line.set_xdata([t, t])
+        self.point.set_data([t], [force])
+        self.clock.set_text(f"t = {t:.3f} s    F = {force:+.3f} N")
+        for artist in (self.line, self.point, self.clock):
+            self.figure.draw_artist(artist)
+        return Image.fromarray(np.asarray(self.canvas.buffer_rgba())[..., :3].copy())
+
+    def palette(self) -> Image.Image:
+        """Return one palette for all frames: every colour, and its shades towards the ground.
+
+        Frames with palettes of their own would be larger, and their colours would flicker.
+        """
+        grounds = [np.array(to_rgb(c)) for c in (self.colours.paper, self.colours.active_fill)]
+        colours = set(vars(self.colours).values()) - {self.colours.paper, self.colours.active_fill}
+        shades = list(grounds)
+        for colour in (np.array(to_rgb(c)) for c in sorted(colours)):
+            for ground in grounds:
+                shades += [ground + k / STEPS * (colour - ground) for k in range(1, STEPS + 1)]
+        image = Image.new("P", (1, 1))
+        table = np.unique(np.round(255 * np.array(shades)).astype(np.uint8), axis=0)
+        image.putpalette(table.tobytes())  # at most 2 + 8 * 2 * 8 of the 256 that a GIF can have
+        return image
+
+
+# --------------------------------------------------------------------------- SVG to matplotlib
+class _Part:
+    """One part of the SVG and its artist.
+
+    Parameters
+    ----------
+    node : Element
+        Of the painted tree.
+    artist : Artist
+        Drawn for it.
+    """
+
+    def __init__(self, node: ElementTree.Element, artist: Artist) -> None:
+        self.node, self.artist = node, artist
+
+    def update(self) -> None:
+        """Give the artist what the tree says now."""
+        get = self.node.get
+        if self.node.tag == "text":
+            shown = get("visibility") != "hidden"
+            self.artist.set(color=get("fill"), text=self.node.text or "", visible=shown)
+        else:
+            fill, stroke = (
+                "none" if get(name) in (None, "transparent") else get(name)
+                for name in ("fill", "stroke")
+            )
+            width = float(get("stroke-width") or 1.0)
+            self.artist.set(facecolor=fill, edgecolor=stroke, linewidth=width)
+
+    def draw(self, figure: Figure) -> None:
+        """Draw the artist on the figure."""
+        figure.draw_artist(self.artist)
+
+
+def _drawn(ax: Axes, root: ElementTree.Element) -> Iterator[_Part]:
+    """Make an artist for each part of the SVG, in its order."""
+    (graph,) = root.findall("g")
+    moved = re.search(r"translate\((\S+) (\S+)\)", graph.get("transform", ""))
+    dx, dy = (float(n) for n in moved.groups()) if moved else (0.0, 0.0)
+    for node in graph.iter():
+        artist = _artist(ax, node, dx, dy)
+        if artist is not None:
+            part = _Part(node, artist)
+            part.update()
+            yield part
+
+
+def _artist(ax: Axes, node: ElementTree.Element, dx: float, dy: float) -> Artist | None:
+    get = node.get
+    if node.tag == "text":
+        return ax.text(
+            float(get("x", "0")) + dx,
+            float(get("y", "0")) + dy,
+            "",
+            ha={"start": "left", "middle": "center"}[get("text-anchor", "start")],
+            va="baseline",
+            fontweight=get("font-weight", "normal"),
+            animated=True,
+            parse_math=False,
+            **_font(node),
+        )
+    if node.tag == "ellipse":
+        at = (float(get("cx", "0")) + dx, float(get("cy", "0")) + dy)
+        size = 2 * float(get("rx", "0")), 2 * float(get("ry", "0"))
+        return ax.add_patch(patches.Ellipse(at, *size, animated=True))
+    if node.tag not in ("path", "polygon", "polyline"):
+        return None
+    numbers = [float(n) for n in re.findall(r"-?\d+(?:\.\d+)?", get("d") or get("points") or "")]
+    points = np.array(numbers).reshape(-1, 2) + (dx, dy)
+    # Graphviz writes a path as M and then cubic curves only.
+    kind = Curve.CURVE4 if node.tag == "path" else Curve.LINETO
+    codes = [Curve.MOVETO, *itertools.repeat(kind, len(points) - 1)]
+    dashes = {"linestyle": (0, (5, 2))} if get("stroke-dasharray") else {}
+    return ax.add_patch(patches.PathPatch(Curve(points, codes), animated=True, **dashes))
+
+
+def _font(node: ElementTree.Element) -> dict[str, Any]:
+    # The two families that come with matplotlib, so that it never searches.
+    size = float(node.get("font-size", "10"))
+    if "Mono" in node.get("font-family", ""):
+        return {"fontfamily": "DejaVu Sans Mono", "fontsize": size}
+    return {"fontfamily": "DejaVu Sans", "fontsize": WIDE * size}

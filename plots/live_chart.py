@@ -1,0 +1,483 @@
+"""The chart of a run at one of its rows: what is active, what could fire, what fired last.
+
+The layout is drawn once, with room for every mark. A frame only gives known parts of that SVG other
+colours, widths, classes and texts, so hundreds of frames cost seconds.
+
+The active state has a thick border and a dot. Of the edges only those that leave it count: their
+clauses carry ✓ or ✗. The edge that the element took last is thick; on the row of that firing it
+carries the marks that it was taken with. All else is pale.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from xml.etree import ElementTree
+
+import numpy as np
+
+from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
+from gms_fsm.explain import values_at
+from gms_fsm.expression import Condition, clauses, evaluate
+from gms_fsm.trace import Trace
+from plots.render import drawn
+from plots.statechart import (
+    FALSE,
+    TRUE,
+    UNKNOWN,
+    Piece,
+    Row,
+    Sheet,
+    chosen,
+    element_id,
+    part_id,
+)
+
+__all__ = ["ElementLook", "LiveChart", "live_statechart"]
+
+SVG = "http://www.w3.org/2000/svg"
+THIN, THICK, BORDER = "1.1", "2.6", "3"
+VALUES_PER_LINE = 3
+TITLE = 2  # texts of a region before its values
+WIDEST = "-0.000e+000"  # a value is never longer than this
+
+Marks = tuple[bool | None, ...]
+
+
+@dataclass(frozen=True)
+class ElementLook:
+    """What a live chart shows of one element.
+
+    Parameters
+    ----------
+    element : int
+        Counted from 0.
+    active : str
+        The active state.
+    marks : mapping of str to tuple of bool or None
+        For each edge that carries marks the truth of its clauses; None where the numbers of the row
+        do not allow to tell (the last row of a run that could not go on).
+    leaving : tuple of str
+        The edges that leave the active state, highest priority first.
+    fired : str
+        The edge taken last, up to this row; empty if none was.
+    """
+
+    element: int
+    active: str
+    marks: Mapping[str, Marks]
+    leaving: tuple[str, ...]
+    fired: str
+
+
+class LiveChart:
+    """A chart that shows the rows of a run, one after the other.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run.
+    elements : int or sequence of int, optional
+        How many elements, or which ones, counted from 0; all if not given.
+    notation : {"stateflow", "math"}
+        See `plots.statechart.statechart`.
+    theme : {"light", "dark"}
+        Colours.
+    values : bool
+        Write time, variables and inputs too.
+    direction : {"TB", "LR"}
+        States from top to bottom, or from left to right.
+
+    Attributes
+    ----------
+    trace : Trace
+        The run.
+    elements : tuple of int
+        The elements shown, counted from 0.
+
+    Raises
+    ------
+    ParameterError
+        If an option is not allowed, or the run has no such element.
+    MissingExtraError
+        If there is no Graphviz, neither program nor package.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    >>> trace = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"),
+    ...                  Prescribed("0.2"), 3.0)
+    >>> chart = LiveChart(trace, [0])
+    >>> chart.look(-1)[0].active
+    'slip'
+    """
+
+    def __init__(
+        self,
+        trace: Trace,
+        elements: int | Sequence[int] | None = None,
+        *,
+        notation: str = "stateflow",
+        theme: str = "light",
+        values: bool = False,
+        direction: str = "TB",
+    ) -> None:
+        self.trace = trace
+        self.elements = chosen(trace.n if elements is None else elements, trace.n)
+        self.values = values
+        chart = trace.model.chart
+        self._sheet = Sheet(chart, notation, direction, theme, live=True)
+        self._names = [*chart.variables, *(name for name in chart.inputs if name != "t")]
+        self._log_count = _log_counts(trace)
+        log = trace.transitions
+        self._own = {i: np.flatnonzero(log.element == i) for i in self.elements}
+        bare = trace.n == 1 and len(self.elements) == 1 and not isinstance(elements, Sequence)
+        graph = self._sheet.graph(
+            self.elements,
+            bare=bare,
+            values=self._value_rows(None),
+            foot=f"t = {WIDEST} s" if values else "",
+        )
+        picture = drawn(graph, "svg")
+        if picture is None:
+            raise MissingExtraError(
+                "a live chart needs Graphviz: install the program dot, or "
+                'pip install "gms-fsm[render]"'
+            )
+        self.root = _plain_tree(picture)
+        self.root.set("style", f"background:{self._sheet.colours.paper}")
+        groups = {group.get("id", ""): group for group in self.root.iter("g")}
+        self._parts = {i: _ElementParts(self._sheet, i, groups) for i in self.elements}
+        texts = groups["graph0"].findall("text")  # under the picture: the values, last the time
+        self._value_texts = {
+            i: texts[:-1] if bare else groups[element_id(i)].findall("text")[TITLE:]
+            for i in self.elements
+        }
+        self._time_text = texts[-1:]
+
+    # ------------------------------------------------------------------ what is shown
+    def at(self, t: float) -> int:
+        """Return the last row at or before a time.
+
+        Parameters
+        ----------
+        t : float
+            s, within the run.
+
+        Returns
+        -------
+        int
+            The row, for `look` and `frame`; of several at one instant the last.
+
+        Raises
+        ------
+        ParameterError
+            If the time lies outside the run.
+        """
+        times = self.trace.t
+        if not times.min() <= t <= times.max():
+            raise ParameterError(
+                f"t is {t!r} s; it must lie within the run, {times.min():g} to {times.max():g} s"
+            )
+        # Not a bisection: the rows of Trace.sample come in the order they were asked for.
+        before = np.flatnonzero(times <= t)
+        return int(before[np.flatnonzero(times[before] == times[before].max())[-1]])
+
+    def look(self, row: int) -> tuple[ElementLook, ...]:
+        """Return what a row looks like, without drawing it.
+
+        Parameters
+        ----------
+        row : int
+            Row index; negative counts from the end.
+
+        Returns
+        -------
+        tuple of ElementLook
+            One an element shown.
+
+        Raises
+        ------
+        IndexError
+            If there is no such row.
+        """
+        row = self._row(row)
+        return tuple(self._look(row, element) for element in self.elements)
+
+    def _row(self, row: int) -> int:
+        rows = len(self.trace)
+        if not -rows <= row < rows:
+            raise IndexError(f"row {row}: the trace has {rows} rows")
+        return row % rows
+
+    def _look(self, row: int, element: int) -> ElementLook:
+        trace, chart = self.trace, self.trace.model.chart
+        state = chart.states[int(trace.rows.mode[row, element])].name
+        leaving = tuple(edge.name for _, edge in chart.leaving(state))
+        values = values_at(trace, row, element)
+        marks = {edge: _marks(chart.guards[edge], values) for edge in leaving}
+        own, count = self._own[element], int(self._log_count[row])
+        past = int(np.searchsorted(own, count))  # firings of this element up to here
+        fired = str(trace.transitions.edge[own[past - 1]]) if past else ""
+        if past and trace.microstep[row] and own[past - 1] == count - 1:
+            # This row is that firing. Its marks are those it was taken with, on the row before.
+            marks[fired] = _marks(chart.guards[fired], values_at(trace, row - 1, element))
+        return ElementLook(element, state, marks, leaving, fired)
+
+    # ------------------------------------------------------------------ drawing
+    def frame(self, row: int) -> str:
+        """Return the chart at a row as SVG.
+
+        Parameters
+        ----------
+        row : int
+            Row index; negative counts from the end. `at` finds the one of a time.
+
+        Returns
+        -------
+        str
+            A whole SVG document, ready for a file or a page.
+
+        Raises
+        ------
+        IndexError
+            If there is no such row.
+        """
+        self.paint(row)
+        return ElementTree.tostring(self.root, encoding="unicode")
+
+    def paint(self, row: int) -> None:
+        """Give the tree `root` the look of a row; `frame` does this and writes the tree.
+
+        Parameters
+        ----------
+        row : int
+            Row index.
+        """
+        row = self._row(row)
+        for look in self.look(row):
+            self._parts[look.element].paint(look)
+            if self.values:
+                for piece, node in _paired(
+                    self._value_rows((row, look.element)), self._value_texts[look.element]
+                ):
+                    node.text = piece.text.replace(" ", "\xa0")
+        for node in self._time_text:
+            node.text = f"t = {self.trace.t[row]:.6g} s"
+
+    def _value_rows(self, at: tuple[int, int] | None) -> list[Row]:
+        """Return the values of an element at a row as lines; without one, as wide as they get."""
+        if not self.values:
+            return []
+        numbers = {} if at is None else values_at(self.trace, *at)
+        cells = [
+            f"{name} = " + (f"{numbers[name]:+.3e}" if at else WIDEST).ljust(len(WIDEST))
+            for name in self._names
+        ]
+        return [
+            [Piece("  ".join(cells[i : i + VALUES_PER_LINE]), "value")]
+            for i in range(0, len(cells), VALUES_PER_LINE)
+        ]
+
+
+def live_statechart(
+    trace: Trace,
+    *,
+    row: int | None = None,
+    t: float | None = None,
+    elements: int | Sequence[int] | None = None,
+    notation: str = "stateflow",
+    theme: str = "light",
+    values: bool = False,
+    direction: str = "TB",
+) -> str:
+    """Draw the chart of a run at a row or a time; for many of them keep one `LiveChart`.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run.
+    row : int, optional
+        Row index; negative counts from the end.
+    t : float, optional
+        s; the last row at or before it is shown.
+    elements, notation, theme, values, direction
+        See `LiveChart`.
+
+    Returns
+    -------
+    str
+        An SVG document.
+
+    Raises
+    ------
+    ParameterError
+        If not exactly one of `row` and `t` is given, or an option is not allowed.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    >>> trace = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"),
+    ...                  Prescribed("0.2"), 3.0)
+    >>> live_statechart(trace, t=2.5)[:4]
+    '<svg'
+    """
+    if (row is None) == (t is None):
+        raise ParameterError(f"row is {row!r} and t is {t!r}; give exactly one of them")
+    chart = LiveChart(
+        trace, elements, notation=notation, theme=theme, values=values, direction=direction
+    )
+    return chart.frame(row if row is not None else chart.at(t if t is not None else math.nan))
+
+
+# --------------------------------------------------------------------------- reading the run
+def _log_counts(trace: Trace) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    """Return for each row how many entries of the log have happened by then.
+
+    m firings at one time give m + 1 rows, the first one before them; a row of a wanted time stands
+    alone and is the one after all of them.
+    """
+    log = trace.transitions.t
+    in_steps = np.isin(trace.t, trace.t[trace.microstep > 0])
+    before = np.searchsorted(log, trace.t, side="left") + trace.microstep
+    return np.where(in_steps, before, np.searchsorted(log, trace.t, side="right"))
+
+
+def _marks(guard: Condition, values: Mapping[str, float]) -> Marks:
+    return tuple(_truth(part, values) for part in clauses(guard))
+
+
+def _truth(part: Condition, values: Mapping[str, float]) -> bool | None:
+    try:
+        return bool(evaluate(part, values))
+    except (ArithmeticError, ValueError):
+        return None
+
+
+# --------------------------------------------------------------------------- reading the SVG
+def _plain_tree(picture: bytes) -> ElementTree.Element:
+    """Read an SVG; its namespace becomes an attribute, so that tags are short and stay so."""
+    root = ElementTree.fromstring(picture)
+    for node in root.iter():
+        node.tag = node.tag.removeprefix(f"{{{SVG}}}")
+        if node.tag == "text":
+            node.set("xml:space", "preserve")  # some readers drop a blank at the beginning
+            node.attrib.pop("{http://www.w3.org/XML/1998/namespace}space", None)
+    root.set("xmlns", SVG)
+    # Graphviz rounds the size up; exact, no edge of another colour is left around a dark picture.
+    width, height = root.get("viewBox", "").split()[2:]
+    root.set("width", f"{width}pt")
+    root.set("height", f"{height}pt")
+    return root
+
+
+Texts = list[tuple[Piece, ElementTree.Element]]
+
+
+def _paired(rows: Sequence[Row], nodes: Sequence[ElementTree.Element]) -> Texts:
+    """Return each piece of a label with its text, found by their order."""
+    pieces = [piece for row in rows for piece in row]
+    if len(pieces) != len(nodes):
+        raise OutputError(
+            f"Graphviz wrote {len(nodes)} texts for {len(pieces)}; this version of Graphviz cannot "
+            "be used for live charts, install another"
+        )
+    return list(zip(pieces, nodes, strict=True))
+
+
+class _ElementParts:
+    """The parts of one element in the SVG, and how they are painted."""
+
+    def __init__(
+        self, sheet: Sheet, number: int, groups: Mapping[str, ElementTree.Element]
+    ) -> None:
+        chart, element = sheet.chart, element_id(number)
+        self.colours = sheet.colours
+        self.states, self.edges = {}, {}
+        for state in chart.states:
+            group = groups[part_id(element, "state", state.name)]
+            texts = _paired(sheet.state_rows(state, number), group.findall("text"))
+            self.states[state.name] = (group, texts)
+            for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
+                name = part_id(element, "edge", edge.name)
+                guard = groups[part_id(element, "guard", edge.name)]
+                texts = _paired(sheet.guard_rows(edge, priority, number), guard.findall("text"))
+                self.edges[edge.name] = (guard, texts, [groups[f"{name}-1"], groups[f"{name}-2"]])
+
+    def paint(self, look: ElementLook) -> None:
+        for state, (group, texts) in self.states.items():
+            self._paint_state(group, texts, state == look.active)
+        for edge, (guard, texts, halves) in self.edges.items():
+            kind = "leaving" if edge in look.leaving else "pale"
+            colour = self.colours.ink if edge in look.leaving else self.colours.pale
+            classes = [kind]
+            if edge == look.fired:
+                colour = self.colours.fired
+                classes.append("fired")
+            for half in halves:
+                _classify(half, "edge", classes)
+                for shape in _shapes(half):
+                    shape.set("stroke", colour)
+                    shape.set("stroke-width", THICK if edge == look.fired else THIN)
+                    if shape.get("fill") != "none":
+                        shape.set("fill", colour)
+            _classify(guard, "node guard", classes)
+            marks = look.marks.get(edge)
+            plain = self.colours.pale if classes == ["pale"] else self.colours.ink
+            for piece, node in texts:
+                self._paint_text(piece, node, marks, plain, colour)
+
+    def _paint_state(
+        self,
+        group: ElementTree.Element,
+        texts: Texts,
+        active: bool,
+    ) -> None:
+        colours = self.colours
+        _classify(group, "node state", ["active"] if active else [])
+        line = colours.active if active else colours.ink
+        for shape in _shapes(group):
+            if shape.get("fill") == "none":  # the border
+                shape.set("stroke", line)
+                shape.set("stroke-width", BORDER if active else "1")
+            elif shape.get("stroke") in ("none", "transparent"):  # the ground
+                shape.set("fill", colours.active_fill if active else colours.paper)
+            else:  # the line under the title
+                shape.set("stroke", line)
+                shape.set("fill", line)
+        for piece, node in texts:
+            if piece.role == "dot":
+                node.set("fill", colours.active)
+                node.set("visibility", "visible" if active else "hidden")
+
+    def _paint_text(
+        self,
+        piece: Piece,
+        node: ElementTree.Element,
+        marks: Marks | None,
+        plain: str,
+        colour: str,
+    ) -> None:
+        if piece.clause < 0:
+            node.set("fill", colour if piece.role == "priority" else plain)
+            return
+        holds = None if marks is None else marks[piece.clause]
+        if marks is None:
+            node.set("fill", plain)
+            node.set("class", piece.role)
+        else:
+            node.set("fill", self.colours.holds if holds else self.colours.fails)
+            word = {True: "true", False: "false", None: "unknown"}[holds]
+            node.set("class", f"{piece.role} {word}")
+        if piece.role == "mark":
+            node.text = {True: TRUE, False: FALSE, None: UNKNOWN}[holds]
+            node.set("visibility", "hidden" if marks is None else "visible")
+
+
+def _classify(group: ElementTree.Element, kind: str, more: Sequence[str]) -> None:
+    group.set("class", " ".join([kind, *more]))
+
+
+def _shapes(group: ElementTree.Element) -> Iterator[ElementTree.Element]:
+    return (node for node in group.iter() if node.tag in ("path", "polygon", "polyline"))

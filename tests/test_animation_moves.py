@@ -1,0 +1,167 @@
+"""An animation shows the run: as many frames as asked for, each with its row's chart and cursor.
+
+The chart is laid out once, whatever the number of frames, and drawn again only where it changes.
+"""
+
+from __future__ import annotations
+
+import shutil
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("matplotlib", reason="animations need the extra 'plots'")
+
+from matplotlib.colors import to_rgb
+from PIL import Image
+
+import plots.live_chart
+from gms_fsm import Trace, simulate
+from gms_fsm.errors import OutputError, ParameterError
+from plots.animation import animate
+from plots.style import CHART_THEMES
+from tests.helpers import one_element, open_loop, stick_slip
+
+
+@pytest.fixture(autouse=True)
+def _graphviz() -> None:
+    if shutil.which("dot") is None:
+        pytest.importorskip("pygraphviz", reason="drawing needs Graphviz, program or package")
+
+
+@cache
+def bank() -> Trace:
+    return simulate(stick_slip("signed"), open_loop(), 45.0)
+
+
+@cache
+def one() -> Trace:
+    return simulate(one_element("signed"), open_loop(), 45.0)
+
+
+def frames(path: Path) -> list[Image.Image]:
+    with Image.open(path) as film:
+        found = []
+        for k in range(film.n_frames):  # type: ignore[attr-defined]
+            film.seek(k)
+            found.append(film.convert("RGB"))
+        return found
+
+
+def count(picture: Image.Image, colour: str) -> int:
+    wanted = tuple(round(255 * part) for part in to_rgb(colour))
+    return sum(n for n, found in picture.getcolors(1 << 24) or [] if found == wanted)
+
+
+@pytest.mark.parametrize("theme", CHART_THEMES)
+def test_frames(theme: str, tmp_path: Path) -> None:
+    path = animate(bank(), tmp_path / "run.gif", frames=12, fps=10, theme=theme, notation="math")
+    assert list(tmp_path.iterdir()) == [path]
+    with Image.open(path) as film:
+        assert film.format == "GIF"
+        assert film.n_frames == 12  # type: ignore[attr-defined]
+        assert film.info["duration"] == 100
+        assert film.info["loop"] == 0
+    pictures = frames(path)
+    assert {picture.size for picture in pictures} == {pictures[0].size}
+    assert min(pictures[0].size) > 300
+    assert len({picture.tobytes() for picture in pictures}) == 12
+    colours = CHART_THEMES[theme]
+    assert pictures[0].getpixel((3, 3)) == tuple(round(255 * c) for c in to_rgb(colours.paper))
+    for picture in pictures:
+        assert count(picture, colours.active) > 500  # four borders
+        assert count(picture, colours.fired) > 50  # the cursor
+
+
+def test_the_active_state_moves_with_the_run(tmp_path: Path) -> None:
+    trace, colours = one(), CHART_THEMES["light"]
+    first = float(trace.transitions.t[0])
+    path = animate(trace, tmp_path / "one.gif", frames=2, t_start=first - 0.5, t_end=first + 0.5)
+    before, after = frames(path)
+
+    def centre(picture: Image.Image) -> float:
+        """Height of the border of the active state."""
+        wanted = tuple(round(255 * part) for part in to_rgb(colours.active))
+        width, height = picture.size
+        rows = [y for y in range(height) for x in range(0, width, 2)
+                if picture.getpixel((x, y)) == wanted]  # fmt: skip
+        return sum(rows) / len(rows)
+
+    assert centre(after) > centre(before) + 50  # slip lies under stick
+    assert count(after, colours.fired) > count(before, colours.fired) + 40  # the edge
+
+
+def test_one_layout_serves_all_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[Any] = []
+    real = plots.live_chart.drawn
+
+    def counted(*arguments: Any) -> bytes | None:
+        calls.append(arguments)
+        return real(*arguments)
+
+    monkeypatch.setattr(plots.live_chart, "drawn", counted)
+    told: list[tuple[int, int]] = []
+    animate(bank(), tmp_path / "run.gif", elements=[1], frames=20,
+            progress=lambda *each: told.append(each))  # fmt: skip
+    assert len(calls) == 1
+    assert told == [(k, 20) for k in range(1, 21)]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"path": "run.mp4"}, r"path is 'run\.mp4'; an animation must end in \.gif"),
+        ({"frames": 1}, "frames is 1; it must be a whole number of at least 2"),
+        ({"frames": 2.5}, r"frames is 2\.5"),
+        ({"frames": True}, "frames is True"),
+        ({"fps": 0}, "fps is 0; it must be above 0 and at most 50"),
+        ({"fps": 51}, "fps is 51"),
+        ({"fps": float("nan")}, "fps is nan"),
+        ({"t_start": 5.0, "t_end": 5.0}, r"t_start is 5\.0 s and t_end is 5\.0 s; .* 0 to 45 s"),
+        ({"t_end": 46.0}, r"t_end is 46\.0 s"),
+        ({"t_start": float("nan")}, "t_start is nan s"),
+        ({"theme": "grey"}, r"theme is 'grey'; it must be 'light' or 'dark'"),
+        ({"notation": "tex"}, "notation is 'tex'"),
+        ({"elements": [7]}, r"elements is \[7\].*the run has 4"),
+    ],
+)
+def test_wrong_options_are_refused(
+    options: dict[str, Any], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ParameterError, match=message):
+        animate(bank(), **({"path": "run.gif"} | options))
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_failure_leaves_the_old_file(tmp_path: Path) -> None:
+    path = tmp_path / "run.gif"
+    path.write_bytes(b"the film of yesterday")
+
+    def stop(done: int, _: int) -> None:
+        if done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        animate(one(), path, frames=5, progress=stop)
+    assert path.read_bytes() == b"the film of yesterday"
+    assert list(tmp_path.iterdir()) == [path]
+    with pytest.raises(OutputError, match="nowhere"):
+        animate(one(), tmp_path / "nowhere" / "run.gif", frames=2)
+
+
+@pytest.mark.parametrize("missing", ["matplotlib", "PIL"])
+def test_without_its_extra_it_is_named(missing: str) -> None:
+    import subprocess
+    import sys
+
+    code = (
+        f"import sys; sys.modules[{missing!r}] = None\n"
+        "from gms_fsm.errors import MissingExtraError\n"
+        "try:\n    import plots.animation\n"
+        "except MissingExtraError as error:\n    print(error)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert 'pip install "gms-fsm[plots]"' in done.stdout
