@@ -31,8 +31,15 @@ def test_make_targets_of_the_readme_exist() -> None:
     assert {"paper", "test"} <= named <= targets
 
 
-def test_pictures_of_the_readme_exist() -> None:
-    pictures = re.findall(r"!\[[^]]*\]\(([^)]+)\)", TEXT)
-    assert pictures
-    for picture in pictures:
-        assert (ROOT / picture).stat().st_size > 1000
+@pytest.mark.parametrize("page", ["README.md", "docs/gallery.md"])
+def test_pictures_and_links_lead_somewhere(page: str) -> None:
+    place = ROOT / page
+    links = re.findall(r"\]\(([^)#]+)", place.read_text(encoding="utf-8"))
+    assert links
+    for link in links:
+        assert (place.parent / link).stat().st_size > 1000, link
+
+
+def test_the_gallery_shows_every_picture_that_is_kept() -> None:
+    shown = set(re.findall(r"images/([\w.]+)", (ROOT / "docs/gallery.md").read_text()))
+    assert shown == {path.name for path in (ROOT / "docs/images").iterdir()}
