@@ -13,7 +13,7 @@ from gms_fsm.chart import Chart, Transition
 from gms_fsm.expression import MATLAB_LIKE, Condition, Relation, clauses, evaluate, spell
 from gms_fsm.trace import Trace
 
-__all__ = ["Clause", "Explanation", "explain", "explain_state", "values_at"]
+__all__ = ["Clause", "Explanation", "explain", "explain_state", "holds", "values_at"]
 
 
 @dataclass(frozen=True)
@@ -27,9 +27,11 @@ class Clause:
     holds : bool
         Whether it is true.
     left, right : float
-        Both sides of a comparison; NaN for a compound clause.
+        Both sides of a comparison; NaN for a compound clause, or one that cannot be computed.
     margin : float
         How far it is on the true side (negative: on the false side); NaN for a compound clause.
+    computable : bool
+        False where it has no value (1/0); it then counts as false.
     """
 
     text: str
@@ -37,6 +39,7 @@ class Clause:
     left: float
     right: float
     margin: float
+    computable: bool = True
 
 
 @dataclass(frozen=True)
@@ -170,7 +173,7 @@ def explain_state(
                 edge,
                 priority,
                 tuple(_clause(part, values) for part in clauses(guard)),
-                bool(evaluate(guard, values)),
+                holds(guard, values),
                 edge.name == fired,
             )
         )
@@ -188,9 +191,34 @@ def _edge_taken(trace: Trace, row: int, element: int) -> str:
 
 
 def _clause(part: Condition, values: Mapping[str, float]) -> Clause:
-    text, holds = spell(part, MATLAB_LIKE), bool(evaluate(part, values))
-    if not isinstance(part, Relation):
-        return Clause(text, holds, math.nan, math.nan, math.nan)
-    left, right = evaluate(part.left, values), evaluate(part.right, values)
+    text = spell(part, MATLAB_LIKE)
+    try:
+        truth = bool(evaluate(part, values))
+        if not isinstance(part, Relation):
+            return Clause(text, truth, math.nan, math.nan, math.nan)
+        left, right = evaluate(part.left, values), evaluate(part.right, values)
+    except (ArithmeticError, ValueError):
+        return Clause(text, False, math.nan, math.nan, math.nan, computable=False)
     margin = left - right if part.op in (">", ">=") else right - left
-    return Clause(text, holds, left, right, margin)
+    return Clause(text, truth, left, right, margin)
+
+
+def holds(condition: Condition, values: Mapping[str, float]) -> bool:
+    """Return a condition's truth; what cannot be computed (1/0) is not true.
+
+    Parameters
+    ----------
+    condition : Condition
+        A guard or a part of one.
+    values : mapping of str to float
+        A number for every name.
+
+    Returns
+    -------
+    bool
+        Its truth.
+    """
+    try:
+        return bool(evaluate(condition, values))
+    except (ArithmeticError, ValueError):
+        return False

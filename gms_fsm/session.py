@@ -9,16 +9,19 @@ go on is no exception here but an outcome of its branch.
 from __future__ import annotations
 
 import json
+import signal
+import threading
 from bisect import bisect_left
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
 from gms_fsm.errors import ParameterError, SessionError, SimulationError, TraceFileError
-from gms_fsm.explain import Explanation, explain_state
+from gms_fsm.explain import Explanation, explain_state, holds
 from gms_fsm.expression import Condition, Value, evaluate, parse_condition, parse_value
 from gms_fsm.files import written_whole
 from gms_fsm.header import Header
@@ -35,6 +38,7 @@ Kind = Literal["tested", "valid", "fires", "enter", "leave"]
 KINDS: tuple[Kind, ...] = ("tested", "valid", "fires", "enter", "leave")
 LOOKS = 16  # places between two rows at which a condition is tried
 HALVINGS = 60
+Row: TypeAlias = tuple[float, int, list[float], tuple[int, ...]]  # time, micro-step, y, modes
 
 
 @dataclass(frozen=True)
@@ -136,8 +140,8 @@ class Branch:
         The parent itself.
     edits : mapping
         What was poked.
-    fork_at : float or None
-        Time of the poke if it was done between two rows, s.
+    begin : row or None
+        The place of the poke, as `raw` has it, if it was between two rows: a row of this branch.
     """
 
     def __init__(
@@ -147,14 +151,14 @@ class Branch:
         fork: int = -1,
         shared: Branch | None = None,
         edits: Mapping[str, Any] | None = None,
-        fork_at: float | None = None,
+        begin: Row | None = None,
     ) -> None:
         self.run, self.parent, self.fork, self.shared = run, parent, fork, shared
-        self.edits, self.fork_at = dict(edits or {}), fork_at
+        self.edits, self.begin = dict(edits or {}), begin
         self.outcome = ""  # "" while it goes on, "end", or the message of what stopped it
         self.cursor = 0
         self.between: tuple[float, list[float]] | None = None  # a located place behind the cursor
-        self.offset = fork + 1
+        self.offset = fork + 1 + (begin is not None)
         self.stops: set[int] = set()  # rows at which the machines were asked
         self.firings: list[int] = []  # rows made by firings, own part
         self.pull()
@@ -166,23 +170,27 @@ class Branch:
     def pull(self) -> bool:
         """Compute at least one more row; return whether there is one."""
         before = len(self)
-        while not self.outcome and len(self) == before:
-            try:
-                if not self.run.advance():
-                    self.outcome = "end"
-                elif isinstance(self.run.happening, Stop):
-                    self.stops.add(len(self) - 1)
-                elif isinstance(self.run.happening, Firing):
-                    self.firings.append(len(self) - 1)
-            except SimulationError as error:
-                self.outcome = str(error)
+        with _unbroken():
+            while not self.outcome and len(self) == before:
+                try:
+                    if not self.run.advance():
+                        self.outcome = "end"
+                    elif isinstance(self.run.happening, Stop):
+                        self.stops.add(len(self) - 1)
+                    elif isinstance(self.run.happening, Firing):
+                        self.firings.append(len(self) - 1)
+                except SimulationError as error:
+                    self.outcome = str(error)
         return len(self) > before
 
-    def raw(self, row: int) -> tuple[float, int, list[float], tuple[int, ...]]:
+    def raw(self, row: int) -> Row:
         """Return time, micro-step, state and modes of a row."""
-        if row < self.offset:
+        if row <= self.fork:
             assert self.shared is not None
             return self.shared.raw(row)
+        if row < self.offset:
+            assert self.begin is not None
+            return self.begin
         rows, i = self.run.recorder.rows, row - self.offset
         return rows.t[i], rows.microstep[i], rows.y[i], rows.mode[i]
 
@@ -190,17 +198,17 @@ class Branch:
         """Return all firings so far, the shared part included."""
         before: list[tuple[Any, ...]] = []
         if self.shared is not None:
-            before = [self.shared.fired(row) for row in self.shared.firing_rows(self.offset)]
+            before = [self.shared.fired(row) for row in self.shared.firing_rows(self.fork + 1)]
         return before + self.run.recorder.log
 
     def firing_rows(self, end: int) -> list[int]:
         """Return the rows before `end` that firings made."""
-        before = [] if self.shared is None else self.shared.firing_rows(min(end, self.offset))
+        before = [] if self.shared is None else self.shared.firing_rows(min(end, self.fork + 1))
         return before + self.firings[: bisect_left(self.firings, end)]
 
     def fired(self, row: int) -> tuple[Any, ...]:
         """Return the log's record of the firing that made a row."""
-        if row < self.offset:
+        if row <= self.fork:
             assert self.shared is not None
             return self.shared.fired(row)
         return self.run.recorder.log[bisect_left(self.firings, row)]
@@ -327,6 +335,8 @@ class Session:
             Where it stopped: the last row if the run ended before.
         """
         branch = self.branch
+        if count < 0:
+            raise SessionError(f"count is {count}; it must be at least 0")
         branch.between = None
         for _ in range(count):
             if branch.cursor + 1 >= len(branch) and not branch.pull():
@@ -348,7 +358,9 @@ class Session:
             Where it stopped.
         """
         branch = self.branch
-        if branch.between is not None:  # from a located place to the row before it
+        if count < 0:
+            raise SessionError(f"count is {count}; it must be at least 0")
+        if branch.between is not None and count > 0:  # from a located place to the row before it
             branch.between, count = None, count - 1
         branch.cursor = max(0, branch.cursor - count)
         return self.here
@@ -524,10 +536,7 @@ class Session:
             truth = now
 
     def _holds(self, tree: Condition, here: Here) -> bool:
-        try:
-            return bool(evaluate(tree, self.values(here)))
-        except (ArithmeticError, ValueError):  # not computable is not true
-            return False
+        return holds(tree, self.values(here))
 
     def _first_true(
         self, tree: Condition, row: int, begin: tuple[float, list[float]] | None, truth: bool
@@ -672,10 +681,8 @@ class Session:
                 branch.pull()
             return row in branch.stops or now[1] > 0
         guard = chart.guards[point.name]
-        held = names[before[3][i]] == edge.source and bool(
-            evaluate(guard, self._guard_values(row - 1, i))
-        )
-        return not held and bool(evaluate(guard, self._guard_values(row, i)))
+        held = names[before[3][i]] == edge.source and holds(guard, self._guard_values(row - 1, i))
+        return not held and holds(guard, self._guard_values(row, i))
 
     def _fired(self, row: int) -> tuple[int, str]:
         """Return element and edge of the firing that made a row."""
@@ -779,9 +786,9 @@ class Session:
         run = Run(self.model, self.rig, self.t_end, rows_at_once=1, **options)
         edits = {"z": dict(z or {}), "v": v, "state": dict(state or {})}
         fork = self.branch.cursor
-        at = here.t if here.located else None
-        branch = Branch(run, self.current, fork, self.branch, edits, at)
-        branch.cursor = fork + 1
+        begin = (here.t, 0, list(y), self.branch.raw(fork)[3]) if here.located else None
+        branch = Branch(run, self.current, fork, self.branch, edits, begin)
+        branch.cursor = branch.offset
         self.branches.append(branch)
         self.current = len(self.branches) - 1
         return self.current
@@ -878,8 +885,9 @@ class Session:
             "t_end": self.t_end,
             "options": {k: _plain(v) for k, v in self.options.items()},
             "branches": [
-                {"parent": b.parent, "fork": b.fork, "from": b.fork_at, "edits": b.edits,
-                 "cursor": b.cursor, "between": None if b.between is None else b.between[0]}
+                {"parent": b.parent, "fork": b.fork, "edits": b.edits, "cursor": b.cursor,
+                 "from": None if b.begin is None else b.begin[0],
+                 "between": None if b.between is None else b.between[0]}
                 for b in self.branches
             ],
             "current": self.current,
@@ -929,7 +937,9 @@ class Session:
                 session.switch(number)
                 session._walk_to(int(record["cursor"]), record["between"])
             session.switch(int(data["current"]))
-            session.breakpoints = [Breakpoint(**point) for point in data["breakpoints"]]
+            for record in data["breakpoints"]:
+                seen = int(record.pop("seen", 0))
+                session.break_on(**record).seen = seen
             session.watches = [str(text) for text in data["watches"]]
             return session
         except FileNotFoundError:
@@ -942,7 +952,7 @@ class Session:
 
     def _walk_to(self, row: int, between: float | None) -> None:
         branch = self.branch
-        while row >= len(branch) and branch.pull():
+        while row + (between is not None) >= len(branch) and branch.pull():
             pass
         branch.cursor, branch.between = min(row, len(branch) - 1), None
         if between is not None:
@@ -951,6 +961,23 @@ class Session:
             program = branch.run.recorder.program
             y = interpolated(program, list(mode), t0, np.array(y0), t1, np.array(y1), between)
             branch.between = (between, [float(u) for u in y])
+
+
+@contextmanager
+def _unbroken() -> Iterator[None]:
+    """Hold Ctrl-C back until the row is complete: a run that is broken off cannot go on."""
+    usual = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(usual):
+        yield
+        return
+    pressed: list[tuple[int, Any]] = []
+    signal.signal(signal.SIGINT, lambda *event: pressed.append(event))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
+    if pressed:
+        usual(*pressed[0])
 
 
 def _plain(value: Any) -> Any:

@@ -1,0 +1,121 @@
+"""A run that cannot go on is an outcome: look at it, step back from it, poke it and go on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gms_fsm import Chart, ChartModel, Prescribed, State, Stribeck, Transition, simulate
+from gms_fsm.charts import gms_element
+from gms_fsm.errors import LivelockError, ParameterError, SessionError, SimulationError
+from gms_fsm.session import Session
+from tests.helpers import stick_slip
+
+
+def both_ways() -> ChartModel:
+    """Element 2 breaks away at z = 1 and is arrested there at once, again and again."""
+    law = gms_element("signed")
+    edges = (
+        Transition("go", "stick", "slip", guard="z >= s and v > v_c"),
+        Transition("stay", "slip", "stick", guard="z >= s"),
+    )
+    chart = Chart("broken", law.inputs, law.variables, law.parameters, law.states, edges,
+                  law.outputs)  # fmt: skip
+    values = {"k": 1.0, "sigma": 0.1, "C": 0.1, "v_c": 1e-6}
+    return ChartModel(chart, values, n=2, weights=[2.0, 1.0], stribeck=Stribeck(1.0, 1.5, 1e-3))
+
+
+def test_a_livelock_can_be_looked_at_stepped_back_from_and_poked() -> None:
+    model, rig = both_ways(), Prescribed("0.15")
+    with pytest.raises(LivelockError) as caught:
+        simulate(model, rig, 20.0)
+    session = Session(model, rig, 20.0)
+    here = session.goto(20.0)
+    assert session.branch.outcome == str(caught.value)
+    assert "element 2 switched 100 times" in session.branch.outcome
+    assert here.t == pytest.approx(1.0 / 0.15)
+    assert here.microstep >= 99
+    same = caught.value.trace
+    assert [
+        session.branch.raw(row)[2] for row in range(len(session.branch))
+    ] == same.rows.y.tolist()
+    assert session.why(1)[0].fired
+    assert session.step() == here  # it stays there
+    assert session.prev_transition().microstep == here.microstep - 1
+    while session.here.microstep:
+        session.back()
+    assert session.here.states == ("stick", "stick")
+    session.poke({1: 0.0})
+    assert session.goto(10.0).t > here.t
+    assert session.branch.outcome == ""
+    assert session.branches[0].outcome.startswith("element 2 switched")
+    assert session.goto(20.0).t == pytest.approx(2.0 / 0.15)  # it gets there a second time
+    assert "switched 100 times" in session.branch.outcome
+
+
+def test_a_record_that_ends_too_early() -> None:
+    t = np.linspace(0, 5, 501)
+    session = Session(stick_slip("signed"), Prescribed((t, 0.1 * np.sin(t))), 9.0)
+    assert session.goto(9.0).t == 5.0
+    assert "ends at t = 5.0 s" in session.branch.outcome
+    assert session.back(3).t < 5.0
+
+
+@pytest.mark.parametrize("guard", ["1 / (z - z) > 0", "sqrt(-1 - z) > 0"])
+def test_a_run_that_cannot_even_start_has_its_first_row(guard: str) -> None:
+    chart = Chart(
+        "bad", ("v",), ("z",), ("k",), (State("on", {"z": "v"}), State("off", {"z": "0"})),
+        (Transition("go", "on", "off", guard=guard),), {"F": "k * z"},
+    )  # fmt: skip
+    session = Session(
+        ChartModel(chart, {"k": 1.0}, n=1, stribeck=Stribeck(1.0, 1.5, 0.1)), Prescribed("1"), 1.0
+    )
+    assert session.goto(1.0).row == 0
+    assert session.branch.outcome not in ("", "end")
+    assert session.step().t == 0.0
+
+
+def test_a_flow_that_leaves_the_numbers() -> None:
+    chart = Chart("singular", ("v",), ("z",), ("k",), (State("on", {"z": "z * z"}),), (),
+                  {"F": "k * z"})  # fmt: skip
+    model = ChartModel(chart, {"k": 1.0}, n=1, stribeck=Stribeck(1.0, 1.5, 0.1))
+    session = Session(model, Prescribed("0"), 2.0, initial={"z": [1.0]})
+    here = session.goto(2.0)
+    assert 0.99 < here.t < 1.001
+    with pytest.raises(SimulationError) as caught:
+        simulate(model, Prescribed("0"), 2.0, initial={"z": [1.0]})
+    assert session.branch.outcome == str(caught.value)
+    session.goto(0.5)
+    session.poke({0: -1.0})
+    assert session.goto(2.0).t == 2.0
+    assert session.branch.outcome == "end"
+
+
+@pytest.mark.parametrize("option", [{"t_eval": [0.0, 1.0]}, {"progress": print}, {"engine": None}])
+def test_options_that_do_not_go_with_a_session(option: Any) -> None:
+    with pytest.raises(ParameterError, match="session"):
+        Session(stick_slip("signed"), Prescribed("0.1"), 1.0, **option)
+
+
+@pytest.mark.parametrize("count", [-1, -5])
+def test_a_negative_count_is_refused(count: int) -> None:
+    session = Session(stick_slip("signed"), Prescribed("0.1"), 1.0)
+    session.step(3)
+    for walk in (session.step, session.back):
+        with pytest.raises(SessionError):
+            walk(count)
+    assert session.here.row == 3
+
+
+@pytest.mark.parametrize("t", [-1.0, float("nan")])
+def test_a_time_before_the_start_is_refused(t: float) -> None:
+    with pytest.raises(SessionError, match="before the start"):
+        Session(stick_slip("signed"), Prescribed("0.1"), 1.0).goto(t)
+
+
+@pytest.mark.parametrize("text", ["1 / x", "sqrt(-1 - x)"])
+def test_a_watch_that_cannot_be_computed_says_so(text: str) -> None:
+    with pytest.raises(SessionError, match="cannot be computed here"):
+        Session(stick_slip("signed"), Prescribed("0.1"), 1.0).watch(text)

@@ -1,0 +1,121 @@
+"""A session comes back from its file with the same rows, cursors, breakpoints and watches."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import scipy.integrate
+
+from gms_fsm import Prescribed
+from gms_fsm.errors import OutputError, SessionError, TraceFileError
+from gms_fsm.session import Session
+from tests.helpers import FIG4_SINE, pulled_mass, stick_slip
+
+
+def _walked() -> Session:
+    model, rig = pulled_mass()
+    session = Session(model, rig, 12.0, rtol=1e-5)
+    session.goto(5.0)
+    session.poke({1: -0.003}, v=0.05, state={2: "slip"})
+    session.goto(8.0)
+    session.until("t > 8.7")
+    session.poke({0: 0.001})
+    session.until("t > 9.3")
+    session.switch(1)
+    session.break_on("fires", "arrest", 1, "z1 > 0", 2)
+    session.break_on("leave", "slip")
+    session.watches.append("z1 / s1")
+    return session
+
+
+def test_everything_comes_back(tmp_path: Path) -> None:
+    session = _walked()
+    loaded = Session.load(session.save(tmp_path / "walk.json"))
+    assert (loaded.current, loaded.watches) == (1, ["z1 / s1"])
+    assert loaded.breakpoints == session.breakpoints
+    for number, (a, b) in enumerate(zip(session.branches, loaded.branches, strict=True)):
+        assert (a.parent, a.fork, a.cursor, a.edits) == (b.parent, b.fork, b.cursor, b.edits)
+        session.switch(number)
+        loaded.switch(number)
+        assert session.here == loaded.here
+        session.goto(12.0)
+        loaded.goto(12.0)
+        assert len(a) == len(b)
+        assert [a.raw(row) for row in range(len(a))] == [b.raw(row) for row in range(len(b))]
+        assert a.log() == b.log()
+
+
+def test_saved_twice_is_the_same_file(tmp_path: Path) -> None:
+    first = _walked().save(tmp_path / "a.json")
+    second = Session.load(first).save(tmp_path / "b.json")
+    assert first.read_text() == second.read_text()
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "{", "[]", "null", "{}", '{"format": "other"}', '{"format": "gms-fsm session 1"}', "\x00",
+     "title = 'a scenario'"],
+)  # fmt: skip
+def test_something_else_is_refused(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "odd.json"
+    path.write_text(text)
+    with pytest.raises(TraceFileError, match=r"odd\.json"):
+        Session.load(path)
+
+
+DAMAGE: list[tuple[str, Any]] = [
+    ("current", 7),
+    ("current", "one"),
+    ("t_end", -1.0),
+    ("t_end", None),
+    ("header", {}),
+    ("options", {"method": "rk5"}),
+    ("options", {"nonsense": 1}),
+    ("branches", None),
+    ("branches", [{"cursor": -3, "between": None}]),
+    ("breakpoints", [{"kind": "fired", "name": "arrest"}]),
+    ("breakpoints", [{"kind": "fires", "name": "arest"}]),
+    ("breakpoints", [{"kind": "fires", "name": "arrest", "element": 9}]),
+    ("breakpoints", [{"kind": "fires", "name": "arrest", "condition": "z9 >"}]),
+    ("watches", 5),
+]
+
+
+@pytest.mark.parametrize(("key", "value"), DAMAGE, ids=[f"{k}={v}"[:50] for k, v in DAMAGE])
+def test_a_damaged_file_is_refused_when_it_is_read(key: str, value: Any, tmp_path: Path) -> None:
+    path = Session(stick_slip("signed"), Prescribed(FIG4_SINE), 5.0).save(tmp_path / "s.json")
+    data = json.loads(path.read_text())
+    path.write_text(json.dumps(data | {key: value}))
+    with pytest.raises(TraceFileError, match="not a session file"):
+        Session.load(path)
+
+
+@pytest.mark.parametrize("key", ["header", "t_end", "options", "branches", "current"])
+def test_a_missing_part_is_refused(key: str, tmp_path: Path) -> None:
+    path = _walked().save(tmp_path / "s.json")
+    data = json.loads(path.read_text())
+    del data[key]
+    path.write_text(json.dumps(data))
+    with pytest.raises(TraceFileError):
+        Session.load(path)
+
+
+def test_a_missing_file_and_a_folder(tmp_path: Path) -> None:
+    with pytest.raises(TraceFileError, match="no such file"):
+        Session.load(tmp_path / "nothing.json")
+    with pytest.raises(TraceFileError):
+        Session.load(tmp_path)
+
+
+def test_what_a_file_cannot_hold(tmp_path: Path) -> None:
+    function = Session(stick_slip("signed"), Prescribed(lambda t: 0.1), 1.0)
+    radau = Session(stick_slip("signed"), Prescribed("0.1"), 1.0, method=scipy.integrate.Radau)
+    for session in (function, radau):
+        with pytest.raises(SessionError):
+            session.save(tmp_path / "s.json")
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(OutputError):
+        _walked().save(tmp_path / "no" / "folder" / "s.json")

@@ -1,0 +1,177 @@
+"""A poke changes what it names and nothing else, in a branch that leaves its parent as it was."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from gms_fsm import Prescribed, simulate
+from gms_fsm.errors import ChartError, ParameterError, SessionError
+from gms_fsm.session import Session
+from tests.helpers import FIG4_SINE, pulled_mass, stick_slip
+
+
+def _open_loop() -> Session:
+    return Session(stick_slip("published"), Prescribed(FIG4_SINE), 100.0)
+
+
+def _pulled() -> Session:
+    model, rig = pulled_mass()
+    return Session(model, rig, 20.0)
+
+
+def test_position_velocity_and_the_other_elements_are_kept() -> None:
+    session = _pulled()
+    before = session.goto(10.0)
+    assert session.poke({1: -0.003}) == 1
+    here = session.here
+    assert (here.t, here.x, here.v, here.states) == (before.t, before.x, before.v, before.states)
+    assert here.z == (before.z[0], -0.003, *before.z[2:])
+    assert (here.row, session.branch.parent, session.branch.fork) == (before.row + 1, 0, before.row)
+    assert session.back() == before
+
+
+def test_velocity_and_state() -> None:
+    session = _pulled()
+    before = session.goto(3.0)
+    session.poke(v=-0.2, state={2: "slip"})
+    here = session.here
+    assert (here.v, here.x, here.z) == (-0.2, before.x, before.z)
+    assert here.states == ("stick", "stick", "slip", "stick")
+    assert session.branch.edits == {"z": {}, "v": -0.2, "state": {2: "slip"}}
+
+
+def test_the_branch_is_the_run_from_there() -> None:
+    session = _open_loop()
+    here = session.goto(30.0)
+    session.poke({0: 0.1})
+    session.goto(100.0)
+    initial = {"x": here.x, "z": [0.1, *here.z[1:]], "states": list(here.states)}
+    alone = simulate(session.model, session.rig, 100.0, t_start=here.t, initial=initial)
+    own = session.branch.trace()
+    assert own.z[here.row + 1 :].tolist() == alone.z.tolist()
+    assert own.t[here.row + 1 :].tolist() == alone.t.tolist()
+
+
+def test_the_parent_stays_and_goes_on() -> None:
+    session = _open_loop()
+    session.goto(30.0)
+    parent = session.branch
+    rows = [parent.raw(row) for row in range(len(parent))]
+    session.poke({0: 0.1})
+    session.goto(100.0)
+    assert [parent.raw(row) for row in range(len(parent))] == rows
+    assert session.switch(0).row == parent.cursor
+    session.goto(100.0)
+    whole = simulate(session.model, session.rig, 100.0)
+    assert parent.trace().z.tolist() == whole.z.tolist()
+
+
+def test_a_branch_of_a_branch_has_both_pasts() -> None:
+    session = _open_loop()
+    session.goto(30.0)
+    session.poke({0: 0.1})
+    session.goto(60.0)
+    session.poke({1: 0.2})
+    session.goto(20.0)  # in the past shared by all
+    session.poke({2: 0.1})
+    session.goto(100.0)
+    assert [branch.parent for branch in session.branches] == [None, 0, 1, 2]
+    last = session.branches[-1]
+    first = session.branches[0]
+    assert all(last.raw(row) == first.raw(row) for row in range(last.fork + 1))
+    for branch in session.branches:
+        rows = branch.firing_rows(len(branch))
+        assert [branch.raw(row)[0] for row in rows] == [record[0] for record in branch.log()]
+        assert all(branch.raw(row)[1] > 0 for row in rows)
+
+
+def test_between_rows_the_past_ends_where_it_was_poked() -> None:
+    session = _open_loop()
+    place = session.until("z1 > 0.123")
+    assert place.located
+    session.poke({0: 0.0})
+    assert session.here.t == place.t
+    assert session.here.z == (0.0, *place.z[1:])
+    before = session.back()
+    # z1 was 0.123 just before the poke: nothing leads from the last row to 0 but the poke.
+    assert (before.t, before.z) == (place.t, place.z)
+    assert session.branches[0].between is not None
+
+
+def test_between_rows_until_sees_no_value_that_never_was() -> None:
+    session = _open_loop()
+    place = session.until("z1 > 0.123")
+    session.poke({0: 0.0})
+    session.goto(place.t - 0.5)
+    assert session.until("z1 < 0.05").z[0] in (0.0, pytest.approx(0.05))
+    assert session.here.t >= place.t
+
+
+def test_between_rows_comparing_shows_a_difference_only_after_the_poke() -> None:
+    session = _open_loop()
+    place = session.until("z1 > 0.123")
+    session.poke({0: 0.0})
+    session.step()
+    first, second = (branch.trace() for branch in session.branches)
+    times = [place.t - d for d in (0.3, 0.1, 0.01)]
+    assert first.sample(times).z[:, 0] == pytest.approx(second.sample(times).z[:, 0], abs=1e-6)
+
+
+def test_compare() -> None:
+    session = _open_loop()
+    session.goto(25.0)
+    session.poke({0: -1.4})
+    same = session.compare(0, 0)
+    assert (same.z, same.F, same.first_difference) == (0.0, 0.0, None)
+    for number in (0, 1):
+        session.switch(number)
+        session.goto(100.0)
+    found = session.compare(0, 1)
+    assert found.t == 100.0
+    logs = [branch.trace().transitions for branch in session.branches]
+    assert found.transitions == tuple(map(len, logs))
+    first = next(
+        (a.t, b.t) for a, b in zip(*logs, strict=False) if a.tolist()[:3] != b.tolist()[:3]
+    )
+    assert found.first_difference == min(first)
+    assert found.z > 0.8
+    back = session.compare(1, 0)
+    assert (back.z, back.F, back.first_difference) == (found.z, found.F, found.first_difference)
+
+
+@pytest.mark.parametrize(
+    ("edits", "error", "said"),
+    [
+        ({}, SessionError, "nothing to poke"),
+        ({"z": {4: 0.1}}, SessionError, "no element 5"),
+        ({"state": {-1: "slip"}}, SessionError, "no element 0"),
+        ({"z": {0: float("nan")}}, ParameterError, "finite"),
+        ({"z": {0: float("inf")}}, ParameterError, "finite"),
+        ({"state": {0: "slipp"}}, ChartError, "'stick', 'slip'"),
+        ({"v": 0.1}, ParameterError, "prescribes the velocity"),
+    ],
+)
+def test_a_wrong_poke_is_refused_and_makes_no_branch(
+    edits: Any, error: type[Exception], said: str
+) -> None:
+    session = _open_loop()
+    with pytest.raises(error, match=said):
+        session.poke(**edits)
+    assert (len(session.branches), session.current) == (1, 0)
+
+
+def test_at_the_end_there_is_nothing_to_go_on_with() -> None:
+    session = _open_loop()
+    session.goto(100.0)
+    with pytest.raises(SessionError, match="the end of the run"):
+        session.poke({0: 0.1})
+
+
+@pytest.mark.parametrize("branch", [-1, 1])
+def test_no_such_branch(branch: int) -> None:
+    session = _open_loop()
+    for ask in (session.switch, lambda n: session.compare(0, n)):
+        with pytest.raises(SessionError, match="no branch"):
+            ask(branch)
