@@ -27,7 +27,7 @@ $(VENV)/dev.stamp: pyproject.toml | $(VENV)/bin/python
 
 .venv-core/stamp: pyproject.toml
 	$(PYTHON) -m venv .venv-core
-	.venv-core/bin/python -m pip --disable-pip-version-check --quiet install -e . pytest hypothesis
+	.venv-core/bin/python -m pip --disable-pip-version-check --quiet install -e . pytest pytest-xdist hypothesis
 	@touch $@
 
 paper: $(VENV)/all.stamp
@@ -43,7 +43,7 @@ lint: $(VENV)/dev.stamp
 	$(RUN)/lint-imports
 
 core: .venv-core/stamp
-	.venv-core/bin/python -m pytest tests gms_fsm integrators
+	.venv-core/bin/python -m pytest -n auto tests gms_fsm integrators
 
 bench: $(VENV)/dev.stamp
 	$(RUN)/python benchmarks/pulled_mass.py
