@@ -239,21 +239,6 @@ def animate_command(
     typer.echo(str(film))
 
 
-@app.command("replay")
-def replay_command(
-    trace: Annotated[Path, typer.Argument(help="A trace, .npz or .csv.", show_default=False)],
-    other: Annotated[Path | None, typer.Argument(help="A second one, beside it.")] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Ends in .html.")] = Path(
-        "replay.html"
-    ),
-) -> None:
-    """Write one HTML file in which a run is stepped, scrubbed and explained."""
-    from plots.replay import write_replay
-
-    second = None if other is None else Trace.load(other)
-    typer.echo(str(write_replay(output, Trace.load(trace), second)))
-
-
 @app.command("debug")
 def debug_command(
     scenario: Annotated[Path, typer.Argument(help="A scenario file, TOML.", show_default=False)],
