@@ -239,6 +239,22 @@ def animate_command(
     typer.echo(str(film))
 
 
+@app.command("replay")
+def replay_command(
+    trace: Annotated[Path, typer.Argument(help="A trace, .npz or .csv.", show_default=False)],
+    other: Annotated[Path | None, typer.Argument(help="A second one, shown beside it.")] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="The page, .html.")] = Path(
+        "replay.html"
+    ),
+    title: Annotated[str, typer.Option(help="Of the page.")] = "",
+) -> None:
+    """Write a run as one web page that is stepped, scrubbed and explained."""
+    from plots.replay import write_replay
+
+    second = None if other is None else Trace.load(other)
+    typer.echo(str(write_replay(output, Trace.load(trace), second, title=title)))
+
+
 @app.command("debug")
 def debug_command(
     scenario: Annotated[Path, typer.Argument(help="A scenario file, TOML.", show_default=False)],

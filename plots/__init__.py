@@ -15,6 +15,7 @@ from plots.live_chart import LiveChart, live_statechart
 from plots.mermaid import mermaid
 from plots.notebook import register
 from plots.render import render
+from plots.replay import replay, write_replay
 from plots.statechart import statechart
 
 if TYPE_CHECKING:
@@ -30,7 +31,9 @@ __all__ = [
     "mermaid",
     "overview",
     "render",
+    "replay",
     "statechart",
+    "write_replay",
 ]
 
 register()

@@ -1,0 +1,88 @@
+"use strict";
+// The `until` box: a condition over stored values, in the expression language of the product.
+// Closures are built from checked text; nothing is ever `eval`ed, and no guard comes here.
+const LEVELS = { or: 1, and: 2, "<": 4, "<=": 4, ">": 4, ">=": 4, "+": 5, "-": 5, "*": 6, "/": 6, "**": 8 };
+const NEGATION = 3, SIGN = 7;
+const OPERATIONS = {
+  or: (a, b) => a || b, and: (a, b) => a && b, "<": (a, b) => a < b, "<=": (a, b) => a <= b,
+  ">": (a, b) => a > b, ">=": (a, b) => a >= b, "+": (a, b) => a + b, "-": (a, b) => a - b,
+  "*": (a, b) => a * b, "/": (a, b) => (b === 0 ? NaN : a / b), "**": (a, b) => a ** b,
+};
+const ONE = ["abs", "exp", "sqrt", "sgn", "sin", "cos", "tanh"], SEVERAL = ["min", "max"];
+
+function parse(text, names, states, modes) {
+  const pattern = /\s*(?:(?<digits>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?!\w)|(?<name>[A-Za-z_]\w*)|\*\*|[<>=!]=|[-+*/()<>,])/y;
+  const fail = (at, reason) => { throw new Error(`until, column ${at + 1}: ${reason}`); };
+  const end = text.trimEnd().length, tokens = [];
+  while (pattern.lastIndex < end) {
+    const begin = pattern.lastIndex + text.slice(pattern.lastIndex).search(/\S/), found = pattern.exec(text);
+    if (!found) fail(begin, `cannot read ${JSON.stringify(text[begin])}`);
+    const word = found[0].trim();
+    tokens.push({ word, ...found.groups, at: pattern.lastIndex - word.length });
+  }
+  let next = 0;
+  const here = () => tokens[next] ?? { word: "", at: end };
+  const take = (words, wanted) => (words.includes(here().word) ? tokens[next++].word : wanted && fail(here().at, `expected ${wanted}`));
+  // A part is a truth or a number; brackets may hold either, so it is checked where it is used.
+  const as = (truth, part) => (Boolean(part.truth) === truth ? part.f
+    : fail(part.at, truth ? "a comparison is needed, for example v > 0" : "a number is needed"));
+
+  function expression(level) {
+    let left = prefix();
+    for (;;) {
+      const { word, at } = here(), own = LEVELS[word];
+      if (word === "==" || word === "!=") fail(at, "only < <= > >= compare numbers; == is for state(1) == name");
+      if (!(own >= level)) return left;
+      next += 1;
+      const right = expression(word === "**" ? SIGN : own + 1), f = OPERATIONS[word], logic = own < NEGATION;
+      const compares = own === LEVELS["<"], before = compares && left.last && left.f; // a < b < c is a < b and b < c
+      const a = before ? left.last : as(logic, left), b = as(logic, right);
+      const now = (row) => f(a(row), b(row));
+      left = { at: left.at, truth: logic || compares, f: before ? (row) => before(row) && now(row) : now, last: compares && b };
+    }
+  }
+
+  function prefix() {
+    const { word, digits, name, at } = here();
+    next += 1;
+    if (digits) return { at, truth: false, f: () => Number(digits) };
+    if (word === "-" || word === "+") {
+      const f = as(false, expression(SIGN));
+      return { at, truth: false, f: word === "-" ? (row) => -f(row) : f };
+    }
+    if (word === "not") {
+      const f = as(true, expression(NEGATION));
+      return { at, truth: true, f: (row) => !f(row) };
+    }
+    if (word === "(") {
+      const { truth, f } = expression(1);
+      take([")"], "a closing bracket");
+      return { at, truth, f };
+    }
+    if (word === "state") return inState(at);
+    if (word === "pi") return { at, truth: false, f: () => Math.PI };
+    if (ONE.includes(word) || SEVERAL.includes(word)) return call(word, at);
+    if (name && Object.hasOwn(names, name)) return { at, truth: false, f: names[name] };
+    return fail(at, word ? `unknown ${JSON.stringify(word)}; names are ${Object.keys(names).join(", ")}` : "the text ends too early");
+  }
+
+  function call(name, at) {
+    const parts = [], f = name === "sgn" ? Math.sign : Math[name];
+    take(["("], `${name}(...)`);
+    do parts.push(as(false, expression(1))); while (take([","]));
+    take([")"], "a closing bracket");
+    if (ONE.includes(name) !== (parts.length === 1)) fail(at, `${name} got ${parts.length} arguments`);
+    return { at, truth: false, f: (row) => f(...parts.map((part) => part(row))) };
+  }
+
+  function inState(at) {
+    take(["("], "state(1) == name");
+    const mode = modes[take(modes.map((_, i) => String(i + 1)), `an element, 1 to ${modes.length}`) - 1];
+    take([")"], "a closing bracket");
+    const equal = take(["==", "!="], "== or !=") === "==", state = states.indexOf(take(states, `a state: ${states.join(", ")}`));
+    return { at, truth: true, f: (row) => (mode[row] === state) === equal };
+  }
+
+  const f = as(true, expression(1));
+  return next < tokens.length ? fail(here().at, `cannot be read from ${JSON.stringify(here().word)}`) : f;
+}
