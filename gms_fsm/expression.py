@@ -690,6 +690,18 @@ def _walk(node: Node) -> Iterator[Node]:
 def names_in(node: Node) -> frozenset[str]:
     """Return the names a tree depends on.
 
+    Parameters
+    ----------
+    node : Node
+        A value or a condition.
+
+    Returns
+    -------
+    frozenset of str
+        Without order.
+
+    Examples
+    --------
     >>> sorted(names_in(parse_value("k * z + pi", ["k", "z"])))
     ['k', 'z']
     """
@@ -699,6 +711,18 @@ def names_in(node: Node) -> frozenset[str]:
 def clauses(condition: Condition) -> tuple[Condition, ...]:
     """Return the parts of a conjunction, or the condition alone.
 
+    Parameters
+    ----------
+    condition : Condition
+        For example a guard.
+
+    Returns
+    -------
+    tuple of Condition
+        In the order of the text.
+
+    Examples
+    --------
     >>> [spell(c) for c in clauses(parse_condition("z >= s and v > 0", "zsv"))]
     ['z >= s', 'v > 0.0']
     """

@@ -77,7 +77,20 @@ def watched(strict: list[bool], size: int) -> Watched:
 
 
 def any_changed(w: Watched, margin: Vector) -> bool:
-    """Tell whether any watched relation differs from its truth at the arc's start."""
+    """Tell whether any watched relation differs from its truth at the arc's start.
+
+    Parameters
+    ----------
+    w : Watched
+        The relations and their truth then.
+    margin : list of float, shape (r,)
+        Margins now; only the active ones are read.
+
+    Returns
+    -------
+    bool
+        True at the first difference.
+    """
     for r in w.active:
         g = margin[r]
         if (g > 0.0 or (g == 0.0 and not w.strict[r])) != w.truth[r]:

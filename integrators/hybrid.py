@@ -15,7 +15,7 @@ from typing import Any, Protocol
 from integrators import advance as kernel
 from integrators.advance import Control, Output, Work, put_row
 from integrators.crossings import Margins, Watched, watched
-from integrators.step_size import starting_step
+from integrators.step_size import LEAST, starting_step
 from integrators.steps import Coefficients, Dense, Flow, Vector, coefficients
 from integrators.tableaux import Tableau
 
@@ -240,11 +240,19 @@ class ExplicitStepper:
         if self.control.step > 0.0:
             return
         self.error_before = 1.0
-        self.h = starting_step(
-            ws.flow, t, y, self.f, ws.mode, ws.held, p, self.method.error_order,
-            self.control.rtol, self.control.atol, min(self.control.max_step, t_stop - t),
-            self.work.y_new, self.work.f_new,
-        )  # fmt: skip
+        longest = min(self.control.max_step, t_stop - t)
+        while True:
+            try:
+                self.h = starting_step(
+                    ws.flow, t, y, self.f, ws.mode, ws.held, p, self.method.error_order,
+                    self.control.rtol, self.control.atol, longest,
+                    self.work.y_new, self.work.f_new,
+                )  # fmt: skip
+                return
+            except Exception as error:
+                longest *= LEAST  # its trial step went too far, see `advance`
+                if not _is_arithmetic(error) or longest <= ws.resolution:
+                    raise
 
     def refresh(self, t: float, y: Vector, ws: Workspace) -> None:
         """Evaluate the slope again but keep the step size (a solver that knows of no switch)."""
@@ -254,6 +262,20 @@ class ExplicitStepper:
         self, t: float, y: Vector, t_stop: float, ws: Workspace, most_steps: int
     ) -> tuple[int, float]:
         """Run the kernel."""
+        while True:
+            try:
+                return self._run_kernel(t, y, t_stop, ws, most_steps)
+            except Exception as error:
+                # Where IEEE arithmetic gives NaN and the kernel shrinks its step, Python's exp,
+                # sqrt and / raise: a trial step too far must not end the run before its time.
+                self.h *= LEAST
+                if not _is_arithmetic(error) or self.h <= ws.resolution:
+                    raise
+                t = max(t, ws.out.reached[0])
+
+    def _run_kernel(
+        self, t: float, y: Vector, t_stop: float, ws: Workspace, most_steps: int
+    ) -> tuple[int, float]:
         status, t, self.h, self.error_before = kernel.advance(
             ws.flow, ws.system.margins, self.method, self.control, t, y, self.f, self.h,
             self.error_before, t_stop, ws.knots, ws.mode, ws.held, ws.system.p, ws.w, ws.out,

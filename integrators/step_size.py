@@ -24,6 +24,20 @@ def error_norm(error: Vector, y: Vector, y_new: Vector, rtol: float, atol: float
 
     The maximum, not the mean: one component in trouble among many at rest has to count.
 
+    Parameters
+    ----------
+    error, y, y_new : list of float, shape (m,)
+        Error estimate, and the state at both ends of the step.
+    rtol, atol : float
+        Tolerances.
+
+    Returns
+    -------
+    float
+        At most 1 for a step that is good enough.
+
+    Examples
+    --------
     >>> error_norm([1e-6], [0.0], [1.0], rtol=1e-6, atol=0.0)
     1.0
     """
@@ -31,7 +45,7 @@ def error_norm(error: Vector, y: Vector, y_new: Vector, rtol: float, atol: float
     for j in range(len(y)):
         size = max(abs(y[j]), abs(y_new[j]))
         ratio = abs(error[j]) / (atol + rtol * size)
-        if not ratio < INFINITY:
+        if not (ratio < INFINITY and size < INFINITY):
             return INFINITY
         if ratio > worst:
             worst = ratio
@@ -41,6 +55,20 @@ def error_norm(error: Vector, y: Vector, y_new: Vector, rtol: float, atol: float
 def next_factor(error: float, error_before: float, order: int) -> float:
     """Return the growth after an accepted step (PI control).
 
+    Parameters
+    ----------
+    error, error_before : float
+        Norms of this step's error and of the one before.
+    order : int
+        The error shrinks like h ** order.
+
+    Returns
+    -------
+    float
+        From LEAST to MOST.
+
+    Examples
+    --------
     >>> next_factor(1e-12, 1.0, 5)
     10.0
     """
@@ -52,6 +80,20 @@ def next_factor(error: float, error_before: float, order: int) -> float:
 def retry_factor(error: float, order: int) -> float:
     """Return the shrinkage after a rejected step.
 
+    Parameters
+    ----------
+    error : float
+        Norm of its error, infinity if not finite.
+    order : int
+        The error shrinks like h ** order.
+
+    Returns
+    -------
+    float
+        From LEAST to SAFETY.
+
+    Examples
+    --------
     >>> retry_factor(float("inf"), 5)
     0.2
     """

@@ -365,3 +365,14 @@ def test_initial_states_and_positions_are_the_first_row() -> None:
     assert (trace.x[0], trace.v[0]) == (0.5, 0.01)
     assert trace.z[0].tolist() == [0, 0.001, 0.002, 0.003]
     assert trace.states[0].tolist() == ["slip"] * 4
+
+
+@pytest.mark.parametrize(
+    "velocity", ["0.1*sqrt(3 - t)", "0.1*exp(-t)*sqrt(3 - t)", "exp(800*(t - 2.9))"]
+)
+def test_a_trial_step_too_far_does_not_end_the_run_early(velocity: str) -> None:
+    """Python's sqrt, / and exp raise where IEEE arithmetic has no number; the run goes up to it."""
+    with pytest.raises(SimulationError) as caught:
+        simulate(stick_slip("published"), Prescribed(velocity), 10.0)
+    end = 3.0 if "3 - t" in velocity else 2.9 + 709.8 / 800  # exp(709.8) overflows
+    assert caught.value.trace.t[-1] == pytest.approx(end, abs=0.15 if "exp" in velocity else 1e-4)
