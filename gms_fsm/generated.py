@@ -5,16 +5,21 @@ The only place where text becomes code, and it is always our own text, printed f
 
 from __future__ import annotations
 
+import ast
 import functools
 import hashlib
 import linecache
-from collections.abc import Mapping
-from types import CodeType
+import math
+from collections.abc import Callable, Mapping
+from types import CodeType, SimpleNamespace
 from typing import Any
 
+import numpy as np
+
+from gms_fsm.errors import GMSError
 from gms_fsm.expression import NAMESPACE
 
-__all__ = ["load"]
+__all__ = ["ieee", "load", "load_careful"]
 
 
 def load(title: str, source: str, names: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -44,9 +49,118 @@ def load(title: str, source: str, names: Mapping[str, Any] | None = None) -> dic
     return namespace
 
 
+def load_careful(title: str, source: str, names: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Run generated text with functions and numbers that never raise, for `ieee`.
+
+    Parameters
+    ----------
+    title, source, names
+        As in `load`.
+
+    Returns
+    -------
+    dict
+        Its namespace.
+    """
+    namespace: dict[str, Any] = {**NAMESPACE, **(names or {}), **_IEEE, "_wide": _wide}
+    exec(_compiled(title, source, careful=True), namespace)
+    return namespace
+
+
 @functools.lru_cache(maxsize=256)
-def _compiled(title: str, source: str) -> CodeType:
+def _compiled(title: str, source: str, careful: bool = False) -> CodeType:
     digest = hashlib.sha256(source.encode()).hexdigest()[:8]
     filename = f"<{title} {digest}>"
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
-    return compile(source, filename, "exec")
+    if not careful:
+        return compile(source, filename, "exec")
+    tree = ast.fix_missing_locations(_WideNumbers().visit(ast.parse(source)))
+    return compile(tree, filename, "exec")
+
+
+class _WideNumbers(ast.NodeTransformer):
+    """Has every number written in a text made one that does not raise: 1.0 / 0.0 is inf."""
+
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:
+        if not isinstance(node.value, float):
+            return node
+        return ast.Call(ast.Name("_wide", ast.Load()), [node], [])
+
+
+# --------------------------------------------------------------------------- IEEE arithmetic
+# A trial step may land where exp overflows or a root is of a negative number. IEEE arithmetic says
+# inf or NaN there and the step size shrinks; Python raises. So the text runs as it is, fast, and
+# where it raises once more with numbers that do not: the same bits as the compiled text.
+def ieee(fast: Callable[..., Any], careful: Callable[..., Any]) -> Callable[..., Any]:
+    r"""Return a generated function that computes inf and NaN where Python would raise.
+
+    Parameters
+    ----------
+    fast : callable
+        The function over Python's floats.
+    careful : callable
+        The same, from `load_careful`.
+
+    Returns
+    -------
+    callable
+        Takes the arguments of both.
+
+    Examples
+    --------
+    >>> source = "def rate(y, dy):\n    dy[0] = 1.0 / y[0]\n"
+    >>> rate = ieee(load("example", source)["rate"], load_careful("example", source)["rate"])
+    >>> dy = [0.0]
+    >>> rate([0.0], dy)
+    >>> dy
+    [inf]
+    """
+
+    @functools.wraps(fast)
+    def function(*arguments: Any) -> Any:
+        try:
+            return fast(*arguments)
+        except (ArithmeticError, ValueError) as error:
+            if isinstance(error, GMSError):  # of a user's own signal
+                raise
+        wide = [_wide(argument) for argument in arguments]
+        with np.errstate(all="ignore"):
+            value = careful(*wide)
+        for argument, result in zip(arguments, wide, strict=True):
+            if isinstance(argument, list):
+                argument[:] = [float(u) if isinstance(u, float) else u for u in result]
+        return value
+
+    return function
+
+
+def _wide(argument: Any) -> Any:
+    """Return floats, wherever they are, as numbers of numpy, which do not raise."""
+    if isinstance(argument, float):
+        return np.float64(argument)
+    if isinstance(argument, list | tuple):
+        return type(argument)(_wide(part) for part in argument)
+    if hasattr(argument, "__dict__"):  # an element, whose values a guard reads
+        return SimpleNamespace(**{name: _wide(value) for name, value in vars(argument).items()})
+    return argument
+
+
+def _quiet(function: Callable[..., float], replacement: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function of `math` that falls back on numpy's where it would raise."""
+
+    def computed(*arguments: Any) -> Any:
+        try:
+            return np.float64(function(*arguments))
+        except (ArithmeticError, ValueError):
+            return replacement(*map(np.float64, arguments))
+
+    return computed
+
+
+_IEEE: Mapping[str, Callable[..., Any]] = {
+    "exp": _quiet(math.exp, np.exp),
+    "sqrt": _quiet(math.sqrt, np.sqrt),
+    "sin": _quiet(math.sin, np.sin),
+    "cos": _quiet(math.cos, np.cos),
+    "pow": _quiet(math.pow, np.power),
+}

@@ -7,7 +7,7 @@ registered by a user (``on_enter_slip``, ``after`` ...) run, once a firing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, Protocol
 
 from transitions import Machine
@@ -15,10 +15,9 @@ from transitions import Machine
 from gms_fsm.chart import Chart
 from gms_fsm.errors import ChartError, ParameterError
 from gms_fsm.expression import PYTHON, Condition, names_in, spell
-from gms_fsm.generated import load
+from gms_fsm.generated import ieee, load, load_careful
 from gms_fsm.models import Model
-from gms_fsm.program import Program
-from integrators import NotFinite
+from gms_fsm.program import Arguments, Program
 
 __all__ = ["Element", "ElementMachines", "Engine", "IfElse"]
 
@@ -49,7 +48,9 @@ class Guard:
         names = {name: f"element.{name}" for name in names_in(condition)}
         self.text = spell(condition, PYTHON)
         source = f"def holds(element):\n    return {spell(condition, PYTHON, names)}\n"
-        self.holds: Callable[[Element], bool] = load(f"guard {edge}", source)["holds"]
+        self.holds: Callable[[Element], bool] = ieee(
+            load(f"guard {edge}", source)["holds"], load_careful(f"guard {edge}", source)["holds"]
+        )
 
     def __call__(self, event: Any) -> bool:
         return self.holds(event.model)
@@ -176,25 +177,17 @@ def _new_element(kind: type[Element], model: Model, index: int) -> Element:
 
 # --------------------------------------------------------------------------- engines
 class Engine(Protocol):
-    """What the driver asks and fires; satisfies `integrators.Switch`."""
+    """Who decides; satisfies `integrators.Switch`."""
 
-    mode: list[int]
+    def ask(
+        self, t: float, y: list[float], mode: list[int], p: Arguments, edges: list[int]
+    ) -> None:
+        """Fill the first enabled edge of each element, or -1."""
 
-    def ask(self, t: float, y: list[float]) -> Sequence[tuple[int, int]]:
-        """Return (element, edge) for each element with an enabled edge."""
-
-    def fire(self, machine: int, edge: int, t: float, y: list[float]) -> None:
+    def act(
+        self, edge: int, machine: int, t: float, y: list[float], mode: list[int], p: Arguments
+    ) -> None:
         """Take an edge."""
-
-
-def act(
-    program: Program, edge: int, machine: int, t: float, y: list[float], mode: list[int]
-) -> None:
-    """Do the assignments of an edge."""
-    try:
-        program.functions["act"](edge, machine, t, y, mode, program.p)
-    except (ArithmeticError, ValueError) as error:
-        raise NotFinite(f"an assignment of an edge: {error}", t, y) from None
 
 
 class MachineEngine:
@@ -203,7 +196,6 @@ class MachineEngine:
     def __init__(self, machines: ElementMachines, program: Program, mode: list[int]) -> None:
         self.machines, self.program = machines, program
         self.chart = machines.model.chart
-        self.mode = mode
         self.table = machines.table(self.chart)
         n = len(mode)
         self.seen = [0.0] * (2 + (2 + len(self.chart.variables)) * n)
@@ -213,27 +205,30 @@ class MachineEngine:
         for element, state in zip(machines.elements, mode, strict=True):
             machines.machine.set_state(self.chart.states[state].name, element)
 
-    def _show(self, i: int, t: float, y: list[float]) -> Element:
-        """Put the present values at hand of element i."""
-        element, seen = self.machines.elements[i], self.seen
-        element.t, element.x, element.v, element.s = t, y[0], seen[0], seen[2 + i]
-        for variable, base in self.places:
-            setattr(element, variable, y[base + i])
-        return element
+    def show(self, t: float, y: list[float], mode: list[int], p: Arguments) -> None:
+        """Put the present values at hand of every element."""
+        seen = self.seen
+        self.program.ieee["observe"](t, y, mode, p, seen)
+        for i, element in enumerate(self.machines.elements):
+            element.t, element.x, element.v, element.s = t, y[0], seen[0], seen[2 + i]
+            for variable, base in self.places:
+                setattr(element, variable, y[base + i])
 
-    def ask(self, t: float, y: list[float]) -> list[tuple[int, int]]:
-        """Return (element, edge) for each element with an enabled edge."""
-        self.program.functions["observe"](t, y, self.mode, self.program.p, self.seen)
-        wanted = []
-        for i, state in enumerate(self.mode):
-            element = self._show(i, t, y)
-            for edge, guard in self.table[state]:
+    def ask(
+        self, t: float, y: list[float], mode: list[int], p: Arguments, edges: list[int]
+    ) -> None:
+        """Fill the first enabled edge of each element, or -1."""
+        self.show(t, y, mode, p)
+        for i, element in enumerate(self.machines.elements):
+            edges[i] = -1
+            for edge, guard in self.table[mode[i]]:
                 if guard.holds(element):
-                    wanted.append((i, edge))
+                    edges[i] = edge
                     break
-        return wanted
 
-    def fire(self, machine: int, edge: int, t: float, y: list[float]) -> None:
+    def act(
+        self, edge: int, machine: int, t: float, y: list[float], mode: list[int], p: Arguments
+    ) -> None:
         """Trigger the edge through `transitions`, so that callbacks run."""
         row = self.chart.transitions[edge]
         element = self.machines.elements[machine]
@@ -244,25 +239,13 @@ class MachineEngine:
                 f"element {machine + 1}: edge {row.name!r} was enabled at t = {t!r} s but a "
                 "callback changed the element's values before it fired; callbacks may only look"
             )
-        act(self.program, edge, machine, t, y, self.mode)
-        self.mode[machine] = self.chart.state_index(element.state)
+        self.program.ieee["act"](edge, machine, t, y, mode, p)
+        mode[machine] = self.chart.state_index(element.state)
 
 
 class IfElse:
     """Asks the generated if-else text, the paper's Fig. 2c."""
 
-    def __init__(self, chart: Chart, program: Program, mode: list[int]) -> None:
-        self.program = program
-        self.mode = mode
-        self.targets = [chart.state_index(edge.target) for edge in chart.transitions]
-        self.edges = [-1] * len(mode)
-
-    def ask(self, t: float, y: list[float]) -> list[tuple[int, int]]:
-        """Return (element, edge) for each element with an enabled edge."""
-        self.program.functions["switch"](t, y, self.mode, self.program.p, self.edges)
-        return [(i, edge) for i, edge in enumerate(self.edges) if edge >= 0]
-
-    def fire(self, machine: int, edge: int, t: float, y: list[float]) -> None:
-        """Assign and switch."""
-        act(self.program, edge, machine, t, y, self.mode)
-        self.mode[machine] = self.targets[edge]
+    def __init__(self, program: Program) -> None:
+        self.ask = program.ieee["switch"]
+        self.act = program.ieee["act"]

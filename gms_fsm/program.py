@@ -9,7 +9,7 @@ The functions of a program
 ``flow``       dy/dt with every state frozen and every sign held (located crossings)
 ``flow_live``  the same with sgn, abs, min, max as they stand (for guards looked at once a step)
 ``switch``     for each element the first edge whose guard holds, or -1
-``act``        the assignments of an edge (nothing for the charts shipped here)
+``act``        take an edge: its assignments and the new state
 ``observe``    v, F, and per element s, F_i, dz
 ``arm``        which comparisons to watch until the next stop, and the signs to hold
 ``margins``    the watched comparisons as numbers that change sign where the comparison does
@@ -48,7 +48,7 @@ from gms_fsm.expression import (
     split,
     substitute,
 )
-from gms_fsm.generated import load
+from gms_fsm.generated import ieee, load, load_careful
 from gms_fsm.models import Model
 from gms_fsm.parameters import as_floats
 from gms_fsm.rigs import Rig
@@ -56,7 +56,7 @@ from gms_fsm.signals import Corners, Formula, Function, Signal, piecewise_linear
 
 __all__ = ["Program", "lower"]
 
-Arguments = tuple[list[float], list[list[float]], list[tuple[list[float], list[float]]]]
+Arguments = tuple[list[float], list[list[float]], list[list[float]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +69,11 @@ class Program:
         The text of all functions.
     functions : mapping of str to callable
         By name, see the module's text.
+    ieee : mapping of str to callable
+        The same functions; they compute inf and NaN where Python would raise.
     p : tuple
-        (shared numbers, one list an own parameter, corner tables): the last argument of all
-        functions.
+        (shared numbers, one list an own parameter, times and values of each corner table): an
+        argument of all functions.
     size : int
         Length of the state vector ``y = (x, [v,] variables...)``.
     first : int
@@ -89,6 +91,7 @@ class Program:
 
     source: str
     functions: Mapping[str, Callable[..., Any]]
+    ieee: Mapping[str, Callable[..., Any]]
     p: Arguments
     size: int
     first: int
@@ -128,15 +131,14 @@ def lower(model: Model, rig: Rig) -> Program:
         for name, signal in rig.signals.items()
         if isinstance(signal, Function)
     }
-    namespace = load(
-        f"{model.chart.name}, {rig.title}",
-        source,
-        {"piecewise_linear": piecewise_linear, **callables},
-    )
+    title = f"{model.chart.name}, {rig.title}"
+    names = {"piecewise_linear": piecewise_linear, **callables}
+    namespace, careful = load(title, source, names), load_careful(title, source, names)
     corners = [s for s in rig.signals.values() if isinstance(s, Corners)]
     return Program(
         source=source,
         functions={name: namespace[name] for name in _FUNCTION_NAMES},
+        ieee={name: ieee(namespace[name], careful[name]) for name in _FUNCTION_NAMES},
         p=writer.arguments(),
         size=writer.first + model.n * len(model.chart.variables),
         first=writer.first,
@@ -271,9 +273,10 @@ class _Lowering:
     # ------------------------------------------------------------------ arrays
     def arguments(self) -> Arguments:
         tables = [
-            (as_floats(s.times), as_floats(s.values))
+            as_floats(column)
             for s in self.rig.signals.values()
             if isinstance(s, Corners)
+            for column in (s.times, s.values)
         ]
         return list(self.shared.values()), list(self.own.values()), tables
 
@@ -393,7 +396,7 @@ class _Lowering:
         if isinstance(signal, Function):
             return [f"{name} = {name}_signal(t)"]
         if isinstance(signal, Corners):
-            return [f"{name} = piecewise_linear(t, tables[{table}][0], tables[{table}][1])"]
+            return [f"{name} = piecewise_linear(t, tables[{2 * table}], tables[{2 * table + 1}])"]
         smooth, calls = substitute(signal.tree, self.sign_names)
         return [*self.rough_lines(calls, live), f"{name} = {spell(smooth)}"]
 
@@ -478,18 +481,15 @@ class _Lowering:
                 *self.chart.assignments["action", edge.name].items(),
                 *self.chart.assignments["entry", targets[edge.target].name].items(),
             ]
-            if not steps:
-                continue
             lines.append(f"{'elif' if lines else 'if'} edge == {self.edge_constant(edge.name)}:")
             for variable, tree in steps:
                 local = self.rename[variable]
                 lines += _indented(
                     [f"{local} = {self.spell(tree)}", f"y[{self.y_index(variable)}] = {local}"]
                 )
-        body = [*self.element_values(_words(lines)), *lines] or ["pass  # no edge assigns anything"]
-        return self.function(
-            "act(edge, i, t, y, mode, p)", "Do the assignments of an edge of element i.", body
-        )
+            lines.append(f"    mode[i] = {self.state_constant(edge.target)}")
+        body = [*self.element_values(_words(lines)), *lines] or ["pass  # the chart has no edge"]
+        return self.function("act(edge, i, t, y, mode, p)", "Take an edge of element i.", body)
 
     def write_flow(self, live: bool) -> list[str]:
         shared_calls: dict[str, Call] = {}
@@ -600,8 +600,8 @@ class _Lowering:
     def witness(self, part: Split) -> list[str]:
         """Write: if this part is false, watch what keeps it false."""
         if isinstance(part, Literal):
-            negated = Literal(part.comparison, not part.holds).relation
-            return [f"if {self.spell(negated)}:",
+            # Not the opposite comparison: of NaN neither is true, and it has to be watched.
+            return [f"if not {self.spell(part.relation)}:",
                     f"    watch[{self.relation_index(part.comparison)}] = 1"]  # fmt: skip
         word, parts = part
         if word == "either":

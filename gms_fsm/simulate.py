@@ -175,8 +175,8 @@ class Run:
         )
         self.t_end, self.last = t_end, _covered(rig, t_start, t_end)
         program = lower(model, rig)
-        y, self.mode = _initial(model, rig, {} if initial is None else initial)
-        switch, engine_name = _engine(engine, model, program, self.mode)
+        y, mode = _initial(model, rig, {} if initial is None else initial)
+        switch, engine_name = _engine(engine, model, program, mode)
         settings: dict[str, str | float | None] = {
             "method": method if isinstance(method, str) else method.__name__,
             "step": step, "rtol": rtol, "atol": atol,
@@ -184,9 +184,11 @@ class Run:
             "events": events, "engine": engine_name, "t_start": t_start, "t_end": t_end,
         }  # fmt: skip
         self.recorder = _Recorder(model, rig, program, settings, wanted=t_eval is not None)
-        self.recorder.start(t_start, y, self.mode)
+        self.recorder.start(t_start, y, mode)
         self.happening: Arc | Firing | integrators.Stop | None = None  # the latest
-        self.happenings = integrators.run(_system(program), switch, t_start, y, self.last, options)
+        self.happenings = integrators.run(
+            _system(program), switch, t_start, y, mode, self.last, options
+        )
 
     def advance(self) -> bool:
         """Let the next thing happen.
@@ -205,7 +207,7 @@ class Run:
         try:
             happening = next(self.happenings, None)
         except HybridError as error:
-            raise _explained(error, recorder, recorder.model, self.mode) from None
+            raise _explained(error, recorder) from None
         except SignalError as error:
             raise SimulationError(
                 f"{error}; the run up to there is kept", recorder.trace()
@@ -220,14 +222,7 @@ class Run:
                 )
             return False
         self.happening = happening
-        try:
-            recorder.take(happening)
-        except ArithmeticError as error:  # of an output at a firing
-            raise NotFiniteError(
-                f"the force cannot be computed at t = {happening.t!r} s: {error}; the run up to "
-                "there is kept in .trace",
-                recorder.trace(),
-            ) from None
+        recorder.take(happening)
         return True
 
     def trace(self) -> Trace:
@@ -245,14 +240,14 @@ def _engine(
     if engine == "machines":
         return MachineEngine(ElementMachines(model), program, mode), engine
     if engine == "ifelse":
-        return IfElse(model.chart, program, mode), engine
+        return IfElse(program), engine
     raise ParameterError(
         f"engine is {engine!r}; it must be 'machines', 'ifelse' or an ElementMachines"
     )
 
 
 def _system(program: Program) -> integrators.System:
-    functions = program.functions
+    functions = program.ieee
     return integrators.System(
         flow=functions["flow"],
         flow_live=functions["flow_live"],
@@ -467,7 +462,7 @@ class _Recorder:
     def observe(self, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
         """Return v, F, s, F_i, dz of a state."""
         out = [0.0] * self.size
-        self.program.functions["observe"](t, y, mode, self.program.p, out)
+        self.program.ieee["observe"](t, y, mode, self.program.p, out)
         return out
 
     def trace(self) -> Trace:
@@ -506,12 +501,10 @@ class Moment:
 
 
 # --------------------------------------------------------------------------- explaining
-def _explained(
-    error: HybridError, recorder: _Recorder, model: Model, mode: list[int]
-) -> SimulationError:
+def _explained(error: HybridError, recorder: _Recorder) -> SimulationError:
     """Put an error of the loop into the words of the model."""
     trace = recorder.trace()
-    chart, kept = model.chart, "the run up to there is kept in .trace"
+    chart, kept = recorder.model.chart, "the run up to there is kept in .trace"
     scene = f"t = {error.t!r} s"
     if isinstance(error, NotFinite):
         return NotFiniteError(
@@ -529,7 +522,7 @@ def _explained(
         )
     if not isinstance(error, Livelock):
         return SimulationError(f"{error} at {scene}; {kept}", trace)
-    seen = recorder.observe(error.t, error.y, mode)
+    seen = recorder.observe(error.t, error.y, error.mode)
 
     def values(i: int) -> str:
         z = error.y[recorder.program.first + i]
@@ -546,11 +539,11 @@ def _explained(
         )
     rough = [
         i
-        for i, state in enumerate(mode)
+        for i, state in enumerate(error.mode)
         if any(rough_points(chart.flows[chart.states[state].name, u]) for u in chart.variables)
     ]
     i = rough[0] if rough else 0
-    state = chart.states[mode[i]]
+    state = chart.states[error.mode[i]]
     edges = ", ".join(f"{edge.name} [{edge.guard}]" for _, edge in chart.leaving(state.name))
     return LivelockError(
         f"{' and '.join(error.relations)} changed {integrators.MOST_SWITCHES} times at {scene}: "

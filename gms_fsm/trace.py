@@ -18,7 +18,7 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gms_fsm.errors import MissingExtraError, OutputError, TraceFileError
+from gms_fsm.errors import MissingExtraError, OutputError, SignalError, TraceFileError
 from gms_fsm.files import written_whole
 from gms_fsm.header import Header
 from gms_fsm.models import Model
@@ -184,7 +184,7 @@ class Trace:
         if self.stored:
             return self.stored
         n, program = self.n, self.program
-        observe = program.functions["observe"]
+        observe = program.ieee["observe"]
         out = [0.0] * (2 + (2 + len(self.model.chart.variables)) * n)
         table = np.empty((len(self.rows), len(out)))
         modes = self.rows.mode.tolist()
@@ -192,7 +192,7 @@ class Trace:
             try:
                 observe(t, y, modes[row], program.p, out)
                 table[row] = out
-            except (ArithmeticError, ValueError):  # the last row of a run that could not go on
+            except SignalError:  # the row at which a Python function failed
                 table[row] = np.nan
         return {
             "v": table[:, 0],
@@ -554,13 +554,11 @@ def interpolated(
     # Signs as they hold inside the interval; at its ends they may just be turning.
     held = [0.0] * program.held
     inside = (0.5 * (y0 + y1)).tolist()
-    program.functions["arm"](
-        0.5 * (t0 + t1), inside, mode, program.p, held, [0] * len(program.strict)
-    )
+    program.ieee["arm"](0.5 * (t0 + t1), inside, mode, program.p, held, [0] * len(program.strict))
     slopes = []
     for time, y in ((t0, y0), (t1, y1)):
         dy = [0.0] * program.size
-        program.functions["flow"](time, y.tolist(), mode, held, program.p, dy)
+        program.ieee["flow"](time, y.tolist(), mode, held, program.p, dy)
         slopes.append(np.array(dy))
     h = t1 - t0
     theta = (t - t0) / h

@@ -48,7 +48,6 @@ class Output(NamedTuple):
     rows_t: Vector  # shape (capacity,)
     rows_y: list[Vector]  # shape (capacity, m)
     cursor: list[int]  # [rows written, next wanted time, next knot]
-    reached: Vector  # [time of the last accepted step]
 
 
 class Work(NamedTuple):
@@ -224,7 +223,6 @@ def advance(
                 y[j] = work.y_new[j]
                 f[j] = work.f_new[j]
         t = t_new
-        out.reached[0] = t
         most_steps -= 1
         if out.every_step:
             put_row(out, t, y)

@@ -26,81 +26,87 @@ from integrators.advance import (
     put_row,
 )
 from integrators.crossings import NO_CHANGE, copy_margins, first_change
+from integrators.loop import NEW_ARC, STATUS, T_STOP, T, active_relations
 
 if TYPE_CHECKING:
-    from integrators.hybrid import Options, Workspace
-    from integrators.steps import Vector
+    from integrators.hybrid import Buffers, Options, System
+    from integrators.steps import Flow, Vector
 
 __all__ = ["SciPyStepper"]
 
 
 class SciPyStepper:
-    """Carries a state along an arc by a SciPy solver.
+    """Takes the steps of a run by a SciPy solver.
 
     Parameters
     ----------
-    solver : type
-        A class derived from `scipy.integrate.OdeSolver`.
-    options : Options
-        Tolerances; with ``step`` the solver is led from grid point to grid point (it keeps its
-        error control, so it may take several steps to each).
+    system, flow, buffers, options
+        The run.
     origin : float
-        Where that grid starts.
+        Where the grid of a fixed ``step`` starts; the solver is led from grid point to grid point
+        (it keeps its error control, so it may take several steps to each).
     """
 
-    def __init__(self, solver: type[Any], options: Options, origin: float) -> None:
-        if not (isinstance(solver, type) and issubclass(solver, OdeSolver)):
-            raise TypeError(f"method {solver!r} is not a scipy.integrate.OdeSolver class")
-        self.solver_class: Any = solver
+    def __init__(
+        self, system: System, flow: Flow, buffers: Buffers, options: Options, origin: float
+    ) -> None:
+        if not (isinstance(options.method, type) and issubclass(options.method, OdeSolver)):
+            raise TypeError(f"method {options.method!r} is not a scipy.integrate.OdeSolver class")
+        self.system, self.flow, self.buffers = system, flow, buffers
         self.options = options
         self.origin = origin
         self.solver: Any = None
 
-    def begin(self, t: float, y: Vector, t_stop: float, ws: Workspace) -> None:  # noqa: ARG002
-        """Forget the old solver: after a stop its step and history mean nothing."""
-        self.solver = None
+    def advance(self, most_steps: int) -> None:
+        """Step until the next stop, a crossing, a full buffer or most_steps steps."""
+        memory = self.buffers.memory
+        if memory.counts[NEW_ARC]:  # after a stop the old solver's step and history mean nothing
+            self.solver = None
+            memory.counts[NEW_ARC] = 0
+        memory.counts[STATUS], memory.now[T] = self._advance(memory.now[T], most_steps)
 
-    def _limit(self, t: float, t_stop: float, ws: Workspace) -> float:
-        cursor, knots = ws.out.cursor, ws.knots
+    def _limit(self, t: float) -> float:
+        b = self.buffers
+        cursor, knots, limit = b.out.cursor, b.plan.knots, b.memory.now[T_STOP]
         while cursor[NEXT_KNOT] < len(knots) and knots[cursor[NEXT_KNOT]] <= t:
             cursor[NEXT_KNOT] += 1
-        limit = min(t_stop, knots[cursor[NEXT_KNOT]]) if cursor[NEXT_KNOT] < len(knots) else t_stop
+        if cursor[NEXT_KNOT] < len(knots):
+            limit = min(limit, knots[cursor[NEXT_KNOT]])
         if self.options.step:
             index = int((t - self.origin) / self.options.step) + 1
-            while self.origin + index * self.options.step - t <= ws.resolution:
+            while self.origin + index * self.options.step - t <= b.control.resolution:
                 index += 1
             limit = min(limit, self.origin + index * self.options.step)
         return limit
 
-    def _solver_to(self, limit: float, t: float, y: Vector, ws: Workspace) -> Any:
+    def _solver_to(self, limit: float, t: float) -> Any:
         if self.solver is not None and self.solver.t_bound == limit:
             return self.solver
-        p = ws.system.p
+        b, p = self.buffers, self.system.p
 
         def slope(time: float, state: NDArray[np.float64]) -> NDArray[np.float64]:
             dy = [0.0] * len(state)
-            ws.flow(float(time), state.tolist(), ws.mode, ws.held, p, dy)
+            self.flow(float(time), state.tolist(), b.mode, b.held, p, dy)
             result = np.array(dy)
             if not np.isfinite(result).all():
                 raise FloatingPointError(f"the flow is not finite at t = {float(time)!r}")
             return result
 
-        return self.solver_class(
+        solver: Any = self.options.method
+        return solver(
             slope,
             t,
-            np.array(y),
+            np.array(b.y),
             limit,
             rtol=self.options.rtol,
             atol=self.options.atol,
             max_step=self.options.max_step if math.isfinite(self.options.max_step) else np.inf,
         )
 
-    def advance(
-        self, t: float, y: Vector, t_stop: float, ws: Workspace, most_steps: int
-    ) -> tuple[int, float]:
-        """Step until t_stop, a crossing, a full buffer or most_steps steps."""
-        out = ws.out
-        cursor = out.cursor
+    def _advance(self, t: float, most_steps: int) -> tuple[int, float]:
+        b = self.buffers
+        out, y, w = b.out, b.y, active_relations(b.relations, b.memory)
+        cursor, t_stop, resolution = out.cursor, b.memory.now[T_STOP], b.control.resolution
         redone, ahead = False, math.inf
         while True:
             if t >= t_stop:
@@ -108,8 +114,7 @@ class SciPyStepper:
             if most_steps <= 0 or (out.every_step and cursor[ROW] >= len(out.rows_t)):
                 return FULL, t
             try:
-                limit = min(self._limit(t, t_stop, ws), ahead)
-                solver = self._solver_to(limit, t, y, ws)
+                solver = self._solver_to(min(self._limit(t), ahead), t)
                 solver.step()
             except (ArithmeticError, np.linalg.LinAlgError):
                 return NOT_FINITE, t
@@ -125,12 +130,12 @@ class SciPyStepper:
                 place[:] = dense(t0 + theta * (t1 - t0)).tolist()
 
             theta = NO_CHANGE
-            if ws.w.active:
+            if w.active:
                 theta = first_change(
-                    interpolate, dense, ws.system.margins, t, t_new, y_new, ws.mode, ws.system.p,
-                    ws.w, ws.resolution,
+                    interpolate, dense, self.system.margins, t, t_new, y_new, b.mode,
+                    self.system.p, w, resolution,
                 )  # fmt: skip
-            if theta < REDO and not redone and theta * (t_new - t) > 1e3 * ws.resolution:
+            if theta < REDO and not redone and theta * (t_new - t) > 1e3 * resolution:
                 # As in the kernel: the solver's stages lay behind the crossing.
                 self.solver, redone = None, True
                 ahead = t + theta * (t_new - t)
@@ -139,7 +144,7 @@ class SciPyStepper:
             if theta < 1.0:
                 t_new = t + theta * (t_new - t)
             else:
-                copy_margins(ws.w, ws.w.end, ws.w.start)
+                copy_margins(w, w.end, w.start)
             while cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] < t_new:
                 put_row(out, out.times[cursor[NEXT_TIME]],
                         dense(out.times[cursor[NEXT_TIME]]).tolist())  # fmt: skip
@@ -149,7 +154,6 @@ class SciPyStepper:
             else:
                 y[:] = y_new
             t = t_new
-            out.reached[0] = t
             most_steps -= 1
             if out.every_step:
                 put_row(out, t, y)

@@ -150,6 +150,8 @@ def starting_step(
     for j in range(len(y)):
         f_try[j] = (f_try[j] - f[j]) / h
     d2 = error_norm(f_try, y, y, rtol, atol)
+    if not d2 < INFINITY:
+        return LEAST * h  # the look ahead went too far
     steepest = max(d1, d2)
     better = max(1e-6, h * 1e-3) if steepest <= 1e-15 else (0.01 / steepest) ** (1.0 / order)
     return min(100.0 * h, better, longest)

@@ -339,7 +339,7 @@ def test_a_guard_that_cannot_be_computed_is_said() -> None:
 
     chart = Chart(
         "bad", ("v",), ("z",), ("k",), (State("on", {"z": "v"}), State("off", {"z": "0"})),
-        (Transition("go", "on", "off", guard="1 / (z - z) > 0"),), {"F": "k * z"},
+        (Transition("go", "on", "off", guard="0 / (z - z) > 0"),), {"F": "k * z"},
     )  # fmt: skip
     model = ChartModel(chart, {"k": 1.0}, n=1, stribeck=Stribeck(1.0, 1.5, 0.1))
     made = Debugger(Session(model, Prescribed("1"), 1.0), "", None, io.StringIO())

@@ -57,21 +57,21 @@ def test_the_flow_sees_one_mode_a_step(case, method):
 
     def flow(t, y, mode, held, p, dy):
         modes.append(tuple(mode))
-        program.functions["flow"](t, y, mode, held, p, dy)
+        program.ieee["flow"](t, y, mode, held, p, dy)
 
     system = integrators.System(
-        flow=flow, flow_live=program.functions["flow_live"], arm=program.functions["arm"],
-        margins=program.functions["margins"], p=program.p, held=program.held,
+        flow=flow, flow_live=program.ieee["flow_live"], arm=program.ieee["arm"],
+        margins=program.ieee["margins"], p=program.p, held=program.held,
         strict=program.strict, relations=program.relations,
     )  # fmt: skip
-    switch = IfElse(model.chart, program, [0] * 4)
+    switch = IfElse(program)
     options = integrators.Options(
         integrators.METHODS[method], 0.0501 if method == "rk4" else None, 1e-6, 1e-9, math.inf,
         True, None,
     )  # fmt: skip
     arcs = firings = 0
     y = [0.0] * program.size
-    for happening in integrators.run(system, switch, 0.0, y, 21.0, options):
+    for happening in integrators.run(system, switch, 0.0, y, [0] * 4, 21.0, options):
         if isinstance(happening, integrators.Firing):
             firings += 1
         elif isinstance(happening, integrators.Arc):
