@@ -11,6 +11,7 @@ import hashlib
 import linecache
 import math
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from types import CodeType, SimpleNamespace
 from typing import Any
 
@@ -22,7 +23,9 @@ from gms_fsm.expression import NAMESPACE
 __all__ = ["ieee", "load", "load_careful"]
 
 
-def load(title: str, source: str, names: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def load(
+    title: str, source: str, names: Mapping[str, Any] | None = None, path: Path | None = None
+) -> dict[str, Any]:
     r"""Run generated text and return what it defines.
 
     Parameters
@@ -33,6 +36,8 @@ def load(title: str, source: str, names: Mapping[str, Any] | None = None) -> dic
         Python text.
     names : mapping, optional
         Objects it may use besides the functions of the expression language.
+    path : Path, optional
+        A file that holds this very text; its lines are then found there.
 
     Returns
     -------
@@ -45,7 +50,8 @@ def load(title: str, source: str, names: Mapping[str, Any] | None = None) -> dic
     6.0
     """
     namespace: dict[str, Any] = {**NAMESPACE, **(names or {})}
-    exec(_compiled(title, source), namespace)
+    code = _compiled(title, source) if path is None else compile(source, str(path), "exec")
+    exec(code, namespace)
     return namespace
 
 

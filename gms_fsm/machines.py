@@ -229,18 +229,21 @@ class MachineEngine:
     def act(
         self, edge: int, machine: int, t: float, y: list[float], mode: list[int], p: Arguments
     ) -> None:
-        """Trigger the edge through `transitions`, so that callbacks run."""
+        """Take an edge through `transitions`, so that callbacks run."""
+        self.trigger(edge, machine, t)
+        self.program.ieee["act"](edge, machine, t, y, mode, p)
+        mode[machine] = self.chart.state_index(self.machines.elements[machine].state)
+
+    def trigger(self, edge: int, machine: int, t: float) -> None:
+        """Fire the machine's edge on the values it was asked with."""
         row = self.chart.transitions[edge]
-        element = self.machines.elements[machine]
-        # The trigger evaluates the guard once more, on the values it was asked with; assignments
-        # come after, as in Stateflow, where the whole set was chosen before any of them.
-        if not getattr(element, row.name)():
+        # The trigger evaluates the guard once more; assignments come after, as in Stateflow, where
+        # the whole set was chosen before any of them.
+        if not getattr(self.machines.elements[machine], row.name)():
             raise ChartError(
                 f"element {machine + 1}: edge {row.name!r} was enabled at t = {t!r} s but a "
                 "callback changed the element's values before it fired; callbacks may only look"
             )
-        self.program.ieee["act"](edge, machine, t, y, mode, p)
-        mode[machine] = self.chart.state_index(element.state)
 
 
 class IfElse:

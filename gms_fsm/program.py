@@ -22,12 +22,15 @@ while slipping toward it, not v_c while sticking below s.
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+import integrators
 from gms_fsm.chart import RESERVED
 from gms_fsm.errors import SignalError
 from gms_fsm.expression import (
@@ -54,7 +57,7 @@ from gms_fsm.parameters import as_floats
 from gms_fsm.rigs import Rig
 from gms_fsm.signals import Corners, Formula, Function, Signal, piecewise_linear
 
-__all__ = ["Program", "lower"]
+__all__ = ["Arguments", "Program", "arguments", "lower", "system"]
 
 Arguments = tuple[list[float], list[list[float]], list[list[float]]]
 
@@ -71,6 +74,8 @@ class Program:
         By name, see the module's text.
     ieee : mapping of str to callable
         The same functions; they compute inf and NaN where Python would raise.
+    callables : mapping of str to callable
+        The Python functions that are signals, by the signal's name.
     p : tuple
         (shared numbers, one list an own parameter, times and values of each corner table): an
         argument of all functions.
@@ -92,6 +97,7 @@ class Program:
     source: str
     functions: Mapping[str, Callable[..., Any]]
     ieee: Mapping[str, Callable[..., Any]]
+    callables: Mapping[str, Callable[[float], float]]
     p: Arguments
     size: int
     first: int
@@ -124,22 +130,50 @@ def lower(model: Model, rig: Rig) -> Program:
     >>> "if z >= s and v > v_c:" in program.source
     True
     """
+    signals = rig.signals.values()
+    shape = (
+        repr(model.chart), model.stribeck.text, model.n,
+        tuple(np.ndim(model.values[name]) for name in model.chart.parameters),
+        rig.title, rig.acceleration, tuple(rig.numbers), tuple(rig.signals),
+        tuple(getattr(s, "text", None) or getattr(s, "call", None) for s in signals),
+    )  # fmt: skip
+    corners = [s for s in signals if isinstance(s, Corners)]
+    return dataclasses.replace(
+        _lowered(_Shape(shape, model, rig)),
+        p=arguments(model, rig),
+        knots=sorted({float(t) for s in corners for t in s.times}),
+        jumps=sorted({float(t) for s in corners for t in s.jumps}),
+    )
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """What the text depends on; a model and a rig of that shape."""
+
+    key: tuple[Any, ...]
+    model: Model = field(compare=False)
+    rig: Rig = field(compare=False)
+
+
+@functools.lru_cache(maxsize=64)
+def _lowered(shape: _Shape) -> Program:
+    """Generate the text for all models and rigs of a shape, without their numbers."""
+    model, rig = shape.model, shape.rig
     writer = _Lowering(model, rig)
     source = writer.source()
     callables = {
-        f"{name}_signal": _guarded(name, signal)
-        for name, signal in rig.signals.items()
-        if isinstance(signal, Function)
+        name: signal.call for name, signal in rig.signals.items() if isinstance(signal, Function)
     }
     title = f"{model.chart.name}, {rig.title}"
-    names = {"piecewise_linear": piecewise_linear, **callables}
+    names: dict[str, Any] = {"piecewise_linear": piecewise_linear}
+    names |= {f"{name}_signal": _guarded(name, call) for name, call in callables.items()}
     namespace, careful = load(title, source, names), load_careful(title, source, names)
-    corners = [s for s in rig.signals.values() if isinstance(s, Corners)]
     return Program(
         source=source,
         functions={name: namespace[name] for name in _FUNCTION_NAMES},
         ieee={name: ieee(namespace[name], careful[name]) for name in _FUNCTION_NAMES},
-        p=writer.arguments(),
+        callables=callables,
+        p=([], [], []),
         size=writer.first + model.n * len(model.chart.variables),
         first=writer.first,
         held=len(writer.shared_rough) + model.n * len(writer.own_rough),
@@ -147,8 +181,63 @@ def lower(model: Model, rig: Rig) -> Program:
             [r.strict for r in writer.shared_relations], [r.strict for r in writer.own_relations]
         ),
         relations=writer.relation_names(),
-        knots=sorted({float(t) for s in corners for t in s.times}),
-        jumps=sorted({float(t) for s in corners for t in s.jumps}),
+        knots=[],
+        jumps=[],
+    )
+
+
+def arguments(model: Model, rig: Rig) -> Arguments:
+    """Return the numbers of a model and a rig, as the functions of their program take them.
+
+    Parameters
+    ----------
+    model, rig
+        What runs.
+
+    Returns
+    -------
+    tuple of lists
+        See `Program`.
+    """
+    curve, values = model.stribeck, [model.values[name] for name in model.chart.parameters]
+    shared = [curve.F_c, curve.F_s, curve.v_s, curve.dip, model.sigma_2, *rig.numbers.values()]
+    shared += [float(value) for value in values if np.ndim(value) == 0]
+    own = [as_floats(model.weights)]
+    own += [as_floats(np.asarray(value)) for value in values if np.ndim(value) > 0]
+    tables = [
+        as_floats(column)
+        for s in rig.signals.values()
+        if isinstance(s, Corners)
+        for column in (s.times, s.values)
+    ]
+    return shared, own, tables
+
+
+def system(program: Program) -> integrators.System:
+    """Return a program as the integrators take it.
+
+    Parameters
+    ----------
+    program : Program
+        From `lower`.
+
+    Returns
+    -------
+    integrators.System
+        Its functions and numbers.
+    """
+    functions = program.ieee
+    return integrators.System(
+        flow=functions["flow"],
+        flow_live=functions["flow_live"],
+        arm=functions["arm"],
+        margins=functions["margins"],
+        p=program.p,
+        held=program.held,
+        strict=program.strict,
+        relations=program.relations,
+        knots=program.knots,
+        jumps=program.jumps,
     )
 
 
@@ -156,10 +245,10 @@ _DIP = "v dip"  # not an identifier, so no chart can have a name like it
 _FUNCTION_NAMES = ("flow", "flow_live", "switch", "act", "observe", "arm", "margins")
 
 
-def _guarded(name: str, signal: Function) -> Callable[[float], float]:
+def _guarded(name: str, call: Callable[[float], float]) -> Callable[[float], float]:
     def sampled(t: float) -> float:
         try:
-            return float(signal.call(t))
+            return float(call(t))
         except Exception as error:
             raise SignalError(
                 f"signal {name!r}: the function raised {type(error).__name__} at t = {t!r} s: "
@@ -189,12 +278,9 @@ class _Lowering:
 
     # ------------------------------------------------------------------ collecting
     def _collect_numbers(self) -> None:
-        curve = self.model.stribeck
-        self.shared: dict[str, float] = {
-            "F_c": curve.F_c, "F_s": curve.F_s, "v_s": curve.v_s, "v_dip": curve.dip,
-            "sigma_2": self.model.sigma_2, **self.rig.numbers,
-        }  # fmt: skip
-        self.own: dict[str, list[float]] = {"weight": as_floats(self.model.weights)}
+        # In the order of `arguments`.
+        self.shared = ["F_c", "F_s", "v_s", "v_dip", "sigma_2", *self.rig.numbers]
+        self.own = ["weight"]
         taken = set(self.shared) | set(self.rig.signals) | {f"{s}_signal" for s in self.rig.signals}
         taken |= {"F_i", "len", "range", "piecewise_linear", "v_dip"}  # of the text itself
         # A chart may call its own parameter F_c or mass: it gets a name of its own in the text.
@@ -208,11 +294,10 @@ class _Lowering:
             self.rename[name] = local
         self.locals = taken
         for name in self.chart.parameters:
-            value = self.model.values[name]
-            if np.ndim(value) == 0:
-                self.shared[self.rename[name]] = float(value)
+            if np.ndim(self.model.values[name]) == 0:
+                self.shared.append(self.rename[name])
             else:
-                self.own[self.rename[name]] = as_floats(value)  # type: ignore[arg-type]
+                self.own.append(self.rename[name])
                 self.rename[name] += "[i]"
 
     def is_shared(self, node: Node) -> bool:
@@ -271,15 +356,6 @@ class _Lowering:
         return [Comparison(v, dip, strict=True), Comparison(Negative(dip), v, strict=True)]
 
     # ------------------------------------------------------------------ arrays
-    def arguments(self) -> Arguments:
-        tables = [
-            as_floats(column)
-            for s in self.rig.signals.values()
-            if isinstance(s, Corners)
-            for column in (s.times, s.values)
-        ]
-        return list(self.shared.values()), list(self.own.values()), tables
-
     def expand(self, shared: Sequence[Any], own: Sequence[Any]) -> list[Any]:
         """Lay out values a relation: the shared ones, then each own one n times."""
         return [*shared, *(value for value in own for _ in range(self.model.n))]

@@ -257,7 +257,7 @@ class RunTable(_Table):
     atol: float = Field(1e-9, gt=0)
     max_step: float | None = Field(None, gt=0, description="s")
     events: Literal["located", "step"] = "located"
-    engine: Literal["machines", "ifelse"] = "machines"
+    engine: Literal["machines", "ifelse", "compiled"] = "machines"
 
     def options(self) -> dict[str, Any]:
         """Return the options for `simulate`."""

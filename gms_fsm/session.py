@@ -29,6 +29,7 @@ from gms_fsm.models import Model
 from gms_fsm.rigs import Rig
 from gms_fsm.signals import Function
 from gms_fsm.simulate import Run
+from gms_fsm.start import Start
 from gms_fsm.trace import Rows, Trace, interpolated, log_of
 from integrators import Firing, Stop
 
@@ -217,15 +218,15 @@ class Branch:
         """Return the branch so far as a trace."""
         raw = [self.raw(row) for row in range(len(self))]
         recorder = self.run.recorder
-        n = recorder.model.n
+        n = recorder.start.model.n
         rows = Rows(
             np.array([r[0] for r in raw]),
             np.array([r[1] for r in raw], dtype=np.int64),
             np.array([r[2] for r in raw]),
             np.array([r[3] for r in raw], dtype=np.int64).reshape(len(raw), n),
         )
-        return Trace(rows, rows, log_of(self.log()), recorder.model, recorder.rig,
-                     recorder.settings)  # fmt: skip
+        return Trace(rows, rows, log_of(self.log()), recorder.start.model, recorder.start.rig,
+                     recorder.start.settings)  # fmt: skip
 
 
 class Session:
@@ -269,7 +270,7 @@ class Session:
                 "'ifelse'"
             )
         self.model, self.rig, self.t_end, self.options = model, rig, t_end, dict(options)
-        self.branches = [Branch(Run(model, rig, t_end, rows_at_once=1, **options))]
+        self.branches = [Branch(Run(Start.of(model, rig, t_end, rows_at_once=1, **options)))]
         self.current = 0
         self.breakpoints: list[Breakpoint] = []
         self.watches: list[str] = []
@@ -312,7 +313,7 @@ class Session:
     ) -> Here:  # fmt: skip
         recorder, n = self.branch.run.recorder, self.model.n
         seen = recorder.observe(t, y, mode)
-        first = recorder.program.first
+        first = recorder.start.program.first
         names = [state.name for state in self.model.chart.states]
         return Here(
             row, t, microstep, y[0], seen[0], seen[1], tuple(y[first : first + n]),
@@ -462,7 +463,7 @@ class Session:
             "t": here.t, "x": here.x, "v": here.v, "F": here.F,
             "s": here.s[0] / float(self.model.weights[0]),
         }  # fmt: skip
-        n, first = self.model.n, self.branch.run.recorder.program.first
+        n, first = self.model.n, self.branch.run.recorder.start.program.first
         for i in range(n):
             for j, name in enumerate(self.model.chart.variables):
                 found[f"{name}{i + 1}"] = y[first + j * n + i]
@@ -548,7 +549,7 @@ class Session:
         start = t0 if begin is None else begin[0]
         if microstep > 0 or t1 <= start:
             return None, truth
-        program = branch.run.recorder.program
+        program = branch.run.recorder.start.program
         a, b = np.array(y0), np.array(y1)
 
         def place(t: float) -> tuple[float, list[float]]:
@@ -692,7 +693,7 @@ class Session:
     def _guard_values(self, row: int, i: int) -> dict[str, float]:
         here = self.at(row)
         y, n = self._state_of(here), self.model.n
-        first = self.branch.run.recorder.program.first
+        first = self.branch.run.recorder.start.program.first
         values = {"t": here.t, "x": here.x, "v": here.v, "s": here.s[i]}
         values |= {name: y[first + j * n + i] for j, name in enumerate(self.model.chart.variables)}
         for name, value in self.model.values.items():
@@ -768,7 +769,7 @@ class Session:
                 raise SessionError(f"no element {element + 1}; there are {n}, counted from 1")
         if not here.t < self.t_end:
             raise SessionError(f"t = {here.t!r} s is the end of the run; go back first")
-        y, first = self._state_of(here), self.branch.run.recorder.program.first
+        y, first = self._state_of(here), self.branch.run.recorder.start.program.first
         initial: dict[str, Any] = {"x": here.x}
         for j, name in enumerate(chart.variables):
             initial[name] = list(y[first + j * n : first + (j + 1) * n])
@@ -783,7 +784,7 @@ class Session:
         elif self.rig.acceleration is not None:
             initial["v"] = here.v
         options = {**self.options, "t_start": here.t, "initial": initial}
-        run = Run(self.model, self.rig, self.t_end, rows_at_once=1, **options)
+        run = Run(Start.of(self.model, self.rig, self.t_end, rows_at_once=1, **options))
         edits = {"z": dict(z or {}), "v": v, "state": dict(state or {})}
         fork = self.branch.cursor
         begin = (here.t, 0, list(y), self.branch.raw(fork)[3]) if here.located else None
@@ -958,7 +959,7 @@ class Session:
         if between is not None:
             t0, _, y0, mode = branch.raw(branch.cursor)
             t1, _, y1, _ = branch.raw(branch.cursor + 1)
-            program = branch.run.recorder.program
+            program = branch.run.recorder.start.program
             y = interpolated(program, list(mode), t0, np.array(y0), t1, np.array(y1), between)
             branch.between = (between, [float(u) for u in y])
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -18,6 +18,7 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gms_fsm.compiled import observe_rows
 from gms_fsm.errors import MissingExtraError, OutputError, SignalError, TraceFileError
 from gms_fsm.files import written_whole
 from gms_fsm.header import Header
@@ -183,17 +184,12 @@ class Trace:
         # Row by row with scalar functions: the very numbers the run saw.
         if self.stored:
             return self.stored
-        n, program = self.n, self.program
-        observe = program.ieee["observe"]
-        out = [0.0] * (2 + (2 + len(self.model.chart.variables)) * n)
-        table = np.empty((len(self.rows), len(out)))
-        modes = self.rows.mode.tolist()
-        for row, (t, y) in enumerate(zip(self.rows.t.tolist(), self.rows.y.tolist(), strict=True)):
-            try:
-                observe(t, y, modes[row], program.p, out)
-                table[row] = out
-            except SignalError:  # the row at which a Python function failed
-                table[row] = np.nan
+        n, width = self.n, 2 + (2 + len(self.model.chart.variables)) * self.n
+        rows, program = self.rows, self.program
+        if self.settings["engine"] == "compiled":
+            table = observe_rows(program, rows.t, rows.y, rows.mode, width)
+        else:
+            table = _observe_rows(program, rows, width)
         return {
             "v": table[:, 0],
             "F": table[:, 1],
@@ -569,6 +565,18 @@ def interpolated(
     return value
 
 
+def _observe_rows(program: Program, rows: Rows, width: int) -> FloatArray:
+    observe, out, table = program.ieee["observe"], [0.0] * width, np.empty((len(rows), width))
+    modes = rows.mode.tolist()
+    for row, (t, y) in enumerate(zip(rows.t.tolist(), rows.y.tolist(), strict=True)):
+        try:
+            observe(t, y, modes[row], program.p, out)
+            table[row] = out
+        except SignalError:  # the row at which a Python function failed
+            table[row] = np.nan
+    return table
+
+
 _LOG_NAMES = ("t", "element", "edge", "source", "target", *_NUMBERS)
 
 
@@ -595,6 +603,15 @@ def log_of(records: Iterable[tuple[Any, ...]]) -> Any:
     rows = list(records)
     width = max([1, *(len(text) for row in rows for text in row[2:5])])
     return np.array(rows, dtype=_log_dtype(width)).view(np.recarray)
+
+
+def log_from(columns: Sequence[Any]) -> Any:
+    """Return columns of arrays as the record array of `Trace.transitions`."""
+    width = max([1, *(len(text) for column in columns[2:5] for text in set(column.tolist()))])
+    log = np.empty(len(columns[0]), dtype=_log_dtype(width))
+    for name, column in zip(_LOG_NAMES, columns, strict=True):
+        log[name] = column
+    return log.view(np.recarray)
 
 
 def _merged(rows: Rows, stops: Rows) -> Rows:

@@ -18,6 +18,7 @@ from integrators.steps import (
     fit_dense,
     interpolate,
     take_step,
+    weigh,
 )
 
 __all__ = ["Control", "Output", "Work", "advance"]
@@ -164,14 +165,8 @@ def advance(
             if not total < infinity:
                 return NOT_FINITE, t, h, error_before
         else:
-            E = method.E
-            stages = len(method.B)
-            for j in range(len(y)):
-                total = E[stages] * work.f_new[j]
-                for m in range(stages):
-                    total += E[m] * work.k[m][j]
-                work.error[j] = h_now * total
-            error = error_norm(work.error, y, work.y_new, control.rtol, control.atol)
+            weigh(method.E, len(method.B), work.f_new, work.k, work.error)
+            error = error_norm(work.error, h_now, y, work.y_new, control.rtol, control.atol)
             if not error <= 1.0:
                 h = h_now * retry_factor(error, order)
                 rejected = True

@@ -91,9 +91,10 @@ def any_changed(w: Watched, margin: Vector) -> bool:
     bool
         True at the first difference.
     """
+    truth, strict = w.truth, w.strict
     for r in w.active:
         g = margin[r]
-        if (g > 0.0 or (g == 0.0 and not w.strict[r])) != w.truth[r]:
+        if (g > 0.0 or (g == 0.0 and not strict[r])) != truth[r]:
             return True
     return False
 
@@ -248,8 +249,9 @@ def _search(
 
 def _is_quiet(w: Watched, left: Vector, middle: Vector, right: Vector) -> bool:
     """Tell whether no margin can have changed between three unchanged places."""
+    truth = w.truth
     for r in w.active:
-        sign = -1.0 if w.truth[r] else 1.0  # of a margin that is negative while unchanged
+        sign = -1.0 if truth[r] else 1.0  # of a margin that is negative while unchanged
         a, m, b = sign * left[r], sign * middle[r], sign * right[r]
         first, second = m - a, b - m
         bend = abs(second - first)

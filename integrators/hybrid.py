@@ -282,7 +282,13 @@ class Buffers:
 
 
 def buffers(
-    system: System, t: float, y: Vector, mode: list[int], t_end: float, options: Options
+    system: System,
+    t: float,
+    y: Vector,
+    mode: list[int],
+    t_end: float,
+    options: Options,
+    capacity: int | None = None,
 ) -> Buffers:
     """Make the buffers of a run, as lists.
 
@@ -290,6 +296,8 @@ def buffers(
     ----------
     system, t, y, mode, t_end, options
         As in `run`; y and mode are used, not copied.
+    capacity : int, optional
+        Room for rows.
 
     Returns
     -------
@@ -302,7 +310,8 @@ def buffers(
     tableau = options.method if isinstance(options.method, Tableau) else EULER
     jumps = [s for s in system.jumps if options.located and t < s <= t_end]
     times = options.times
-    capacity = ROWS_AT_ONCE if times is None else len(times)
+    if capacity is None:
+        capacity = ROWS_AT_ONCE if times is None else len(times)
 
     def vector() -> Vector:
         return [0.0] * size

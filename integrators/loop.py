@@ -332,6 +332,14 @@ def _often_changed(
     return often
 
 
+def borrow(argument: Any) -> Any:
+    """Return the argument; compiled code does not count references to it from here on.
+
+    Counting is atomic and was half of the time. Whoever calls `record` holds all arrays anyway.
+    """
+    return argument
+
+
 def record(
     flow: Flow,
     arm: Callable[..., Any],
@@ -353,6 +361,7 @@ def record(
     log: Log,
     first: int,
     most_steps: int,
+    pause: bool,
 ) -> int:
     """Go on, writing all that happens into columns, until they are full or the run has ended.
 
@@ -366,20 +375,28 @@ def record(
     first : int
         Where the machines' own variables start in y.
     most_steps : int
-        Come back after about so many steps.
+        Come back after about so many steps or happenings.
+    pause : bool
+        Come back before each firing too.
 
     Others as in `go_on`.
 
     Returns
     -------
     int
-        ROWS when a column is full or the steps are used up, else as `go_on`.
+        ROWS when a column is full or the steps are used up, FIRING, DONE or an error as `go_on`.
     """
+    # One argument after the other: a tuple of all would be one more thing to compile.
+    method, plan, memory, log = borrow(method), borrow(plan), borrow(memory), borrow(log)
+    y, mode, held, p = borrow(y), borrow(mode), borrow(held), borrow(p)
+    relations, out, work = borrow(relations), borrow(out), borrow(work)
     cursor, counts, entries = out.cursor, memory.counts, log.counts
     keep_stops = len(log.stops_t) > 0
     seen_at = float("nan")  # the time log.seen is of
+    left = most_steps
     while True:
-        if out.every_step and cursor[ROW] + 1 >= len(out.rows_t):
+        left -= 1
+        if left < 0 or (out.every_step and cursor[ROW] + 1 >= len(out.rows_t)):
             return ROWS
         if entries[0] >= len(log.t) or (keep_stops and entries[1] >= len(log.stops_t)):
             return ROWS
@@ -408,6 +425,8 @@ def record(
             log.numbers[row][1] = log.seen[0]
             log.numbers[row][2] = log.seen[2 + i]
             log.numbers[row][3] = log.seen[1]
+            if pause:
+                return FIRING
         elif happening == FIRED:
             observe(t, y, mode, p, log.seen)
             seen_at = t

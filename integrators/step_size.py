@@ -19,15 +19,19 @@ LEAST, MOST = 0.2, 10.0  # a step shrinks or grows by no more than this
 INFINITY = float("inf")
 
 
-def error_norm(error: Vector, y: Vector, y_new: Vector, rtol: float, atol: float) -> float:
-    """Return the largest component error in units of its tolerance; infinity if not finite.
+def error_norm(
+    error: Vector, h: float, y: Vector, y_new: Vector, rtol: float, atol: float
+) -> float:
+    """Return the largest component of h error in units of its tolerance; infinity if not finite.
 
     The maximum, not the mean: one component in trouble among many at rest has to count.
 
     Parameters
     ----------
     error, y, y_new : list of float, shape (m,)
-        Error estimate, and the state at both ends of the step.
+        Error estimate per step length, and the state at both ends of the step.
+    h : float
+        The step's length.
     rtol, atol : float
         Tolerances.
 
@@ -38,13 +42,13 @@ def error_norm(error: Vector, y: Vector, y_new: Vector, rtol: float, atol: float
 
     Examples
     --------
-    >>> error_norm([1e-6], [0.0], [1.0], rtol=1e-6, atol=0.0)
+    >>> error_norm([2e-6], 0.5, [0.0], [1.0], rtol=1e-6, atol=0.0)
     1.0
     """
     worst = 0.0
     for j in range(len(y)):
         size = max(abs(y[j]), abs(y_new[j]))
-        ratio = abs(error[j]) / (atol + rtol * size)
+        ratio = abs(h * error[j]) / (atol + rtol * size)
         if not (ratio < INFINITY and size < INFINITY):
             return INFINITY
         if ratio > worst:
@@ -138,8 +142,8 @@ def starting_step(
     float
         A step, > 0.
     """
-    d0 = error_norm(y, y, y, rtol, atol)
-    d1 = error_norm(f, y, y, rtol, atol)
+    d0 = error_norm(y, 1.0, y, y, rtol, atol)
+    d1 = error_norm(f, 1.0, y, y, rtol, atol)
     if not d1 < INFINITY:
         return longest
     h = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
@@ -149,7 +153,7 @@ def starting_step(
     flow(t + h, y_try, mode, held, p, f_try)
     for j in range(len(y)):
         f_try[j] = (f_try[j] - f[j]) / h
-    d2 = error_norm(f_try, y, y, rtol, atol)
+    d2 = error_norm(f_try, 1.0, y, y, rtol, atol)
     if not d2 < INFINITY:
         return LEAST * h  # the look ahead went too far
     steepest = max(d1, d2)

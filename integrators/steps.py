@@ -98,11 +98,16 @@ def take_step(
         first[j] = f[j]
     for i in range(1, stages + 1):
         row = A[i] if i < stages else B
+        a = row[0]
         for j in range(size):
-            total = row[0] * first[j]
-            for m in range(1, i):
-                total += row[m] * k[m][j]
-            y_new[j] = y[j] + h * total
+            y_new[j] = a * first[j]
+        for m in range(1, i):
+            a = row[m]
+            k_m = k[m]
+            for j in range(size):
+                y_new[j] += a * k_m[j]
+        for j in range(size):
+            y_new[j] = y[j] + h * y_new[j]
         if i < stages:
             flow(t + C[i] * h, y_new, mode, held, p, k[i])
     flow(t_new, y_new, mode, held, p, f_new)
@@ -120,18 +125,31 @@ def fit_dense(
     """Fill the polynomial of the step just taken."""
     D = method.D
     stages = len(method.B)
+    start, rises, bends, twists, bumps = dense
+    first = k[0]
     for j in range(len(y)):
         rise = y_new[j] - y[j]
-        bend = h * k[0][j] - rise
-        dense.start[j] = y[j]
-        dense.rise[j] = rise
-        dense.bend[j] = bend
-        dense.twist[j] = rise - h * f_new[j] - bend
-        if len(D) > 0:
-            total = D[stages] * f_new[j]
-            for m in range(stages):
-                total += D[m] * k[m][j]
-            dense.bump[j] = h * total
+        bend = h * first[j] - rise
+        start[j] = y[j]
+        rises[j] = rise
+        bends[j] = bend
+        twists[j] = rise - h * f_new[j] - bend
+    if len(D) > 0:
+        weigh(D, stages, f_new, k, bumps)
+        for j in range(len(y)):
+            bumps[j] = h * bumps[j]
+
+
+def weigh(weights: Row, stages: int, f_new: Vector, k: list[Vector], out: Vector) -> None:
+    """Fill the sum of all slopes of a step, weighted."""
+    last = weights[stages]
+    for j in range(len(out)):
+        out[j] = last * f_new[j]
+    for m in range(stages):
+        a = weights[m]
+        k_m = k[m]
+        for j in range(len(out)):
+            out[j] += a * k_m[j]
 
 
 def interpolate(dense: Dense, theta: float, out: Vector) -> None:
@@ -146,9 +164,10 @@ def interpolate(dense: Dense, theta: float, out: Vector) -> None:
     out : list of float, shape (m,)
         Filled.
     """
+    start, rise, bend, twist, bump = dense
     rest = 1.0 - theta
     for j in range(len(out)):
-        inner = dense.twist[j] + rest * dense.bump[j]
-        inner = dense.bend[j] + theta * inner
-        inner = dense.rise[j] + rest * inner
-        out[j] = dense.start[j] + theta * inner
+        inner = twist[j] + rest * bump[j]
+        inner = bend[j] + theta * inner
+        inner = rise[j] + rest * inner
+        out[j] = start[j] + theta * inner

@@ -1,0 +1,209 @@
+"""A program's functions as machine code, from the same generated text (extra ``fast``)."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib.util
+import inspect
+import os
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm.errors import MissingExtraError, OutputError, SignalError
+from gms_fsm.expression import sgn
+from gms_fsm.files import written_whole
+from gms_fsm.generated import load
+from gms_fsm.parameters import FloatArray
+from gms_fsm.program import Arguments, Program
+from gms_fsm.signals import piecewise_linear
+
+__all__ = ["cache_folder", "check_numba", "machine_code", "observe_rows", "packed"]
+
+Packed = tuple[FloatArray, FloatArray, FloatArray]
+_lock = threading.RLock()  # a sweep asks from several threads
+
+
+def check_numba() -> None:
+    """Raise unless numba is there.
+
+    Raises
+    ------
+    MissingExtraError
+        With what to do.
+    """
+    for module in ("numba", "platformdirs"):
+        if importlib.util.find_spec(module) is None:
+            raise MissingExtraError(
+                f"engine 'compiled' needs {module}, which is not installed: pip install "
+                "'gms-fsm[fast]', or use engine='machines' (the same result, slower)"
+            )
+
+
+def packed(p: Arguments) -> Packed:
+    """Return a program's arguments as arrays.
+
+    Parameters
+    ----------
+    p : tuple of lists
+        ``Program.p``.
+
+    Returns
+    -------
+    tuple of ndarray
+        Shared numbers (m,), own parameters (rows, n), corner tables (2 tables, corners). Tables
+        shorter than the longest repeat their last corner, which changes no value.
+
+    Examples
+    --------
+    >>> packed(([2.0], [[1.0, 1.0]], []))[1].shape
+    (1, 2)
+    """
+    shared, own, tables = p
+    length = max(map(len, tables), default=0)
+    padded = [row + row[-1:] * (length - len(row)) for row in tables]
+    return (
+        np.array(shared, dtype=np.float64),
+        np.array(own, dtype=np.float64),
+        np.array(padded, dtype=np.float64).reshape(len(tables), length),
+    )
+
+
+def machine_code(program: Program, name: str) -> Any:
+    """Return one of a program's functions as machine code.
+
+    Parameters
+    ----------
+    program : Program
+        From `gms_fsm.program.lower`.
+    name : str
+        Such as ``"flow"``.
+
+    Returns
+    -------
+    callable
+        Over the arrays of `packed`.
+
+    Raises
+    ------
+    MissingExtraError
+        If numba is not installed.
+    SignalError
+        If numba cannot compile a Python function that is a signal.
+    """
+    check_numba()
+    with _lock:
+        return _machine_code(program.source, tuple(program.callables.items()), name)
+
+
+@functools.lru_cache(maxsize=512)
+def _machine_code(
+    source: str, callables: tuple[tuple[str, Callable[[float], float]], ...], name: str
+) -> Any:
+    from integrators import compiled
+
+    functions, in_a_file = _loaded(source, callables)
+    return compiled.compiled(name, functions[name], cache_folder() if in_a_file else None)
+
+
+@functools.lru_cache(maxsize=64)
+def _loaded(
+    source: str, callables: tuple[tuple[str, Callable[[float], float]], ...]
+) -> tuple[dict[str, Any], bool]:
+    """Load a text from a file of its own; tell whether machine code may be kept beside it."""
+    from integrators import compiled
+
+    for helper in (sgn, piecewise_linear):
+        compiled.usable_inside(helper)
+    # The name of a module that exists: numba imports it when it loads machine code from disk.
+    names: dict[str, Any] = {"piecewise_linear": piecewise_linear, "__name__": __name__}
+    for name, call in callables:
+        names[f"{name}_signal"] = _compiled_signal(name, call)
+    # A user's function may change without its text changing: such code is not kept.
+    path = None if callables else _text_file(source)
+    return load("compiled program", source, names, path), path is not None
+
+
+@functools.cache
+def cache_folder() -> Path | None:
+    """Return the folder machine code is kept in, None where none can be written.
+
+    It is the platform's folder for caches, or NUMBA_CACHE_DIR.
+
+    Returns
+    -------
+    Path or None
+        An existing folder.
+    """
+    from platformdirs import user_cache_path
+
+    from integrators import compiled
+
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    return compiled.cache_folder(Path(given) if given else user_cache_path("gms-fsm"))
+
+
+def _text_file(source: str) -> Path | None:
+    """Write a generated text where numba's cache can refer to it; None where nothing can be."""
+    folder = cache_folder()
+    if folder is None:
+        return None
+    stamp = hashlib.sha256(source.encode())
+    for part in (sgn, piecewise_linear, _loaded):  # what else decides the machine code
+        stamp.update(inspect.getsource(part).encode())
+    path = folder / f"program_{stamp.hexdigest()[:16]}.py"
+    try:
+        if not path.exists():
+            written_whole(path, lambda file: file.write(source.encode()))
+    except OutputError:
+        return None
+    return path
+
+
+def _compiled_signal(name: str, call: Callable[[float], float]) -> Any:
+    import numba
+
+    signature = numba.types.float64(numba.types.float64)
+    try:
+        return numba.njit(signature, error_model="numpy")(getattr(call, "py_func", call))
+    except Exception as error:  # numba raises many kinds, TypeError and its own among them
+        first = next((line for line in str(error).splitlines() if line.strip()), "")
+        raise SignalError(
+            f"signal {name!r}: numba cannot compile the function ({type(error).__name__}: "
+            f"{first.strip()}); use engine='machines', or give the signal as an expression of t or "
+            "as arrays (times, values)"
+        ) from None
+
+
+def observe_rows(
+    program: Program, t: FloatArray, y: FloatArray, mode: NDArray[np.int64], width: int
+) -> FloatArray:
+    """Return what `observe` says of many rows.
+
+    Parameters
+    ----------
+    program : Program
+        The program.
+    t, y, mode : ndarray, shapes (rows,), (rows, m), (rows, n)
+        The rows.
+    width : int
+        Numbers a row.
+
+    Returns
+    -------
+    ndarray, shape (rows, width)
+        Bit for bit as the readable engine.
+    """
+    from integrators import compiled
+
+    table = np.empty((t.size, width))
+    compiled.for_each_row(
+        machine_code(program, "observe"), np.ascontiguousarray(t), np.ascontiguousarray(y),
+        np.ascontiguousarray(mode), packed(program.p), table, cache_folder(),
+    )  # fmt: skip
+    return table

@@ -1,0 +1,211 @@
+"""A run by the compiled engine: the outer loop itself is machine code and fills columns."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gms_fsm import compiled
+from gms_fsm.machines import ElementMachines, MachineEngine
+from gms_fsm.program import system
+from gms_fsm.recording import Recording, check_end, explained, observed
+from gms_fsm.start import Start
+from gms_fsm.trace import Rows, Trace, log_from
+from integrators import hybrid, loop
+from integrators.advance import ROW
+
+__all__ = ["CompiledRun"]
+
+STEPS_AT_ONCE = 20_000  # between two looks at the keyboard and two calls of progress
+
+
+class CompiledRun:
+    """A simulation under way, chunk by chunk; the same interface as `gms_fsm.simulate.Run`.
+
+    Parameters
+    ----------
+    start : Start
+        What to run.
+    machines : ElementMachines, optional
+        Machines of the user's own: each firing is replayed through them.
+    """
+
+    def __init__(self, start: Start, machines: ElementMachines | None = None) -> None:
+        program = start.program
+        names = ("flow" if start.options.located else "flow_live", "arm", "margins", "switch")
+        self.functions = [
+            compiled.machine_code(program, name) for name in (*names, "act", "observe")
+        ]
+        self.columns = Columns(start)
+        self.recorder: Recording = self.columns
+        self.engine: MachineEngine | None = None
+        if machines is not None:
+            self.engine = MachineEngine(machines, program, start.mode)
+
+    def advance(self) -> bool:
+        """Let the run go on for a while.
+
+        Returns
+        -------
+        bool
+            False when the run has reached its end.
+
+        Raises
+        ------
+        SimulationError
+            If it cannot go on.
+        """
+        from integrators.compiled import record
+
+        columns = self.columns
+        columns.make_room()
+        b, start = columns.buffers, columns.start
+        happening = record(
+            (
+                *self.functions, b.method, b.control, b.plan, b.memory, b.y, b.mode, b.held,
+                columns.p, b.relations, b.out, b.work, columns.log, start.program.first,
+                STEPS_AT_ONCE, self.engine is not None,
+            ),
+            compiled.cache_folder(),
+        )  # fmt: skip
+        if happening == loop.DONE:
+            check_end(columns)
+            return False
+        if happening == loop.FIRING:
+            self._replay(self.engine)
+        elif happening != loop.ROWS:
+            error = hybrid.failure(happening, b, start.program.relations)
+            raise explained(error, columns) from None
+        return True
+
+    def _replay(self, engine: MachineEngine | None) -> None:
+        """Fire the user's machine as the compiled one is about to."""
+        assert engine is not None
+        memory, (t, y, mode) = self.columns.buffers.memory, self.columns.latest
+        if memory.counts[loop.FIRED_ONE] == 0:  # the elements saw these values when asked
+            engine.show(t, y, list(mode), self.columns.start.program.p)
+        engine.trigger(int(memory.counts[loop.EDGE]), int(memory.counts[loop.MACHINE]), t)
+
+
+class Columns:
+    """The arrays a compiled run fills; they grow as needed.
+
+    Parameters
+    ----------
+    start : Start
+        What runs.
+    p : tuple of ndarray, optional
+        Parameters in place of the program's own.
+    """
+
+    def __init__(self, start: Start, p: compiled.Packed | None = None) -> None:
+        from integrators.compiled import arrays
+
+        self.start = start
+        self.p = compiled.packed(start.program.p) if p is None else p
+        size, n = start.program.size, start.model.n
+        b = hybrid.buffers(
+            system(start.program), start.t_start, start.y, start.mode, start.last, start.options,
+            capacity=0,
+        )  # fmt: skip
+        few = max(16, min(1024, 4_000_000 // size))  # rows to begin with
+        rows = {"all": few, "t_eval": len(start.options.times or ()), "end": 0}[start.output]
+        stops = few if start.output == "t_eval" else 0
+        array: Any = np.array  # the buffers' fields say list; compiled code takes arrays
+        floats: Any = np.empty
+        ints: Any = functools.partial(np.zeros, dtype=np.int64)
+        self.buffers = dataclasses.replace(
+            b,
+            method=arrays(b.method), control=b.control, plan=arrays(b.plan),
+            memory=arrays(b.memory), relations=arrays(b.relations), work=arrays(b.work),
+            out=arrays(b.out)._replace(rows_t=floats(rows), rows_y=floats((rows, size))),
+            y=array(b.y),
+            mode=array(b.mode, dtype=np.int64),
+            held=array(b.held),
+        )  # fmt: skip
+        self.log = loop.Log(
+            counts=ints(2), t=floats(64), machine=ints(64), edge=ints(64), numbers=floats((64, 5)),
+            seen=floats(2 + (2 + len(start.model.chart.variables)) * n),
+            rows_microstep=ints(rows), rows_mode=ints((rows, n)),
+            stops_t=floats(stops), stops_microstep=ints(stops), stops_y=floats((stops, size)),
+            stops_mode=ints((stops, n)),
+        )  # fmt: skip
+        if stops:
+            self.log.stops_t[0], self.log.stops_y[0], self.log.stops_mode[0] = (
+                start.t_start, self.buffers.y, self.buffers.mode,
+            )  # fmt: skip
+            self.log.counts[STOPS] = 1
+
+    def make_room(self) -> None:
+        """Double the columns that are full."""
+        out, log = self.buffers.out, self.log
+        if out.every_step and out.cursor[ROW] + 1 >= len(out.rows_t):
+            self.buffers = dataclasses.replace(
+                self.buffers, out=out._replace(rows_t=_twice(out.rows_t), rows_y=_twice(out.rows_y))
+            )
+            log = log._replace(
+                rows_microstep=_twice(log.rows_microstep), rows_mode=_twice(log.rows_mode)
+            )
+        if log.counts[FIRINGS] >= len(log.t):
+            log = log._replace(
+                **{name: _twice(getattr(log, name)) for name in ("t", "machine", "edge", "numbers")}
+            )
+        if 0 < len(log.stops_t) <= log.counts[STOPS]:
+            names = ("stops_t", "stops_microstep", "stops_y", "stops_mode")
+            log = log._replace(**{name: _twice(getattr(log, name)) for name in names})
+        self.log = log
+
+    @property
+    def latest(self) -> tuple[float, list[float], tuple[int, ...]]:
+        """Time, state and modes reached."""
+        b: Any = self.buffers
+        return float(b.memory.now[loop.T]), b.y.tolist(), tuple(b.mode.tolist())
+
+    def observe(self, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
+        """Return v, F, s, F_i, dz of a state."""
+        return observed(self.start, t, y, mode)
+
+    def transitions(self) -> Any:
+        """Return the transition log."""
+        chart, log, count = self.start.model.chart, self.log, int(self.log.counts[FIRINGS])
+        edges = log.edge[:count]
+        texts = [
+            np.array([getattr(edge, name) for edge in chart.transitions], dtype=np.str_)[edges]
+            for name in ("name", "source", "target")
+            if chart.transitions
+        ] or [np.empty(0, dtype=np.str_)] * 3
+        columns: Any = log.numbers
+        return log_from([log.t[:count], log.machine[:count], *texts, *columns[:count].T])
+
+    def trace(self) -> Trace:
+        """Return all that was kept."""
+        start, log, out = self.start, self.log, self.buffers.out
+        count = int(out.cursor[ROW])
+        if start.output == "end":
+            t, y, mode = self.latest
+            rows = Rows(np.array([t]), np.zeros(1, dtype=np.int64), np.array([y]), np.array([mode]))
+        else:
+            rows = _rows(count, out.rows_t, log.rows_microstep, out.rows_y, log.rows_mode)
+        stops = rows
+        if start.output == "t_eval":
+            stops = _rows(
+                int(log.counts[STOPS]), log.stops_t, log.stops_microstep, log.stops_y,
+                log.stops_mode,
+            )  # fmt: skip
+        return Trace(rows, stops, self.transitions(), start.model, start.rig, start.settings)
+
+
+FIRINGS, STOPS = 0, 1  # places in Log.counts
+
+
+def _twice(column: Any) -> Any:
+    return np.concatenate([column, np.zeros_like(column)])
+
+
+def _rows(count: int, *columns: Any) -> Rows:
+    """Return the filled part of four columns."""
+    return Rows(*(column[:count].copy() for column in columns))

@@ -1,0 +1,271 @@
+"""What a run keeps, and how it words an error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+import integrators
+from gms_fsm.errors import (
+    LivelockError,
+    NotFiniteError,
+    SignalEndError,
+    SimulationError,
+    StepSizeError,
+)
+from gms_fsm.expression import rough_points
+from gms_fsm.start import Start
+from gms_fsm.trace import Rows, Trace, log_of
+from integrators import Arc, Firing, HybridError, Livelock, NotFinite, StepTooSmall
+
+__all__ = ["Moment", "Recorder", "Recording", "check_end", "explained", "observed"]
+
+
+class Recording(Protocol):
+    """What listeners may ask of a run under way."""
+
+    @property
+    def start(self) -> Start:
+        """What runs."""
+
+    @property
+    def latest(self) -> tuple[float, list[float], tuple[int, ...]]:
+        """Time, state and modes reached."""
+
+    def observe(self, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
+        """Return v, F, s, F_i, dz of a state."""
+
+    def trace(self) -> Trace:
+        """Return all that was kept."""
+
+
+def observed(start: Start, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
+    """Return v, F, then s, F_i and rates of all elements in a state.
+
+    Parameters
+    ----------
+    start : Start
+        What runs.
+    t, y, mode
+        The state.
+
+    Returns
+    -------
+    list of float
+        As ``observe`` of the program fills it.
+    """
+    out = [0.0] * ((2 + len(start.model.chart.variables)) * start.model.n + 2)
+    start.program.ieee["observe"](t, y, mode, start.program.p, out)
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class _Columns:
+    """Growing lists behind one `Rows`."""
+
+    t: list[float]
+    microstep: list[int]
+    y: list[list[float]]
+    mode: list[tuple[int, ...]]
+
+    def add(self, t: float, microstep: int, y: list[float], mode: tuple[int, ...]) -> None:
+        self.t.append(t)
+        self.microstep.append(microstep)
+        self.y.append(y)
+        self.mode.append(mode)
+
+    def rows(self, size: int, n: int) -> Rows:
+        return Rows(
+            np.array(self.t, dtype=np.float64),
+            np.array(self.microstep, dtype=np.int64),
+            np.array(self.y, dtype=np.float64).reshape(len(self.t), size),
+            np.array(self.mode, dtype=np.int64).reshape(len(self.t), n),
+        )
+
+
+class Recorder:
+    """Keeps what the loop yields.
+
+    Parameters
+    ----------
+    start : Start
+        What runs.
+    """
+
+    def __init__(self, start: Start) -> None:
+        self.start = start
+        self.rows = _Columns([], [], [], [])
+        self.stops = _Columns([], [], [], [])
+        self.log: list[tuple[Any, ...]] = []
+        self.latest = start.t_start, start.y, tuple(start.mode)
+        if start.output == "t_eval":
+            self.stops.add(start.t_start, 0, list(start.y), tuple(start.mode))
+
+    def take(self, happening: Arc | Firing | integrators.Stop) -> None:
+        """Keep one happening."""
+        output = self.start.output
+        match happening:
+            case Arc(t=times, y=states, mode=mode):
+                self.rows.t.extend(times)
+                self.rows.microstep.extend([0] * len(times))
+                self.rows.y.extend(states)
+                self.rows.mode.extend([mode] * len(times))
+                self.latest = (times[-1], states[-1], mode)
+            case Firing():
+                if output != "end":
+                    side = self.stops if output == "t_eval" else self.rows
+                    side.add(happening.t, happening.microstep, happening.y, happening.mode)
+                self.log.append(self._record(happening))
+                self.latest = (happening.t, happening.y, happening.mode)
+            case integrators.Stop(t=t, y=y, mode=mode):
+                if output == "t_eval":
+                    self.stops.add(t, 0, y, mode)
+                self.latest = (t, y, mode)
+
+    def _record(self, firing: Firing) -> tuple[Any, ...]:
+        chart, i = self.start.model.chart, firing.machine
+        edge = chart.transitions[firing.edge]
+        before, after = (
+            self.observe(firing.t, y, mode)
+            for y, mode in ((firing.y_before, firing.mode_before), (firing.y, firing.mode))
+        )
+        z = firing.y_before[self.start.program.first + i]
+        return (
+            firing.t, i, edge.name, edge.source, edge.target,
+            z, before[0], before[2 + i], before[1], after[1],
+        )  # fmt: skip
+
+    def observe(self, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
+        """Return v, F, s, F_i, dz of a state."""
+        return observed(self.start, t, y, mode)
+
+    def trace(self) -> Trace:
+        """Return all that was kept."""
+        start = self.start
+        size, n = start.program.size, start.model.n
+        if start.output == "end":
+            self.rows = _Columns([], [], [], [])
+            t, y, mode = self.latest
+            self.rows.add(t, 0, y, mode)
+        rows = self.rows.rows(size, n)
+        stops = self.stops.rows(size, n) if start.output == "t_eval" else rows
+        return Trace(rows, stops, log_of(self.log), start.model, start.rig, start.settings)
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """The latest row of a running simulation; computed only when asked."""
+
+    _recording: Recording
+
+    @property
+    def t(self) -> float:
+        """Time, s."""
+        return self._recording.latest[0]
+
+    @property
+    def states(self) -> list[str]:
+        """Active state of each element."""
+        states = self._recording.start.model.chart.states
+        return [states[mode].name for mode in self._recording.latest[2]]
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """``v`` [m/s] and ``F`` [N]; ``z`` and ``s`` [m], one an element."""
+        recording, start = self._recording, self._recording.start
+        t, y, mode = recording.latest
+        seen = recording.observe(t, y, mode)
+        first, n = start.program.first, start.model.n
+        return {"v": seen[0], "F": seen[1], "z": y[first : first + n], "s": seen[2 : 2 + n]}
+
+
+# --------------------------------------------------------------------------- explaining
+def explained(error: HybridError, recorder: Recording) -> SimulationError:
+    """Put an error of the loop into the words of the model.
+
+    Parameters
+    ----------
+    error : HybridError
+        From `integrators`.
+    recorder : Recording
+        What was kept.
+
+    Returns
+    -------
+    SimulationError
+        With the trace.
+    """
+    trace = recorder.trace()
+    chart, kept = recorder.start.model.chart, "the run up to there is kept in .trace"
+    scene = f"t = {error.t!r} s"
+    if isinstance(error, NotFinite):
+        return NotFiniteError(
+            f"a signal or a flow is not finite at or just after {scene} "
+            f"(x, v, z ... = {[float(f'{u:.6g}') for u in error.y]}): {error}; look at the signals "
+            f"and parameters there; {kept}",
+            trace,
+        )
+    if isinstance(error, StepTooSmall):
+        return StepSizeError(
+            f"the step size fell under the resolution of the clock at {scene}: the flow changes "
+            "too fast there for this method; try a stiff method (method=scipy.integrate.Radau), a "
+            f"larger rtol/atol, or look for a singular parameter; {kept}",
+            trace,
+        )
+    if not isinstance(error, Livelock):
+        return SimulationError(f"{error} at {scene}; {kept}", trace)
+    seen = recorder.observe(error.t, error.y, error.mode)
+
+    def values(i: int) -> str:
+        z = error.y[recorder.start.program.first + i]
+        return f"z = {z:.6g}, s = {seen[2 + i]:.6g}, v = {seen[0]:.6g}"
+
+    if error.machine is not None and error.edge is not None:
+        edge = chart.transitions[error.edge]
+        return LivelockError(
+            f"element {error.machine + 1} switched {integrators.MOST_SWITCHES} times at {scene}, "
+            f"last by {edge.name!r} from {edge.source} to {edge.target} ({values(error.machine)}): "
+            f"guard [{edge.guard}] and a way back hold together; make the guards exclude each "
+            f"other; {kept}",
+            trace,
+        )
+    rough = [
+        i
+        for i, state in enumerate(error.mode)
+        if any(rough_points(chart.flows[chart.states[state].name, u]) for u in chart.variables)
+    ]
+    i = rough[0] if rough else 0
+    state = chart.states[error.mode[i]]
+    edges = ", ".join(f"{edge.name} [{edge.guard}]" for _, edge in chart.leaving(state.name))
+    return LivelockError(
+        f"{' and '.join(error.relations)} changed {integrators.MOST_SWITCHES} times at {scene}: "
+        f"element {i + 1} is in {state.name} ({values(i)}), its flow pushes back on both sides and "
+        f"no edge leaves ({edges or 'it has none'}): a sliding mode (Filippov); try the signed "
+        f"law, a larger v_c, or other parameters; {kept}",
+        trace,
+    )
+
+
+def check_end(recorder: Recording) -> None:
+    """Raise if a sampled signal ended before the run should.
+
+    Parameters
+    ----------
+    recorder : Recording
+        Of a run that has reached its last time.
+
+    Raises
+    ------
+    SignalEndError
+        With the trace.
+    """
+    last, t_end = recorder.start.last, recorder.start.t_end
+    if last < t_end:
+        raise SignalEndError(
+            f"a sampled signal ends at t = {last!r} s, before t_end = {t_end!r} s; give a longer "
+            f"record or t_end <= {last!r}; the run up to there is kept",
+            recorder.trace(),
+        )

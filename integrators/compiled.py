@@ -1,0 +1,314 @@
+"""`integrators.loop.record` as machine code: the very same functions, through numba.
+
+The system's functions come in as addresses of functions with fixed signatures, so that the loop is
+compiled once per machine and cached on disk, whatever it integrates.
+"""
+
+from __future__ import annotations
+
+import functools
+import gc
+import hashlib
+import sys
+import tempfile
+import threading
+import time
+import typing
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from integrators import advance, crossings, loop, step_size, steps
+
+__all__ = ["SIGNATURES", "arrays", "cache_folder", "compiled", "record", "usable_inside"]
+
+# Every function that `record` reaches, by its module's own name for it.
+_HELPERS = (
+    advance.advance, advance.put_row,
+    crossings.any_changed, crossings.copy_margins, crossings.first_change,
+    crossings._bracket, crossings._is_quiet, crossings._search,
+    loop.active_relations, loop.go_on, loop._look_at_clock, loop._often_changed, loop._rearm,
+    loop._undefined,
+    step_size.error_norm, step_size.next_factor, step_size.retry_factor, step_size.starting_step,
+    steps.fit_dense, steps.interpolate, steps.take_step, steps.weigh,
+)  # fmt: skip
+_MODULES = ("compiled", "steps", "step_size", "crossings", "advance", "loop")
+_ARRAYS: Mapping[Any, tuple[type[Any], int]] = {
+    list[float]: (np.float64, 1),
+    tuple[float, ...]: (np.float64, 1),
+    list[int]: (np.int64, 1),
+    list[bool]: (np.bool_, 1),
+    list[list[float]]: (np.float64, 2),
+    tuple[tuple[float, ...], ...]: (np.float64, 2),
+    list[list[int]]: (np.int64, 2),
+}
+# Of the functions a system is made of: letters for float, Vector, list[int], int and p.
+SIGNATURES: Mapping[str, str] = {
+    "flow": "fVIVPV",
+    "flow_live": "fVIVPV",
+    "arm": "fVIPVI",
+    "margins": "fVIPIV",
+    "switch": "fVIPI",
+    "act": "iifVIP",
+    "observe": "fVIPV",
+}
+_hints: Callable[[type], Mapping[str, Any]] = functools.cache(typing.get_type_hints)
+
+
+def arrays(record: Any) -> Any:
+    """Return a named tuple of lists as the same named tuple of arrays.
+
+    Parameters
+    ----------
+    record : NamedTuple
+        Of lists, numbers and named tuples.
+
+    Returns
+    -------
+    NamedTuple
+        Lists of lists are padded with zeros to a table.
+
+    Examples
+    --------
+    >>> from integrators.steps import coefficients
+    >>> from integrators.tableaux import HEUN
+    >>> arrays(coefficients(HEUN)).A.tolist()
+    [[0.0, 0.0], [1.0, 0.0]]
+    """
+    hints = _hints(type(record))
+    return type(record)(*(_array(value, hints[name]) for name, value in record._asdict().items()))
+
+
+def _array(value: Any, hint: Any) -> Any:
+    if hint not in _ARRAYS:
+        return arrays(value) if hasattr(value, "_fields") else value
+    dtype, dimensions = _ARRAYS[hint]
+    if dimensions == 1:
+        return np.array(value, dtype=dtype)
+    table = np.zeros((len(value), max(map(len, value), default=0)), dtype=dtype)
+    for row, numbers in zip(table, value, strict=True):
+        row[: len(numbers)] = numbers
+    return table
+
+
+# --------------------------------------------------------------------------- the cache on disk
+def cache_folder(base: Path) -> Path | None:
+    """Return the folder to keep compiled code in, or None if it cannot be written.
+
+    Parameters
+    ----------
+    base : Path
+        Its parent. The folder's name changes with this package's source and with the versions of
+        Python and numba.
+
+    Returns
+    -------
+    Path or None
+        An existing folder.
+    """
+    import numba
+
+    stamp = hashlib.sha256(f"{sys.version} {numba.__version__}".encode())
+    for module in _MODULES:
+        stamp.update(Path(__file__).with_name(f"{module}.py").read_bytes())
+    folder = base / stamp.hexdigest()[:16]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError:
+        return None
+
+
+def _machine_code(signature: Any, function: Callable[..., Any], folder: Path | None) -> Any:
+    """Compile a function, or load what was kept of it in a folder."""
+    import numba
+
+    jit = functools.partial(numba.njit, signature, error_model="numpy", nogil=True)
+    config = numba.config
+    before = config.CACHE_DIR, config.LOOP_VECTORIZE
+    # Vectorized loops cost a fifth at n = 4, and gain only where n is in the hundreds.
+    config.CACHE_DIR, config.LOOP_VECTORIZE = str(folder or ""), 0
+    collecting = gc.isenabled()
+    gc.disable()  # compiling makes objects by the million and no garbage worth looking for
+    try:
+        return jit(cache=folder is not None)(function)
+    except Exception:  # a damaged file, a full disk: it only costs time
+        return jit()(function)
+    finally:
+        config.CACHE_DIR, config.LOOP_VECTORIZE = before
+        if collecting:
+            gc.enable()
+
+
+# --------------------------------------------------------------------------- compiling
+def usable_inside(function: Callable[..., Any]) -> None:
+    """Let compiled code call a Python function by its name.
+
+    Parameters
+    ----------
+    function : callable
+        Of plain loops over numbers and arrays.
+    """
+    from numba.extending import register_jitable
+
+    # IEEE arithmetic: x / 0 is inf or NaN as it is for our Python (see gms_fsm.generated).
+    register_jitable(error_model="numpy")(function)
+
+
+@functools.cache
+def _types() -> Mapping[str, Any]:
+    from numba import types
+
+    vector, ints, table = types.float64[::1], types.int64[::1], types.float64[:, ::1]
+    return {
+        "f": types.float64,
+        "i": types.int64,
+        "V": vector,
+        "I": ints,
+        "P": types.Tuple((vector, table, table)),
+    }
+
+
+def _signature(letters: str) -> Any:
+    from numba import types
+
+    return types.void(*(_types()[letter] for letter in letters))
+
+
+def compiled(name: str, function: Callable[..., None], folder: Path | None) -> Any:
+    """Return a system's function as machine code.
+
+    Parameters
+    ----------
+    name : str
+        A key of `SIGNATURES`.
+    function : callable
+        Its text lies in a file if it is to be kept.
+    folder : Path, optional
+        Where to keep it.
+
+    Returns
+    -------
+    callable
+        With the fixed signature.
+    """
+    return _machine_code(_signature(SIGNATURES[name]), function, folder)
+
+
+def record(arguments: tuple[Any, ...], folder: Path | None) -> int:
+    """Call `integrators.loop.record` as machine code; it releases the GIL.
+
+    Parameters
+    ----------
+    arguments : tuple
+        Its arguments: compiled functions, arrays and numbers.
+    folder : Path, optional
+        Where to keep the machine code.
+
+    Returns
+    -------
+    int
+        What it returns.
+    """
+    machine_code: Callable[..., int] = _record(arguments, folder)
+    return machine_code(*arguments)
+
+
+_lock = threading.Lock()
+_compiled_record: list[Any] = []
+
+
+def _record(arguments: tuple[Any, ...], folder: Path | None) -> Any:
+    if _compiled_record:
+        return _compiled_record[0]
+    with _lock:
+        if not _compiled_record:
+            _compiled_record.append(_compile_record(arguments, folder))
+        return _compiled_record[0]
+
+
+def _teach_borrow() -> None:
+    """Have numba drop the reference counts of what goes through `integrators.loop.borrow`."""
+    from numba import types
+    from numba.core import cgutils
+    from numba.extending import intrinsic, overload
+
+    def stripped(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+        if isinstance(kind, types.Array):
+            array = cgutils.create_struct_proxy(kind)(context, builder, value=value)
+            array.meminfo = cgutils.get_null_value(array.meminfo.type)
+            array.parent = cgutils.get_null_value(array.parent.type)
+            return array._getvalue()
+        if isinstance(kind, types.BaseTuple):
+            parts = cgutils.unpack_tuple(builder, value, len(kind))
+            inner = [stripped(context, builder, k, v) for k, v in zip(kind, parts, strict=True)]
+            return context.make_tuple(builder, kind, inner)
+        return value
+
+    @intrinsic  # type: ignore[untyped-decorator]
+    def borrowed(_: Any, argument: Any) -> Any:
+        def codegen(context: Any, builder: Any, __: Any, arguments: Any) -> Any:
+            return stripped(context, builder, argument, arguments[0])
+
+        return argument(argument), codegen
+
+    overload(loop.borrow)(lambda argument: lambda argument: borrowed(argument))  # noqa: ARG005
+
+
+def _compile_record(arguments: tuple[Any, ...], folder: Path | None) -> Any:
+    import numba
+
+    names = ("flow", "arm", "margins", "switch", "act", "observe")
+    functions = [numba.types.FunctionType(_signature(SIGNATURES[name])) for name in names]
+    others = [numba.typeof(argument) for argument in arguments[len(names) :]]
+    for helper in _HELPERS:
+        usable_inside(helper)
+    _teach_borrow()
+    known = folder is not None and any(folder.rglob("loop.record-*.nbi"))
+    if not known:
+        print("gms-fsm: compiling the engine, once on this machine ...", file=sys.stderr)
+    start = time.perf_counter()
+    result = _machine_code(numba.types.int64(*functions, *others), loop.record, folder)
+    if not known:
+        print(f"gms-fsm: compiled in {time.perf_counter() - start:.1f} s", file=sys.stderr)
+    return result
+
+
+def _each_row(observe: Any, t: Any, y: Any, mode: Any, p: Any, table: Any) -> None:
+    for row in range(len(t)):
+        observe(t[row], y[row], mode[row], p, table[row])
+
+
+@functools.cache
+def _compiled_each_row(folder: Path | None) -> Any:
+    import numba
+
+    kind = _types()
+    observe = numba.types.FunctionType(_signature(SIGNATURES["observe"]))
+    table, modes = numba.types.float64[:, ::1], numba.types.int64[:, ::1]
+    signature = numba.types.void(observe, kind["V"], table, modes, kind["P"], table)
+    return _machine_code(signature, _each_row, folder)
+
+
+def for_each_row(
+    observe: Any, t: Any, y: Any, mode: Any, p: Any, table: Any, folder: Path | None
+) -> None:
+    """Call a compiled ``observe`` for many rows.
+
+    Parameters
+    ----------
+    observe : callable
+        From `compiled`.
+    t, y, mode : ndarray, shapes (rows,), (rows, m), (rows, n)
+        The rows.
+    p : tuple of ndarray
+        Parameters.
+    table : ndarray, shape (rows, width)
+        Filled.
+    folder : Path, optional
+        Where to keep the machine code.
+    """
+    _compiled_each_row(folder)(observe, t, y, mode, p, table)
