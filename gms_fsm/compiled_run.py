@@ -128,7 +128,7 @@ class Columns:
             held=array(b.held),
         )  # fmt: skip
         self.log = loop.Log(
-            counts=ints(2), t=floats(64), machine=ints(64), edge=ints(64), numbers=floats((64, 5)),
+            counts=ints(2), t=floats(256), machine=ints(256), edge=ints(256), numbers=floats((256, 5)),
             seen=floats(2 + (2 + len(start.model.chart.variables)) * n),
             rows_microstep=ints(rows), rows_mode=ints((rows, n)),
             stops_t=floats(stops), stops_microstep=ints(stops), stops_y=floats((stops, size)),

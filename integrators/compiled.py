@@ -24,15 +24,17 @@ from integrators import advance, crossings, loop, step_size, steps
 
 __all__ = ["SIGNATURES", "arrays", "cache_folder", "compiled", "record", "usable_inside"]
 
-# Every function that `record` reaches, by its module's own name for it.
-_HELPERS = (
-    advance.advance, advance.put_row,
-    crossings.any_changed, crossings.copy_margins, crossings.first_change,
+# Every function that `record` reaches. Those of a step are inlined: a call hands on ten arrays,
+# which takes as long as their work does.
+_OF_A_STEP = (
+    advance.put_row, crossings.any_changed, crossings.copy_margins, crossings.first_change,
     crossings._bracket, crossings._is_quiet, crossings._search,
-    loop.active_relations, loop.go_on, loop._look_at_clock, loop._often_changed, loop._rearm,
-    loop._undefined,
-    step_size.error_norm, step_size.next_factor, step_size.retry_factor, step_size.starting_step,
+    step_size.error_norm, step_size.next_factor, step_size.retry_factor,
     steps.fit_dense, steps.interpolate, steps.take_step, steps.weigh,
+)  # fmt: skip
+_OF_AN_ARC = (
+    advance.advance, loop.active_relations, loop.go_on, loop._look_at_clock, loop._often_changed,
+    loop._rearm, loop._undefined, step_size.starting_step,
 )  # fmt: skip
 _MODULES = ("compiled", "steps", "step_size", "crossings", "advance", "loop")
 _ARRAYS: Mapping[Any, tuple[type[Any], int]] = {
@@ -54,6 +56,10 @@ SIGNATURES: Mapping[str, str] = {
     "act": "iifVIP",
     "observe": "fVIPV",
 }
+# IEEE arithmetic: x / 0 is inf or NaN as it is for our Python (see gms_fsm.generated). And no
+# counting of references, which is atomic and took half of the time: nothing is allocated here, all
+# arrays belong to the caller.
+_OPTIONS: Mapping[str, Any] = {"error_model": "numpy", "_nrt": False}
 _hints: Callable[[type], Mapping[str, Any]] = functools.cache(typing.get_type_hints)
 
 
@@ -126,7 +132,7 @@ def _machine_code(signature: Any, function: Callable[..., Any], folder: Path | N
     """Compile a function, or load what was kept of it in a folder."""
     import numba
 
-    jit = functools.partial(numba.njit, signature, error_model="numpy", nogil=True)
+    jit = functools.partial(numba.njit, signature, nogil=True, **_OPTIONS)
     config = numba.config
     before = config.CACHE_DIR, config.LOOP_VECTORIZE
     # Vectorized loops cost a fifth at n = 4, and gain only where n is in the hundreds.
@@ -144,18 +150,19 @@ def _machine_code(signature: Any, function: Callable[..., Any], folder: Path | N
 
 
 # --------------------------------------------------------------------------- compiling
-def usable_inside(function: Callable[..., Any]) -> None:
+def usable_inside(function: Callable[..., Any], *, inlined: bool = False) -> None:
     """Let compiled code call a Python function by its name.
 
     Parameters
     ----------
     function : callable
         Of plain loops over numbers and arrays.
+    inlined : bool
+        Whether its code is copied into that of its callers.
     """
     from numba.extending import register_jitable
 
-    # IEEE arithmetic: x / 0 is inf or NaN as it is for our Python (see gms_fsm.generated).
-    register_jitable(error_model="numpy")(function)
+    register_jitable(**_OPTIONS, forceinline=inlined)(function)
 
 
 @functools.cache
@@ -230,43 +237,16 @@ def _record(arguments: tuple[Any, ...], folder: Path | None) -> Any:
         return _compiled_record[0]
 
 
-def _teach_borrow() -> None:
-    """Have numba drop the reference counts of what goes through `integrators.loop.borrow`."""
-    from numba import types
-    from numba.core import cgutils
-    from numba.extending import intrinsic, overload
-
-    def stripped(context: Any, builder: Any, kind: Any, value: Any) -> Any:
-        if isinstance(kind, types.Array):
-            array = cgutils.create_struct_proxy(kind)(context, builder, value=value)
-            array.meminfo = cgutils.get_null_value(array.meminfo.type)
-            array.parent = cgutils.get_null_value(array.parent.type)
-            return array._getvalue()
-        if isinstance(kind, types.BaseTuple):
-            parts = cgutils.unpack_tuple(builder, value, len(kind))
-            inner = [stripped(context, builder, k, v) for k, v in zip(kind, parts, strict=True)]
-            return context.make_tuple(builder, kind, inner)
-        return value
-
-    @intrinsic  # type: ignore[untyped-decorator]
-    def borrowed(_: Any, argument: Any) -> Any:
-        def codegen(context: Any, builder: Any, __: Any, arguments: Any) -> Any:
-            return stripped(context, builder, argument, arguments[0])
-
-        return argument(argument), codegen
-
-    overload(loop.borrow)(lambda argument: lambda argument: borrowed(argument))  # noqa: ARG005
-
-
 def _compile_record(arguments: tuple[Any, ...], folder: Path | None) -> Any:
     import numba
 
     names = ("flow", "arm", "margins", "switch", "act", "observe")
     functions = [numba.types.FunctionType(_signature(SIGNATURES[name])) for name in names]
     others = [numba.typeof(argument) for argument in arguments[len(names) :]]
-    for helper in _HELPERS:
+    for helper in _OF_A_STEP:
+        usable_inside(helper, inlined=True)
+    for helper in _OF_AN_ARC:
         usable_inside(helper)
-    _teach_borrow()
     known = folder is not None and any(folder.rglob("loop.record-*.nbi"))
     if not known:
         print("gms-fsm: compiling the engine, once on this machine ...", file=sys.stderr)

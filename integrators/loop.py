@@ -332,14 +332,6 @@ def _often_changed(
     return often
 
 
-def borrow(argument: Any) -> Any:
-    """Return the argument; compiled code does not count references to it from here on.
-
-    Counting is atomic and was half of the time. Whoever calls `record` holds all arrays anyway.
-    """
-    return argument
-
-
 def record(
     flow: Flow,
     arm: Callable[..., Any],
@@ -386,10 +378,6 @@ def record(
     int
         ROWS when a column is full or the steps are used up, FIRING, DONE or an error as `go_on`.
     """
-    # One argument after the other: a tuple of all would be one more thing to compile.
-    method, plan, memory, log = borrow(method), borrow(plan), borrow(memory), borrow(log)
-    y, mode, held, p = borrow(y), borrow(mode), borrow(held), borrow(p)
-    relations, out, work = borrow(relations), borrow(out), borrow(work)
     cursor, counts, entries = out.cursor, memory.counts, log.counts
     keep_stops = len(log.stops_t) > 0
     seen_at = float("nan")  # the time log.seen is of
