@@ -15,8 +15,10 @@ from gms_fsm.errors import GMSError, SimulationError
 from gms_fsm.machines import Element, ElementMachines
 from gms_fsm.models import GMS, ChartModel, LuGre
 from gms_fsm.parameters import GMSParameters, Stribeck
+from gms_fsm.prove import Finding, Report, prove
 from gms_fsm.rigs import Prescribed, PulledSlider, Slider
 from gms_fsm.simulate import simulate
+from gms_fsm.sweep import Sweep, sweep
 from gms_fsm.trace import Trace
 
 __version__ = "0.1.0"
@@ -27,16 +29,21 @@ __all__ = [
     "ChartModel",
     "Element",
     "ElementMachines",
+    "Finding",
     "GMSError",
     "GMSParameters",
     "LuGre",
     "Prescribed",
     "PulledSlider",
+    "Report",
     "SimulationError",
     "Slider",
     "State",
     "Stribeck",
+    "Sweep",
     "Trace",
     "Transition",
+    "prove",
     "simulate",
+    "sweep",
 ]

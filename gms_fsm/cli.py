@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 import json
 import sys
+import textwrap
 import warnings
 from pathlib import Path
 from typing import Annotated
@@ -15,13 +16,16 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 
 import gms_fsm
 from gms_fsm import paper
+from gms_fsm.chart import Chart
 from gms_fsm.charts import LUGRE, gms_element
+from gms_fsm.charts.broken import BROKEN
 from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.files import output_folder, written_whole
 from gms_fsm.live import LiveView
 from gms_fsm.models import GMS, Model
 from gms_fsm.parameters import GMSParameters
 from gms_fsm.program import lower
+from gms_fsm.prove import Report, prove
 from gms_fsm.report import run_scenario, velocity_note
 from gms_fsm.rigs import Prescribed, PulledSlider, Rig, Slider
 from gms_fsm.scenario import Scenario, load_scenario
@@ -187,6 +191,72 @@ def chart_command(
     typer.echo(str(written))
 
 
+@app.command("check")
+def check_command(
+    name: Annotated[
+        str, typer.Argument(help="gms, lugre, or a broken reading; see --list.", show_default=False)
+    ] = "",
+    law: Annotated[LawName | None, typer.Option(help="Slip law of the GMS chart.")] = None,
+    domain: Annotated[
+        list[str] | None,
+        typer.Option(help="Assume this instead, for example 's >= 0'; may be given again."),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Folder for the report and the charts, marked."),
+    ] = None,
+    names: Annotated[bool, typer.Option("--list", help="Say what can be checked.")] = False,
+) -> None:
+    """Prove a chart free of contradictions, or refute it by an example; then exit with 1."""
+    if names:
+        typer.echo("gms --law signed, gms --law published, lugre, and as demonstrations:")
+        for broken, what in BROKEN.items():
+            typer.echo(textwrap.fill(f"broken:{broken}  {what.wrong}", 78, subsequent_indent="  "))
+        return
+    chart, usual = _to_check(name, law)
+    folder = None if output is None else output_folder(output)
+    report = prove(chart, domain or usual)
+    typer.echo(str(report))
+    for path in [] if folder is None else _write_report(report, folder):
+        typer.echo(str(path))
+    if report.refuted:
+        raise typer.Exit(1)
+
+
+def _to_check(name: str, law: LawName | None) -> tuple[Chart, tuple[str, ...] | None]:
+    """Return a chart and its domain, None for the usual one."""
+    charts = {"lugre": LUGRE, **{f"broken:{key}": found.chart for key, found in BROKEN.items()}}
+    if name == "gms":
+        if law is None:
+            raise ParameterError("check gms needs --law signed or --law published; they differ")
+        return gms_element(law.value), None
+    if name not in charts:
+        raise ParameterError(f"name is {name!r}; it must be one of gms, {', '.join(charts)}")
+    if law is not None:
+        raise ParameterError(f"check {name} takes no --law; only gms does")
+    found = BROKEN.get(name.removeprefix("broken:"))
+    return charts[name], None if found is None else found.domain
+
+
+def _write_report(report: Report, folder: Path) -> list[Path]:
+    """Write a report, and for each thing refuted the chart with the place marked."""
+    import plots
+
+    text = f"{report}\n".encode()
+    written = [written_whole(folder / "report.txt", lambda file: file.write(text))]
+    edges = report.chart.guards
+    for number, finding in enumerate(report.refuted, start=1):
+        marked = [part for part in finding.where if part in edges] or finding.where
+        what = f"{finding.check}, {finding.case}" if finding.case else finding.check
+        note = textwrap.wrap(f"{what}: {finding.text}", 50)
+        note += textwrap.wrap(finding.example, 50)
+        graph = plots.statechart(report.chart, marked=marked, note="\n".join(note))
+        for ending in ("svg", "png"):
+            path = folder / f"{number}-{finding.check}.{ending}"
+            written.append(plots.render(graph, path))
+    return list(dict.fromkeys(written))
+
+
 @app.command("blocks")
 def blocks_command(
     output: Annotated[
@@ -267,6 +337,29 @@ def debug_command(
     from gms_fsm.debugger import run_debugger
 
     raise typer.Exit(run_debugger(load_scenario(scenario, overrides or [])))
+
+
+@app.command("lesson")
+def lesson_command(
+    number: Annotated[
+        int | None, typer.Argument(help="Which one; left out, all are listed.", show_default=False)
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder.")] = Path("lessons"),
+) -> None:
+    """Run a lesson: a picture, a replay page, and five lines with the measured figures."""
+    from gms_fsm.lessons import LESSONS, teach
+
+    if number is None:
+        for key, each in LESSONS.items():
+            typer.echo(f"{key}  {each.TITLE}: {each.QUESTION}")
+        return
+    with Console(stderr=True).status(f"running lesson {number}"):
+        taught = teach(number, output)
+    for line in taught.lines:
+        typer.echo(line)
+    typer.echo()
+    for path in taught.files:
+        typer.echo(str(path))
 
 
 @app.command("code")

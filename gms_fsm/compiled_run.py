@@ -11,8 +11,10 @@ import numpy as np
 
 from gms_fsm import compiled
 from gms_fsm.machines import ElementMachines, MachineEngine
-from gms_fsm.program import system
+from gms_fsm.models import Model
+from gms_fsm.program import arguments, system
 from gms_fsm.recording import Recording, check_end, explained, observed
+from gms_fsm.rigs import Rig
 from gms_fsm.start import Start
 from gms_fsm.trace import Rows, Trace, log_from
 from integrators import hybrid, loop
@@ -45,6 +47,16 @@ class CompiledRun:
         self.engine: MachineEngine | None = None
         if machines is not None:
             self.engine = MachineEngine(machines, program, start.mode)
+
+    def begin_again(self, model: Model, rig: Rig) -> None:
+        """Start over with other numbers; signals and initial values stay.
+
+        Parameters
+        ----------
+        model, rig
+            Of the same kind as those before.
+        """
+        self.columns.begin_again(model, rig)
 
     def advance(self) -> bool:
         """Let the run go on for a while.
@@ -128,7 +140,8 @@ class Columns:
             held=array(b.held),
         )  # fmt: skip
         self.log = loop.Log(
-            counts=ints(2), t=floats(256), machine=ints(256), edge=ints(256), numbers=floats((256, 5)),
+            counts=ints(2), t=floats(256), machine=ints(256), edge=ints(256),
+            numbers=floats((256, 5)),
             seen=floats(2 + (2 + len(start.model.chart.variables)) * n),
             rows_microstep=ints(rows), rows_mode=ints((rows, n)),
             stops_t=floats(stops), stops_microstep=ints(stops), stops_y=floats((stops, size)),
@@ -139,6 +152,21 @@ class Columns:
                 start.t_start, self.buffers.y, self.buffers.mode,
             )  # fmt: skip
             self.log.counts[STOPS] = 1
+
+    def begin_again(self, model: Model, rig: Rig) -> None:
+        """Empty the columns and go back to the start, with the numbers of a model and a rig."""
+        start, b, log = self.start, self.buffers, self.log
+        p = arguments(model, rig)
+        program = dataclasses.replace(start.program, p=p)
+        self.start = dataclasses.replace(start, model=model, rig=rig, program=program)
+        self.p = compiled.packed(p)
+        memory: Any = b.memory  # arrays
+        watch: Any = b.relations.watch
+        memory.now[:] = hybrid.beginning(start.t_start, start.last)
+        for counts in (memory.counts, memory.switches, memory.changes, watch):
+            counts[:] = 0
+        b.y[:], b.mode[:], b.out.cursor[:] = start.y, start.mode, [0, 0, 0]
+        log.counts[:] = [0, min(1, len(log.stops_t))]
 
     def make_room(self) -> None:
         """Double the columns that are full."""

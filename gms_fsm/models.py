@@ -8,7 +8,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +19,7 @@ from gms_fsm.charts.lugre import LUGRE
 from gms_fsm.errors import ParameterError
 from gms_fsm.parameters import FloatArray, GMSParameters, Stribeck, checked_array, checked_scalar
 
-__all__ = ["GMS", "ChartModel", "LuGre", "Model"]
+__all__ = ["GMS", "ChartModel", "LuGre", "Model", "parameter_names", "with_values"]
 
 
 class Model(Protocol):
@@ -262,3 +262,79 @@ def _number_or_array(name: str, value: float | FloatArray, n: int) -> float | Fl
     if np.ndim(value) == 0:
         return checked_scalar(name, value, "finite")  # type: ignore[arg-type]
     return checked_array(name, value, n, "finite")
+
+
+# --------------------------------------------------------------------------- varying
+def parameter_names(model: Model) -> tuple[str, ...]:
+    """Return the names `with_values` takes for a model.
+
+    Parameters
+    ----------
+    model : Model
+        Any.
+
+    Returns
+    -------
+    tuple of str
+        The chart's parameters and what all models share.
+
+    Examples
+    --------
+    >>> parameter_names(GMS(GMSParameters.paper("stick-slip"), law="signed"))
+    ('k', 'sigma', 'C', 'v_c', 'weights', 'sigma_2', 'F_c', 'F_s', 'v_s')
+    """
+    weights = () if isinstance(model, LuGre) else ("weights",)
+    return (*model.values, *weights, "sigma_2", "F_c", "F_s", "v_s")
+
+
+def with_values(model: Model, values: Mapping[str, ArrayLike]) -> Model:
+    """Return a model with some of its numbers replaced.
+
+    Parameters
+    ----------
+    model : GMS, LuGre or ChartModel
+        Where the others come from.
+    values : mapping
+        By a name of `parameter_names`; a single number goes to all elements. Other names are
+        ignored.
+
+    Returns
+    -------
+    Model
+        A new one, checked.
+
+    Raises
+    ------
+    ParameterError
+        If a value breaks its rule.
+
+    Examples
+    --------
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> with_values(model, {"k": 2.0, "F_s": 1.0}).values["k"].tolist()
+    [2.0, 2.0, 2.0, 2.0]
+    """
+
+    def number(name: str, old: float) -> float:
+        return checked_scalar(name, values.get(name, old), "finite")  # type: ignore[arg-type]
+
+    def array(name: str, old: float | FloatArray) -> FloatArray:
+        return np.full(model.n, values.get(name, old), dtype=np.float64)
+
+    old = model.stribeck
+    stribeck = Stribeck(number("F_c", old.F_c), number("F_s", old.F_s), number("v_s", old.v_s))
+    shared: Any = {"stribeck": stribeck, "sigma_2": number("sigma_2", model.sigma_2)}
+    if isinstance(model, LuGre):
+        own: Any = {name: number(name, float(value)) for name, value in model.values.items()}
+        return LuGre(**own, **shared)
+    weights = array("weights", model.weights)
+    if isinstance(model, GMS):
+        p = model.parameters
+        arrays = [array(name, getattr(p, name)) for name in ("k", "sigma", "C")]
+        v_c = number("v_c", p.v_c)
+        return GMS(GMSParameters(*arrays, v_c=v_c, weights=weights, **shared), law=model.law)
+    new = {
+        name: number(name, value) if isinstance(value, float) else array(name, value)
+        for name, value in model.values.items()
+    }
+    return ChartModel(model.chart, new, n=model.n, weights=weights, title=model.title, **shared)

@@ -5,14 +5,17 @@ Each rig states its equation of motion as text, like a chart states its flows.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
+
+from numpy.typing import ArrayLike
 
 from gms_fsm.parameters import checked_scalar
 from gms_fsm.signals import Signal, SignalLike, as_signal
 
-__all__ = ["Prescribed", "PulledSlider", "Rig", "Slider"]
+__all__ = ["Prescribed", "PulledSlider", "Rig", "Slider", "with_numbers"]
 
 
 class Rig(Protocol):
@@ -140,3 +143,32 @@ class PulledSlider:
     def numbers(self) -> Mapping[str, float]:
         """Mass, stiffness, speed."""
         return {"mass": self.mass, "stiffness": self.stiffness, "speed": self.speed}
+
+
+def with_numbers(rig: Rig, values: Mapping[str, ArrayLike]) -> Rig:
+    """Return a rig with some of its numbers replaced.
+
+    Parameters
+    ----------
+    rig : Rig
+        A frozen dataclass that has its numbers as fields.
+    values : mapping
+        By a name of ``rig.numbers``; other names are ignored.
+
+    Returns
+    -------
+    Rig
+        A new one, checked.
+
+    Raises
+    ------
+    ParameterError
+        If a value breaks its rule.
+
+    Examples
+    --------
+    >>> with_numbers(PulledSlider(1.0, 2.0, 0.1), {"speed": 0.2}).speed
+    0.2
+    """
+    new: Any = {name: values[name] for name in rig.numbers if name in values}
+    return dataclasses.replace(rig, **new) if new else rig  # type: ignore[type-var]

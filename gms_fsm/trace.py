@@ -30,7 +30,7 @@ from gms_fsm.rigs import Rig
 if TYPE_CHECKING:
     import pandas
 
-__all__ = ["Rows", "Trace", "dwell_times", "interpolated"]
+__all__ = ["Rows", "Trace", "column_name", "dwell_times", "interpolated", "log_from", "log_of"]
 
 _NUMBERS = ("z", "v", "s", "F_before", "F_after")
 
@@ -399,7 +399,7 @@ class Trace:
         blocks += [("state", self.states), ("s", self.s), ("F", self.F_elements)]  # type: ignore[list-item]
         blocks.append((f"d{variables[0]}", self.dz))
         for name, values in blocks:
-            table |= {_column(name, i): values[:, i] for i in range(self.n)}
+            table |= {column_name(name, i): values[:, i] for i in range(self.n)}
         return table
 
     def to_pandas(self) -> pandas.DataFrame:
@@ -459,12 +459,12 @@ class Trace:
             return np.array([float(cell) for cell in table[name]])
 
         def block(name: str) -> FloatArray:
-            return np.array([number(_column(name, i)) for i in range(model.n)]).T
+            return np.array([number(column_name(name, i)) for i in range(model.n)]).T
 
         y = [number("x")] if header.rig.prescribed else [number("x"), number("v")]
         for name in model.chart.variables:
             y += list(block(name).T)
-        mode = [[states.index(c) for c in table[_column("state", i)]] for i in range(model.n)]
+        mode = [[states.index(c) for c in table[column_name("state", i)]] for i in range(model.n)]
         rows = Rows(
             number("t"),
             np.array([int(c) for c in table["microstep"]], dtype=np.int64),
@@ -631,7 +631,7 @@ def _merged(rows: Rows, stops: Rows) -> Rows:
     )
 
 
-def _column(name: str, i: int) -> str:
+def column_name(name: str, i: int) -> str:
     """Return the column's name of element i: z1, but z1_1 for a variable that is called z1."""
     return f"{name}{'_' if name[-1].isdigit() or name[-1] == '_' else ''}{i + 1}"
 

@@ -26,13 +26,13 @@ __all__ = ["SIGNATURES", "arrays", "cache_folder", "compiled", "record", "usable
 
 # Every function that `record` reaches. Those of a step are inlined: a call hands on ten arrays,
 # which takes as long as their work does.
-_OF_A_STEP = (
+_OF_A_STEP: tuple[Callable[..., Any], ...] = (
     advance.put_row, crossings.any_changed, crossings.copy_margins, crossings.first_change,
     crossings._bracket, crossings._is_quiet, crossings._search,
     step_size.error_norm, step_size.next_factor, step_size.retry_factor,
     steps.fit_dense, steps.interpolate, steps.take_step, steps.weigh,
 )  # fmt: skip
-_OF_AN_ARC = (
+_OF_AN_ARC: tuple[Callable[..., Any], ...] = (
     advance.advance, loop.active_relations, loop.go_on, loop._look_at_clock, loop._often_changed,
     loop._rearm, loop._undefined, step_size.starting_step,
 )  # fmt: skip
@@ -243,10 +243,8 @@ def _compile_record(arguments: tuple[Any, ...], folder: Path | None) -> Any:
     names = ("flow", "arm", "margins", "switch", "act", "observe")
     functions = [numba.types.FunctionType(_signature(SIGNATURES[name])) for name in names]
     others = [numba.typeof(argument) for argument in arguments[len(names) :]]
-    for helper in _OF_A_STEP:
-        usable_inside(helper, inlined=True)
-    for helper in _OF_AN_ARC:
-        usable_inside(helper)
+    for helper in (*_OF_A_STEP, *_OF_AN_ARC):
+        usable_inside(helper, inlined=helper in _OF_A_STEP)
     known = folder is not None and any(folder.rglob("loop.record-*.nbi"))
     if not known:
         print("gms-fsm: compiling the engine, once on this machine ...", file=sys.stderr)

@@ -336,7 +336,7 @@ def buffers(
             standstill=1000.0 * resolution,
         ),
         memory=Memory(
-            now=[t, 0.0, 1.0, t_end, -math.inf],
+            now=beginning(t, t_end),
             counts=[0] * loop.PLACES,
             edges=[-1] * n,
             switches=[0] * n,
@@ -363,6 +363,11 @@ def buffers(
             dense=Dense(vector(), vector(), vector(), vector(), vector()),
         ),
     )
+
+
+def beginning(t: float, t_end: float) -> Vector:
+    """Return `Memory.now` of a run that has not begun."""
+    return [t, 0.0, 1.0, t_end, -math.inf]
 
 
 def failure(happening: int, b: Buffers, relations: list[str]) -> HybridError:

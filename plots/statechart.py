@@ -46,6 +46,7 @@ DIRECTIONS = {"TB": "top to bottom", "LR": "left to right"}
 # would leave around the corners and run into each other.
 ROOM_PER_EDGE = {"TB": 45, "LR": 16}
 LONGEST_LINE = 52  # characters; longer texts are wrapped
+MARKED = "2.6"  # points, of lines that point something out
 DOT, TRUE, FALSE, UNKNOWN = "●", "✓", "✗", "?"
 
 
@@ -57,6 +58,8 @@ def statechart(
     direction: str = "TB",
     theme: str = "light",
     counts: Trace | None = None,
+    marked: Iterable[str] = (),
+    note: str = "",
 ) -> graphviz.Digraph:
     """Draw a chart: one element, or a bank of elements as parallel states.
 
@@ -76,6 +79,10 @@ def statechart(
     counts : Trace, optional
         A run of this chart: how long each element was in each state and how often it took each edge
         are written on it; an edge never taken is dashed.
+    marked : iterable of str, optional
+        Names of states and edges to point out: drawn thick, with a frame around the guard.
+    note : str, optional
+        Written under the picture, line by line.
 
     Returns
     -------
@@ -85,7 +92,8 @@ def statechart(
     Raises
     ------
     ParameterError
-        If an option is not one of those above, or `counts` is the run of another chart.
+        If an option is not one of those above, `counts` is the run of another chart, or the chart
+        has no such state or edge to mark.
 
     Examples
     --------
@@ -100,10 +108,15 @@ def statechart(
             f"counts is a run of the chart {counts.model.chart.name!r}; it must be one of the "
             f"chart that is drawn, {chart.name!r}"
         )
-    sheet = Sheet(chart, notation, direction, theme, Tally(counts) if counts else None)
+    names = tuple(marked)
+    parts = [*(state.name for state in chart.states), *(edge.name for edge in chart.transitions)]
+    for name in names:
+        one_of("marked", name, parts)
+    tally = Tally(counts) if counts else None
+    sheet = Sheet(chart, notation, direction, theme, tally, marked=frozenset(names))
     numbers = chosen(elements, None if counts is None else counts.n)
     bare = elements == 1 and (counts is None or counts.n == 1)
-    return sheet.graph(numbers, bare=bare)
+    return sheet.graph(numbers, bare=bare, foot=note)
 
 
 def chosen(elements: int | Sequence[int], n: int | None = None) -> tuple[int, ...]:
@@ -364,6 +377,8 @@ class Sheet:
         Counts to be written on it.
     live : bool
         Leave room for the dot of the active state and the marks of the clauses.
+    marked : frozenset of str
+        States and edges to point out.
     """
 
     chart: Chart
@@ -372,6 +387,7 @@ class Sheet:
     theme: str = "light"
     tally: Tally | None = None
     live: bool = False
+    marked: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         one_of("notation", self.notation, NOTATIONS)
@@ -402,7 +418,7 @@ class Sheet:
         values : sequence of Row
             Written under the title of each element.
         foot : str
-            Written under the picture.
+            Written under the picture, line by line.
 
         Returns
         -------
@@ -425,7 +441,8 @@ class Sheet:
             edge_attr={"color": ink, "arrowsize": "0.7", "penwidth": "1.1"},
         )
         if foot:
-            below = [*values, [Piece(foot, "value")]] if bare else [[Piece(foot, "value")]]
+            last = [[Piece(line, "value")] for line in foot.splitlines()]
+            below = [*values, *last] if bare else last
             graph.attr(label=f"<{self._lines(below)}>", labeljust="l", labelloc="b")
         if bare:
             self._draw_element(graph, numbers[0])
@@ -482,7 +499,8 @@ class Sheet:
         )
         for state in chart.states:
             name = part_id(element, "state", state.name)
-            graph.node(name, f"<{self._state_box(state, number)}>", id=name, **{"class": "state"})
+            kind = "state marked" if state.name in self.marked else "state"
+            graph.node(name, f"<{self._state_box(state, number)}>", id=name, **{"class": kind})
         graph.edge(
             dot,
             part_id(element, "state", chart.default_state.name),
@@ -502,13 +520,16 @@ class Sheet:
         guard = part_id(element, "guard", edge.name)
         name = part_id(element, "edge", edge.name)
         box = self._guard_box(edge, priority, number)
-        graph.node(guard, f"<{box}>", id=guard, **{"class": "guard"})
+        kind = "guard marked" if edge.name in self.marked else "guard"
+        graph.node(guard, f"<{box}>", id=guard, **{"class": kind})
         before, after, left, right = "nswe" if self.direction == "TB" else "wens"
-        dashed = {}
+        look = {}
         if self.tally is not None and not self.tally.firings[number, edge.name]:
-            dashed = {"style": "dashed"}
-        into = {"id": f"{name}-1", "dir": "none", **dashed}
-        out = {"id": f"{name}-2", **dashed}
+            look = {"style": "dashed"}
+        if edge.name in self.marked:
+            look |= {"class": "marked", "color": self.colours.fired, "penwidth": MARKED}
+        into = {"id": f"{name}-1", "dir": "none", **look}
+        out = {"id": f"{name}-2", **look}
         if edge.source == edge.target:
             graph.edge(source, f"{guard}:{left}", **into)
             graph.edge(source, f"{guard}:{right}", dir="back", **out)
@@ -624,10 +645,13 @@ class Sheet:
         blank = ""
         if self.direction == "LR" and room > height:
             blank = f'<TR><TD HEIGHT="{room - height}"></TD></TR>'
-        ink, paper = self.colours.ink, self.colours.paper
+        ink, paper, border = self.colours.ink, self.colours.paper, 1
+        if state.name in self.marked:
+            ink, border = self.colours.fired, 3
         return (
-            f'<TABLE BORDER="1" COLOR="{ink}" BGCOLOR="{paper}" STYLE="ROUNDED" CELLBORDER="0" '
-            f'CELLSPACING="0" CELLPADDING="3"><TR><TD ALIGN="LEFT" {size}>{title}</TD></TR><HR/>'
+            f'<TABLE BORDER="{border}" COLOR="{ink}" BGCOLOR="{paper}" STYLE="ROUNDED" '
+            'CELLBORDER="0" CELLSPACING="0" CELLPADDING="3">'
+            f'<TR><TD ALIGN="LEFT" {size}>{title}</TD></TR><HR/>'
             + "".join(f'<TR><TD ALIGN="LEFT">{row}</TD></TR>' for row in rows)
             + f"{blank}</TABLE>"
         )
@@ -638,8 +662,11 @@ class Sheet:
             f'<TD ALIGN="LEFT">{self._line(row[1:])}</TD></TR>'
             for row in self.guard_rows(edge, priority, number)
         )
+        frame = 'BORDER="0"'
+        if edge.name in self.marked:
+            frame = f'BORDER="1" COLOR="{self.colours.fired}"'
         return (
-            '<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="1" '
+            f'<TABLE {frame} CELLBORDER="0" CELLSPACING="0" CELLPADDING="1" '
             f'BGCOLOR="{self.colours.paper}">{rows}</TABLE>'
         )
 

@@ -1,0 +1,389 @@
+/* What a C programmer writes by hand for exactly one model: the yardstick of compare.py.
+ *
+ * Four GMS elements under the signed law. Without OPEN_LOOP a mass is pulled through a spring for
+ * 60 s (72 transitions); with it v = 0.2 sin(2 pi t / 20) is given for 61 s (48 transitions).
+ * Dormand-Prince 5(4), max-norm, dense output, every crossing located on it, a fresh small step
+ * after each. All numbers are constants, nothing is general. C99 and the vectors of GCC and Clang.
+ *
+ *     cc -O3 -march=native -std=c99 -ffp-contract=off -shared -fPIC [-DOPEN_LOOP] c_loop.c -lm
+ *
+ * Stops: |z| = s of the elements that stick, |v| = v_c and v = 0 while that can matter, and
+ * |v| = 6.1 v_s, where the Stribeck curve starts to bend: a long step would jump it.
+ */
+#include <math.h>
+#include <string.h>
+
+/* fmax and fmin mind NaN, and are calls. */
+#define MAX(a, b) ((a) > (b) ? (a) : (b))
+#define MIN(a, b) ((a) < (b) ? (a) : (b))
+
+typedef double vec __attribute__((vector_size(32))); /* one number an element */
+typedef struct { vec z; double x, v; } State;
+
+enum { STICK, SLIP };
+enum { FORWARD, BACKWARD, ARREST };
+enum { COLUMNS = 8, MOST_STOPS = 1000 };
+
+static const double RTOL = 1e-6, ATOL = 1e-9, V_C = 1e-6;
+#ifdef OPEN_LOOP
+static const vec K = {0.7, 0.7, 0.7, 0.7}, SIGMA = {0.3, 0.4, 0.5, 0.6};
+static const double C[4] = {0.1, 0.05, 0.025, 1e-4}, W[4] = {1.0, 1.0, 1.0, 1.0};
+static const double SIGMA_2 = 0.1, F_C = 0.4, F_S = 1.5, V_S = 1e-3, T_END = 61.0;
+static const double OMEGA = 2.0 * 3.14159265358979323846 / 20.0, AMPLITUDE = 0.2;
+static const double H_START = 0.01;
+#define VELOCITY(t, y) (AMPLITUDE * sin(OMEGA * (t)))
+#define ACCELERATION(t, f) ((void)(f), AMPLITUDE * OMEGA * cos(OMEGA * (t)))
+#else
+static const vec K = {40.0, 30.0, 20.0, 10.0}, SIGMA = {0.4, 0.3, 0.2, 0.1};
+static const double C[4] = {0.02, 0.02, 0.02, 0.02};
+static const double W[4] = {1.0 / 160.0, 1.0 / 120.0, 1.0 / 80.0, 1.0 / 40.0};
+static const double SIGMA_2 = 0.4, F_C = 1.0, F_S = 1.5, V_S = 0.05, T_END = 60.0;
+static const double MASS = 1.0, SPRING = 2.0, SPEED = 0.1, H_START = 0.03;
+#define VELOCITY(t, y) ((y).v)
+#define ACCELERATION(t, f) ((f).v)
+#endif
+#define V_DIP (6.1 * V_S)
+
+typedef struct {
+    int state[4];
+    vec a, b, c;       /* dz = a v + b - c z / S */
+    int slips, pinned; /* any element in slip; any watched one with |z| >= s */
+    int any_z, watch[4], zone[4];
+    double v_low, v_high; /* v is in here, ends included, as long as nothing changes */
+} Arc;
+
+typedef struct { State y, rise, bend, twist, bump; double t, h; } Dense;
+
+static inline double stribeck(double v) /* beyond V_DIP the rest is below rounding */
+{
+    double u = v * (1.0 / V_S);
+    return fabs(v) > V_DIP ? F_C : F_C + (F_S - F_C) * exp(-(u * u));
+}
+
+static inline State plus(State y, double a, State k)
+{
+    return (State){y.z + a * k.z, y.x + a * k.x, y.v + a * k.v};
+}
+
+/* Slope with all states frozen; sets s(v) if it is needed. */
+static inline State flow(const Arc *arc, double t, double v, State y, double *S)
+{
+    State f = {arc->a * v + arc->b, v, 0.0};
+    if (arc->slips) {
+        *S = stribeck(v);
+        f.z -= arc->c * y.z * (1.0 / *S);
+    }
+#ifdef OPEN_LOOP
+    (void)t;
+#else
+    vec F = K * y.z + SIGMA * f.z;
+    f.v = (SPRING * (SPEED * t - y.x) - SIGMA_2 * v - ((F[0] + F[2]) + (F[1] + F[3]))) / MASS;
+#endif
+    return f;
+}
+
+static inline State at(const Dense *d, double theta)
+{
+    double rest = 1.0 - theta;
+    State y = plus(d->twist, rest, d->bump);
+    return plus(d->y, theta, plus(d->rise, rest, plus(d->bend, theta, y)));
+}
+
+/* Take every enabled edge, in element order (an edge taken enables no other); returns how many in
+ * all so far. */
+static int fire(Arc *arc, double t, double v, vec z, int count, double *times, int *what)
+{
+    double S = stribeck(v);
+    for (int i = 0; i < 4; i++) {
+        double s = W[i] * S;
+        int edge = -1;
+        if (arc->state[i] == STICK) {
+            if (z[i] >= s && v > V_C) edge = FORWARD;
+            else if (z[i] <= -s && v < -V_C) edge = BACKWARD;
+        } else if (fabs(v) <= V_C && fabs(z[i]) < s) edge = ARREST;
+        if (edge < 0) continue;
+        arc->state[i] = edge == ARREST ? STICK : SLIP;
+        times[count] = t;
+        what[count++] = 3 * i + edge;
+    }
+    return count;
+}
+
+/* Freeze signs and states into coefficients, and choose what is watched. */
+static void arm(Arc *arc, double v, vec z)
+{
+    double S = stribeck(v), sign = (v > 0.0) - (v < 0.0);
+    arc->slips = arc->any_z = arc->pinned = 0;
+    for (int i = 0; i < 4; i++) {
+        int slip = arc->state[i] == SLIP;
+        arc->zone[i] = (z[i] >= W[i] * S) - (z[i] <= -W[i] * S);
+        arc->a[i] = slip ? 0.0 : 1.0;
+        arc->b[i] = slip ? C[i] * sign : 0.0;
+        arc->c[i] = slip ? C[i] / W[i] : 0.0;
+        arc->slips |= slip;
+        arc->watch[i] = !slip || (fabs(v) <= V_C && arc->zone[i]);
+        arc->any_z |= arc->watch[i];
+        arc->pinned |= arc->watch[i] && arc->zone[i];
+    }
+    double speed = fabs(v), low = -V_DIP, high = V_DIP;
+    if (speed > V_DIP) {
+        low = nextafter(V_DIP, 1.0);
+        high = INFINITY;
+    } else if (arc->slips || arc->pinned) {
+        high = speed > V_C ? V_DIP : speed > 0.0 ? V_C : 0.0;
+        low = speed > V_C ? nextafter(V_C, 1.0) : speed > 0.0 ? nextafter(0.0, 1.0) : 0.0;
+    }
+    arc->v_low = v < 0.0 && low > 0.0 ? -high : low;
+    arc->v_high = v < 0.0 && low > 0.0 ? -low : high;
+}
+
+/* Margins of all watched comparisons; returns whether one has changed its truth. */
+static inline int changed(const Arc *arc, double S, double v, vec z, double *g)
+{
+    int any = !(v >= arc->v_low && v <= arc->v_high);
+    g[4] = arc->v_high - v;
+    g[5] = v - arc->v_low;
+    if (arc->any_z)
+        for (int i = 0; i < 4; i++) {
+            double s = W[i] * S;
+            g[i] = !arc->watch[i] ? 1.0 : arc->zone[i] ? arc->zone[i] * z[i] - s : s - fabs(z[i]);
+            any |= arc->zone[i] ? g[i] < 0.0 : g[i] <= 0.0;
+        }
+    return any;
+}
+
+static inline int look(const Arc *arc, const Dense *d, double theta, double *g)
+{
+    State y = at(d, theta);
+    double v = VELOCITY(d->t + theta * d->h, y);
+    return changed(arc, arc->any_z ? stribeck(v) : 0.0, v, y.z, g);
+}
+
+/* Look at m - 1 places between; returns the first changed one, else -1. */
+static double scan(const Arc *arc, const Dense *d, double end, int m, double *low, double *g)
+{
+    double seen[6];
+    for (int i = 1; i < m; i++) {
+        double theta = end * i / m;
+        if (look(arc, d, theta, seen)) {
+            memcpy(g + 6, seen, sizeof seen);
+            return theta;
+        }
+        memcpy(g, seen, sizeof seen);
+        *low = theta;
+    }
+    return -1.0;
+}
+
+/* Close the bracket down to a tick; returns its right end, where the change has happened.
+ * g holds six margins at the left end and six at the right. */
+static double bracket(const Arc *arc, const Dense *d, double *left, double high, double tick,
+                      double *g)
+{
+    double low = *left, seen[6];
+    int halve = 0, first = arc->any_z ? 0 : 4;
+    while (high - low > tick) {
+        double width = high - low, guess = 0.5 * (low + high);
+        if (!halve) {
+            guess = high;
+            for (int r = first; r < 6; r++)
+                if (g[6 + r] <= 0.0 && g[r] > g[6 + r]) {
+                    double root = low + width * (g[r] / (g[r] - g[6 + r]));
+                    if (root < guess) guess = root;
+                }
+        }
+        if (guess < low + 0.5 * tick) guess = low + 0.5 * tick;
+        if (guess > high - 0.5 * tick) guess = high - 0.5 * tick;
+        if (look(arc, d, guess, seen)) {
+            high = guess;
+            memcpy(g + 6, seen, sizeof seen);
+        } else {
+            low = guess;
+            memcpy(g, seen, sizeof seen);
+        }
+        halve = high - low > 0.5 * width;
+    }
+    *left = low;
+    return high;
+}
+
+/* May a comparison have changed and changed back inside the step? Sure not where |v| and |z| run
+ * one way: then both are largest, and s smallest, at an end. */
+static inline int suspicious(const Arc *arc, double h, vec z, vec z_new,
+                             double v, double v_new, double a, double a_new, double S, double S_new)
+{
+    double over = a * a_new > 0.0 ? 0.0 : 0.25 * h * MAX(fabs(a), fabs(a_new));
+    if (over > 0.0 && (MAX(v, v_new) + over > arc->v_high || MIN(v, v_new) - over < arc->v_low))
+        return 1;
+    if (!arc->any_z) return 0;
+    if (arc->pinned) return 1;
+    double fastest = MAX(fabs(v), fabs(v_new)) + over;
+    double farther = v * v_new > 0.0 ? 0.0 : 0.25 * h * fastest;
+    double least = over > 0.0 ? stribeck(fastest) : MIN(S, S_new);
+    int any = 0;
+    for (int i = 0; i < 4; i++)
+        any |= arc->watch[i] && MAX(fabs(z[i]), fabs(z_new[i])) + farther >= W[i] * least;
+    return any;
+}
+
+static inline void put(const Arc *arc, double t, State y, double *row)
+{
+    double v = VELOCITY(t, y);
+    vec dz = arc->a * v + arc->b;
+    if (arc->slips) dz -= arc->c * y.z * (1.0 / stribeck(v));
+    vec F = K * y.z + SIGMA * dz;
+    row[0] = t;
+    row[1] = y.x;
+    row[2] = v;
+    for (int i = 0; i < 4; i++) row[3 + i] = y.z[i];
+    row[7] = (F[0] + F[2]) + (F[1] + F[3]) + SIGMA_2 * v;
+}
+
+#define FLOW(c) flow(&arc, t + (c) * h, VELOCITY(t + (c) * h, y_new), y_new, &S_new)
+#define SUM(a, b, c) plus(plus(plus(y, h * (a), k1), h * (b), k2), h * (c), k3)
+#define SHARE(u) (fabs(h * e.u) / (ATOL + RTOL * MAX(fabs(y.u), fabs(y_new.u))))
+
+static inline int run(int rows, double *out, double *times, int *what)
+{
+    Arc arc = {.state = {STICK, STICK, STICK, STICK}};
+    Dense d;
+    State y = {{0.0}, 0.0, 0.0}, y_new, k1, k2, k3, k4, k5, k6, k7;
+    double g[12], t = 0.0, spacing = rows > 1 ? T_END / (rows - 1) : 0.0;
+    int count = 0, row = 0;
+    for (int stops = 0; t < T_END; stops++) {
+        if (stops == MOST_STOPS) return -1;
+        double v = VELOCITY(t, y), h = H_START;
+        count = fire(&arc, t, v, y.z, count, times, what);
+        arm(&arc, v, y.z);
+        double S = stribeck(v);
+        k1 = flow(&arc, t, v, y, &S);
+        double a = ACCELERATION(t, k1);
+        changed(&arc, S, v, y.z, g);
+        float before = -13.0f; /* log2 of the last error */
+        int rejected = 0, redone = 0;
+        for (int crossed = 0; !crossed && t < T_END;) {
+            double t_new = t + h;
+            if (t_new + 1e-13 >= T_END) {
+                t_new = T_END;
+                h = T_END - t;
+            }
+            double S_new = S;
+            y_new = plus(y, h * 0.2, k1);
+            k2 = FLOW(0.2);
+            y_new = plus(plus(y, h * (3.0 / 40.0), k1), h * (9.0 / 40.0), k2);
+            k3 = FLOW(0.3);
+            y_new = SUM(44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0);
+            k4 = FLOW(0.8);
+            y_new = SUM(19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0);
+            y_new = plus(y_new, h * (-212.0 / 729.0), k4);
+            k5 = FLOW(8.0 / 9.0);
+            y_new = SUM(9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0);
+            y_new = plus(plus(y_new, h * (49.0 / 176.0), k4), h * (-5103.0 / 18656.0), k5);
+            double v_new = VELOCITY(t_new, y_new);
+            k6 = flow(&arc, t_new, v_new, y_new, &S_new);
+            y_new = plus(plus(y, h * (35.0 / 384.0), k1), h * (500.0 / 1113.0), k3);
+            y_new = plus(plus(y_new, h * (125.0 / 192.0), k4), h * (-2187.0 / 6784.0), k5);
+            y_new = plus(y_new, h * (11.0 / 84.0), k6);
+#ifndef OPEN_LOOP
+            v_new = y_new.v;
+#endif
+            k7 = flow(&arc, t_new, v_new, y_new, &S_new);
+            State e = {{0.0}, 0.0, 0.0};
+            e = plus(plus(e, 71.0 / 57600.0, k1), -71.0 / 16695.0, k3);
+            e = plus(plus(e, 71.0 / 1920.0, k4), -17253.0 / 339200.0, k5);
+            e = plus(plus(e, 22.0 / 525.0, k6), -1.0 / 40.0, k7);
+            double worst = MAX(SHARE(x), SHARE(v));
+            for (int i = 0; i < 4; i++) worst = MAX(worst, SHARE(z[i]));
+            float size = log2f(MAX((float)worst, 1e-10f));
+            if (!(worst <= 1.0)) {
+                h *= MAX(0.2f, 0.9f * exp2f(-0.2f * size));
+                rejected = 1;
+                if (!(h > 1e-14)) return -1;
+                continue;
+            }
+            float factor = MAX(0.2f, 0.9f * exp2f(0.08f * before - 0.14f * size));
+            double h_next = h * MIN(rejected ? 1.0f : 10.0f, factor);
+            before = MAX(size, -13.0f);
+            rejected = 0;
+
+            if (arc.any_z && !arc.slips) S_new = stribeck(v_new);
+            double a_new = ACCELERATION(t_new, k7), theta = 1.0;
+            crossed = changed(&arc, S_new, v_new, y_new.z, g + 6);
+            int doubt = crossed || suspicious(&arc, h, y.z, y_new.z, v, v_new, a, a_new, S, S_new);
+            if (doubt || (row < rows && row * spacing < t_new)) {
+                d.t = t;
+                d.h = h;
+                State none = {{0.0}, 0.0, 0.0};
+                d.y = y;
+                d.rise = plus(y_new, -1.0, y);
+                d.bend = plus(plus(none, h, k1), -1.0, d.rise);
+                d.twist = plus(plus(d.rise, -h, k7), -1.0, d.bend);
+                d.bump = plus(none, -12715105075.0 / 11282082432.0 * h, k1);
+                d.bump = plus(d.bump, 87487479700.0 / 32700410799.0 * h, k3);
+                d.bump = plus(d.bump, -10690763975.0 / 1880347072.0 * h, k4);
+                d.bump = plus(d.bump, 701980252875.0 / 199316789632.0 * h, k5);
+                d.bump = plus(d.bump, -1453857185.0 / 822651844.0 * h, k6);
+                d.bump = plus(d.bump, 69997945.0 / 29380423.0 * h, k7);
+            }
+            if (doubt) {
+                double tick = 2e-14 / h, last[6], low = 0.0, quiet = 1.0, found = 1.0;
+                memcpy(last, g + 6, sizeof last);
+                if (crossed) {
+                    found = bracket(&arc, &d, &low, 1.0, 0.01, g);
+                    if (found < 0.9 && !redone) { /* the stages lay far behind: do it again */
+                        h *= 1.01 * found;
+                        redone = 1;
+                        crossed = 0;
+                        changed(&arc, S, v, y.z, g);
+                        continue;
+                    }
+                    theta = bracket(&arc, &d, &low, found, tick, g);
+                    State y_low = at(&d, quiet = low);
+                    double t_low = t + low * h, v_low = VELOCITY(t_low, y_low), S_low = 0.0;
+                    State f = flow(&arc, t_low, v_low, y_low, &S_low);
+                    if (arc.any_z && !arc.slips) S_low = stribeck(v_low);
+                    doubt = suspicious(&arc, low * h, y.z, y_low.z, v, v_low, a,
+                                       ACCELERATION(t_low, f), S, S_low);
+                }
+                while (doubt) { /* is there one before it? */
+                    changed(&arc, S, v, y.z, g);
+                    low = 0.0;
+                    if ((found = scan(&arc, &d, quiet, 16, &low, g)) < 0.0) break;
+                    crossed = 1;
+                    theta = bracket(&arc, &d, &low, found, tick, g);
+                    quiet = low;
+                }
+                if (!crossed) memcpy(g + 6, last, sizeof last);
+            }
+            redone = 0;
+            if (crossed) t_new = t + theta * h;
+            for (; row < rows && row * spacing < t_new; row++)
+                put(&arc, row * spacing, at(&d, (row * spacing - t) / h), out + COLUMNS * row);
+            if (crossed) y = at(&d, theta);
+            else {
+                y = y_new;
+                k1 = k7;
+                memcpy(g, g + 6, 6 * sizeof *g);
+            }
+            t = t_new;
+            v = v_new;
+            S = S_new;
+            a = a_new;
+            h = h_next;
+        }
+    }
+    count = fire(&arc, t, VELOCITY(t, y), y.z, count, times, what);
+    arm(&arc, VELOCITY(t, y), y.z);
+    put(&arc, t, y, out + (rows ? COLUMNS * (rows - 1) : 0));
+    return count;
+}
+
+/* End state only: out has 8 numbers (t, x, v, z1..z4, F). times, what (3 * element + edge; edges
+ * forward, backward, arrest) have room for a transition each. Returns their number, or -1. */
+int run_end(double *out, double *times, int *what) { return run(0, out, times, what); }
+
+/* The same with evenly spaced rows: out has shape (rows, 8). */
+int run_rows(int rows, double *out, double *times, int *what)
+{
+    return run(rows, out, times, what);
+}

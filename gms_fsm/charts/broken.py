@@ -1,0 +1,81 @@
+"""Broken readings of the GMS element's guards: what each of them gets wrong, as data.
+
+Each is one or two edges away from `gms_fsm.charts.gms` and looks right at first sight. They are a
+demonstration for `gms_fsm.prove` and for teaching, not models: no other part of the package uses
+them. All have the signed slip law, so that nothing but the guards is wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from gms_fsm.chart import Chart, Transition
+from gms_fsm.charts.gms import gms_element
+
+__all__ = ["BROKEN", "Broken"]
+
+
+@dataclass(frozen=True)
+class Broken:
+    """A chart with a fault.
+
+    Parameters
+    ----------
+    chart : Chart
+        The chart.
+    wrong : str
+        What is wrong with it, in one sentence.
+    domain : tuple of str, optional
+        The domain in which the fault shows; None for the usual one.
+    """
+
+    chart: Chart
+    wrong: str
+    domain: tuple[str, ...] | None = None
+
+
+def _reading(name: str, *edges: Transition) -> Chart:
+    return replace(gms_element("signed"), name=f"GMS element, {name}", transitions=edges)
+
+
+BROKEN: Mapping[str, Broken] = {
+    "overlap": Broken(
+        _reading(
+            "overlapping guards",
+            Transition("break_away", "stick", "slip", guard="abs(z) >= s"),
+            Transition("arrest", "slip", "stick", guard="abs(v) <= v_c"),
+        ),
+        "Break-away looks at z alone and arrest at v alone, so both hold at once and the element "
+        "switches without end: livelock.",
+    ),
+    "literal": Broken(
+        _reading(
+            "the paper's prose read literally",
+            Transition("break_away", "stick", "slip", guard="z >= s"),
+            Transition("arrest", "slip", "stick", guard="v <= v_c"),
+        ),
+        "The signs of z and v are forgotten as well: livelock at z = s, v = 0, and a backward "
+        "motion never breaks away.",
+    ),
+    "memoryless": Broken(
+        _reading(
+            "memoryless guards",
+            Transition("break_away", "stick", "slip", guard="abs(z) >= s"),
+            Transition("arrest", "slip", "stick", guard="abs(z) < s"),
+        ),
+        "The two guards never hold at once, but each is the other's negation: while s rises, stick "
+        "pushes z over s and slip lets it fall behind at once: chattering.",
+    ),
+    "arms": Broken(
+        _reading(
+            "break-away arms without velocity, s = 0 allowed",
+            Transition("break_away_forward", "stick", "slip", guard="z >= s"),
+            Transition("break_away_backward", "stick", "slip", guard="z <= -s"),
+            Transition("arrest", "slip", "stick", guard="abs(v) <= v_c and abs(z) < s"),
+        ),
+        "With s = 0 both break-away arms hold at once at z = 0, and which is taken is left to "
+        "priority.",
+        domain=("s >= 0", "v_c > 0", "C > 0"),
+    ),
+}

@@ -1,0 +1,67 @@
+"""Lesson 8: chart and if-else agree bit for bit when driven alike; a late look makes the residual.
+
+The spike and what is left after it are foretold from the lateness.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from gms_fsm.lessons import l8_chart_or_ifelse as lesson
+from tests.helpers import same_bits
+from tests.lesson_checks import check_figure, check_lines
+
+
+@pytest.fixture(scope="module")
+def result() -> lesson.Result:
+    return lesson.run()
+
+
+def test_driven_alike_they_are_identical(result: lesson.Result) -> None:
+    same_bits(result.chart, result.ifelse)
+    same_bits(result.chart_once, result.ifelse_once)
+    assert result.differ[0] == result.differ_once[0] == 0
+    assert result.differ_once[1] > 300_000
+
+
+def test_the_spike_is_the_step_of_F(result: lesson.Result) -> None:
+    """sum sigma_i (dz_slip - v), with dz_slip = 0 at z = s; t* from the cosine of the motion."""
+    w = 2 * math.pi / 25
+    t = math.acos(1 - 0.4 * w / 0.15) / w  # x = 0.15 (1 - cos w t) / w reaches s = F_c = 0.4
+    spike = (0.3 + 0.4 + 0.5 + 0.6) * 0.15 * math.sin(w * t)
+    first = result.chart.transitions.t[0]
+    assert first == pytest.approx(t, abs=1e-6)
+    measured = np.abs(result.residual[result.t == first])
+    assert measured == pytest.approx(spike, rel=1e-3)
+
+
+def test_what_is_left_is_in_proportion_to_the_lateness(result: lesson.Result) -> None:
+    assert (result.late > 0).all()
+    assert (result.late <= lesson.STEPS).all()
+    np.testing.assert_allclose(result.left, lesson.predicted(result.late, result.chart), rtol=0.01)
+    # About v late sum k: the way it was stretched too far, in all springs.
+    first = result.chart.transitions[0]
+    rough = first.v * result.late * 4 * 0.7
+    assert (result.left < rough).all()
+    assert (result.left > 0.9 * rough).all()
+
+
+def test_the_papers_size_takes_a_later_switch_than_its_step_allows(result: lesson.Result) -> None:
+    assert lesson.PAPER_STEP < result.late_for_the_papers < 4e-3
+    assert np.median(result.between(0.0, 4.9)) < 1e-5
+    plateau = np.median(result.between(5.0, 12.4))
+    assert 2e-5 < plateau < 5e-4
+
+
+def test_looked_at_once_a_step_the_arrests_are_missed(result: lesson.Result) -> None:
+    assert set(result.ifelse_once.transitions.edge) == {"break_away_forward"}
+    assert (result.chart.transitions.edge == "arrest").any()
+    assert result.between(13.0, lesson.END).max() > 1.0
+
+
+def test_lines_and_picture(result: lesson.Result) -> None:
+    check_lines(result)
+    check_figure(lesson, result)

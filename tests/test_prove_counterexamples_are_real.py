@@ -1,0 +1,211 @@
+"""On random charts every counterexample is real, and no point contradicts what is proved.
+
+Counterexamples are put into the guards and flows of the chart; what is proved is attacked with
+every point of a grid that holds the numbers the guards are made of, and with random points. The
+grid is of short binary fractions, so that floats compute these guards exactly.
+"""
+
+from __future__ import annotations
+
+import random
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+
+import pytest
+
+pytest.importorskip("z3", reason="needs z3 (extra: check)")
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gms_fsm import Chart, Finding, Report, State, Transition, prove
+from gms_fsm.expression import Value, evaluate, parse_value
+
+STEP = 2.0**-20  # s
+PASSES = 20
+NAMES = ("z", "v", "s", "v_c")
+SIGNED = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
+POSITIVE = (0.5, 1.0, 2.0)  # s and v_c: the domain
+GRID = [dict(zip(NAMES, point, strict=True))
+        for point in product(SIGNED, SIGNED, POSITIVE, POSITIVE)]  # fmt: skip
+DICE = random.Random(3)
+GRID += [
+    {"z": DICE.randint(-64, 64) / 16, "v": DICE.randint(-64, 64) / 16,
+     "s": DICE.randint(1, 64) / 16, "v_c": DICE.randint(1, 64) / 16}
+    for _ in range(500)
+]  # fmt: skip
+
+# --------------------------------------------------------------------------- random charts
+left_sides = st.sampled_from(
+    ["z", "abs(z)", "v", "abs(v)", "z * v", "z + v", "max(z, v)", "sgn(v) * z", "z ** 2", "z - v"]
+)
+right_sides = st.sampled_from(["s", "-s", "v_c", "-v_c", "0", "1", "0.5 * s", "s + v_c", "-0.5"])
+comparisons = st.builds(
+    "{} {} {}".format, left_sides, st.sampled_from(["<", "<=", ">", ">="]), right_sides
+)
+clauses = st.one_of(
+    comparisons,
+    comparisons.map("not {}".format),
+    st.builds("({} or {})".format, comparisons, comparisons),
+)
+guards = st.lists(clauses, min_size=1, max_size=3).map(" and ".join)
+flows = st.sampled_from(["v", "0", "1 - z / s", "sgn(v) - z / s", "-v", "abs(v)", "z * v"])
+actions = st.one_of(st.just({}), st.sampled_from([{"z": "0"}, {"z": "-z"}, {"z": "s"}]))
+
+
+@st.composite
+def charts(draw: st.DrawFn) -> Chart:
+    names = ["first", "second", "third"][: draw(st.integers(2, 3))]
+    ends = st.sampled_from(names)
+    edges = tuple(
+        Transition(f"edge{i}", draw(ends), draw(ends), draw(guards), draw(actions))
+        for i in range(draw(st.integers(2, 4)))
+    )
+    states = tuple(State(name, {"z": draw(flows)}) for name in names)
+    return Chart("random", ("v", "s"), ("z",), ("v_c",), states, edges, {"F": "z"})
+
+
+# --------------------------------------------------------------------------- what a point shows
+def edges_of(chart: Chart, where: Sequence[str]) -> list[Transition]:
+    by_name = {edge.name: edge for edge in chart.transitions}
+    return [by_name[name] for name in where if name in by_name]
+
+
+def passes(
+    chart: Chart, cycle: Sequence[Transition], point: Mapping[str, float]
+) -> Iterator[dict[str, float]]:
+    """Go around while the guards let us; yield the values after each pass."""
+    here = dict(point)
+    while True:
+        for edge in cycle:
+            if not evaluate(chart.guards[edge.name], here):
+                return
+            for name, tree in chart.assignments["action", edge.name].items():
+                here[name] = float(evaluate(tree, here))
+        yield dict(here)
+
+
+def goes_on(chart: Chart, cycle: Sequence[Transition], point: Mapping[str, float]) -> bool:
+    return sum(1 for _ in zip(range(PASSES), passes(chart, cycle, point), strict=False)) == PASSES
+
+
+def shown(chart: Chart, finding: Finding, point: Mapping[str, float]) -> bool:
+    """Whether a point contradicts a statement."""
+    edges = edges_of(chart, finding.where)
+    if finding.check == "determinism":
+        return len(edges) == 2 and all(evaluate(chart.guards[e.name], point) for e in edges)
+    if finding.check == "livelock":
+        return bool(edges) and goes_on(chart, edges, point)
+    raise AssertionError(finding.check)
+
+
+def after(chart: Chart, state: str, point: Mapping[str, float]) -> dict[str, float]:
+    rates = {"z": float(evaluate(chart.flows[state, "z"], point))}
+    rates |= {name: point.get(f"d{name}/dt", 0.0) for name in chart.inputs}
+    return {name: value + STEP * rates.get(name, 0.0) for name, value in point.items()}
+
+
+def in_domain(point: Mapping[str, float]) -> bool:
+    return point.get("s", 1.0) > 0 and point.get("v_c", 1.0) > 0
+
+
+def count_of(found: Report, seen: Counter[tuple[str, str]]) -> None:
+    for finding in found.findings:
+        seen[finding.check, finding.status] += 1
+        assert bool(finding.counterexample) <= (finding.status == "refuted")
+
+
+def test_refuted_is_shown_and_proved_is_not_broken() -> None:
+    seen: Counter[tuple[str, str]] = Counter()
+
+    @settings(max_examples=80, deadline=None, derandomize=True)
+    @given(charts())
+    def attack(chart: Chart) -> None:
+        found = prove(chart, ["s > 0", "v_c > 0"])
+        count_of(found, seen)
+        for finding in found.findings:
+            if finding.check in ("determinism", "livelock"):
+                if finding.status == "refuted":
+                    assert in_domain(finding.counterexample), finding
+                    assert shown(chart, finding, finding.counterexample), finding
+                elif finding.status == "proved":
+                    broken = [point for point in GRID if shown(chart, finding, point)]
+                    assert not broken, (finding, broken[0])
+            if finding.check == "reachability" and "never hold" in finding.text:
+                guard = chart.guards[finding.where[0]]
+                assert not any(evaluate(guard, point) for point in GRID), finding
+
+    attack()
+    for check in ("determinism", "livelock"):
+        for status in ("proved", "refuted"):
+            assert seen[check, status] >= 10, seen
+
+
+# --------------------------------------------------------------------------- on a surface
+surfaces = st.sampled_from(
+    ["s", "-s", "0.5 * s", "v", "1", "1 / s", "0.5 + abs(v)", "max(v, s)", "min(v, s)"]
+)
+rests = st.lists(
+    st.sampled_from(["v > v_c", "v <= v_c", "z > 0", "abs(v) <= v_c", "v < 0", "z * v >= 0"]),
+    max_size=2,
+)
+
+
+@st.composite
+def pairs(draw: st.DrawFn) -> Chart:
+    """Two states whose guards share a surface."""
+    surface = draw(surfaces)
+    go, back = (
+        " and ".join([f"z {op} {surface}", *draw(rests)])
+        for op in draw(st.sampled_from([(">=", "<"), ("<=", ">"), (">", "<="), (">", "<")]))
+    )
+    states = tuple(State(name, {"z": draw(flows)}) for name in ("first", "second"))
+    edges = (Transition("go", "first", "second", go), Transition("back", "second", "first", back))
+    return Chart(surface, ("v", "s"), ("z",), ("v_c",), states, edges, {"F": "z"})
+
+
+RATES = list(product((-1.0, -0.25, 0.0, 0.75), (-1.0, 0.0, 0.25)))
+
+
+def on_surface(surface: Value) -> Iterator[dict[str, float]]:
+    for point in GRID[:: len(SIGNED)]:
+        if point["v"] != 0:  # a flow may jump there
+            z = float(evaluate(surface, point))
+            yield from ({**point, "z": z, "ds/dt": ds, "dv/dt": dv} for ds, dv in RATES)
+
+
+def pushed(chart: Chart, surface: Value, point: Mapping[str, float]) -> bool:
+    """Whether each flow leads from the surface into the guard that leaves its state."""
+    moments = [after(chart, name, point) for name in ("first", "second")]
+    sides = [moment["z"] - evaluate(surface, moment) for moment in moments]
+    return (
+        point["z"] == evaluate(surface, point)
+        and sides[0] * sides[1] < 0
+        and all(
+            evaluate(chart.guards[edge], moment)
+            for edge, moment in zip(("go", "back"), moments, strict=True)
+        )
+    )
+
+
+def test_chattering_is_shown_by_a_short_step_of_each_flow() -> None:
+    seen: Counter[tuple[str, str]] = Counter()
+
+    @settings(max_examples=150, deadline=None, derandomize=True)
+    @given(pairs())
+    def attack(chart: Chart) -> None:
+        found = prove(chart, ["s > 0", "v_c > 0"])
+        count_of(found, seen)
+        (finding,) = found.of("chattering")
+        surface = parse_value(chart.name, NAMES)
+        if finding.status == "refuted":
+            example = finding.counterexample
+            assert in_domain(example)
+            assert pushed(chart, surface, {"v": 1.0, "s": 1.0, "v_c": 1.0, **example}), finding
+        elif finding.status == "proved":
+            broken = [p for p in on_surface(surface) if pushed(chart, surface, p)]
+            assert not broken, (finding, broken[0])
+
+    attack()
+    assert min(seen["chattering", status] for status in ("proved", "refuted")) >= 10, seen

@@ -1,0 +1,399 @@
+"""What is known of the GMS element's guards, and of their broken readings, is what is found.
+
+Every counterexample is put back into the chart's own guards and flows.
+"""
+
+from __future__ import annotations
+
+import doctest
+import inspect
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+
+pytest.importorskip("z3", reason="needs z3 (extra: check)")
+
+from gms_fsm import Chart, Finding, Report, State, Transition, prove
+from gms_fsm.charts import LAWS, LUGRE, gms_element
+from gms_fsm.charts.broken import BROKEN
+from gms_fsm.errors import ExpressionError, ParameterError
+from gms_fsm.expression import evaluate
+from gms_fsm.prove import CHECKS, Check, default_domain
+
+STEP = 2.0**-20  # s; exact in floats
+
+
+def report(name: str) -> Report:
+    """The report on a broken reading, in the domain where its fault shows."""
+    return prove(BROKEN[name].chart, BROKEN[name].domain)
+
+
+def passes(found: Report, *checks: Check) -> None:
+    """Assert that nothing is refuted or open in these checks."""
+    for check in checks:
+        assert {f.status for f in found.of(check)} == {"proved"}, check
+
+
+def only(found: Report, check: Check) -> Finding:
+    """The only thing refuted, which is of this check."""
+    (finding,) = found.refuted
+    assert finding.check == check
+    return finding
+
+
+def both_hold(chart: Chart, edges: tuple[str, str], point: Mapping[str, float]) -> bool:
+    return all(evaluate(chart.guards[edge], point) for edge in edges)
+
+
+def after_a_moment(chart: Chart, state: str, point: Mapping[str, float]) -> dict[str, float]:
+    """A short step with the flow of a state; inputs move at the rates of the example."""
+    rates = {name: float(evaluate(chart.flows[state, name], point)) for name in chart.variables}
+    rates |= {name: point.get(f"d{name}/dt", 0.0) for name in chart.inputs}
+    return {name: value + STEP * rates.get(name, 0.0) for name, value in point.items()}
+
+
+# --------------------------------------------------------------------------- the paper's guards
+@pytest.mark.parametrize("law", LAWS)
+def test_the_papers_guards_pass(law: str) -> None:
+    found = prove(gms_element(law))  # type: ignore[arg-type]
+    assert found.domain == ("s > 0", "C > 0", "v_c > 0")
+    passes(found, "determinism", "livelock", "reachability", "chattering")
+    assert found.of("determinism")[0].where == (
+        "stick", "break_away_forward", "break_away_backward"
+    )  # fmt: skip
+    assert [f.where for f in found.of("livelock")] == [
+        ("stick", "break_away_forward", "slip", "arrest"),
+        ("stick", "break_away_backward", "slip", "arrest"),
+    ]
+
+
+def test_the_published_law_is_unstable_for_v_below_0_and_the_signed_law_is_not() -> None:
+    published = gms_element("published")
+    finding = only(prove(published), "stability")
+    assert (finding.where, finding.case) == (("slip",), "z for v < 0")
+    assert "z = s" in finding.text
+    point = finding.counterexample
+    assert point["v"] < 0 < point["C"]
+    assert point["z"] == point["s"] > 0
+    flow = published.flows["slip", "z"]
+    assert evaluate(flow, point) == 0
+    assert evaluate(flow, {**point, "z": point["z"] + 0.25}) > 0  # away from it, on both sides
+    assert evaluate(flow, {**point, "z": point["z"] - 0.25}) < 0
+    assert prove(gms_element("signed")).refuted == ()
+
+
+def test_the_equilibria_are_named() -> None:
+    said = {f.case: f.text for f in prove(gms_element("signed")).of("stability")
+            if f.where == ("slip",)}  # fmt: skip
+    assert said == {
+        "z for v > 0": "stable: z = s attracts",
+        "z for v < 0": "stable: z = -s attracts",
+        "z for v = 0": "stable: z = 0 attracts",
+    }
+
+
+def test_lugre_has_nothing_to_contradict() -> None:
+    found = prove(LUGRE)
+    assert found.domain == ("s > 0", "sigma_0 > 0")
+    passes(found, *CHECKS)
+    assert "z = -s / sigma_0" in str(found)
+
+
+# --------------------------------------------------------------------------- broken readings
+def test_break_away_by_z_with_arrest_by_v_livelocks() -> None:
+    found = report("overlap")
+    finding = only(found, "livelock")
+    assert finding.where == ("stick", "break_away", "slip", "arrest")
+    point = finding.counterexample
+    assert 0 < abs(point["v"]) <= point["v_c"]
+    assert both_hold(found.chart, ("break_away", "arrest"), point)
+    passes(found, "determinism", "reachability", "chattering", "stability")
+
+
+def test_the_paper_read_literally_livelocks_at_z_equal_s_and_v_equal_0() -> None:
+    found = report("literal")
+    finding = only(found, "livelock")
+    assert both_hold(found.chart, ("break_away", "arrest"), finding.counterexample)
+    known = {"z": 1.0, "s": 1.0, "v": 0.0, "v_c": 1e-6}
+    assert both_hold(found.chart, ("break_away", "arrest"), known)
+    at_rest = prove(found.chart, ["s > 0", "v_c > 0", "C > 0", "v >= 0", "v <= 0", "z <= s"])
+    point = only(at_rest, "livelock").counterexample
+    assert (point["v"], point["z"]) == (0, point["s"])
+
+
+def test_memoryless_guards_chatter_while_s_rises() -> None:
+    found = report("memoryless")
+    finding = only(found, "chattering")
+    passes(found, "determinism", "livelock", "reachability", "stability")
+    point = finding.counterexample
+    assert point["ds/dt"] > 0
+    assert point["z"] == point["s"]
+    assert "z = s" in finding.text
+    stuck = after_a_moment(found.chart, "stick", point)
+    slipped = after_a_moment(found.chart, "slip", point)
+    for edge, there, other in (("break_away", stuck, slipped), ("arrest", slipped, stuck)):
+        assert evaluate(found.chart.guards[edge], there)
+        assert not evaluate(found.chart.guards[edge], other)
+
+
+def test_with_s_equal_0_both_arms_hold_unless_the_velocity_tells_them_apart() -> None:
+    arms = ("break_away_forward", "break_away_backward")
+    found = report("arms")
+    finding = only(found, "determinism")
+    assert finding.where == ("stick", *arms)
+    assert finding.counterexample == {"s": 0, "z": 0}
+    assert both_hold(found.chart, arms, finding.counterexample)
+    passes(prove(found.chart), "determinism")  # s > 0
+    # The paper's own arms ask for v > v_c and v < -v_c as well: they never hold at once.
+    passes(prove(gms_element("published"), ["s >= 0", "v_c > 0"]), "determinism")
+    passes(prove(gms_element("published"), []), "livelock")
+    loose = prove(gms_element("published"), ["s >= 0"])  # v_c < 0 allowed
+    point = loose.of("determinism")[0].counterexample
+    assert point["v_c"] < 0
+    assert both_hold(loose.chart, arms, point)
+
+
+def test_each_broken_reading_says_what_is_wrong() -> None:
+    for name, broken in BROKEN.items():
+        finding = report(name).refuted[0]
+        word = "at once" if finding.check == "determinism" else finding.check
+        assert word in broken.wrong
+
+
+# --------------------------------------------------------------------------- other charts
+def chart(go: str = "z >= s", back: str = "z < 0.5 * s", **changes: Any) -> Chart:
+    """Two states, two edges."""
+    sound: dict[str, Any] = {
+        "name": "two", "inputs": ("v", "s", "t", "x"), "variables": ("z",), "parameters": ("C",),
+        "states": (State("one", {"z": "v"}), State("two", {"z": "C * (sgn(v) - z / s)"})),
+        "transitions": (Transition("go", "one", "two", go), Transition("back", "two", "one", back)),
+        "outputs": {"F": "z"},
+    }  # fmt: skip
+    return Chart(**{**sound, **changes})
+
+
+def states(one: str = "v", two: str = "-z") -> dict[str, Any]:
+    return {"states": (State("one", {"z": one}), State("two", {"z": two}))}
+
+
+@pytest.mark.parametrize("flow", ["C * tanh(v)", "exp(-z)", "v - sin(z)", "sqrt(s)", "z ** 0.5"])
+def test_what_is_not_encoded_is_undecided_and_said(flow: str) -> None:
+    found = prove(chart(back="z < s", **states(two=flow)))
+    passes(found, "determinism", "livelock", "reachability")
+    (chattering,) = found.of("chattering")
+    words = "powers" if "**" in flow else f"{flow.partition('(')[0].split()[-1]} is not encoded"
+    for finding in (chattering, found.of("stability")[-1]):
+        assert finding.status == "undecided"
+        assert words in finding.text
+        assert not finding.counterexample
+
+
+def test_a_guard_that_is_not_encoded_leaves_open_what_rests_on_it() -> None:
+    found = prove(chart(go="exp(z) > s"))
+    open_ = {(f.check, f.where) for f in found.findings if f.status == "undecided"}
+    assert open_ == {
+        ("livelock", ("one", "go", "two", "back")), ("chattering", ("one", "go", "two", "back")),
+        ("reachability", ("go",)), ("reachability", ("one",)), ("reachability", ("two",)),
+    }  # fmt: skip
+
+
+def test_a_quotient_counts_only_where_its_denominator_is_not_0() -> None:
+    assert prove(chart(go="z / s >= 1")).of("livelock")[0].status == "proved"
+    (finding,) = prove(chart(go="z / v >= 1")).of("livelock")
+    assert finding.status == "undecided"
+    assert "v can be 0" in finding.text
+    assert prove(chart(go="z / v >= 1"), ["v > 0", "s > 0"]).of("livelock")[0].status == "refuted"
+
+
+def test_hysteresis_ends_chattering() -> None:
+    passes(prove(chart()), "livelock", "chattering")
+    (finding,) = prove(chart(back="z < s")).of("chattering")
+    assert finding.status == "refuted"
+
+
+@pytest.mark.parametrize(
+    ("one", "two", "status"),
+    [("1", "-1", "refuted"), ("-1", "1", "proved"), ("v", "v", "proved"), ("2", "1", "proved")],
+)
+def test_flows_chatter_where_they_meet_head_on(one: str, two: str, status: str) -> None:
+    found = prove(chart("z >= 1", "z < 1", **states(one, two)))
+    assert [f.status for f in found.of("chattering")] == [status]
+
+
+@pytest.mark.parametrize(
+    ("guard", "one", "two"),
+    [
+        ("w >= 0 and w <= 0", "1", "-1"),  # w rests on the edge of both guards
+        ("v >= 0 and v <= 0", "1 + sgn(v)", "sgn(v) - 1"),  # both flows jump there
+    ],
+)
+def test_what_first_order_cannot_tell_is_undecided(guard: str, one: str, two: str) -> None:
+    pair = tuple(State(n, {"z": flow, "w": "0"}) for n, flow in (("one", one), ("two", two)))
+    both = chart(f"z >= 1 and {guard}", f"z < 1 and {guard}", variables=("z", "w"), states=pair)
+    (finding,) = prove(both).of("chattering")
+    assert (finding.status, "first order" in finding.text) == ("undecided", True)
+
+
+def test_a_jump_in_a_guard_is_undecided_unless_an_example_is_found() -> None:
+    (finding,) = prove(chart("sgn(z) >= 1", "sgn(z) < 1", **states("1", "-1"))).of("chattering")
+    assert (finding.status, finding.text) == ("undecided", "sgn jumps in a guard")
+
+
+@pytest.mark.parametrize(
+    ("corner", "one", "two", "status"),
+    [
+        ("min(t, 2 - t)", "-0.5", "-1.5", "refuted"),  # from t = 1 on it falls at 1 / s
+        ("max(t, 2 - t)", "1.5", "0.5", "refuted"),  # ... rises
+        ("1 + abs(t - 1)", "1.5", "0.5", "refuted"),
+        ("1 + abs(t - 1)", "-0.5", "-1.5", "proved"),  # what it did before does not matter
+    ],
+)
+def test_at_a_corner_what_comes_next_counts(corner: str, one: str, two: str, status: str) -> None:
+    pair = chart(f"z >= {corner}", f"z < {corner}", **states(one, two))
+    (finding,) = prove(pair, ["t >= 1", "t <= 1"]).of("chattering")
+    assert finding.status == status
+
+
+def test_t_runs_and_x_moves_with_v() -> None:
+    for surface, one, two in (("t", "2", "0.5"), ("x", "v + 1", "v - 1")):
+        pair = (f"z >= {surface}", f"z < {surface}")
+        (finding,) = prove(chart(*pair, **states(one, two))).of("chattering")
+        assert finding.status == "refuted"
+        assert not [name for name in finding.counterexample if name.endswith("/dt")]
+        passes(prove(chart(*pair, **states(two, one))), "chattering")
+
+
+def test_states_and_guards_without_use_are_found() -> None:
+    lost = chart(
+        states=(*states()["states"], State("three", {"z": "0"})),
+        transitions=(
+            Transition("go", "one", "two", "z >= s and z < 0"),
+            Transition("leave", "three", "one", "z > s"),
+        ),
+    )
+    found = {(f.where, f.text.partition(":")[0]) for f in prove(lost).refuted}
+    assert found == {
+        (("go",), "its guard can never hold"),
+        (("one",), "no edge leaves it"),
+        (("two",), "no edge leaves it"),
+        (("two",), "no chain of edges leads to it"),
+        (("three",), "no chain of edges leads to it"),
+    }
+
+
+@pytest.mark.parametrize(
+    ("action", "status", "words"),
+    [
+        ({"z": "0"}, "proved", "ends it"),
+        ({"z": "z"}, "refuted", "at one point"),
+        ({"z": "-z"}, "undecided", "no more than two"),
+        ({"z": "3 * s"}, "proved", "never all enabled"),
+    ],
+)
+def test_what_an_edge_assigns_can_end_a_livelock(
+    action: dict[str, str], status: str, words: str
+) -> None:
+    edges = (
+        Transition("go", "one", "two", "z >= s or z <= -s", action),
+        Transition("back", "two", "one", "abs(z) <= 2 * s"),
+    )
+    (finding,) = prove(chart(transitions=edges)).of("livelock")
+    assert (finding.status, words in finding.text) == (status, True)
+    assert prove(chart(transitions=edges)).of("chattering")[0].status == "undecided"
+
+
+def test_an_edge_from_a_state_to_itself_livelocks() -> None:
+    edges = (Transition("again", "one", "one", "z > s"),)
+    (finding,) = prove(chart(transitions=edges)).of("livelock")
+    assert (finding.status, finding.where) == ("refuted", ("one", "again"))
+    reset = (Transition("again", "one", "one", "z > s", {"z": "0"}),)
+    passes(prove(chart(transitions=reset)), "livelock")
+
+
+def test_flows_that_are_not_linear_or_hang_together_are_undecided() -> None:
+    for flow, words in (("v * abs(z)", "not linear"), ("-sgn(z)", "not linear")):
+        finding = prove(chart(**states(two=flow))).of("stability")[-1]
+        assert finding.status == ("proved" if finding.case.endswith("= 0") else "undecided")
+        assert any(words in f.text for f in prove(chart(**states(two=flow))).of("stability"))
+    pair = tuple(State(name, {"z": "w", "w": "-z - w"}) for name in ("one", "two"))
+    for finding in prove(chart(variables=("z", "w"), states=pair)).of("stability"):
+        assert (finding.status, "too" in finding.text) == ("undecided", True)
+
+
+# --------------------------------------------------------------------------- examples, honesty
+def test_a_point_that_floats_cannot_hold_is_no_refutation() -> None:
+    (finding,) = prove(chart("z ** 2 >= 2", "z ** 2 <= 2")).of("livelock")
+    assert finding.status == "undecided"
+    assert "1.41421" in finding.text
+
+
+def test_a_point_beyond_floats_is_no_refutation() -> None:
+    (finding,) = prove(chart("z > 1e300 * 1e300", "z > 0")).of("livelock")
+    assert finding.status == "undecided"
+    assert "z = beyond floats" in finding.text
+
+
+def test_a_point_that_rounding_hides_is_no_refutation() -> None:
+    pair = ("z + 1e-20 > 1", "z <= 1 and z > 0.5 and z + 1e-20 >= z and z >= 1")
+    (finding,) = prove(chart(*pair)).of("livelock")
+    assert finding.status == "undecided"
+    assert "rounding hides it" in finding.text
+
+
+def test_a_long_question_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.modules[Report.__module__], "PATIENCE", 0.1)
+    hard = " and ".join(
+        f"({a}*{b}*{b} - {c}*{d}*{d} + {a}*{d}*{c} - 1)**2 <= 0"
+        for a, b, c, d in ("efgh", "fghj", "ghjl", "hjle", "jlef")
+    )
+    found = prove(chart(f"{hard} and z > 0", "z > 0", parameters=(*"Cefghjl",)))
+    (finding,) = found.of("livelock")
+    assert (finding.status, finding.text) == ("undecided", "z3 gave up after 0.1 s")
+
+
+def test_a_text_of_high_degree_is_not_tried() -> None:
+    (finding,) = prove(chart("(z * v) ** 8 * s > 1", "z > 0")).of("livelock")
+    assert (finding.status, "degree 17" in finding.text) == ("undecided", True)
+
+
+def test_the_report_says_what_was_asked_and_of_what() -> None:
+    found = prove(gms_element("published"))
+    assert [check for check in CHECKS if found.of(check)] == list(CHECKS)
+    text = str(found)
+    assert text.startswith("GMS element, published law\nassumed: s > 0, C > 0, v_c > 0\n")
+    assert "over the reals, not floats" in text
+    assert "18 proved, 1 refuted, 0 undecided" in text
+    assert "for example at C = 1, v = -1, s = 1, z = 1" in text
+    assert str(prove(gms_element("published"))) == text
+
+
+def test_only_names_of_the_shipped_charts_are_assumed_positive() -> None:
+    own = chart(parameters=("C", "share", "k"), go="z >= share * s")
+    assert default_domain(own) == ("s > 0", "C > 0")
+    assert prove(own, "s > 0").domain == ("s > 0",)
+    assert prove(own, []).domain == ()
+
+
+@pytest.mark.parametrize(
+    ("domain", "error", "words"),
+    [
+        (["s > 0", "s < 0"], ParameterError, "holds nowhere"),
+        (["s > q"], ExpressionError, "domain, column 5: unknown name 'q'"),
+        (["exp(s) > 1"], ParameterError, "exp is not encoded"),
+        (["z / s > 1"], ParameterError, "without"),
+    ],
+)
+def test_a_domain_that_makes_no_sense_is_refused(
+    domain: list[str], error: type[Exception], words: str
+) -> None:
+    with pytest.raises(error, match=words):
+        prove(chart(), domain)
+
+
+def test_the_example_of_the_docstring_is_true() -> None:
+    text = (inspect.getdoc(prove) or "").replace("# doctest: +SKIP", "")
+    example = doctest.DocTestParser().get_doctest(text, {"prove": prove}, "prove", None, None)
+    assert len(example.examples) == 4
+    assert doctest.DocTestRunner().run(example).failed == 0
