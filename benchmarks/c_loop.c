@@ -3,7 +3,7 @@
  * Four GMS elements under the signed law. Without OPEN_LOOP a mass is pulled through a spring for
  * 60 s (72 transitions); with it v = 0.2 sin(2 pi t / 20) is given for 61 s (48 transitions).
  * Dormand-Prince 5(4), max-norm, dense output, every crossing located on it, a fresh small step
- * after each. All numbers are constants, nothing is general. C99 and the vectors of GCC and Clang.
+ * after each. All numbers are constants, nothing is general.
  *
  *     cc -O3 -march=native -std=c99 -ffp-contract=off -shared -fPIC [-DOPEN_LOOP] c_loop.c -lm
  *
@@ -17,8 +17,9 @@
 #define MAX(a, b) ((a) > (b) ? (a) : (b))
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
 
-typedef double vec __attribute__((vector_size(32))); /* one number an element */
-typedef struct { vec z; double x, v; } State;
+typedef struct { double z[4], x, v; } State;
+
+#define ELEMENTS for (int i = 0; i < 4; i++)
 
 enum { STICK, SLIP };
 enum { FORWARD, BACKWARD, ARREST };
@@ -26,7 +27,7 @@ enum { COLUMNS = 8, MOST_STOPS = 1000 };
 
 static const double RTOL = 1e-6, ATOL = 1e-9, V_C = 1e-6;
 #ifdef OPEN_LOOP
-static const vec K = {0.7, 0.7, 0.7, 0.7}, SIGMA = {0.3, 0.4, 0.5, 0.6};
+static const double K[4] = {0.7, 0.7, 0.7, 0.7}, SIGMA[4] = {0.3, 0.4, 0.5, 0.6};
 static const double C[4] = {0.1, 0.05, 0.025, 1e-4}, W[4] = {1.0, 1.0, 1.0, 1.0};
 static const double SIGMA_2 = 0.1, F_C = 0.4, F_S = 1.5, V_S = 1e-3, T_END = 61.0;
 static const double OMEGA = 2.0 * 3.14159265358979323846 / 20.0, AMPLITUDE = 0.2;
@@ -34,7 +35,7 @@ static const double H_START = 0.01;
 #define VELOCITY(t, y) (AMPLITUDE * sin(OMEGA * (t)))
 #define ACCELERATION(t, f) ((void)(f), AMPLITUDE * OMEGA * cos(OMEGA * (t)))
 #else
-static const vec K = {40.0, 30.0, 20.0, 10.0}, SIGMA = {0.4, 0.3, 0.2, 0.1};
+static const double K[4] = {40.0, 30.0, 20.0, 10.0}, SIGMA[4] = {0.4, 0.3, 0.2, 0.1};
 static const double C[4] = {0.02, 0.02, 0.02, 0.02};
 static const double W[4] = {1.0 / 160.0, 1.0 / 120.0, 1.0 / 80.0, 1.0 / 40.0};
 static const double SIGMA_2 = 0.4, F_C = 1.0, F_S = 1.5, V_S = 0.05, T_END = 60.0;
@@ -46,7 +47,7 @@ static const double MASS = 1.0, SPRING = 2.0, SPEED = 0.1, H_START = 0.03;
 
 typedef struct {
     int state[4];
-    vec a, b, c;       /* dz = a v + b - c z / S */
+    double a[4], b[4], c[4]; /* dz = a v + b - c z / S */
     int slips, pinned; /* any element in slip; any watched one with |z| >= s */
     int any_z, watch[4], zone[4];
     double v_low, v_high; /* v is in here, ends included, as long as nothing changes */
@@ -62,22 +63,32 @@ static inline double stribeck(double v) /* beyond V_DIP the rest is below roundi
 
 static inline State plus(State y, double a, State k)
 {
-    return (State){y.z + a * k.z, y.x + a * k.x, y.v + a * k.v};
+    ELEMENTS y.z[i] += a * k.z[i];
+    y.x += a * k.x;
+    y.v += a * k.v;
+    return y;
+}
+
+static inline double force(const double *z, const double *dz)
+{
+    double F = 0.0;
+    ELEMENTS F += K[i] * z[i] + SIGMA[i] * dz[i];
+    return F;
 }
 
 /* Slope with all states frozen; sets s(v) if it is needed. */
 static inline State flow(const Arc *arc, double t, double v, State y, double *S)
 {
-    State f = {arc->a * v + arc->b, v, 0.0};
+    State f = {{0.0}, v, 0.0};
+    ELEMENTS f.z[i] = arc->a[i] * v + arc->b[i];
     if (arc->slips) {
-        *S = stribeck(v);
-        f.z -= arc->c * y.z * (1.0 / *S);
+        double share = 1.0 / (*S = stribeck(v));
+        ELEMENTS f.z[i] -= arc->c[i] * y.z[i] * share;
     }
 #ifdef OPEN_LOOP
     (void)t;
 #else
-    vec F = K * y.z + SIGMA * f.z;
-    f.v = (SPRING * (SPEED * t - y.x) - SIGMA_2 * v - ((F[0] + F[2]) + (F[1] + F[3]))) / MASS;
+    f.v = (SPRING * (SPEED * t - y.x) - SIGMA_2 * v - force(y.z, f.z)) / MASS;
 #endif
     return f;
 }
@@ -91,7 +102,7 @@ static inline State at(const Dense *d, double theta)
 
 /* Take every enabled edge, in element order (an edge taken enables no other); returns how many in
  * all so far. */
-static int fire(Arc *arc, double t, double v, vec z, int count, double *times, int *what)
+static int fire(Arc *arc, double t, double v, const double *z, int count, double *times, int *what)
 {
     double S = stribeck(v);
     for (int i = 0; i < 4; i++) {
@@ -110,7 +121,7 @@ static int fire(Arc *arc, double t, double v, vec z, int count, double *times, i
 }
 
 /* Freeze signs and states into coefficients, and choose what is watched. */
-static void arm(Arc *arc, double v, vec z)
+static void arm(Arc *arc, double v, const double *z)
 {
     double S = stribeck(v), sign = (v > 0.0) - (v < 0.0);
     arc->slips = arc->any_z = arc->pinned = 0;
@@ -138,7 +149,7 @@ static void arm(Arc *arc, double v, vec z)
 }
 
 /* Margins of all watched comparisons; returns whether one has changed its truth. */
-static inline int changed(const Arc *arc, double S, double v, vec z, double *g)
+static inline int changed(const Arc *arc, double S, double v, const double *z, double *g)
 {
     int any = !(v >= arc->v_low && v <= arc->v_high);
     g[4] = arc->v_high - v;
@@ -209,7 +220,7 @@ static double bracket(const Arc *arc, const Dense *d, double *left, double high,
 
 /* May a comparison have changed and changed back inside the step? Sure not where |v| and |z| run
  * one way: then both are largest, and s smallest, at an end. */
-static inline int suspicious(const Arc *arc, double h, vec z, vec z_new,
+static inline int suspicious(const Arc *arc, double h, const double *z, const double *z_new,
                              double v, double v_new, double a, double a_new, double S, double S_new)
 {
     double over = a * a_new > 0.0 ? 0.0 : 0.25 * h * MAX(fabs(a), fabs(a_new));
@@ -229,14 +240,13 @@ static inline int suspicious(const Arc *arc, double h, vec z, vec z_new,
 static inline void put(const Arc *arc, double t, State y, double *row)
 {
     double v = VELOCITY(t, y);
-    vec dz = arc->a * v + arc->b;
-    if (arc->slips) dz -= arc->c * y.z * (1.0 / stribeck(v));
-    vec F = K * y.z + SIGMA * dz;
+    double dz[4], share = arc->slips ? 1.0 / stribeck(v) : 0.0;
+    ELEMENTS dz[i] = arc->a[i] * v + arc->b[i] - arc->c[i] * y.z[i] * share;
     row[0] = t;
     row[1] = y.x;
     row[2] = v;
-    for (int i = 0; i < 4; i++) row[3 + i] = y.z[i];
-    row[7] = (F[0] + F[2]) + (F[1] + F[3]) + SIGMA_2 * v;
+    ELEMENTS row[3 + i] = y.z[i];
+    row[7] = force(y.z, dz) + SIGMA_2 * v;
 }
 
 #define FLOW(c) flow(&arc, t + (c) * h, VELOCITY(t + (c) * h, y_new), y_new, &S_new)
@@ -293,7 +303,7 @@ static inline int run(int rows, double *out, double *times, int *what)
             e = plus(plus(e, 71.0 / 1920.0, k4), -17253.0 / 339200.0, k5);
             e = plus(plus(e, 22.0 / 525.0, k6), -1.0 / 40.0, k7);
             double worst = MAX(SHARE(x), SHARE(v));
-            for (int i = 0; i < 4; i++) worst = MAX(worst, SHARE(z[i]));
+            ELEMENTS worst = MAX(worst, SHARE(z[i]));
             float size = log2f(MAX((float)worst, 1e-10f));
             if (!(worst <= 1.0)) {
                 h *= MAX(0.2f, 0.9f * exp2f(-0.2f * size));

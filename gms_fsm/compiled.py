@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 import importlib.util
-import inspect
 import os
 import threading
 from collections.abc import Callable
@@ -121,12 +119,37 @@ def _loaded(
     for helper in (sgn, piecewise_linear):
         compiled.usable_inside(helper)
     # The name of a module that exists: numba imports it when it loads machine code from disk.
-    names: dict[str, Any] = {"piecewise_linear": piecewise_linear, "__name__": __name__}
+    names: dict[str, Any] = {"piecewise_linear": piecewise_linear, "pow": _power()}
+    names["__name__"] = __name__
     for name, call in callables:
         names[f"{name}_signal"] = _compiled_signal(name, call)
     # A user's function may change without its text changing: such code is not kept.
     path = None if callables else _text_file(source)
     return load("compiled program", source, names, path), path is not None
+
+
+@functools.cache
+def _power() -> Any:
+    """Return ``pow`` of the C library, which `math.pow` is.
+
+    Left to itself LLVM makes 8**z an exp2 and z**0.5 a sqrt, whose last bits are others.
+    """
+    from numba import types
+    from numba.core.cgutils import ir
+    from numba.extending import intrinsic
+
+    def call(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        number = ir.DoubleType()
+        declared = builder.module.globals.get("pow") or ir.Function(
+            builder.module, ir.FunctionType(number, [number, number]), "pow"
+        )
+        declared.attributes.add("nobuiltin")
+        return builder.call(declared, arguments)
+
+    def power(_typing: Any, _base: Any, _exponent: Any) -> Any:
+        return types.float64(types.float64, types.float64), call
+
+    return intrinsic(power)
 
 
 @functools.cache
@@ -150,13 +173,14 @@ def cache_folder() -> Path | None:
 
 def _text_file(source: str) -> Path | None:
     """Write a generated text where numba's cache can refer to it; None where nothing can be."""
+    from integrators import compiled
+
     folder = cache_folder()
     if folder is None:
         return None
-    stamp = hashlib.sha256(source.encode())
-    for part in (sgn, piecewise_linear, _loaded):  # what else decides the machine code
-        stamp.update(inspect.getsource(part).encode())
-    path = folder / f"program_{stamp.hexdigest()[:16]}.py"
+    # What else decides the machine code.
+    stamp = compiled.digest(sgn, piecewise_linear, _loaded.__wrapped__, text=source)
+    path = folder / f"program_{stamp}.py"
     try:
         if not path.exists():
             written_whole(path, lambda file: file.write(source.encode()))

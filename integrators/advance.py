@@ -8,7 +8,14 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from integrators.crossings import NO_CHANGE, Margins, Watched, copy_margins, first_change
+from integrators.crossings import (
+    NO_CHANGE,
+    Margins,
+    Watched,
+    copy_margins,
+    first_change,
+    nothing_near,
+)
 from integrators.step_size import error_norm, next_factor, retry_factor
 from integrators.steps import (
     Coefficients,
@@ -184,9 +191,12 @@ def advance(
 
         wanted = cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] < t_new
         theta = NO_CHANGE
-        if watching or wanted:
+        near = watching and not nothing_near(
+            margins, t, t_new, y, f, work.y_new, work.f_new, mode, p, w
+        )
+        if near or wanted:
             fit_dense(method, h_now, y, work.k, work.y_new, work.f_new, work.dense)
-        if watching:
+        if near:
             theta = first_change(
                 interpolate, work.dense, margins, t, t_new, work.y_new, mode, p, w,
                 control.resolution,

@@ -16,19 +16,29 @@ import time
 import typing
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
 import numpy as np
 
 from integrators import advance, crossings, loop, step_size, steps
 
-__all__ = ["SIGNATURES", "arrays", "cache_folder", "compiled", "record", "usable_inside"]
+__all__ = [
+    "SIGNATURES",
+    "arrays",
+    "cache_folder",
+    "compiled",
+    "digest",
+    "for_each_row",
+    "record",
+    "usable_inside",
+]
 
 # Every function that `record` reaches. Those of a step are inlined: a call hands on ten arrays,
 # which takes as long as their work does.
 _OF_A_STEP: tuple[Callable[..., Any], ...] = (
     advance.put_row, crossings.any_changed, crossings.copy_margins, crossings.first_change,
-    crossings._bracket, crossings._is_quiet, crossings._search,
+    crossings.nothing_near, crossings._bracket, crossings._is_quiet, crossings._search,
     step_size.error_norm, step_size.next_factor, step_size.retry_factor,
     steps.fit_dense, steps.interpolate, steps.take_step, steps.weigh,
 )  # fmt: skip
@@ -36,7 +46,6 @@ _OF_AN_ARC: tuple[Callable[..., Any], ...] = (
     advance.advance, loop.active_relations, loop.go_on, loop._look_at_clock, loop._often_changed,
     loop._rearm, loop._undefined, step_size.starting_step,
 )  # fmt: skip
-_MODULES = ("compiled", "steps", "step_size", "crossings", "advance", "loop")
 _ARRAYS: Mapping[Any, tuple[type[Any], int]] = {
     list[float]: (np.float64, 1),
     tuple[float, ...]: (np.float64, 1),
@@ -100,6 +109,34 @@ def _array(value: Any, hint: Any) -> Any:
 
 
 # --------------------------------------------------------------------------- the cache on disk
+def digest(*functions: Callable[..., Any], text: str = "") -> str:
+    """Return a short name for what some functions do.
+
+    Of their code as it was loaded, not of their files: these may have been replaced under a running
+    program, which would then keep its old code under the new name.
+
+    Parameters
+    ----------
+    *functions : callable
+        Python functions.
+    text : str
+        What else counts.
+
+    Returns
+    -------
+    str
+        16 hexadecimal digits.
+    """
+    stamp = hashlib.sha256(text.encode())
+    codes = [function.__code__ for function in functions]
+    while codes:
+        code = codes.pop()
+        codes += [u for u in code.co_consts if isinstance(u, CodeType)]
+        constants = [u for u in code.co_consts if not isinstance(u, CodeType)]
+        stamp.update(repr((code.co_code, code.co_names, code.co_varnames, constants)).encode())
+    return stamp.hexdigest()[:16]
+
+
 def cache_folder(base: Path) -> Path | None:
     """Return the folder to keep compiled code in, or None if it cannot be written.
 
@@ -116,10 +153,15 @@ def cache_folder(base: Path) -> Path | None:
     """
     import numba
 
-    stamp = hashlib.sha256(f"{sys.version} {numba.__version__}".encode())
-    for module in _MODULES:
-        stamp.update(Path(__file__).with_name(f"{module}.py").read_bytes())
-    folder = base / stamp.hexdigest()[:16]
+    functions: list[Callable[..., Any]] = [loop.record, _machine_code, *_OF_A_STEP, *_OF_AN_ARC]
+    modules = (steps, step_size, crossings, advance, loop)
+    constants = [
+        (name, value if isinstance(value, int | float) else getattr(value, "_fields", None))
+        for module in modules
+        for name, value in vars(module).items()
+    ]
+    parts = sys.version, numba.__version__, _OPTIONS, SIGNATURES, constants
+    folder = base / digest(*functions, text=repr(parts))
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):

@@ -22,7 +22,16 @@ from typing import Any, NamedTuple
 
 from integrators.steps import Vector
 
-__all__ = ["DEEPEST", "NO_CHANGE", "Margins", "Watched", "any_changed", "first_change", "watched"]
+__all__ = [
+    "DEEPEST",
+    "NO_CHANGE",
+    "Margins",
+    "Watched",
+    "any_changed",
+    "first_change",
+    "nothing_near",
+    "watched",
+]
 
 Margins = Callable[..., Any]  # margins(t, y, mode, p, watch, out) -> None, fills watched entries
 NO_CHANGE = 2.0
@@ -103,6 +112,52 @@ def copy_margins(w: Watched, source: Vector, target: Vector) -> None:
     """Copy the active margins."""
     for r in w.active:
         target[r] = source[r]
+
+
+def nothing_near(
+    margins: Margins,
+    t: float,
+    t_new: float,
+    y: Vector,
+    f: Vector,
+    y_new: Vector,
+    f_new: Vector,
+    mode: list[int],
+    p: Any,
+    w: Watched,
+) -> bool:
+    """Tell whether a whole step is quiet: most are, and then no dense output is needed.
+
+    Expects ``w.start`` filled with the margins at t; fills ``w.end`` with those at t_new. The place
+    between is that of the cubic through both ends and both slopes.
+
+    Parameters
+    ----------
+    margins : callable
+        ``margins(t, y, mode, p, watch, out)``.
+    t, t_new : float
+        Ends of the step.
+    y, f, y_new, f_new : list of float, shape (m,)
+        State and slope there.
+    mode, p
+        Handed on.
+    w : Watched
+        Relations.
+
+    Returns
+    -------
+    bool
+        False if `first_change` has to look.
+    """
+    margins(t_new, y_new, mode, p, w.watch, w.end)
+    if any_changed(w, w.end):
+        return False
+    h = t_new - t
+    middle = w.y_probe
+    for j in range(len(y)):
+        middle[j] = 0.5 * (y[j] + y_new[j]) + 0.125 * h * (f[j] - f_new[j])
+    margins(t + 0.5 * h, middle, mode, p, w.watch, w.probe)
+    return not any_changed(w, w.probe) and _is_quiet(w, w.start, w.probe, w.end)
 
 
 def first_change(
