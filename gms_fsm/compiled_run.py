@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,7 @@ class CompiledRun:
     """
 
     def __init__(self, start: Start, machines: ElementMachines | None = None) -> None:
+        self.start = start
         program = start.program
         names = ("flow" if start.options.located else "flow_live", "arm", "margins", "switch")
         self.functions = [
@@ -47,6 +48,27 @@ class CompiledRun:
         self.engine: MachineEngine | None = None
         if machines is not None:
             self.engine = MachineEngine(machines, program, start.mode)
+
+    @property
+    def buffers(self) -> hybrid.Buffers:
+        """Where the loop keeps its state."""
+        return self.columns.buffers
+
+    def kept(self) -> dict[str, Any]:
+        """Return what the columns hold, for a checkpoint."""
+        return self.columns.state()
+
+    def go_on_from(self, kept: dict[str, Any]) -> None:
+        """Take over what `kept` returned; the buffers are filled already."""
+        self.columns.put_back(kept)
+        counts: Any = self.buffers.memory.counts
+        t, y, mode = self.columns.latest
+        if self.engine is not None:
+            self.engine.go_on_from(t, y, mode, self.start.program.p)
+            if counts[loop.PHASE] == loop.FIRE:  # its callbacks have run, the loop is yet to follow
+                edge = self.start.model.chart.transitions[counts[loop.EDGE]]
+                element = self.engine.machines.elements[counts[loop.MACHINE]]
+                self.engine.machines.machine.set_state(edge.target, element)
 
     def begin_again(self, model: Model, rig: Rig) -> None:
         """Start over with other numbers; signals and initial values stay.
@@ -90,7 +112,7 @@ class CompiledRun:
         if happening == loop.FIRING:
             self._replay(self.engine)
         elif happening != loop.ROWS:
-            error = hybrid.failure(happening, b, start.program.relations)
+            error = hybrid.failure(happening, columns.as_lists(), start.program.relations)
             raise explained(error, columns) from None
         return True
 
@@ -132,7 +154,9 @@ class Columns:
         ints: Any = functools.partial(np.zeros, dtype=np.int64)
         self.buffers = dataclasses.replace(
             b,
-            method=arrays(b.method), control=b.control, plan=arrays(b.plan),
+            method=arrays(b.method),
+            control=b.control._replace(rtol=float(b.control.rtol), atol=float(b.control.atol)),
+            plan=arrays(b.plan),
             memory=arrays(b.memory), relations=arrays(b.relations), work=arrays(b.work),
             out=arrays(b.out)._replace(rows_t=floats(rows), rows_y=floats((rows, size))),
             y=array(b.y),
@@ -168,6 +192,17 @@ class Columns:
         b.y[:], b.mode[:], b.out.cursor[:] = start.y, start.mode, [0, 0, 0]
         log.counts[:] = [0, min(1, len(log.stops_t))]
 
+    def state(self) -> dict[str, Any]:
+        """Return what was kept, as arrays, for a checkpoint."""
+        out = self.buffers.out
+        return {**self.log._asdict(), "rows_t": out.rows_t, "rows_y": out.rows_y}
+
+    def put_back(self, state: Mapping[str, Any]) -> None:
+        """Take over what `state` returned."""
+        self.log = loop.Log(**{name: state[name] for name in self.log._fields})
+        out = self.buffers.out._replace(rows_t=state["rows_t"], rows_y=state["rows_y"])
+        self.buffers = dataclasses.replace(self.buffers, out=out)
+
     def make_room(self) -> None:
         """Double the columns that are full."""
         out, log = self.buffers.out, self.log
@@ -192,6 +227,14 @@ class Columns:
         """Time, state and modes reached."""
         b: Any = self.buffers
         return float(b.memory.now[loop.T]), b.y.tolist(), tuple(b.mode.tolist())
+
+    def as_lists(self) -> hybrid.Buffers:
+        """Return the buffers with time, state and modes as Python's own numbers, for messages."""
+        b: Any = self.buffers
+        memory = b.memory._replace(now=b.memory.now.tolist(), counts=b.memory.counts.tolist())
+        return dataclasses.replace(
+            self.buffers, memory=memory, y=b.y.tolist(), mode=b.mode.tolist()
+        )
 
     def observe(self, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
         """Return v, F, s, F_i, dz of a state."""

@@ -12,6 +12,22 @@ if TYPE_CHECKING:
     from gms_fsm.trace import Trace
 
 
+LONGEST_SHOWN = 120  # characters of a value in a message
+
+
+def shown(value: object, longest: int = LONGEST_SHOWN) -> str:
+    """Return a value as a message can show it: its text in Python, cut where it is long.
+
+    >>> shown("abc"), shown([1] * 1000, 12)
+    ("'abc'", '[1, 1, 1, 1, ...')
+    """
+    try:
+        text = repr(value)
+    except (RecursionError, ValueError):  # nested too deeply; a whole number of 5,000 digits
+        return "..."
+    return text if len(text) <= longest else f"{text[:longest]} ..."
+
+
 class GMSError(Exception):
     """Base of every error this package raises on purpose."""
 
@@ -73,6 +89,10 @@ class SignalError(GMSError, ValueError):
 
 class TraceFileError(GMSError, ValueError):
     """A trace file is damaged, incomplete or not a trace."""
+
+
+class CheckpointError(GMSError, ValueError):
+    """A checkpoint is damaged, or belongs to another run."""
 
 
 class OutputError(GMSError, OSError):

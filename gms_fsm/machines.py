@@ -7,7 +7,7 @@ registered by a user (``on_enter_slip``, ``after`` ...) run, once a firing.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 from transitions import Machine
@@ -202,8 +202,17 @@ class MachineEngine:
         self.places = [
             (variable, program.first + j * n) for j, variable in enumerate(self.chart.variables)
         ]
-        for element, state in zip(machines.elements, mode, strict=True):
-            machines.machine.set_state(self.chart.states[state].name, element)
+        self.set_states(mode)
+
+    def go_on_from(self, t: float, y: list[float], mode: Sequence[int], p: Arguments) -> None:
+        """Put every element where it was when a run was interrupted."""
+        self.set_states(mode)
+        self.show(t, y, list(mode), p)  # perhaps between two firings of a set
+
+    def set_states(self, mode: Sequence[int]) -> None:
+        """Put every element into a state, without callbacks."""
+        for element, state in zip(self.machines.elements, mode, strict=True):
+            self.machines.machine.set_state(self.chart.states[state].name, element)
 
     def show(self, t: float, y: list[float], mode: list[int], p: Arguments) -> None:
         """Put the present values at hand of every element."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -124,6 +124,29 @@ class Recorder:
                 if output == "t_eval":
                     self.stops.add(t, 0, y, mode)
                 self.latest = (t, y, mode)
+
+    def state(self) -> dict[str, Any]:
+        """Return what was kept, as arrays, for a checkpoint."""
+        size, n = self.start.program.size, self.start.model.n
+        tables = {"rows": self.rows, "stops": self.stops}
+        kept = {
+            f"{name}_{column}": values
+            for name, table in tables.items()
+            for column, values in vars(table.rows(size, n)).items()
+        }
+        return kept | {"log": np.asarray(log_of(self.log))}
+
+    def put_back(
+        self, state: Mapping[str, Any], latest: tuple[float, list[float], tuple[int, ...]]
+    ) -> None:
+        """Take over what `state` returned, and the state reached."""
+        for name in ("rows", "stops"):
+            t, microstep, y, mode = (
+                state[f"{name}_{column}"].tolist() for column in ("t", "microstep", "y", "mode")
+            )
+            setattr(self, name, _Columns(t, microstep, y, [tuple(row) for row in mode]))
+        self.log = state["log"].tolist()
+        self.latest = latest
 
     def _record(self, firing: Firing) -> tuple[Any, ...]:
         chart, i = self.start.model.chart, firing.machine

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 from numpy.typing import ArrayLike
 
 import integrators
+from gms_fsm.checkpoint import Keeper
 from gms_fsm.compiled_run import CompiledRun
 from gms_fsm.errors import ParameterError, SignalError, SimulationError
 from gms_fsm.machines import ElementMachines, IfElse, MachineEngine
@@ -18,7 +20,8 @@ from gms_fsm.recording import Moment, Recorder, check_end, explained
 from gms_fsm.rigs import Rig
 from gms_fsm.start import Start
 from gms_fsm.trace import Trace
-from integrators import Arc, Firing, HybridError
+from integrators import Arc, Firing, HybridError, hybrid
+from integrators.loop import T
 
 __all__ = ["Moment", "Run", "simulate"]
 
@@ -41,6 +44,8 @@ def simulate(
     t_eval: ArrayLike | None = None,
     initial: Mapping[str, Any] | None = None,
     progress: Callable[[Moment], object] | None = None,
+    checkpoint: str | Path | None = None,
+    checkpoint_every: float = 60.0,
 ) -> Trace:
     """Run a friction model on a rig.
 
@@ -87,6 +92,12 @@ def simulate(
         and ``x`` [m].
     progress : callable, optional
         Called now and then with the `Moment` reached.
+    checkpoint : str or Path, optional
+        A file for the state of a long run, written now and then. If it is there when the run
+        starts, the run goes on from it, bit for bit as if it had not been interrupted; at the end
+        the file is removed.
+    checkpoint_every : float
+        s of the computer's time between two checkpoints.
 
     Returns
     -------
@@ -97,6 +108,8 @@ def simulate(
     ------
     ParameterError, SignalError
         If an argument breaks its rule.
+    CheckpointError
+        If the checkpoint belongs to another run, or is damaged.
     SimulationError
         If the run cannot go on (`LivelockError`, `StepSizeError`, `NotFiniteError`,
         `SignalEndError`); its ``trace`` holds the part before.
@@ -124,9 +137,14 @@ def simulate(
         initial=initial,
     )  # fmt: skip
     run = CompiledRun(start, machines) if engine == "compiled" else Run(start, machines)
+    keeper = None if checkpoint is None else Keeper(run, Path(checkpoint), checkpoint_every)
     while run.advance():
+        if keeper is not None:
+            keeper.look()
         if progress is not None:
             progress(Moment(run.recorder))
+    if keeper is not None:
+        keeper.finish()
     return run.recorder.trace()
 
 
@@ -151,18 +169,29 @@ class Run:
 
     def __init__(self, start: Start, machines: ElementMachines | None = None) -> None:
         self.start = start
-        switch: MachineEngine | IfElse
-        if start.settings["engine"] == "ifelse":
-            switch = IfElse(start.program)
-        else:
+        switch: MachineEngine | IfElse = IfElse(start.program)
+        self.engine: MachineEngine | None = None
+        if start.settings["engine"] != "ifelse":
             machines = ElementMachines(start.model) if machines is None else machines
-            switch = MachineEngine(machines, start.program, start.mode)
+            switch = self.engine = MachineEngine(machines, start.program, start.mode)
         self.recorder = Recorder(start)
         self.happening: Arc | Firing | integrators.Stop | None = None  # the latest
-        self.happenings = integrators.run(
-            system(start.program), switch, start.t_start, start.y, start.mode, start.last,
-            start.options,
-        )  # fmt: skip
+        made = system(start.program)
+        self.buffers = hybrid.buffers(
+            made, start.t_start, start.y, start.mode, start.last, start.options
+        )
+        self.happenings = hybrid.happenings(made, switch, self.buffers, start.options)
+
+    def kept(self) -> dict[str, Any]:
+        """Return what the recorder holds, for a checkpoint."""
+        return self.recorder.state()
+
+    def go_on_from(self, kept: dict[str, Any]) -> None:
+        """Take over what `kept` returned; the buffers are filled already."""
+        b = self.buffers
+        self.recorder.put_back(kept, (b.memory.now[T], list(b.y), tuple(b.mode)))
+        if self.engine is not None:
+            self.engine.go_on_from(*self.recorder.latest, self.start.program.p)
 
     def advance(self) -> bool:
         """Let the next thing happen.

@@ -90,7 +90,7 @@ def arrays(record: Any) -> Any:
     >>> from integrators.steps import coefficients
     >>> from integrators.tableaux import HEUN
     >>> arrays(coefficients(HEUN)).A.tolist()
-    [[0.0, 0.0], [1.0, 0.0]]
+    [[0.0], [1.0]]
     """
     hints = _hints(type(record))
     return type(record)(*(_array(value, hints[name]) for name, value in record._asdict().items()))

@@ -32,7 +32,10 @@ __all__ = [
     "Stop",
     "Switch",
     "System",
+    "buffers",
+    "happenings",
     "run",
+    "state_of",
 ]
 
 ROWS_AT_ONCE = 512  # a buffer
@@ -226,13 +229,34 @@ def run(
     Livelock, StepTooSmall, NotFinite
         When it cannot go on; all before has been yielded.
     """
-    b = buffers(system, t, list(y), list(mode), t_end, options)
+    return happenings(system, switch, buffers(system, t, y, mode, t_end, options), options)
+
+
+def happenings(
+    system: System, switch: Switch, b: Buffers, options: Options
+) -> Iterator[Arc | Stop | Firing]:
+    """Go on from where some buffers are; see `run`.
+
+    Between two happenings the buffers hold all there is to know of the run (`state_of`).
+
+    Parameters
+    ----------
+    system, switch, options
+        As in `run`.
+    b : Buffers
+        From `buffers`, perhaps with a state put back.
+
+    Yields
+    ------
+    Arc, Stop or Firing
+        As `run`.
+    """
     flow = system.flow if options.located else system.flow_live
     solver = None
     if b.plan.foreign:
         from integrators.scipy_arcs import SciPyStepper
 
-        solver = SciPyStepper(system, flow, b, options, t)
+        solver = SciPyStepper(system, flow, b, options)
     now, counts, cursor, y, mode = b.memory.now, b.memory.counts, b.out.cursor, b.y, b.mode
     before: tuple[Vector, tuple[int, ...]] = [], ()
     while True:
@@ -295,7 +319,7 @@ def buffers(
     Parameters
     ----------
     system, t, y, mode, t_end, options
-        As in `run`; y and mode are used, not copied.
+        As in `run`.
     capacity : int, optional
         Room for rows.
 
@@ -344,8 +368,8 @@ def buffers(
             room=[0] * r,
             f=vector(),
         ),
-        y=y,
-        mode=mode,
+        y=list(y),
+        mode=list(mode),
         held=[0.0] * system.held,
         relations=watched(system.strict, size),
         out=Output(
@@ -363,6 +387,26 @@ def buffers(
             dense=Dense(vector(), vector(), vector(), vector(), vector()),
         ),
     )
+
+
+def state_of(b: Buffers) -> dict[str, Any]:
+    """Return the lists (or arrays) that say how far a run is; not copies.
+
+    Parameters
+    ----------
+    b : Buffers
+        Of a run between two happenings.
+
+    Returns
+    -------
+    dict
+        By name; to go on bit for bit, put copies of them back into buffers made alike.
+    """
+    w = b.relations
+    return {
+        **b.memory._asdict(), "y": b.y, "mode": b.mode, "held": b.held, "watch": w.watch,
+        "truth": w.truth, "start": w.start, "cursor": b.out.cursor,
+    }  # fmt: skip
 
 
 def beginning(t: float, t_end: float) -> Vector:

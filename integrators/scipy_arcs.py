@@ -41,20 +41,15 @@ class SciPyStepper:
     Parameters
     ----------
     system, flow, buffers, options
-        The run.
-    origin : float
-        Where the grid of a fixed ``step`` starts; the solver is led from grid point to grid point
-        (it keeps its error control, so it may take several steps to each).
+        The run. With a fixed ``step`` the solver is led from grid point to grid point (it keeps its
+        error control, so it may take several steps to each).
     """
 
-    def __init__(
-        self, system: System, flow: Flow, buffers: Buffers, options: Options, origin: float
-    ) -> None:
+    def __init__(self, system: System, flow: Flow, buffers: Buffers, options: Options) -> None:
         if not (isinstance(options.method, type) and issubclass(options.method, OdeSolver)):
             raise TypeError(f"method {options.method!r} is not a scipy.integrate.OdeSolver class")
         self.system, self.flow, self.buffers = system, flow, buffers
         self.options = options
-        self.origin = origin
         self.solver: Any = None
 
     def advance(self, most_steps: int) -> None:
@@ -73,10 +68,10 @@ class SciPyStepper:
         if cursor[NEXT_KNOT] < len(knots):
             limit = min(limit, knots[cursor[NEXT_KNOT]])
         if self.options.step:
-            index = int((t - self.origin) / self.options.step) + 1
-            while self.origin + index * self.options.step - t <= b.control.resolution:
+            index = int((t - b.control.origin) / self.options.step) + 1
+            while b.control.origin + index * self.options.step - t <= b.control.resolution:
                 index += 1
-            limit = min(limit, self.origin + index * self.options.step)
+            limit = min(limit, b.control.origin + index * self.options.step)
         return limit
 
     def _solver_to(self, limit: float, t: float) -> Any:
