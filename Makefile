@@ -3,14 +3,15 @@
 #   make test    all tests
 #   make lint    formatting, style, types, import contracts
 #   make core    the tests with only the required dependencies
-#   make bench   speed against hand-written SciPy
+#   make bench   speed and error against C, SciPy, CVODE and PathSim
 #   make gallery the pictures kept under docs/, shown in docs/gallery.md
+#   make docs    the documentation -> folder site/, to be opened from disk
 PYTHON ?= python3
 VENV ?= .venv
 RUN := $(VENV)/bin
 PIP := $(RUN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: paper test lint core bench gallery clean
+.PHONY: paper test lint core bench gallery docs clean
 .DEFAULT_GOAL := test
 
 $(VENV)/bin/python:
@@ -23,7 +24,15 @@ $(VENV)/all.stamp: pyproject.toml | $(VENV)/bin/python
 
 $(VENV)/dev.stamp: pyproject.toml | $(VENV)/bin/python
 	$(PIP) install -e ".[dev]"
+	@touch $@ $(VENV)/all.stamp $(VENV)/docs.stamp
+
+$(VENV)/docs.stamp: pyproject.toml | $(VENV)/bin/python
+	$(PIP) install -e ".[docs]"
 	@touch $@ $(VENV)/all.stamp
+
+$(VENV)/bench.stamp: pyproject.toml | $(VENV)/bin/python
+	$(PIP) install -e ".[dev,bench]"
+	@touch $@ $(VENV)/dev.stamp
 
 .venv-core/stamp: pyproject.toml
 	$(PYTHON) -m venv .venv-core
@@ -45,13 +54,16 @@ lint: $(VENV)/dev.stamp
 core: .venv-core/stamp
 	.venv-core/bin/python -m pytest -n auto tests gms_fsm integrators
 
-bench: $(VENV)/dev.stamp
-	$(RUN)/python benchmarks/pulled_mass.py
+bench: $(VENV)/bench.stamp
+	$(RUN)/python benchmarks/compare.py
 	$(RUN)/python benchmarks/live_frames.py
 	$(RUN)/python benchmarks/overview_figure.py
 
 gallery: $(VENV)/all.stamp
 	$(RUN)/python docs/make_pictures.py
 
+docs: $(VENV)/docs.stamp
+	$(RUN)/sphinx-build --quiet --fail-on-warning --keep-going -d .docs-cache/doctrees docs site
+
 clean:
-	rm -rf $(VENV) .venv-core paper build *.egg-info
+	rm -rf $(VENV) .venv-core .docs-cache paper site build *.egg-info

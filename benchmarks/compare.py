@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import ctypes
-import dataclasses
 import datetime
 import functools
 import json
@@ -24,6 +23,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -32,8 +32,19 @@ from typing import Any
 import numpy as np
 from rivals import EDGES, OPEN_LOOP, PULLED_MASS, RIVALS, Array, Case, Outcome
 
-from gms_fsm import GMS, GMSParameters, Prescribed, PulledSlider, Stribeck, simulate
+from gms_fsm import (
+    GMS,
+    GMSParameters,
+    Prescribed,
+    PulledSlider,
+    Stribeck,
+    Sweep,
+    simulate,
+    sweep,
+)
+from gms_fsm.compiled_run import CompiledRun
 from gms_fsm.errors import MissingExtraError, ParameterError
+from gms_fsm.start import Start
 
 ROWS = 6001
 NONE = np.empty(0)
@@ -95,6 +106,27 @@ def ours(case: Case, **how: Any) -> Outcome:
     return Outcome(log.t, log.element, log.edge.tolist(), trace.z)
 
 
+def kernel(case: Case) -> Callable[[], Outcome]:
+    """Return a call of the compiled loop without all that `simulate` does before and after."""
+    model, rig = model_and_rig(case)
+    start = Start.of(model, rig, case.t_end, engine="compiled", output="end")
+    made: list[CompiledRun] = []
+
+    def run() -> Outcome:
+        if not made:
+            made.append(CompiledRun(start))
+        columns = made[0].columns
+        columns.begin_again(model, rig)
+        while made[0].advance():
+            pass
+        log, count = columns.log, columns.log.counts[0]
+        edge = [EDGES[i] for i in np.asarray(log.edge[:count]).tolist()]
+        z = columns.buffers.y[-model.n :]
+        return Outcome(log.t[:count].copy(), log.machine[:count].copy(), edge, z[None].copy())
+
+    return run
+
+
 def c_loop(case: Case, folder: Path) -> Callable[[Array], Outcome]:
     """Compile the C loop; calls through ctypes."""
     library = folder / f"{'open' if case.signal else 'closed'}.so"
@@ -129,6 +161,7 @@ def contestants(case: Case, folder: Path) -> Iterator[tuple[str, bool, Callable[
         run = functools.partial(ours, case, engine=engine)
         yield f"gms-fsm, {engine}", True, functools.partial(run, t_eval=times)
         yield f"gms-fsm, {engine}", False, functools.partial(run, output="end")
+    yield "gms-fsm, compiled, kernel alone", False, kernel(case)
     for name, rival in RIVALS.items():
         yield name, True, functools.partial(rival, case, times)
         yield name, False, functools.partial(rival, case, NONE)
@@ -257,6 +290,33 @@ def length(rounds: int) -> Table:
     )  # fmt: skip
 
 
+# --------------------------------------------------------------------------- sweeps
+def many(count: int, threads: int = 1, **options: Any) -> Sweep:
+    """Run the pulled mass with k varied by 20 %, w = 1/(4k)."""
+    k = PULLED_MASS.k * np.random.default_rng(1).uniform(0.8, 1.2, (count, 4))
+    varied = {"k": k, "weights": 1 / (4 * k)}
+    with ThreadPoolExecutor(threads) as executor:
+        return sweep(*model_and_rig(PULLED_MASS), 60.0, varied, executor=executor, **options)
+
+
+def sweeps(rounds: int) -> Table:
+    """How many runs a second, and how many of them are wrong."""
+    count = 1000 if rounds > 3 else 200
+    right = many(count, rtol=1e-12, atol=1e-15)
+    table = []
+    for threads in (1, 2):
+        result = many(count, threads)
+        rate = count / min(seconds(lambda n=threads: many(count, n)) for _ in range(3))
+        wrong = sum(result.sequence(run) != right.sequence(run) for run in range(count))
+        failed = int((result.outcome != "ok").sum())
+        table.append((f"{threads}", f"{rate:,.0f}", f"{wrong} of {count:,}", f"{failed}"))
+    return Table(
+        f"Sweep: {count:,} pulled masses, 60 s each, end states",
+        ("threads", "runs a second", "wrong event sequences", "failed"), table,
+        "k varied by 20 %, w = 1/(4k), rtol 1e-6; right is rtol 1e-12.",
+    )  # fmt: skip
+
+
 # --------------------------------------------------------------------------- in child processes
 def child(task: str, **environment: str) -> dict[str, float]:
     """Run a task of `TASKS` in a process of its own."""
@@ -293,15 +353,6 @@ def first_call(law: str) -> dict[str, float]:
     return {"seconds": seconds(lambda: compiled(model, 1.0))}
 
 
-def many(count: int) -> list[float]:
-    """Run a sweep over F_s, keeping what one wants to know of each run."""
-    found = []
-    for F_s in np.linspace(1.2, 1.8, count):
-        model, rig = model_and_rig(dataclasses.replace(PULLED_MASS, F_s=F_s))
-        found.append(simulate(model, rig, 60.0, engine="compiled", output="end").F[-1])
-    return found
-
-
 TASKS: dict[str, tuple[str, Callable[[], dict[str, float]]]] = {
     "run_end": (
         "6,000 s, end state",
@@ -315,7 +366,8 @@ TASKS: dict[str, tuple[str, Callable[[], dict[str, float]]]] = {
         "10,000 elements, 12 s, end state",
         lambda: grown(lambda: compiled(bank(10_000, False), 12.0, output="end")),
     ),
-    "sweep": ("sweep of 1,000 runs of 60 s, end states", lambda: grown(lambda: many(1000))),
+    "sweep_100": ("sweep of 100 runs of 60 s, end states", lambda: grown(lambda: many(100))),
+    "sweep_1000": ("sweep of 1,000 runs of 60 s, end states", lambda: grown(lambda: many(1000))),
     "signed": ("", lambda: first_call("signed")),
     "published": ("", lambda: first_call("published")),
 }
@@ -324,7 +376,7 @@ TASKS: dict[str, tuple[str, Callable[[], dict[str, float]]]] = {
 def memory(_: int) -> Table:
     """Peak memory of processes that do one thing."""
     table = []
-    for task in ("run_end", "run_all", "bank_end", "sweep"):
+    for task in ("run_end", "run_all", "bank_end", "sweep_100", "sweep_1000"):
         found = child(task)
         grew = found["after"] - found["before"]
         table.append((TASKS[task][0], f"{found['before']:.0f} MB", f"{grew:.1f} MB"))
@@ -352,7 +404,7 @@ def first(_: int) -> Table:
 SECTIONS: dict[str, Callable[[int], Table]] = {
     "closed": lambda rounds: runs(PULLED_MASS, rounds),
     "open": lambda rounds: runs(OPEN_LOOP, rounds),
-    "size": size, "length": length, "memory": memory, "first": first,
+    "size": size, "length": length, "sweeps": sweeps, "memory": memory, "first": first,
 }  # fmt: skip
 
 

@@ -113,13 +113,20 @@ def run_command(
     live: Annotated[
         bool, typer.Option("--live", help="Show every element's state while it runs.")
     ] = False,
+    checkpoint: Annotated[
+        bool,
+        typer.Option(
+            "--checkpoint",
+            help="Keep the state in the folder once a minute; the same command goes on from it.",
+        ),
+    ] = False,
 ) -> None:
     """Run a scenario; write trace, transition log, overview figure and summary."""
     loaded = load_scenario(scenario, overrides or [])
     folder = Path("out") / scenario.stem if output is None else output
     start, end = loaded.arguments["t_start"], loaded.arguments["t_end"]
     with LiveView(Console(stderr=True), start, end, detail=live) as view:
-        trace, files = run_scenario(loaded, folder, view)
+        trace, files = run_scenario(loaded, folder, view, checkpoint=checkpoint)
     if loaded.motion is not None and (note := velocity_note(trace, loaded.motion)):
         _plain_warning(note)
     typer.echo(f"{len(trace.transitions)} transitions; {len(files)} files in {folder}")

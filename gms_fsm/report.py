@@ -82,7 +82,11 @@ def measured_force(record: Record) -> tuple[FloatArray, FloatArray]:
 
 
 def run_scenario(
-    loaded: Loaded, folder: str | Path, progress: Callable[[Moment], object] | None = None
+    loaded: Loaded,
+    folder: str | Path,
+    progress: Callable[[Moment], object] | None = None,
+    *,
+    checkpoint: bool = False,
 ) -> tuple[Trace, list[Path]]:
     """Run a scenario and write trace, log, figure and summary.
 
@@ -94,6 +98,8 @@ def run_scenario(
         Made where missing, before anything is run.
     progress : callable, optional
         Handed to `simulate`.
+    checkpoint : bool
+        Keep the state of the run in ``run.checkpoint``; a run interrupted there goes on from it.
 
     Returns
     -------
@@ -111,7 +117,10 @@ def run_scenario(
     """
     folder = output_folder(folder)
     try:
-        trace = simulate(loaded.model, loaded.rig, progress=progress, **loaded.arguments)
+        trace = simulate(
+            loaded.model, loaded.rig, progress=progress,
+            checkpoint=folder / "run.checkpoint" if checkpoint else None, **loaded.arguments,
+        )  # fmt: skip
     except SimulationError as error:
         kept = error.trace.save(folder / "partial.npz")
         told = str(error).replace(" is kept in .trace", " is kept")

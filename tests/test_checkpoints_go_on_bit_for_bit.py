@@ -19,6 +19,8 @@ import scipy.integrate
 from gms_fsm import ElementMachines, Prescribed, Trace, simulate
 from gms_fsm.checkpoint import Keeper
 from gms_fsm.errors import CheckpointError, OutputError, ParameterError
+from gms_fsm.report import run_scenario
+from gms_fsm.scenario import load_scenario
 from tests.helpers import open_loop, pulled_mass, same_bits, stick_slip
 
 ENGINES = [
@@ -187,3 +189,26 @@ def test_it_is_written_as_often_as_asked(tmp_path: Path, monkeypatch: pytest.Mon
     path = tmp_path / "run.checkpoint"
     simulate(stick_slip("signed"), open_loop(), 25.0, checkpoint=path, checkpoint_every=1e6)
     assert len(saved) == 1  # at the start
+
+
+def test_the_command_line_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`gms-fsm run --checkpoint`, interrupted, then the same command again."""
+    loaded = load_scenario(Path(__file__).parents[1] / "scenarios" / "pulled_mass.toml", [])
+    told = itertools.count(1)
+
+    def stop(_: object) -> None:
+        if next(told) == 30:
+            raise Interrupted
+
+    with pytest.raises(Interrupted):
+        run_scenario(loaded, tmp_path, stop, checkpoint=True)
+    assert (tmp_path / "run.checkpoint").exists()
+    done = subprocess.run(
+        [sys.executable, "-c", "from gms_fsm.cli import main; main()", "run", str(loaded.path),
+         "-o", str(tmp_path), "--checkpoint", "--set", "output.figures=[]"],
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert not (tmp_path / "run.checkpoint").exists()
+    whole = simulate(loaded.model, loaded.rig, **loaded.arguments)
+    same_bits(Trace.load(tmp_path / "trace.npz"), whole)
