@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gms_fsm.errors import ParameterError
+from gms_fsm.errors import ParameterError, shown
 
 __all__ = ["PAPER_COLUMNS", "FloatArray", "GMSParameters", "Stribeck"]
 
@@ -24,7 +24,9 @@ def checked_scalar(name: str, value: float, rule: str) -> float:
     try:
         number = float(value)
     except (TypeError, ValueError):
-        raise ParameterError(f"{name} is {value!r}; it must be a number") from None
+        raise ParameterError(f"{name} is {shown(value)}; it must be a number") from None
+    except OverflowError:  # a whole number that no float can hold
+        raise ParameterError(f"{name} is too large a number; it must be finite") from None
     if not math.isfinite(number):
         raise ParameterError(f"{name} is {number!r}; it must be finite")
     if (rule == "> 0" and number <= 0) or (rule == ">= 0" and number < 0):
@@ -37,7 +39,9 @@ def checked_array(name: str, values: ArrayLike, n: int | None, rule: str) -> Flo
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
-        raise ParameterError(f"{name} is {values!r}; it must be a list of numbers") from None
+        raise ParameterError(f"{name} is {shown(values)}; it must be a list of numbers") from None
+    except OverflowError:
+        raise ParameterError(f"{name} has too large a number; it must be finite") from None
     if array.ndim != 1 or array.size == 0:
         raise ParameterError(
             f"{name} has shape {array.shape}; it must be a flat list of numbers, not empty"
@@ -69,8 +73,8 @@ class Stribeck:
     Raises
     ------
     ParameterError
-        Naming the parameter, its value and the rule. With s = 0 both break-away guards could hold
-        at once, hence F_c > 0.
+        Naming the parameter, its value and the rule. With s = 0 both ``z >= s`` and ``z <= -s``
+        could hold at once, and z / s means nothing, hence F_c > 0.
 
     Examples
     --------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from gms_fsm.compiled_run import CompiledRun
 from gms_fsm.errors import ParameterError, SignalError, SimulationError
 from gms_fsm.machines import ElementMachines, IfElse, MachineEngine
 from gms_fsm.models import Model
+from gms_fsm.monitors import Monitor, checked, watched
 from gms_fsm.program import system
 from gms_fsm.recording import Moment, Recorder, check_end, explained
 from gms_fsm.rigs import Rig
@@ -46,6 +47,7 @@ def simulate(
     progress: Callable[[Moment], object] | None = None,
     checkpoint: str | Path | None = None,
     checkpoint_every: float = 60.0,
+    monitors: str | Iterable[str | Monitor] = (),
 ) -> Trace:
     """Run a friction model on a rig.
 
@@ -98,6 +100,11 @@ def simulate(
         the file is removed.
     checkpoint_every : float
         s of the computer's time between two checkpoints.
+    monitors : str or iterable of str or Monitor
+        What to watch the run for: ``"chattering"``, ``"passivity"``, ``"coverage"``, ``"all"``
+        of these, invariants such as ``"abs(z) <= 2*s"``, or objects of `gms_fsm.monitors`. What
+        they say is in ``Trace.monitors``. They look at the rows and the log when the run has
+        ended, or has failed.
 
     Returns
     -------
@@ -136,16 +143,23 @@ def simulate(
         max_step=max_step, events=events, engine=engine, output=output, t_eval=t_eval,
         initial=initial,
     )  # fmt: skip
+    watching = checked(monitors, model, start.output).values() if monitors else ()
     run = CompiledRun(start, machines) if engine == "compiled" else Run(start, machines)
     keeper = None if checkpoint is None else Keeper(run, Path(checkpoint), checkpoint_every)
-    while run.advance():
-        if keeper is not None:
-            keeper.look()
-        if progress is not None:
-            progress(Moment(run.recorder))
+    try:
+        while run.advance():
+            if keeper is not None:
+                keeper.look()
+            if progress is not None:
+                progress(Moment(run.recorder))
+    except SimulationError as error:
+        if watching:
+            error.trace = watched(error.trace, watching, error)
+        raise
     if keeper is not None:
         keeper.finish()
-    return run.recorder.trace()
+    trace = run.recorder.trace()
+    return watched(trace, watching) if watching else trace
 
 
 class Run:
@@ -210,6 +224,7 @@ class Run:
         try:
             happening = next(self.happenings, None)
         except HybridError as error:
+            recorder.latest = error.t, error.y, tuple(error.mode)
             raise explained(error, recorder) from None
         except SignalError as error:
             raise SimulationError(

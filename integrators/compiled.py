@@ -6,6 +6,7 @@ compiled once per machine and cached on disk, whatever it integrates.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import gc
 import hashlib
@@ -170,25 +171,38 @@ def cache_folder(base: Path) -> Path | None:
         return None
 
 
+_lock = threading.RLock()  # of numba's settings, and so that nothing is compiled twice
+
+
 def _machine_code(signature: Any, function: Callable[..., Any], folder: Path | None) -> Any:
     """Compile a function, or load what was kept of it in a folder."""
     import numba
 
     jit = functools.partial(numba.njit, signature, nogil=True, **_OPTIONS)
     config = numba.config
-    before = config.CACHE_DIR, config.LOOP_VECTORIZE
-    # Vectorized loops cost a fifth at n = 4, and gain only where n is in the hundreds.
-    config.CACHE_DIR, config.LOOP_VECTORIZE = str(folder or ""), 0
-    collecting = gc.isenabled()
-    gc.disable()  # compiling makes objects by the million and no garbage worth looking for
-    try:
-        return jit(cache=folder is not None)(function)
-    except Exception:  # a damaged file, a full disk: it only costs time
-        return jit()(function)
-    finally:
-        config.CACHE_DIR, config.LOOP_VECTORIZE = before
-        if collecting:
-            gc.enable()
+    with _lock:
+        before = config.CACHE_DIR, config.LOOP_VECTORIZE
+        # Vectorized loops cost a fifth at n = 4, and gain only where n is in the hundreds.
+        config.CACHE_DIR, config.LOOP_VECTORIZE = str(folder or ""), 0
+        collecting = gc.isenabled()
+        gc.disable()  # compiling makes objects by the million and no garbage worth looking for
+        try:
+            return jit(cache=folder is not None)(function)
+        except Exception:  # a damaged file, a full disk: it only costs time, and not for ever
+            _forget(function, folder)
+            return jit()(function)
+        finally:
+            config.CACHE_DIR, config.LOOP_VECTORIZE = before
+            if collecting:
+                gc.enable()
+
+
+def _forget(function: Callable[..., Any], folder: Path | None) -> None:
+    """Remove what was kept of a function, so that the next program keeps it anew."""
+    stem = Path(function.__code__.co_filename).stem
+    with contextlib.suppress(OSError):
+        for file in folder.rglob(f"{stem}.{function.__qualname__}-*.nb?") if folder else ():
+            file.unlink(missing_ok=True)
 
 
 # --------------------------------------------------------------------------- compiling
@@ -266,7 +280,6 @@ def record(arguments: tuple[Any, ...], folder: Path | None) -> int:
     return machine_code(*arguments)
 
 
-_lock = threading.Lock()
 _compiled_record: list[Any] = []
 
 

@@ -99,15 +99,28 @@ def take_step(
     for i in range(1, stages + 1):
         row = A[i] if i < stages else B
         a = row[0]
-        for j in range(size):
-            y_new[j] = a * first[j]
-        for m in range(1, i):
-            a = row[m]
-            k_m = k[m]
+        if i == 1:
             for j in range(size):
-                y_new[j] += a * k_m[j]
-        for j in range(size):
-            y_new[j] = y[j] + h * y_new[j]
+                y_new[j] = y[j] + h * (a * first[j])
+        else:
+            # Two stages at a time: half the loads and stores.
+            b = row[1]
+            second = k[1]
+            for j in range(size):
+                y_new[j] = a * first[j] + b * second[j]
+            for m in range(2, i - 1, 2):
+                a, b = row[m], row[m + 1]
+                k_m, k_n = k[m], k[m + 1]
+                for j in range(size):
+                    y_new[j] = y_new[j] + a * k_m[j] + b * k_n[j]
+            if i % 2 == 1:
+                a = row[i - 1]
+                k_m = k[i - 1]
+                for j in range(size):
+                    y_new[j] = y[j] + h * (y_new[j] + a * k_m[j])
+            else:
+                for j in range(size):
+                    y_new[j] = y[j] + h * y_new[j]
         if i < stages:
             flow(t + C[i] * h, y_new, mode, held, p, k[i])
     flow(t_new, y_new, mode, held, p, f_new)
@@ -142,12 +155,18 @@ def fit_dense(
 
 def weigh(weights: Row, stages: int, f_new: Vector, k: list[Vector], out: Vector) -> None:
     """Fill the sum of all slopes of a step, weighted."""
-    last = weights[stages]
+    last, a = weights[stages], weights[0]
+    first = k[0]
     for j in range(len(out)):
-        out[j] = last * f_new[j]
-    for m in range(stages):
-        a = weights[m]
-        k_m = k[m]
+        out[j] = last * f_new[j] + a * first[j]
+    for m in range(1, stages - 1, 2):
+        a, b = weights[m], weights[m + 1]
+        k_m, k_n = k[m], k[m + 1]
+        for j in range(len(out)):
+            out[j] = out[j] + a * k_m[j] + b * k_n[j]
+    if stages % 2 == 0:
+        a = weights[stages - 1]
+        k_m = k[stages - 1]
         for j in range(len(out)):
             out[j] += a * k_m[j]
 

@@ -19,7 +19,7 @@ def test_the_transcript_is_true() -> None:
     scenario, transcript = found.groups()
     commands = re.findall(r"^\(t=[^)]*\) (.+)$", transcript, re.MULTILINE)
     assert commands[-1] in ("q", "quit")
-    assert 4 <= len(commands) <= 12
+    assert 3 <= len(commands) <= 12
     out = io.StringIO()
     script = io.StringIO("".join(f"{command}\n" for command in commands))
     assert run_debugger(load_scenario(ROOT / scenario), script, out) == 0

@@ -1,4 +1,4 @@
-"""An own table of positions and the README's scenario become a picture and a summary."""
+"""An own table of positions and the scenario of the how-to page become a picture and a summary."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from gms_fsm import Trace
 from tests.scenario_files import CommandLine, command_line, table
 
-README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+PAGE = Path(__file__).parents[1] / "docs" / "howto" / "measured-record.md"
 
 SCENARIO = """\
 [model]
@@ -58,8 +58,8 @@ def own_table() -> str:
     return table(columns, t, 1e3 * position + 2e-5 * noise[0], force + 0.05 * noise[1])
 
 
-def test_the_scenario_here_is_the_one_of_the_readme() -> None:
-    blocks = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
+def test_the_scenario_here_is_the_one_of_the_page() -> None:
+    blocks = re.findall(r"```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     assert SCENARIO in blocks
 
 
