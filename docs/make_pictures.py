@@ -3,19 +3,36 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import wrap
 
+import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 import plots
-from gms_fsm import GMS, GMSParameters, Prescribed, Trace, simulate
+from gms_fsm import (
+    GMS,
+    Chart,
+    GMSParameters,
+    Prescribed,
+    PulledSlider,
+    State,
+    Stribeck,
+    Sweep,
+    Trace,
+    Transition,
+    prove,
+    simulate,
+    sweep,
+)
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
+from gms_fsm.charts.broken import BROKEN
 from gms_fsm.files import written_whole
 from gms_fsm.paper import FIG4_END, VELOCITY
 from gms_fsm.scenario import load_scenario
 from plots import figures, panels
 from plots.schematic import schematic_figure
-from plots.style import RC
+from plots.style import BLUE, INK, LINE_GREY, RC, TEXT_ORANGE, VERMILION
 
 FOLDER = Path(__file__).parent / "images"
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -36,6 +53,8 @@ def main() -> None:
     published, signed = runs.values()
     draw_charts(published, signed)
     draw_figures(signed)
+    draw_concepts(published)
+    draw_howto()
 
 
 def draw_charts(published: Trace, signed: Trace) -> None:
@@ -73,6 +92,171 @@ def draw_figures(signed: Trace) -> None:
         panels.stribeck(ax, run("stribeck_sweep"))
         ax.legend()
     figures.save(figure, FOLDER / "figure_stribeck.png")
+
+
+# --------------------------------------------------------------------------- for the concept pages
+ELEMENT = GMSParameters.from_shares(
+    [1.0], [1e5], C=0.05, stribeck=Stribeck(F_c=1.0, F_s=1.5, v_s=1e-5), v_c=1e-7
+)
+STROKES = "1e-4*sin(2*pi*t/4)"  # m/s
+
+
+def draw_concepts(published: Trace) -> None:
+    """Write the pictures of the concept pages that are not among the others."""
+    figures.save(element_figure(), FOLDER / "concept_element.png")
+    row = int(np.flatnonzero(published.t <= 25.0)[-1])
+    live = plots.live_statechart(published, row=row, elements=[0], values=True)
+    written_whole(FOLDER / "concept_guard.svg", lambda file: file.write(live.encode()))
+    figures.save(microstep_figure(published), FOLDER / "concept_microstep.png")
+    figures.save(crossing_figure(), FOLDER / "concept_crossing.png")
+
+
+def element_figure() -> Figure:
+    """Draw one element moved to and fro: distance to the threshold, force, states."""
+    trace = simulate(GMS(ELEMENT, law="signed"), Prescribed(STROKES), 6.0)
+    with rc_context(RC):
+        figure = Figure(figsize=(7.2, 4.8), layout="constrained")
+        velocity, ratio, force, states = figure.subplots(4, 1, height_ratios=(1, 1.6, 1.6, 0.6))
+        panels.velocity(velocity, trace)
+        panels.ratio(ratio, trace)
+        panels.force(force, trace)
+        panels.ribbons(states, trace)
+        for ax, title in (
+            (velocity, "a) the slider moves to and fro"), (ratio, "b) deflection over threshold"),
+            (force, "c) force"), (states, "d) state"),
+        ):  # fmt: skip
+            ax.set_title(title)
+            if ax is not states:
+                ax.set_xlabel("")
+                ax.tick_params(labelbottom=False)
+    return figure
+
+
+def microstep_figure(trace: Trace) -> Figure:
+    """Draw the force at the micro-steps of one instant, and what fires at each."""
+    log = trace.transitions[:4]
+    rows = np.flatnonzero(trace.t == log.t[0])
+    with rc_context(RC):
+        figure = Figure(figsize=(7.6, 3.2), layout="constrained")
+        over_time, by_step = figure.subplots(1, 2, width_ratios=(1, 1.5))
+        t = float(log.t[0])
+        panels.force(over_time, trace, window=(t - 1.5, t + 1.5))
+        over_time.set_title("a) over time: one step of F")
+        by_step.set_title(f"b) at t = {t:.4f} s: four firings, five rows")
+        by_step.plot(trace.microstep[rows], trace.F[rows], "o--", color=INK, markersize=6)
+        for record, number in zip(log, range(1, 5), strict=True):
+            by_step.annotate(
+                f"element {record.element + 1}\n{record.source} → {record.target}",
+                (number, record.F_after), (4, 7), textcoords="offset points", ha="left",
+                fontsize=8, color=TEXT_ORANGE,
+            )  # fmt: skip
+        by_step.annotate("before", (0, log.F_before[0]), (0, -14), textcoords="offset points",
+                         ha="center", fontsize=8)  # fmt: skip
+        by_step.set(xlabel="micro-step", ylabel="F [N]", xticks=range(5), xlim=(-0.5, 5.3))
+        by_step.margins(y=0.25)
+    return figure
+
+
+def crossing_figure() -> Figure:
+    """Draw a break-away that lies inside a step: found at the step's end, and located."""
+    step, rig = 0.13, Prescribed(0.2)
+    model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    located, once = (
+        simulate(model, rig, 2.5, method="rk4", step=step, events=events)
+        for events in ("located", "step")
+    )
+    true = float(located.transitions.t[0])
+    found = float(once.transitions.t[0])
+    with rc_context(RC):
+        figure = Figure(figsize=(7.2, 3.6), layout="constrained")
+        ax = figure.subplots()
+        looks = (
+            (once, VERMILION, "s--", "guards looked at once a step"),
+            (located, BLUE, "o-", "located"),
+        )  # fmt: skip
+        for trace, colour, look, name in looks:
+            keep = (trace.t > true - 1.9 * step) & (trace.t < true + 2.9 * step)
+            ax.plot(
+                trace.t[keep], trace.z[keep, 0] - trace.s[keep, 0], look, color=colour, label=name,
+                markersize=7, markerfacecolor="white" if colour == VERMILION else colour,
+            )  # fmt: skip
+        ax.axhline(0, color=LINE_GREY, linewidth=0.9, zorder=0)
+        for time, text, colour, height in (
+            (true, "z >= s becomes true", BLUE, 0.97), (found, "it is noticed", TEXT_ORANGE, 0.62),
+        ):  # fmt: skip
+            ax.axvline(time, color=LINE_GREY, linestyle=":", linewidth=0.9, zorder=0)
+            ax.annotate(
+                f"{text}\nt = {time:.2f} s", (time, height), (-6 if colour == BLUE else 6, 0),
+                xycoords=("data", "axes fraction"), textcoords="offset points",
+                ha="right" if colour == BLUE else "left", va="top", color=colour,
+            )  # fmt: skip
+        ax.set(
+            xlabel="t [s]", ylabel="z − s [m]", title=f"{model.title}: fixed steps of {step:g} s"
+        )
+        ax.legend(loc="lower right")
+    return figure
+
+
+# --------------------------------------------------------------------------- for the how-to pages
+AGEING = Chart(  # docs/howto/own-chart.md explains it
+    "ageing contact",
+    inputs=("v", "s"),
+    variables=("z", "r"),
+    parameters=("k", "C", "v_c", "beta", "tau"),
+    states=(
+        State("stick", flow={"z": "v", "r": "1"}, entry={"r": "0"}),
+        State("slip", flow={"z": "C * (sgn(v) - z / s)", "r": "0"}),
+    ),
+    transitions=(
+        Transition(
+            "break_away_forward", "stick", "slip",
+            guard="z >= s * (1 + beta * r / (r + tau)) and v > v_c",
+        ),
+        Transition(
+            "break_away_backward", "stick", "slip",
+            guard="z <= -s * (1 + beta * r / (r + tau)) and v < -v_c",
+        ),
+        Transition("arrest", "slip", "stick", guard="abs(v) <= v_c"),
+    ),
+    outputs={"F": "k * z"},
+)  # fmt: skip
+
+
+def draw_howto() -> None:
+    """Write the pictures of the how-to pages."""
+    plots.render(plots.statechart(AGEING), FOLDER / "howto_own_chart.png")
+    report = prove(BROKEN["memoryless"].chart)
+    (finding,) = report.refuted
+    note = [*wrap(f"{finding.check}: {finding.text}", 50), *wrap(finding.example, 50)]
+    marked = [part for part in finding.where if part in report.chart.guards]
+    graph = plots.statechart(report.chart, marked=marked, note="\n".join(note))
+    plots.render(graph, FOLDER / "howto_refuted.png")
+    figures.save(sweep_figure(), FOLDER / "howto_sweep.png")
+
+
+def sweep_figure() -> Figure:
+    """Draw where a pulled mass sticks and slips: arrests in 60 s over speed and v_s."""
+    parameters = GMSParameters.from_shares(
+        [0.4, 0.3, 0.2, 0.1], [40, 30, 20, 10], C=2.0, stribeck=Stribeck(1.0, 1.5, 0.05),
+        v_c=1e-6, sigma=[0.4, 0.3, 0.2, 0.1], sigma_2=0.4,
+    )  # fmt: skip
+    speed, v_s = np.meshgrid(np.linspace(0.02, 0.3, 40), np.geomspace(5e-3, 0.2, 40))
+    result: Sweep = sweep(
+        GMS(parameters, law="signed"), PulledSlider(1.0, 2.0, 0.1), 60.0,
+        {"speed": speed.ravel(), "v_s": v_s.ravel()},
+    )  # fmt: skip
+    arrests = result.transitions["run"][
+        result.transitions["edge"] == result.edges.index("arrest")
+    ]  # fmt: skip
+    counts = np.bincount(arrests, minlength=len(result)).reshape(speed.shape)
+    with rc_context(RC):
+        figure = Figure(figsize=(6.0, 3.8), layout="constrained")
+        ax = figure.subplots()
+        image = ax.pcolormesh(speed, v_s, counts, cmap="cividis", rasterized=True)
+        ax.set(yscale="log", xlabel="pulling speed [m/s]", ylabel="v_s [m/s]")
+        ax.set_title(f"arrests in 60 s, {len(result):,} runs; signed law")
+        figure.colorbar(image, label="arrests")
+    return figure
 
 
 def run(name: str) -> Trace:

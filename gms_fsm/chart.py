@@ -11,7 +11,7 @@ import unicodedata
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from gms_fsm.errors import ChartError, ExpressionError
+from gms_fsm.errors import ChartError, ExpressionError, shown
 from gms_fsm.expression import (
     CONSTANTS,
     FUNCTIONS,
@@ -272,7 +272,7 @@ class Chart:
         names = [s.name for s in self.states]
         if name not in names:
             raise ChartError(
-                f"chart {self.name!r} has no state {name!r}; its states are {_listed(names)}"
+                f"chart {self.name!r} has no state {shown(name)}; its states are {_listed(names)}"
             )
         return names.index(name)
 

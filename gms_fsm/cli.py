@@ -26,7 +26,7 @@ from gms_fsm.models import GMS, Model
 from gms_fsm.parameters import GMSParameters
 from gms_fsm.program import lower
 from gms_fsm.prove import Report, prove
-from gms_fsm.report import run_scenario, velocity_note
+from gms_fsm.report import monitor_lines, run_scenario, velocity_note
 from gms_fsm.rigs import Prescribed, PulledSlider, Rig, Slider
 from gms_fsm.scenario import Scenario, load_scenario
 from gms_fsm.trace import Trace
@@ -130,6 +130,8 @@ def run_command(
     if loaded.motion is not None and (note := velocity_note(trace, loaded.motion)):
         _plain_warning(note)
     typer.echo(f"{len(trace.transitions)} transitions; {len(files)} files in {folder}")
+    for line in monitor_lines(trace):
+        typer.echo(line)
     typer.echo(f"start with {files[0]}")
 
 

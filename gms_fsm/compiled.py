@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import importlib.util
 import os
+import re
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -106,7 +107,11 @@ def _machine_code(
     from integrators import compiled
 
     functions, in_a_file = _loaded(source, callables)
-    return compiled.compiled(name, functions[name], cache_folder() if in_a_file else None)
+    function = functions[name]
+    # The linker knows machine code from disk by its function's name alone: without a name of its
+    # own the flow of one program would be run in place of another's.
+    function.__qualname__ = f"{name}_{compiled.digest(text=source)}"
+    return compiled.compiled(name, function, cache_folder() if in_a_file else None)
 
 
 @functools.lru_cache(maxsize=64)
@@ -192,15 +197,18 @@ def _text_file(source: str) -> Path | None:
 def _compiled_signal(name: str, call: Callable[[float], float]) -> Any:
     import numba
 
-    signature = numba.types.float64(numba.types.float64)
+    jit = numba.njit(
+        numba.types.float64(numba.types.float64), error_model="numpy", boundscheck=True
+    )
     try:
-        return numba.njit(signature, error_model="numpy")(getattr(call, "py_func", call))
+        return jit(getattr(call, "py_func", call))
     except Exception as error:  # numba raises many kinds, TypeError and its own among them
-        first = next((line for line in str(error).splitlines() if line.strip()), "")
+        lines = (re.sub(r"\x1b\[\d*m", "", line).strip() for line in str(error).splitlines())
+        reason = next((u for u in lines if u and not u.startswith("Failed in nopython mode")), "")
         raise SignalError(
             f"signal {name!r}: numba cannot compile the function ({type(error).__name__}: "
-            f"{first.strip()}); use engine='machines', or give the signal as an expression of t or "
-            "as arrays (times, values)"
+            f"{reason}); use engine='machines', or give the signal as an expression of t or as "
+            "arrays (times, values)"
         ) from None
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm import compiled
+from gms_fsm.errors import SimulationError
 from gms_fsm.machines import ElementMachines, MachineEngine
 from gms_fsm.models import Model
 from gms_fsm.program import arguments, system
@@ -97,23 +98,34 @@ class CompiledRun:
 
         columns = self.columns
         columns.make_room()
-        b, start = columns.buffers, columns.start
-        happening = record(
-            (
-                *self.functions, b.method, b.control, b.plan, b.memory, b.y, b.mode, b.held,
-                columns.p, b.relations, b.out, b.work, columns.log, start.program.first,
-                STEPS_AT_ONCE, self.engine is not None,
-            ),
-            compiled.cache_folder(),
-        )  # fmt: skip
+        b, start, before = columns.buffers, columns.start, columns.latest
+        try:
+            happening = record(
+                (
+                    *self.functions, b.method, b.control, b.plan, b.memory, b.y, b.mode, b.held,
+                    columns.p, b.relations, b.out, b.work, columns.log, start.program.first,
+                    STEPS_AT_ONCE, self.engine is not None,
+                ),
+                compiled.cache_folder(),
+            )  # fmt: skip
+        except Exception as error:
+            if not start.program.callables:
+                raise
+            columns.interrupted(before)
+            names = " or ".join(map(repr, start.program.callables))
+            raise SimulationError(
+                f"signal {names}: the function raised {type(error).__name__}: {error}; the run up "
+                "to there is kept",
+                columns.trace(),
+            ) from error
         if happening == loop.DONE:
             check_end(columns)
             return False
         if happening == loop.FIRING:
             self._replay(self.engine)
         elif happening != loop.ROWS:
-            error = hybrid.failure(happening, columns.as_lists(), start.program.relations)
-            raise explained(error, columns) from None
+            failed = hybrid.failure(happening, columns.as_lists(), start.program.relations)
+            raise explained(failed, columns) from None
         return True
 
     def _replay(self, engine: MachineEngine | None) -> None:
@@ -221,6 +233,17 @@ class Columns:
             names = ("stops_t", "stops_microstep", "stops_y", "stops_mode")
             log = log._replace(**{name: _twice(getattr(log, name)) for name in names})
         self.log = log
+
+    def interrupted(self, before: tuple[float, list[float], tuple[int, ...]]) -> None:
+        """Make sense of what machine code leaves behind where a function of the user's raised.
+
+        The rows are whole but for their modes; of time and state only those before are certain.
+        """
+        b: Any = self.buffers
+        log: Any = self.log
+        fresh = slice(int(b.memory.counts[loop.TAKEN]), int(b.out.cursor[ROW]))
+        log.rows_microstep[fresh], log.rows_mode[fresh] = 0, b.mode
+        b.memory.now[loop.T], b.y[:], b.mode[:] = before
 
     @property
     def latest(self) -> tuple[float, list[float], tuple[int, ...]]:

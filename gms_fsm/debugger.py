@@ -948,7 +948,8 @@ def run_debugger(loaded: Loaded, stdin: TextIO | None = None, stdout: TextIO | N
     ScenarioError
         If the scenario's run cannot be set up.
     """
-    options = {name: value for name, value in loaded.arguments.items() if name != "t_eval"}
+    not_here = ("t_eval", "monitors")
+    options = {name: value for name, value in loaded.arguments.items() if name not in not_here}
     try:
         session = Session(loaded.model, loaded.rig, options.pop("t_end"), **options)
     except GMSError as error:

@@ -15,17 +15,25 @@ if TYPE_CHECKING:
 LONGEST_SHOWN = 120  # characters of a value in a message
 
 
-def shown(value: object, longest: int = LONGEST_SHOWN) -> str:
+def cut(text: str, longest: int = LONGEST_SHOWN) -> str:
+    """Return a text that is not too long for a message.
+
+    >>> cut("abcdef", 3)
+    'abc ...'
+    """
+    return text if len(text) <= longest else f"{text[:longest]} ..."
+
+
+def shown(value: object) -> str:
     """Return a value as a message can show it: its text in Python, cut where it is long.
 
-    >>> shown("abc"), shown([1] * 1000, 12)
-    ("'abc'", '[1, 1, 1, 1, ...')
+    >>> shown("abc")
+    "'abc'"
     """
     try:
-        text = repr(value)
+        return cut(repr(value))
     except (RecursionError, ValueError):  # nested too deeply; a whole number of 5,000 digits
         return "..."
-    return text if len(text) <= longest else f"{text[:longest]} ..."
 
 
 class GMSError(Exception):

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from gms_fsm.errors import ExpressionError
+from gms_fsm.errors import ExpressionError, shown
 
 __all__ = [
     "MATLAB_LIKE",
@@ -43,9 +43,11 @@ __all__ = [
     "names_in",
     "parse_condition",
     "parse_value",
+    "product_power",
     "rough_points",
     "spell",
     "split",
+    "states_in",
     "substitute",
 ]
 
@@ -106,7 +108,10 @@ class Relation:
 
 @dataclass(frozen=True)
 class InState:
-    """``state(element) == name``, elements counted from 1: of breakpoints, never of guards."""
+    """``state(element) == name``, elements counted from 1: of breakpoints, never of guards.
+
+    Element 0 is the one that is asked: ``state == name``, of invariants.
+    """
 
     element: int
     state: str
@@ -215,7 +220,12 @@ def parse_value(text: str, names: Iterable[str]) -> Value:
 
 
 def parse_condition(
-    text: str, names: Iterable[str], states: Iterable[str] = (), elements: int = 0
+    text: str,
+    names: Iterable[str],
+    states: Iterable[str] = (),
+    elements: int = 0,
+    *,
+    own_state: bool = False,
 ) -> Condition:
     """Read a text that is true or false, such as a guard.
 
@@ -229,6 +239,8 @@ def parse_condition(
         State names that ``state(i) == name`` may ask for (breakpoints do, guards do not).
     elements : int, optional
         How many elements there are; i counts from 1.
+    own_state : bool
+        Whether ``state == name`` may ask for the element at hand (invariants do).
 
     Returns
     -------
@@ -245,7 +257,7 @@ def parse_condition(
     >>> spell(parse_condition("0 < v < 1", ["v"]))
     '0.0 < v and v < 1.0'
     """
-    return _Reader(text, names, states, elements).condition(_tree(text), 0)
+    return _Reader(text, names, states, elements, own_state).condition(_tree(text), 0)
 
 
 def _tree(text: str) -> ast.expr:
@@ -292,11 +304,16 @@ class _Reader:
     """Turns `ast` nodes into our own, refusing everything that is not on the list."""
 
     def __init__(
-        self, text: str, names: Iterable[str], states: Iterable[str] = (), elements: int = 0
+        self,
+        text: str,
+        names: Iterable[str],
+        states: Iterable[str] = (),
+        elements: int = 0,
+        own_state: bool = False,
     ) -> None:
         self.text = text
         self.names = tuple(dict.fromkeys(names))
-        self.states, self.elements = tuple(states), elements
+        self.states, self.elements, self.own_state = tuple(states), elements, own_state
 
     def refuse(self, reason: str, node: ast.expr, allowed: str = _GRAMMAR) -> ExpressionError:
         return ExpressionError(reason, self.text, node.col_offset + 1, allowed)
@@ -329,7 +346,7 @@ class _Reader:
                 if name in FUNCTIONS:
                     raise self.refuse(f"the function {name!r} needs (...)", node, f"{name}(...)")
                 known = ", ".join(self.names) or "none"
-                raise self.refuse(f"unknown name {name!r}", node, f"the names {known}, and pi")
+                raise self.refuse(f"unknown name {shown(name)}", node, f"the names {known}, and pi")
             case ast.UnaryOp(op=ast.USub(), operand=operand):
                 return Negative(self.value(operand, depth))
             case ast.UnaryOp(op=ast.UAdd(), operand=operand):
@@ -347,7 +364,7 @@ class _Reader:
     def call(self, node: ast.expr, function: str, arguments: list[ast.expr], depth: int) -> Call:
         if function not in FUNCTIONS:
             raise self.refuse(
-                f"unknown function {function!r}", node, "the functions " + ", ".join(FUNCTIONS)
+                f"unknown function {shown(function)}", node, "the functions " + ", ".join(FUNCTIONS)
             )
         several = function in ("min", "max")
         if (len(arguments) < 2) if several else (len(arguments) != 1):
@@ -357,9 +374,14 @@ class _Reader:
             raise self.refuse(
                 f"{function} got {len(arguments)} arguments", node, f"at most {MOST_ARGUMENTS}"
             )
-        values = [self.value(argument, depth) for argument in arguments]
+        # min(a, b, c) is min(min(a, b), c), one corner at a time: the first arguments lie deepest.
+        folds = max(0, len(arguments) - 2)
+        values = [
+            self.value(argument, depth + min(folds, len(arguments) - 1 - i))
+            for i, argument in enumerate(arguments)
+        ]
         result = Call(function, tuple(values[:2]))
-        for value in values[2:]:  # min(a, b, c) is min(min(a, b), c): one corner at a time
+        for value in values[2:]:
             result = Call(function, (result, value))
         return result
 
@@ -369,7 +391,11 @@ class _Reader:
             case ast.Compare(
                 left=ast.Call(func=ast.Name(id="state")) as call, ops=[op], comparators=[name]
             ) if self.states:
-                return self.in_state(call, op, name)
+                return self.in_state(self.numbered(call), op, name)
+            case ast.Compare(left=ast.Name(id="state"), ops=[op], comparators=[name]) if (
+                self.own_state
+            ):
+                return self.in_state(0, op, name)
             case ast.Compare(left=left, ops=ops, comparators=comparators):
                 sides = [left, *comparators]
                 parts: list[Condition] = []
@@ -399,16 +425,15 @@ class _Reader:
                 )
         raise self.refuse(f"{_plain(node)} is not part of the language", node)
 
-    def in_state(self, call: ast.Call, op: ast.cmpop, name: ast.expr) -> Condition:
+    def numbered(self, call: ast.Call) -> int:
         match call.args:
             case [ast.Constant(value=int() as element)] if 1 <= element <= self.elements:
-                pass
-            case _:
-                raise self.refuse(
-                    "state(...) takes an element's number",
-                    call,
-                    f"state(1) to state({self.elements})",
-                )
+                return element
+        raise self.refuse(
+            "state(...) takes an element's number", call, f"state(1) to state({self.elements})"
+        )
+
+    def in_state(self, element: int, op: ast.cmpop, name: ast.expr) -> Condition:
         if not isinstance(name, ast.Name) or name.id not in self.states:
             raise self.refuse("unknown state", name, "the states " + ", ".join(self.states))
         if not isinstance(op, ast.Eq | ast.NotEq):
@@ -420,7 +445,7 @@ class _Reader:
 def _plain(node: ast.expr) -> str:
     match node:
         case ast.Constant(value=value) if value is not ...:
-            return f"the constant {value!r}"
+            return f"the constant {shown(value)}"
         case ast.BinOp(op=op) | ast.UnaryOp(op=op):
             signs = {"Mod": "%", "FloorDiv": "//", "MatMult": "@", "BitAnd": "&", "BitOr": "|",
                      "BitXor": "^", "LShift": "<<", "RShift": ">>", "Invert": "~"}  # fmt: skip
@@ -532,7 +557,8 @@ def _spell(node: Node, spelling: Spelling, rename: Mapping[str, str]) -> tuple[s
         case Relation(op, left, right):
             return f"{part(left, _LEVEL['+'])} {op} {part(right, _LEVEL['+'])}", _LEVEL["<"]
         case InState(element, state):
-            return f"state({element}) == {state}", _LEVEL["<"]
+            own = f"state({element})" if element else "state"
+            return f"{own} == {state}", _LEVEL["<"]
         case Not(operand):
             inner = part(operand, _ATOM if spelling.negation == "!" else _LEVEL["not"])
             return spelling.negation + inner, _LEVEL["not"]
@@ -550,7 +576,7 @@ def _power(
         power, power_level = _spell(exponent, spelling, rename)
         power = power if power_level == _ATOM else f"({power})"
         return f"{inner if level == _ATOM else f'({inner})'}^{power}", _LEVEL["**"]
-    whole = _product_power(base, exponent)
+    whole = product_power(base, exponent)
     if whole is None:
         return f"pow({inner}, {_spell(exponent, spelling, rename)[0]})", _ATOM
     if whole == 0:
@@ -565,19 +591,38 @@ def _power(
     return product, _LEVEL["*"]
 
 
-def _product_power(base: Value, exponent: Value) -> int | None:
-    """Return the power if it is computed as a product, else None (it is computed by pow)."""
+def product_power(base: Value, exponent: Value) -> int | None:
+    """Return the power if it is computed as a product, else None (it is computed by pow).
+
+    Parameters
+    ----------
+    base, exponent : Value
+        Of ``base**exponent``.
+
+    Returns
+    -------
+    int or None
+        The whole power, -8 to 8.
+
+    Examples
+    --------
+    >>> product_power(Name("v"), Number(2.0)), product_power(Name("v"), Number(0.5))
+    (2, None)
+    """
+    return _fitting_power(_parts(base), exponent)
+
+
+def _fitting_power(parts: int, exponent: Value) -> int | None:
     whole = _whole_power(exponent)
-    if whole is None or abs(whole) * _parts(base) > LARGEST_PRODUCT:
-        return None
-    return whole
+    return None if whole is None or abs(whole) * parts > LARGEST_PRODUCT else whole
 
 
 def _parts(node: Value) -> int:
     """Count the names and numbers of a value as printed, powers as products."""
     match node:
         case Binary("**", base, exponent):
-            return _parts(base) * max(1, abs(_product_power(base, exponent) or 1))
+            parts = _parts(base)  # once: a power of a power of a power would double the work
+            return parts * max(1, abs(_fitting_power(parts, exponent) or 1))
         case Negative(operand):
             return _parts(operand)
         case Binary(_, left, right):
@@ -657,7 +702,7 @@ def _compare(op: str, a: float, b: float) -> bool:
 
 
 def _evaluate_power(base: Value, exponent: Value, values: Mapping[str, float]) -> float:
-    whole = _product_power(base, exponent)
+    whole = product_power(base, exponent)
     if whole is None:
         return math.pow(evaluate(base, values), evaluate(exponent, values))
     if whole == 0:
@@ -706,6 +751,28 @@ def names_in(node: Node) -> frozenset[str]:
     ['k', 'z']
     """
     return frozenset(n.id for n in _walk(node) if isinstance(n, Name))
+
+
+def states_in(node: Node) -> frozenset[int]:
+    """Return the elements whose states a condition asks for, 0 for the one at hand.
+
+    Parameters
+    ----------
+    node : Node
+        A value or a condition.
+
+    Returns
+    -------
+    frozenset of int
+        Without order.
+
+    Examples
+    --------
+    >>> asked = parse_condition("v > 0 or state(2) == slip", ["v"], ["slip"], 2)
+    >>> sorted(states_in(asked))
+    [2]
+    """
+    return frozenset(n.element for n in _walk(node) if isinstance(n, InState))
 
 
 def clauses(condition: Condition) -> tuple[Condition, ...]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import IO
 
 from gms_fsm.errors import OutputError
 
-__all__ = ["output_folder", "written_whole"]
+__all__ = ["leftovers", "output_folder", "written_together", "written_whole"]
 
 
 def output_folder(path: str | Path) -> Path:
@@ -62,16 +63,53 @@ def written_whole(path: Path, write: Callable[[IO[bytes]], object]) -> Path:
     OutputError
         If the folder cannot be written.
     """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    written_together({path: write})
+    return path
+
+
+def written_together(files: Mapping[Path, Callable[[IO[bytes]], object]]) -> None:
+    """Write files that belong together: all are complete before the first takes its place.
+
+    Parameters
+    ----------
+    files : mapping of Path to callable
+        ``write(file)`` fills the open binary file; they take their places in this order. A process
+        killed in between leaves the complete ones behind as `leftovers`.
+
+    Raises
+    ------
+    OutputError
+        If a folder cannot be written.
+    """
+    temporary = {path: path.with_name(f".{path.name}.{os.getpid()}.part") for path in files}
     try:
         try:
-            with temporary.open("wb") as file:
-                write(file)
-            os.replace(temporary, path)
+            for path, write in files.items():
+                with temporary[path].open("wb") as file:
+                    write(file)
+            for path in files:
+                os.replace(temporary[path], path)
         finally:  # also when the writer itself fails, or is interrupted
-            temporary.unlink(missing_ok=True)
+            for part in temporary.values():
+                part.unlink(missing_ok=True)
     except OSError as error:
         raise OutputError(
             f"cannot write {path}: {error.strerror or error}; choose another folder or make room"
         ) from None
-    return path
+
+
+def leftovers(path: Path) -> list[Path]:
+    """Return what processes that were killed while writing a file have left beside it.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    list of Path
+        ``.<name>.<number>.part``; a later run does not need them, and they may be deleted.
+    """
+    pattern = re.compile(rf"\.{re.escape(path.name)}\.[0-9]+\.part")
+    return sorted(other for other in path.parent.iterdir() if pattern.fullmatch(other.name))

@@ -76,7 +76,8 @@ def load_careful(title: str, source: str, names: Mapping[str, Any] | None = None
 @functools.lru_cache(maxsize=256)
 def _compiled(title: str, source: str, careful: bool = False) -> CodeType:
     digest = hashlib.sha256(source.encode()).hexdigest()[:8]
-    filename = f"<{title} {digest}>"
+    shown = "".join(c if c.isprintable() else "?" for c in title)  # a file name takes not all
+    filename = f"<{shown} {digest}>"
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
     if not careful:
         return compile(source, filename, "exec")

@@ -14,12 +14,13 @@ from gms_fsm.models import ChartModel, Model
 from gms_fsm.parameters import Stribeck
 from gms_fsm.rigs import Prescribed, PulledSlider, Rig, Slider
 from gms_fsm.signals import Corners, Formula, Function, Signal
+from gms_fsm.verdicts import Verdict
 
 __all__ = ["Header"]
 
 
 class _Record(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, ser_json_inf_nan="constants")
 
 
 class ChartRecord(_Record):
@@ -94,9 +95,17 @@ class Header(_Record):
     model: ModelRecord
     rig: RigRecord
     settings: dict[str, str | float | None]
+    log: str = ""  # in a CSV: the stamp of the transition log that lies beside it
+    monitors: dict[str, Annotated[Verdict, Field(discriminator="kind")]] = {}
 
     @classmethod
-    def of(cls, model: Model, rig: Rig, settings: Mapping[str, str | float | None]) -> Header:
+    def of(
+        cls,
+        model: Model,
+        rig: Rig,
+        settings: Mapping[str, str | float | None],
+        monitors: Mapping[str, Verdict] | None = None,
+    ) -> Header:
         """Describe a run."""
         chart = model.chart
         return cls(
@@ -120,6 +129,7 @@ class Header(_Record):
                 signals={name: _signal_record(signal) for name, signal in rig.signals.items()},
             ),
             settings=dict(settings),
+            monitors=dict(monitors or {}),
         )
 
     def to_model(self) -> ChartModel:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_smoothing_spline
 
-from gms_fsm.errors import ExpressionError, RecordError, UnitError
+from gms_fsm.errors import ExpressionError, RecordError, UnitError, cut, shown
 from gms_fsm.expression import evaluate, names_in, parse_condition
 from gms_fsm.parameters import FloatArray
 from gms_fsm.units import convert_numbers, factor
@@ -115,7 +115,9 @@ def read_record(
     rows = next(iter(values.values())).size
     chosen = _chosen(path, values, where, rows)
     if not chosen.any():
-        raise RecordError(f"{path}: no row fulfils where = {where!r}; choose another condition")
+        raise RecordError(
+            f"{path}: no row fulfils where = {shown(where)}; choose another condition"
+        )
     first, last = np.flatnonzero(chosen)[[0, -1]]
     part = {quantity: value[first : last + 1] for quantity, value in values.items()}
     chosen = chosen[first : last + 1]
@@ -123,8 +125,8 @@ def read_record(
     notes = []
     if last - first + 1 < rows or not chosen.all():
         notes.append(
-            f"{int(chosen.sum())} of {rows} rows count (where = {where!r}); the motion uses rows "
-            f"{first + 2} to {last + 2}"
+            f"{int(chosen.sum())} of {rows} rows count (where = {shown(where)}); the motion uses "
+            f"rows {first + 2} to {last + 2}"
         )
     notes += _gaps(part["time"], int(first) + 2)
     return Record(path, part, chosen, int(first) + 2, tuple(notes))
@@ -176,8 +178,8 @@ def _read_cells(
         if head.count(column.name) != 1:
             what = "no column" if column.name not in head else "several columns"
             raise RecordError(
-                f"{path}: {what} {column.name!r} (for {quantity}); columns: "
-                f"{', '.join(map(repr, head))}"
+                f"{path}: {what} {shown(column.name)} (for {quantity}); columns: "
+                f"{cut(', '.join(map(repr, head)), 1000)}"
             )
         places[quantity] = head.index(column.name)
     found: dict[str, list[float]] = {quantity: [] for quantity in columns}
@@ -198,8 +200,8 @@ def _read_cells(
                     found[quantity].append(float(row[place]))
                 except ValueError:
                     raise RecordError(
-                        f"{path}: row {number}, column {columns[quantity].name!r}: "
-                        f"{row[place]!r} is not a number (a decimal point is a point)"
+                        f"{path}: row {number}, column {shown(columns[quantity].name)}: "
+                        f"{shown(row[place])} is not a number (a decimal point is a point)"
                     ) from None
     except csv.Error as error:
         raise RecordError(f"{path}: row {number + 1} cannot be read ({error})") from None
@@ -216,21 +218,21 @@ def _chosen(
     try:
         condition = parse_condition(convert_numbers(where), QUANTITIES)
     except ExpressionError as error:
-        shown = ExpressionError(error.reason, where, error.column, error.allowed)
-        raise RecordError(f"{path}: record.where = {where!r}, {shown}") from None
+        in_place = ExpressionError(error.reason, where, error.column, error.allowed)
+        raise RecordError(f"{path}: record.where = {shown(where)}, {in_place}") from None
     except UnitError as error:
-        raise RecordError(f"{path}: record.where = {where!r}: {error}") from None
+        raise RecordError(f"{path}: record.where = {shown(where)}: {error}") from None
     names = sorted(names_in(condition))
     for name in names:
         if name not in values:
-            raise RecordError(f"{path}: where = {where!r} uses {name!r}, which has no column")
+            raise RecordError(f"{path}: where = {shown(where)} uses {name!r}, which has no column")
     table = zip(*(values[name].tolist() for name in names), strict=True)
     try:
         return np.array(
             [evaluate(condition, dict(zip(names, row, strict=True))) for row in table], dtype=bool
         )
-    except ArithmeticError as error:
-        raise RecordError(f"{path}: where = {where!r} cannot be computed ({error})") from None
+    except (ArithmeticError, ValueError) as error:
+        raise RecordError(f"{path}: where = {shown(where)} cannot be computed ({error})") from None
 
 
 def _check(
@@ -246,7 +248,7 @@ def _check(
         bad = np.flatnonzero(~np.isfinite(value) & needed)
         if bad.size:
             raise RecordError(
-                f"{path}: {_rows(bad + first_row)}, column {columns[quantity].name!r}: not a "
+                f"{path}: {_rows(bad + first_row)}, column {shown(columns[quantity].name)}: not a "
                 "finite number; take the rows out or leave them out by where = ..."
             )
     time = part["time"]

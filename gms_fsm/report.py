@@ -20,7 +20,14 @@ from gms_fsm.scenario import Loaded
 from gms_fsm.simulate import Moment, simulate
 from gms_fsm.trace import Trace, dwell_times
 
-__all__ = ["Comparison", "compare", "dwell_times", "run_scenario", "summary_text"]
+__all__ = [
+    "Comparison",
+    "compare",
+    "dwell_times",
+    "monitor_lines",
+    "run_scenario",
+    "summary_text",
+]
 
 
 ONE_SPEED = 2.0  # a plateau has its speeds within this factor; a sine spreads over 2.7
@@ -124,7 +131,14 @@ def run_scenario(
     except SimulationError as error:
         kept = error.trace.save(folder / "partial.npz")
         told = str(error).replace(" is kept in .trace", " is kept")
-        error.args = (f"{loaded.path}: {told}; written to {kept}",)
+        watched = [
+            line
+            for line, verdict in zip(
+                monitor_lines(error.trace), error.trace.monitors.values(), strict=True
+            )
+            if not getattr(verdict, "livelock", False)  # it is what has just been told
+        ]
+        error.args = ("\n".join([f"{loaded.path}: {told}; written to {kept}", *watched]),)
         raise
     except GMSError as error:
         raise ScenarioError(f"{loaded.path}: {error}") from None
@@ -194,9 +208,30 @@ def summary_text(loaded: Loaded, trace: Trace) -> str:
         "",
         *_element_table(trace),
     ]
+    if trace.monitors:
+        lines += ["", "## Monitors", "", *(f"- {line}" for line in monitor_lines(trace))]
     if loaded.record is not None and loaded.motion is not None:
         lines += ["", *_measurement(loaded.record, loaded.motion, trace)]
     return "\n".join(lines) + "\n"
+
+
+def monitor_lines(trace: Trace) -> list[str]:
+    """Return what the monitors of a run say, a line each.
+
+    Parameters
+    ----------
+    trace : Trace
+        A run.
+
+    Returns
+    -------
+    list of str
+        For people; `Trace.monitors` has the numbers.
+    """
+    return [
+        f"monitor {name} ({'ok' if verdict.ok else 'not ok'}): {verdict.text}"
+        for name, verdict in trace.monitors.items()
+    ]
 
 
 def _parameters(trace: Trace) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 import tomllib
 import warnings
 from collections.abc import Mapping, Sequence
@@ -27,8 +28,18 @@ from pydantic import (
     model_validator,
 )
 
-from gms_fsm.errors import GMSError, ParameterError, RecordError, ScenarioError, UnitError
+from gms_fsm.errors import (
+    LONGEST_SHOWN,
+    GMSError,
+    ParameterError,
+    RecordError,
+    ScenarioError,
+    UnitError,
+    cut,
+    shown,
+)
 from gms_fsm.models import GMS, LuGre, Model
+from gms_fsm.monitors import checked
 from gms_fsm.parameters import GMSParameters, Stribeck
 from gms_fsm.records import Column, Motion, Record, motion_of, read_record
 from gms_fsm.rigs import Prescribed, PulledSlider, Rig, Slider
@@ -39,7 +50,10 @@ __all__ = ["DATA_VARIABLE", "Loaded", "Scenario", "load_scenario"]
 DATA_VARIABLE = "GMS_FSM_DATA"
 LARGEST_FILE = 1_000_000  # bytes
 DEEPEST_KEY = 6  # parts
-LONGEST_SHOWN = 120  # characters of a value in a message
+# A key of very many parts keeps tomllib busy for hours (its work grows with their square).
+_ENDLESS_KEY = re.compile(
+    r"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){20}"""
+)
 SCIPY_METHODS = ("RK45", "DOP853", "Radau", "BDF", "LSODA")
 
 
@@ -258,6 +272,11 @@ class RunTable(_Table):
     max_step: float | None = Field(None, gt=0, description="s")
     events: Literal["located", "step"] = "located"
     engine: Literal["machines", "ifelse", "compiled"] = "machines"
+    monitors: list[str] = Field(
+        [],
+        description='what to watch for: "chattering", "passivity", "coverage", "all" of these, '
+        'and invariants such as "abs(z) <= 2*s"',
+    )
 
     def options(self) -> dict[str, Any]:
         """Return the options for `simulate`."""
@@ -419,14 +438,21 @@ def _loaded(path: Path, scenario: Scenario) -> Loaded:
     assert end is not None
     start = 0.0 if start is None else start
     if scenario.output.every is not None:
-        count = int((end - start) / scenario.output.every)
-        if count > 10_000_000:
+        wanted = max(0.0, (end - start) / scenario.output.every)  # t_end is checked with the rest
+        if wanted > 10_000_000:
             raise ScenarioError(
-                f"{path}: output.every = {scenario.output.every} s makes {count} rows; take more"
+                f"{path}: output.every = {scenario.output.every} s makes {wanted:.4g} rows; take more"
             )
+        count = int(wanted)
         arguments["t_eval"] = np.minimum(start + scenario.output.every * np.arange(count + 1), end)
     arguments |= {"t_start": start, "t_end": end, "initial": initial}
-    return Loaded(path, scenario, scenario.model.build(), rig, arguments, record, motion)
+    model = scenario.model.build()
+    if run.monitors:
+        try:
+            arguments["monitors"] = tuple(checked(run.monitors, model).values())
+        except GMSError as error:
+            raise ScenarioError(f"{path}: run.monitors: {error}") from None
+    return Loaded(path, scenario, model, rig, arguments, record, motion)
 
 
 def _signal(path: Path, given: SignalField, key: str, quantity: str) -> SignalLike:
@@ -444,7 +470,7 @@ def _signal(path: Path, given: SignalField, key: str, quantity: str) -> SignalLi
             return as_signal([(t, value) for t, value in given])
         return as_signal(given)
     except GMSError as error:
-        raise ScenarioError(f"{path}: {key} = {_shown(given)}: {error}") from None
+        raise ScenarioError(f"{path}: {key} = {shown(given)}: {error}") from None
 
 
 def find_file(scenario: Path, name: str) -> Path:
@@ -477,18 +503,18 @@ def find_file(scenario: Path, name: str) -> Path:
             there = place.is_file()
         except (OSError, ValueError) as error:  # too long, or with a null byte
             raise ScenarioError(
-                f"{scenario}: file = {_shown(name)} is not a file name ({_cut(str(error))})"
+                f"{scenario}: file = {shown(name)} is not a file name ({cut(str(error))})"
             ) from None
         if wanted.is_absolute() or not place.is_relative_to(folder.resolve()):
             raise ScenarioError(
-                f"{scenario}: file = {_shown(name)} leads outside of the scenario's folder; put "
+                f"{scenario}: file = {shown(name)} leads outside of the scenario's folder; put "
                 f"the file beside the scenario, or in the folder named by {DATA_VARIABLE}"
             )
         if there:
             return folder / wanted
     looked = " and ".join(str(folder) for folder in folders)
     hint = "" if len(folders) > 1 else f" (a data folder can be named by {DATA_VARIABLE})"
-    raise ScenarioError(f"{scenario}: file = {_shown(name)}: no such file in {looked}{hint}")
+    raise ScenarioError(f"{scenario}: file = {shown(name)}: no such file in {looked}{hint}")
 
 
 # --------------------------------------------------------------------------- reading and explaining
@@ -503,34 +529,45 @@ def _parse(path: Path) -> dict[str, Any]:
     if len(raw) > LARGEST_FILE:
         raise ScenarioError(f"{path}: larger than {LARGEST_FILE} bytes; records go in own files")
     try:
-        return tomllib.loads(raw.decode("utf-8-sig"))
+        text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise ScenarioError(f"{path}: not UTF-8 text; a scenario is a TOML file") from None
+    if endless := _ENDLESS_KEY.search(text):
+        line = text.count("\n", 0, endless.start()) + 1
+        raise ScenarioError(
+            f"{path}: line {line}: a key of more than 20 parts; no key lies this deep"
+        )
+    try:
+        return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # a number of 5,000 digits is a ValueError
-        raise ScenarioError(f"{path}: not valid TOML: {_cut(str(error))}") from None
+        raise ScenarioError(f"{path}: not valid TOML: {cut(str(error))}") from None
 
 
 def _override(data: dict[str, Any], override: str) -> None:
     key, equals, text = override.partition("=")
     parts = [part.strip() for part in key.split(".")]
     if not equals or not all(parts):
-        raise ScenarioError(f"--set {override}: give it as key=value, for example run.t_end=10")
+        raise ScenarioError(
+            f"--set {cut(override)}: give it as key=value, for example run.t_end=10"
+        )
     if "\n" in override:
         line = override.partition("\n")[0]
-        raise ScenarioError(f"--set {_cut(line)}: one key and one value, on one line")
+        raise ScenarioError(f"--set {cut(line)}: one key and one value, on one line")
     if len(parts) > DEEPEST_KEY:
-        raise ScenarioError(f"--set {_cut(override)}: no key lies this deep")
+        raise ScenarioError(f"--set {cut(override)}: no key lies this deep")
+    if _ENDLESS_KEY.search(text):
+        raise ScenarioError(f"--set {cut(override)}: no key lies this deep")
     try:
         value = tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         value = text.strip()
     except (ValueError, RecursionError) as error:
-        raise ScenarioError(f"--set {_cut(override)}: {_cut(str(error))}") from None
+        raise ScenarioError(f"--set {cut(override)}: {cut(str(error))}") from None
     table = data
     for part in parts[:-1]:
         table = table.setdefault(part, {})
         if not isinstance(table, dict):
-            raise ScenarioError(f"--set {override}: {part!r} is a value, not a table")
+            raise ScenarioError(f"--set {cut(override)}: {shown(part)} is a value, not a table")
     table[parts[-1]] = value
 
 
@@ -558,7 +595,7 @@ def _explained(error: ValidationError, data: dict[str, Any]) -> str:
     # An unknown key is most often the cause of a missing one: say it first.
     first = min(findings, key=lambda f: f["type"] != "extra_forbidden")
     places = _written_key(first["loc"])
-    key = _cut(".".join(places))
+    key = cut(".".join(places))
     value = first.get("input")
     rest = len(findings) - 1
     more = f" (and {rest} more)" if rest else ""
@@ -567,33 +604,21 @@ def _explained(error: ValidationError, data: dict[str, Any]) -> str:
         valid = _valid_keys(places[:-1], data)
         near = difflib.get_close_matches(places[-1][:LONGEST_SHOWN], valid, n=1)
         hint = f"did you mean {near[0]!r}? " if near else ""
-        return f"{key} = {_shown(value)}: unknown key; {hint}valid here: {', '.join(valid)}{more}"
+        return f"{key} = {shown(value)}: unknown key; {hint}valid here: {', '.join(valid)}{more}"
     if kind == "missing":
         return f"{key} is missing{more}"
     if kind == "union_tag_not_found":
         return f"{key}.kind is missing{more}"
     if kind == "union_tag_invalid":
         allowed = first["ctx"]["expected_tags"]
-        return f"{key}.kind = {first['ctx']['tag']!r}: it must be one of {allowed}{more}"
+        return f"{key}.kind = {shown(first['ctx']['tag'])}: it must be one of {allowed}{more}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
-        return f"{key} = {_shown(value)}: it must be a table, [{key}]{more}"
+        return f"{key} = {shown(value)}: it must be a table, [{key}]{more}"
     text = first["msg"].removeprefix("Value error, ")
     text = text.replace("Input should be", "it must be")
     if isinstance(value, dict):
         return f"[{key}] {text}{more}" if key else f"{text}{more}"
-    return f"{key} = {_shown(value)}: {text}{more}"
-
-
-def _shown(value: Any) -> str:
-    """Return a value as a message can show it."""
-    try:
-        return _cut(repr(value))
-    except RecursionError:
-        return "..."
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + " ..."
+    return f"{key} = {shown(value)}: {text}{more}"
 
 
 def _valid_keys(places: list[str], data: dict[str, Any]) -> list[str]:

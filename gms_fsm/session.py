@@ -264,6 +264,11 @@ class Session:
         for name in ("t_eval", "progress"):
             if name in options:
                 raise ParameterError(f"{name} does not go with a session: it stops at every row")
+        if "monitors" in options:
+            raise ParameterError(
+                "monitors look at a finished run: gms_fsm.monitors.examine(session.branch.trace(), "
+                "...)"
+            )
         if not isinstance(options.get("engine", ""), str):
             raise ParameterError(
                 "engine: every branch of a session makes machines of its own; use 'machines' or "

@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gms_fsm.errors import ExpressionError, SignalError
+from gms_fsm.errors import ExpressionError, SignalError, shown
 from gms_fsm.expression import Value, parse_value
 from gms_fsm.parameters import FloatArray
 
@@ -79,9 +79,10 @@ class Corners:
         for name in ("times", "values"):
             try:
                 array = np.array(getattr(self, name), dtype=np.float64)
-            except (TypeError, ValueError):
+            except (TypeError, ValueError, OverflowError):
                 raise SignalError(
-                    f"signal: the {name} {getattr(self, name)!r} are not numbers"
+                    f"signal: the {name} {shown(getattr(self, name))} are not numbers; give "
+                    "numbers that a float can hold"
                 ) from None
             if array.ndim != 1:
                 raise SignalError(f"signal: the {name} have shape {array.shape}; give a flat list")
@@ -174,27 +175,30 @@ def as_signal(given: SignalLike) -> Signal:
     if isinstance(form, bool):
         raise SignalError(f"signal: {form!r} is not a signal; give a number, say 1.0")
     if isinstance(form, Real | np.generic):
-        level = float(form)
+        try:
+            level = float(form)
+        except OverflowError:
+            raise SignalError(f"signal: {shown(form)} is too large; it must be finite") from None
         return Corners(np.array([-1.0, 0.0]), np.array([level, level]), held=True)
     if callable(form):
         return Function(form)
     pair = form if isinstance(form, tuple) and len(form) == 2 else ()
     if pair and all(isinstance(part, tuple) and len(part) == 2 for part in pair):
         raise SignalError(
-            f"signal: {form!r} can be read as two ramp corners and as a record of two samples; "
-            "give a list [(t, value), (t, value)] or arrays (times, values)"
+            f"signal: {shown(form)} can be read as two ramp corners and as a record of two "
+            "samples; give a list [(t, value), (t, value)] or arrays (times, values)"
         )
     if pair:
         return Corners(pair[0], pair[1], held=False)
     if isinstance(form, list | np.ndarray | tuple):
         try:
             corners = np.array(form, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             corners = np.empty(0)
         if corners.ndim == 2 and corners.shape[1] == 2:
             return Corners(corners[:, 0], corners[:, 1], held=True)
     raise SignalError(
-        f"signal: {form!r} is not a signal; give an expression of t in quotes, a list of "
+        f"signal: {shown(form)} is not a signal; give an expression of t in quotes, a list of "
         "(t, value) pairs, a pair (times, values), or a function of t"
     )
 

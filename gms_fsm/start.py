@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import integrators
-from gms_fsm.errors import ParameterError, SignalError
+from gms_fsm.errors import ParameterError, SignalError, shown
 from gms_fsm.models import Model
 from gms_fsm.parameters import as_floats, checked_array, checked_scalar
 from gms_fsm.program import Program, lower
@@ -113,7 +113,7 @@ class Start:
             raise ParameterError(f"t_end is {t_end!r}, t_start is {t_start!r}; t_end must be later")
         if engine not in ENGINES:
             raise ParameterError(
-                f"engine is {engine!r}; it must be {', '.join(map(repr, ENGINES))}, or an "
+                f"engine is {shown(engine)}; it must be {', '.join(map(repr, ENGINES))}, or an "
                 "ElementMachines"
             )
         if engine == "compiled" and not isinstance(method, str):
@@ -142,7 +142,7 @@ def _output(output: str | None, t_eval: ArrayLike | None) -> str:
     if output is None:
         return "all" if t_eval is None else "t_eval"
     if output not in ("all", "t_eval", "end"):
-        raise ParameterError(f"output is {output!r}; it must be 'all', 't_eval' or 'end'")
+        raise ParameterError(f"output is {shown(output)}; it must be 'all', 't_eval' or 'end'")
     if (output == "t_eval") != (t_eval is not None):
         raise ParameterError(
             "output='t_eval' needs t_eval=..., the times of the rows"
@@ -169,8 +169,8 @@ def _options(
     if isinstance(method, str):
         if method not in integrators.METHODS:
             raise ParameterError(
-                f"method is {method!r}; it must be one of {', '.join(integrators.METHODS)}, or a "
-                "scipy.integrate.OdeSolver class"
+                f"method is {shown(method)}; it must be one of {', '.join(integrators.METHODS)}, "
+                "or a scipy.integrate.OdeSolver class"
             )
         chosen = integrators.METHODS[method]
         if step is None and not chosen.adaptive:
@@ -179,7 +179,7 @@ def _options(
             )
     elif not (isinstance(method, type) and hasattr(method, "TOO_SMALL_STEP")):
         raise ParameterError(
-            f"method is {method!r}; it must be a name ({', '.join(integrators.METHODS)}) or a "
+            f"method is {shown(method)}; it must be a name ({', '.join(integrators.METHODS)}) or a "
             "scipy.integrate.OdeSolver class"
         )
     if step is not None:
@@ -196,7 +196,7 @@ def _options(
                 "give a longer one"
             )
     if events not in ("located", "step"):
-        raise ParameterError(f"events is {events!r}; it must be 'located' or 'step'")
+        raise ParameterError(f"events is {shown(events)}; it must be 'located' or 'step'")
     if events == "step" and step is None and not math.isfinite(max_step):
         raise ParameterError(
             "events='step' looks at the guards once a step: give step=... or a finite max_step"
@@ -240,19 +240,20 @@ def _initial(model: Model, rig: Rig, initial: Mapping[str, Any]) -> tuple[list[f
     known = ("x", "v", *chart.variables, "states")
     if not isinstance(initial, Mapping):
         raise ParameterError(
-            f"initial is {initial!r}; it must be a mapping, for example {{'x': 0}}"
+            f"initial is {shown(initial)}; it must be a mapping, for example {{'x': 0}}"
         )
     for name in initial:
         if name not in known:
             raise ParameterError(
-                f"initial has the key {name!r}; known are {', '.join(map(repr, known))}"
+                f"initial has the key {shown(name)}; known are {', '.join(map(repr, known))}"
             )
     y = [checked_scalar("initial['x']", initial.get("x", 0.0), "finite")]
     if rig.acceleration is not None:
         y.append(checked_scalar("initial['v']", initial.get("v", 0.0), "finite"))
     elif "v" in initial:
         raise ParameterError(
-            f"initial has 'v' = {initial['v']!r}, but the rig prescribes the velocity; leave it out"
+            f"initial has 'v' = {shown(initial['v'])}, but the rig prescribes the velocity; leave "
+            "it out"
         )
     for name in chart.variables:
         values = checked_array(f"initial[{name!r}]", initial.get(name, [0.0] * n), None, "finite")
@@ -263,5 +264,5 @@ def _initial(model: Model, rig: Rig, initial: Mapping[str, Any]) -> tuple[list[f
         y += as_floats(values)
     names: Any = initial.get("states", [chart.default_state.name] * n)
     if isinstance(names, str) or np.ndim(names) != 1 or len(names) != n:
-        raise ParameterError(f"initial['states'] is {names!r}; it must list {n} state names")
+        raise ParameterError(f"initial['states'] is {shown(names)}; it must list {n} state names")
     return y, [chart.state_index(str(name)) for name in names]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import contextlib
 import importlib
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, Future, ThreadPoolExecutor, as_completed
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -125,16 +125,17 @@ class Sweep:
             Parameters, outcome, end of the run; columns of elements are numbered from 1.
         """
         pandas = _imported("pandas", "pandas")
-        columns: dict[str, Any] = {}
-        for name, values in self.parameters.items():
-            columns |= _numbered(name, values)
-        columns |= {"outcome": self.outcome, "message": self.message, "t": self.t, "x": self.x,
-                    "v": self.v, "F": self.F}  # fmt: skip
-        columns |= _numbered("z", self.z) | _numbered("state", self.states)
-        return pandas.DataFrame(
-            columns | {"transitions": self.transition_count},
-            index=pandas.RangeIndex(len(self), name="run"),
-        )
+        results = {"outcome": self.outcome, "message": self.message, "t": self.t, "x": self.x,
+                   "v": self.v, "F": self.F}  # fmt: skip
+        results |= _numbered("z", self.z) | _numbered("state", self.states)
+        results |= {"transitions": self.transition_count}
+        columns = {
+            _apart(column, results): numbers
+            for name, values in self.parameters.items()
+            for column, numbers in _numbered(name, values).items()
+        }
+        index = pandas.RangeIndex(len(self), name="run")
+        return pandas.DataFrame(columns | results, index=index)
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the results as an xarray Dataset (extra ``sweep``).
@@ -147,8 +148,6 @@ class Sweep:
         xarray = _imported("xarray", "sweep")
         units = {"t": "s", "x": "m", "v": "m/s", "F": "N", "z": "m"}
         data: dict[str, Any] = {}
-        for name, values in self.parameters.items():
-            data[name] = (("run", "element")[: values.ndim], values)
         for name in ("outcome", "message", "t", "x", "v", "F"):
             data[f"{name}_end" if name in units else name] = ("run", getattr(self, name))
         data["z_end"] = (("run", "element"), self.z)
@@ -159,7 +158,12 @@ class Sweep:
         coordinates = {"run": np.arange(len(self)), "element": np.arange(1, self.z.shape[1] + 1)}
         if self.times.size:
             coordinates["time"] = self.times
-        dataset = xarray.Dataset(data, coordinates)
+        taken = {*data, *coordinates}
+        parameters = {
+            _apart(name, taken): (("run", "element")[: values.ndim], values)
+            for name, values in self.parameters.items()
+        }
+        dataset = xarray.Dataset(parameters | data, coordinates)
         for name, variable in dataset.variables.items():
             if unit := units.get(str(name).removesuffix("_end")):
                 variable.attrs["units"] = unit
@@ -324,7 +328,12 @@ def sweep(
         try:
             for chunk in chunks:
                 part = {name: array[chunk.start : chunk.stop] for name, array in values.items()}
-                waiting[executor.submit(_run_chunk, model, rig, t_end, part, options)] = chunk
+                try:
+                    task = executor.submit(_run_chunk, model, rig, t_end, part, options)
+                except BrokenExecutor as error:  # by a task before this one
+                    task = Future()
+                    task.set_exception(error)
+                waiting[task] = chunk
             for future in as_completed(list(waiting)):
                 chunk = waiting.pop(future)
                 collected.take(chunk, _results(future, len(chunk)))
@@ -527,6 +536,11 @@ def _numbered(name: str, values: NDArray[Any]) -> dict[str, Any]:
     if values.ndim == 1:
         return {name: values}
     return {column_name(name, i): values[:, i] for i in range(values.shape[1])}
+
+
+def _apart(name: str, taken: Collection[str]) -> str:
+    """Return a parameter's column name that is not one of the results'."""
+    return f"parameter_{name}" if name in taken else name
 
 
 def _imported(module: str, extra: str) -> Any:

@@ -7,10 +7,11 @@ times (`t_eval`) the rows are exactly those times, right-continuous; the log is 
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -20,17 +21,27 @@ from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.compiled import observe_rows
 from gms_fsm.errors import MissingExtraError, OutputError, SignalError, TraceFileError
-from gms_fsm.files import written_whole
+from gms_fsm.files import leftovers, written_together, written_whole
 from gms_fsm.header import Header
 from gms_fsm.models import Model
 from gms_fsm.parameters import FloatArray
 from gms_fsm.program import Program, lower
 from gms_fsm.rigs import Rig
+from gms_fsm.verdicts import Verdict
 
 if TYPE_CHECKING:
     import pandas
 
-__all__ = ["Rows", "Trace", "column_name", "dwell_times", "interpolated", "log_from", "log_of"]
+__all__ = [
+    "Rows",
+    "Trace",
+    "column_name",
+    "dwell_times",
+    "interpolated",
+    "log_from",
+    "log_of",
+    "slopes",
+]
 
 _NUMBERS = ("z", "v", "s", "F_before", "F_after")
 
@@ -70,6 +81,8 @@ class Trace:
         What ran. After `load` a generic `ChartModel`.
     settings : dict
         Method, tolerances, engine and so on.
+    monitors : mapping of str to Verdict
+        What the monitors of the run say, by name; empty if it had none.
 
     Examples
     --------
@@ -87,6 +100,7 @@ class Trace:
     rig: Rig
     settings: Mapping[str, str | float | None]
     stored: Mapping[str, FloatArray] = field(default_factory=dict, repr=False)
+    monitors: Mapping[str, Verdict] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
         return (
@@ -186,7 +200,7 @@ class Trace:
             return self.stored
         n, width = self.n, 2 + (2 + len(self.model.chart.variables)) * self.n
         rows, program = self.rows, self.program
-        if self.settings["engine"] == "compiled":
+        if self.settings.get("engine") == "compiled":
             table = observe_rows(program, rows.t, rows.y, rows.mode, width)
         else:
             table = _observe_rows(program, rows, width)
@@ -235,7 +249,7 @@ class Trace:
         y = np.array([self._between(table, int(i), t) for i, t in zip(left, wanted, strict=True)])
         rows = Rows(wanted, np.zeros(wanted.size, dtype=np.int64), y, table.mode[left])
         return Trace(rows, _merged(table, rows), self.transitions, self.model, self.rig,
-                     self.settings)  # fmt: skip
+                     self.settings, monitors=self.monitors)  # fmt: skip
 
     def refined(self, points: int) -> Trace:
         """Return the rows with evenly spaced samples between them, for smooth curves.
@@ -254,7 +268,22 @@ class Trace:
         inner = ~np.isin(even.t, self.t)
         between = Rows(*(column[inner] for column in vars(even).values()))
         rows = _merged(between, self.rows)
-        return Trace(rows, rows, self.transitions, self.model, self.rig, self.settings)
+        return Trace(rows, rows, self.transitions, self.model, self.rig, self.settings,
+                     monitors=self.monitors)  # fmt: skip
+
+    def whole(self) -> Trace:
+        """Return the run with both sides of every stop as rows, beside the wanted times.
+
+        Returns
+        -------
+        Trace
+            This one if it has them already.
+        """
+        table = _merged(self.rows, self.stops)
+        if len(table) == len(self.rows):
+            return self
+        return Trace(table, table, self.transitions, self.model, self.rig, self.settings,
+                     monitors=self.monitors)  # fmt: skip
 
     def _between(self, table: Rows, i: int, t: float) -> FloatArray:
         t0 = table.t[i]
@@ -264,6 +293,23 @@ class Trace:
             self.program, table.mode[i].tolist(), float(t0), table.y[i], float(table.t[i + 1]),
             table.y[i + 1], t,
         )  # fmt: skip
+
+    def with_monitors(self, found: Mapping[str, Verdict]) -> Trace:
+        """Return the same run with what its monitors say.
+
+        Parameters
+        ----------
+        found : mapping of str to Verdict
+            By name.
+
+        Returns
+        -------
+        Trace
+            With all that has been computed from the rows already.
+        """
+        trace = replace(self, monitors=found)
+        vars(trace).update({**vars(self), "monitors": found})
+        return trace
 
     # ------------------------------------------------------------------ files
     def save(self, path: str | Path) -> Path:
@@ -299,8 +345,16 @@ class Trace:
             }
             return written_whole(path, lambda file: np.savez_compressed(file, **arrays))
         if path.suffix == ".csv":
-            written_whole(_log_path(path), lambda file: file.write(self.transitions_csv().encode()))
-            return written_whole(path, lambda file: file.write(self._rows_csv().encode()))
+            log = self.transitions_csv()
+            rows = self._rows_csv(_stamp(log)).encode()
+            # The rows name their log, so a process killed between the two leaves no mixture.
+            written_together(
+                {
+                    path: lambda file: file.write(rows),
+                    _log_path(path): lambda file: file.write(log.encode()),
+                }
+            )
+            return path
         raise OutputError(f"{path}: a trace is saved as .npz or .csv, not {path.suffix!r}")
 
     @classmethod
@@ -328,8 +382,10 @@ class Trace:
             raise TraceFileError(f"{path}: a trace ends in .npz or .csv, not {path.suffix!r}")
         try:
             return reader(path)
-        except TraceFileError:
-            raise
+        except TraceFileError as error:
+            if str(error).startswith((f"{path}:", f"{_log_path(path)}:")):
+                raise
+            raise TraceFileError(f"{path}: {error}") from None
         except FileNotFoundError as error:
             raise TraceFileError(f"{error.filename}: no such file") from None
         except Exception as error:
@@ -343,22 +399,32 @@ class Trace:
     @classmethod
     def _load_npz(cls, path: Path) -> Trace:
         with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
-            header = Header.model_validate_json(str(file["header"]))
-            tables = {
-                kind: Rows(*(file[f"{kind}_{name}"] for name in ("t", "microstep", "y", "mode")))
-                for kind in ("rows", "stops")
-            }
+            header = Header.model_validate_json(str(_member(file, "header")))
+            model = header.to_model()
+            width = 8 * model.n * (2 + len(model.chart.variables))  # bytes a row
+            tables = {}
+            for kind in ("rows", "stops"):
+                t = _member(file, f"{kind}_t")
+                names = [f"{kind}_{name}" for name in ("microstep", "y", "mode")]
+                tables[kind] = Rows(t, *(_member(file, name, width * t.size) for name in names))
+            rows = tables["rows"].t.size
             stored = {
-                name: file[f"observed_{name}"] for name in ("v", "F", "s", "F_elements", "dz")
+                name: _member(file, f"observed_{name}", width * rows)
+                for name in ("v", "F", "s", "F_elements", "dz")
             }
-            log = file["transitions"].view(np.recarray)
-        return cls._checked(header, tables["rows"], tables["stops"], log, stored)
+            log = _member(file, "transitions").view(np.recarray)
+        return cls._checked(header, model, tables["rows"], tables["stops"], log, stored)
 
     @classmethod
     def _checked(
-        cls, header: Header, rows: Rows, stops: Rows, log: Any, stored: Mapping[str, FloatArray]
+        cls,
+        header: Header,
+        model: Model,
+        rows: Rows,
+        stops: Rows,
+        log: Any,
+        stored: Mapping[str, FloatArray],
     ) -> Trace:
-        model = header.to_model()
         n, m = model.n, rows.t.size
         size = (1 if header.rig.prescribed else 2) + n * len(model.chart.variables)
         for kind, table in (("rows", rows), ("stops", stops)):
@@ -371,16 +437,28 @@ class Trace:
                 raise TraceFileError(f"{kind} t: times must be finite and must not go backward")
             if count and not 0 <= table.mode.min() <= table.mode.max() < len(model.chart.states):
                 raise TraceFileError(f"{kind} mode: a number is not a state of the chart")
+        if m == 0:
+            raise TraceFileError("rows: there are none")
         for name, value in stored.items():
             _expect(name, value, (m, n) if name in ("s", "F_elements", "dz") else (m,), "f")
         if log.ndim != 1 or log.dtype != _log_dtype(_text_width(log.dtype)):
             raise TraceFileError("the transition log has other columns than a trace has")
         if log.size and not 0 <= log.element.min() <= log.element.max() < n:
             raise TraceFileError("the transition log names an element that the model has not")
-        return cls(rows, stops, log, model, header.to_rig(), header.settings, stored)
+        if not (np.diff(log.t) >= 0).all() or not np.isfinite(log.t).all():
+            raise TraceFileError("the transition log: times must be finite and not go backward")
+        edges = {(edge.name, edge.source, edge.target) for edge in model.chart.transitions}
+        if not edges >= set(zip(*(log[name].tolist() for name in _LOG_NAMES[2:5]), strict=True)):
+            raise TraceFileError("the transition log names an edge that the chart has not")
+        for kind, table in (("rows", rows), ("stops", stops)):
+            fired = np.searchsorted(log.t, table.t, "right") - np.searchsorted(log.t, table.t)
+            if not ((table.microstep >= 0) & (table.microstep <= fired)).all():
+                raise TraceFileError(f"{kind} microstep: the log has other firings at a time")
+        return cls(rows, stops, log, model, header.to_rig(), header.settings, stored,
+                   header.monitors)  # fmt: skip
 
     def _header(self) -> Header:
-        return Header.of(self.model, self.rig, self.settings)
+        return Header.of(self.model, self.rig, self.settings, self.monitors)
 
     # ------------------------------------------------------------------ tables
     def columns(self) -> dict[str, NDArray[Any]]:
@@ -436,10 +514,11 @@ class Trace:
                 for record in self.transitions.tolist())  # fmt: skip
         return _csv(names, rows)
 
-    def _rows_csv(self) -> str:
+    def _rows_csv(self, stamp: str) -> str:
         table = self.columns()
         rows = zip(*(column.tolist() for column in table.values()), strict=True)
-        head = json.dumps(json.loads(self._header().model_dump_json()))
+        header = self._header().model_copy(update={"log": stamp})
+        head = json.dumps(json.loads(header.model_dump_json()))
         return f"# {head}\n" + _csv(table, ([_cell("", v) for v in row] for row in rows))
 
     @classmethod
@@ -450,8 +529,7 @@ class Trace:
                 raise TraceFileError(f"{path}: line 1 must be '# ' and the trace's header")
             header = Header.model_validate_json(first[2:])
             table = _read_columns(file, path, 2)
-        with _log_path(path).open(encoding="utf-8", newline="") as file:
-            log = _read_columns(file, _log_path(path), 1)
+        log = _read_columns(io.StringIO(_log_text(path, header.log)), _log_path(path), 1)
         model = header.to_model()
         states = [s.name for s in model.chart.states]
 
@@ -479,7 +557,7 @@ class Trace:
             "v": number("v"), "F": number("F"), "s": block("s"), "F_elements": block("F"),
             "dz": block(f"d{model.chart.variables[0]}"),
         }  # fmt: skip
-        return cls._checked(header, rows, rows, log_of(records), observed)
+        return cls._checked(header, model, rows, rows, log_of(records), observed)
 
 
 # --------------------------------------------------------------------------- helpers
@@ -547,22 +625,42 @@ def interpolated(
     ndarray, shape (m,)
         The state.
     """
+    with np.errstate(all="ignore"):  # as in a run: beyond the largest float lies inf
+        at_start, at_end = slopes(program, mode, t0, y0, t1, y1)
+        h = t1 - t0
+        theta = (t - t0) / h
+        rise = y1 - y0
+        bend = h * at_start - rise
+        twist = rise - h * at_end - bend
+        value: FloatArray = y0 + theta * (rise + (1 - theta) * (bend + theta * twist))
+    return value
+
+
+def slopes(
+    program: Program, mode: list[int], t0: float, y0: FloatArray, t1: float, y1: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return dy/dt at two neighbouring rows of one arc, both as seen from between them.
+
+    Parameters
+    ----------
+    program, mode, t0, y0, t1, y1
+        As in `interpolated`.
+
+    Returns
+    -------
+    tuple of ndarray, shape (m,)
+        At the first row and at the second.
+    """
     # Signs as they hold inside the interval; at its ends they may just be turning.
     held = [0.0] * program.held
     inside = (0.5 * (y0 + y1)).tolist()
     program.ieee["arm"](0.5 * (t0 + t1), inside, mode, program.p, held, [0] * len(program.strict))
-    slopes = []
+    found = []
     for time, y in ((t0, y0), (t1, y1)):
         dy = [0.0] * program.size
         program.ieee["flow"](time, y.tolist(), mode, held, program.p, dy)
-        slopes.append(np.array(dy))
-    h = t1 - t0
-    theta = (t - t0) / h
-    rise = y1 - y0
-    bend = h * slopes[0] - rise
-    twist = rise - h * slopes[1] - bend
-    value: FloatArray = y0 + theta * (rise + (1 - theta) * (bend + theta * twist))
-    return value
+        found.append(np.array(dy))
+    return found[0], found[1]
 
 
 def _observe_rows(program: Program, rows: Rows, width: int) -> FloatArray:
@@ -575,6 +673,23 @@ def _observe_rows(program: Program, rows: Rows, width: int) -> FloatArray:
         except SignalError:  # the row at which a Python function failed
             table[row] = np.nan
     return table
+
+
+_ROOM = 2**26  # bytes that any array of a file may have
+_DENSEST = 200  # times: no header, column of times or log is packed tighter than this
+
+
+def _member(file: Any, name: str, most: int | None = None) -> Any:
+    """Read an array of an archive, if it unpacks to no more bytes than a trace's would."""
+    members = {info.filename: info for info in file.zip.infolist()}
+    member = members.get(name) or members[f"{name}.npy"]
+    most = _ROOM + (_DENSEST * member.compress_size if most is None else most)
+    if member.file_size > most:
+        raise TraceFileError(
+            f"{name} unpacks to {member.file_size} bytes; in a trace of this length it has at most "
+            f"{most}"
+        )
+    return file[name]
 
 
 _LOG_NAMES = ("t", "element", "edge", "source", "target", *_NUMBERS)
@@ -618,6 +733,8 @@ def _merged(rows: Rows, stops: Rows) -> Rows:
     """Merge two tables in time order; rows that both have are kept once."""
     if rows is stops or not len(stops):
         return rows
+    once = ~_found_in(rows, stops)
+    rows = Rows(*(column[once] for column in vars(rows).values()))
     t = np.concatenate([rows.t, stops.t])
     microstep = np.concatenate([rows.microstep, stops.microstep])
     # A wanted row on an event holds the values after it: sort it behind the micro-steps.
@@ -631,6 +748,22 @@ def _merged(rows: Rows, stops: Rows) -> Rows:
     )
 
 
+def _found_in(rows: Rows, stops: Rows) -> NDArray[np.bool_]:
+    """Tell which rows the stops have too, to the bit."""
+    found = np.isin(rows.t, stops.t)
+    if not found.any():
+        return found
+
+    def texts(table: Rows, chosen: NDArray[np.bool_]) -> list[bytes]:
+        columns = table.t, table.microstep, table.y, table.mode
+        both = np.column_stack([np.asarray(column[chosen], np.float64) for column in columns])
+        return [row.tobytes() for row in both]
+
+    known = set(texts(stops, np.ones(len(stops), dtype=np.bool_)))
+    found[found] = [text in known for text in texts(rows, found)]
+    return found
+
+
 def column_name(name: str, i: int) -> str:
     """Return the column's name of element i: z1, but z1_1 for a variable that is called z1."""
     return f"{name}{'_' if name[-1].isdigit() or name[-1] == '_' else ''}{i + 1}"
@@ -638,6 +771,28 @@ def column_name(name: str, i: int) -> str:
 
 def _log_path(path: Path) -> Path:
     return path.with_name(f"{path.stem}.transitions.csv")
+
+
+def _stamp(text: str) -> str:
+    """Return what tells one text from another; how its lines end does not count."""
+    return hashlib.sha256("\n".join(text.splitlines()).encode()).hexdigest()[:16]
+
+
+def _log_text(path: Path, stamp: str) -> str:
+    """Read the transition log that belongs to a CSV trace.
+
+    Where the process was killed after the rows took their place and before the log did, the log is
+    complete under its temporary name.
+    """
+    log = _log_path(path)
+    for place in (log, *leftovers(log)):
+        with place.open(encoding="utf-8", newline="") as file:
+            text = file.read()
+        if stamp in ("", _stamp(text)):
+            return text
+    raise TraceFileError(
+        f"{log}: belongs to another run than {path.name}, or was changed; keep the two together"
+    )
 
 
 def _cell(name: str, value: Any) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from gms_fsm.errors import UnitError
+from gms_fsm.errors import UnitError, shown
 
 __all__ = ["FACTORS", "convert_numbers", "factor"]
 
@@ -50,9 +50,10 @@ def factor(quantity: str, unit: str) -> float:
     for other, units in FACTORS.items():
         if plain in units:
             raise UnitError(
-                f"unit {unit!r} measures {other}, not {quantity}; use one of {', '.join(known)}"
+                f"unit {shown(unit)} measures {other}, not {quantity}; use one of "
+                f"{', '.join(known)}"
             )
-    raise UnitError(f"unknown unit {unit!r}; for {quantity} use one of {', '.join(known)}")
+    raise UnitError(f"unknown unit {shown(unit)}; for {quantity} use one of {', '.join(known)}")
 
 
 def convert_numbers(text: str) -> str:
@@ -78,15 +79,15 @@ def convert_numbers(text: str) -> str:
     >>> convert_numbers("normal > 4500 mN and time < 3 min")
     'normal > 4.5     and time < 180.0'
     """
-    number_unit = (
-        r"(?<![\w.])(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)\s*([^\W\d]\w*(?:/s)?)"
-    )
+    # Never given back once read (++): 2e3 is no 2 with the unit e3, and long digits take no time.
+    number = r"(?:\d++(?:\.\d*+)?+|\.\d++)(?:[eE][-+]?\d++)?+"
+    number_unit = rf"(?<![\w.])({number})\s*+([^\W\d]\w*+(?:/s)?)"
 
     def converted(clause: str) -> str:
         # A unit has to fit the quantity it is compared with.
         quantities = [q for q in FACTORS if re.search(rf"\b{q}\b", clause)]
 
-        def number(found: re.Match[str]) -> str:
+        def in_si(found: re.Match[str]) -> str:
             value, unit = float(found.group(1)), found.group(2)
             fitting = (
                 quantities or [q for q, units in FACTORS.items() if unit in units] or ["force"]
@@ -94,7 +95,7 @@ def convert_numbers(text: str) -> str:
             # As long as what it replaces, where it can be: columns in messages stay true.
             return repr(value * factor(fitting[0], unit)).ljust(len(found.group(0)))
 
-        return re.sub(number_unit, number, clause)
+        return re.sub(number_unit, in_si, clause)
 
     parts = re.split(r"(\band\b|\bor\b|\bnot\b)", text)
     return "".join(p if p in ("and", "or", "not") else converted(p) for p in parts)

@@ -1,148 +1,374 @@
-"""Machine code is kept on disk, found again and shared; a broken cache only costs time."""
+"""Machine code is kept on disk, and whatever happens to it there costs time and nothing else.
+
+Another process does not compile again; two may start at once; an unwritable folder or a damaged
+file is survived; changed source goes to another folder; programs that were compiled in different
+processes are never taken for each other. Without numba the words say what to install, and the
+machines run.
+"""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
+import textwrap
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-pytest.importorskip("numba", reason="needs the extra fast")
+from gms_fsm import compiled
 
-from integrators import compiled
+numba = pytest.importorskip("numba", reason="needs the extra fast")
+
+from integrators import compiled as machine
+from integrators import loop, step_size
 
 ROOT = Path(__file__).parents[1]
+NOTE = "gms-fsm: compiling the engine, once on this machine"
+
+# A whole run, by both engines. A new machine pays some 10 s for it.
 RUN = """
-from gms_fsm import GMS, GMSParameters, Prescribed, simulate
-model = GMS(GMSParameters.paper("stick-slip"), law="signed")
-rigs = [Prescribed("0.2*sin(2*pi*t/20)"), Prescribed("0.2*cos(2*pi*t/20)")]
-runs = [simulate(model, rig, 25.0, engine="compiled") for rig in rigs]
-print([(len(run), float(run.z[-1, 0]).hex()) for run in runs])
+    from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    rig = Prescribed("0.2*sin(2*pi*t/20)")
+    one, other = (simulate(model, rig, 31.0, engine=e) for e in ("compiled", "machines"))
+    assert one.rows.y.tobytes() == other.rows.y.tobytes()
+    assert one.F.tobytes() == other.F.tobytes()
+    assert one.transitions.tobytes() == other.transitions.tobytes()
+    print("equal", len(one.transitions))
 """
-NOTE = "compiling the engine"
+# One function of one program: a second. The velocities are such that a mix-up is seen.
+ROWS = """
+    import sys
+    import numpy as np
+    from gms_fsm import GMS, GMSParameters, Prescribed, compiled
+    from gms_fsm.program import lower
+    model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    t = np.linspace(0.0, 3.0, 50)
+    y, mode = np.full((50, 5), 0.1), np.zeros((50, 4), dtype=np.int64)
+    for velocity in sys.argv[1:]:
+        program = lower(model, Prescribed(velocity))
+        found = compiled.observe_rows(program, t, y, mode, 14)
+        for row in range(50):
+            out = [0.0] * 14
+            program.ieee["observe"](t[row], y[row].tolist(), [0] * 4, program.p, out)
+            assert found[row].tolist() == out, velocity
+    print("equal")
+"""
 
 
-def child(folder: Path, text: str = RUN) -> subprocess.Popen[str]:
-    """Start a process whose cache lies in a folder."""
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder), "PYTHONPATH": str(ROOT)}
+def _start(code: str, *arguments: str, **environment: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-W", "error", "-c", text], env=environment, text=True,
+        [sys.executable, "-W", "error", "-c", textwrap.dedent(code), *arguments],
+        cwd=ROOT, env={**os.environ, **environment}, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )  # fmt: skip
 
 
-def finished(process: subprocess.Popen[str]) -> tuple[str, str]:
-    """Return what a process printed and noted."""
+def _ended(process: subprocess.Popen[str]) -> tuple[str, str]:
+    """Return what a process said, on both channels; it must have ended well."""
     out, err = process.communicate()
     assert process.returncode == 0, err
     return out, err
 
 
+def _rows(folder: Path, *velocities: str) -> str:
+    out, err = _ended(_start(ROWS, *velocities, NUMBA_CACHE_DIR=str(folder)))
+    assert out == "equal\n"
+    return err
+
+
+def _kept(folder: Path) -> set[Path]:
+    return {path for path in folder.rglob("*.nb?") if path.stat().st_size}
+
+
+# --------------------------------------------------------------------------- once on this machine
 @pytest.fixture(scope="module")
-def warm(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """A folder that two processes filled at the same time, and what they computed."""
+def warm(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[tuple[str, str]]]:
+    """A new cache folder after two processes have started at once, and what these said."""
     folder = tmp_path_factory.mktemp("cache")
-    together = [finished(process) for process in [child(folder), child(folder)]]
-    assert all(NOTE in err and "compiled in" in err for _, err in together)
-    assert together[0][0] == together[1][0]
-    return folder, together[0][0]
+    started = [_start(RUN, NUMBA_CACHE_DIR=str(folder)) for _ in range(2)]
+    return folder, [_ended(process) for process in started]
 
 
-def test_two_processes_fill_it_together_and_a_third_finds_it(warm: tuple[Path, str]) -> None:
-    folder, right = warm
-    out, err = finished(child(folder))
-    assert out == right
-    assert err == ""
+def test_two_processes_that_start_at_once_both_succeed(
+    warm: tuple[Path, list[tuple[str, str]]],
+) -> None:
+    folder, said = warm
+    assert [out for out, _ in said] == ["equal 24\n"] * 2
+    assert any(NOTE in err for _, err in said), "the wait is explained"
+    assert [path.name for path in _kept(folder) if path.match("loop.record-*.nbi")]
+    assert not list(folder.rglob("*.part")), "no half files are left"
 
 
-def test_what_it_holds_computes_what_the_machines_do(warm: tuple[Path, str]) -> None:
-    """Two programs loaded from disk into one process do not take each other's functions."""
-    folder, right = warm
-    assert finished(child(folder, RUN.replace("compiled", "machines")))[0] == right
+def test_the_next_process_does_not_compile_again(
+    warm: tuple[Path, list[tuple[str, str]]],
+) -> None:
+    folder = warm[0]
+    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
+    assert _ended(_start(RUN, NUMBA_CACHE_DIR=str(folder))) == ("equal 24\n", "")
+    after = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
+    assert after == before
 
 
-def test_damaged_files_are_compiled_again(warm: tuple[Path, str], tmp_path: Path) -> None:
-    folder, right = warm
-    kept = [path for path in folder.rglob("*") if path.suffix in (".nbi", ".nbc")]
-    assert len(kept) > 10
-    whole = {path: path.read_bytes() for path in kept}
-    for number, path in enumerate(kept):
-        data = whole[path]
-        path.write_bytes([b"", data[: len(data) // 2], b"\x00garbage" * 50][number % 3])
+def test_a_damaged_cache_only_costs_time(warm: tuple[Path, list[tuple[str, str]]]) -> None:
+    """Every file of it: the indices are garbage, the code is cut short."""
+    folder = warm[0]
+    for path in _kept(folder):
+        content = path.read_bytes()
+        path.write_bytes(b"garbage" * 9 if path.suffix == ".nbi" else content[: len(content) // 2])
+    out, err = _ended(_start(RUN, NUMBA_CACHE_DIR=str(folder)))
+    assert out == "equal 24\n"
+    assert "Traceback" not in err
+
+
+# --------------------------------------------------------------------------- damage of every kind
+def _truncated(path: Path) -> None:
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+
+
+def _empty(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+def _garbage(path: Path) -> None:
+    path.write_bytes(b"\x80\x05garbage" * 100)
+
+
+def _another_kind(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
+@pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
+@pytest.mark.parametrize("damage", [_truncated, _empty, _garbage, _another_kind])
+def test_a_damaged_file_is_survived(
+    damage: Callable[[Path], None], suffix: str, tmp_path: Path
+) -> None:
+    _rows(tmp_path, "0.1*t")
+    paths = [path for path in _kept(tmp_path) if path.suffix == suffix]
+    assert len(paths) == 2
+    for path in paths:
+        damage(path)
+    assert "Traceback" not in _rows(tmp_path, "0.1*t")
+
+
+def test_a_damaged_cache_is_made_anew(tmp_path: Path) -> None:
+    """It costs the time once, not each time."""
+    _rows(tmp_path, "0.1*t")
+    whole = {path: path.stat().st_size for path in _kept(tmp_path)}
+    for path in whole:
+        _garbage(path)
+    _rows(tmp_path, "0.1*t")  # removes what it cannot read
+    _rows(tmp_path, "0.1*t")  # keeps its own
+    assert {path: path.stat().st_size for path in _kept(tmp_path)} == whole
+
+
+def test_a_folder_that_cannot_be_written_only_costs_time(tmp_path: Path) -> None:
+    in_the_way = tmp_path / "file"
+    in_the_way.write_text("not a folder")
+    read_only = tmp_path / "read only"
+    read_only.mkdir(mode=0o500)
+    for folder in (in_the_way, in_the_way / "below", Path("/proc/no such place"), read_only):
+        assert "Traceback" not in _rows(folder, "0.1*t")
+    assert in_the_way.read_text() == "not a folder"
+
+
+def test_a_text_in_the_cache_that_was_tampered_with_is_not_run(tmp_path: Path) -> None:
+    """The text beside machine code is there for numba's bookkeeping; it is never imported."""
+    _rows(tmp_path, "0.1*t")
+    (text,) = tmp_path.rglob("program_*.py")
+    text.write_text("raise SystemExit('from the cache')\n")
+    _rows(tmp_path, "0.1*t")
+
+
+# --------------------------------------------------------------------------- no mix-up
+def test_programs_compiled_in_different_processes_are_told_apart(tmp_path: Path) -> None:
+    """Each is the first that its process compiles; a third process loads them all."""
+    velocities = ["0.1*t", "0.2*sin(t)", "exp(-t)", "0.3"]
+    for velocity in velocities:
+        _rows(tmp_path, velocity)
+    before = _kept(tmp_path)
+    _rows(tmp_path, *velocities)
+    _rows(tmp_path, *reversed(velocities))
+    assert _kept(tmp_path) == before
+
+
+def test_the_folder_is_the_same_in_every_process(tmp_path: Path) -> None:
+    code = "from gms_fsm import compiled; print(compiled.cache_folder())"
+    names = {
+        _ended(_start(code, NUMBA_CACHE_DIR=str(tmp_path), PYTHONHASHSEED=seed))[0]
+        for seed in ("0", "1", "random")
+    }
+    (name,) = names
+    assert Path(name.strip()).parent == tmp_path
+    assert Path(name.strip()).is_dir()
+
+
+# --------------------------------------------------------------------------- changed source
+def _other(a: Any, b: Any) -> Any:
+    return a - b
+
+
+def _changes(patch: pytest.MonkeyPatch) -> dict[str, Callable[[], None]]:
+    return {
+        "a function of a step": lambda: patch.setattr(
+            machine, "_OF_A_STEP", (*machine._OF_A_STEP[:-1], _other)
+        ),
+        "a function of an arc": lambda: patch.setattr(
+            machine, "_OF_AN_ARC", (*machine._OF_AN_ARC[1:], _other)
+        ),
+        "the loop": lambda: patch.setattr(loop, "record", _other),
+        "a number": lambda: patch.setattr(step_size, "SAFETY", 0.8),
+        "a limit": lambda: patch.setattr(loop, "MOST_SWITCHES", 99),
+        "the order of an argument": lambda: patch.setattr(
+            machine, "SIGNATURES", {**machine.SIGNATURES, "act": "fiiVIP"}
+        ),
+        "an option": lambda: patch.setattr(machine, "_OPTIONS", {"error_model": "python"}),
+        "numba": lambda: patch.setattr(numba, "__version__", "0.0"),
+        "Python": lambda: patch.setattr(sys, "version", "4.0"),
+    }
+
+
+def test_changed_source_gives_another_folder(tmp_path: Path) -> None:
+    usual = machine.cache_folder(tmp_path)
+    assert machine.cache_folder(tmp_path) == usual is not None
+    found = {"nothing": usual}
+    with pytest.MonkeyPatch.context() as patch:
+        names = list(_changes(patch))
+    for name in names:
+        with pytest.MonkeyPatch.context() as patch:
+            _changes(patch)[name]()
+            found[name] = machine.cache_folder(tmp_path)
+    assert len(set(found.values())) == len(found), found
+    assert machine.cache_folder(tmp_path) == usual
+
+
+def test_another_text_gives_another_file() -> None:
+    if compiled.cache_folder() is None:
+        pytest.skip("no cache can be written here")
+    files = [compiled._text_file(source) for source in ("a = 1\n", "a = 2\n", "a = 1\n")]
     try:
-        assert finished(child(folder))[0] == right
+        assert files[0] == files[2] != files[1]
+        assert files[0] is not None
+        assert files[0].read_text() == "a = 1\n"
     finally:
-        for path, data in whole.items():
-            path.write_bytes(data)
+        for path in set(files):
+            if path is not None:
+                path.unlink()
 
 
-def test_a_folder_that_cannot_be_made_only_costs_time(
-    warm: tuple[Path, str], tmp_path: Path
-) -> None:
-    (tmp_path / "file").write_text("in the way")
-    out, err = finished(child(tmp_path / "file" / "cache"))
-    assert out == warm[1]
-    assert NOTE in err
-    assert (tmp_path / "file").read_text() == "in the way"
+def test_a_digest_follows_code_and_constants_but_not_the_place() -> None:
+    def function(text: str) -> Callable[..., Any]:
+        names: dict[str, Any] = {}
+        exec(compile(text, "<one>", "exec"), names)
+        return names["f"]  # type: ignore[no-any-return]
+
+    one = function("def f(a):\n    return a + 1.0\n")
+    same = function("\n\n\ndef f(a):\n    return a + 1.0\n")
+    others = [
+        function("def f(a):\n    return a + 1.5\n"),
+        function("def f(a):\n    return a - 1.0\n"),
+        function("def f(b):\n    return b + 1.0\n"),
+        function("def f(a):\n    def g(b):\n        return b\n    return a + 1.0\n"),
+        function("def f(a):\n    return abs(a)\n"),
+        function("def f(a):\n    return max(a)\n"),
+    ]
+    digests = {machine.digest(u) for u in (one, *others)}
+    assert len(digests) == 1 + len(others)
+    assert machine.digest(same) == machine.digest(one) != machine.digest(one, text="more")
 
 
-def test_the_folder_is_named_after_what_the_code_does(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    first = compiled.cache_folder(tmp_path)
-    assert first is not None
-    assert first.is_dir()
-    assert compiled.cache_folder(tmp_path) == first
-    monkeypatch.setattr("integrators.advance.REDO", 0.8)
-    second = compiled.cache_folder(tmp_path)
-    assert second not in (None, first)
-    monkeypatch.undo()
-    monkeypatch.setattr("integrators.compiled._OPTIONS", {"error_model": "python"})
-    assert compiled.cache_folder(tmp_path) not in (None, first, second)
+# --------------------------------------------------------------------------- several threads
+def test_settings_of_numba_are_as_they_were_whoever_compiles() -> None:
+    """Many threads compile at once; the user's own numba functions must not notice."""
+    code = """
+        import threading
+        import numba
+        import numpy as np
+        from gms_fsm import GMS, GMSParameters, Prescribed, compiled
+        from gms_fsm.program import lower
+        from integrators import compiled as machine
+
+        before = numba.config.CACHE_DIR, numba.config.LOOP_VECTORIZE
+        model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+        begin = threading.Barrier(4)
+
+        def system() -> None:
+            begin.wait()
+            compiled.machine_code(lower(model, Prescribed("0.1*t")), "act")
+
+        def rows() -> None:
+            begin.wait()
+            machine._compiled_each_row(compiled.cache_folder())
+
+        threads = [threading.Thread(target=work) for work in (system, rows, rows, system)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert (numba.config.CACHE_DIR, numba.config.LOOP_VECTORIZE) == before
+        print("as before")
+    """
+    assert _ended(_start(code))[0] == "as before\n"
 
 
-def test_a_digest_sees_inner_functions() -> None:
-    def one() -> list[int]:
-        return [u + 1 for u in range(3)]
-
-    def two() -> list[int]:
-        return [u + 2 for u in range(3)]
-
-    assert compiled.digest(one) != compiled.digest(two)
-    assert compiled.digest(one) == compiled.digest(one)
-    assert compiled.digest(one, text="a") != compiled.digest(one)
-
-
+# --------------------------------------------------------------------------- without numba
 WITHOUT = """
-import sys
-class NoNumba:
-    def find_spec(self, name, path=None, target=None):
-        if name == "numba":
-            raise ModuleNotFoundError("No module named 'numba'", name="numba")
-sys.meta_path.insert(0, NoNumba())
-import importlib.util
-found = importlib.util.find_spec
-importlib.util.find_spec = lambda name, *rest: None if name == "numba" else found(name, *rest)
-from gms_fsm import GMS, GMSParameters, Prescribed, simulate, sweep
-from gms_fsm.errors import MissingExtraError
-model = GMS(GMSParameters.paper("stick-slip"), law="signed")
-print(len(simulate(model, Prescribed("0.2"), 3.0).transitions))
-for call in (lambda: simulate(model, Prescribed("0.2"), 3.0, engine="compiled"),
-             lambda: sweep(model, Prescribed("0.2"), 3.0, {"F_s": [1.5]})):
-    try:
-        call()
-    except MissingExtraError as error:
-        print(error)
+    import sys
+    for name in {absent!r}:
+        sys.modules[name] = None
+    import numpy as np
+    from gms_fsm import GMS, GMSParameters, Prescribed, Trace, errors, simulate, sweep
+    model, rig = GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.2")
+    for ask in (
+        lambda: simulate(model, rig, 3.0, engine="compiled"),
+        lambda: simulate(model, rig, 3.0, engine="compiled", output="end"),
+        lambda: sweep(model, rig, 3.0, {{"F_s": [1.0, 2.0]}}),
+    ):
+        try:
+            ask()
+        except errors.MissingExtraError as error:
+            print(error)
+        else:
+            raise SystemExit("not refused")
+    assert len(simulate(model, rig, 3.0).transitions) == 4
+    assert len(simulate(model, rig, 3.0, engine="ifelse").transitions) == 4
+    made = sweep(model, rig, 3.0, {{"F_s": [1.0, 2.0]}}, engine="machines")
+    assert made.outcome.tolist() == ["ok", "ok"], made.message
+    for path in sys.argv[1:]:
+        print(float(Trace.load(path).F[-1]), len(Trace.load(path).sample([1.0])))
 """
 
 
-def test_without_numba_it_says_what_to_install(tmp_path: Path) -> None:
-    out, _ = finished(child(tmp_path, WITHOUT))
-    first, *messages = out.splitlines()
-    assert first == "4"
-    assert len(messages) == 2
-    for message in messages:
-        for words in ("needs numba", "gms-fsm[fast]", "engine='machines'"):
-            assert words in message
+@pytest.mark.parametrize("absent", [["numba"], ["platformdirs"], ["numba", "platformdirs"]])
+def test_without_the_extra_the_words_say_what_to_install(absent: list[str], tmp_path: Path) -> None:
+    from gms_fsm import simulate
+    from tests.helpers import open_loop, stick_slip
+
+    trace = simulate(stick_slip("signed"), open_loop(), 3.0, engine="compiled")
+    path = trace.save(tmp_path / "compiled.npz")
+    out, err = _ended(_start(WITHOUT.format(absent=absent), str(path)))
+    *said, loaded = out.splitlines()
+    assert len(said) == 3
+    for line in said:
+        for word in (absent[0], "not installed", "gms-fsm[fast]", "engine='machines'"):
+            assert word in line
+    assert loaded == f"{float(trace.F[-1])} 1", "what was computed with it is read without it"
+    assert err == ""
+
+
+def test_numba_is_not_loaded_before_it_is_needed() -> None:
+    code = """
+        import sys
+        import gms_fsm
+        from gms_fsm import GMS, GMSParameters, Prescribed, simulate, sweep
+        model, rig = GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.2")
+        simulate(model, rig, 3.0)
+        sweep(model, rig, 3.0, {"F_s": [1.0, 2.0]}, engine="machines")
+        print(sorted({"numba", "llvmlite"} & set(sys.modules)))
+    """
+    assert _ended(_start(code))[0] == "[]\n"

@@ -165,7 +165,7 @@ def test_the_schema_names_every_key_and_no_other(schema: dict[str, Any]) -> None
         "stiffness", "speed", "file", "time", "position", "normal", "where", "smoothing",
         "delimiter", "column", "unit", "sign", "value", "t_end", "t_start", "method", "step",
         "rtol", "atol", "max_step", "events", "engine", "z", "states", "v", "x", "every",
-        "figures", "csv",
+        "figures", "csv", "monitors",
     ):  # fmt: skip
         assert key in named, key
     for name, table in tables.items():

@@ -1,0 +1,96 @@
+"""How Sphinx makes the site from this folder; run it with ``make docs``."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+from sphinx.application import Sphinx
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+
+import mathml  # noqa: E402
+import notebooks  # noqa: E402
+
+import gms_fsm  # noqa: E402
+
+project = "gms-fsm"
+author = "The gms-fsm founders"
+project_copyright = "The gms-fsm founders, MIT licence"
+version = release = gms_fsm.__version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    "sphinx_copybutton",
+]
+exclude_patterns = ["**/__pycache__"]
+default_role = "py:obj"  # a name in backticks in a docstring is a link where there is such a name
+
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 3
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"  # the docstrings name type, shape and unit
+napoleon_google_docstring = False
+napoleon_use_param = False  # types are words here ("shape (n,), m"), not names to link
+napoleon_use_rtype = False
+copybutton_prompt_text = r">>> |\.\.\. |\$ "
+copybutton_prompt_is_regexp = True
+
+# Nothing is loaded from elsewhere: fonts of the reader's system, formulas as MathML.
+html_theme = "furo"
+html_title = "gms-fsm"
+html_math_renderer = "mathml"
+html_copy_source = False
+html_show_sourcelink = False
+html_static_path = ["site.css"]
+html_css_files = ["site.css"]
+html_theme_options = {
+    "light_css_variables": {
+        "color-brand-primary": "#005F96",
+        "color-brand-content": "#005F96",
+        "color-brand-visited": "#7A3E8E",
+    },
+    "dark_css_variables": {
+        "color-brand-primary": "#6CB9EA",
+        "color-brand-content": "#6CB9EA",
+        "color-brand-visited": "#C9A0DC",
+    },
+}
+
+
+def keep_bars(*arguments: Any) -> None:
+    """Let |z| in a docstring mean what it says, not a substitution."""
+    lines: list[str] = arguments[-1]
+    for number, line in enumerate(lines):
+        if not line.lstrip().startswith((">>>", "...")):
+            parts = re.split(r"(``.*?``)", line)
+            parts[::2] = [part.replace("|", r"\|") for part in parts[::2]]
+            lines[number] = "".join(parts)
+
+
+def make_lessons(_: Sphinx) -> None:
+    """Write the lessons' pages beside their index."""
+    notebooks.write_all(HERE / "lessons")
+
+
+def copy_replay_pages(app: Sphinx, error: Exception | None) -> None:
+    """Put the lessons' replay pages beside their pages, as they are."""
+    if error is None:
+        for path in (HERE / "lessons").glob("*_replay.html"):
+            shutil.copy(path, Path(app.outdir) / "lessons")
+
+
+def setup(app: Sphinx) -> None:
+    """Connect what is ours."""
+    mathml.register(app)
+    app.connect("autodoc-process-docstring", keep_bars, priority=100)  # before napoleon
+    app.connect("builder-inited", make_lessons)
+    app.connect("build-finished", copy_replay_pages)

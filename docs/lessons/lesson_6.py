@@ -1,0 +1,35 @@
+"""What the notebook of lesson 6 adds: the pulling speed, as a slider."""
+
+# %% [markdown]
+# ## Turn a knob
+#
+# The same mass on the same spring, pulled from rest at another speed.
+
+# %%
+from ipywidgets import FloatSlider, interact
+from matplotlib.figure import Figure
+
+from gms_fsm import PulledSlider, simulate
+from gms_fsm.lessons.l6_stick_slip import MASS, STIFFNESS, bank
+
+
+def pulled(V):
+    trace = simulate(bank(), PulledSlider(MASS, STIFFNESS, V), 60.0)
+    arrests = (trace.transitions.edge == "arrest").sum()
+    figure = Figure(figsize=(6.4, 3.4), layout="constrained")
+    ax = figure.subplots()
+    ax.plot(trace.t, trace.v)
+    ax.axhline(V, color="0.6", linestyle="--", linewidth=1)
+    ax.set(xlabel="t [s]", ylabel="v [m/s]", title=f"V = {V:g} m/s (dashed): {arrests} arrests")
+    return figure
+
+
+V = FloatSlider(0.05, min=0.02, max=0.3, step=0.01, description="V [m/s]", continuous_update=False)
+_ = interact(pulled, V=V)
+
+# %% [markdown]
+# ## Try
+#
+# - At which speed does it stop to stick and slip? Does a stiffer spring move that speed up or down?
+# - Take the Stribeck curve away: `bank(F_s=1.0)`.
+# - With v_s = 1e-3 m/s it never comes to rest again. Why? Look at v just before break-away.

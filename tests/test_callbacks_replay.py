@@ -1,0 +1,320 @@
+"""Machines of the user's own see of a compiled run what they see of their own.
+
+`simulate(..., engine="compiled", machines=...)` fires every edge through `transitions` too: each
+callback runs once a firing, in the log's order, with the values the machines engine shows, and the
+machines end in the states of the last row. The run is the same to the last bit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gms_fsm import (
+    GMS,
+    Chart,
+    ChartModel,
+    Element,
+    ElementMachines,
+    Prescribed,
+    PulledSlider,
+    State,
+    Stribeck,
+    Trace,
+    Transition,
+    simulate,
+)
+from gms_fsm.charts import gms_element
+from gms_fsm.errors import ChartError, LivelockError, ParameterError
+from gms_fsm.models import Model
+from gms_fsm.rigs import Rig
+from tests.helpers import non_drifting, one_element, open_loop, pulled_mass, same_bits, stick_slip
+
+pytest.importorskip("numba", reason="needs the extra fast")
+
+CURVE = Stribeck(F_c=1.0, F_s=1.5, v_s=0.02)
+Call = tuple[Any, ...]
+
+RESETS = Chart(
+    "resets",
+    inputs=("v", "s", "t", "x"),
+    variables=("z", "w"),
+    parameters=("k", "C", "v_c", "share"),
+    states=(
+        State("stick", flow={"z": "v", "w": "0"}, entry={"z": "0.5 * z"}),
+        State("creep", flow={"z": "v * (1 - 0.5 * abs(z) / s)", "w": "0"}),
+        State("slip", flow={"z": "C * (sgn(v) - z / s)", "w": "abs(v)"}, exit={"w": "w + 1"}),
+    ),
+    transitions=(
+        Transition("yield_", "stick", "creep", guard="abs(z) >= share * s"),
+        Transition("tear", "creep", "slip", guard="abs(z) >= s and (v > v_c or v < -v_c)"),
+        Transition("heal", "creep", "stick", guard="not abs(z) >= 0.5 * share * s"),
+        Transition("arrest", "slip", "stick", guard="abs(v) <= v_c", actions={"z": "0.8 * z"}),
+    ),
+    outputs={"F": "k * z + 0.1 * dz"},
+)
+
+
+def _resets(n: int = 3) -> ChartModel:
+    values = {"k": np.linspace(1, 2, n), "C": 0.3, "v_c": 1e-6, "share": np.linspace(0.5, 0.7, n)}
+    return ChartModel(RESETS, values, n=n, stribeck=CURVE, weights=np.linspace(0.5, 1, n))
+
+
+CASES: dict[str, tuple[Model, Rig, float]] = {
+    "open loop": (stick_slip("signed"), open_loop(), 61.0),
+    "published": (stick_slip("published"), Prescribed("0.15*sin(2*pi*t/25)"), 60.0),
+    "pulled mass": (*pulled_mass(), 30.0),
+    "fig. 3, slipping": (*non_drifting("signed", slipping=True), 20.0),
+    "resets, open loop": (_resets(), Prescribed("0.3*sin(2*pi*t/17)"), 40.0),
+    "resets, closed loop": (_resets(), PulledSlider(1, 2, 0.1), 40.0),
+}
+OPTIONS: dict[str, dict[str, Any]] = {
+    "all rows": {},
+    "rk4": {"method": "rk4", "step": 5.003e-3},
+    "by step": {"events": "step", "max_step": 1e-2},
+    "the end": {"output": "end"},
+    "wanted rows": {"t_eval": [0.0, 3.0, 20.0]},
+}
+PLACES = ("prepare_event", "before_state_change", "after_state_change", "finalize_event")
+
+
+def _watched(model: Model, kind: type[Element] = Element) -> tuple[ElementMachines, list[Call]]:
+    """Machines with a note of every callback at every place, and the notes."""
+    machines, calls = ElementMachines(model, kind), []
+    variables, parameters = model.chart.variables, model.chart.parameters
+
+    def note(place: str) -> Any:
+        def callback(event: Any) -> None:
+            e = event.model
+            values = [getattr(e, name) for name in ("t", "x", "v", "s", *variables, *parameters)]
+            calls.append((place, event.event.name, e.index, e.state, *values))
+
+        return callback
+
+    for place in PLACES:
+        setattr(machines.machine, place, [note(place)])
+    for state in model.chart.states:
+        for kind_of in ("on_enter", "on_exit"):
+            getattr(machines.machine, f"{kind_of}_{state.name}")(note(kind_of))
+    return machines, calls
+
+
+def _both(case: str, **options: Any) -> tuple[Trace, list[Call]]:
+    """Run the machines engine and the compiled one with a replay; compare; return one."""
+    model, rig, t_end = CASES[case]
+    own, wanted = _watched(model)
+    replayed, calls = _watched(model)
+    one = simulate(model, rig, t_end, engine=own, **options)
+    other = simulate(model, rig, t_end, engine="compiled", machines=replayed, **options)
+    same_bits(one, other)
+    assert [e.state for e in replayed.elements] == [e.state for e in own.elements]
+    assert calls == wanted
+    return other, calls
+
+
+@pytest.mark.parametrize("options", OPTIONS)
+@pytest.mark.parametrize("case", CASES)
+def test_every_callback_sees_what_it_would_have_seen(case: str, options: str) -> None:
+    trace, calls = _both(case, **OPTIONS[options])
+    log = trace.transitions
+    assert len(log) > 0
+    fired = [call for call in calls if call[0] == "after_state_change"]
+    assert [call[1:3] for call in fired] == [(str(r.edge), int(r.element)) for r in log]
+    assert [call[3] for call in fired] == log.target.tolist()
+    assert [call[4] for call in fired] == log.t.tolist()
+    assert len(calls) == 6 * len(log)
+
+
+def test_the_values_are_those_of_the_log() -> None:
+    """v, s and z of the instant before the firing, for the first of a set at least."""
+    trace, calls = _both("open loop")
+    for r, call in zip(trace.transitions, [c for c in calls if c[0] == "on_exit"], strict=True):
+        name, element, state, t, _, v, s, z = call[1:9]
+        assert (name, element, state, t) == (r.edge, r.element, r.source, r.t)
+        assert (v, s, z) == (r.v, r.s, r.z)
+
+
+def test_the_second_firing_at_one_time_sees_what_the_first_assigned() -> None:
+    chart = Chart(
+        "chain", ("t",), ("z",), (),
+        (State("a", {"z": "0"}), State("b", {"z": "0"}), State("c", {"z": "0"})),
+        (
+            Transition("one", "a", "b", "t >= 1", actions={"z": "10 * z"}),
+            Transition("two", "b", "c", "z > 5"),
+        ),
+        {"F": "z"},
+    )  # fmt: skip
+    model = ChartModel(chart, {}, n=3, stribeck=CURVE)
+    seen = []
+    for engine in ("machines", "compiled"):
+        machines, calls = _watched(model)
+        simulate(
+            model, Prescribed("0"), 2.0, engine=engine, machines=machines,
+            initial={"z": [1.0, 0.1, 2.0]},
+        )  # fmt: skip
+        exits = [call for call in calls if call[0] == "on_exit"]
+        assert [call[1:3] for call in exits] == [
+            ("one", 0), ("one", 1), ("one", 2), ("two", 0), ("two", 2),
+        ]  # fmt: skip
+        assert [call[8] for call in exits] == [1.0, 0.1, 2.0, 10.0, 20.0]
+        assert [e.state for e in machines.elements] == ["c", "b", "c"]
+        seen.append(calls)
+    assert seen[0] == seen[1]
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_machines_end_in_the_states_of_the_last_row_and_start_anew(case: str) -> None:
+    model, rig, t_end = CASES[case]
+    machines = ElementMachines(model)
+    for fraction in (0.6, 0.2, 1.0):
+        trace = simulate(model, rig, fraction * t_end, engine="compiled", machines=machines)
+        assert [e.state for e in machines.elements] == trace.states[-1].tolist()
+        same_bits(trace, simulate(model, rig, fraction * t_end, engine="compiled"))
+
+
+def test_a_run_without_firings_calls_nothing() -> None:
+    machines, calls = _watched(stick_slip("signed"))
+    trace = simulate(
+        machines.model, Prescribed("0.01*sin(t)"), 20.0, engine="compiled", machines=machines
+    )
+    assert len(trace.transitions) == 0
+    assert calls == []
+
+
+def test_every_element_starts_in_its_own_state() -> None:
+    machines, calls = _watched(stick_slip("signed"))
+    states = ["stick", "slip", "slip", "stick"]
+    initial = {"states": states, "z": [0.0, 0.1, 0.2, 0.3]}
+    simulate(
+        machines.model, Prescribed("0.1"), 0.5, engine="compiled", machines=machines,
+        initial=initial,
+    )  # fmt: skip
+    assert [e.state for e in machines.elements] == states
+    assert calls == [], "being put into the initial state is no firing"
+
+
+def test_elements_of_a_class_of_ones_own() -> None:
+    @dataclass(eq=False)
+    class Counting(Element):
+        hits: int = 0
+
+        def on_enter_slip(self, event: Any) -> None:
+            self.hits += 1
+            assert event.model is self
+
+    model, rig = pulled_mass()
+    machines = ElementMachines(model, Counting)
+    trace = simulate(model, rig, 30.0, engine="compiled", machines=machines)
+    for i, element in enumerate(machines.elements):
+        log = trace.transitions
+        wanted = int(np.sum((log.element == i) & (log.target == "slip")))
+        assert element.hits == wanted > 0  # type: ignore[attr-defined]
+
+
+def test_more_firings_than_the_columns_hold_at_first() -> None:
+    model, _ = pulled_mass()
+    machines, calls = _watched(model)
+    rig = Prescribed("0.3*sin(20*t)")
+    trace = simulate(model, rig, 25.0, engine="compiled", machines=machines)
+    assert len(trace.transitions) > 512
+    assert len(calls) == 6 * len(trace.transitions)
+    same_bits(trace, simulate(model, rig, 25.0, engine="compiled"))
+
+
+# --------------------------------------------------------------------------- one truth
+@pytest.mark.parametrize("error", [ZeroDivisionError, ValueError, KeyError, KeyboardInterrupt])
+def test_an_error_of_a_callback_reaches_the_user_as_it_is(error: type[BaseException]) -> None:
+    model = stick_slip("signed")
+    seen: dict[str, list[float]] = {}
+    for engine in ("machines", "compiled"):
+        machines = ElementMachines(model)
+        times = seen[engine] = []
+
+        def fail(event: Any, times: list[float] = times) -> None:
+            times.append(event.model.t)
+            if len(times) == 3:
+                raise error("mine")
+
+        machines.machine.on_enter_slip(fail)
+        with pytest.raises(error, match="mine") as caught:
+            simulate(model, open_loop(), 20.0, engine=engine, machines=machines)
+        assert type(caught.value) is error
+        trace = simulate(model, open_loop(), 20.0, engine=engine, machines=ElementMachines(model))
+        assert len(trace.transitions) == 16, "the next run is not disturbed"
+    assert seen["machines"] == seen["compiled"]
+
+
+def test_a_callback_that_changes_the_values_before_the_guard_is_refused() -> None:
+    machines = ElementMachines(stick_slip("signed"))
+
+    def stop(event: Any) -> None:
+        event.model.v = 0.0
+
+    machines.machine.prepare_event = [stop]
+    with pytest.raises(ChartError, match=r"element 1: edge 'break_away_forward'.*only look"):
+        simulate(machines.model, open_loop(), 20.0, engine="compiled", machines=machines)
+
+
+def test_what_a_callback_writes_afterwards_does_not_reach_the_run() -> None:
+    machines = ElementMachines(stick_slip("signed"))
+
+    def scribble(event: Any) -> None:
+        event.model.z, event.model.v, event.model.t = 1e9, 1e9, 1e9
+
+    machines.machine.on_enter_slip(scribble)
+    same_bits(
+        simulate(machines.model, open_loop(), 61.0, engine="compiled", machines=machines),
+        simulate(machines.model, open_loop(), 61.0),
+    )
+
+
+def test_a_machine_given_another_edge_or_condition_is_refused() -> None:
+    model = stick_slip("signed")
+    panics, picky = ElementMachines(model), ElementMachines(model)
+    panics.machine.add_transition("panic", "slip", "stick")
+    (edge,) = picky.machine.get_transitions("arrest", "slip", "stick")
+    edge.conditions.append(type(edge.conditions[0])(lambda event: False))
+    for machines, word in ((panics, "panic"), (picky, "arrest")):
+        with pytest.raises(ChartError, match=word):
+            simulate(model, open_loop(), 20.0, engine="compiled", machines=machines)
+
+
+def test_a_livelock_was_seen_by_the_callbacks_too() -> None:
+    sound = gms_element("signed")
+    edges = (
+        Transition("break_away", "stick", "slip", guard="abs(z) >= s and abs(v) <= v_c"),
+        Transition("arrest", "slip", "stick", guard="abs(v) <= v_c and abs(z) < 10 * s"),
+    )
+    chart = Chart(
+        "broken", sound.inputs, sound.variables, sound.parameters, sound.states, edges,
+        sound.outputs,
+    )  # fmt: skip
+    values = {"k": 1, "sigma": 0.1, "C": 0.1, "v_c": 0.2}
+    model = ChartModel(chart, values, n=2, stribeck=CURVE, weights=[2, 1])
+    seen = []
+    for engine in ("machines", "compiled"):
+        machines, calls = _watched(model)
+        with pytest.raises(LivelockError) as caught:
+            simulate(model, Prescribed("0.15"), 20.0, engine=engine, machines=machines)
+        assert len(calls) == 6 * len(caught.value.trace.transitions) == 600
+        seen.append((calls, str(caught.value), [e.state for e in machines.elements]))
+    assert seen[0] == seen[1]
+
+
+def test_machines_of_another_model_are_refused() -> None:
+    machines = ElementMachines(one_element("signed"))
+    for engine in ("machines", "compiled"):
+        with pytest.raises(ParameterError, match="another model"):
+            simulate(stick_slip("signed"), open_loop(), 20.0, engine=engine, machines=machines)
+
+
+def test_machines_where_there_is_no_use_for_them_are_refused() -> None:
+    model = GMS(one_element("signed").parameters, law="signed")
+    machines = ElementMachines(model)
+    with pytest.raises(ParameterError, match=r"'ifelse' asks no machines.*leave machines"):
+        simulate(model, open_loop(), 20.0, engine="ifelse", machines=machines)
+    with pytest.raises(ParameterError, match="give one of them"):
+        simulate(model, open_loop(), 20.0, engine=machines, machines=machines)

@@ -1,0 +1,141 @@
+"""Coverage counts what the log and the rows show: states, edges, and clauses true and false.
+
+Clauses count only where they are asked: in the edge's source state.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from gms_fsm import (
+    Chart,
+    ChartModel,
+    LuGre,
+    Prescribed,
+    State,
+    Stribeck,
+    Trace,
+    Transition,
+    simulate,
+)
+from gms_fsm.explain import explain
+from gms_fsm.verdicts import CoverageVerdict
+from tests.helpers import FIG4_SINE, one_element, pulled_mass, stick_slip
+
+
+def coverage(trace: Trace) -> CoverageVerdict:
+    found = trace.monitors["coverage"]
+    assert isinstance(found, CoverageVerdict)
+    return found
+
+
+def run(*arguments: Any, **options: Any) -> Trace:
+    return simulate(*arguments, monitors="coverage", **options)
+
+
+def test_a_motion_both_ways_covers_the_gms_chart() -> None:
+    trace = run(stick_slip("signed"), Prescribed(FIG4_SINE), 50.0)
+    found = coverage(trace)
+    assert found.ok
+    assert found.never == ()
+    assert found.states == {"stick": (True,) * 4, "slip": (True,) * 4}
+    log = trace.transitions
+    for edge, taken in found.edges.items():
+        assert list(taken) == [
+            int(((log.element == i) & (log.edge == edge)).sum()) for i in range(4)
+        ]
+    assert [clause.text for clause in found.clauses] == [
+        "z >= s", "v > v_c", "z <= -s", "v < -v_c", "|v| <= v_c", "|z| < s",
+    ]  # fmt: skip
+    assert found.text == ("states 2 of 2, edges 3 of 3, clauses true 6 of 6, clauses false 6 of 6")
+
+
+def test_a_motion_one_way_does_not() -> None:
+    found = coverage(run(stick_slip("signed"), Prescribed(0.2), 3.0))
+    assert not found.ok
+    assert found.never == (
+        "edge break_away_backward", "edge arrest", "v > v_c of break_away_forward false",
+        "z <= -s of break_away_backward true", "v < -v_c of break_away_backward true",
+        "|v| <= v_c of arrest true", "|z| < s of arrest true",
+    )  # fmt: skip
+    assert "never: edge break_away_backward, edge arrest, " in found.text
+    assert "a longer run, a motion both ways" in found.text
+
+
+def test_nothing_is_asked_in_a_state_that_is_never_reached() -> None:
+    found = coverage(run(stick_slip("signed"), Prescribed(0.2), 1.0))
+    assert found.states == {"stick": (True,) * 4, "slip": (False,) * 4}
+    arrest = [clause for clause in found.clauses if clause.edge == "arrest"]
+    assert all(not any(clause.true + clause.false) for clause in arrest)
+    assert "state slip" in found.never
+    assert "|z| < s of arrest false" in found.never
+
+
+def test_elements_are_counted_one_by_one() -> None:
+    """Four elements of a pulled mass: each breaks away forward, none backward."""
+    model, rig = pulled_mass()
+    found = coverage(run(model, rig, 60.0))
+    assert found.edges["break_away_forward"] == (14, 8, 8, 8)
+    assert found.edges["break_away_backward"] == (0, 0, 0, 0)
+    assert found.edges["arrest"] == (13, 7, 7, 7)
+    assert found.never == (
+        "edge break_away_backward", "z <= -s of break_away_backward true",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("t_eval", [None, [0.0, 20.0, 50.0]])
+def test_clauses_are_those_of_the_explanations(t_eval: list[float] | None) -> None:
+    """Row by row, element by element, as `explain` tells it."""
+    trace = run(stick_slip("published"), Prescribed(FIG4_SINE), 50.0, t_eval=t_eval)
+    found, whole = coverage(trace), trace.whole()
+    seen: set[tuple[str, str, int, bool]] = set()
+    for row in range(len(whole)):
+        for i in range(whole.n):
+            for edge in explain(whole, row, i):
+                seen |= {(edge.edge.name, c.text, i, c.holds) for c in edge.clauses}
+    for clause in found.clauses:
+        for i in range(whole.n):
+            assert clause.true[i] == ((clause.edge, clause.text, i, True) in seen)
+            assert clause.false[i] == ((clause.edge, clause.text, i, False) in seen)
+
+
+def test_both_sides_of_every_firing_are_seen_with_few_rows() -> None:
+    many = coverage(run(stick_slip("signed"), Prescribed(FIG4_SINE), 50.0))
+    few = coverage(run(stick_slip("signed"), Prescribed(FIG4_SINE), 50.0, t_eval=[0.0]))
+    assert few.edges == many.edges
+    assert few.states == many.states
+    assert [clause.true for clause in few.clauses] == [clause.true for clause in many.clauses]
+
+
+def test_lugre_has_one_state_and_no_edges() -> None:
+    model = LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4.0, stribeck=Stribeck(1.0, 1.5, 1e-3))
+    found = coverage(run(model, Prescribed("0.01*sin(t)"), 1.0))
+    assert found.ok
+    assert (found.edges, found.clauses, found.text) == ({}, (), "states 1 of 1")
+
+
+def test_a_clause_that_cannot_be_computed_is_false() -> None:
+    """As the guards themselves: 1/z at z = 0 does not hold."""
+    chart = Chart(
+        "reciprocal", inputs=("v",), variables=("z",), parameters=("k",),
+        states=(State("a", flow={"z": "v"}), State("b", flow={"z": "v"})),
+        transitions=(Transition("go", "a", "b", guard="1 / z < 2 and z > 0"),),
+        outputs={"F": "k * z"},
+    )  # fmt: skip
+    model = ChartModel(chart, {"k": 1.0}, n=1, stribeck=Stribeck(1.0, 1.0, 1.0))
+    found = coverage(run(model, Prescribed(0.0), 1.0))
+    assert found.clauses[0].true == (False,)
+    assert found.clauses[0].false == (True,)
+    assert not found.edges["go"][0]
+
+
+def test_an_event_missed_by_looking_once_a_step_is_missed_here_too() -> None:
+    model = one_element("signed", v_s=1e-3)
+    rig, step = Prescribed("0.2*sin(2*pi*t/20)"), {"method": "rk4", "step": 1.0001e-2}
+    looked = coverage(run(model, rig, 19.0, events="step", **step))
+    located = coverage(run(model, rig, 19.0))
+    assert located.edges["arrest"] == (1,)
+    assert looked.edges["arrest"] == (0,)
+    assert "edge arrest" in looked.never

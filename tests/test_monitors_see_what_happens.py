@@ -1,0 +1,416 @@
+"""Monitors find what happens: chattering and livelock in the log, invariants where they break.
+
+Times are checked against closed forms, verdicts at rows against one evaluation at a time, and what
+cannot be watched is refused before the run begins.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gms_fsm import (
+    Chart,
+    ChartModel,
+    Prescribed,
+    Slider,
+    State,
+    Stribeck,
+    Trace,
+    Transition,
+    simulate,
+)
+from gms_fsm.charts.broken import BROKEN
+from gms_fsm.errors import ExpressionError, LivelockError, ParameterError, SimulationError
+from gms_fsm.explain import holds, values_at
+from gms_fsm.expression import parse_condition
+from gms_fsm.monitors import Chattering, Coverage, Invariant, Passivity, checked, examine
+from gms_fsm.session import Session
+from gms_fsm.verdicts import ChatteringVerdict, InvariantVerdict
+from tests.helpers import FIG4_SINE, one_element, open_loop, pulled_mass, stick_slip
+
+SLOWING = Prescribed("0.2*cos(2*pi*t/20)")
+
+
+def memoryless(weights: list[float]) -> ChartModel:
+    """Guards that are each other's negation: on z = s both flows push into the other's state."""
+    return ChartModel(
+        BROKEN["memoryless"].chart, {"k": 1.0, "sigma": 0.1, "C": 0.1, "v_c": 1e-6},
+        n=len(weights), stribeck=Stribeck(1.0, 1.5, 0.05), weights=np.array(weights),
+    )  # fmt: skip
+
+
+def blinker(period: float) -> ChartModel:
+    """An element that goes on and off once a period, at known times."""
+    return ChartModel(
+        Chart(
+            "blinker", inputs=("t",), variables=("z",), parameters=("T", "k"),
+            states=(State("off", flow={"z": "0"}), State("on", flow={"z": "0"})),
+            transitions=(
+                Transition("rise", "off", "on", guard="sin(2*pi*t/T) > 0"),
+                Transition("fall", "on", "off", guard="sin(2*pi*t/T) < 0"),
+            ),
+            outputs={"F": "k * z"},
+        ),
+        {"T": period, "k": 1.0}, n=1, stribeck=Stribeck(1.0, 1.0, 1.0),
+    )  # fmt: skip
+
+
+def chattering(trace: Trace) -> ChatteringVerdict:
+    found = trace.monitors["chattering"]
+    assert isinstance(found, ChatteringVerdict)
+    return found
+
+
+def invariant(trace: Trace, text: str) -> InvariantVerdict:
+    found = trace.monitors[text]
+    assert isinstance(found, InvariantVerdict)
+    assert found.condition == text
+    return found
+
+
+# --------------------------------------------------------------------------- chattering
+def test_memoryless_guards_chatter() -> None:
+    trace = simulate(memoryless([0.5, 0.4]), SLOWING, 2.162645425, monitors=["chattering"])
+    found = chattering(trace)
+    assert not found.ok
+    assert not found.livelock
+    (episode,) = found.episodes
+    log = trace.transitions[trace.transitions.element == 1]
+    taken = log[log.edge == "break_away"]
+    assert (episode.element, episode.edge, episode.back) == (1, "break_away", ("arrest",))
+    assert episode.count == len(taken) > 50
+    assert (episode.t_first, episode.t_last) == (taken.t[0], taken.t[-1])
+    assert episode.values == {"z": taken.z[0], "s": taken.s[0], "v": taken.v[0]}
+    for part in (
+        "element 2 took break_away, and back arrest,", f"{episode.count} times in ",
+        "t = 2.16264542", "z = 0.400012", "[|z| >= s]", "[|z| < s]", "gap", "v_c",
+    ):  # fmt: skip
+        assert part in found.text
+
+
+@pytest.mark.parametrize("events", ["located", "step"])
+def test_sound_guards_do_not_chatter(events: str) -> None:
+    options: dict[str, Any] = {} if events == "located" else {"step": 1e-3, "method": "rk4"}
+    model, rig = pulled_mass()
+    trace = simulate(model, rig, 20.0, events=events, monitors="chattering", **options)
+    assert len(trace.transitions) > 10
+    assert chattering(trace).ok
+    assert chattering(trace).episodes == ()
+    assert chattering(trace).text == "no element took an edge 20 times within 0.1 s"
+
+
+@pytest.mark.parametrize(("within", "ok"), [(0.3999, True), (0.4001, False)])
+def test_so_often_in_so_many_seconds(within: float, ok: bool) -> None:
+    """Five rises of a blinker of 0.1 s take 0.4 s."""
+    monitor = Chattering(times=5, within=within)
+    trace = simulate(blinker(0.1), Prescribed("0"), 2.02, monitors=[monitor], max_step=0.01)
+    assert chattering(trace).ok == ok
+    if not ok:
+        (episode,) = chattering(trace).episodes
+        assert episode.edge in ("rise", "fall")
+        assert episode.count == 20 + (episode.edge == "rise")
+        assert episode.t_last - episode.t_first == pytest.approx(0.1 * (episode.count - 1))
+
+
+def test_the_longest_stretch_counts() -> None:
+    """Fast for half a second, slow, fast for a second: the second stretch is reported."""
+    times = "min(t, 0.5) + max(0, min(t - 5, 1))"
+    slow = blinker(0.1).chart
+    model = ChartModel(
+        Chart(
+            slow.name, slow.inputs, slow.variables, slow.parameters, slow.states,
+            tuple(
+                Transition(e.name, e.source, e.target, e.guard.replace("*t/T", f"*({times})/T"))
+                for e in slow.transitions
+            ),
+            slow.outputs,
+        ),
+        {"T": 0.1, "k": 1.0}, n=1, stribeck=Stribeck(1.0, 1.0, 1.0),
+    )  # fmt: skip
+    trace = simulate(model, Prescribed("0"), 8.0, monitors=[Chattering(4, 0.35)], max_step=0.01)
+    (episode,) = chattering(trace).episodes
+    assert episode.t_first == pytest.approx(5.0, abs=0.11)
+    assert episode.count in (9, 10, 11)
+
+
+def test_a_livelock_is_reported_with_the_partial_trace() -> None:
+    with pytest.raises(LivelockError) as caught:
+        simulate(memoryless([0.5]), SLOWING, 30.0, monitors=["chattering", "coverage"])
+    found = chattering(caught.value.trace)
+    assert found.livelock
+    assert not found.ok
+    assert found.text.startswith(f"livelock: {caught.value}")
+    assert found.episodes[0].count >= 49
+    assert found.episodes[0].t_last - found.episodes[0].t_first < 1e-9
+    assert caught.value.trace.monitors["coverage"].ok
+
+
+def test_a_sliding_mode_is_a_livelock_without_an_edge() -> None:
+    model = one_element("published", F_c=1.0, F_s=1.5, v_s=0.05, C=0.1, sigma=5.0, k=1.0)
+    start = {"z": [-2.5], "states": ["slip"], "v": 0.05}
+    with pytest.raises(LivelockError) as caught:
+        simulate(model, Slider(1.0, -2.4), 5.0, initial=start, monitors=["chattering"])
+    found = chattering(caught.value.trace)
+    assert (found.ok, found.livelock, found.episodes) == (False, True, ())
+
+
+# --------------------------------------------------------------------------- invariants
+def test_an_invariant_that_holds() -> None:
+    """Until it breaks away |z| = 0.2 t stays below 0.3 m."""
+    trace = simulate(stick_slip("signed"), Prescribed(0.2), 1.0, monitors=["abs(z) <= 0.3"])
+    found = invariant(trace, "abs(z) <= 0.3")
+    assert found.ok
+    assert found.rows == len(trace)
+    assert (found.broken, found.t, found.element, found.t_last) == (0, None, None, None)
+    assert found.text == f"held at all {len(trace)} rows"
+
+
+@pytest.mark.parametrize("times", [None, [0.0, 1.0, 2.0]])
+def test_the_first_break_in_stick_is_located(times: list[float] | None) -> None:
+    """z = v t crosses 0.1 m at 0.5 s, between two rows."""
+    trace = simulate(stick_slip("signed"), Prescribed(0.2), 2.0, monitors=["z <= 0.1"],
+                     t_eval=times)  # fmt: skip
+    found = invariant(trace, "z <= 0.1")
+    assert not found.ok
+    assert found.t == pytest.approx(0.5, abs=1e-12)
+    assert found.element == 0
+    assert found.state == "stick"
+    assert found.values["z"] > 0.1
+    assert found.values == {"z": pytest.approx(0.1)}
+    assert found.t_last == trace.t[-1]
+    assert 0 < found.broken < found.rows
+    for part in ("first at t = 0.5 s", "element 1 in stick", "(z = 0.1)", "goto 0.5"):
+        assert part in found.text
+
+
+@pytest.mark.parametrize("law", ["signed", "published"])
+def test_the_first_break_in_slip_is_located(law: str) -> None:
+    """z = s (1 - exp(-C t / s)) crosses s / 2 at t = s/C ln 2."""
+    model = one_element(law, F_c=1.0, F_s=1.5, v_s=1e-3, C=0.1, sigma=0.0)
+    trace = simulate(model, Prescribed(0.2), 20.0, monitors=["z <= 0.5*s"], rtol=1e-9,
+                     atol=1e-12, initial={"states": ["slip"]})  # fmt: skip
+    found = invariant(trace, "z <= 0.5*s")
+    assert found.t == pytest.approx(10.0 * math.log(2.0), abs=1e-6)
+    assert found.values["s"] == 1.0
+
+
+def test_the_element_is_named() -> None:
+    """Weights 1, 0.5 ...: the second element has the smallest threshold, and z > 0.3 s first."""
+    model = memoryless([1.0, 0.5, 2.0])
+    trace = simulate(model, Prescribed(0.2), 1.0, monitors=["z <= 0.3*s"])
+    found = invariant(trace, "z <= 0.3*s")
+    assert found.element == 1
+    assert found.t == pytest.approx(0.15 / 0.2, rel=1e-4)
+    assert "element 2 in stick" in found.text
+
+
+def test_an_invariant_of_the_whole_has_no_element() -> None:
+    trace = simulate(stick_slip("signed"), Prescribed(0.2), 1.0, monitors=["F <= 0.6 and z2 < 9"])
+    found = invariant(trace, "F <= 0.6 and z2 < 9")
+    assert (found.element, found.state) == (None, "")
+    # F = sum(k) z + sum(sigma) v + sigma_2 v
+    assert found.t == pytest.approx((0.6 - 1.9 * 0.2) / 2.8 / 0.2, rel=1e-9)
+    assert set(found.values) == {"F", "z2"}
+
+
+def test_a_break_at_an_edge_is_on_the_row_behind_it() -> None:
+    """The force steps by sigma (dz - v) at a break-away: nothing lies between the two rows."""
+    model = one_element("signed", F_c=1.0, F_s=1.0, sigma=1.0, C=0.1)
+    trace = simulate(model, Prescribed(0.2), 8.0, monitors=["F >= 1.1 or z < 0.95"])
+    found = invariant(trace, "F >= 1.1 or z < 0.95")
+    assert found.t == trace.transitions.t[0]
+    assert found.values["F"] == trace.transitions.F_after[0]
+
+
+def test_states_can_be_asked_for() -> None:
+    model = one_element("signed", F_c=1.0, F_s=1.0, sigma=1.0, C=0.1)
+    texts = ["state == stick", "state(1) != slip", "state == slip or abs(z) <= s"]
+    trace = simulate(model, Prescribed(0.2), 8.0, monitors=texts)
+    own, first, both = (invariant(trace, text) for text in texts)
+    assert own.t == first.t == trace.transitions.t[0]
+    assert (own.element, own.state, first.element) == (0, "slip", None)
+    assert both.ok
+
+
+def test_what_cannot_be_computed_does_not_hold() -> None:
+    trace = simulate(stick_slip("signed"), Prescribed(0.2), 1.0, monitors=["1 / z > 0"])
+    found = invariant(trace, "1 / z > 0")
+    assert not found.ok
+    assert found.t == 0.0
+    assert found.broken == 1
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["z <= q", "abs(z) <= 1.1*", "z", "state(9) == slip", "state == slide", "z == s", "w < 1"],
+)
+def test_an_invariant_that_cannot_be_read_is_refused_before_the_run(text: str) -> None:
+    def never(_: object) -> None:
+        raise AssertionError("the run has begun")
+
+    kind = ParameterError if text.isidentifier() else ExpressionError
+    with pytest.raises(kind) as caught:
+        simulate(stick_slip("signed"), Prescribed(0.2), 1.0, monitors=[text], progress=never)
+    if kind is ExpressionError:
+        assert str(caught.value).startswith("invariant, column ")
+
+
+CONDITIONS = (
+    "z <= 0.999*s or state == slip", "exp(-z) < 0.9 and v > 0", "1 / (v - 0.15) > z / s",
+    "sqrt(z) <= 0.7", "(z / s)**2 < 1", "z**0.5 < 0.6", "z**-1 > k", "max(z, v) > min(s, 0.1)",
+    "not sin(t) * cos(x) > tanh(z)", "exp(1000 * t) > 1", "sgn(z - s) < sigma", "abs(F) < 1",
+    "z1 < z2 or F3 > s4", "v <= v_c or -1 < F < C * 10", "z**9 < s", "1 / z**2 > s",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("text", CONDITIONS)
+def test_the_verdict_at_a_row_is_that_of_the_row_alone(text: str) -> None:
+    trace = simulate(stick_slip("published"), Prescribed(FIG4_SINE), 30.0, monitors=[text])
+    found = invariant(trace, text)
+    model, n = trace.model, trace.n
+    names = ["t", "x", "v", "F", "s", "z", *model.chart.parameters]
+    names += [f"{name}{i + 1}" for name in ("z", "s", "F") for i in range(n)]
+    tree = parse_condition(text, names, ["stick", "slip"], n, own_state=True)
+    broken = []
+    for row in range(len(trace)):
+        values: dict[str, Any] = {"F": trace.F[row]}
+        for i in range(n):
+            values |= {f"z{i + 1}": trace.z[row, i], f"s{i + 1}": trace.s[row, i],
+                       f"F{i + 1}": trace.F_elements[row, i]}  # fmt: skip
+        broken.append(
+            not all(
+                holds(tree, values_at(trace, row, i) | values | {"state(0)": trace.states[row, i]})
+                for i in range(n)
+            )
+        )
+    assert found.broken == sum(broken)
+    if any(broken):
+        first = broken.index(True)
+        assert found.t is not None
+        assert trace.t[max(0, first - 1)] <= found.t <= trace.t[first]
+
+
+@settings(max_examples=30, deadline=None)
+@given(bound=st.floats(0.01, 0.55), v=st.floats(0.05, 0.5))
+def test_any_bound_is_found_where_it_is_crossed(bound: float, v: float) -> None:
+    text = f"z <= {bound!r}"
+    trace = simulate(one_element("signed", F_c=1.0, F_s=1.0), Prescribed(v), 2.0, monitors=[text])
+    found = invariant(trace, text)
+    assert found.ok == (bound >= min(1.0, 2.0 * v))
+    if not found.ok:
+        assert found.t == pytest.approx(bound / v, rel=1e-9)
+
+
+# --------------------------------------------------------------------------- asking for them
+def test_all_means_these_three() -> None:
+    model = stick_slip("signed")
+    assert list(checked("all", model)) == ["chattering", "passivity", "coverage"]
+    assert checked(["z <= s", Coverage()], model) == {
+        "z <= s": Invariant("z <= s"), "coverage": Coverage(),
+    }  # fmt: skip
+    assert checked("passivity", model) == {"passivity": Passivity()}
+    assert checked(Chattering(3, 0.5), model) == {"chattering": Chattering(3, 0.5)}
+
+
+@pytest.mark.parametrize(
+    ("monitors", "said"),
+    [
+        ("pasivity", "did you mean 'passivity'?"),
+        (["chattering", Chattering(5)], "'chattering' twice"),
+        (["z <= s", "z <= s"], "'z <= s' twice"),
+        ([3], "monitors has 3"),
+        (["everything"], "no monitor 'everything'"),
+    ],
+)
+def test_what_is_no_monitor_is_refused(monitors: Any, said: str) -> None:
+    with pytest.raises(ParameterError, match=r".") as caught:
+        simulate(stick_slip("signed"), Prescribed(0.2), 1.0, monitors=monitors)
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("make", [
+    lambda: Chattering(times=1), lambda: Chattering(times=2.5), lambda: Chattering(within=0.0),
+    lambda: Chattering(within=math.nan), lambda: Passivity(tolerance=-1.0),
+])  # fmt: skip
+def test_numbers_of_a_monitor_have_rules(make: Any) -> None:
+    with pytest.raises(ParameterError):
+        make()
+
+
+def test_with_the_end_alone_only_the_log_can_be_watched() -> None:
+    model, rig = pulled_mass()
+    trace = simulate(model, rig, 20.0, output="end", monitors=[Chattering(2, 30.0)])
+    assert chattering(trace).episodes
+    for monitor in ("passivity", "coverage", "z <= s"):
+        with pytest.raises(ParameterError, match="use output='all'"):
+            simulate(model, rig, 20.0, output="end", monitors=[monitor])
+
+
+def test_a_session_is_examined_afterwards() -> None:
+    with pytest.raises(ParameterError, match="examine"):
+        Session(stick_slip("signed"), open_loop(), 5.0, monitors=["coverage"])
+    session = Session(stick_slip("signed"), open_loop(), 8.0)
+    session.step(10_000)
+    found = examine(session.branch.trace(), ["coverage", "z <= 2*s"])
+    assert found["z <= 2*s"].ok
+
+
+# --------------------------------------------------------------------------- where they are kept
+def test_a_run_without_monitors_has_none() -> None:
+    trace = simulate(stick_slip("signed"), Prescribed(0.2), 1.0)
+    assert trace.monitors == {}
+    assert simulate(stick_slip("signed"), Prescribed(0.2), 1.0, monitors=[]).monitors == {}
+
+
+@pytest.mark.parametrize("engine", ["ifelse", "compiled"])
+def test_all_engines_say_the_same(engine: str) -> None:
+    if engine == "compiled":
+        pytest.importorskip("numba", reason="needs the extra 'fast'")
+    monitors = ["all", "abs(z) <= 1.1*s", "F < 1"]
+    one, other = (
+        simulate(stick_slip("published"), Prescribed(FIG4_SINE), 50.0, engine=e, monitors=monitors)
+        for e in ("machines", engine)
+    )
+    assert one.monitors == other.monitors
+
+
+@pytest.mark.parametrize("ending", ["npz", "csv"])
+def test_files_keep_what_they_said(ending: str, tmp_path: Path) -> None:
+    monitors = ["all", "abs(z) <= 1.1*s", "1 / z > 0", "F < 1", "state == stick"]
+    trace = simulate(stick_slip("published"), Prescribed(FIG4_SINE), 50.0, monitors=monitors)
+    read = Trace.load(trace.save(tmp_path / f"run.{ending}"))
+    assert read.monitors == trace.monitors
+    assert list(read.monitors) == list(trace.monitors)
+    again = examine(read, monitors)
+    for name, found in trace.monitors.items():
+        assert again[name] == found or name == "passivity"  # a sum may round in another order
+    assert again["passivity"].text == trace.monitors["passivity"].text
+    assert read.sample([1.0, 2.0]).monitors == read.refined(50).monitors == trace.monitors
+
+
+def test_values_that_are_not_finite_survive_a_file(tmp_path: Path) -> None:
+    found = InvariantVerdict(False, "broken", "z < 1", 2, 1, 0.5, 0, "slip",
+                             {"z": math.inf, "s": -math.inf}, 1.0)  # fmt: skip
+    trace = simulate(stick_slip("signed"), Prescribed(0.2), 1.0).with_monitors({"z < 1": found})
+    for ending in ("npz", "csv"):
+        read = Trace.load(trace.save(tmp_path / f"run.{ending}"))
+        assert read.monitors == {"z < 1": found}
+
+
+def test_a_run_that_fails_has_been_watched_too() -> None:
+    """The velocity has no value after 0.5 s."""
+    monitors = ["all", "z <= 0.1"]
+    with pytest.raises(SimulationError) as caught:
+        simulate(stick_slip("signed"), Prescribed("sqrt(0.5 - t)"), 2.0, monitors=monitors)
+    trace = caught.value.trace
+    assert 0.3 < trace.t[-1] <= 0.5
+    assert list(trace.monitors) == ["chattering", "passivity", "coverage", "z <= 0.1"]
+    assert not invariant(trace, "z <= 0.1").ok
+    assert chattering(trace).ok

@@ -1,0 +1,207 @@
+"""output= decides which rows are kept and nothing else: "all", the times of t_eval, or the end.
+
+The transition log is complete in each, with every engine; what contradicts itself is refused.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gms_fsm import LuGre, Prescribed, Stribeck, Trace, simulate
+from gms_fsm.errors import ParameterError
+from gms_fsm.models import Model
+from gms_fsm.rigs import Rig
+from tests.helpers import non_drifting, open_loop, pulled_mass, stick_slip
+
+JUMPS = [(0, 0.1), (1, 0.2), (1, -0.3), (6, -0.3), (6, 0.4), (9, 0.4)]
+CASES: dict[str, tuple[Model, Rig, float]] = {
+    "open loop": (stick_slip("signed"), open_loop(), 31.0),
+    "pulled mass": (*pulled_mass(), 10.0),
+    "fig. 3, slipping": (*non_drifting("signed", slipping=True), 10.0),
+    "jumps": (stick_slip("published"), Prescribed(JUMPS), 12.0),
+    "no edges": (
+        LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4.0, stribeck=Stribeck(1.0, 1.5, 1e-3)),
+        Prescribed("1e-3*sin(t)"),
+        8.0,
+    ),
+}
+METHODS: dict[str, dict[str, Any]] = {
+    "dp45": {},
+    "rk4": {"method": "rk4", "step": 4.03e-3},
+    "by step": {"method": "bs23", "max_step": 1e-2, "events": "step"},
+}
+every_case = pytest.mark.parametrize("case", CASES)
+every_method = pytest.mark.parametrize("method", METHODS)
+
+
+@pytest.fixture(params=["machines", "ifelse", "compiled"])
+def engine(request: pytest.FixtureRequest) -> str:
+    """Each engine; the compiled one where its extra is installed."""
+    if request.param == "compiled":
+        pytest.importorskip("numba", reason="needs the extra fast")
+    return str(request.param)
+
+
+def _row(trace: Trace, row: int) -> dict[str, Any]:
+    names = ("t", "microstep", "x", "v", "z", "s", "F", "F_elements", "dz", "states")
+    return {name: np.array(getattr(trace, name)[row]) for name in names}
+
+
+def _same_row(one: dict[str, Any], other: dict[str, Any]) -> None:
+    for name, value in one.items():
+        np.testing.assert_array_equal(value, other[name], err_msg=name)
+
+
+@every_method
+@every_case
+def test_the_end_is_the_last_of_all_rows(case: str, method: str, engine: str) -> None:
+    model, rig, t_end = CASES[case]
+    options = METHODS[method] | {"engine": engine}
+    whole = simulate(model, rig, t_end, output="all", **options)
+    end = simulate(model, rig, t_end, output="end", **options)
+    assert len(end) == len(end.rows) == len(end.stops) == 1
+    assert end.t.tolist() == [t_end]
+    assert end.microstep.tolist() == [0]
+    last = _row(whole, -1) | {"microstep": np.array(0)}
+    _same_row(last, _row(end, -1))
+    np.testing.assert_array_equal(end.transitions, whole.transitions)
+    assert end.transitions.dtype == whole.transitions.dtype
+    assert (len(whole.transitions) > 0) == (case != "no edges")
+
+
+@every_method
+@every_case
+def test_wanted_rows_and_no_others(case: str, method: str, engine: str) -> None:
+    model, rig, t_end = CASES[case]
+    options = METHODS[method] | {"engine": engine}
+    whole = simulate(model, rig, t_end, **options)
+    events = np.unique(whole.transitions.t[:4])  # a row on a switch is the one after it
+    times = np.unique([0.0, 0.1 * t_end, *events, 0.77 * t_end, t_end])
+    trace = simulate(model, rig, t_end, output="t_eval", t_eval=times, **options)
+    np.testing.assert_array_equal(trace.t, times)
+    assert not trace.microstep.any()
+    np.testing.assert_array_equal(trace.transitions, whole.transitions)
+    _same_row(_row(whole, -1) | {"microstep": np.array(0)}, _row(trace, -1))
+    if method != "by step":  # there an edge is taken behind the step's end
+        on_event = np.searchsorted(whole.t, events, side="right") - 1
+        for name in ("x", "z", "F", "states"):
+            np.testing.assert_array_equal(
+                getattr(trace, name)[np.searchsorted(times, events)],
+                getattr(whole, name)[on_event],
+            )
+
+
+def test_without_output_it_is_what_the_arguments_say(engine: str) -> None:
+    model, rig, t_end = CASES["open loop"]
+
+    def shapes(**options: Any) -> tuple[int, int, int]:
+        trace = simulate(model, rig, t_end, engine=engine, **options)
+        return len(trace), len(trace.stops), len(trace.transitions)
+
+    assert shapes() == shapes(output="all")
+    assert shapes(t_eval=[1.0, 2.0]) == shapes(output="t_eval", t_eval=[1.0, 2.0])
+    assert shapes(t_eval=[1.0, 2.0])[0] == 2
+    assert shapes(output="end")[0] == 1
+
+
+def test_both_sides_of_every_stop_are_kept_beside_wanted_rows(engine: str) -> None:
+    """So that samples between far rows do not go across a switch or a jump."""
+    model, rig, t_end = CASES["jumps"]
+    trace = simulate(model, rig, t_end, t_eval=[0.0, t_end], engine=engine)
+    stops = trace.stops
+    assert stops.t[0] == 0.0
+    assert (np.diff(stops.t) >= 0).all()
+    for t in trace.transitions.t:
+        assert (stops.t == t).sum() >= 2, "before and after"
+    for jump in (1.0, 6.0):
+        assert {np.nextafter(jump, 0.0), jump} <= set(stops.t.tolist())
+    whole = simulate(model, rig, t_end, engine=engine)
+    times = np.linspace(0.0, t_end, 101)
+    between, sampled = trace.sample(times), whole.sample(times)
+    np.testing.assert_array_equal(between.states, sampled.states)
+
+
+@pytest.mark.parametrize("rows", [[0.0], [31.0], [15.5], np.linspace(0, 31, 4001)])
+def test_few_and_many_wanted_rows(rows: Any, engine: str) -> None:
+    model, rig, t_end = CASES["open loop"]
+    trace = simulate(model, rig, t_end, t_eval=rows, engine=engine)
+    assert trace.t.tolist() == list(rows)
+    assert len(trace.transitions) == 24
+
+
+def test_the_end_can_be_saved_and_sampled(engine: str, tmp_path: Any) -> None:
+    model, rig, t_end = CASES["open loop"]
+    end = simulate(model, rig, t_end, output="end", engine=engine)
+    for name in ("end.npz", "end.csv"):
+        _same_row(_row(end, 0), _row(Trace.load(end.save(tmp_path / name)), 0))
+    assert end.sample([t_end]).z.tolist() == end.z.tolist()
+    with pytest.raises(ValueError, match="outside the run"):
+        end.sample([0.5 * t_end])
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"output": "rows"}, ("output is 'rows'", "'all', 't_eval' or 'end'")),
+        ({"output": 3}, ("output is 3", "'all'")),
+        ({"output": True}, ("output is True", "'all'")),
+        ({"output": "t_eval"}, ("output='t_eval' needs t_eval=",)),
+        ({"output": "end", "t_eval": [0.5]}, ("output is 'end'", "t_eval", "leave one out")),
+        ({"output": "all", "t_eval": [0.5]}, ("output is 'all'", "t_eval", "leave one out")),
+        ({"output": "t_eval", "t_eval": [0.5, 2.0]}, ("t_eval has 2.0", "t_end = 1.0")),
+        ({"output": "t_eval", "t_eval": []}, ("t_eval",)),
+    ],
+)
+def test_contradictions_are_refused(
+    options: dict[str, Any], words: tuple[str, ...], engine: str
+) -> None:
+    with pytest.raises(ParameterError) as caught:
+        simulate(*CASES["open loop"][:2], 1.0, engine=engine, **options)
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_progress_is_told_of_a_run_that_keeps_its_end_only() -> None:
+    """The last it is told of lies before the end, in time order, with finite values."""
+    seen: list[tuple[float, float]] = []
+    simulate(
+        *CASES["pulled mass"], output="end",
+        progress=lambda moment: seen.append((moment.t, moment.values["F"])),
+    )  # fmt: skip
+    assert len(seen) > 3
+    assert [t for t, _ in seen] == sorted(t for t, _ in seen)
+    assert np.isfinite(seen).all()
+
+
+NEVER_BACK = (
+    "with events='step' the loop comes back only when there are rows, so that a long compiled run "
+    "hears no Ctrl-C: integrators.loop.go_on should return ROWS after each step not located"
+)
+
+
+def _waiting(*options: Any) -> list[Any]:
+    return [pytest.param("step", u, marks=[pytest.mark.xfail(reason=NEVER_BACK)]) for u in options]
+
+
+@pytest.mark.parametrize(
+    ("events", "options"),
+    [
+        ("located", {"output": "all"}),
+        ("located", {"output": "end"}),
+        ("located", {"t_eval": [0.0, 45.0]}),
+        ("step", {"output": "all"}),
+        *_waiting({"output": "end"}, {"t_eval": [0.0, 45.0]}),
+    ],
+)
+def test_a_long_compiled_run_comes_up_for_air(events: str, options: dict[str, Any]) -> None:
+    pytest.importorskip("numba", reason="needs the extra fast")
+    seen: list[float] = []
+    simulate(
+        stick_slip("signed"), Prescribed("0.2"), 45.0, engine="compiled", method="euler",
+        step=1e-3, events=events, progress=lambda moment: seen.append(moment.t), **options,
+    )  # fmt: skip
+    assert seen, "45,000 steps without a look at the keyboard"
+    assert seen == sorted(seen)
