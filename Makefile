@@ -58,6 +58,7 @@ bench: $(VENV)/bench.stamp
 	$(RUN)/python benchmarks/compare.py
 	$(RUN)/python benchmarks/live_frames.py
 	$(RUN)/python benchmarks/overview_figure.py
+	$(RUN)/python benchmarks/monitors.py
 
 gallery: $(VENV)/all.stamp
 	$(RUN)/python docs/make_pictures.py

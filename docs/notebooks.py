@@ -13,15 +13,22 @@ import base64
 import hashlib
 import inspect
 import logging
+import math
 import re
 import sys
+import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from queue import Empty
 from typing import Any
 
 import jupytext
 import nbformat
+from jupyter_client.asynchronous import AsyncKernelClient
+from jupyter_client.channels import AsyncZMQSocketChannel
+from jupyter_client.manager import AsyncKernelManager
 from nbclient import NotebookClient
+from traitlets import Type
 
 from gms_fsm.lessons import LESSONS
 
@@ -92,6 +99,29 @@ def _escaped(text: str) -> str:
 
 
 # --------------------------------------------------------------------------- executing
+class _Channel(AsyncZMQSocketChannel):
+    """Looks again every second: an asynchronous socket misses a wake-up now and then."""
+
+    async def get_msg(self, timeout: float | None = None) -> dict[str, Any]:
+        end = math.inf if timeout is None else time.monotonic() + timeout
+        while True:
+            left = end - time.monotonic()
+            try:
+                return await super().get_msg(timeout=max(0.0, min(1.0, left)))
+            except Empty:
+                if left <= 0:
+                    raise
+
+
+class _Client(AsyncKernelClient):
+    shell_channel_class = Type(_Channel)
+    iopub_channel_class = Type(_Channel)
+
+
+class _Manager(AsyncKernelManager):
+    client_factory = Type(_Client)
+
+
 def executed(text: str, folder: Path) -> Any:
     """Run a composed notebook.
 
@@ -116,8 +146,8 @@ def executed(text: str, folder: Path) -> Any:
     notebook.cells.insert(0, nbformat.v4.new_code_cell(STRICT))
     notebook.metadata["kernelspec"] = {"name": "python3", "display_name": "Python 3"}
     NotebookClient(
-        notebook, timeout=90, kernel_name="python3", extra_arguments=["--log-level=CRITICAL"],
-        resources={"metadata": {"path": str(folder)}},
+        notebook, timeout=600, kernel_name="python3", kernel_manager_class=_Manager,
+        extra_arguments=["--log-level=CRITICAL"], resources={"metadata": {"path": str(folder)}},
     ).execute()  # fmt: skip
     del notebook.cells[0]
     for cell in notebook.cells:

@@ -77,6 +77,7 @@ class Record:
         return int(self.columns["time"].size)
 
 
+@np.errstate(all="ignore")  # what overflows is refused in words
 def read_record(
     path: str | Path, columns: Mapping[str, Column], where: str = "", delimiter: str | None = None
 ) -> Record:
@@ -314,6 +315,7 @@ class Motion:
         return float(f"{math.ceil(3.0 * self.standstill / digit) * digit:.1g}")
 
 
+@np.errstate(all="ignore")  # what overflows is refused in words
 def motion_of(record: Record, smoothing: float | None = None) -> Motion:
     """Return the motion of a record; from positions by a smoothing spline.
 
@@ -357,7 +359,13 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
         raise RecordError(f"{record.path}: neither a position nor a velocity column is given")
     # The spline is blind to the origin; without its offset the sums keep their digits.
     shift = float(raw[0])
-    spline = make_smoothing_spline(time, raw - shift, lam=tau**4 / interval)
+    try:
+        spline = make_smoothing_spline(time, raw - shift, lam=tau**4 / interval)
+    except (ArithmeticError, ValueError) as error:  # LinAlgError is a ValueError
+        raise RecordError(
+            f"{record.path}: no smoothing spline fits the {given} column ({cut(str(error))}); "
+            "look for values or times that are far out"
+        ) from None
     smooth = spline(time) + shift
     if given == "position":
         velocity, position = spline.derivative()(time), smooth
@@ -375,6 +383,11 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
             "velocity: as measured"
             + (f", smoothed with a time constant of {tau:.4g} s" if tau else "")
         ]
+    if not np.isfinite([velocity, position]).all():
+        raise RecordError(
+            f"{record.path}: the {given} column has values too large to make a motion of, up to "
+            f"{float(np.abs(raw).max()):.3g} (SI); look for cells that are far out"
+        )
     return Motion(time, velocity, position, tau, _standstill(velocity), tuple(notes))
 
 

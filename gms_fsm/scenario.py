@@ -441,7 +441,8 @@ def _loaded(path: Path, scenario: Scenario) -> Loaded:
         wanted = max(0.0, (end - start) / scenario.output.every)  # t_end is checked with the rest
         if wanted > 10_000_000:
             raise ScenarioError(
-                f"{path}: output.every = {scenario.output.every} s makes {wanted:.4g} rows; take more"
+                f"{path}: output.every = {scenario.output.every} s makes {wanted:.4g} rows; take "
+                "more"
             )
         count = int(wanted)
         arguments["t_eval"] = np.minimum(start + scenario.output.every * np.arange(count + 1), end)

@@ -38,8 +38,11 @@ if TYPE_CHECKING:
 __all__ = ["Sweep", "sweep"]
 
 AT_ONCE = 64  # runs a task, at most
-_LOG = [("run", "i8"), ("t", "f8"), ("element", "i8"), ("edge", "i8"), ("z", "f8"), ("v", "f8"),
-        ("s", "f8"), ("F_before", "f8"), ("F_after", "f8")]  # fmt: skip
+_OPTIONS = ("t_start", "method", "step", "rtol", "atol", "max_step", "events", "t_eval", "initial")
+_LOG = np.dtype([
+    ("run", "i8"), ("t", "f8"), ("element", "i8"), ("edge", "i8"), ("z", "f8"), ("v", "f8"),
+    ("s", "f8"), ("F_before", "f8"), ("F_after", "f8"),
+])  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +205,7 @@ class Sweep:
             pandas = _imported("pandas", "sweep")
             _imported("pyarrow", "sweep")
             log = pandas.DataFrame(
-                {name: self.transitions[name] for name, _ in _LOG}
+                {name: self.transitions[name] for name in _LOG.names or ()}
                 | {"edge": np.array(self.edges, dtype=object)[self.transitions["edge"]]}
             )
             beside = path.with_name(f"{path.stem}.transitions.parquet")
@@ -230,7 +233,8 @@ class Sweep:
             If the file is missing, damaged, or not a sweep; nothing in it is executed.
         """
         try:
-            with np.load(Path(path), allow_pickle=False) as file:
+            # Opened here: np.load leaves a damaged file open.
+            with Path(path).open("rb") as raw, np.load(raw, allow_pickle=False) as file:
                 arrays = {name: file[name] for name in file.files}
             groups: dict[str, dict[str, Any]] = {"parameter": {}, "rows": {}}
             for name in list(arrays):
@@ -315,6 +319,11 @@ def sweep(
         check_numba()
     values = _values(model, rig, parameters)
     runs = len(next(iter(values.values())))
+    for name in options:
+        if name not in _OPTIONS:
+            raise ParameterError(
+                f"a sweep takes no {name!r}; of simulate's arguments it takes {', '.join(_OPTIONS)}"
+            )
     options = {**options, "engine": engine, "output": output}
     Start.of(model, rig, t_end, **options)  # what is wrong for all is said once, here
     collected = _Collected(model, runs, options.get("t_eval"))
@@ -442,7 +451,7 @@ def _result(run: Run | CompiledRun | None, outcome: str, message: str) -> _Resul
     t, y, mode = recorder.latest
     edges = {edge.name: index for index, edge in enumerate(trace.model.chart.transitions)}
     log = np.empty(len(trace.transitions), dtype=_LOG)
-    for name, _ in _LOG[1:]:
+    for name in (_LOG.names or ())[1:]:
         log[name] = trace.transitions[name] if name != "edge" else [
             edges[edge] for edge in trace.transitions.edge.tolist()
         ]  # fmt: skip

@@ -618,7 +618,7 @@ def one_scenario(data: bytes) -> bool:
 
 def _start_and_run(loaded: Any) -> None:
     """Run a few steps, as `simulate` would begin."""
-    arguments = dict(loaded.arguments)
+    arguments = {name: value for name, value in loaded.arguments.items() if name != "monitors"}
     if np.size(arguments.get("t_eval", ())) < 10_000:
         Start.of(loaded.model, loaded.rig, **arguments)
     # With wanted times an arc goes on to the last of them, and hostile numbers make stiff runs.

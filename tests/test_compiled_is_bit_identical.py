@@ -64,10 +64,6 @@ pytest.importorskip("numba", reason="needs the extra fast")
 from gms_fsm import compiled
 
 ROOT = Path(__file__).parents[1]
-STALE = (
-    "the readable engines keep the last stop, not the state reached: Run.advance should set "
-    "recorder.latest = error.t, error.y, tuple(error.mode) where it catches HybridError"
-)
 CURVE = Stribeck(F_c=1.0, F_s=1.5, v_s=0.02)
 
 
@@ -574,20 +570,7 @@ def test_failures_keep_the_state_they_got_to(case: str) -> None:
     _same_logs(whole, end)
 
 
-MID_ARC = [
-    "sliding mode", "blow-up", "blow-up, bs23", "blow-up by step", "blow-up, rk4",
-    "blow-up, rk4 by step", "pole of t", "odd pole of t", "sqrt leaves its domain",
-    "sqrt, fixed steps", "exp overflows", "division by zero", "a force without end",
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    "case",
-    [
-        pytest.param(case, marks=pytest.mark.xfail(reason=STALE)) if case in MID_ARC else case
-        for case in FAILURES
-    ],
-)
+@pytest.mark.parametrize("case", FAILURES)
 def test_failures_keep_the_same_end(case: str) -> None:
     _, model, rig, t_end, options = FAILURES[case]
     both(model, rig, t_end, **options, output="end")

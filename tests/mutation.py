@@ -1,0 +1,155 @@
+"""Measures what the tests notice: one small change of a module at a time, then the tests near it.
+
+``python tests/mutation.py [module ...] [--sample 80] [--seed 8] [--budget seconds]``, with
+``pip install -e ".[dev,mutation]"``. cosmic-ray makes the mutants; a copy of the repository is
+mutated, never the repository. Each mutant has a forked process, so that numpy and scipy are
+imported once. Survivors are printed as diffs.
+"""
+
+import argparse
+import difflib
+import os
+import random
+import resource
+import shutil
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from cosmic_ray.ast import ast_nodes, get_ast
+from cosmic_ray.mutating import mutate_code
+from cosmic_ray.plugins import get_operator
+
+ROOT = Path(__file__).resolve().parents[1]
+TIMEOUT = 15  # seconds of the processor; a mutant that hangs is noticed
+# Bit shifts of floats and the like die at once and would only flatter the score.
+_SIGNS = ("Eq", "NotEq", "Lt", "LtE", "Gt", "GtE")
+OPERATORS = (
+    [f"ReplaceComparisonOperator_{a}_{b}" for a in _SIGNS for b in _SIGNS if a != b]
+    + [f"ReplaceBinaryOperator_{a}" for a in ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul")]
+    + ["ReplaceUnaryOperator_Delete_USub", "ReplaceUnaryOperator_Delete_Not", "AddNot"]
+    + ["ReplaceAndWithOr", "ReplaceOrWithAnd", "ReplaceTrueWithFalse", "ReplaceFalseWithTrue"]
+    + ["ReplaceBreakWithContinue", "ReplaceContinueWithBreak", "ExceptionReplacer"]
+    + ["NumberReplacer", "ZeroIterationForLoop"]
+)
+PHYSICS = [
+    "traps_boundary_values", "traps_velocity_window", "traps_true_and_false_again",
+    "traps_frozen_states", "traps_sign_discontinuity", "constant_velocity_closed_forms",
+]  # fmt: skip
+NEAR = {  # module: its tests, the quickest to notice first
+    "gms_fsm/chart.py": [
+        "mutants_are_killed", "chart_refuses_contradictions", "gms_chart_is_the_papers",
+    ],
+    "gms_fsm/machines.py": [
+        "mutants_are_killed", "callbacks_run_once_per_firing", "gms_chart_is_the_papers",
+    ],
+    "integrators/advance.py": ["mutants_are_killed", *PHYSICS, "convergence_orders"],
+    "integrators/crossings.py": ["mutants_are_killed", *PHYSICS],
+    "gms_fsm/expression.py": [
+        "mutants_are_killed", "expression_refuses_everything_else",
+        "expression_evaluates_like_python", "gms_chart_is_the_papers",
+    ],
+}  # fmt: skip
+
+
+def mutants(source):
+    """All (operator, occurrence, line), without those inside a message that is raised."""
+    tree = get_ast(source)
+    lines = source.splitlines()
+    found = []
+    for name in OPERATORS:
+        operator, occurrence = get_operator("core/" + name)(), 0
+        for node in ast_nodes(tree):
+            for (line, _), _ in operator.mutation_positions(node):
+                if not lines[line - 1].lstrip().startswith(("f'", 'f"', "'", '"')):
+                    found.append((name, occurrence, line))
+                occurrence += 1
+    return found
+
+
+def run_tests(arguments, shown=False):
+    """Return passed, failed or timeout, of a forked run in the working directory."""
+    child = os.fork()
+    if child == 0:
+        if not shown:
+            null = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(null, 1)
+            os.dup2(null, 2)
+        resource.setrlimit(resource.RLIMIT_CPU, (TIMEOUT, TIMEOUT))
+        import pytest
+
+        os._exit(int(pytest.main(arguments)) != 0)
+    _, status = os.waitpid(child, 0)
+    if os.WIFSIGNALED(status):
+        return "timeout"
+    return "failed" if status else "passed"
+
+
+def measure(module, sample, seed, budget):
+    path = Path(module)
+    source = path.read_text(encoding="utf-8")
+    every = mutants(source)
+    chosen = random.Random(f"{seed} {module}").sample(every, min(sample, len(every)))
+    tests = [f"tests/test_{name}.py" for name in NEAR[module]] + [module]  # its examples
+    arguments = ["-x", "-q", "--no-header", "-p", "no:cacheprovider", "--hypothesis-seed=0"]
+    arguments += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # of what is imported here
+    arguments += [test for test in tests if Path(test).exists()]
+    if run_tests(arguments, shown=True) != "passed":
+        sys.exit(f"{module}: the tests do not pass on the module as it is")
+    counts, start = {"failed": 0, "timeout": 0, "passed": 0}, time.monotonic()
+    for name, occurrence, line in chosen:
+        if time.monotonic() - start > budget:
+            break
+        mutated = mutate_code(source, get_operator("core/" + name)(), occurrence)
+        path.write_text(mutated, encoding="utf-8")
+        for stale in path.parent.glob(f"__pycache__/{path.stem}.*"):
+            stale.unlink()  # it may be as long and as old as the mutant
+        outcome = run_tests(arguments)
+        counts[outcome] += 1
+        if outcome == "passed":
+            print(f"SURVIVED {module}:{line} {name} {occurrence}")
+            pair = source.splitlines(), mutated.splitlines()
+            print("\n".join(list(difflib.unified_diff(*pair, lineterm="", n=0))[2:]), flush=True)
+    path.write_text(source, encoding="utf-8")
+    killed = counts["failed"] + counts["timeout"]
+    print(
+        f"{module}: {sum(counts.values())} of {len(every)} mutants, {killed} killed "
+        f"({counts['timeout']} by timeout), {counts['passed']} survived, "
+        f"{time.monotonic() - start:.0f} s",
+        flush=True,
+    )
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("modules", nargs="*", default=list(NEAR))
+    parser.add_argument("--sample", type=int, default=80, help="mutants of a module")
+    parser.add_argument("--seed", type=int, default=8)
+    parser.add_argument("--budget", type=float, default=float("inf"), help="seconds a module")
+    asked = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        for part in ("gms_fsm", "integrators", "plots", "tests", "scenarios", "pyproject.toml"):
+            copy = shutil.copytree if (ROOT / part).is_dir() else shutil.copy
+            copy(ROOT / part, Path(folder, part))
+        os.chdir(folder)
+        sys.path[0] = os.environ["PYTHONPATH"] = folder
+        os.environ["XDG_CACHE_HOME"] = folder
+        import hypothesis
+        import pytest  # noqa: F401
+        import scipy.integrate
+        import scipy.optimize  # noqa: F401
+        import transitions  # noqa: F401
+
+        # Not to shrink, nor to remember, what a mutant fails on.
+        phases = (hypothesis.Phase.explicit, hypothesis.Phase.generate)
+        hypothesis.settings.register_profile(
+            "mutation", phases=phases, database=None, max_examples=40
+        )
+        hypothesis.settings.load_profile("mutation")
+        for module in asked.modules:
+            measure(module, asked.sample, asked.seed, asked.budget)
+
+
+if __name__ == "__main__":
+    main()
