@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import sys
@@ -41,6 +42,7 @@ autodoc_typehints = "none"  # the docstrings name type, shape and unit
 napoleon_google_docstring = False
 napoleon_use_param = False  # types are words here ("shape (n,), m"), not names to link
 napoleon_use_rtype = False
+napoleon_custom_sections = [("Attributes", "params_style")]
 copybutton_prompt_text = r">>> |\.\.\. |\$ "
 copybutton_prompt_is_regexp = True
 
@@ -76,6 +78,33 @@ def keep_bars(*arguments: Any) -> None:
             lines[number] = "".join(parts)
 
 
+def mend_ways_back(app: Sphinx, page: str, _: str, context: dict[str, Any], __: Any) -> None:
+    """Let a source page lead back to objects that are documented under a shorter name.
+
+    Sphinx takes one module's name for all objects of a source file, though ``gms_fsm.trace.Trace``
+    is ``gms_fsm.Trace`` in its documentation and ``gms_fsm.trace.dwell_times`` is not.
+    """
+    if not page.startswith("_modules/") or "body" not in context:
+        return
+    objects = app.env.get_domain("py").objects  # type: ignore[attr-defined]
+
+    def mended(match: re.Match[str]) -> str:
+        there = os.path.normpath(Path(page).parent / match["page"])
+        parts = match["name"].split(".")
+        for first in range(len(parts)):
+            ending = "." + ".".join(parts[first:])
+            for name, found in objects.items():
+                if found.docname == there and f".{name}".endswith(ending):
+                    return f'{match["before"]}{match["page"]}.html#{name}"'
+        return match[0]
+
+    context["body"] = re.sub(
+        r'(?P<before>class="viewcode-back" href=")(?P<page>[^"#]*)\.html#(?P<name>[^"]*)"',
+        mended,
+        context["body"],
+    )
+
+
 def make_lessons(_: Sphinx) -> None:
     """Write the lessons' pages beside their index."""
     notebooks.write_all(HERE / "lessons")
@@ -92,5 +121,6 @@ def setup(app: Sphinx) -> None:
     """Connect what is ours."""
     mathml.register(app)
     app.connect("autodoc-process-docstring", keep_bars, priority=100)  # before napoleon
+    app.connect("html-page-context", mend_ways_back)
     app.connect("builder-inited", make_lessons)
     app.connect("build-finished", copy_replay_pages)

@@ -7,12 +7,14 @@ import json
 import sys
 import textwrap
 import warnings
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from typer.core import TyperGroup
 
 import gms_fsm
 from gms_fsm import paper
@@ -33,8 +35,27 @@ from gms_fsm.trace import Trace
 
 __all__ = ["app", "main"]
 
+
+@dataclass
+class Wishes:
+    """What the options before the verb ask for."""
+
+    debug: bool = False
+
+
+class _Verbs(TyperGroup):
+    """The verbs; ``--debug`` may stand before or behind one."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        options = args[: args.index("--")] if "--" in args else args
+        if "--debug" in options:
+            args = ["--debug", *(a for a in options if a != "--debug"), *args[len(options) :]]
+        return super().parse_args(ctx, args)
+
+
 app = typer.Typer(
     name="gms-fsm",
+    cls=_Verbs,
     help="Friction as an explicit state machine: the Generalized Maxwell Slip model.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -65,11 +86,16 @@ def _version(wanted: bool) -> None:
 
 @app.callback()
 def root(
-    version: Annotated[
+    context: typer.Context,
+    _asked: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+    debug: Annotated[
+        bool, typer.Option("--debug", help="Answer a mistake with the traceback and its causes.")
     ] = False,
 ) -> None:
     """Friction as an explicit state machine: the Generalized Maxwell Slip model."""
+    context.ensure_object(Wishes).debug = debug
 
 
 @app.command("paper")
@@ -391,19 +417,32 @@ def code_command(
 def main() -> None:
     """Run the command line; print a user's mistake as one message and exit with code 2."""
     warnings.showwarning = _plain_warning
+    wishes = Wishes()
     try:
-        app()
+        app(obj=wishes)
     except GMSError as error:
+        if wishes.debug:
+            _with_causes(error)
+            raise
         Console(stderr=True, soft_wrap=True).print(
             f"[bold red]error:[/] {_escaped(str(error))}", highlight=False, emoji=False
         )
         sys.exit(2)
 
 
+def _with_causes(error: BaseException | None) -> None:
+    """Have a traceback show what an error was made from; to a user that says nothing."""
+    while error is not None:
+        error.__suppress_context__ = False
+        error = error.__context__
+
+
 def _escaped(text: str) -> str:
+    """Return a text as it is, neither markup nor a terminal's control codes."""
     from rich.markup import escape
 
-    return escape(text)
+    printable = (c if c.isprintable() or c in "\n\t" else ascii(c)[1:-1] for c in text)
+    return escape("".join(printable))
 
 
 def _plain_warning(message: Warning | str, *_: object, **__: object) -> None:

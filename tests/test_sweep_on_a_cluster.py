@@ -1,11 +1,15 @@
-"""A sweep on a Dask cluster of processes survives a killed worker: every result arrives once."""
+"""A sweep on a Dask cluster of processes survives a killed worker: every result arrives once.
+
+What kills its worker each time it is tried is a row that says so.
+"""
 
 from __future__ import annotations
 
 import logging
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
 from typing import Any
 
 import numpy as np
@@ -20,8 +24,8 @@ distributed = pytest.importorskip("distributed", reason="needs the extra cluster
 RUNS = 192
 
 
-def sets() -> dict[str, Any]:
-    k = pulled_mass()[0].values["k"] * np.random.default_rng(5).uniform(0.8, 1.2, (RUNS, 4))
+def sets(runs: int = RUNS) -> dict[str, Any]:
+    k = pulled_mass()[0].values["k"] * np.random.default_rng(5).uniform(0.8, 1.2, (runs, 4))
     return {"k": k, "weights": 1 / (4 * k)}
 
 
@@ -36,8 +40,13 @@ def cluster() -> Iterator[Any]:
         yield made
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+quiet = pytest.mark.filterwarnings(
+    "ignore::DeprecationWarning", "ignore::ResourceWarning",
+    "ignore::pytest.PytestUnraisableExceptionWarning",
+)  # fmt: skip
+
+
+@quiet
 def test_a_killed_worker_costs_no_result(cluster: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     model, rig = pulled_mass()
     arrived: list[int] = []
@@ -67,3 +76,45 @@ def test_a_killed_worker_costs_no_result(cluster: Any, monkeypatch: pytest.Monke
     for name in ("t", "x", "v", "F", "z", "states"):
         np.testing.assert_array_equal(getattr(far, name), getattr(here, name))
     assert far.transitions.tolist() == here.transitions.tolist()
+
+
+class Deadly(Executor):
+    """Sends a task that ends its worker in place of the third."""
+
+    def __init__(self, cluster: Executor) -> None:
+        self.cluster, self.count = cluster, 0
+
+    def submit(self, function: Callable[..., Any], /, *a: Any, **b: Any) -> Future[Any]:
+        self.count += 1
+        if self.count == 3:
+            return self.cluster.submit(os._exit, 3)
+        return self.cluster.submit(function, *a, **b)
+
+
+@quiet
+def test_what_kills_every_worker_is_a_row_that_says_so() -> None:
+    dask = pytest.importorskip("dask", reason="needs the extra cluster")
+    pytest.importorskip("numba", reason="needs the extra fast")
+    model, rig = pulled_mass()
+    here = sweep(model, rig, 12.0, sets(8), engine="machines")
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        ) as made,
+        distributed.Client(made) as client,
+    ):  # fmt: skip
+        executor = client.get_executor()
+        far = sweep(model, rig, 12.0, sets(8), executor=Deadly(executor))
+        again = sweep(model, rig, 12.0, sets(8), executor=executor)
+    lost = far.outcome != "ok"
+    assert lost[2]
+    assert lost.sum() < 4, "what waited beside it may be lost with it, no more"
+    assert set(far.outcome[lost]) == {"KilledWorker"}
+    assert all("the worker failed" in text for text in far.message[lost])
+    assert np.isnan(far.F[lost]).all()
+    np.testing.assert_array_equal(far.F[~lost], here.F[~lost])
+    assert set(again.outcome) == {"ok"}
+    np.testing.assert_array_equal(again.F, here.F)  # compiled over there, by machines here
+    assert again.transitions.tolist() == here.transitions.tolist()

@@ -1,0 +1,108 @@
+"""Every code block of the documentation runs, and shows what comes out.
+
+A page is run from top to bottom: Python in one namespace, sessions with ``gms-fsm``, files that the
+page names, all in a temporary folder. CONTRIBUTING.md explains the notation.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from gms_fsm.scenario import Scenario
+from tests.page_blocks import ROOT, Page, agrees, blocks_of
+
+for module in ("matplotlib", "numba", "pandas", "pygraphviz", "pyarrow", "uplot", "xarray", "z3"):
+    pytest.importorskip(module, reason="the pages use all extras")
+
+PAGES = [
+    path
+    for path in [*sorted((ROOT / "docs").rglob("*.md")), ROOT / "CONTRIBUTING.md"]
+    if not path.name.startswith("lesson_")  # made from the lessons and run as notebooks
+]
+TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+EXTRAS = set(
+    tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+)
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_page(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.delenv("GMS_FSM_DATA", raising=False)
+    monkeypatch.setattr("warnings.showwarning", None)  # the command line sets its own
+    page = Page(str(path.relative_to(ROOT)))
+    printed: str | None = None
+    for block in blocks_of(path.read_text(encoding="utf-8")):
+        where = f"{page.name}, line {block.line}"
+        if block.kind == "python":
+            assert printed in (None, ""), f"{where}: the block before prints what is not shown"
+            printed = page.python(block)
+        elif block.kind == "text":
+            assert printed, f"{where}: nothing was printed before"
+            assert agrees(block.body, printed), f"{where}: {printed}"
+            printed = None
+        elif block.kind == "console":
+            for command, shown, said, went_well in page.console(block):
+                assert went_well or shown, f"{where}: {command} fails: {said}"
+                assert not shown or agrees(shown, said), f"{where}: {command}: {said}"
+        elif block.file:
+            (tmp_path / block.file).write_text(block.body, encoding="utf-8")
+        elif block.kind == "toml":
+            _part_of_a_scenario(block.body)
+        else:
+            assert block.kind == "sh", f"{where}: nobody runs a block of the kind {block.kind!r}"
+            for line in block.body.strip().splitlines():
+                _shell(line, where)
+    assert printed in (None, ""), f"{page.name}: the last block prints what is not shown"
+
+
+def _part_of_a_scenario(text: str) -> None:
+    """A part of a scenario fits into one that ships."""
+    whole = tomllib.loads((ROOT / "scenarios/pulled_mass.toml").read_text(encoding="utf-8"))
+    for name, table in tomllib.loads(text).items():
+        whole[name] = whole.get(name, {}) | table if isinstance(table, dict) else table
+    Scenario.model_validate(whole)
+
+
+def _shell(line: str, where: str) -> None:
+    """A shell line sets things up, with extras and make targets that exist; it is not run."""
+    command = line.partition("#")[0].split()
+    while "=" in command[0]:  # PYTHON=python3.12 make test
+        del command[0]
+    if command[0] == "make":
+        assert set(command[1:]) <= TARGETS, f"{where}: {line}"
+        return
+    assert re.match(r"git clone |python3 -m venv |(\.venv/bin/)?pip install ", line), (where, line)
+    for names in re.findall(r"\[([\w,]+)\]", line):
+        assert set(names.split(",")) <= EXTRAS, f"{where}: {line}"
+
+
+def test_there_are_pages_and_they_have_blocks() -> None:
+    count = {path.name: len(blocks_of(path.read_text(encoding="utf-8"))) for path in PAGES}
+    assert len(PAGES) > 20
+    assert sum(count.values()) > 60
+    for name in ("element", "chart", "guard", "micro-step", "located-crossing"):
+        assert count[f"{name}.md"] >= 2, name
+
+
+@pytest.mark.parametrize(
+    ("shown", "said", "right"),
+    [
+        ("a\nb\n", "a\nb\n", True), ("a\n", "a\nb\n", False), ("a\n...\nd\n", "a\nb\nc\nd\n", True),
+        ("...\nd\n", "a\nd\n", True), ("a\n...\n", "a\nb\n", True), ("a\n...\n", "b\n", False),
+        ("a  \n", "a\n", True), ("a.c\n", "abc\n", False),
+    ],
+)  # fmt: skip
+def test_what_agrees(shown: str, said: str, right: bool) -> None:
+    assert agrees(shown, said) == right
+
+
+def test_a_fence_is_read_with_its_file() -> None:
+    text = "# A page\n\n<!-- file: a.toml -->\n```toml\nx = 1\n```\n\n```{toctree}\nb\n```\n"
+    (block,) = blocks_of(text)
+    assert (block.kind, block.body, block.file, block.line) == ("toml", "x = 1\n", "a.toml", 3)
