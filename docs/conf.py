@@ -105,6 +105,17 @@ def mend_ways_back(app: Sphinx, page: str, _: str, context: dict[str, Any], __: 
     )
 
 
+def open_to_keyboards(_: Sphinx, __: str, ___: str, context: dict[str, Any], ____: Any) -> None:
+    """Let what scrolls sideways be reached by keys, and headings in the sidebar have a level."""
+    if "body" in context:
+        for tag in ("<pre>", '<div class="math">'):
+            context["body"] = context["body"].replace(tag, f'{tag[:-1]} tabindex="0">')
+    tree = context.get("furo_navigation_tree", "")
+    context["furo_navigation_tree"] = tree.replace(
+        'role="heading"', 'role="heading" aria-level="2"'
+    )
+
+
 def make_lessons(_: Sphinx) -> None:
     """Write the lessons' pages beside their index."""
     notebooks.write_all(HERE / "lessons")
@@ -122,5 +133,6 @@ def setup(app: Sphinx) -> None:
     mathml.register(app)
     app.connect("autodoc-process-docstring", keep_bars, priority=100)  # before napoleon
     app.connect("html-page-context", mend_ways_back)
+    app.connect("html-page-context", open_to_keyboards, priority=900)  # after the theme
     app.connect("builder-inited", make_lessons)
     app.connect("build-finished", copy_replay_pages)

@@ -220,12 +220,12 @@ def test_a_text_in_the_cache_that_was_tampered_with_is_not_run(
 
 # --------------------------------------------------------------------------- no mix-up
 def test_programs_compiled_in_different_processes_are_told_apart(tmp_path: Path) -> None:
-    """Each is the first that its process compiles; a third process loads them both."""
+    """Each is the first that its process compiles; a third loads both and uses both again."""
     velocities = "0.1*t", "0.2*sin(t)"
     for velocity in velocities:
         _rows(tmp_path, velocity)
     before = _kept(tmp_path)
-    _rows(tmp_path, *velocities)
+    _rows(tmp_path, *velocities, *velocities)
     assert _kept(tmp_path) == before
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from gms_fsm import simulate
+from gms_fsm import ChartModel, Prescribed, simulate
 from gms_fsm.chart import Chart, State, Transition
 from gms_fsm.errors import ChartError, ExpressionError
 from gms_fsm.expression import (
@@ -29,8 +29,10 @@ from gms_fsm.expression import (
     parse_condition,
     parse_value,
     product_power,
+    rough_points,
     spell,
     split,
+    substitute,
 )
 from gms_fsm.machines import Element, ElementMachines, Guard
 from integrators import advance as kernel
@@ -255,6 +257,17 @@ def test_splitting_flattens_like_in_like_and_turns_words_under_negation() -> Non
     assert _literals(f"not ({text})") == turned
 
 
+def test_rough_calls_become_names_in_the_order_they_are_computed_and_smooth_ones_stay() -> None:
+    flow = parse_value("C * sgn(v) - max(v, -exp(abs(z)))", ["C", "v", "z"])
+    names = dict(zip(rough_points(flow), "abc", strict=True))
+    assert [spell(u) for u in names] == ["v", "z", "v - -exp(abs(z))"]
+    smooth, calls = substitute(flow, names)
+    assert spell(smooth) == "C * sgn_a - max_c"
+    assert [(name, spell(call)) for name, call in calls.items()] == [
+        ("sgn_a", "sgn(v)"), ("abs_b", "abs(z)"), ("max_c", "max(v, -exp(abs_b))"),
+    ]  # fmt: skip
+
+
 # --------------------------------------------------------------------------- machines
 def test_an_element_knows_its_number_and_its_own_parameters_as_floats() -> None:
     machines = ElementMachines(stick_slip("signed"))
@@ -275,6 +288,7 @@ def test_a_guard_says_its_text_and_answers_an_event_as_it_answers_an_element() -
 
 def test_a_machine_that_was_changed_is_refused() -> None:
     model = stick_slip("signed")
+    leaving = model.chart.leaving("stick")[0][1].name
     changes: list[Callable[[Any], Any]] = [
         lambda m: m.add_transition("arrest", "slip", "stick"),
         lambda m: m.add_transition("arrest", "slip", "slip"),
@@ -282,6 +296,7 @@ def test_a_machine_that_was_changed_is_refused() -> None:
         lambda m: m.remove_transition("arrest", "slip", "stick"),
         lambda m: m.get_transitions("arrest", "slip")[0].conditions.clear(),
         lambda m: setattr(m.get_transitions("arrest", "slip")[0], "dest", "slip"),
+        lambda m: setattr(m.get_transitions(leaving, "stick")[0], "dest", "stick"),
     ]
     for change in changes:
         machines = ElementMachines(model)
@@ -289,6 +304,23 @@ def test_a_machine_that_was_changed_is_refused() -> None:
         change(machines.machine)
         with pytest.raises(ChartError):
             machines.table(model.chart)
+
+
+@pytest.mark.parametrize("engine", ["machines", "ifelse"])
+@pytest.mark.parametrize("first", ["fly", "dive"])
+def test_of_two_edges_enabled_at_once_the_earlier_is_taken(engine: Any, first: str) -> None:
+    edges = {name: Transition(name, "stick", name + "s", "z >= 0.1") for name in ("fly", "dive")}
+    chart = Chart(
+        "forked",
+        inputs=("v",),
+        variables=("z",),
+        parameters=("k",),
+        states=(State("stick", {"z": "v"}), State("flys", {"z": "v"}), State("dives", {"z": "v"})),
+        transitions=(edges.pop(first), *edges.values()),
+        outputs={"F": "k * z"},
+    )
+    trace = simulate(ChartModel(chart, {"k": 1.0}), Prescribed("0.2"), 1.0, engine=engine)
+    assert [str(edge) for edge in trace.transitions.edge] == [first]
 
 
 def test_an_element_shows_the_values_of_the_moment_it_is_asked_at() -> None:
@@ -453,8 +485,8 @@ class _Run:
             dy[0] = slope(t, y[0])
 
         def margins(t: float, y: list, mode: list, p: None, watch: list, out: list) -> None:
-            if margin is not None:
-                out[0] = margin(t, y[0])
+            assert margin is not None, "nothing is watched, and margins are asked for"
+            out[0] = margin(t, y[0])
 
         system = System(flow, flow, lambda *_: None, margins, None, 0, [False], ["g"], list(knots))
         method = RK4 if step else DP45
@@ -494,14 +526,15 @@ def test_fixed_steps_end_on_the_grid_wherever_they_begin() -> None:
     assert late.rows == [0.75, 1.0, 1.25]
 
 
-def test_no_sliver_is_stepped_at_either_end() -> None:
-    tick = _Run().b.control.resolution
-    run = _Run(step=0.25, t=0.5 - 0.5 * tick)
-    run.to(1.0 + 0.5 * tick)
-    assert run.rows == [0.75, 1.0 + 0.5 * tick]
+@pytest.mark.parametrize("share", [0.5, 1.0])
+def test_no_sliver_is_stepped_at_either_end(share: float) -> None:
+    sliver = share * _Run().b.control.resolution
+    run = _Run(step=0.25, t=0.5 - sliver)
+    run.to(1.0 + sliver)
+    assert run.rows == [0.75, 1.0 + sliver]
     adaptive = _Run()
-    adaptive.to(0.1 + 0.5 * tick)
-    assert adaptive.rows == [0.1 + 0.5 * tick]
+    adaptive.to(0.125 + sliver, h=0.125)
+    assert adaptive.rows == [0.125 + sliver]
 
 
 @pytest.mark.parametrize("step", [None, 0.25])
@@ -604,6 +637,9 @@ def test_between_stops_a_quiet_step_hands_its_margins_to_the_next() -> None:
 
 
 def test_an_infinite_slope_and_a_step_of_nothing_are_told_apart() -> None:
+    known = (kernel.REACHED, kernel.CROSSED, kernel.FULL, kernel.TOO_SMALL, kernel.NOT_FINITE)
+    assert len(set(known)) == 5
+
     def wall(t: float, y: float) -> float:
         return math.inf if t > 0.5 else 1.0
 
@@ -618,9 +654,10 @@ def test_an_infinite_slope_and_a_step_of_nothing_are_told_apart() -> None:
 # --------------------------------------------------------------------------- what nobody can notice
 # Mutants of the sample that survive, by reason:
 #
-# - Cannot occur: `quiet` in `first_change` is never negative, a chain of comparisons is never empty,
-#   so `> 0` and `!= 0`, `== 1` and `<= 1` are the same.
-# - Read by nobody: scratch of `watched` is filled before it is read.
+# - Cannot occur: `quiet` in `first_change` is never negative, a chain of comparisons never
+#   empty, so `> 0` and `!= 0`, `== 1` and `<= 1` are the same.
+# - Read by nobody: scratch of `watched` and of `MachineEngine` is filled before it is read, and may
+#   be longer; which negative number says "no edge" is not asked.
 # - One look more or less: at equality `_is_quiet` may halve once more or not, and `_bracket` may
 #   halve next or use the slope; both lead to a bracket as narrow.
 # - Follows from the rest: `compare=True` for the trees of a `Chart`; equal texts give equal trees.

@@ -1,0 +1,524 @@
+"""Random charts, parameters, signals and steps keep the laws that every run keeps.
+
+Time does not go back; rows and log tell one story; no guard is overdue; the signed law is mirror
+symmetric; pieces of constant v are closed forms to 1e-9; the engines agree to the bit; and a run
+that cannot go on says so by a `GMSError` that holds the part before. GMS_FSM_EXAMPLES asks for more
+examples, drawn anew, as tests/soak.py does.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import itertools
+import math
+import os
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, assume, event, given, settings
+from hypothesis import strategies as st
+
+from gms_fsm import (
+    GMS,
+    Chart,
+    ChartModel,
+    GMSParameters,
+    Prescribed,
+    PulledSlider,
+    Slider,
+    State,
+    Stribeck,
+    Trace,
+    Transition,
+    simulate,
+)
+from gms_fsm.errors import GMSError, SimulationError
+from gms_fsm.explain import Explanation, explain, explain_state, values_at
+from tests.helpers import same_bits
+
+EXAMPLES = int(os.environ.get("GMS_FSM_EXAMPLES", "0"))
+HAS_NUMBA = bool(importlib.util.find_spec("numba"))
+
+
+def hard(examples: int) -> Any:
+    """Settings: a fixed set of examples, or as many new ones as GMS_FSM_EXAMPLES says."""
+    return settings(
+        max_examples=EXAMPLES or examples,
+        derandomize=not EXAMPLES,
+        database=None,
+        print_blob=True,
+        deadline=None,
+        suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
+    )
+
+
+def rounded(low: float, high: float) -> st.SearchStrategy[float]:
+    """Numbers of three digits, evenly spread; they land on boundaries now and then."""
+    return st.integers(0, 1000).map(lambda i: float(f"{low + (high - low) * i / 1000:.3g}"))
+
+
+# --------------------------------------------------------------------------- what is run
+FLOWS = [
+    "v", "0", "-z", "0.5 * (sgn(v) - z / s)", "0.2 * v * cos(z)", "tanh(v) - z",
+    "v - abs(v) * z / s", "min(v, 0.2) - 0.5 * z", "max(-0.3, v) * exp(-abs(z))",
+    "0.1 * sin(3 * t) - 0.2 * z",
+]  # fmt: skip
+CLAUSES = [
+    "z >= {a}", "z <= -{a}", "abs(z) < {a}", "abs(z) >= s", "z >= s", "z <= -s", "abs(v) <= {b}",
+    "v > {b}", "v < -{b}", "v >= {b}", "z * v > 0", "t > {a}", "sin(4 * t) > {b}", "z + v < {a}",
+    "not (z < {a})",
+]  # fmt: skip
+ACTIONS = [{}, {}, {}, {"z": "0.5 * z"}, {"z": "0"}, {"z": "z + 0.01"}]
+
+
+@st.composite
+def guards(draw: st.DrawFn) -> str:
+    """One to three comparisons, joined."""
+    parts = [
+        text.format(a=draw(rounded(0.01, 0.3)), b=draw(rounded(0.0, 0.2)))
+        for text in draw(st.lists(st.sampled_from(CLAUSES), min_size=1, max_size=3))
+    ]
+    return draw(st.sampled_from([" and ", " or "])).join(parts)
+
+
+@st.composite
+def charts(draw: st.DrawFn) -> Chart:
+    """Two or three states, and edges between them."""
+    names = ["rest", "go", "turn"][: draw(st.integers(2, 3))]
+    states = [
+        State(name, {"z": draw(st.sampled_from(FLOWS))}, entry=draw(st.sampled_from(ACTIONS)))
+        for name in names
+    ]
+    pairs = [(a, b) for a in names for b in names if a != b]
+    edges = [
+        Transition(f"e{i}", *pair, draw(guards()), actions=draw(st.sampled_from(ACTIONS)))
+        for i, pair in enumerate(draw(st.lists(st.sampled_from(pairs), min_size=1, max_size=5)))
+    ]
+    return Chart(
+        "random", ("v", "s", "t"), ("z",), ("k",), states, edges, {"F": "k * z + 0.1 * dz"}
+    )
+
+
+@st.composite
+def chart_models(draw: st.DrawFn) -> ChartModel:
+    """A bank of one to three elements of a random chart."""
+    n = draw(st.integers(1, 3))
+    F_c = draw(rounded(0.2, 0.8))
+    return ChartModel(
+        draw(charts()), {"k": np.array(draw(st.lists(rounded(0.1, 9), min_size=n, max_size=n)))},
+        n=n, stribeck=Stribeck(F_c, F_c * draw(rounded(1, 2)), draw(rounded(0.01, 0.3))),
+        sigma_2=draw(rounded(0, 1)),
+        weights=np.array(draw(st.lists(rounded(0.05, 0.5), min_size=n, max_size=n))),
+    )  # fmt: skip
+
+
+@st.composite
+def banks(draw: st.DrawFn, law: str | None = None) -> GMS:
+    """A GMS bank of one to four elements."""
+    n = draw(st.integers(1, 4))
+
+    def numbers(low: float, high: float) -> list[float]:
+        return draw(st.lists(rounded(low, high), min_size=n, max_size=n))
+
+    F_c = draw(rounded(0.1, 1))
+    parameters = GMSParameters(
+        numbers(0.5, 50), numbers(0, 1), numbers(0.01, 1),
+        sigma_2=draw(rounded(0, 1)),
+        stribeck=Stribeck(F_c, F_c * draw(rounded(1.01, 3)), draw(rounded(1e-3, 0.1))),
+        v_c=draw(st.sampled_from([1e-6, 1e-4, 1e-3])), weights=numbers(0.03, 0.4),
+    )  # fmt: skip
+    law = law or draw(st.sampled_from(["signed", "published"]))
+    return GMS(parameters, law=law)  # type: ignore[arg-type]
+
+
+@st.composite
+def ramps(draw: st.DrawFn, jumps: bool = False) -> list[tuple[float, float]]:
+    """Corners of a velocity or a force; with `jumps` some of them vertical."""
+    waits = draw(st.lists(rounded(0.05, 2), min_size=2, max_size=6))
+    times = np.concatenate([[0.0], np.cumsum(waits)]).tolist()
+    corners = [(t, draw(rounded(-0.6, 0.6))) for t in times]
+    if jumps and draw(st.booleans()):
+        place = draw(st.integers(1, len(corners) - 1))
+        corners.insert(place, (corners[place][0], draw(rounded(-0.6, 0.6))))
+    return corners
+
+
+@st.composite
+def signals(draw: st.DrawFn) -> Any:
+    """A formula, ramps, a record or a constant."""
+    kind = draw(st.sampled_from([0, 0, 0, 1, 1, 2, 3]))
+    if kind == 0:
+        a, w, p = draw(rounded(0.1, 0.6)), draw(rounded(0.5, 5)), draw(rounded(0, 6))
+        text = draw(st.sampled_from([
+            "{a}*sin({w}*t + {p})", "{a}*sgn(sin({w}*t))*min(1, 9*abs(sin({w}*t)))",
+            "{a}*cos({w}*t)*exp(-t/{w})", "{a}*tanh({w}*(t - 1))", "{a}*(t - 1)**3",
+            "max(0, {a}*sin({w}*t + {p}))",
+        ]))  # fmt: skip
+        return text.format(a=a, w=w, p=p)
+    if kind == 1:
+        return draw(ramps(jumps=True))
+    if kind == 2:
+        times = np.linspace(0.0, 6.0, draw(st.integers(9, 60)))
+        a, w = draw(rounded(0.1, 0.6)), draw(rounded(0.5, 5))
+        return times, (a * np.sin(w * times)).round(draw(st.integers(1, 6)))
+    return draw(st.sampled_from([0.0, 0.2, -0.2, 1e-6, 1e-3]) | rounded(-0.6, 0.6))
+
+
+@st.composite
+def rigs(draw: st.DrawFn) -> Any:
+    """Open loop mostly."""
+    kind = draw(st.sampled_from([0, 0, 0, 1, 2]))
+    mass = draw(rounded(0.2, 3))
+    if kind == 1:
+        return Slider(
+            mass, draw(st.sampled_from(["3*sin(2*t)", "2*t - 3", "9*cos(t)"]) | signals())
+        )
+    if kind == 2:
+        return PulledSlider(mass, draw(rounded(0.5, 9)), draw(rounded(-0.5, 0.5)))
+    return Prescribed(draw(signals()))
+
+
+@st.composite
+def options(draw: st.DrawFn) -> dict[str, Any]:
+    """Adaptive and fixed steps, located events and those at step ends."""
+    kind = draw(st.integers(0, 5))
+    if kind <= 2:
+        found: dict[str, Any] = {
+            "method": draw(st.sampled_from(["dp45", "bs23"])),
+            "rtol": draw(st.sampled_from([1e-3, 1e-5, 1e-6, 1e-8])),
+        }
+        if draw(st.booleans()):
+            found["max_step"] = draw(rounded(0.01, 1))
+    else:
+        methods = st.sampled_from(["rk4", "heun", "euler", "dp45"])
+        found = {"method": draw(methods), "step": draw(rounded(0.003, 0.1))}
+    if kind == 5:
+        found["events"] = "step"
+    return found
+
+
+# --------------------------------------------------------------------------- the laws of any run
+def a_message(error: GMSError) -> None:
+    """Assert that an error says something, in a few lines."""
+    assert str(error).strip()
+    assert len(str(error)) < 2000
+
+
+def attempt(model: Any, rig: Any, t_end: float, **given: Any) -> tuple[Trace, str]:
+    """Run; return the trace, also of a run that stops, and the kind of its end."""
+    try:
+        return simulate(model, rig, t_end, **given), "end"
+    except SimulationError as error:
+        a_message(error)
+        return error.trace, type(error).__name__
+
+
+def rows_and_log_agree(trace: Trace) -> None:
+    """Every firing has its row, and between firings no state changes."""
+    t, microstep, states, log = trace.t, trace.microstep, trace.states, trace.transitions
+    assert np.isfinite(trace.rows.y).all()
+    assert (np.diff(t) >= 0).all()
+    assert microstep[0] == 0
+    fired = np.flatnonzero(microstep > 0)
+    assert len(fired) == len(log)
+    chart_edges = {e.name: e for e in trace.model.chart.transitions}
+    for row, record in zip(fired.tolist(), log, strict=True):
+        i, edge = int(record.element), chart_edges[str(record.edge)]
+        assert record.t == t[row] == t[row - 1]
+        assert microstep[row] == microstep[row - 1] + 1
+        assert (record.source, record.target) == (edge.source, edge.target)
+        assert (states[row - 1, i], states[row, i]) == (edge.source, edge.target)
+        others = np.arange(trace.n) != i
+        assert (states[row, others] == states[row - 1, others]).all()
+        assert (trace.z[row, others] == trace.z[row - 1, others]).all()
+        assert record.z == trace.z[row - 1, i]
+        assert record.v == trace.v[row - 1]
+        assert record.s == trace.s[row - 1, i]
+        assert record.F_before == trace.F[row - 1]
+        assert record.F_after == trace.F[row]
+    quiet = np.flatnonzero(microstep[1:] == 0) + 1
+    assert (states[quiet] == states[quiet - 1]).all()
+    assert (trace.rows.y[quiet] == trace.rows.y[quiet - 1])[t[quiet] == t[quiet - 1]].all()
+
+
+def guards_say_so(trace: Trace) -> None:
+    """A firing's guard was true, no guard before it in its state was."""
+    for row in np.flatnonzero(trace.microstep > 0).tolist():
+        i = int(np.flatnonzero(trace.rows.mode[row] != trace.rows.mode[row - 1])[0])
+        edges = explain(trace, row, i)
+        taken = [edge.fired for edge in edges].index(True)
+        assert edges[taken].holds
+        assert not any(edge.holds for edge in edges[:taken])
+
+
+def nothing_is_overdue(trace: Trace) -> None:
+    """Where the run went on, no edge was enabled."""
+    last_at_a_time = np.flatnonzero(np.diff(trace.t) > 0)
+    for row in last_at_a_time.tolist():
+        for i in range(trace.n):
+            mode = trace.model.chart.states[int(trace.rows.mode[row, i])].name
+            due = [edge.edge.name for edge in _asked(trace, row, i) if edge.holds]
+            assert due == [], f"row {row}, t = {trace.t[row]!r}, element {i} in {mode}: {due}"
+
+
+def _asked(trace: Trace, row: int, i: int) -> list[Explanation]:
+    """Return the edges out of the state that an element is in, not of the one it has left."""
+    state = trace.model.chart.states[int(trace.rows.mode[row, i])].name
+    return explain_state(trace.model.chart, state, values_at(trace, row, i))
+
+
+def lawful(trace: Trace, end: str, t_end: float, located: bool) -> None:
+    """Assert all that every run keeps."""
+    rows_and_log_agree(trace)
+    guards_say_so(trace)
+    if located:
+        nothing_is_overdue(trace)
+    fired(trace)
+    assert trace.t[0] == 0.0
+    assert trace.t[-1] <= t_end
+    if end == "end":
+        assert trace.t[-1] == t_end
+    event(end)
+
+
+def fired(trace: Trace) -> None:
+    """Tell the statistics how many transitions there were."""
+    count = len(trace.transitions)
+    event(f"transitions: {count if count < 3 else '3 or more' if count < 10 else '10 or more'}")
+
+
+@hard(120)
+@given(chart_models(), rigs(), options(), rounded(1, 5))
+def test_random_charts(model: ChartModel, rig: Any, given: dict[str, Any], t_end: float) -> None:
+    trace, end = attempt(model, rig, t_end, **given)
+    lawful(trace, end, t_end, given.get("events") != "step")
+
+
+@hard(80)
+@given(banks(), rigs(), options(), rounded(2, 8))
+def test_random_banks(model: GMS, rig: Any, given: dict[str, Any], t_end: float) -> None:
+    trace, end = attempt(model, rig, t_end, **given)
+    lawful(trace, end, t_end, given.get("events") != "step")
+
+
+@hard(60)
+@given(banks(), rigs(), options(), st.data())
+def test_wanted_times_change_nothing(
+    model: GMS, rig: Any, given: dict[str, Any], data: st.DataObject
+) -> None:
+    """With rows at wanted times, or none at all, the log is the same to the bit."""
+    whole, end = attempt(model, rig, 3.0, **given)
+    times = data.draw(st.lists(rounded(0, 3), min_size=1, max_size=9, unique=True).map(sorted))
+    for more in ({"t_eval": times}, {"output": "end"}):
+        part, other = attempt(model, rig, 3.0, **given, **more)
+        assert other == end
+        assert part.transitions.tolist() == whole.transitions.tolist()
+        if "t_eval" in more:
+            assert part.t.tolist() == [t for t in times if t <= part.stops.t[-1]]
+        else:
+            assert part.rows.y[-1].tolist() == whole.rows.y[-1].tolist()
+
+
+# --------------------------------------------------------------------------- engines
+@hard(40)
+@given(chart_models(), rigs(), options())
+def test_machines_and_ifelse_agree_on_random_charts(
+    model: ChartModel, rig: Any, given: dict[str, Any]
+) -> None:
+    one, end = attempt(model, rig, 3.0, **given)
+    other, end_too = attempt(model, rig, 3.0, **given, engine="ifelse")
+    assert end == end_too
+    same_bits(one, other)
+    fired(one)
+
+
+@pytest.mark.skipif(not HAS_NUMBA, reason="needs numba (extra: fast)")
+@hard(60)
+@given(banks(), ramps(jumps=True), options(), st.booleans())
+def test_compiled_agrees_on_random_banks(
+    model: GMS, corners: Any, given: dict[str, Any], pushed: bool
+) -> None:
+    """Ramps and parameters are arguments of the machine code, so this compiles only twice a law."""
+    rig = Slider(1.0, corners) if pushed else Prescribed(corners)
+    one, end = attempt(model, rig, 3.0, **given)
+    other, end_too = attempt(model, rig, 3.0, **given, engine="compiled")
+    assert end == end_too
+    same_bits(one, other)
+    fired(one)
+
+
+@pytest.mark.skipif(not HAS_NUMBA, reason="needs numba (extra: fast)")
+@hard(4)
+@given(chart_models(), ramps(), options())
+def test_compiled_agrees_on_random_charts(
+    model: ChartModel, corners: Any, given: dict[str, Any]
+) -> None:
+    one, end = attempt(model, Prescribed(corners), 2.0, **given)
+    other, end_too = attempt(model, Prescribed(corners), 2.0, **given, engine="compiled")
+    assert end == end_too
+    same_bits(one, other)
+
+
+# --------------------------------------------------------------------------- symmetry
+MIRRORED = {
+    "break_away_forward": "break_away_backward",
+    "break_away_backward": "break_away_forward",
+    "arrest": "arrest",
+}
+
+
+@hard(60)
+@given(banks("signed"), ramps(jumps=True), options(), st.integers(0, 2))
+def test_the_mirrored_signal_gives_the_mirrored_run(
+    model: GMS, corners: Any, given: dict[str, Any], kind: int
+) -> None:
+    """(v, z, F) -> (-v, -z, -F) under the signed law, for every method and step, to the bit."""
+    mirror = [(t, -value) for t, value in corners]
+    speed = corners[0][1]
+    one, other = [
+        (Prescribed(corners), Prescribed(mirror)),
+        (Slider(0.1, corners), Slider(0.1, mirror)),
+        (PulledSlider(1.0, 2.0, speed), PulledSlider(1.0, 2.0, -speed)),
+    ][kind]
+    a, end = attempt(model, one, 3.0, **given)
+    b, end_too = attempt(model, other, 3.0, **given)
+    assert end == end_too
+    np.testing.assert_array_equal(a.t, b.t)
+    np.testing.assert_array_equal(a.states, b.states)
+    fired(a)
+    for name in ("x", "v", "z", "F", "F_elements"):
+        np.testing.assert_array_equal(getattr(a, name), -getattr(b, name), err_msg=name)
+    assert [MIRRORED[edge] for edge in a.transitions.edge] == b.transitions.edge.tolist()
+
+
+# --------------------------------------------------------------------------- closed forms
+class Exact:
+    """One element under pieces of constant v, by its closed forms."""
+
+    def __init__(self, model: GMS, i: int, z: float, state: str) -> None:
+        self.law = model.law
+        self.w, self.C = float(model.weights[i]), float(model.parameters.C[i])
+        self.stribeck, self.v_c = model.stribeck, model.parameters.v_c
+        self.z, self.state = z, state
+        self.log: list[tuple[float, str]] = []
+
+    def s(self, v: float) -> float:
+        """The threshold, m."""
+        return self.w * float(self.stribeck(v))
+
+    def go(self, start: float, end: float, v: float) -> None:
+        """Go through one piece."""
+        t = start
+        for _ in range(3):  # at most two switches in a piece
+            wait, edge = self.next_switch(v)
+            if t + wait > end or edge == "":
+                self.z = self.flow(end - t, v)
+                return
+            self.z = self.flow(wait, v)
+            t += wait
+            self.state = "stick" if edge == "arrest" else "slip"
+            self.log.append((t, edge))
+        raise AssertionError("three switches under one velocity")
+
+    def next_switch(self, v: float) -> tuple[float, str]:
+        """Return when the next edge is taken, if v stays, and which."""
+        s = self.s(v)
+        if self.state == "stick":
+            if abs(v) <= self.v_c:
+                return math.inf, ""
+            wait = max(0.0, (math.copysign(s, v) - self.z) / v)
+            return wait, "break_away_forward" if v > 0 else "break_away_backward"
+        if abs(v) > self.v_c:
+            return math.inf, ""
+        if abs(self.z) < s:
+            return 0.0, "arrest"
+        if self.law == "published":  # at rest under v = 0
+            return math.inf, ""
+        return s / self.C * math.log(abs(self.z) / s), "arrest"
+
+    def flow(self, wait: float, v: float) -> float:
+        """Return z after a while in the present state."""
+        if self.state == "stick":
+            return self.z + v * wait
+        s, sign = self.s(v), (v > 0) - (v < 0)
+        if self.law == "published":
+            return s + (self.z - s) * math.exp(-sign * self.C * wait / s)
+        return sign * s + (self.z - sign * s) * math.exp(-self.C * wait / s)
+
+
+@st.composite
+def pieces(draw: st.DrawFn, law: str) -> tuple[list[float], list[float]]:
+    """Times and velocities; the published law is left where it is stable."""
+    waits = draw(st.lists(rounded(0.1, 3), min_size=1, max_size=5))
+    speed = rounded(0.05, 0.8) | st.just(0.0)
+    if law == "signed":
+        speed = speed | rounded(-0.8, -0.05)
+    speeds = [draw(speed) for _ in waits]
+    return np.concatenate([[0.0], np.cumsum(waits)]).tolist(), speeds
+
+
+@hard(100)
+@given(st.data(), st.sampled_from(["signed", "published"]))
+def test_pieces_of_constant_velocity_are_closed_forms(data: st.DataObject, law: str) -> None:
+    """Break-aways, arrests and every z between them, to 1e-9."""
+    model = data.draw(banks(law))
+    times, speeds = data.draw(pieces(law))
+    shares = data.draw(st.lists(rounded(-1.3, 1.3), min_size=model.n, max_size=model.n))
+    states = data.draw(
+        st.lists(st.sampled_from(["stick", "slip"]), min_size=model.n, max_size=model.n)
+    )
+    z = np.array(shares) * model.weights * model.stribeck.F_s
+    exact = [Exact(model, i, float(z[i]), states[i]) for i in range(model.n)]
+    assume(all(abs(abs(e.z) / e.s(v) - 1) > 1e-6 for e in exact for v in (0.0, *speeds)))
+    corners = [
+        (t, v) for (a, b), v in zip(itertools.pairwise(times), speeds, strict=True) for t in (a, b)
+    ]
+    trace = simulate(
+        model, Prescribed(corners), times[-1], rtol=1e-12, atol=1e-14,
+        initial={"z": z, "states": states},
+    )  # fmt: skip
+    for (start, end), v in zip(itertools.pairwise(times), speeds, strict=True):
+        for element in exact:
+            element.go(start, end, v)
+        row = int(np.searchsorted(trace.t, end, "right")) - 1
+        before = int(np.searchsorted(trace.t, end, "left"))  # a jump may fire edges, z stays
+        for i, element in enumerate(exact):
+            assert trace.z[before, i] == pytest.approx(element.z, abs=1e-9)
+            assert trace.z[row, i] == pytest.approx(element.z, abs=1e-9)
+    for i, element in enumerate(exact):
+        log = trace.transitions[trace.transitions.element == i]
+        expected = [(t, edge) for t, edge in element.log]
+        assert log.edge.tolist() == [edge for _, edge in expected]
+        np.testing.assert_allclose(log.t, [t for t, _ in expected], rtol=0, atol=1e-9)
+        assert trace.states[-1, i] == element.state
+    fired(trace)
+
+
+# --------------------------------------------------------------------------- refused
+@hard(80)
+@given(
+    chart_models() | banks(), rigs(),
+    st.dictionaries(
+        st.sampled_from(["method", "step", "rtol", "atol", "max_step", "events", "engine", "t_eval",
+                         "initial", "output", "t_start"]),
+        st.none() | st.floats() | st.integers(-3, 10**400) | st.text(max_size=4)
+        | st.lists(st.floats(), max_size=4)
+        | st.dictionaries(st.sampled_from(["z", "v", "x", "states", "u"]), st.floats(), max_size=2),
+        min_size=1, max_size=2,
+    ),
+    st.floats() | st.just(0.3),
+)  # fmt: skip
+def test_arguments_that_make_no_sense_are_refused_in_words(
+    model: Any, rig: Any, nonsense: dict[str, Any], t_end: float
+) -> None:
+    """Whatever stands there: it runs, or a `GMSError` says what is wrong."""
+    steps = [u for u in (nonsense.get("step"), nonsense.get("max_step")) if isinstance(u, float)]
+    assume(not any(0 < u < 1e-3 for u in steps))  # a fine grid is no mistake, only slow
+    assume(not any(isinstance(nonsense.get(u), float) and 0 < nonsense[u] < 1e-10
+                   for u in ("rtol", "atol")))  # fmt: skip
+    t_end = t_end if not 1 < t_end < 1e9 else 1.0
+    try:
+        simulate(model, rig, t_end, **nonsense)
+    except GMSError as error:
+        a_message(error)
