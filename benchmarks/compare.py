@@ -116,7 +116,7 @@ def kernel(case: Case) -> Callable[[], Outcome]:
         if not made:
             made.append(CompiledRun(start))
         columns = made[0].columns
-        columns.begin_again(model, rig)
+        columns.empty()
         while made[0].advance():
             pass
         log, count = columns.log, columns.log.counts[0]

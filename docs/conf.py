@@ -32,6 +32,7 @@ extensions = [
     "sphinx_copybutton",
 ]
 exclude_patterns = ["**/__pycache__"]
+smartquotes = False  # "dp45" is to be copied as it stands
 default_role = "py:obj"  # a name in backticks in a docstring is a link where there is such a name
 
 myst_enable_extensions = ["dollarmath"]
@@ -69,13 +70,13 @@ html_theme_options = {
 
 
 def keep_bars(*arguments: Any) -> None:
-    """Let |z| in a docstring mean what it says, not a substitution."""
+    """Let |z| in a docstring be no substitution, and a line "s." no list that begins at s."""
     lines: list[str] = arguments[-1]
     for number, line in enumerate(lines):
         if not line.lstrip().startswith((">>>", "...")):
             parts = re.split(r"(``.*?``)", line)
             parts[::2] = [part.replace("|", r"\|") for part in parts[::2]]
-            lines[number] = "".join(parts)
+            lines[number] = re.sub(r"^(\s*)([A-Za-z]\.)(?=\s|$)", r"\1\\\2", "".join(parts))
 
 
 def mend_ways_back(app: Sphinx, page: str, _: str, context: dict[str, Any], __: Any) -> None:
@@ -105,11 +106,16 @@ def mend_ways_back(app: Sphinx, page: str, _: str, context: dict[str, Any], __: 
     )
 
 
-def open_to_keyboards(_: Sphinx, __: str, ___: str, context: dict[str, Any], ____: Any) -> None:
-    """Let what scrolls sideways be reached by keys, and headings in the sidebar have a level."""
+def open_to_all(_: Sphinx, __: str, ___: str, context: dict[str, Any], ____: Any) -> None:
+    """Let pictures lead to themselves in full size, and what scrolls be reached by keys."""
     if "body" in context:
         for tag in ("<pre>", '<div class="math">'):
             context["body"] = context["body"].replace(tag, f'{tag[:-1]} tabindex="0">')
+        context["body"] = re.sub(
+            r'<p>(<img [^>]*src="([^"]+)"[^>]*>)</p>',
+            r'<p><a href="\2">\1</a></p>',
+            context["body"],
+        )
     tree = context.get("furo_navigation_tree", "")
     context["furo_navigation_tree"] = tree.replace(
         'role="heading"', 'role="heading" aria-level="2"'
@@ -133,6 +139,6 @@ def setup(app: Sphinx) -> None:
     mathml.register(app)
     app.connect("autodoc-process-docstring", keep_bars, priority=100)  # before napoleon
     app.connect("html-page-context", mend_ways_back)
-    app.connect("html-page-context", open_to_keyboards, priority=900)  # after the theme
+    app.connect("html-page-context", open_to_all, priority=900)  # after the theme
     app.connect("builder-inited", make_lessons)
     app.connect("build-finished", copy_replay_pages)

@@ -191,11 +191,15 @@ class Columns:
 
     def begin_again(self, model: Model, rig: Rig) -> None:
         """Empty the columns and go back to the start, with the numbers of a model and a rig."""
-        start, b, log = self.start, self.buffers, self.log
         p = arguments(model, rig)
-        program = dataclasses.replace(start.program, p=p)
-        self.start = dataclasses.replace(start, model=model, rig=rig, program=program)
+        program = dataclasses.replace(self.start.program, p=p)
+        self.start = dataclasses.replace(self.start, model=model, rig=rig, program=program)
         self.p = compiled.packed(p)
+        self.empty()
+
+    def empty(self) -> None:
+        """Empty the columns and go back to the start."""
+        start, b, log = self.start, self.buffers, self.log
         memory: Any = b.memory  # arrays
         watch: Any = b.relations.watch
         memory.now[:] = hybrid.beginning(start.t_start, start.last)

@@ -427,8 +427,9 @@ class _Reader:
 
     def numbered(self, call: ast.Call) -> int:
         match call.args:
-            case [ast.Constant(value=int() as element)] if 1 <= element <= self.elements:
-                return element
+            case [ast.Constant(value=element)] if type(element) is int:  # True is not 1 here
+                if 1 <= element <= self.elements:
+                    return element
         raise self.refuse(
             "state(...) takes an element's number", call, f"state(1) to state({self.elements})"
         )

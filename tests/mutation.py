@@ -1,6 +1,6 @@
 """Measures what the tests notice: one small change of a module at a time, then the tests near it.
 
-``python tests/mutation.py [module ...] [--sample 80] [--seed 8] [--budget seconds]``, with
+``python tests/mutation.py [module ...] [--sample 60] [--seed 8] [--budget seconds]``, with
 ``pip install -e ".[dev,mutation]"``. cosmic-ray makes the mutants; a copy of the repository is
 mutated, never the repository. Each mutant has a forked process, so that numpy and scipy are
 imported once. Survivors are printed as diffs.
@@ -140,7 +140,7 @@ def measure(module, sample, seed, budget):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("modules", nargs="*", default=list(NEAR))
-    parser.add_argument("--sample", type=int, default=80, help="mutants of a module")
+    parser.add_argument("--sample", type=int, default=60, help="mutants of a module")
     parser.add_argument("--seed", type=int, default=8)
     parser.add_argument("--budget", type=float, default=float("inf"), help="seconds a module")
     asked = parser.parse_args()

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from gms_fsm import ChartModel, Prescribed, simulate
+from gms_fsm import ChartModel, Prescribed, Stribeck, simulate
 from gms_fsm.chart import Chart, State, Transition
 from gms_fsm.errors import ChartError, ExpressionError
 from gms_fsm.expression import (
@@ -219,7 +219,7 @@ def test_a_state_is_asked_for_by_a_number_from_one_and_by_equality() -> None:
     known: dict[str, Any] = {"states": ["slip"], "elements": 2}
     assert parse_condition("state(1) == slip", "v", **known) == InState(1, "slip")
     assert parse_condition("state(2) != slip", "v", **known) == Not(InState(2, "slip"))
-    for wrong in ("state(0) == slip", "state(3) == slip", "state(1.0) == slip",
+    for wrong in ("state(0) == slip", "state(3) == slip", "state(1.0) == slip", "state(True) == slip",
                   "state(1) > slip", "state(1) == fly", "state == slip"):  # fmt: skip
         _refused(wrong, "v", **known)
     _refused("state(1) == slip", "v", states=())
@@ -319,7 +319,8 @@ def test_of_two_edges_enabled_at_once_the_earlier_is_taken(engine: Any, first: s
         transitions=(edges.pop(first), *edges.values()),
         outputs={"F": "k * z"},
     )
-    trace = simulate(ChartModel(chart, {"k": 1.0}), Prescribed("0.2"), 1.0, engine=engine)
+    model = ChartModel(chart, {"k": 1.0}, n=1, stribeck=Stribeck(1.0, 1.5, 0.05))
+    trace = simulate(model, Prescribed("0.2"), 1.0, engine=engine)
     assert [str(edge) for edge in trace.transitions.edge] == [first]
 
 
@@ -655,7 +656,8 @@ def test_an_infinite_slope_and_a_step_of_nothing_are_told_apart() -> None:
 # Mutants of the sample that survive, by reason:
 #
 # - Cannot occur: `quiet` in `first_change` is never negative, a chain of comparisons never
-#   empty, so `> 0` and `!= 0`, `== 1` and `<= 1` are the same.
+#   empty, no place lies beyond `NO_CHANGE`; so `> 0` and `!= 0`, `== 1` and `<= 1`, `!= NO_CHANGE`
+#   and `< NO_CHANGE` are the same.
 # - Read by nobody: scratch of `watched` and of `MachineEngine` is filled before it is read, and may
 #   be longer; which negative number says "no edge" is not asked.
 # - One look more or less: at equality `_is_quiet` may halve once more or not, and `_bracket` may
