@@ -50,6 +50,7 @@ copybutton_prompt_is_regexp = True
 # Nothing is loaded from elsewhere: fonts of the reader's system, formulas as MathML.
 html_theme = "furo"
 html_title = "gms-fsm"
+html_favicon = "favicon.svg"
 html_math_renderer = "mathml"
 html_copy_source = False
 html_show_sourcelink = False
@@ -111,11 +112,8 @@ def open_to_all(_: Sphinx, __: str, ___: str, context: dict[str, Any], ____: Any
     if "body" in context:
         for tag in ("<pre>", '<div class="math">'):
             context["body"] = context["body"].replace(tag, f'{tag[:-1]} tabindex="0">')
-        context["body"] = re.sub(
-            r'<p>(<img [^>]*src="([^"]+)"[^>]*>)</p>',
-            r'<p><a href="\2">\1</a></p>',
-            context["body"],
-        )
+        picture = r'<p>(<img [^>]*src="([^"]+)"[^>]*>)</p>'
+        context["body"] = re.sub(picture, r'<p><a href="\2">\1</a></p>', context["body"])
     tree = context.get("furo_navigation_tree", "")
     context["furo_navigation_tree"] = tree.replace(
         'role="heading"', 'role="heading" aria-level="2"'
