@@ -32,7 +32,7 @@ extensions = [
     "sphinx_copybutton",
 ]
 exclude_patterns = ["**/__pycache__"]
-smartquotes = False  # "dp45" is to be copied as it stands
+smartquotes_action = "D"  # "dp45" is to be copied as it stands
 default_role = "py:obj"  # a name in backticks in a docstring is a link where there is such a name
 
 myst_enable_extensions = ["dollarmath"]

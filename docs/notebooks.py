@@ -74,9 +74,9 @@ def composed(number: int) -> str:
                      f"```python\n{source}```"),
         ("markdown", "## Step through it\n\nA page in which the runs are stepped, scrubbed and "
                      "explained guard by guard:"),
-        ("code", "from plots import write_replay\n\n"
-                 f"print(write_replay({replay}, *result.replayed.values(), "
-                 "title=this.QUESTION))"),
+        ("code", "from plots import write_replay\n\nruns = result.replayed\n"
+                 f"title = \"Lesson {number}: \" + \" | \".join(runs)\n"
+                 f"print(write_replay({replay}, *runs.values(), title=title))"),
     ]  # fmt: skip
     return "\n\n".join(_cell(kind, body) for kind, body in cells) + "\n\n" + _more(number)
 

@@ -184,7 +184,7 @@ class LuGre:
 
     @property
     def weights(self) -> FloatArray:
-        """One weight of 1: LuGre uses s(v) itself."""
+        """One weight of 1; LuGre uses s(v) itself."""
         return np.ones(1)
 
 

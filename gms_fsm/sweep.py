@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import importlib
 import os
+import signal
+import threading
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -335,14 +337,15 @@ def sweep(
         shown = stack.enter_context(_bar(runs, progress))
         waiting: dict[Future[list[_Result]], range] = {}
         try:
-            for chunk in chunks:
-                part = {name: array[chunk.start : chunk.stop] for name, array in values.items()}
-                try:
-                    task = executor.submit(_run_chunk, model, rig, t_end, part, options)
-                except BrokenExecutor as error:  # by a task before this one
-                    task = Future()
-                    task.set_exception(error)
-                waiting[task] = chunk
+            with _undisturbed():
+                for chunk in chunks:
+                    part = {name: array[chunk.start : chunk.stop] for name, array in values.items()}
+                    try:
+                        task = executor.submit(_run_chunk, model, rig, t_end, part, options)
+                    except BrokenExecutor as error:  # by a task before this one
+                        task = Future()
+                        task.set_exception(error)
+                    waiting[task] = chunk
             for future in as_completed(list(waiting)):
                 chunk = waiting.pop(future)
                 collected.take(chunk, _results(future, len(chunk)))
@@ -522,6 +525,22 @@ class _Collected:
 # --------------------------------------------------------------------------- helpers
 def _threads() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(os.cpu_count() or 1)
+
+
+@contextlib.contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Put Ctrl-C off: in the middle of `submit` it would leave the executor's lock locked."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    pressed: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: pressed.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if pressed:
+        raise KeyboardInterrupt
 
 
 @contextlib.contextmanager

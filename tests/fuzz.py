@@ -660,7 +660,7 @@ HEADERS = [
 ]  # fmt: skip
 
 
-_UNFIT = (ValueError, TypeError, OverflowError)
+_UNFIT = (ValueError, TypeError, OverflowError, RuntimeError)
 
 
 def _mutated_array(choices: Choices, array: Any) -> Any:
