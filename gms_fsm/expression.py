@@ -56,6 +56,7 @@ DEEPEST_TREE = 60  # levels; keeps every recursive reader far from Python's own 
 LARGEST_PRODUCT_POWER = 8  # x**8 and below are printed as products ...
 LARGEST_PRODUCT = 64  # ... unless the text would grow beyond this many parts
 MOST_ARGUMENTS = 50  # of min and max
+MOST_COMPARISONS = 100  # in one text; a guard is a line, and each is watched on its own
 
 
 # --------------------------------------------------------------------------- the tree
@@ -314,6 +315,7 @@ class _Reader:
         self.text = text
         self.names = tuple(dict.fromkeys(names))
         self.states, self.elements, self.own_state = tuple(states), elements, own_state
+        self.comparisons = 0
 
     def refuse(self, reason: str, node: ast.expr, allowed: str = _GRAMMAR) -> ExpressionError:
         return ExpressionError(reason, self.text, node.col_offset + 1, allowed)
@@ -398,6 +400,11 @@ class _Reader:
                 return self.in_state(0, op, name)
             case ast.Compare(left=left, ops=ops, comparators=comparators):
                 sides = [left, *comparators]
+                self.comparisons += len(ops)
+                if self.comparisons > MOST_COMPARISONS:
+                    raise self.refuse(
+                        "too many comparisons", node, f"at most {MOST_COMPARISONS} in one text"
+                    )
                 parts: list[Condition] = []
                 for i, op in enumerate(ops):
                     if type(op) not in _COMPARISONS:

@@ -43,7 +43,7 @@ class Model(Protocol):
 
     @property
     def weights(self) -> FloatArray:
-        """Threshold weights, shape (n,), m/N: ``s_i = weights[i] * s(v)``."""
+        """Threshold weights, shape (n,), m/N; ``s_i = weights[i] * s(v)``."""
 
     @property
     def stribeck(self) -> Stribeck:

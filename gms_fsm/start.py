@@ -116,7 +116,7 @@ class Start:
                 f"engine is {shown(engine)}; it must be {', '.join(map(repr, ENGINES))}, or an "
                 "ElementMachines"
             )
-        if engine == "compiled" and not isinstance(method, str):
+        if engine == "compiled" and isinstance(method, type):
             raise ParameterError(
                 f"engine 'compiled' runs our own methods ({', '.join(integrators.METHODS)}), not "
                 f"{method.__name__}; use engine='machines' for SciPy's solvers"
@@ -184,8 +184,8 @@ def _options(
         )
     if step is not None:
         step = checked_scalar("step", step, "> 0")
-    checked_scalar("rtol", rtol, "> 0")
-    checked_scalar("atol", atol, "> 0")
+    rtol = checked_scalar("rtol", rtol, "> 0")
+    atol = checked_scalar("atol", atol, "> 0")
     if max_step != math.inf:
         max_step = checked_scalar("max_step", max_step, "> 0")
     tick = 16.0 * math.ulp(max(abs(t_start), abs(t_end)))

@@ -226,6 +226,8 @@ def go_on(
             if status == REACHED and t < plan.t_end:
                 counts[PHASE] = JUMPING
                 return STOPPED
+            if status == FULL and not plan.located:
+                return ROWS  # perhaps none, but a caller may want to breathe
             if status == CROSSED:
                 if _often_changed(margins, t, y, mode, p, w, memory, plan.standstill):
                     return RELATION_LIVELOCK

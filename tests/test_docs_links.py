@@ -85,3 +85,10 @@ def test_every_page_is_in_the_contents() -> None:
     assert pages <= listed, pages - listed
     scripts = {f"lessons/{path.stem}" for path in (docs / "lessons").glob("lesson_*.py")}
     assert listed <= pages | scripts, listed - pages - scripts
+
+
+def test_the_citation_names_this_version() -> None:
+    version = re.search(r'__version__ = "(.+)"', (ROOT / "gms_fsm/__init__.py").read_text())
+    assert version
+    assert f"\nversion: {version[1]}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"(version {version[1]})" in (ROOT / "docs/cite.md").read_text(encoding="utf-8")

@@ -373,3 +373,25 @@ def test_any_name_of_a_chart_can_be_run(name: str) -> None:
     model = ChartModel(chart, {}, n=1, stribeck=Stribeck(1, 1.5, 1e-3))
     for engine in ("machines", "ifelse"):
         assert len(simulate(model, Prescribed("1"), 2.0, engine=engine).transitions) == 1
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["z >= s" + " >= v" * 1500, " or ".join(["z >= s"] * 600),
+     " and ".join(["(" + " or ".join(["z < s"] * 20) + ")"] * 20)],
+    ids=["chain", "row", "groups"],
+)  # fmt: skip
+def test_hundreds_of_comparisons_are_refused(text: str) -> None:
+    """The program that watches each of them on its own was too deep for Python to compile."""
+    with pytest.raises(ExpressionError, match="too many comparisons"):
+        parse_condition(text, ["z", "s", "v"])
+
+
+def test_a_hundred_comparisons_run() -> None:
+    guard = " or ".join(f"z >= s + {i}" for i in range(50)) + " or z" + " >= s" * 50
+    states = State("a", {"z": "v"}), State("b", {"z": "0"})
+    edge = Transition("e", "a", "b", guard)
+    chart = Chart("long", ("v", "s"), ("z",), (), states, (edge,), {"F": "z"})
+    model = ChartModel(chart, {}, n=1, stribeck=Stribeck(1, 1.5, 1e-3))
+    for engine in ("machines", "ifelse"):
+        assert len(simulate(model, Prescribed("1"), 2.0, engine=engine).transitions) == 1

@@ -176,16 +176,6 @@ def test_progress_is_told_of_a_run_that_keeps_its_end_only() -> None:
     assert np.isfinite(seen).all()
 
 
-NEVER_BACK = (
-    "with events='step' the loop comes back only when there are rows, so that a long compiled run "
-    "hears no Ctrl-C: integrators.loop.go_on should return ROWS after each step not located"
-)
-
-
-def _waiting(*options: Any) -> list[Any]:
-    return [pytest.param("step", u, marks=[pytest.mark.xfail(reason=NEVER_BACK)]) for u in options]
-
-
 @pytest.mark.parametrize(
     ("events", "options"),
     [
@@ -193,7 +183,8 @@ def _waiting(*options: Any) -> list[Any]:
         ("located", {"output": "end"}),
         ("located", {"t_eval": [0.0, 45.0]}),
         ("step", {"output": "all"}),
-        *_waiting({"output": "end"}, {"t_eval": [0.0, 45.0]}),
+        ("step", {"output": "end"}),
+        ("step", {"t_eval": [0.0, 45.0]}),
     ],
 )
 def test_a_long_compiled_run_comes_up_for_air(events: str, options: dict[str, Any]) -> None:
