@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from gms_fsm.errors import CheckpointError, ParameterError
+from gms_fsm.errors import CheckpointError, ParameterError, why
 from gms_fsm.files import written_whole
 from gms_fsm.header import Header
 from gms_fsm.start import Start
@@ -104,7 +104,7 @@ class Keeper:
             )  # fmt: skip
         except Exception as error:  # numpy and zipfile raise many kinds over damaged files
             raise CheckpointError(
-                f"{self.path}: not a checkpoint, or damaged ({type(error).__name__}: {error}); "
+                f"{self.path}: not a checkpoint, or damaged ({why(error)}); "
                 "remove it to start the run anew"
             ) from None
         if identity != self.identity:

@@ -36,6 +36,18 @@ def shown(value: object) -> str:
         return "..."
 
 
+def why(error: BaseException) -> str:
+    """Return what another library's error says, in one line.
+
+    Numpy's advice to unpickle a file that it cannot read is not passed on.
+
+    >>> why(ValueError("no header. If you trust the file, unpickle it"))
+    'ValueError: no header.'
+    """
+    text = cut(str(error).partition("\n")[0].partition(" If you trust")[0], 200)
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
 class GMSError(Exception):
     """Base of every error this package raises on purpose."""
 

@@ -159,7 +159,7 @@ def _lines(path: Path) -> Iterator[str]:
                         f"{path}: line {number} is not UTF-8 text; save the table as UTF-8 CSV"
                     ) from None
     except FileNotFoundError:
-        raise RecordError(f"{path}: no such file") from None
+        raise RecordError(f"{path}: no such file; check its name and the folder") from None
     except OSError as error:
         raise RecordError(f"{path}: cannot be read ({error.strerror})") from None
 
@@ -192,7 +192,8 @@ def _read_cells(
                 raise RecordError(f"{path}: row {number} is empty; take it out")
             if len(row) != len(head):
                 raise RecordError(
-                    f"{path}: row {number} has {len(row)} cells, the head line has {len(head)}"
+                    f"{path}: row {number} has {len(row)} cells, the head line has {len(head)}; "
+                    "give each row as many (a decimal comma needs another delimiter)"
                 )
             for quantity, place in places.items():
                 try:
@@ -226,14 +227,20 @@ def _chosen(
     names = sorted(names_in(condition))
     for name in names:
         if name not in values:
-            raise RecordError(f"{path}: where = {shown(where)} uses {name!r}, which has no column")
+            raise RecordError(
+                f"{path}: where = {shown(where)} uses {name!r}, which has no column; "
+                "name its column, or leave it out"
+            )
     table = zip(*(values[name].tolist() for name in names), strict=True)
     try:
         return np.array(
             [evaluate(condition, dict(zip(names, row, strict=True))) for row in table], dtype=bool
         )
     except (ArithmeticError, ValueError) as error:
-        raise RecordError(f"{path}: where = {shown(where)} cannot be computed ({error})") from None
+        raise RecordError(
+            f"{path}: where = {shown(where)} cannot be computed in every row ({error}); change it "
+            "so that it can"
+        ) from None
 
 
 def _check(
@@ -347,7 +354,7 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
     if smoothing is not None and smoothing > time[-1] - time[0]:
         raise RecordError(
             f"{record.path}: smoothing is {smoothing!r} s, longer than the record "
-            f"({time[-1] - time[0]:.6g} s)"
+            f"({time[-1] - time[0]:.6g} s); give less"
         )
     if "velocity" in record.columns:
         raw, given = record.columns["velocity"], "velocity"
@@ -356,7 +363,9 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
         raw, given = record.columns["position"], "position"
         tau = 4.0 * interval if smoothing is None else smoothing
     else:
-        raise RecordError(f"{record.path}: neither a position nor a velocity column is given")
+        raise RecordError(
+            f"{record.path}: neither a position nor a velocity column is given; name one of them"
+        )
     # The spline is blind to the origin; without its offset the sums keep their digits.
     shift = float(raw[0])
     try:

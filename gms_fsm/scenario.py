@@ -524,9 +524,11 @@ def _parse(path: Path) -> dict[str, Any]:
         with path.open("rb") as file:
             raw = file.read(LARGEST_FILE + 1)
     except FileNotFoundError:
-        raise ScenarioError(f"{path}: no such file") from None
+        raise ScenarioError(f"{path}: no such file; check its name and the folder") from None
     except OSError as error:
-        raise ScenarioError(f"{path}: cannot be read ({error.strerror})") from None
+        raise ScenarioError(
+            f"{path}: cannot be read ({error.strerror}); give a file that can"
+        ) from None
     if len(raw) > LARGEST_FILE:
         raise ScenarioError(f"{path}: larger than {LARGEST_FILE} bytes; records go in own files")
     try:

@@ -20,7 +20,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from gms_fsm.errors import ParameterError, SessionError, SimulationError, TraceFileError
+from gms_fsm.errors import ParameterError, SessionError, SimulationError, TraceFileError, why
 from gms_fsm.explain import Explanation, explain_state, holds
 from gms_fsm.expression import Condition, Value, evaluate, parse_condition, parse_value
 from gms_fsm.files import written_whole
@@ -949,12 +949,9 @@ class Session:
             session.watches = [str(text) for text in data["watches"]]
             return session
         except FileNotFoundError:
-            raise TraceFileError(f"{path}: no such file") from None
+            raise TraceFileError(f"{path}: no such file; check its name and the folder") from None
         except Exception as error:  # whatever a damaged file provokes, it is the file's fault
-            reason = str(error).partition("\n")[0][:200]
-            raise TraceFileError(
-                f"{path}: not a session file ({type(error).__name__}: {reason})"
-            ) from None
+            raise TraceFileError(f"{path}: not a session file, or damaged ({why(error)})") from None
 
     def _walk_to(self, row: int, between: float | None) -> None:
         branch = self.branch

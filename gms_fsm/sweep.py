@@ -24,6 +24,7 @@ from gms_fsm.errors import (
     OutputError,
     ParameterError,
     TraceFileError,
+    why,
 )
 from gms_fsm.files import written_whole
 from gms_fsm.models import Model, parameter_names, with_values
@@ -249,10 +250,12 @@ class Sweep:
                 edges=tuple(arrays["edges"].tolist()), **{name: arrays[name] for name in _SAVED},
             )  # fmt: skip
         except FileNotFoundError:
-            raise TraceFileError(f"{path}: there is no such file") from None
+            raise TraceFileError(
+                f"{path}: there is no such file; check its name and the folder"
+            ) from None
         except Exception as error:  # numpy and zipfile raise many kinds over damaged files
             raise TraceFileError(
-                f"{path}: not a sweep, or damaged ({type(error).__name__}: {error})"
+                f"{path}: not a sweep, or damaged ({why(error)}); run it again"
             ) from None
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.compiled import observe_rows
-from gms_fsm.errors import MissingExtraError, OutputError, SignalError, TraceFileError
+from gms_fsm.errors import MissingExtraError, OutputError, SignalError, TraceFileError, why
 from gms_fsm.files import leftovers, written_together, written_whole
 from gms_fsm.header import Header
 from gms_fsm.models import Model
@@ -387,13 +387,14 @@ class Trace:
                 raise
             raise TraceFileError(f"{path}: {error}") from None
         except FileNotFoundError as error:
-            raise TraceFileError(f"{error.filename}: no such file") from None
+            raise TraceFileError(
+                f"{error.filename}: no such file; check its name and the folder"
+            ) from None
         except Exception as error:
             # A damaged file can fail anywhere inside zipfile, zlib, numpy, csv or pydantic, and
             # each has errors of its own; whatever it is, it is the file's fault.
-            reason = str(error).partition("\n")[0][:200] or type(error).__name__
             raise TraceFileError(
-                f"{path}: damaged or incomplete trace file ({type(error).__name__}: {reason})"
+                f"{path}: damaged or incomplete trace file ({why(error)}); write it again"
             ) from None
 
     @classmethod

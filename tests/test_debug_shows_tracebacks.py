@@ -103,6 +103,7 @@ def test_behind_two_dashes_it_is_an_argument(gms_fsm: CommandLine) -> None:
 
 def test_causes_are_shown_that_a_message_keeps_to_itself(gms_fsm: CommandLine) -> None:
     """Behind "damaged trace file" stands what zipfile said."""
+    pytest.importorskip("matplotlib", reason="needs the extra plots")
     with pytest.raises(TraceFileError) as caught:
         gms_fsm("plot", "bad.npz", "--debug")
     assert caught.value.__context__ is not None
