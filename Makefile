@@ -4,14 +4,16 @@
 #   make lint    formatting, style, types, import contracts
 #   make core    the tests with only the required dependencies
 #   make bench   speed and error against C, SciPy, CVODE and PathSim
+#   make soak    hard use: fuzzing, kills, a million transitions; SOAK_MINUTES=10 for each fuzzer
 #   make gallery the pictures kept under docs/, shown in docs/gallery.md
 #   make docs    the documentation -> folder site/, to be opened from disk
 PYTHON ?= python3
 VENV ?= .venv
 RUN := $(VENV)/bin
+SOAK_MINUTES ?= 10
 PIP := $(RUN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: paper test lint core bench gallery docs clean
+.PHONY: paper test lint core bench soak gallery docs clean
 .DEFAULT_GOAL := test
 
 $(VENV)/bin/python:
@@ -59,6 +61,9 @@ bench: $(VENV)/bench.stamp
 	$(RUN)/python benchmarks/live_frames.py
 	$(RUN)/python benchmarks/overview_figure.py
 	$(RUN)/python benchmarks/monitors.py
+
+soak: $(VENV)/dev.stamp
+	$(RUN)/python -m tests.soak --minutes $(SOAK_MINUTES)
 
 gallery: $(VENV)/all.stamp
 	$(RUN)/python docs/make_pictures.py

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
 
 HERE = Path(__file__).parent
@@ -110,8 +111,8 @@ def mend_ways_back(app: Sphinx, page: str, _: str, context: dict[str, Any], __: 
 def open_to_all(_: Sphinx, __: str, ___: str, context: dict[str, Any], ____: Any) -> None:
     """Let pictures lead to themselves in full size, and what scrolls be reached by keys."""
     if "body" in context:
-        for tag in ("<pre>", '<div class="math">'):
-            context["body"] = context["body"].replace(tag, f'{tag[:-1]} tabindex="0">')
+        wide = r'<(pre(?=>)|div(?= class="(?:math|table-wrapper)\b))'
+        context["body"] = re.sub(wide, r'<\1 tabindex="0"', context["body"])
         picture = r'<p>(<img [^>]*src="([^"]+)"[^>]*>)</p>'
         context["body"] = re.sub(picture, r'<p><a href="\2">\1</a></p>', context["body"])
     tree = context.get("furo_navigation_tree", "")
@@ -135,6 +136,7 @@ def copy_replay_pages(app: Sphinx, error: Exception | None) -> None:
 def setup(app: Sphinx) -> None:
     """Connect what is ours."""
     mathml.register(app)
+    app.add_lexer("csv", TextLexer)
     app.connect("autodoc-process-docstring", keep_bars, priority=100)  # before napoleon
     app.connect("html-page-context", mend_ways_back)
     app.connect("html-page-context", open_to_all, priority=900)  # after the theme

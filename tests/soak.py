@@ -1,7 +1,7 @@
 """Hard use for minutes and hours: ``python -m tests.soak --minutes 10``, or ``make soak``.
 
 The three fuzz bodies for so many minutes each, 200 kills at random moments, a run of a million
-transitions. Each part runs in processes of its own, under a limit of memory and with a watch on
+transitions, new random runs of tests/test_hard_random_runs.py. Each part runs in processes of its own, under a limit of memory and with a watch on
 time; what is found is printed with the line that repeats it, and the exit code is 1.
 """
 
@@ -144,23 +144,24 @@ def _index(watch: Path) -> int:
 
 def killing(seed: int, kills: int) -> bool:
     """Kill writers at random moments; return whether every file was whole."""
-    from tests.test_killed_runs_leave_whole_files import WRITERS, kill_and_look
+    from tests.test_killed_runs_leave_whole_files import WRITERS, end_nursery, kill_and_look
 
-    moments, began = random.Random(seed), time.monotonic()
+    moments, began, amid = random.Random(seed), time.monotonic(), 0
     with tempfile.TemporaryDirectory() as folder:
         for number in range(kills):
             name = list(WRITERS)[number % len(WRITERS)]
             place = Path(folder) / f"{number}"
             place.mkdir()
             try:
-                kill_and_look(name, moments.random(), place)
+                amid += bool(kill_and_look(name, moments.random(), place))
             except Exception:
                 print(f"FINDING kill {number} of {name}, seed {seed}")
                 traceback.print_exc()
                 return False
+    end_nursery()
     print(
-        f"kill -9: {kills} kills of {', '.join(WRITERS)} in {time.monotonic() - began:.0f} s; "
-        f"every file old or new, and whole; seed {seed}",
+        f"kill -9: {kills} kills of {', '.join(WRITERS)} in {time.monotonic() - began:.0f} s, "
+        f"{amid} of them amid writing; every file old or new, and whole; seed {seed}",
         flush=True,
     )
     return True
@@ -182,14 +183,34 @@ def million(transitions: int) -> bool:
     return good
 
 
+def random_runs(seed: int, examples: int) -> bool:
+    """Draw new random runs; hypothesis prints the one that fails, shrunk."""
+    began = time.monotonic()
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "tests/test_hard_random_runs.py",
+         f"--hypothesis-seed={seed}"],
+        cwd=ROOT, env={**os.environ, "GMS_FSM_EXAMPLES": str(examples)},
+        stdout=subprocess.PIPE, text=True, check=False,
+    )  # fmt: skip
+    print(
+        f"random runs: {examples} of each kind in {time.monotonic() - began:.0f} s, seed {seed}: "
+        + done.stdout.strip().splitlines()[-1],
+        flush=True,
+    )
+    if done.returncode:
+        print("FINDING", done.stdout)
+    return done.returncode == 0
+
+
 # --------------------------------------------------------------------------- all of it
 def main() -> None:
     """Run the parts asked for; exit with 1 if anything was found."""
-    parts = ("expression", "scenario", "trace", "kill", "million")
+    parts = ("expression", "scenario", "trace", "kill", "million", "runs")
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=10.0, help="for each of the three")
     parser.add_argument("--seed", type=int, default=random.SystemRandom().randrange(10**9))
     parser.add_argument("--kills", type=int, default=200)
+    parser.add_argument("--examples", type=int, default=300, help="of each kind of random run")
     parser.add_argument("--transitions", type=int, default=1_000_000)
     parser.add_argument("--only", choices=parts, action="append")
     parser.add_argument("--input", type=int, help="repeat this input of the one part given")
@@ -214,6 +235,7 @@ def main() -> None:
         "trace": lambda: fuzzing("trace", given.seed, given.minutes),
         "kill": lambda: killing(given.seed, given.kills),
         "million": lambda: million(given.transitions),
+        "runs": lambda: random_runs(given.seed, given.examples),
     }
     good = [work[part]() for part in given.only or parts]
     print("nothing found" if all(good) else "see FINDING above")
