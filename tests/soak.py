@@ -1,8 +1,9 @@
 """Hard use for minutes and hours: ``python -m tests.soak --minutes 10``, or ``make soak``.
 
 The three fuzz bodies for so many minutes each, 200 kills at random moments, a run of a million
-transitions, new random runs of tests/test_hard_random_runs.py. Each part runs in processes of its own, under a limit of memory and with a watch on
-time; what is found is printed with the line that repeats it, and the exit code is 1.
+transitions, new random runs of tests/test_hard_random_runs.py. Each part runs in processes of its
+own, under a limit of memory and with a watch on time; what is found is printed with the line that
+repeats it, and the exit code is 1.
 """
 
 from __future__ import annotations
