@@ -630,7 +630,8 @@ def _parts(node: Value) -> int:
     match node:
         case Binary("**", base, exponent):
             parts = _parts(base)  # once: a power of a power of a power would double the work
-            return parts * max(1, abs(_fitting_power(parts, exponent) or 1))
+            whole = _fitting_power(parts, exponent)
+            return parts + _parts(exponent) if whole is None else parts * max(1, abs(whole))
         case Negative(operand):
             return _parts(operand)
         case Binary(_, left, right):

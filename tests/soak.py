@@ -187,12 +187,14 @@ def million(transitions: int) -> bool:
 def random_runs(seed: int, examples: int) -> bool:
     """Draw new random runs; hypothesis prints the one that fails, shrunk."""
     began = time.monotonic()
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "tests/test_hard_random_runs.py",
-         f"--hypothesis-seed={seed}"],
-        cwd=ROOT, env={**os.environ, "GMS_FSM_EXAMPLES": str(examples)},
-        stdout=subprocess.PIPE, text=True, check=False,
-    )  # fmt: skip
+    with tempfile.TemporaryDirectory() as folder:  # for machine code that nobody needs again
+        surroundings = {"GMS_FSM_EXAMPLES": str(examples), "NUMBA_CACHE_DIR": folder}
+        done = subprocess.run(
+            [sys.executable, "-m", "pytest", "-q", "tests/test_hard_random_runs.py",
+             f"--hypothesis-seed={seed}"],
+            cwd=ROOT, env={**os.environ, **surroundings}, stdout=subprocess.PIPE, text=True,
+            check=False,
+        )  # fmt: skip
     print(
         f"random runs: {examples} of each kind in {time.monotonic() - began:.0f} s, seed {seed}: "
         + done.stdout.strip().splitlines()[-1],

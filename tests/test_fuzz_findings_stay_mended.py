@@ -71,6 +71,16 @@ def test_powers_of_powers_cost_no_more_than_their_length(power: str) -> None:
     assert calls_of(read) < 100_000
 
 
+def test_exponents_count_as_part_of_what_is_multiplied() -> None:
+    """64 copies of a power whose exponent holds 64 copies of a power ...: a line made gigabytes."""
+    text = "v"
+    for _ in range(9):
+        text = f"((v**({text} + z))**8)**8"
+    tree = parse_value(text, ["v", "z"])
+    assert len(spell(tree)) < 100 * len(text)
+    assert evaluate(tree, {"v": 1.0, "z": 0.0}) == 1.0
+
+
 @pytest.mark.parametrize("function", ["min", "max"])
 def test_many_arguments_inside_many_arguments_count_as_depth(function: str) -> None:
     """min(a, b, c) is min(min(a, b), c): 50 in 50 in 50 is too deep for every later reader."""
