@@ -940,7 +940,8 @@ def substitute(value: Value, sign_names: Mapping[Value, str]) -> tuple[Value, di
         The tree with names in place of the calls.
     calls : dict of str to Call
         For each such name the call it stands for, in the order they must be computed; arguments
-        are already smooth.
+        are already smooth. A call under a square root or a power stays where it is: with its sign
+        held it would go below zero behind the corner, where these are not defined.
     """
     calls: dict[str, Call] = {}
 
@@ -948,8 +949,12 @@ def substitute(value: Value, sign_names: Mapping[Value, str]) -> tuple[Value, di
         match node:
             case Negative(operand):
                 return Negative(smooth(operand))
+            case Binary("**", base, exponent) if _whole_power(exponent) is None:
+                return Binary("**", base, smooth(exponent))
             case Binary(op, left, right):
                 return Binary(op, smooth(left), smooth(right))
+            case Call("sqrt"):
+                return node
             case Call(function, arguments):
                 inner = Call(function, tuple(smooth(a) for a in arguments))
                 if function not in ROUGH:

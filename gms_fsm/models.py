@@ -284,7 +284,7 @@ def parameter_names(model: Model) -> tuple[str, ...]:
     ('k', 'sigma', 'C', 'v_c', 'weights', 'sigma_2', 'F_c', 'F_s', 'v_s')
     """
     weights = () if isinstance(model, LuGre) else ("weights",)
-    return (*model.values, *weights, "sigma_2", "F_c", "F_s", "v_s")
+    return tuple(dict.fromkeys([*model.values, *weights, "sigma_2", "F_c", "F_s", "v_s"]))
 
 
 def with_values(model: Model, values: Mapping[str, ArrayLike]) -> Model:
@@ -296,7 +296,7 @@ def with_values(model: Model, values: Mapping[str, ArrayLike]) -> Model:
         Where the others come from.
     values : mapping
         By a name of `parameter_names`; a single number goes to all elements. Other names are
-        ignored.
+        ignored. A chart's own parameter goes before a shared one of its name.
 
     Returns
     -------
@@ -321,13 +321,16 @@ def with_values(model: Model, values: Mapping[str, ArrayLike]) -> Model:
     def array(name: str, old: float | FloatArray) -> FloatArray:
         return np.full(model.n, values.get(name, old), dtype=np.float64)
 
+    def common(name: str, old: float) -> float:
+        return old if name in model.values else number(name, old)
+
     old = model.stribeck
-    stribeck = Stribeck(number("F_c", old.F_c), number("F_s", old.F_s), number("v_s", old.v_s))
-    shared: Any = {"stribeck": stribeck, "sigma_2": number("sigma_2", model.sigma_2)}
+    stribeck = Stribeck(common("F_c", old.F_c), common("F_s", old.F_s), common("v_s", old.v_s))
+    shared: Any = {"stribeck": stribeck, "sigma_2": common("sigma_2", model.sigma_2)}
     if isinstance(model, LuGre):
         own: Any = {name: number(name, float(value)) for name, value in model.values.items()}
         return LuGre(**own, **shared)
-    weights = array("weights", model.weights)
+    weights = model.weights if "weights" in model.values else array("weights", model.weights)
     if isinstance(model, GMS):
         p = model.parameters
         arrays = [array(name, getattr(p, name)) for name in ("k", "sigma", "C")]

@@ -135,7 +135,7 @@ def lower(model: Model, rig: Rig) -> Program:
         repr(model.chart), model.stribeck.text, model.n,
         tuple(np.ndim(model.values[name]) for name in model.chart.parameters),
         rig.title, rig.acceleration, tuple(rig.numbers), tuple(rig.signals),
-        tuple(getattr(s, "text", None) or getattr(s, "call", None) for s in signals),
+        tuple(_spelling(s) for s in signals),
     )  # fmt: skip
     corners = [s for s in signals if isinstance(s, Corners)]
     return dataclasses.replace(
@@ -144,6 +144,20 @@ def lower(model: Model, rig: Rig) -> Program:
         knots=sorted({float(t) for s in corners for t in s.times}),
         jumps=sorted({float(t) for s in corners for t in s.jumps}),
     )
+
+
+def _spelling(signal: Signal) -> str | int | None:
+    """Return what the text depends on in a signal, hashable.
+
+    A callable counts by identity, which the rig in the cache keeps from being given away: callables
+    that call themselves equal need not return the same, and some cannot be hashed.
+    """
+    match signal:
+        case Formula(text=text):
+            return text
+        case Function(call=call):
+            return id(call)
+    return None
 
 
 @dataclass(frozen=True)

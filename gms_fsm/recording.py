@@ -246,13 +246,23 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
         z = error.y[recorder.start.program.first + i]
         return f"z = {z:.6g}, s = {seen[2 + i]:.6g}, v = {seen[0]:.6g}"
 
-    if error.machine is not None and error.edge is not None:
-        edge = chart.transitions[error.edge]
+    if error.machine is not None:
+        log = trace.transitions
+        taken = log[log.element == error.machine][-integrators.MOST_SWITCHES :]
+        last = taken[-1]
+        guard = next(edge.guard for edge in chart.transitions if edge.name == last.edge)
+        time = float(last.t - taken[0].t)
+        cause = (
+            f"the flows on both sides of guard [{guard}] push back over it (chattering); leave a "
+            "gap between the guards there and back"
+            if time > 0.0
+            else f"guard [{guard}] and a way back hold together; make the guards exclude each other"
+        )
         return LivelockError(
-            f"element {error.machine + 1} switched {integrators.MOST_SWITCHES} times at {scene}, "
-            f"last by {edge.name!r} from {edge.source} to {edge.target} ({values(error.machine)}): "
-            f"guard [{edge.guard}] and a way back hold together; make the guards exclude each "
-            f"other; {kept}",
+            f"element {error.machine + 1} switched {len(taken)} times "
+            f"{f'in {time:.3g} s ' if time else ''}at {scene}, "
+            f"last by {str(last.edge)!r} from {last.source} to {last.target} "
+            f"({values(error.machine)}): {cause}; {kept}",
             trace,
         )
     rough = [

@@ -170,17 +170,10 @@ class Livelock(HybridError):
     """Switches without progress in time, of one machine or of one relation."""
 
     def __init__(
-        self,
-        t: float,
-        y: Vector,
-        mode: list[int],
-        machine: int | None,
-        edge: int | None,
-        relations: list[str],
+        self, t: float, y: Vector, mode: list[int], machine: int | None, relations: list[str]
     ) -> None:
         super().__init__(f"{MOST_SWITCHES} switches without progress", t, y, mode)
         self.machine = machine
-        self.edge = edge
         self.relations = relations
 
 
@@ -357,7 +350,9 @@ def buffers(
             jumps=jumps,
             before_jumps=[math.nextafter(s, -math.inf) for s in jumps],
             knots=system.knots if options.located else [],
-            standstill=1000.0 * resolution,
+            # About 1e-9 of the run: two machines that chatter together move the clock on by some
+            # ticks each time, and a run that goes on like that would never end.
+            standstill=1e6 * resolution,
         ),
         memory=Memory(
             now=beginning(t, t_end),
@@ -436,10 +431,14 @@ def failure(happening: int, b: Buffers, relations: list[str]) -> HybridError:
     if happening == kernel.TOO_SMALL:
         return StepTooSmall("step size under the clock's resolution", t, y, mode)
     if happening == loop.MACHINE_LIVELOCK:
-        return Livelock(t, y, mode, counts[loop.MACHINE], counts[loop.EDGE], [])
+        return Livelock(t, y, mode, counts[loop.MACHINE], [])
     if happening == loop.RELATION_LIVELOCK:
+        # A relation in a guard may have changed once more than its machine has switched.
+        machine = max(range(len(mode)), key=lambda i: memory.switches[i])
+        if memory.switches[machine] >= MOST_SWITCHES // 2:
+            return Livelock(t, y, mode, machine, [])
         often = [name for r, name in enumerate(relations) if memory.changes[r] >= MOST_SWITCHES]
-        return Livelock(t, y, mode, None, None, often)
+        return Livelock(t, y, mode, None, often)
     w = loop.active_relations(b.relations, memory)
     undefined = [relations[r] for r in w.active if w.start[r] != w.start[r]]
     text = f"{undefined[0]} compares NaN" if undefined else "NaN or infinity"

@@ -7,6 +7,7 @@ with its value.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -141,6 +142,23 @@ def test_two_functions_on_one_generated_text_stay_apart() -> None:
     )
     assert (slow.v == 0.1).all()
     assert (fast.v == 0.3).all()
+
+
+@dataclass
+class Ramp:
+    """A callable that compares by part of what it knows, and cannot be hashed."""
+
+    unit: str
+    slope: float = field(compare=False)
+
+    def __call__(self, t: float) -> float:
+        return self.slope * t
+
+
+def test_a_callable_object_is_called_itself_though_another_is_equal_to_it() -> None:
+    for slope in (0.1, 0.2):
+        trace = simulate(stick_slip("signed"), Prescribed(Ramp("m/s", slope)), 1.0)
+        assert trace.v[-1] == slope
 
 
 def test_a_signal_keeps_its_own_copy() -> None:

@@ -42,7 +42,7 @@ from gms_fsm.errors import (
     SimulationError,
     TraceFileError,
 )
-from gms_fsm.models import Model, with_values
+from gms_fsm.models import Model, parameter_names, with_values
 from gms_fsm.rigs import Rig, with_numbers
 from tests.helpers import non_drifting, open_loop, pulled_mass, stick_slip
 
@@ -174,6 +174,19 @@ def test_more_runs_than_a_task_holds_and_more_firings_than_a_column() -> None:
 
 
 # --------------------------------------------------------------------------- what is varied
+def test_a_charts_own_parameter_goes_before_a_shared_one_of_its_name() -> None:
+    chart = Chart(
+        "own Coulomb", ("v",), ("z",), ("F_c", "weights"),
+        (State("slip", flow={"z": "v"}),), (), {"F": "F_c * weights * sgn(v)"},
+    )  # fmt: skip
+    model = ChartModel(chart, {"F_c": 2.0, "weights": 3.0}, n=2, stribeck=Stribeck(1.0, 1.5, 0.1))
+    assert parameter_names(model) == ("F_c", "weights", "sigma_2", "F_s", "v_s")
+    other = with_values(model, {"F_c": 5.0, "weights": 7.0, "F_s": 1.25})
+    assert (other.values["F_c"], other.values["weights"]) == (5.0, 7.0)
+    assert (other.stribeck.F_c, other.stribeck.F_s) == (1.0, 1.25)
+    assert other.weights.tolist() == [1.0, 1.0]
+
+
 def test_one_number_goes_to_all_elements() -> None:
     model, rig = pulled_mass()
     level = np.array([20.0, 30.0])
