@@ -75,8 +75,8 @@ def composed(number: int) -> str:
         ("markdown", "## Step through it\n\nA page in which the runs are stepped, scrubbed and "
                      "explained guard by guard:"),
         ("code", "from plots import write_replay\n\nruns = result.replayed\n"
-                 f"title = \"Lesson {number}: \" + \" | \".join(runs)\n"
-                 f"print(write_replay({replay}, *runs.values(), title=title))"),
+                 f'print(write_replay({replay}, *runs.values(), title="Lesson {number}", '
+                 "names=list(runs)))"),
     ]  # fmt: skip
     return "\n\n".join(_cell(kind, body) for kind, body in cells) + "\n\n" + _more(number)
 

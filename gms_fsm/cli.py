@@ -357,7 +357,9 @@ def replay_command(
     from plots.replay import write_replay
 
     second = None if other is None else Trace.load(other)
-    typer.echo(str(write_replay(output, Trace.load(trace), second, title=title)))
+    names = [] if other is None else [trace.stem, other.stem]
+    page = write_replay(output, Trace.load(trace), second, title=title, names=names)
+    typer.echo(str(page))
 
 
 @app.command("debug")

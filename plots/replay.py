@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.chart import Chart
-from gms_fsm.errors import MissingExtraError, SignalError, TraceFileError
+from gms_fsm.errors import MissingExtraError, ParameterError, SignalError, TraceFileError
 from gms_fsm.explain import explain_state, values_at
 from gms_fsm.expression import MATLAB_LIKE, Relation, clauses, spell
 from gms_fsm.files import written_whole
@@ -114,7 +114,9 @@ class Replay:
         return written_whole(Path(path), lambda file: file.write(self.html.encode()))
 
 
-def replay(trace: Trace, other: Trace | None = None, *, title: str = "") -> Replay:
+def replay(
+    trace: Trace, other: Trace | None = None, *, title: str = "", names: Sequence[str] = ()
+) -> Replay:
     """Make a replay page, for a notebook.
 
     Parameters
@@ -125,6 +127,8 @@ def replay(trace: Trace, other: Trace | None = None, *, title: str = "") -> Repl
         A second run, shown beside it on the same time.
     title : str, optional
         Of the page; the charts' names if left out.
+    names : sequence of str, optional
+        What each run is called; two runs of one model on one rig are told apart by nothing else.
 
     Returns
     -------
@@ -133,6 +137,8 @@ def replay(trace: Trace, other: Trace | None = None, *, title: str = "") -> Repl
 
     Raises
     ------
+    ParameterError
+        If there are names, but not one a run.
     MissingExtraError
         If uPlot is not installed.
 
@@ -143,11 +149,16 @@ def replay(trace: Trace, other: Trace | None = None, *, title: str = "") -> Repl
     ...                  Prescribed("0.2"), 3.0)
     >>> replay(trace).save("page.html")  # doctest: +SKIP
     """
-    return Replay(replay_html(trace, other, title=title))
+    return Replay(replay_html(trace, other, title=title, names=names))
 
 
 def write_replay(
-    path: str | Path, trace: Trace, other: Trace | None = None, *, title: str = ""
+    path: str | Path,
+    trace: Trace,
+    other: Trace | None = None,
+    *,
+    title: str = "",
+    names: Sequence[str] = (),
 ) -> Path:
     """Write a replay page: one file that needs neither a network nor a server.
 
@@ -155,7 +166,7 @@ def write_replay(
     ----------
     path : str or Path
         The file; its folder has to exist.
-    trace, other, title
+    trace, other, title, names
         See `replay`.
 
     Returns
@@ -165,20 +176,24 @@ def write_replay(
 
     Raises
     ------
+    ParameterError
+        If there are names, but not one a run.
     MissingExtraError
         If uPlot is not installed.
     OutputError
         If the folder cannot be written.
     """
-    return replay(trace, other, title=title).save(path)
+    return replay(trace, other, title=title, names=names).save(path)
 
 
-def replay_html(trace: Trace, other: Trace | None = None, *, title: str = "") -> str:
+def replay_html(
+    trace: Trace, other: Trace | None = None, *, title: str = "", names: Sequence[str] = ()
+) -> str:
     """Return a replay page as text.
 
     Parameters
     ----------
-    trace, other, title
+    trace, other, title, names
         See `replay`.
 
     Returns
@@ -188,17 +203,25 @@ def replay_html(trace: Trace, other: Trace | None = None, *, title: str = "") ->
 
     Raises
     ------
+    ParameterError
+        If there are names, but not one a run.
     MissingExtraError
         If uPlot is not installed.
     """
     plot_script, plot_style = _uplot()
     traces = [trace] if other is None else [trace, other]
+    if len(names) not in (0, len(traces)):
+        raise ParameterError(f"{len(traces)} run(s) but names = {list(names)!r}; give one each")
     pictures = [_chart_svg(each.model.chart, each.n) for each in traces]
     charts = list(dict.fromkeys(pictures))
     chosen = [_page_rows(each) for each in traces]
     frames = _frames([run.t.tolist() for run, _ in chosen])
     runs = [
-        {"chart": charts.index(picture), **_run(run, between, _frame_of(frames, i))}
+        {
+            "chart": charts.index(picture),
+            "title": ": ".join([*names[i : i + 1], f"{run.model.title}; {run.rig.title}"]),
+            **_run(run, between, _frame_of(frames, i)),
+        }
         for i, (picture, (run, between)) in enumerate(zip(pictures, chosen, strict=True))
     ]
     data = {
@@ -250,7 +273,6 @@ def _run(trace: Trace, between: NDArray[np.bool_], frame_of: Sequence[int]) -> d
         entry["frame"] = frame_of[entry["row"]]
     mode = trace.rows.mode.T.tolist()
     return {
-        "title": f"{trace.model.title}; {trace.rig.title}",
         "states": [state.name for state in chart.states],
         "edges": edges,
         "names": {"t": pool.add(trace.t, digits=17),  # 17 digits tell all numbers apart

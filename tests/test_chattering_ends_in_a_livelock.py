@@ -22,9 +22,7 @@ def memoryless(weights):
 
 
 @pytest.mark.parametrize("engine", ["machines", "ifelse", "compiled"])
-@pytest.mark.parametrize(
-    ("weights", "element", "t"), [([0.5], 1, 2.8799), ([0.5, 0.4], 2, 2.1626)]
-)
+@pytest.mark.parametrize(("weights", "element", "t"), [([0.5], 1, 2.8799), ([0.5, 0.4], 2, 2.1626)])
 def test_the_error_names_the_element_and_says_that_it_chatters(weights, element, t, engine):
     """Which of the two counts is full first, that of the guard or of the machine, is no matter."""
     if engine == "compiled":

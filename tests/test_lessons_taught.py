@@ -53,7 +53,10 @@ def test_one_is_run_and_written(tmp_path: Path) -> None:
     assert done.stdout.startswith(text)
     assert (folder / "lesson_7.png").read_bytes().startswith(b"\x89PNG")
     assert "<svg" in (folder / "lesson_7.svg").read_text()
-    assert "Lesson 7" in (folder / "lesson_7.html").read_text()
+    page = (folder / "lesson_7.html").read_text()
+    assert "Lesson 7" in page
+    for name in lessons.lesson(7).run().replayed:
+        assert f"{name}: GMS" in page
     for path in folder.iterdir():
         assert path.name in done.stdout
 

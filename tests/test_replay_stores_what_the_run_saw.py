@@ -20,7 +20,13 @@ import pytest
 from gms_fsm import Prescribed, Trace, simulate
 from gms_fsm.chart import Chart, State
 from gms_fsm.charts import GMS_ELEMENT
-from gms_fsm.errors import MissingExtraError, OutputError, SimulationError, TraceFileError
+from gms_fsm.errors import (
+    MissingExtraError,
+    OutputError,
+    ParameterError,
+    SimulationError,
+    TraceFileError,
+)
 from gms_fsm.explain import explain
 from gms_fsm.models import ChartModel, LuGre
 from gms_fsm.parameters import Stribeck
@@ -223,6 +229,18 @@ def test_without_uplot_the_message_names_the_extra(monkeypatch: pytest.MonkeyPat
 def test_a_page_in_a_missing_folder_is_one_clear_error(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="cannot write"):
         write_replay(tmp_path / "none" / "page.html", fig4("signed"))
+
+
+@uplot
+def test_two_runs_of_one_model_are_told_apart_by_their_names() -> None:
+    coarse, fine = fig4("signed"), fig4("signed")
+    runs = data_of(replay_html(coarse, fine, names=["coarse", "fine"]))["runs"]
+    assert [run["title"].partition(":")[0] for run in runs] == ["coarse", "fine"]
+    assert [run["title"].partition(": ")[2] for run in runs] == [
+        run["title"] for run in data_of(replay_html(coarse, fine))["runs"]
+    ]
+    with pytest.raises(ParameterError, match=r"2 run\(s\) but names = \['one'\]"):
+        replay_html(coarse, fine, names=["one"])
 
 
 @uplot

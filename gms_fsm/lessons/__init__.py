@@ -179,5 +179,6 @@ def _replay(number: int, result: Result, folder: Path) -> list[Path]:
     from plots.replay import write_replay
 
     runs = result.replayed
-    title = f"Lesson {number}: {LESSONS[number].QUESTION} ({' | '.join(runs)})"
-    return [write_replay(folder / f"lesson_{number}.html", *runs.values(), title=title)]
+    title = f"Lesson {number}: {LESSONS[number].QUESTION}"
+    page = folder / f"lesson_{number}.html"
+    return [write_replay(page, *runs.values(), title=title, names=list(runs))]
