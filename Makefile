@@ -1,6 +1,8 @@
 # Targets are the interface: each does its own set-up in .venv and then runs.
+#   make help    this list
 #   make paper   the paper's two experiments -> folder paper/
 #   make test    all tests
+#   make coverage  all tests, and what of the three packages they run
 #   make lint    formatting, style, types, import contracts
 #   make core    the tests with only the required dependencies
 #   make bench   speed and error against C, SciPy, CVODE and PathSim
@@ -13,7 +15,7 @@ RUN := $(VENV)/bin
 SOAK_MINUTES ?= 10
 PIP := $(RUN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: paper test lint core bench soak gallery docs clean
+.PHONY: help paper test coverage lint core bench soak gallery docs clean
 .DEFAULT_GOAL := test
 
 $(VENV)/bin/python:
@@ -36,6 +38,9 @@ $(VENV)/bench.stamp: pyproject.toml | $(VENV)/bin/python
 	$(PIP) install -e ".[dev,bench]"
 	@touch $@ $(VENV)/dev.stamp
 
+help:
+	@sed -n 's/^# \{0,1\}//p' Makefile
+
 .venv-core/stamp: pyproject.toml
 	$(PYTHON) -m venv .venv-core
 	.venv-core/bin/python -m pip --disable-pip-version-check --quiet install -e . pytest pytest-xdist hypothesis
@@ -46,6 +51,9 @@ paper: $(VENV)/all.stamp
 
 test: $(VENV)/dev.stamp
 	$(RUN)/python -m pytest -n auto
+
+coverage: $(VENV)/dev.stamp
+	$(RUN)/python -m pytest -n auto --cov --cov-report=term
 
 lint: $(VENV)/dev.stamp
 	$(RUN)/ruff format --check .

@@ -17,6 +17,7 @@ from gms_fsm.models import GMS, ChartModel, LuGre
 from gms_fsm.parameters import GMSParameters, Stribeck
 from gms_fsm.prove import Finding, Report, prove
 from gms_fsm.rigs import Prescribed, PulledSlider, Slider
+from gms_fsm.session import Session
 from gms_fsm.simulate import simulate
 from gms_fsm.sweep import Sweep, sweep
 from gms_fsm.trace import Trace
@@ -36,6 +37,7 @@ __all__ = [
     "Prescribed",
     "PulledSlider",
     "Report",
+    "Session",
     "SimulationError",
     "Slider",
     "State",

@@ -153,7 +153,14 @@ class Chart:
 
     def __post_init__(self) -> None:
         for each in ("inputs", "variables", "parameters", "states", "transitions"):
-            object.__setattr__(self, each, tuple(getattr(self, each)))
+            given = getattr(self, each)
+            if isinstance(given, str | State | Transition):
+                text = shown(given) if isinstance(given, str) else f"{type(given).__name__}(...)"
+                raise ChartError(
+                    f"chart {self.name!r}: {each} is {text}, not a tuple; write it with a comma: "
+                    f"({text},)"
+                )
+            object.__setattr__(self, each, tuple(given))
         object.__setattr__(self, "outputs", dict(self.outputs))
         self._check_names()
         symbols = self.inputs + self.variables + self.parameters

@@ -104,10 +104,10 @@ def paper_command(
         Path, typer.Option("--output", "-o", help="Folder for everything that is written.")
     ] = Path("paper"),
     force: Annotated[
-        str, typer.Option(help="Applied force of Fig. 3 [N] as an expression of t [s].")
+        str, typer.Option(help="Applied force of Fig. 3 (N), an expression of t (s).")
     ] = paper.FORCE,
     velocity: Annotated[
-        str, typer.Option(help="Velocity of Fig. 4 [m/s] as an expression of t [s].")
+        str, typer.Option(help="Velocity of Fig. 4 (m/s), an expression of t (s).")
     ] = paper.VELOCITY,
 ) -> None:
     """Run the paper's two experiments; write figures, traces, logs and claims.md."""
@@ -127,7 +127,12 @@ def paper_command(
 
 @app.command("run")
 def run_command(
-    scenario: Annotated[Path, typer.Argument(help="A scenario file, TOML.", show_default=False)],
+    scenario: Annotated[
+        Path,
+        typer.Argument(
+            help="A scenario file, such as scenarios/pulled_mass.toml.", show_default=False
+        ),
+    ],
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="Folder for what is written; out/<name> if left out."),
@@ -207,6 +212,7 @@ def chart_command(
     notation: Annotated[Notation, typer.Option(help="Spelling.")] = Notation.stateflow,
     direction: Annotated[Direction, typer.Option(help="Layout.")] = Direction.TB,
     theme: Annotated[Theme, typer.Option(help="Colours.")] = Theme.light,
+    names: Annotated[bool, typer.Option("--names", help="Write the edges' names too.")] = False,
 ) -> None:
     """Draw a state chart."""
     import plots
@@ -220,8 +226,9 @@ def chart_command(
         written = written_whole(output, lambda file: file.write(text))
     else:
         graph = plots.statechart(
-            chart, elements, notation=notation.value, direction=direction.value, theme=theme.value
-        )
+            chart, elements, notation=notation.value, direction=direction.value,
+            theme=theme.value, names=names,
+        )  # fmt: skip
         written = plots.render(graph, output)
     typer.echo(str(written))
 
@@ -328,8 +335,8 @@ def animate_command(
         "film.gif"
     ),
     frames: Annotated[int, typer.Option(help="How many pictures.")] = 200,
-    start: Annotated[float | None, typer.Option(help="From t [s].")] = None,
-    end: Annotated[float | None, typer.Option(help="To t [s].")] = None,
+    start: Annotated[float | None, typer.Option(help="From t (s).")] = None,
+    end: Annotated[float | None, typer.Option(help="To t (s).")] = None,
 ) -> None:
     """Make a film of the chart at work, beside the force."""
     from plots.animation import animate
@@ -364,7 +371,12 @@ def replay_command(
 
 @app.command("debug")
 def debug_command(
-    scenario: Annotated[Path, typer.Argument(help="A scenario file, TOML.", show_default=False)],
+    scenario: Annotated[
+        Path,
+        typer.Argument(
+            help="A scenario file, such as scenarios/pulled_mass.toml.", show_default=False
+        ),
+    ],
     overrides: Annotated[
         list[str] | None,
         typer.Option("--set", help="Change a key, for example --set model.law=published."),

@@ -198,10 +198,10 @@ class ChartModel:
         The element's chart.
     values : mapping
         For each parameter of the chart a number, or an array of shape (n,).
-    n : int
-        Number of elements.
-    stribeck : Stribeck
-        The curve behind the input ``s``.
+    n : int, optional
+        Number of elements; 1 when left out.
+    stribeck : Stribeck, optional
+        The curve behind the input ``s``; needed only by charts that have this input.
     sigma_2 : float
         Viscous friction, Ns/m, >= 0.
     weights : array_like, shape (n,), optional
@@ -213,7 +213,7 @@ class ChartModel:
     ------
     ParameterError
         If a value is missing, unknown, not finite or of the wrong length, or the chart wants an
-        input that no model supplies.
+        input that no model supplies, or ``s`` without a curve.
 
     Examples
     --------
@@ -225,8 +225,8 @@ class ChartModel:
 
     chart: Chart
     values: Mapping[str, float | FloatArray]
-    n: int = field(kw_only=True)
-    stribeck: Stribeck = field(kw_only=True)
+    n: int = field(default=1, kw_only=True)
+    stribeck: Stribeck = field(default=None, kw_only=True)  # type: ignore[assignment]
     sigma_2: float = field(default=0.0, kw_only=True)
     weights: FloatArray = field(default=None, kw_only=True)  # type: ignore[arg-type]
     title: str = field(default="", kw_only=True)
@@ -236,8 +236,13 @@ class ChartModel:
             raise ParameterError(
                 f"n is {self.n!r}; a bank has a whole number of elements, at least one"
             )
-        if not isinstance(self.stribeck, Stribeck):
-            raise ParameterError(f"stribeck is {self.stribeck!r}; it must be a Stribeck")
+        if self.stribeck is None and "s" not in self.chart.inputs:
+            object.__setattr__(self, "stribeck", Stribeck(1.0, 1.0, 1.0))  # nobody reads it
+        elif not isinstance(self.stribeck, Stribeck):
+            raise ParameterError(
+                f"chart {self.chart.name!r} has the input s, and stribeck is {self.stribeck!r}; "
+                "give its curve, stribeck=Stribeck(F_c, F_s, v_s)"
+            )
         for name in self.chart.inputs:
             if name not in SUPPLIED:
                 raise ParameterError(

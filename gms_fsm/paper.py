@@ -621,11 +621,22 @@ def claims_text(traces: Mapping[str, Trace], force: str = FORCE, velocity: str =
         )
     )
     if (force, velocity) == (FORCE, VELOCITY):
+        claims = judge(traces)
         rows = [
             "| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |"
-            for cells in ((c.figure, c.text, c.measured, f"**{c.verdict}**") for c in judge(traces))
+            for cells in ((c.figure, c.text, c.measured, f"**{c.verdict}**") for c in claims)
         ]
-        table = ["| | claim | measured | verdict |", "|---|---|---|---|", *rows]
+        holds = sum(claim.verdict == "holds" for claim in claims)
+        differs = sum(claim.verdict.startswith("differs") for claim in claims)
+        table = [
+            f"{len(claims)} claims: {holds} hold, {len(claims) - holds - differs} hold under a "
+            f"condition, {differs} differ. What the paper does not print and we chose is listed "
+            "below the table.",
+            "",
+            "| | claim | measured | verdict |",
+            "|---|---|---|---|",
+            *rows,
+        ]
     else:
         table = [
             "Not judged: the claims are about the signals chosen for the reproduction, and these "

@@ -22,6 +22,8 @@ PAPER_COLUMNS = ("non-drifting", "stick-slip")
 def checked_scalar(name: str, value: float, rule: str) -> float:
     """Return value as a float if it keeps the rule, one of ``> 0``, ``>= 0``, ``finite``."""
     try:
+        if isinstance(value, str | bytes):  # float("100") is a number
+            raise TypeError
         number = float(value)
     except (TypeError, ValueError):
         raise ParameterError(f"{name} is {shown(value)}; it must be a number") from None

@@ -505,7 +505,10 @@ class _Prover:
         """Leave a question open whose quotients are not all defined within the domain."""
         for denominator, text in reading.denominators:
             if self.find(*case, denominator == 0) is not None:
-                raise _Undecided(f"the denominator {text} can be 0 within the domain")
+                raise _Undecided(
+                    f"the denominator {text} can be 0 within the domain; say what it cannot be, "
+                    f"for example domain=['{text} > 0', ...]"
+                )
 
     def settle(
         self,

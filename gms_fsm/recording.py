@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -226,7 +227,7 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
     scene = f"t = {error.t!r} s"
     if isinstance(error, NotFinite):
         return NotFiniteError(
-            f"a signal or a flow is not finite at or just after {scene} "
+            f"{_not_finite(error, recorder)} at or just after {scene} "
             f"(x, v, z ... = {[float(f'{u:.6g}') for u in error.y]}): {error}; look at the signals "
             f"and parameters there; {kept}",
             trace,
@@ -244,7 +245,8 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
 
     def values(i: int) -> str:
         z = error.y[recorder.start.program.first + i]
-        return f"z = {z:.6g}, s = {seen[2 + i]:.6g}, v = {seen[0]:.6g}"
+        s = f", s = {seen[2 + i]:.6g}" if "s" in chart.inputs else ""
+        return f"{chart.variables[0]} = {z:.6g}{s}, v = {seen[0]:.6g}"
 
     if error.machine is not None:
         log = trace.transitions
@@ -280,6 +282,24 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
         f"law, a larger v_c, or other parameters; {kept}",
         trace,
     )
+
+
+def _not_finite(error: NotFinite, recorder: Recording) -> str:
+    """Name what is not finite where a run ended, as far as it shows there."""
+    model = recorder.start.model
+    seen = recorder.observe(error.t, error.y, error.mode)
+    if not math.isfinite(seen[0]):
+        return "the velocity v is not finite"
+    rates = seen[2 + 2 * model.n :]
+    for j, variable in enumerate(model.chart.variables):
+        for i, mode in enumerate(error.mode):
+            if not math.isfinite(rates[j * model.n + i]):
+                state = model.chart.states[mode]
+                return (
+                    f"the flow of {variable} in state {state.name}, [{state.flow[variable]}], is "
+                    f"not finite in element {i + 1}"
+                )
+    return "a signal or a flow is not finite"
 
 
 def check_end(recorder: Recording) -> None:

@@ -102,6 +102,14 @@ class Start:
         ParameterError, SignalError
             If an argument breaks its rule.
         """
+        for what, given, mark, example in (
+            ("model", model, "chart", "GMS(parameters, law='signed')"),
+            ("rig", rig, "signals", "Prescribed('0.1*sin(t)')"),
+        ):
+            if not hasattr(given, mark):
+                raise ParameterError(
+                    f"{what} is {shown(given)}; it must be a {what}, for example {example}"
+                )
         t_start = checked_scalar("t_start", t_start, "finite")
         t_end = checked_scalar("t_end", t_end, "finite")
         for name, time in (("t_start", t_start), ("t_end", t_end)):

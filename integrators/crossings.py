@@ -50,9 +50,9 @@ class Watched(NamedTuple):
     low: Vector  # ... at the left end of the bracket
     high: Vector  # ... at its right end
     probe: Vector
-    rights: list[Vector]  # right ends of the intervals still to search, shape (DEEPEST + 2, r)
-    places: Vector  # where these are, shape (DEEPEST + 2,)
-    depths: list[int]  # how often they were halved, shape (DEEPEST + 2,)
+    rights: list[Vector]  # right ends of the intervals still to search, shape (DEEPEST + 1, r)
+    places: Vector  # where these are, shape (DEEPEST + 1,)
+    depths: list[int]  # how often they were halved, shape (DEEPEST + 1,)
     y_probe: Vector  # shape (m,)
 
 
@@ -78,9 +78,9 @@ def watched(strict: list[bool], size: int) -> Watched:
 
     return Watched(
         [0] * r, [], [False] * r, strict, vector(), vector(), vector(), vector(), vector(),
-        rights=[vector() for _ in range(DEEPEST + 2)],
-        places=[0.0] * (DEEPEST + 2),
-        depths=[0] * (DEEPEST + 2),
+        rights=[vector() for _ in range(DEEPEST + 1)],
+        places=[0.0] * (DEEPEST + 1),
+        depths=[0] * (DEEPEST + 1),
         y_probe=[0.0] * size,
     )  # fmt: skip
 
@@ -207,7 +207,6 @@ def first_change(
         copy_margins(w, w.start, w.low)
         copy_margins(w, w.end, w.high)
         quiet, found = _bracket(interpolate, dense, margins, t, h, 0.0, 1.0, mode, p, w, resolution)
-        copy_margins(w, w.low, w.rights[0])
     while quiet > 0.0:
         low, high = _search(interpolate, dense, margins, t, h, quiet, mode, p, w)
         if high == NO_CHANGE:
@@ -215,7 +214,6 @@ def first_change(
         quiet, found = _bracket(
             interpolate, dense, margins, t, h, low, high, mode, p, w, resolution
         )
-        copy_margins(w, w.low, w.rights[0])
     return found
 
 
@@ -232,7 +230,10 @@ def _bracket(
     w: Watched,
     resolution: float,
 ) -> tuple[float, float]:
-    """Close the bracket (low unchanged, high changed; margins in w.low, w.high)."""
+    """Close the bracket (low unchanged, high changed; margins in w.low, w.high).
+
+    Leaves the margins of the place before the change in ``w.rights[0]``, for `_search`.
+    """
     tolerance = max(resolution / h, 4e-16)
     halve = False
     while high - low > tolerance:
@@ -257,6 +258,7 @@ def _bracket(
             low = guess
             copy_margins(w, w.probe, w.low)
         halve = high - low > 0.5 * width
+    copy_margins(w, w.low, w.rights[0])
     return low, high
 
 
@@ -310,7 +312,7 @@ def _is_quiet(w: Watched, left: Vector, middle: Vector, right: Vector) -> bool:
         a, m, b = sign * left[r], sign * middle[r], sign * right[r]
         first, second = m - a, b - m
         bend = abs(second - first)
-        monotone = first * second > 0.0 and bend < min(abs(first), abs(second))
+        monotone = bend < min(abs(first), abs(second))  # of opposite signs they bend by more
         if not monotone and max(a, m, b) + bend >= 0.0 and bend > 0.0:
             return False
     return True

@@ -63,7 +63,7 @@ def block_diagram(elements: int = 4) -> graphviz.Digraph:
     Returns
     -------
     graphviz.Digraph
-        The picture as a Graphviz graph; `plots.render.render` writes it to a file.
+        The picture as a Graphviz graph; `plots.render` writes it to a file.
 
     Raises
     ------

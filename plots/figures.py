@@ -458,7 +458,8 @@ def ribbons_figure(
         panels.ribbons(left[3], part, window=limits, elements=elements)
         _one_time_axis(left)
         axes = left + right
-        second = "threshold ratio" if trace.model.chart.transitions else "deflection over s(v)"
+        over_s = "deflection over s(v)" if "s" in trace.model.chart.inputs else "deflection"
+        second = "threshold ratio" if panels.has_threshold(trace) else over_s
         names = ["velocity", second, "friction", "active states"]
         if limits[0] > trace.t[0] and crowded:
             names = [f"{name}, last {limits[1] - limits[0]:.3g} s" for name in names]

@@ -51,6 +51,7 @@ __all__ = [
     "deflections",
     "difference",
     "force",
+    "has_threshold",
     "hysteresis",
     "margins",
     "portrait",
@@ -87,6 +88,22 @@ class Forces(Protocol):
 
 
 # --------------------------------------------------------------------------- what is drawn
+def has_threshold(trace: Trace) -> bool:
+    """Tell whether s(v) is a threshold of the chart: it is an input, and there are edges.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run.
+
+    Returns
+    -------
+    bool
+        Without it neither |z|/s = 1 nor a margin to it means anything.
+    """
+    return "s" in trace.model.chart.inputs and bool(trace.model.chart.transitions)
+
+
 def shown(trace: Trace, window: Window | None = None) -> Trace:
     """Return the rows worth drawing.
 
@@ -160,7 +177,8 @@ def _telling_rows(trace: Trace) -> NDArray[np.intp]:
     start = size * np.arange(count)
     keep = [start, np.array([len(trace) - 1])]
     pad = count * size - len(trace)
-    for column in (trace.x, trace.v, trace.F, *trace.z.T, *(trace.z / trace.s).T):
+    ratio = (trace.z / trace.s).T if "s" in trace.model.chart.inputs else ()
+    for column in (trace.x, trace.v, trace.F, *trace.z.T, *ratio):
         values = np.nan_to_num(np.pad(column, (0, pad), mode="edge")).reshape(count, size)
         keep += [start + values.argmin(axis=1), start + values.argmax(axis=1)]
     switched = np.flatnonzero((np.diff(trace.rows.mode, axis=0) != 0).any(axis=1))
@@ -416,9 +434,10 @@ def ratio(
     """
     chosen = checked_elements(trace, elements)
     part = shown(trace, window)
-    values = part.z / part.s
-    threshold = bool(trace.model.chart.transitions)
-    factor, unit = (1.0, "–") if threshold else scaled(values, "m/N")
+    over_s = "s" in trace.model.chart.inputs
+    values = part.z / part.s if over_s else part.z
+    threshold = has_threshold(trace)
+    factor, unit = (1.0, "–") if threshold else scaled(values, "m/N" if over_s else "m")
     lines: Artists = []
     for i in chosen:
         lines += _curve(ax, part.t, factor * values[:, i], label=f"E{i + 1}", **_look(i))
@@ -426,7 +445,8 @@ def ratio(
         lines += [
             ax.axhline(level, color=LINE_GREY, linewidth=0.8, zorder=1) for level in (1.0, -1.0)
         ]
-    ax.set_ylabel(f"z / s(v) [{unit}]")
+    deflection = trace.model.chart.variables[0]
+    ax.set_ylabel(f"{deflection} / s(v) [{unit}]" if over_s else f"{deflection} [{unit}]")
     _time_axis(ax, *checked_window(trace, window))
     return lines
 
@@ -698,14 +718,16 @@ def margins(
     -------
     list of Artist
         One line an element, the line at zero, a set of dots for each element that switches (there),
-        then the marks. For a chart without edges a note only: it has no threshold.
+        then the marks. For a chart without edges, or without the input s, a note only: it has no
+        threshold.
     """
     chosen = checked_elements(trace, elements)
-    if not trace.model.chart.transitions:
+    if not has_threshold(trace):
         ax.set_yticks([])
+        missing = "input s" if trace.model.chart.transitions else "edges"
         return [
             ax.text(
-                0.5, 0.5, "no threshold:\nthis chart has no edges", ha="center", va="center",
+                0.5, 0.5, f"no threshold:\nthis chart has no {missing}", ha="center", va="center",
                 transform=ax.transAxes, color=TEXT_GREY,
             )
         ]  # fmt: skip

@@ -264,7 +264,8 @@ def _run(trace: Trace, between: NDArray[np.bool_], frame_of: Sequence[int]) -> d
         columns |= {f"{name}{i + 1}": block[:, i] for i in range(n)}
     edges = _edges(chart)
     inner, inner_title = trace.z, f"{chart.variables[0]} [m]"
-    if edges:  # without edges (LuGre) s is no threshold
+    threshold = bool(edges) and "s" in chart.inputs  # without edges (LuGre) s is none
+    if threshold:
         with np.errstate(all="ignore"):
             inner, inner_title = trace.z / trace.s, f"{chart.variables[0]} / s(v), lines at ±1"
     sides, truth, holds = _explained(trace, edges, pool)
@@ -277,7 +278,7 @@ def _run(trace: Trace, between: NDArray[np.bool_], frame_of: Sequence[int]) -> d
         "edges": edges,
         "names": {"t": pool.add(trace.t, digits=17),  # 17 digits tell all numbers apart
                   **{name: pool.add(column) for name, column in columns.items()}},
-        "inner": {"title": inner_title, "bounds": [1, -1] if edges else [],
+        "inner": {"title": inner_title, "bounds": [1, -1] if threshold else [],
                   "columns": [pool.add(inner[:, i]) for i in range(n)]},
         "mode": mode,
         "pieces": [_pieces(trace.t.tolist(), mode[i]) for i in range(n)],

@@ -59,6 +59,7 @@ def statechart(
     theme: str = "light",
     counts: Trace | None = None,
     marked: Iterable[str] = (),
+    names: bool = False,
     note: str = "",
 ) -> graphviz.Digraph:
     """Draw a chart: one element, or a bank of elements as parallel states.
@@ -81,13 +82,15 @@ def statechart(
         are written on it; an edge never taken is dashed.
     marked : iterable of str, optional
         Names of states and edges to point out: drawn thick, with a frame around the guard.
+    names : bool, optional
+        Whether each edge's name, which the log and the debugger use, is written over its guard.
     note : str, optional
         Written under the picture, line by line.
 
     Returns
     -------
     graphviz.Digraph
-        The picture as a Graphviz graph; `plots.render.render` writes it to a file.
+        The picture as a Graphviz graph; `plots.render` writes it to a file.
 
     Raises
     ------
@@ -108,12 +111,14 @@ def statechart(
             f"counts is a run of the chart {counts.model.chart.name!r}; it must be one of the "
             f"chart that is drawn, {chart.name!r}"
         )
-    names = tuple(marked)
+    pointed = tuple(marked)
     parts = [*(state.name for state in chart.states), *(edge.name for edge in chart.transitions)]
-    for name in names:
+    for name in pointed:
         one_of("marked", name, parts)
     tally = Tally(counts) if counts else None
-    sheet = Sheet(chart, notation, direction, theme, tally, marked=frozenset(names))
+    sheet = Sheet(
+        chart, notation, direction, theme, tally, marked=frozenset(pointed), names=names
+    )  # fmt: skip
     numbers = chosen(elements, None if counts is None else counts.n)
     bare = elements == 1 and (counts is None or counts.n == 1)
     return sheet.graph(numbers, bare=bare, foot=note)
@@ -379,6 +384,8 @@ class Sheet:
         Leave room for the dot of the active state and the marks of the clauses.
     marked : frozenset of str
         States and edges to point out.
+    names : bool
+        Write each edge's name over its guard.
     """
 
     chart: Chart
@@ -388,6 +395,7 @@ class Sheet:
     tally: Tally | None = None
     live: bool = False
     marked: frozenset[str] = frozenset()
+    names: bool = False
 
     def __post_init__(self) -> None:
         one_of("notation", self.notation, NOTATIONS)
@@ -599,7 +607,7 @@ class Sheet:
             for clause, part in enumerate(clauses(guard))
             for line in self._clause_lines(part, inside=isinstance(guard, Both))
         ]
-        rows: list[Row] = []
+        rows: list[Row] = [[Piece(edge.name, "word")]] if self.names else []
         for i, (line, clause) in enumerate(lines):
             last = i + 1 == len(lines) or lines[i + 1][1] != clause
             row = [Piece("[" if i == 0 else " ", "bracket"), Piece(line, "clause", clause)]

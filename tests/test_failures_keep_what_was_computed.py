@@ -389,3 +389,23 @@ def test_a_trial_step_too_far_does_not_end_the_run_early(velocity: str) -> None:
         simulate(stick_slip("published"), Prescribed(velocity), 10.0)
     end = 3.0 if "3 - t" in velocity else 2.9 + 709.8 / 800  # exp(709.8) overflows
     assert caught.value.trace.t[-1] == pytest.approx(end, abs=0.15 if "exp" in velocity else 1e-4)
+
+
+def test_a_flow_that_is_not_finite_is_named_with_its_element() -> None:
+    error = _failed(NotFiniteError, _singular("v / (z - 1)"), Prescribed("1"), 2.0,
+                    initial={"z": [0.0, 1.0]})  # fmt: skip
+    assert "the flow of z in state on, [v / (z - 1)], is not finite in element 2" in str(error)
+
+
+@pytest.mark.parametrize(
+    ("model", "rig", "words"),
+    [("GMS", Prescribed("0"), ["model is 'GMS'", "GMS(parameters, law='signed')"]),
+     (BOTH_WAYS, "0.1*t", ["rig is '0.1*t'", "Prescribed('0.1*sin(t)')"]),
+     (Prescribed("0"), BOTH_WAYS, ["model is Prescribed("])],
+    ids=["text for a model", "text for a rig", "the wrong way round"],
+)  # fmt: skip
+def test_what_is_no_model_or_no_rig_is_refused(model: Any, rig: Any, words: list[str]) -> None:
+    with pytest.raises(ParameterError) as caught:
+        simulate(model, rig, 1.0)
+    for word in words:
+        assert word in str(caught.value)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
+from fractions import Fraction
 from types import SimpleNamespace
 from typing import Any
 
@@ -294,6 +295,10 @@ def test_a_machine_that_was_changed_is_refused() -> None:
         lambda m: m.add_transition("arrest", "slip", "stick"),
         lambda m: m.add_transition("arrest", "slip", "slip"),
         lambda m: m.add_transition("fly", "slip", "stick"),
+        lambda m: m.add_transition(
+            "arrest", "slip", "stick",
+            conditions=m.get_transitions("arrest", "slip")[0].conditions[0].func,
+        ),
         lambda m: m.remove_transition("arrest", "slip", "stick"),
         lambda m: m.get_transitions("arrest", "slip")[0].conditions.clear(),
         lambda m: setattr(m.get_transitions("arrest", "slip")[0], "dest", "slip"),
@@ -340,6 +345,24 @@ def test_an_element_shows_the_values_of_the_moment_it_is_asked_at() -> None:
     for (t, x, v, s, z, index), row in zip(seen, log, strict=True):
         assert (t, v, s, z, index) == (row.t, row.v, row.s, row.z, row.element)
         assert x == trace.x[trace.t == t][0]
+
+
+def test_an_element_shows_every_variable_of_its_own() -> None:
+    chart = Chart(
+        "two", ("v",), ("z", "w"), ("k",),
+        (State("rest", {"z": "v", "w": "2*v"}), State("gone", {"z": "v", "w": "0"})),
+        (Transition("leave", "rest", "gone", "z >= 0.25*k"),), {"F": "z"},
+    )  # fmt: skip
+    model = ChartModel(chart, {"k": [1.0, 2.0]}, n=2)
+    seen = []
+
+    class Looking(Element):
+        def on_enter_gone(self, event: Any) -> None:
+            seen.append((self.index, self.z, self.w))
+
+    simulate(model, Prescribed("1"), 1.0, engine=ElementMachines(model, Looking))
+    assert [index for index, *_ in seen] == [0, 1]
+    assert [value for _, *pair in seen for value in pair] == pytest.approx([0.25, 0.5, 0.5, 1.0])
 
 
 # --------------------------------------------------------------------------- crossings
@@ -414,6 +437,17 @@ def test_a_window_of_a_256th_of_a_step_is_found_wherever_it_lies(
     half = 0.51 / 256
     place, _ = _first(lambda t: sign * ((t - middle) ** 2 - half**2))
     assert place == pytest.approx(middle - half, abs=1e-11)
+
+
+def test_a_margin_that_is_never_quiet_is_looked_at_in_every_512th_of_a_step_and_no_more() -> None:
+    def rough(t: float, window: float) -> float:
+        halvings = Fraction(t).denominator.bit_length() - 1
+        return 1.0 if abs(t - window) < 1e-9 else -1.0 if halvings % 2 else -1e-3
+
+    for k in range(1, 512, 2):
+        place, _ = _first(lambda t, k=k: rough(t, k / 512))
+        assert place == pytest.approx(k / 512, abs=1.1e-9)
+    assert _first(lambda t: rough(t, 2.0)) == (NO_CHANGE, 512)  # the end, and 511 between
 
 
 def test_of_two_windows_the_earlier_counts_though_the_later_is_seen_first() -> None:
@@ -627,6 +661,10 @@ def test_an_adaptive_step_with_an_early_crossing_is_done_again_up_to_it() -> Non
     assert t == pytest.approx(0.2, abs=1e-12)
     assert max(run.asked) >= 0.5
     assert max(run.asked[-6:]) <= 0.2 + 1e-12  # no stage of the step kept lies behind it
+    later = _Run(lambda t, y: 1.0, lambda t, y: t - 0.9)  # after a quiet step in the same call
+    assert later.to(2.0, h=0.1)[1] == pytest.approx(0.9, abs=1e-12)
+    assert later.rows[0] == 0.1
+    assert max(later.asked[-6:]) <= 0.9 + 1e-12
     late = _Run(lambda t, y: math.cos(t), lambda t, y: t - 0.097)
     late.to(2.0, h=0.1)
     assert max(late.asked[-6:]) == 0.1  # near the step's end it is kept
@@ -649,6 +687,10 @@ def test_an_infinite_slope_and_a_step_of_nothing_are_told_apart() -> None:
     status, t, _, _ = _Run(wall).to(1.0)
     assert status == kernel.NOT_FINITE
     assert t == pytest.approx(0.5, abs=1e-9)
+    # Only the slope at the step's end is infinite: no stage has that y.
+    cliff = _Run(lambda t, y: math.inf if 0.778 < y < 0.779 else -y, step=0.25)
+    assert cliff.to(1.0)[:2] == (kernel.NOT_FINITE, 0.0)
+    assert _Run(t=1.0).to(2.0, h=1e-30)[:2] == (kernel.TOO_SMALL, 1.0)
     blind = _Run(lambda t, y: 1e200 * math.sin(1e30 * t), tolerance=1e-12)
     assert blind.to(1.0)[0] == kernel.TOO_SMALL
 

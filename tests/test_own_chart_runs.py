@@ -340,3 +340,17 @@ def test_states_and_edges_may_differ_by_case_only(
     except ChartError:
         return
     _equal_but_for_names(model, plain)
+
+
+def test_a_chart_without_the_input_s_needs_no_curve_and_one_element_is_enough() -> None:
+    chart = Chart(
+        "end stop", ("v",), ("z",), ("k", "w"),
+        (State("free", {"z": "v"}), State("blocked", {"z": "0"})),
+        (Transition("stop", "free", "blocked", guard="z >= w and v > 0"),
+         Transition("leave", "blocked", "free", guard="v < 0")),
+        {"F": "k * z"},
+    )  # fmt: skip
+    trace = simulate(ChartModel(chart, {"k": 2.0, "w": 0.5}), Prescribed("sin(t)"), 6.0)
+    assert trace.n == 1
+    assert trace.transitions.edge.tolist() == ["stop", "leave"]
+    np.testing.assert_allclose(trace.transitions.t, [math.acos(0.5), math.pi], atol=1e-8)

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from gms_fsm import LuGre, Prescribed, Stribeck
+from gms_fsm import Chart, ChartModel, LuGre, Prescribed, State, Stribeck, Transition
 from plots import figures, panels
 from tests.helpers import FIG4_SINE, non_drifting, open_loop, pulled_mass, stick_slip
 
@@ -77,7 +77,22 @@ def test_lugre_has_no_threshold(lugre: Trace, ax: Axes) -> None:
     assert len(panels.ratio(ax, lugre)) == 1
     assert ax.get_ylabel() == "z / s(v) [mm/N]"
     (note,) = panels.margins(ax, lugre)
-    assert "no threshold" in note.get_text()
+    assert "no threshold:\nthis chart has no edges" in note.get_text()
+
+
+def test_a_chart_that_does_not_know_s_is_not_held_against_it(ax: Axes) -> None:
+    stop = Chart(
+        "stop", ("v",), ("d",), ("k",), (State("free", {"d": "v"}), State("blocked", {"d": "0"})),
+        (Transition("stop", "free", "blocked", guard="d >= 0.5"),), {"F": "k * d"},
+    )  # fmt: skip
+    trace = simulate(ChartModel(stop, {"k": 2.0}), Prescribed("0.4"), 2.0)
+    (line,) = panels.ratio(ax, trace)
+    assert drawn(line)[1].max() == pytest.approx(0.5)
+    assert ax.get_ylabel() == "d [m]"
+    (note,) = panels.margins(ax, trace)
+    assert "no threshold:\nthis chart has no input s" in note.get_text()
+    names = [text.get_text() for a in figures.ribbons_figure(trace).axes for text in a.texts]
+    assert not any("threshold ratio" in name for name in names)
 
 
 @pytest.mark.parametrize("panel", [panels.deflections, panels.ratio, panels.margins])

@@ -81,6 +81,11 @@ def test_claims_say_what_we_chose_and_how_far_the_engines_agree(folder: Path) ->
     assert paper.VELOCITY in text
     assert re.search(r"\*\*0 of \d{5} numbers differ\*\*", text)
     assert "eigenvalue +C/s" in text
+    claims, holds, condition, differ = map(int, re.findall(
+        r"(\d+) claims: (\d+) hold, (\d+) hold under a condition, (\d+) differ", text)[0]
+    )  # fmt: skip
+    assert claims == holds + condition + differ == text.count("| **")
+    assert (holds, condition) == (text.count("| **holds** |"), text.count("| **holds only"))
 
 
 def test_figures_are_whole_and_small(folder: Path) -> None:

@@ -204,6 +204,7 @@ def test_a_quotient_counts_only_where_its_denominator_is_not_0() -> None:
     (finding,) = prove(chart(go="z / v >= 1")).of("livelock")
     assert finding.status == "undecided"
     assert "v can be 0" in finding.text
+    assert "domain=['v > 0', ...]" in finding.text
     assert prove(chart(go="z / v >= 1"), ["v > 0", "s > 0"]).of("livelock")[0].status == "refuted"
 
 

@@ -186,3 +186,11 @@ def test_wrong_options_are_refused() -> None:
     for elements in ([], [0, 0], [-1], [0, 1.5], "01", None):
         with pytest.raises(ParameterError, match=r"elements is .*; (it must be|a chart has)"):
             statechart(LUGRE, elements)  # type: ignore[arg-type]
+
+
+def test_names_of_edges_are_written_when_asked_for(tmp_path: Path) -> None:
+    shown = {"".join(box.texts) for box in drawn(statechart(SIGNED), tmp_path).values()}
+    named = {"".join(box.texts) for box in drawn(statechart(SIGNED, names=True), tmp_path).values()}
+    for edge in SIGNED.transitions:
+        assert not any(edge.name in text for text in shown)
+        assert any(edge.name in text and "[" in text for text in named)
