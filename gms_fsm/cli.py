@@ -383,9 +383,9 @@ def debug_command(
     ] = None,
 ) -> None:
     """Step through a scenario at the terminal: break, why, back, poke, compare."""
-    from gms_fsm.debugger import run_debugger
+    from gms_fsm.debugger import run_debugger, scenario_to_debug
 
-    raise typer.Exit(run_debugger(load_scenario(scenario, overrides or [])))
+    raise typer.Exit(run_debugger(scenario_to_debug(scenario, overrides or [])))
 
 
 @app.command("lesson")

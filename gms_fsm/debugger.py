@@ -11,32 +11,31 @@ import difflib
 import io
 import os
 import re
+import string
 import sys
 import textwrap
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
 from gms_fsm.errors import GMSError, ScenarioError, SessionError
-from gms_fsm.explain import Clause, Explanation
+from gms_fsm.explain import UNITS, Explanation, holds
 from gms_fsm.expression import evaluate
-from gms_fsm.scenario import Loaded
+from gms_fsm.scenario import Loaded, load_scenario
 from gms_fsm.session import KINDS, Branch, Breakpoint, Session
 
-__all__ = ["Debugger", "run_debugger"]
+__all__ = ["Debugger", "run_debugger", "scenario_to_debug"]
 
 WIDTH = 80
 BAR = 8  # characters of |z|/s = 1
-ROUNDING = 1e-8  # a margin this small beside both sides is the clock's and the floats', not physics
-UNITS = {"t": "s", "x": "m", "v": "m/s", "v_c": "m/s", "z": "m", "s": "m"}
 
 
 # --------------------------------------------------------------------------- the commands
 @dataclass(frozen=True)
 class Command:
-    """What the help says of a command."""
+    """What the help says of a command; `Debugger.help_of` fills the braces with a chart's names."""
 
     group: str
     usage: str
@@ -48,15 +47,16 @@ class Command:
 COMMANDS = {
     "where": Command(
         "look", "where",
-        "Everything on one screen: each element's state, z, s, |z|/s, force, and its edges by "
-        "priority with a mark a clause; below, the states over time.",
+        "Everything on one screen: each element's state, variables, threshold s and |{z}|/s if it "
+        "has one, force, and its edges by priority with a mark a clause; below, the states over "
+        "time.",
         ("where",), "w",
     ),
     "why": Command(
-        "look", "why [ELEMENT]",
+        "look", "why [ELEMENT] [EDGE]",
         "Say why the edges of an element fire or do not, clause by clause: both sides, the margin "
-        "(negative: on the false side), and the truth.",
-        ("why", "why 2"),
+        "(negative: on the false side), and the truth. With an edge's name, that one alone.",
+        ("why", "why {n}", "why {n} {leaving}"),
     ),
     "list": Command(
         "look", "list",
@@ -67,17 +67,18 @@ COMMANDS = {
     "print": Command(
         "look", "print EXPRESSION",
         "The value of an expression or the truth of a condition. Names: t, x, v, F, s, and with an "
-        "element's number z1, s1, F1, state(1).",
-        ("print z1 / s1", "p state(2) == slip"), "p",
+        "element's number {numbered}, s1, F1, state(1).",
+        ("print {z}1 / {s}1", "p state({n}) == {state}"), "p",
     ),
     "watch": Command(
         "look", "watch [EXPRESSION]",
-        "Show an expression after every move; alone, show all watches.", ("watch abs(z1) / s1",),
+        "Show an expression after every move; alone, show all watches.",
+        ("watch F{n}", "watch abs({z}1) / {s}1"),
     ),
     "unwatch": Command("look", "unwatch N|all", "Take a watch away.", ("unwatch 1",)),
     "element": Command(
         "look", "element N",
-        "Choose the element that list and why show; counted from 1.", ("element 2",),
+        "Choose the element that list and why show; counted from 1.", ("element {n}",),
     ),
     "step": Command(
         "move", "step [N]",
@@ -88,12 +89,12 @@ COMMANDS = {
     "next": Command("move", "next", "Go forward to the next transition.", ("next",), "n"),
     "prev": Command("move", "prev", "Go back to the transition before.", ("prev",)),
     "goto": Command(
-        "move", "goto T", "Go to the last row at or before a time, in seconds.", ("goto 25",)
+        "move", "goto T", "Go to the last row at or before a time, in seconds.", ("goto {t}",)
     ),
     "until": Command(
         "move", "until CONDITION",
         "Go forward to where a condition next becomes true, also between two rows.",
-        ("until abs(z1) > 0.3", "u state(2) == slip and v < 0"), "u",
+        ("until abs({z}1) > 0.9*{s}1", "u state({n}) == {state} and v > 0"), "u",
     ),
     "continue": Command(
         "move", "continue", "Go forward to the next breakpoint that hits, or the end.",
@@ -106,15 +107,16 @@ COMMANDS = {
         "it is taken (fires, also if left out); where a state is entered (also if left out) or "
         "left. The condition is looked at after the event; K: stop from the K-th hit on. Alone, "
         "show all breakpoints.",
-        ("break fires break_away_backward element 2", "b enter slip if v < 0 hits 3"), "b",
+        ("break fires {edge} element {n}", "b enter {state} if v < 0 hits 3"), "b",
     ),
     "breaks": Command("stop", "breaks", "Show all breakpoints and their hits.", ("breaks",)),
     "clear": Command("stop", "clear N|all", "Take a breakpoint away.", ("clear 1",)),
     "poke": Command(
-        "change", "poke z1=VALUE v=VALUE state1=STATE ...",
-        "Change values here and go on in a new branch; the present one stays as it is. A value can "
-        "be an expression without blanks. v only where the rig has a mass.",
-        ("poke z1=-0.3", "poke z2=0.9*s2 state2=stick"),
+        "change", "poke {z}1=VALUE v=VALUE state1=STATE ...",
+        "Change values here and go on in a new branch; the present one stays as it is. What can be "
+        "changed: {numbered}, state1, likewise of the other elements, and v where the rig has a "
+        "mass. A value can be an expression without blanks.",
+        ("poke {z}1=0", "poke {z}{n}=0.9*{s}{n} state{n}={state}"),
     ),
     "run": Command("change", "run", "Compute this branch to its end; stay here.", ("run",)),
     "branches": Command("change", "branches", "Show all branches.", ("branches",)),
@@ -137,7 +139,7 @@ COMMANDS = {
 ALIASES = {each.alias: name for name, each in COMMANDS.items() if each.alias} | {"?": "help"}
 MOVES = ("step", "back", "next", "prev", "until", "continue")
 OVERVIEW = """\
-To find out why an element switches or does not:  goto 25   then   why 1
+To find out why an element switches or does not:  goto {t}   then   why 1
 
 {groups}
 
@@ -166,26 +168,35 @@ WORDS = {"true": "32", "false": "31", "fired": "1", "FIRED": "1", "error:": "1;3
 
 
 class Debugger(cmd.Cmd):
-    """Reads commands and shows a session.
+    r"""Reads commands and shows a session: ``Debugger(Session(model, rig, t_end)).run()``.
 
     Parameters
     ----------
     session : Session
         What is walked.
-    title : str
-        Said at the start.
+    title : str, optional
+        Said by `run` before the titles of the model and the rig.
     stdin, stdout : text files, optional
         The terminal when left out. Commands that do not come from a terminal are echoed, so that a
         transcript reads well.
 
     Examples
     --------
+    At a terminal ``Debugger(session).run()`` asks for commands. Here they come from a text:
+
     >>> import io
     >>> from gms_fsm import GMS, GMSParameters, Prescribed
     >>> session = Session(GMS(GMSParameters.paper("stick-slip"), law="published"),
     ...                   Prescribed("0.15*sin(2*pi*t/25)"), 100.0)
     >>> print(Debugger(session).reply("print s1"))
     1.5
+    >>> code = Debugger(session, stdin=io.StringIO("next\nquit\n")).run()
+    GMS, 4 elements, published law; prescribed velocity, to t = 100 s
+    help shows the commands, where shows everything, quit leaves.
+    (t=0.0000 s) next
+    row 17, t = 4.91276067 s, micro-step 1: v = 0.141608 m/s, F = 1.34657 N
+      element 1: stick -> slip by break_away_forward
+    (t=4.9128 s) quit
     """
 
     def __init__(
@@ -212,7 +223,7 @@ class Debugger(cmd.Cmd):
 
     # ------------------------------------------------------------------ the loop
     def run(self) -> int:
-        """Read and answer until `quit` or the end of input.
+        """Greet, then read and answer until `quit` or the end of input.
 
         Returns
         -------
@@ -336,15 +347,65 @@ class Debugger(cmd.Cmd):
                 short = f"{name} ({each.alias})" if each.alias else name
                 groups.setdefault(each.group, []).append(short)
             lines = [f"  {group:<8}{'  '.join(names)}" for group, names in groups.items()]
-            self.say(OVERVIEW.format(groups="\n".join(lines)))
+            self.say(OVERVIEW.format(groups="\n".join(lines), **self._names()))
             return
         name = ALIASES.get(arg, arg)
         if name not in COMMANDS:
             raise SessionError(f"no command {arg!r}; help lists them")
-        each = COMMANDS[name]
+        each = self.help_of(name)
         alias = f"   (short: {each.alias})" if each.alias else ""
         self.say(f"{each.usage}{alias}\n{each.says}")
         self.say("\n".join(f"  example: {example}" for example in each.examples))
+
+    def help_of(self, name: str) -> Command:
+        """Return what the help says of a command, with the names of this session.
+
+        Parameters
+        ----------
+        name : str
+            A command.
+
+        Returns
+        -------
+        Command
+            Without braces; an example that needs what the chart lacks is left out.
+        """
+        each, names = COMMANDS[name], self._names()
+        examples = [
+            example.format_map(names)
+            for example in each.examples
+            if all(field in (None, *names) for _, field, *_ in string.Formatter().parse(example))
+        ]
+        usage, says = each.usage.format_map(names), each.says.format_map(names)
+        return Command(each.group, usage, says, tuple(examples), each.alias)
+
+    def _names(self) -> dict[str, str]:
+        """Return what stands for the braces of the help, as far as the chart has it."""
+        session, chart = self.session, self.session.model.chart
+        start, n = session.branch.raw(0)[0], min(2, session.model.n)
+        names = {
+            "t": f"{start + 0.25 * (session.t_end - start):.9g}",
+            "n": str(n),
+            "z": chart.variables[0],
+            "numbered": ", ".join(f"{name}1" for name in chart.variables),
+            "state": chart.states[0].name,
+        }
+        if "s" in chart.inputs:
+            names["s"] = "s"
+        if chart.transitions:
+            names |= {"edge": chart.transitions[0].name, "state": chart.transitions[0].target}
+        for each in session.why(n - 1):
+            names.setdefault("leaving", each.edge.name)
+        return names
+
+    def _usage(self, name: str) -> str:
+        each = self.help_of(name)
+        return f"usage: {each.usage}, for example: {each.examples[-1]}"
+
+    def _path(self, name: str, text: str) -> Path:
+        if not text:
+            raise SessionError(f"a file name is missing; {self._usage(name)}")
+        return Path(text.strip("\"'")).expanduser()
 
     def completenames(self, text: str, *_: object) -> list[str]:
         """Complete a command."""
@@ -361,23 +422,21 @@ class Debugger(cmd.Cmd):
 
     def _words(self, name: str, before: str) -> Sequence[str]:
         chart, session = self.session.model.chart, self.session
-        states = [state.name for state in chart.states]
+        states, edges = self._states, self._edges
         elements = [str(i + 1) for i in range(session.model.n)]
         names = [*session.names, *(f"state({i})" for i in elements)]
         if before.endswith("="):
             return states
         match name:
             case "break":
-                edges = [edge.name for edge in chart.transitions]
                 return [*KINDS, *edges, *states, "element", "if", "hits", *names]
             case "until" | "print" | "watch":
                 return [*names, *states]
             case "poke":
-                return [
-                    *(f"{u}{i}=" for u in (chart.variables[0], "state") for i in elements),
-                    "v=",
-                ]
-            case "why" | "element":
+                return [*(f"{u}{i}=" for u in (*chart.variables, "state") for i in elements), "v="]
+            case "why":
+                return [*elements, *edges]
+            case "element":
                 return elements
             case "help":
                 return list(COMMANDS)
@@ -389,10 +448,27 @@ class Debugger(cmd.Cmd):
                 return [*(str(i + 1) for i in range(len(session.watches))), "all"]
         return ()
 
+    @property
+    def _states(self) -> list[str]:
+        return [state.name for state in self.session.model.chart.states]
+
+    @property
+    def _edges(self) -> list[str]:
+        return [edge.name for edge in self.session.model.chart.transitions]
+
     # ------------------------------------------------------------------ moving
+    def _ahead(self) -> None:
+        """Refuse to go forward from the end."""
+        branch = self.session.branch
+        last = branch.between is None and branch.cursor + 1 == len(branch)
+        if last and not branch.pull() and branch.outcome == "end":
+            raise SessionError("this is the end of the run; go back first")
+
     def do_step(self, arg: str) -> None:
         """Go forward."""
-        self.session.step(_count("step", arg))
+        count = _count("step", arg)
+        self._ahead()
+        self.session.step(count)
         self._show()
 
     def do_back(self, arg: str) -> None:
@@ -403,7 +479,9 @@ class Debugger(cmd.Cmd):
     def do_next(self, arg: str) -> None:
         """Go to the next transition."""
         _nothing("next", arg)
-        self.session.next_transition()
+        self._ahead()
+        if self.session.next_transition().fired is None:
+            self.say("no transition before the end")
         self._show()
 
     def do_prev(self, arg: str) -> None:
@@ -417,7 +495,7 @@ class Debugger(cmd.Cmd):
         try:
             t = float(arg.removesuffix("s"))
         except ValueError:
-            raise SessionError(f"{arg!r} is no time; {_usage('goto')}") from None
+            raise SessionError(f"{arg!r} is no time; {self._usage('goto')}") from None
         try:
             self.session.goto(t)
         except KeyboardInterrupt:
@@ -428,15 +506,32 @@ class Debugger(cmd.Cmd):
     def do_until(self, arg: str) -> None:
         """Go to where a condition becomes true."""
         if not arg:
-            raise SessionError(f"a condition is missing; {_usage('until')}")
-        here = self.session.until(arg)
-        if not here.located and not self._truth(arg):
-            self.say("it does not become true before the end")
+            raise SessionError(f"a condition is missing; {self._usage('until')}")
+        condition, session, branch = self._with_states(arg), self.session, self.session.branch
+        already = holds(session.parse(condition), session.values())
+        self._ahead()
+        start = branch.cursor, branch.between
+        if not session.reaches(condition):
+            if already:
+                branch.cursor, branch.between = start
+                self.say("it is true here already and does not become true again; until waits for "
+                         "it to become true")  # fmt: skip
+            else:
+                self.say("it does not become true before the end")
         self._show()
+
+    def _with_states(self, condition: str) -> str:
+        """Return a condition with the states' own capitals."""
+        return re.sub(
+            r"(\bstate\b\s*(?:\(\s*\d+\s*\)\s*)?[=!]=\s*)(\w+)",
+            lambda found: found[1] + _spelt(found[2], self._states),
+            condition,
+        )
 
     def do_continue(self, arg: str) -> None:
         """Go to the next breakpoint."""
         _nothing("continue", arg)
+        self._ahead()
         _, point = self.session.proceed()
         if point is None:
             self.say("no breakpoint hit" if self.session.breakpoints else "no breakpoint is set")
@@ -456,13 +551,7 @@ class Debugger(cmd.Cmd):
     # ------------------------------------------------------------------ looking
     def _show(self) -> None:
         """Say where we are, after a move."""
-        here, branch = self.session.here, self.session.branch
-        place = f"between rows {here.row} and {here.row + 1}" if here.located else f"row {here.row}"
-        step = f", micro-step {here.microstep}" if here.microstep else ""
-        self.say(f"{place}, t = {here.t:.9g} s{step}: v = {here.v:.6g} m/s, F = {here.F:.6g} N")
-        if here.microstep:
-            _, i, edge, source, target = branch.fired(here.row)[:5]
-            self.say(f"  element {i + 1}: {source} -> {target} by {edge}")
+        self.say(str(self.session.here))
         self._say_outcome()
         if self.session.watches:
             self.do_watch("")
@@ -485,28 +574,48 @@ class Debugger(cmd.Cmd):
         self.say(f"t = {here.t:.9g} s, row {here.row}{step}, branch {session.current}")
         self.say(f"v = {here.v:.6g} m/s, x = {here.x:.6g} m, F = {here.F:.6g} N")
         self._say_outcome()
-        names = [state.name for state in session.model.chart.states]
-        wide = max(5, min(8, max(map(len, names))))
-        bar = " " * (BAR + 2)
-        head = (
-            f"  el  {'state':<{wide}} {'z [m]':>10} {'s [m]':>9} {'|z|/s':>7} {bar} {'F_i [N]':>10}"
-        )
-        self.say(f"{head}  edges")
+        wide = max(5, min(8, max(map(len, self._states))))
+        self.say("  ".join(["  el", " ".join([f"{'state':<{wide}}", *self._heads()]), "edges"]))
         for i in range(session.model.n):
-            z, s = here.z[i], here.s[i]
-            ratio = abs(z) / s
-            shown = f"{ratio:.3f}" if ratio < 100 else f"{ratio:.1e}"
-            line = (
-                f"{'>' if i == self.element else ' '}{i + 1:>3}  "
-                f"{_short(here.states[i], wide):<{wide}} {z:>10.4g} {s:>9.4g} {shown:>7} "
-                f"{self._bar(ratio)} {here.F_elements[i]:>10.4g}  "
-            )
-            self.say(_short(line + self._edge_marks(i), WIDTH))
+            lead = f"{'>' if i == self.element else ' '}{i + 1:>3}  "
+            line = lead + " ".join([f"{_short(here.states[i], wide):<{wide}}", *self._cells(i)])
+            marks = self._edge_marks(i)
+            if len(line) + 2 + len(marks) <= WIDTH:
+                self.say(f"{line}  {marks}")
+            else:
+                self.say(f"{line}\n      {marks}")
         no, yes = tuple(self.marks.truth)
         self.say(
             f"edges by priority, a mark a clause: {yes} true, {no} false, * just taken; see why"
         )
         self.say("\n".join(self._ribbons()))
+
+    def _heads(self) -> list[str]:
+        """Return the headings of a line of `where`, as wide as `_cells`."""
+        chart = self.session.model.chart
+        names = [f"{name} [{UNITS[name]}]" if name in UNITS else name for name in chart.variables]
+        heads = [f"{_short(name, 10):>10}" for name in names]
+        if "s" in chart.inputs:
+            heads += [f"{'s [m]':>9}", f"{_short(f'|{chart.variables[0]}|/s', 7):>7}"]
+            if len(names) == 1:
+                heads.append(" " * (BAR + 2))
+        return [*heads, f"{'F_i [N]':>10}"]
+
+    def _cells(self, i: int) -> list[str]:
+        """Return an element's numbers: variables, threshold and ratio if it has one, force.
+
+        A bar shows the ratio where further variables do not need its place.
+        """
+        session, here = self.session, self.session.here
+        chart, values = session.model.chart, session.values()
+        cells = [f"{values[f'{name}{i + 1}']:>10.4g}" for name in chart.variables]
+        if "s" in chart.inputs:
+            ratio = abs(here.z[i]) / here.s[i]
+            shown = f"{ratio:.3f}" if ratio < 100 else f"{ratio:.1e}"
+            cells += [f"{here.s[i]:>9.4g}", f"{shown:>7}"]
+            if len(chart.variables) == 1:
+                cells.append(self._bar(ratio))
+        return [*cells, f"{here.F_elements[i]:>10.4g}"]
 
     def _bar(self, ratio: float) -> str:
         empty, full = tuple(self.marks.bar)
@@ -552,25 +661,21 @@ class Debugger(cmd.Cmd):
 
     def do_why(self, arg: str) -> None:
         """Explain the guards of an element."""
-        i = self._element(arg) if arg else self.element
-        here, found = self.session.here, self.session.why(i)
-        fired = next((each for each in found if each.fired), None)
-        self.say(f"element {i + 1} is in {here.states[i]} at t = {here.t:.9g} s")
-        if fired is not None:
-            self.say(f"it has just left {fired.edge.source}; values are those before that")
-        if not found:
-            self.say("no edge leaves this state")
-        holding = next((each for each in found if each.holds), None)
-        for each in found:
-            self.say(_verdict(each, fired, holding))
-        for each in found:
-            self.say(
-                f"  {each.priority} {each.edge.name}: {each.edge.source} -> {each.edge.target}"
-            )
-            wide = max(len(clause.text) for clause in each.clauses)
-            for clause in each.clauses:
-                self.say(f"    {'true ' if clause.holds else 'false'}  {clause.text:<{wide}}"
-                         f"{_sides(clause)}")  # fmt: skip
+        i, edge, words = self.element, "", arg.split()
+        if words and words[0].isdigit():
+            i = self._element("why", words.pop(0))
+        if words:
+            edge = _spelt(words.pop(0), self._edges)
+            if edge not in self._edges or words:
+                raise SessionError(
+                    f"{' '.join([edge, *words])!r} is no edge; there are "
+                    f"{', '.join(self._edges) or 'none'}; {self._usage('why')}"
+                )
+        found, branch = self.session.why(i, edge), self.session.branch
+        self.say(str(found))
+        if found.left and not edge and (branch.cursor + 1 < len(branch) or branch.pull()):
+            which = "" if i == self.element else f" {i + 1}"
+            self.say(f"step, then why{which}: the edges that leave {found.state}")
 
     def do_list(self, arg: str) -> None:
         """Draw the chart."""
@@ -598,16 +703,14 @@ class Debugger(cmd.Cmd):
         if not rows:
             self.say("no transition up to here")
         for row in rows[-count:]:
-            t, i, edge, source, target = branch.fired(row)[:5]
-            self.say(f"  t = {t:<12.9g} s  row {row:<5} element {i + 1:<3} {source} -> {target} "
-                     f"by {edge}")  # fmt: skip
+            self.say(f"  t = {branch.raw(row)[0]:<12.9g} s  row {row:<5} {branch.fired(row)}")
         if len(rows) > count:
             self.say(f"  ({len(rows) - count} before these)")
 
     def do_print(self, arg: str) -> None:
         """Show a value."""
         if not arg:
-            raise SessionError(f"an expression is missing; {_usage('print')}")
+            raise SessionError(f"an expression is missing; {self._usage('print')}")
         self.say(self._value(arg))
 
     def _value(self, text: str) -> str:
@@ -616,7 +719,7 @@ class Debugger(cmd.Cmd):
         return f"{self.session.watch(text):.9g}"
 
     def _truth(self, text: str) -> bool:
-        tree = self.session.parse(text)
+        tree = self.session.parse(self._with_states(text))
         try:
             return bool(evaluate(tree, self.session.values()))
         except (ArithmeticError, ValueError) as error:
@@ -643,11 +746,11 @@ class Debugger(cmd.Cmd):
 
     def do_element(self, arg: str) -> None:
         """Choose an element."""
-        self.element = self._element(arg)
+        self.element = self._element("element", arg)
         self.say(f"element {self.element + 1} is in {self.session.here.states[self.element]}")
 
-    def _element(self, text: str) -> int:
-        number = _whole(text, "element N")
+    def _element(self, command: str, text: str) -> int:
+        number = _whole(text, self.help_of(command).usage)
         if not 1 <= number <= self.session.model.n:
             raise SessionError(f"no element {number}; there are 1 to {self.session.model.n}")
         return number - 1
@@ -664,19 +767,20 @@ class Debugger(cmd.Cmd):
             arg,
         )
         if form is None:
-            raise SessionError(f"{arg!r} is no breakpoint; {_usage('break')}")
+            raise SessionError(f"{arg!r} is no breakpoint; {self._usage('break')}")
         kind, name, element, condition, hits = form.groups()
-        states = [state.name for state in self.session.model.chart.states]
-        edges = [edge.name for edge in self.session.model.chart.transitions]
-        if name not in (*states, *edges):
+        states, edges = self._states, self._edges
+        asked = {None: states + edges, "enter": states, "leave": states}.get(kind, edges)
+        name = _spelt(name, asked)
+        if name not in states + edges:
             raise SessionError(
                 f"no edge or state {name!r}; edges: {', '.join(edges) or 'none'}; "
                 f"states: {', '.join(states)}"
             )
         point = self.session.break_on(
             kind or ("enter" if name in states else "fires"), name,
-            None if element in (None, "all") else self._element(element),
-            condition or "", _whole(hits, "hits K") if hits else 1,
+            None if element in (None, "all") else self._element("break", element),
+            self._with_states(condition or ""), _whole(hits, "hits K") if hits else 1,
         )  # fmt: skip
         self.say(f"breakpoint {len(self.session.breakpoints)}: {_described(point)}")
 
@@ -705,29 +809,46 @@ class Debugger(cmd.Cmd):
     # ------------------------------------------------------------------ branches
     def do_poke(self, arg: str) -> None:
         """Change values in a new branch."""
-        variable = self.session.model.chart.variables[0]
-        z: dict[int, float] = {}
+        variables: dict[str, dict[int, float]] = {}
         states: dict[int, str] = {}
         v: float | None = None
         for part in re.sub(r"\s*=\s*", "=", arg).split():
-            name, equals, value = part.partition("=")
-            form = re.fullmatch(rf"({re.escape(variable)}|state)(\d+)", name)
-            if not equals or not value or (form is None and name != "v"):
-                raise SessionError(f"{part!r} cannot be poked; {_usage('poke')}")
-            if form is None:
+            name, _, value = part.partition("=")
+            if name == "v" and value:
                 v = self.session.watch(value)
-            elif form[1] == variable:
-                z[self._element(form[2])] = self.session.watch(value)
+                continue
+            what, i = self._pokeable(name)
+            if not value or not what:
+                raise SessionError(f"{part!r} cannot be poked; {self._usage('poke')}")
+            if what == "state":
+                states[i] = _spelt(value, self._states)
             else:
-                states[self._element(form[2])] = value
+                variables.setdefault(what, {})[i] = self.session.watch(value)
         parent = self.session.current
-        number = self.session.poke(z, v, states)
+        number = self.session.poke(variables, v, states)
         self.say(f"branch {number}, from branch {parent}: {self._edits(self.session.branch)}")
         self._show()
 
-    def _edits(self, branch: Branch) -> str:
-        edits, variable = branch.edits, self.session.model.chart.variables[0]
-        parts = [f"{variable}{i + 1} = {value:.6g}" for i, value in edits.get("z", {}).items()]
+    def _pokeable(self, name: str) -> tuple[str, int]:
+        """Return variable (or 'state') and element; an empty text for another name."""
+        known = (*self.session.model.chart.variables, "state")
+        form = re.fullmatch(rf"({'|'.join(map(re.escape, known))})(\d*)", name)
+        if form is None:
+            return "", 0
+        if form[2]:
+            return form[1], self._element("poke", form[2])
+        if self.session.model.n > 1:
+            raise SessionError(f"{name!r} cannot be poked; for element 1 write {name}1")
+        return form[1], 0
+
+    @staticmethod
+    def _edits(branch: Branch) -> str:
+        edits = branch.edits
+        parts = [
+            f"{name}{i + 1} = {value:.6g}"
+            for name, values in edits.get("variables", {}).items()
+            for i, value in values.items()
+        ]
         if edits.get("v") is not None:
             parts.append(f"v = {edits['v']:.6g}")
         parts += [f"state {i + 1} = {name}" for i, name in edits.get("state", {}).items()]
@@ -767,12 +888,12 @@ class Debugger(cmd.Cmd):
         if arg:
             numbers = [_whole(text, "compare A B") for text in arg.split()]
             if len(numbers) != 2:
-                raise SessionError(f"two branches are needed; {_usage('compare')}")
+                raise SessionError(f"two branches are needed; {self._usage('compare')}")
             a, b = numbers
         else:
             parent = self.session.branch.parent
             if parent is None:
-                raise SessionError(f"branch 0 has no parent; {_usage('compare')}")
+                raise SessionError(f"branch 0 has no parent; {self._usage('compare')}")
             a, b = parent, self.session.current
         found = self.session.compare(a, b)
         p, q = found.transitions
@@ -788,7 +909,7 @@ class Debugger(cmd.Cmd):
 
     def do_plot(self, arg: str) -> None:
         """Draw branches."""
-        path = _path("plot", arg)
+        path = self._path("plot", arg)
         if path.suffix not in (".png", ".svg", ".pdf"):
             raise SessionError(f"{arg!r} must end in .png, .svg or .pdf")
         from plots import figures
@@ -804,11 +925,11 @@ class Debugger(cmd.Cmd):
 
     def do_save(self, arg: str) -> None:
         """Write the session."""
-        self.say(f"written to {self.session.save(_path('save', arg))}")
+        self.say(f"written to {self.session.save(self._path('save', arg))}")
 
     def do_load(self, arg: str) -> None:
         """Read a session."""
-        self.session = Session.load(_path("load", arg))
+        self.session = Session.load(self._path("load", arg))
         self.element = min(self.element, self.session.model.n - 1)
         self.say(f"{self.session.model.title}, {len(self.session.branches)} branches")
         self._show()
@@ -820,11 +941,6 @@ class Debugger(cmd.Cmd):
 
 
 # --------------------------------------------------------------------------- reading arguments
-def _usage(name: str) -> str:
-    each = COMMANDS[name]
-    return f"usage: {each.usage}, for example: {each.examples[-1]}"
-
-
 def _whole(text: str, usage: str) -> int:
     if not re.fullmatch(r"\d{1,9}", text):
         raise SessionError(f"{text!r} is no whole number; usage: {usage}")
@@ -843,10 +959,10 @@ def _nothing(name: str, arg: str) -> None:
         raise SessionError(f"{name} takes no argument, it got {arg!r}")
 
 
-def _path(name: str, text: str) -> Path:
-    if not text:
-        raise SessionError(f"a file name is missing; {_usage(name)}")
-    return Path(text.strip("\"'")).expanduser()
+def _spelt(name: str, known: Iterable[str]) -> str:
+    """Return the known name that is the same but for capitals; the name as it is if in doubt."""
+    same = [each for each in known if each.casefold() == name.casefold()]
+    return same[0] if len(same) == 1 else name
 
 
 # --------------------------------------------------------------------------- wording
@@ -869,50 +985,6 @@ def _described(point: Breakpoint) -> str:
     return f"{point.kind} {point.name}, {who}{condition}{hits}"
 
 
-def _unit(clause: Clause) -> str:
-    """Return the unit of a clause's margin where its names leave no doubt."""
-    units = {UNITS.get(name, "?") for name in re.findall(r"[A-Za-z_]\w*", clause.text)}
-    plain = not set(clause.text) & set("*/^()")
-    return f" {units.pop()}" if plain and len(units) == 1 and "?" not in units else ""
-
-
-def _sides(clause: Clause) -> str:
-    if not clause.computable:
-        return "  cannot be computed here"
-    if clause.margin != clause.margin:  # compound: no two sides
-        return ""
-    return (
-        f"  left {clause.left:<11.5g} right {clause.right:<11.5g} margin "
-        f"{_amount(clause, signed=True)}"
-    )
-
-
-def _amount(clause: Clause, *, signed: bool) -> str:
-    if abs(clause.margin) <= ROUNDING * max(abs(clause.left), abs(clause.right)):
-        return "0 (rounding)"
-    return f"{clause.margin if signed else abs(clause.margin):{'+' if signed else ''}.3g}" + _unit(
-        clause
-    )
-
-
-def _verdict(each: Explanation, fired: Explanation | None, holding: Explanation | None) -> str:
-    """Say in one sentence why an edge fires or does not."""
-    name = each.edge.name
-    if each.fired:
-        return f"{name} fired here: every clause was true."
-    if each.holds:
-        other = fired or holding
-        if other is not None and other is not each:
-            return f"{name} does not fire: its guard is true, but {other.edge.name} goes first."
-        return f"{name} fires next: every clause is true."
-    parts = []
-    for clause in each.clauses:
-        if not clause.holds:
-            by = "" if clause.margin != clause.margin else f" by {_amount(clause, signed=False)}"
-            parts.append(f"{clause.text} is false{by}")
-    return f"{name} {'did' if fired else 'does'} not fire: {' and '.join(parts)}."
-
-
 def _truths(each: Explanation) -> str:
     return "  " + " ".join("true" if clause.holds else "false" for clause in each.clauses)
 
@@ -925,6 +997,47 @@ def _boxed(lines: Sequence[str], box: str, lead: str) -> Iterator[str]:
     for number, line in enumerate(lines):
         yield f"{'  ' if number else lead}{side} {line:<{wide - 1}}{side}"
     yield f"  {low_left}{across * wide}{low_right}"
+
+
+def scenario_to_debug(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
+    """Read the scenario that ``gms-fsm debug`` is given; say where another file belongs.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file.
+    overrides : sequence of str
+        See `gms_fsm.scenario.load_scenario`.
+
+    Returns
+    -------
+    Loaded
+        For `run_debugger`.
+
+    Raises
+    ------
+    ScenarioError
+        If it is a trace, a Python file, or no valid scenario.
+
+    Examples
+    --------
+    >>> scenario_to_debug("t.npz")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    gms_fsm.errors.ScenarioError: t.npz is a trace; `gms-fsm replay t.npz` steps through it; ...
+    """
+    match Path(path).suffix.lower():
+        case ".py":
+            raise ScenarioError(
+                f"{path} is Python; debug takes a scenario (.toml); for a model of your own: "
+                "Debugger(Session(model, rig, t_end)).run(), see docs/howto/debugging.md"
+            )
+        case ".npz" | ".csv":
+            raise ScenarioError(
+                f"{path} is a trace; `gms-fsm replay {path}` steps through it; debug takes a "
+                "scenario (.toml)"
+            )
+    return load_scenario(path, overrides)
 
 
 def run_debugger(loaded: Loaded, stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:

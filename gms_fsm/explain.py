@@ -1,19 +1,24 @@
 """Why an edge fired or did not: its guard, clause by clause, on a stored row.
 
 Computed on demand from the row with the chart's own trees, so it is what the run itself saw.
+Printed, an explanation is the text that the debugger says; there elements count from 1.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from gms_fsm.chart import Chart, Transition
 from gms_fsm.expression import MATLAB_LIKE, Condition, Relation, clauses, evaluate, spell
 from gms_fsm.trace import Trace
 
-__all__ = ["Clause", "Explanation", "explain", "explain_state", "holds", "values_at"]
+__all__ = ["Clause", "Explanation", "Why", "explain", "explain_state", "holds", "values_at"]
+
+ROUNDING = 1e-8  # a margin this small beside both sides is the clock's and the floats', not physics
+UNITS = {"t": "s", "x": "m", "v": "m/s", "v_c": "m/s", "z": "m", "s": "m"}
 
 
 @dataclass(frozen=True)
@@ -56,15 +61,80 @@ class Explanation:
         The guard's parts.
     holds : bool
         Whether the whole guard is true.
-    fired : bool
-        Whether it is the edge that was taken to reach this row.
+    taken : str
+        The edge that is taken from this state: the one that led to this row, else the first whose
+        guard is true; empty for none.
+    past : bool
+        Whether it led to this row; the values are then those before.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts import gms_element
+    >>> values = {"z": 0.5, "s": 1.0, "v": 0.2, "v_c": 1e-6, "k": 1.0, "sigma": 0.0, "C": 1.0}
+    >>> forward, _ = explain_state(gms_element("signed"), "stick", values)
+    >>> print(forward)
+    break_away_forward does not fire: z >= s is false by 0.5 m.
+      1 break_away_forward: stick -> slip
+        false  z >= s   left 0.5         right 1           margin -0.5 m
+        true   v > v_c  left 0.2         right 1e-06       margin +0.2 m/s
     """
 
     edge: Transition
     priority: int
     clauses: tuple[Clause, ...]
     holds: bool
-    fired: bool
+    taken: str = ""
+    past: bool = False
+
+    @property
+    def fired(self) -> bool:
+        """Whether it is the edge that was taken to reach this row."""
+        return self.past and self.taken == self.edge.name
+
+    def __str__(self) -> str:
+        return f"{_verdict(self)}\n{_detail(self)}"
+
+
+@dataclass(frozen=True)
+class Why:
+    """Why an element switches or does not: a sequence of `Explanation`, highest priority first.
+
+    Parameters
+    ----------
+    element : int
+        Counted from 0.
+    t : float
+        s.
+    state : str
+        The one it is in.
+    left : str
+        The one it has just left, if that is the one whose edges these are; else empty.
+    edges : tuple of Explanation
+        Empty if no edge leaves the state.
+    """
+
+    element: int
+    t: float
+    state: str
+    left: str
+    edges: tuple[Explanation, ...]
+
+    def __iter__(self) -> Iterator[Explanation]:
+        return iter(self.edges)
+
+    def __len__(self) -> int:
+        return len(self.edges)
+
+    def __getitem__(self, index: int) -> Explanation:
+        return self.edges[index]
+
+    def __str__(self) -> str:
+        lines = [f"element {self.element + 1} is in {self.state} at t = {self.t:.9g} s"]
+        if self.left:
+            lines.append(f"it has just left {self.left}; values are those before that")
+        if not self.edges:
+            lines.append("no edge leaves this state")
+        return "\n".join([*lines, *map(_verdict, self.edges), *map(_detail, self.edges)])
 
 
 def values_at(trace: Trace, row: int, element: int) -> dict[str, float]:
@@ -97,7 +167,7 @@ def values_at(trace: Trace, row: int, element: int) -> dict[str, float]:
     return values
 
 
-def explain(trace: Trace, row: int, element: int) -> list[Explanation]:
+def explain(trace: Trace, row: int, element: int) -> Why:
     """Explain the edges of an element at a row, highest priority first.
 
     On a row that a firing of this element made, the edges are those of the state it left, with the
@@ -114,8 +184,8 @@ def explain(trace: Trace, row: int, element: int) -> list[Explanation]:
 
     Returns
     -------
-    list of Explanation
-        One an edge; empty if the state has none.
+    Why
+        An `Explanation` an edge; printed, the debugger's text.
 
     Raises
     ------
@@ -139,9 +209,9 @@ def explain(trace: Trace, row: int, element: int) -> list[Explanation]:
     chart, modes = trace.model.chart, trace.rows.mode[:, element]
     fired = _edge_taken(trace, row, element)
     before = row - 1 if fired else row
-    state = chart.states[int(modes[before])]
-    values = values_at(trace, before, element)
-    return explain_state(chart, state.name, values, fired)
+    now, asked = (chart.states[int(modes[r])].name for r in (row, before))
+    edges = explain_state(chart, asked, values_at(trace, before, element), fired)
+    return Why(element, float(trace.t[row]), now, asked if fired else "", tuple(edges))
 
 
 def explain_state(
@@ -165,19 +235,20 @@ def explain_state(
     list of Explanation
         Highest priority first.
     """
-    found = []
-    for priority, (_, edge) in enumerate(chart.leaving(state), start=1):
-        guard = chart.guards[edge.name]
-        found.append(
-            Explanation(
-                edge,
-                priority,
-                tuple(_clause(part, values) for part in clauses(guard)),
-                holds(guard, values),
-                edge.name == fired,
-            )
+    leaving = [edge for _, edge in chart.leaving(state)]
+    true = {edge.name: holds(chart.guards[edge.name], values) for edge in leaving}
+    taken = fired or next((name for name, truth in true.items() if truth), "")
+    return [
+        Explanation(
+            edge,
+            priority,
+            tuple(_clause(part, values) for part in clauses(chart.guards[edge.name])),
+            true[edge.name],
+            taken,
+            bool(fired),
         )
-    return found
+        for priority, edge in enumerate(leaving, start=1)
+    ]
 
 
 def _edge_taken(trace: Trace, row: int, element: int) -> str:
@@ -222,3 +293,57 @@ def holds(condition: Condition, values: Mapping[str, float]) -> bool:
         return bool(evaluate(condition, values))
     except (ArithmeticError, ValueError):
         return False
+
+
+# --------------------------------------------------------------------------- in words
+def _verdict(each: Explanation) -> str:
+    """Say in one sentence why an edge fires or does not."""
+    name = each.edge.name
+    if each.fired:
+        return f"{name} fired here: every clause was true."
+    if each.holds:
+        if each.taken != name:
+            return f"{name} does not fire: its guard is true, but {each.taken} goes first."
+        return f"{name} fires next: every clause is true."
+    parts = []
+    for clause in each.clauses:
+        if not clause.holds:
+            by = "" if math.isnan(clause.margin) else f" by {_amount(clause, signed=False)}"
+            parts.append(f"{clause.text} is false{by}")
+    return f"{name} {'did' if each.past else 'does'} not fire: {' and '.join(parts)}."
+
+
+def _detail(each: Explanation) -> str:
+    """Show an edge's guard, a line a clause."""
+    wide = max(len(clause.text) for clause in each.clauses)
+    lines = [f"  {each.priority} {each.edge.name}: {each.edge.source} -> {each.edge.target}"]
+    for clause in each.clauses:
+        truth = "true " if clause.holds else "false"
+        lines.append(f"    {truth}  {clause.text:<{wide}}{_sides(clause)}".rstrip())
+    return "\n".join(lines)
+
+
+def _sides(clause: Clause) -> str:
+    if not clause.computable:
+        return "  cannot be computed here"
+    if math.isnan(clause.margin):  # compound: no two sides
+        return ""
+    return (
+        f"  left {clause.left:<11.5g} right {clause.right:<11.5g} margin "
+        f"{_amount(clause, signed=True)}"
+    )
+
+
+def _amount(clause: Clause, *, signed: bool) -> str:
+    if abs(clause.margin) <= ROUNDING * max(abs(clause.left), abs(clause.right)):
+        return "0 (rounding)"
+    return f"{clause.margin if signed else abs(clause.margin):{'+' if signed else ''}.3g}" + _unit(
+        clause
+    )
+
+
+def _unit(clause: Clause) -> str:
+    """Return the unit of a clause's margin where its names leave no doubt."""
+    units = {UNITS.get(name, "?") for name in re.findall(r"[A-Za-z_]\w*", clause.text)}
+    plain = not set(clause.text) & set("*/^()")
+    return f" {units.pop()}" if plain and len(units) == 1 and "?" not in units else ""

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from gms_fsm.chart import SUPPLIED, Chart
 from gms_fsm.charts.gms import GMS_ELEMENT, Law, gms_element
 from gms_fsm.charts.lugre import LUGRE
-from gms_fsm.errors import ParameterError
+from gms_fsm.errors import ParameterError, shown
 from gms_fsm.parameters import FloatArray, GMSParameters, Stribeck, checked_array, checked_scalar
 
 __all__ = ["GMS", "ChartModel", "LuGre", "Model", "parameter_names", "with_values"]
@@ -236,12 +236,13 @@ class ChartModel:
             raise ParameterError(
                 f"n is {self.n!r}; a bank has a whole number of elements, at least one"
             )
-        if self.stribeck is None and "s" not in self.chart.inputs:
+        curve: Any = self.stribeck
+        if curve is None and "s" not in self.chart.inputs:
             object.__setattr__(self, "stribeck", Stribeck(1.0, 1.0, 1.0))  # nobody reads it
-        elif not isinstance(self.stribeck, Stribeck):
+        elif not isinstance(curve, Stribeck):
             raise ParameterError(
-                f"chart {self.chart.name!r} has the input s, and stribeck is {self.stribeck!r}; "
-                "give its curve, stribeck=Stribeck(F_c, F_s, v_s)"
+                f"chart {self.chart.name!r} has the input s, and stribeck is {shown(curve)}; give "
+                "its curve, stribeck=Stribeck(F_c, F_s, v_s)"
             )
         for name in self.chart.inputs:
             if name not in SUPPLIED:
@@ -265,7 +266,7 @@ class ChartModel:
 
 def _number_or_array(name: str, value: float | FloatArray, n: int) -> float | FloatArray:
     if np.ndim(value) == 0:
-        return checked_scalar(name, value, "finite")  # type: ignore[arg-type]
+        return checked_scalar(name, value, "finite")
     return checked_array(name, value, n, "finite")
 
 
@@ -321,7 +322,7 @@ def with_values(model: Model, values: Mapping[str, ArrayLike]) -> Model:
     """
 
     def number(name: str, old: float) -> float:
-        return checked_scalar(name, values.get(name, old), "finite")  # type: ignore[arg-type]
+        return checked_scalar(name, values.get(name, old), "finite")
 
     def array(name: str, old: float | FloatArray) -> FloatArray:
         return np.full(model.n, values.get(name, old), dtype=np.float64)

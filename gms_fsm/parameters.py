@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +19,7 @@ DIP_WIDTH = 6.1  # in v_s: beyond it exp(-(v/v_s)**2) is under 1e-16, the curve 
 PAPER_COLUMNS = ("non-drifting", "stick-slip")
 
 
-def checked_scalar(name: str, value: float, rule: str) -> float:
+def checked_scalar(name: str, value: Any, rule: str) -> float:
     """Return value as a float if it keeps the rule, one of ``> 0``, ``>= 0``, ``finite``."""
     try:
         if isinstance(value, str | bytes):  # float("100") is a number

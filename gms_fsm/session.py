@@ -20,8 +20,16 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from gms_fsm.errors import ParameterError, SessionError, SimulationError, TraceFileError, why
-from gms_fsm.explain import Explanation, explain_state, holds
+from gms_fsm.errors import (
+    ExpressionError,
+    ParameterError,
+    SessionError,
+    SimulationError,
+    TraceFileError,
+    shown,
+    why,
+)
+from gms_fsm.explain import Why, explain_state, holds
 from gms_fsm.expression import Condition, Value, evaluate, parse_condition, parse_value
 from gms_fsm.files import written_whole
 from gms_fsm.header import Header
@@ -33,7 +41,7 @@ from gms_fsm.start import Start
 from gms_fsm.trace import Rows, Trace, interpolated, log_of
 from integrators import Firing, Stop
 
-__all__ = ["Branch", "Breakpoint", "Comparison", "Here", "Session"]
+__all__ = ["Branch", "Breakpoint", "Comparison", "Fired", "Here", "Session"]
 
 Kind = Literal["tested", "valid", "fires", "enter", "leave"]
 KINDS: tuple[Kind, ...] = ("tested", "valid", "fires", "enter", "leave")
@@ -43,8 +51,29 @@ Row: TypeAlias = tuple[float, int, list[float], tuple[int, ...]]  # time, micro-
 
 
 @dataclass(frozen=True)
+class Fired:
+    """The firing that made a row.
+
+    Parameters
+    ----------
+    element : int
+        Counted from 0.
+    edge, source, target : str
+        The edge taken, the state it left and the state it entered.
+    """
+
+    element: int
+    edge: str
+    source: str
+    target: str
+
+    def __str__(self) -> str:
+        return f"element {self.element + 1}: {self.source} -> {self.target} by {self.edge}"
+
+
+@dataclass(frozen=True)
 class Here:
-    """One row of a branch, with everything a person asks for.
+    """One row of a branch; printed, it is what the debugger says after a move.
 
     Parameters
     ----------
@@ -60,6 +89,8 @@ class Here:
         Active states.
     located : bool
         Whether it lies between rows, where a condition became true.
+    fired : Fired or None
+        The firing that made it, if one did.
     """
 
     row: int
@@ -73,6 +104,13 @@ class Here:
     F_elements: tuple[float, ...]
     states: tuple[str, ...]
     located: bool
+    fired: Fired | None
+
+    def __str__(self) -> str:
+        place = f"between rows {self.row} and {self.row + 1}" if self.located else f"row {self.row}"
+        step = f", micro-step {self.microstep}" if self.microstep else ""
+        fired = "" if self.fired is None else f"\n  {self.fired}"
+        return f"{place}, t = {self.t:.9g} s{step}: v = {self.v:.6g} m/s, F = {self.F:.6g} N{fired}"
 
 
 @dataclass
@@ -199,7 +237,7 @@ class Branch:
         """Return all firings so far, the shared part included."""
         before: list[tuple[Any, ...]] = []
         if self.shared is not None:
-            before = [self.shared.fired(row) for row in self.shared.firing_rows(self.fork + 1)]
+            before = [self.shared.record(row) for row in self.shared.firing_rows(self.fork + 1)]
         return before + self.run.recorder.log
 
     def firing_rows(self, end: int) -> list[int]:
@@ -207,12 +245,19 @@ class Branch:
         before = [] if self.shared is None else self.shared.firing_rows(min(end, self.fork + 1))
         return before + self.firings[: bisect_left(self.firings, end)]
 
-    def fired(self, row: int) -> tuple[Any, ...]:
+    def record(self, row: int) -> tuple[Any, ...]:
         """Return the log's record of the firing that made a row."""
         if row <= self.fork:
             assert self.shared is not None
-            return self.shared.fired(row)
+            return self.shared.record(row)
         return self.run.recorder.log[bisect_left(self.firings, row)]
+
+    def fired(self, row: int) -> Fired | None:
+        """Return the firing that made a row, None if none did."""
+        if self.raw(row)[1] == 0:
+            return None
+        _, element, edge, source, target = self.record(row)[:5]
+        return Fired(int(element), str(edge), str(source), str(target))
 
     def trace(self) -> Trace:
         """Return the branch so far as a trace."""
@@ -253,11 +298,18 @@ class Session:
     >>> from gms_fsm import GMS, GMSParameters, Prescribed
     >>> session = Session(GMS(GMSParameters.paper("stick-slip"), law="published"),
     ...                   Prescribed("0.15*sin(2*pi*t/25)"), 100.0)
+    >>> session
+    <Session: GMS, 4 elements, published law; prescribed velocity, to t = 100 s; at t = 0 s>
+
+    A move returns where it stopped: fields to compute with, and printed, a line to read. Elements
+    count from 0 here, and from 1 in all that is printed and in conditions.
+
     >>> here = session.next_transition()
-    >>> round(here.t, 3), here.states[0]
-    (4.913, 'slip')
-    >>> session.back().microstep
-    0
+    >>> round(here.t, 3), here.fired.element, here.fired.edge, here.states[0]
+    (4.913, 0, 'break_away_forward', 'slip')
+    >>> print(here)
+    row 17, t = 4.91276067 s, micro-step 1: v = 0.141608 m/s, F = 1.34657 N
+      element 1: stick -> slip by break_away_forward
     """
 
     def __init__(self, model: Model, rig: Rig, t_end: float, **options: Any) -> None:
@@ -279,6 +331,13 @@ class Session:
         self.current = 0
         self.breakpoints: list[Breakpoint] = []
         self.watches: list[str] = []
+
+    def __repr__(self) -> str:
+        branch = f", branch {self.current}" if self.current else ""
+        return (
+            f"<Session: {self.model.title}; {self.rig.title}, to t = {self.t_end:g} s; "
+            f"at t = {self.here.t:.9g} s{branch}>"
+        )
 
     # ------------------------------------------------------------------ where we are
     @property
@@ -323,7 +382,7 @@ class Session:
         return Here(
             row, t, microstep, y[0], seen[0], seen[1], tuple(y[first : first + n]),
             tuple(seen[2 : 2 + n]), tuple(seen[2 + n : 2 + 2 * n]),
-            tuple(names[m] for m in mode), located,
+            tuple(names[m] for m in mode), located, None if located else self.branch.fired(row),
         )  # fmt: skip
 
     # ------------------------------------------------------------------ walking
@@ -433,10 +492,14 @@ class Session:
     # ------------------------------------------------------------------ conditions
     @property
     def names(self) -> list[str]:
-        """What conditions and watches can name; elements counted from 1."""
-        elements = range(1, self.model.n + 1)
-        numbered = [*self.model.chart.variables, "s", "F"]
-        return ["t", "x", "v", "F", "s", *(f"{name}{i}" for name in numbered for i in elements)]
+        """What conditions and watches can name; elements counted from 1.
+
+        A single element's variables need no number.
+        """
+        elements, variables = range(1, self.model.n + 1), self.model.chart.variables
+        bare = variables if self.model.n == 1 else ()
+        numbered = (f"{name}{i}" for name in (*variables, "s", "F") for i in elements)
+        return ["t", "x", "v", "F", "s", *bare, *numbered]
 
     def parse(self, text: str) -> Condition:
         """Read a condition such as ``"z1 > 0.3 and state(2) == slip"``.
@@ -458,7 +521,21 @@ class Session:
             With column and what is allowed.
         """
         states = [state.name for state in self.model.chart.states]
-        return parse_condition(text, self.names, states, self.model.n)
+        n = self.model.n
+        with self._numbered():
+            return parse_condition(text, self.names, states, n, own_state=n == 1)
+
+    @contextmanager
+    def _numbered(self) -> Iterator[None]:
+        """Say of a variable without an element's number that it needs one."""
+        try:
+            yield
+        except ExpressionError as error:
+            for name in self.model.chart.variables:
+                if error.reason == f"unknown name {name!r}":
+                    reason = f"{error.reason}; for element 1 write {name}1"
+                    raise ExpressionError(reason, error.text, error.column, error.allowed) from None
+            raise
 
     def values(self, here: Here | None = None) -> dict[str, Any]:
         """Return a value for every name of a condition, at the cursor if not said otherwise."""
@@ -474,6 +551,9 @@ class Session:
                 found[f"{name}{i + 1}"] = y[first + j * n + i]
             found |= {f"s{i + 1}": here.s[i], f"F{i + 1}": here.F_elements[i],
                       f"state({i + 1})": here.states[i]}  # fmt: skip
+        if n == 1:
+            found |= {name: found[f"{name}1"] for name in self.model.chart.variables}
+            found["state(0)"] = here.states[0]  # what `state == name` asks for
         return found
 
     def _state_of(self, here: Here) -> list[float]:
@@ -501,7 +581,8 @@ class Session:
         SessionError
             If it cannot be computed here (a division by zero).
         """
-        tree: Value = parse_value(text, self.names)
+        with self._numbered():
+            tree: Value = parse_value(text, self.names)
         try:
             return float(evaluate(tree, self.values()))
         except (ArithmeticError, ValueError) as error:
@@ -520,6 +601,32 @@ class Session:
         Here
             The place (``located`` is set if it lies between rows), or the end of the run.
         """
+        self.reaches(condition)
+        return self.here
+
+    def reaches(self, condition: str) -> bool:
+        """Go forward as `until` does, and say whether the condition became true.
+
+        Parameters
+        ----------
+        condition : str
+            See `parse`. If it is true already it must first become false.
+
+        Returns
+        -------
+        bool
+            False at the end of the run.
+
+        Examples
+        --------
+        >>> from gms_fsm import GMS, GMSParameters, Prescribed
+        >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+        >>> session = Session(model, Prescribed("0.15*sin(2*pi*t/25)"), 20.0)
+        >>> session.reaches("v < -0.1"), round(session.here.t, 3)
+        (True, 15.403)
+        >>> session.reaches("t > 1"), session.here.t  # it is, and stays so
+        (False, 20.0)
+        """
         tree, branch = self.parse(condition), self.branch
         truth = self._holds(tree, self.here)
         begin = branch.between  # a second `until` starts from a located place
@@ -528,17 +635,17 @@ class Session:
             if row + 1 >= len(branch) and not branch.pull():
                 branch.between = None
                 branch.cursor = len(branch) - 1
-                return self.here
+                return False
             place, truth = self._first_true(tree, row, begin, truth)
             begin = None
             if place is not None:
                 branch.between = place
-                return self.here
+                return True
             branch.between = None
             branch.cursor = row + 1
             now = self._holds(tree, self.here)
             if now and not truth:
-                return self.here
+                return True
             truth = now
 
     def _holds(self, tree: Condition, here: Here) -> bool:
@@ -631,10 +738,8 @@ class Session:
         known, what = (states, "state") if kind in ("enter", "leave") else (edges, "edge")
         if name not in known:
             raise SessionError(f"no {what} {name!r}; there are {', '.join(known) or 'none'}")
-        if element is not None and not 0 <= element < self.model.n:
-            raise SessionError(
-                f"no element {element + 1}; there are {self.model.n}, counted from 1 in text"
-            )
+        if element is not None:
+            self._check_element(element)
         if hits < 1:
             raise SessionError(f"hits is {hits}; it must be at least 1")
         if condition:
@@ -668,17 +773,14 @@ class Session:
     def _happens(self, point: Breakpoint, row: int, i: int) -> bool:
         chart, branch = self.model.chart, self.branch
         before, now = branch.raw(row - 1), branch.raw(row)
-        names = [state.name for state in chart.states]
-        moved = now[1] > 0 and self._fired(row)[0] == i
-        match point.kind:
-            case "fires":
-                return moved and self._fired(row)[1] == point.name
-            case "enter":
-                return moved and names[now[3][i]] == point.name
-            case "leave":
-                return moved and names[before[3][i]] == point.name
-        edge = next(e for e in chart.transitions if e.name == point.name)
-        if names[now[3][i]] != edge.source:
+        if point.kind in ("fires", "enter", "leave"):
+            fired = branch.fired(row)
+            if fired is None or fired.element != i:
+                return False
+            names = {"fires": fired.edge, "enter": fired.target, "leave": fired.source}
+            return names[point.kind] == point.name
+        source = chart.state_index(self._source(point.name))
+        if now[3][i] != source:
             return False
         if point.kind == "tested":
             # The driver asks where an arc ends, and again after every firing. That a row was
@@ -687,13 +789,8 @@ class Session:
                 branch.pull()
             return row in branch.stops or now[1] > 0
         guard = chart.guards[point.name]
-        held = names[before[3][i]] == edge.source and holds(guard, self._guard_values(row - 1, i))
+        held = before[3][i] == source and holds(guard, self._guard_values(row - 1, i))
         return not held and holds(guard, self._guard_values(row, i))
-
-    def _fired(self, row: int) -> tuple[int, str]:
-        """Return element and edge of the firing that made a row."""
-        record = self.branch.fired(row)
-        return int(record[1]), str(record[2])
 
     def _guard_values(self, row: int, i: int) -> dict[str, float]:
         here = self.at(row)
@@ -705,7 +802,7 @@ class Session:
             values[name] = float(value if isinstance(value, float | int) else value[i])
         return values
 
-    def why(self, element: int) -> list[Explanation]:
+    def why(self, element: int = 0, edge: str = "") -> Why:
         """Explain the edges of an element at the cursor, clause by clause.
 
         On a row where it fired: the edges of the state it left, with the edge taken marked.
@@ -714,32 +811,67 @@ class Session:
         ----------
         element : int
             Counted from 0.
+        edge : str, optional
+            Explain this edge alone; all when left out. On a row where the element fired it may
+            also leave the state that was entered.
 
         Returns
         -------
-        list of Explanation
-            Highest priority first.
+        Why
+            An `Explanation` an edge, highest priority first; printed, the debugger's text.
 
         Raises
         ------
         SessionError
-            If there is no such element.
+            If there is no such element or edge, or the edge leaves another state.
+
+        Examples
+        --------
+        >>> from gms_fsm import GMS, GMSParameters, Prescribed
+        >>> model = GMS(GMSParameters.paper("stick-slip"), law="published")
+        >>> session = Session(model, Prescribed("0.15*sin(2*pi*t/25)"), 30.0)
+        >>> here = session.goto(25.0)
+        >>> print(session.why())
+        element 1 is in slip at t = 24.9999735 s
+        arrest does not fire: |z| < s is false by 0.776 m.
+          1 arrest: slip -> stick
+            true   |v| <= v_c  left 1e-06       right 1e-06       margin 0 (rounding)
+            false  |z| < s     left 2.2762      right 1.5         margin -0.776 m
+        >>> session.why()[0].clauses[1].holds
+        False
         """
+        self._check_element(element)
+        chart, here, row = self.model.chart, self.here, self.branch.cursor
+        state, left, taken = here.states[element], "", ""
+        source = self._source(edge) if edge else ""
+        fired = here.fired
+        if fired and fired.element == element and source in ("", fired.source):
+            left, taken, row = fired.source, fired.edge, row - 1
+        asked = left or state
+        if source not in ("", asked):
+            raise SessionError(f"{edge} leaves {source}; element {element + 1} is in {state}")
+        found = explain_state(chart, asked, self._guard_values(row, element), taken)
+        edges = tuple(each for each in found if edge in ("", each.edge.name))
+        return Why(element, here.t, state, left, edges)
+
+    def _source(self, edge: str) -> str:
+        """Return the state that an edge leaves."""
+        sources = {each.name: each.source for each in self.model.chart.transitions}
+        if edge not in sources:
+            raise SessionError(f"no edge {edge!r}; there are {', '.join(sources) or 'none'}")
+        return sources[edge]
+
+    def _check_element(self, element: int) -> None:
         if not 0 <= element < self.model.n:
             raise SessionError(
-                f"no element {element + 1}; there are {self.model.n}, counted from 1 in text"
+                f"no element {element!r}; there are 0 to {self.model.n - 1} (counted from 0 in "
+                "Python, from 1 in text)"
             )
-        here, fired, row = self.here, "", self.branch.cursor
-        if here.microstep > 0 and self._fired(row)[0] == element:
-            fired, row = self._fired(row)[1], row - 1
-            here = self.at(row)
-        values = self._guard_values(row, element)
-        return explain_state(self.model.chart, here.states[element], values, fired)
 
     # ------------------------------------------------------------------ branches
     def poke(
         self,
-        z: Mapping[int, float] | None = None,
+        variables: Mapping[str, Mapping[int, float]] | None = None,
         v: float | None = None,
         state: Mapping[int, str] | None = None,
     ) -> int:
@@ -747,8 +879,9 @@ class Session:
 
         Parameters
         ----------
-        z : mapping of int to float, optional
-            New deflections [m] by element, counted from 0.
+        variables : mapping of str to mapping of int to float, optional
+            New values of the chart's variables, each by element, counted from 0:
+            ``{"z": {0: 0.1}, "w": {1: 2.0}}``.
         v : float, optional
             New velocity, m/s; not with a prescribed one.
         state : mapping of int to str, optional
@@ -762,35 +895,55 @@ class Session:
         Raises
         ------
         SessionError
-            If there is nothing to change, no such element, or the run is at its end.
+            If there is nothing to change, no such variable or element, or the run is at its end.
         ParameterError, ChartError
             If a value breaks its rule.
+
+        Examples
+        --------
+        >>> from gms_fsm import GMS, GMSParameters, Prescribed
+        >>> model = GMS(GMSParameters.paper("stick-slip"), law="published")
+        >>> session = Session(model, Prescribed("0.15*sin(2*pi*t/25)"), 30.0)
+        >>> here = session.goto(25.0)
+        >>> session.poke({"z": {0: -1.4, 1: 0.0}}, state={3: "slip"})
+        1
+        >>> session.here.z[:2], session.here.states[3]
+        ((-1.4, 0.0), 'slip')
         """
         here, chart, n = self.here, self.model.chart, self.model.n
-        if not (z or state or v is not None):
-            raise SessionError("nothing to poke; give z, v or state")
-        for element in (*(z or {}), *(state or {})):
-            if not 0 <= element < n:
-                raise SessionError(f"no element {element + 1}; there are {n}, counted from 1")
+        variables, state = dict(variables or {}), dict(state or {})
+        for name, values in variables.items():
+            if name not in chart.variables:
+                raise SessionError(f"no variable {name!r}; there are {', '.join(chart.variables)}")
+            if not isinstance(values, Mapping):
+                raise SessionError(
+                    f"{name} is {shown(values)}; give its values by element, for example "
+                    f"{{{name!r}: {{0: 0.1}}}}"
+                )
+        if not (any(variables.values()) or state or v is not None):
+            raise SessionError("nothing to poke; give variables, v or state")
+        for element in (*(i for values in variables.values() for i in values), *state):
+            self._check_element(element)
         if not here.t < self.t_end:
             raise SessionError(f"t = {here.t!r} s is the end of the run; go back first")
         y, first = self._state_of(here), self.branch.run.recorder.start.program.first
         initial: dict[str, Any] = {"x": here.x}
         for j, name in enumerate(chart.variables):
             initial[name] = list(y[first + j * n : first + (j + 1) * n])
-        for element, value in (z or {}).items():
-            initial[chart.variables[0]][element] = value
-        states = list(here.states)
-        for element, name in (state or {}).items():
-            states[element] = name
-        initial["states"] = states
+            for element, value in variables.get(name, {}).items():
+                initial[name][element] = value
+        initial["states"] = [state.get(i, name) for i, name in enumerate(here.states)]
         if v is not None:
             initial["v"] = v
         elif self.rig.acceleration is not None:
             initial["v"] = here.v
         options = {**self.options, "t_start": here.t, "initial": initial}
         run = Run(Start.of(self.model, self.rig, self.t_end, rows_at_once=1, **options))
-        edits = {"z": dict(z or {}), "v": v, "state": dict(state or {})}
+        edits = {
+            "variables": {name: dict(values) for name, values in variables.items()},
+            "v": v,
+            "state": state,
+        }
         fork = self.branch.cursor
         begin = (here.t, 0, list(y), self.branch.raw(fork)[3]) if here.located else None
         branch = Branch(run, self.current, fork, self.branch, edits, begin)
@@ -935,9 +1088,9 @@ class Session:
                     session._walk_to(int(record["fork"]), record["from"])
                     edits = record["edits"]
                     session.poke(
-                        {int(i): value for i, value in edits["z"].items()},
+                        {name: _by_number(values) for name, values in edits["variables"].items()},
                         edits["v"],
-                        {int(i): name for i, name in edits["state"].items()},
+                        _by_number(edits["state"]),
                     )
             for number, record in enumerate(data["branches"]):
                 session.switch(number)
@@ -981,6 +1134,11 @@ def _unbroken() -> Iterator[None]:
         signal.signal(signal.SIGINT, usual)
     if pressed:
         usual(*pressed[0])
+
+
+def _by_number(values: Mapping[str, Any]) -> dict[int, Any]:
+    """Return values by element with numbers for keys, which JSON makes texts."""
+    return {int(element): value for element, value in values.items()}
 
 
 def _plain(value: Any) -> Any:

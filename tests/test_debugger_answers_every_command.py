@@ -30,7 +30,7 @@ def test_help_has_usage_and_an_example_that_works(
     made = _debugger()
     text = made.reply(f"help {name}")
     assert text.startswith(COMMANDS[name].usage.split()[0])
-    for example in COMMANDS[name].examples:
+    for example in made.help_of(name).examples:
         assert f"example: {example}" in text
         for line in ("goto 20", "watch x", "b arrest", "poke z1=0.1", "run", "save mine.json"):
             assert "error" not in made.reply(line)
@@ -74,14 +74,28 @@ def test_letters_are_those_of_pdb(alias: str, name: str) -> None:
         ("until z1 >", "column"),
         ("why 5", "no element 5; there are 1 to 4"),
         ("why 0", "no element 0"),
-        ("why one", "no whole number"),
+        (
+            "why one",
+            "'one' is no edge; there are break_away_forward, break_away_backward, arrest; "
+            "usage: why [ELEMENT] [EDGE], for example: why 2 break_away_forward",
+        ),
+        ("why 1 arest", "'arest' is no edge"),
+        ("why arrest 1", "'arrest 1' is no edge"),
+        ("why 1.5", "'1.5' is no edge"),
+        ("why 99999999999", "no whole number; usage: why [ELEMENT] [EDGE]"),
+        ("why arrest", "arrest leaves slip; element 1 is in stick"),
+        ("why 2 Arrest", "arrest leaves slip; element 2 is in stick"),
         ("element", "usage: element N"),
+        ("element arrest", "'arrest' is no whole number; usage: element N"),
         ("print", "an expression is missing"),
         ("print 1 / x", "cannot be computed here"),
         ("print 1 / x > 2", "cannot be computed here"),
         ("print __import__('os')", "unknown function"),
         ("print z1 = 3", "column"),
         ("watch z9", "unknown name 'z9'"),
+        ("print z", "unknown name 'z'; for element 1 write z1; allowed: the names t, x"),
+        ("until z > 1", "unknown name 'z'; for element 1 write z1"),
+        ("print sgn", "the function 'sgn' needs (...)"),
         ("unwatch 1", "there is no number 1; there are 0"),
         ("break arest", "edges: break_away_forward"),
         ("break fired arrest", "is no breakpoint; usage: break"),
@@ -94,7 +108,10 @@ def test_letters_are_those_of_pdb(alias: str, name: str) -> None:
         ("clear", "no whole number"),
         ("clear 3", "there is no number 3"),
         ("poke", "nothing to poke"),
-        ("poke z1", "'z1' cannot be poked; usage: poke"),
+        ("poke z1", "'z1' cannot be poked; usage: poke z1=VALUE"),
+        ("poke z=1", "'z' cannot be poked; for element 1 write z1"),
+        ("poke state=slip", "'state' cannot be poked; for element 1 write state1"),
+        ("poke v", "'v' cannot be poked"),
         ("poke z1=", "cannot be poked"),
         ("poke q1=3", "cannot be poked"),
         ("poke z9=0", "no element 9; there are 1 to 4"),
@@ -144,11 +161,41 @@ def test_moves() -> None:
     assert "element 4: slip -> stick by arrest" in said[4]
 
 
+def test_next_says_that_there_is_no_other() -> None:
+    said = answers(FIG_4, "goto 99.9", "next", "next", "next")[3]
+    assert said.startswith("no transition before the end\nrow 410, t = 100 s")
+
+
 def test_until_says_where_and_whether() -> None:
     said = answers(FIG_4, "u z1 > 0.123", "u state(1) == slip", "u z1 > 99")
     assert said[0].startswith("between rows 11 and 12, t = 2.60049")
     assert "element 1: stick -> slip by break_away_forward" in said[1]
     assert said[2].startswith("it does not become true before the end\nrow 410, t = 100 s")
+
+
+def test_until_stays_where_it_is_true_already_and_for_good() -> None:
+    said = answers(FIG_4, "goto 25", "u t > 1", "s", "u t > 30", "u t > 30", "u t > 30.1")
+    stays = "it is true here already and does not become true again; until waits for it to become"
+    assert " ".join(said[1].split()) == " ".join(f"{stays} true {said[0]}".split())
+    assert said[2].startswith("row 87")
+    assert "t = 30 s" in said[3]
+    assert " ".join(said[4].split()).startswith(stays)
+    assert said[4].endswith(said[3])  # the located place, too, is kept
+    assert "t = 30.1 s" in said[5]
+
+
+def test_until_goes_on_to_where_it_becomes_true_again() -> None:
+    said = answers(FIG_4, "u v > 0.1", "u v > 0.1", "u v > 0.1")
+    times = [float(text.split("t = ")[1].split(" s")[0]) for text in said]
+    assert times == sorted(set(times))
+
+
+@pytest.mark.parametrize("command", ["step", "step 3", "next", "continue", "until z1 > 9", "u t>1"])
+def test_at_the_end_there_is_only_back(command: str) -> None:
+    said = answers(FIG_4, "goto 100", "b arrest", command, "print t", "back", command)
+    assert said[2] == "error: this is the end of the run; go back first"
+    assert said[3] == "100"
+    assert "error" not in said[5]
 
 
 def test_print_and_watch() -> None:
@@ -301,7 +348,9 @@ def test_the_end_of_input_is_a_quiet_quit() -> None:
         ("p ", "state(", ["state(1)", "state(2)", "state(3)", "state(4)"]),
         ("poke ", "state1", ["state1="]),
         ("poke state1=", "s", ["stick", "slip"]),
-        ("why ", "", ["1", "2", "3", "4"]),
+        ("why ", "", ["1", "2", "3", "4", "break_away_forward", "break_away_backward", "arrest"]),
+        ("why 1 ", "arr", ["arrest"]),
+        ("element ", "", ["1", "2", "3", "4"]),
         ("help ", "go", ["goto"]),
         ("branch ", "", ["0"]),
         ("clear ", "", ["all"]),

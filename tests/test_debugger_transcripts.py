@@ -58,6 +58,7 @@ break_away_backward fired here: every clause was true.
   2 break_away_backward: stick -> slip
     true   z <= -s   left -0.4        right -0.4        margin 0 (rounding)
     true   v < -v_c  left -0.14093    right -1e-06      margin +0.141 m/s
+step, then why 2: the edges that leave slip
 (t=20.1407 s) back 10
 """
     assert said.startswith(expected)

@@ -296,7 +296,9 @@ def test_a_machine_that_was_changed_is_refused() -> None:
         lambda m: m.add_transition("arrest", "slip", "slip"),
         lambda m: m.add_transition("fly", "slip", "stick"),
         lambda m: m.add_transition(
-            "arrest", "slip", "stick",
+            "arrest",
+            "slip",
+            "stick",
             conditions=m.get_transitions("arrest", "slip")[0].conditions[0].func,
         ),
         lambda m: m.remove_transition("arrest", "slip", "stick"),

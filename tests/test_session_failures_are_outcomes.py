@@ -47,7 +47,7 @@ def test_a_livelock_can_be_looked_at_stepped_back_from_and_poked() -> None:
     while session.here.microstep:
         session.back()
     assert session.here.states == ("stick", "stick")
-    session.poke({1: 0.0})
+    session.poke({"z": {1: 0.0}})
     assert session.goto(10.0).t > here.t
     assert session.branch.outcome == ""
     assert session.branches[0].outcome.startswith("element 2 switched")
@@ -88,7 +88,7 @@ def test_a_flow_that_leaves_the_numbers() -> None:
         simulate(model, Prescribed("0"), 2.0, initial={"z": [1.0]})
     assert session.branch.outcome == str(caught.value)
     session.goto(0.5)
-    session.poke({0: -1.0})
+    session.poke({"z": {0: -1.0}})
     assert session.goto(2.0).t == 2.0
     assert session.branch.outcome == "end"
 

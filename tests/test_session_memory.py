@@ -17,7 +17,7 @@ session = Session(GMS(GMSParameters.paper("stick-slip"), law="signed"),
                   Prescribed("0.15*sin(2*pi*t/25)"), 100.0, method="rk4", step=1e-3)
 session.goto(100.0)
 session.goto(50.0)
-session.poke({0: 0.1})
+session.poke({"z": {0: 0.1}})
 assert len(session.branches[0]) > 100_000, len(session.branches[0])
 status = Path("/proc/self/status")
 if status.exists():  # there ru_maxrss begins with the parent's memory

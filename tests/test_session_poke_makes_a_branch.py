@@ -24,7 +24,7 @@ def _pulled() -> Session:
 def test_position_velocity_and_the_other_elements_are_kept() -> None:
     session = _pulled()
     before = session.goto(10.0)
-    assert session.poke({1: -0.003}) == 1
+    assert session.poke({"z": {1: -0.003}}) == 1
     here = session.here
     assert (here.t, here.x, here.v, here.states) == (before.t, before.x, before.v, before.states)
     assert here.z == (before.z[0], -0.003, *before.z[2:])
@@ -39,13 +39,13 @@ def test_velocity_and_state() -> None:
     here = session.here
     assert (here.v, here.x, here.z) == (-0.2, before.x, before.z)
     assert here.states == ("stick", "stick", "slip", "stick")
-    assert session.branch.edits == {"z": {}, "v": -0.2, "state": {2: "slip"}}
+    assert session.branch.edits == {"variables": {}, "v": -0.2, "state": {2: "slip"}}
 
 
 def test_the_branch_is_the_run_from_there() -> None:
     session = _open_loop()
     here = session.goto(30.0)
-    session.poke({0: 0.1})
+    session.poke({"z": {0: 0.1}})
     session.goto(100.0)
     initial = {"x": here.x, "z": [0.1, *here.z[1:]], "states": list(here.states)}
     alone = simulate(session.model, session.rig, 100.0, t_start=here.t, initial=initial)
@@ -59,7 +59,7 @@ def test_the_parent_stays_and_goes_on() -> None:
     session.goto(30.0)
     parent = session.branch
     rows = [parent.raw(row) for row in range(len(parent))]
-    session.poke({0: 0.1})
+    session.poke({"z": {0: 0.1}})
     session.goto(100.0)
     assert [parent.raw(row) for row in range(len(parent))] == rows
     assert session.switch(0).row == parent.cursor
@@ -71,11 +71,11 @@ def test_the_parent_stays_and_goes_on() -> None:
 def test_a_branch_of_a_branch_has_both_pasts() -> None:
     session = _open_loop()
     session.goto(30.0)
-    session.poke({0: 0.1})
+    session.poke({"z": {0: 0.1}})
     session.goto(60.0)
-    session.poke({1: 0.2})
+    session.poke({"z": {1: 0.2}})
     session.goto(20.0)  # in the past shared by all
-    session.poke({2: 0.1})
+    session.poke({"z": {2: 0.1}})
     session.goto(100.0)
     assert [branch.parent for branch in session.branches] == [None, 0, 1, 2]
     last = session.branches[-1]
@@ -91,7 +91,7 @@ def test_between_rows_the_past_ends_where_it_was_poked() -> None:
     session = _open_loop()
     place = session.until("z1 > 0.123")
     assert place.located
-    session.poke({0: 0.0})
+    session.poke({"z": {0: 0.0}})
     assert session.here.t == place.t
     assert session.here.z == (0.0, *place.z[1:])
     before = session.back()
@@ -103,7 +103,7 @@ def test_between_rows_the_past_ends_where_it_was_poked() -> None:
 def test_between_rows_until_sees_no_value_that_never_was() -> None:
     session = _open_loop()
     place = session.until("z1 > 0.123")
-    session.poke({0: 0.0})
+    session.poke({"z": {0: 0.0}})
     session.goto(place.t - 0.5)
     assert session.until("z1 < 0.05").z[0] in (0.0, pytest.approx(0.05))
     assert session.here.t >= place.t
@@ -112,7 +112,7 @@ def test_between_rows_until_sees_no_value_that_never_was() -> None:
 def test_between_rows_comparing_shows_a_difference_only_after_the_poke() -> None:
     session = _open_loop()
     place = session.until("z1 > 0.123")
-    session.poke({0: 0.0})
+    session.poke({"z": {0: 0.0}})
     session.step()
     first, second = (branch.trace() for branch in session.branches)
     times = [place.t - d for d in (0.3, 0.1, 0.01)]
@@ -122,7 +122,7 @@ def test_between_rows_comparing_shows_a_difference_only_after_the_poke() -> None
 def test_compare() -> None:
     session = _open_loop()
     session.goto(25.0)
-    session.poke({0: -1.4})
+    session.poke({"z": {0: -1.4}})
     same = session.compare(0, 0)
     assert (same.z, same.F, same.first_difference) == (0.0, 0.0, None)
     for number in (0, 1):
@@ -145,10 +145,15 @@ def test_compare() -> None:
     ("edits", "error", "said"),
     [
         ({}, SessionError, "nothing to poke"),
-        ({"z": {4: 0.1}}, SessionError, "no element 5"),
-        ({"state": {-1: "slip"}}, SessionError, "no element 0"),
-        ({"z": {0: float("nan")}}, ParameterError, "finite"),
-        ({"z": {0: float("inf")}}, ParameterError, "finite"),
+        ({"variables": {}}, SessionError, "nothing to poke"),
+        ({"variables": {"z": {}}, "state": {}}, SessionError, "nothing to poke"),
+        ({"variables": {"z": {4: 0.1}}}, SessionError, "no element 4; there are 0 to 3"),
+        ({"variables": {"w": {0: 0.1}}}, SessionError, "no variable 'w'; there are z"),
+        ({"variables": {0: 0.1}}, SessionError, "no variable 0; there are z"),
+        ({"variables": {"z": 0.1}}, SessionError, r"z is 0\.1; give its values by element"),
+        ({"state": {-1: "slip"}}, SessionError, "no element -1"),
+        ({"variables": {"z": {0: float("nan")}}}, ParameterError, "finite"),
+        ({"variables": {"z": {0: float("inf")}}}, ParameterError, "finite"),
         ({"state": {0: "slipp"}}, ChartError, "'stick', 'slip'"),
         ({"v": 0.1}, ParameterError, "prescribes the velocity"),
     ],
@@ -166,7 +171,7 @@ def test_at_the_end_there_is_nothing_to_go_on_with() -> None:
     session = _open_loop()
     session.goto(100.0)
     with pytest.raises(SessionError, match="the end of the run"):
-        session.poke({0: 0.1})
+        session.poke({"z": {0: 0.1}})
 
 
 @pytest.mark.parametrize("branch", [-1, 1])

@@ -76,7 +76,7 @@ def _poked(session: Session, z: float, state: str | None) -> dict[str, Any]:
         initial["v"] = here.v
     if state is not None:
         initial["states"][0] = state
-    session.poke({0: z}, state={} if state is None else {0: state})
+    session.poke({"z": {0: z}}, state={} if state is None else {0: state})
     return {"t_start": here.t, "initial": initial}
 
 

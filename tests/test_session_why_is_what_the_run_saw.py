@@ -52,5 +52,5 @@ def test_at_a_located_place_it_uses_the_values_there() -> None:
 @pytest.mark.parametrize("element", [-1, 4])
 def test_no_such_element(element: int) -> None:
     session = Session(stick_slip("signed"), Prescribed("0.1"), 5.0)
-    with pytest.raises(SessionError, match="there are 4, counted from 1"):
+    with pytest.raises(SessionError, match=f"no element {element}; there are 0 to 3"):
         session.why(element)
