@@ -25,10 +25,14 @@ def test_the_blocks_run_in_their_order(
     assert "break_away" in (tmp_path / "chart.svg").read_text(encoding="utf-8")
 
 
-def test_the_blocks_before_the_pictures_need_no_extra(capsys: pytest.CaptureFixture[str]) -> None:
-    for block in BLOCKS[:2]:
+def test_what_is_printed_is_what_stands_below_and_needs_no_extra(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    shown = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", TEXT, re.DOTALL)
+    assert len(shown) == 2
+    for block, text in shown:
         exec(compile(block, "README.md", "exec"), {"__name__": "readme"})
-        assert capsys.readouterr().out.count("\n") >= 4
+        assert capsys.readouterr().out == text
 
 
 def test_the_first_example_is_short() -> None:
