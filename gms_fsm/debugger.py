@@ -123,12 +123,12 @@ COMMANDS = {
     "branch": Command("change", "branch N", "Walk another branch.", ("branch 0",)),
     "compare": Command(
         "change", "compare [A B]",
-        "Compare two branches as far as both are computed; alone, this one and its parent.",
+        "Compute two branches to their ends and compare them; alone, this one and its parent.",
         ("compare 0 1",),
     ),
     "plot": Command(
         "change", "plot FILE.png",
-        "Draw the branches against each other (.png, .svg or .pdf; needs matplotlib).",
+        "Compute all branches to their ends and draw them (.png, .svg or .pdf; needs matplotlib).",
         ("plot branches.png",),
     ),
     "save": Command("file", "save FILE", "Write the session to a file.", ("save mine.json",)),
@@ -544,8 +544,7 @@ class Debugger(cmd.Cmd):
         """Compute to the end."""
         _nothing("run", arg)
         branch = self.session.branch
-        while branch.pull():
-            pass
+        branch.complete()
         self.say(f"branch {self.session.current}: {self._progress(branch)}")
 
     # ------------------------------------------------------------------ looking
@@ -885,27 +884,10 @@ class Debugger(cmd.Cmd):
 
     def do_compare(self, arg: str) -> None:
         """Compare branches."""
-        if arg:
-            numbers = [_whole(text, "compare A B") for text in arg.split()]
-            if len(numbers) != 2:
-                raise SessionError(f"two branches are needed; {self._usage('compare')}")
-            a, b = numbers
-        else:
-            parent = self.session.branch.parent
-            if parent is None:
-                raise SessionError(f"branch 0 has no parent; {self._usage('compare')}")
-            a, b = parent, self.session.current
-        found = self.session.compare(a, b)
-        p, q = found.transitions
-        self.say(f"branches {a} and {b} until t = {found.t:.9g} s: {p} and {q} transitions")
-        if found.first_difference is None:
-            self.say("  the same transitions")
-        else:
-            self.say(f"  first different transition at t = {found.first_difference:.9g} s")
-        self.say(f"  largest difference: z {found.z:.3g} m, F {found.F:.3g} N")
-        for number in (a, b):
-            if not self.session.branches[number].outcome:
-                self.say(f"  branch {number} is not at its end; there, run computes the rest")
+        numbers = [_whole(text, "compare A B") for text in arg.split()]
+        if len(numbers) not in (0, 2):
+            raise SessionError(f"two branches are needed; {self._usage('compare')}")
+        self.say(str(self.session.compare(*numbers)))
 
     def do_plot(self, arg: str) -> None:
         """Draw branches."""
@@ -916,9 +898,10 @@ class Debugger(cmd.Cmd):
 
         runs = {}
         for number, branch in enumerate(self.session.branches):
+            branch.complete()
             trace = branch.trace()
             if not trace.t[-1] > trace.t[0]:
-                raise SessionError(f"branch {number} has no stretch of time yet; run computes it")
+                raise SessionError(f"branch {number} failed at once; there is nothing to draw")
             edits = f": {self._edits(branch)}" if branch.edits else ""
             runs[_short(f"branch {number}{edits}", 50)] = trace
         self.say(f"written to {figures.save(figures.compare_laws(runs), path)}")

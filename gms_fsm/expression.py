@@ -12,7 +12,9 @@ Grammar: numbers, declared names, ``pi``, ``+ - * / **``, ``< <= > >=`` (chains 
 from __future__ import annotations
 
 import ast
+import difflib
 import math
+import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -188,6 +190,13 @@ _COMPARISONS: Mapping[type[ast.cmpop], str] = {
     ast.Gt: ">",
     ast.GtE: ">=",
 }
+# What pictures show and other languages write, and what is written here.
+_INSTEAD: Mapping[str, str] = {
+    "&&": "and", "&": "and", "∧": "and", "||": "or", "∨": "or", "|": "abs(...)", "!": "not",
+    "¬": "not", "=": "<= or >=", "≤": "<=", "≥": ">=", "^": "**", "·": "*", "−": "-",
+}  # fmt: skip
+_FOREIGN = re.compile(r"&&?|\|\|?|!(?!=)|(?<![<>=!:])=(?![=>])|[∧∨¬≤≥^·−]")
+_ALIASES: Mapping[str, str] = {"sign": "sgn", "signum": "sgn", "fabs": "abs"}
 _GRAMMAR = "numbers, names, + - * / **, < <= > >=, and or not, " + " ".join(FUNCTIONS) + " pi"
 
 
@@ -279,6 +288,13 @@ def _tree(text: str) -> ast.expr:
                 f"unexpected {mark!a}" if mark < "\ud800" else "half a character cannot be read"
             )
             raise ExpressionError(reason, text, column, _GRAMMAR)
+    foreign = _FOREIGN.search(text)
+    if foreign:
+        mark = foreign[0]
+        raise ExpressionError(
+            f"{mark} is not part of the language", text, foreign.start() + 1,
+            f"{_INSTEAD[mark]}, in its place",
+        )  # fmt: skip
     flat = "".join(" " if c.isspace() else c for c in text)  # same length: columns stay true
     lead = len(flat) - len(flat.lstrip())
     if lead == len(flat):
@@ -299,6 +315,14 @@ def _tree(text: str) -> ast.expr:
         if isinstance(node, ast.expr):  # ast counts bytes, a reader counts characters
             node.col_offset = lead + len(raw[: node.col_offset].decode(errors="ignore"))
     return body
+
+
+def _meant(name: str, known: Iterable[str]) -> str:
+    """Return the known name that is nearest to a wrong one, as a question."""
+    by_case = {each.casefold(): each for each in known}
+    wanted = _ALIASES.get(name, name).casefold()
+    near = difflib.get_close_matches(wanted[:100], by_case, n=1, cutoff=0.75)
+    return f" (did you mean {by_case[near[0]]!r}?)" if near else ""
 
 
 class _Reader:
@@ -348,7 +372,10 @@ class _Reader:
                 if name in FUNCTIONS:
                     raise self.refuse(f"the function {name!r} needs (...)", node, f"{name}(...)")
                 known = ", ".join(self.names) or "none"
-                raise self.refuse(f"unknown name {shown(name)}", node, f"the names {known}, and pi")
+                raise self.refuse(
+                    f"unknown name {shown(name)}{_meant(name, self.names)}", node,
+                    f"the names {known}, and pi",
+                )  # fmt: skip
             case ast.UnaryOp(op=ast.USub(), operand=operand):
                 return Negative(self.value(operand, depth))
             case ast.UnaryOp(op=ast.UAdd(), operand=operand):
@@ -366,8 +393,9 @@ class _Reader:
     def call(self, node: ast.expr, function: str, arguments: list[ast.expr], depth: int) -> Call:
         if function not in FUNCTIONS:
             raise self.refuse(
-                f"unknown function {shown(function)}", node, "the functions " + ", ".join(FUNCTIONS)
-            )
+                f"unknown function {shown(function)}{_meant(function, FUNCTIONS)}", node,
+                "the functions " + ", ".join(FUNCTIONS),
+            )  # fmt: skip
         several = function in ("min", "max")
         if (len(arguments) < 2) if several else (len(arguments) != 1):
             wanted = "two or more arguments" if several else "one argument"

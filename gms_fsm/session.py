@@ -143,25 +143,44 @@ class Breakpoint:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two branches against each other.
+    """Two branches against each other; printed, the debugger's text.
 
     Parameters
     ----------
+    branches : tuple of int
+        Their numbers.
     t : float
         Until when, s (the shorter of the two).
     transitions : tuple of int
         How many each has until then.
     first_difference : float or None
         Time of the first transition that differs, s; None if none does.
+    variable : str
+        The chart's first.
     z, F : float
-        Largest differences on common times, m and N.
+        Largest differences of this variable and of the friction force [N] on common times.
     """
 
+    branches: tuple[int, int]
     t: float
     transitions: tuple[int, int]
     first_difference: float | None
+    variable: str
     z: float
     F: float
+
+    def __str__(self) -> str:
+        (a, b), (p, q) = self.branches, self.transitions
+        z = f"{self.variable} {self.z:.3g}{' m' if self.variable == 'z' else ''}"
+        return (
+            f"branches {a} and {b} until t = {self.t:.9g} s: {p} and {q} transitions\n"
+            + (
+                "  the same transitions\n"
+                if self.first_difference is None
+                else f"  first different transition at t = {self.first_difference:.9g} s\n"
+            )
+            + f"  largest difference: {z}, F {self.F:.3g} N"
+        )
 
 
 class Branch:
@@ -221,6 +240,11 @@ class Branch:
                 except SimulationError as error:
                     self.outcome = str(error)
         return len(self) > before
+
+    def complete(self) -> None:
+        """Compute all rows up to the end, or to where the run cannot go on."""
+        while self.pull():
+            pass
 
     def raw(self, row: int) -> Row:
         """Return time, micro-step, state and modes of a row."""
@@ -975,22 +999,45 @@ class Session:
         self.current = branch
         return self.here
 
-    def compare(self, a: int, b: int) -> Comparison:
-        """Compare two branches as far as both have been computed.
+    def compare(self, a: int | None = None, b: int | None = None) -> Comparison:
+        """Compute two branches to their ends and compare them.
 
         Parameters
         ----------
-        a, b : int
-            Branch numbers.
+        a, b : int, optional
+            Branch numbers; when left out the branch that this one was poked from, and this one.
 
         Returns
         -------
         Comparison
-            Transitions, and largest differences of z and F.
+            Transitions, and largest differences of the first variable and F.
+
+        Raises
+        ------
+        SessionError
+            If there is no such branch, or nothing was poked.
+
+        Examples
+        --------
+        >>> from gms_fsm import GMS, GMSParameters, Prescribed
+        >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+        >>> session = Session(model, Prescribed("0.15*sin(2*pi*t/25)"), 30.0)
+        >>> here = session.goto(6.0)
+        >>> session.poke({"z": {0: -0.2}})
+        1
+        >>> print(session.compare())
+        branches 0 and 1 until t = 30 s: 16 and 16 transitions
+          first different transition at t = 12.4999735 s
+          largest difference: z 0.599 m, F 0.375 N
         """
+        b = self.current if b is None else b
+        a = self.branches[b].parent if a is None and 0 <= b < len(self.branches) else a
+        if a is None:
+            raise SessionError(f"branch {b} has no parent; name two branches")
         for number in (a, b):
             if not 0 <= number < len(self.branches):
                 raise SessionError(f"no branch {number}; there are 0 to {len(self.branches) - 1}")
+            self.branches[number].complete()
         first, second = self.branches[a].trace(), self.branches[b].trace()
         t = min(float(first.t[-1]), float(second.t[-1]))
         logs = [trace.transitions[trace.transitions.t <= t] for trace in (first, second)]
@@ -1008,7 +1055,7 @@ class Session:
         times = np.linspace(start, t, 2000)
         p, q = first.sample(times), second.sample(times)
         return Comparison(
-            t, (len(logs[0]), len(logs[1])), differs,
+            (a, b), t, (len(logs[0]), len(logs[1])), differs, self.model.chart.variables[0],
             float(np.abs(p.z - q.z).max()), float(np.abs(p.F - q.F).max()),
         )  # fmt: skip
 

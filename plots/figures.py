@@ -250,18 +250,19 @@ def compare_laws(
             panels.deflections(column[0], trace, elements=elements)
             panels.force(column[1], trace)
             panels.ribbons(column[2], trace, elements=elements)
-            for sign in (1, -1):
+            for sign in (1, -1) if panels.has_threshold(trace) else ():
                 column[0].axhline(sign * trace.s.min(), color=LINE_GREY, linewidth=0.7, zorder=0)
             column[0].set_title(title)
             for ax in column[:2]:
                 ax.set_xlabel("")
-        grid[0, 0].annotate(
-            "grey lines: ± s(v) away from reversals",
-            (0.02, 0.04),
-            xycoords="axes fraction",
-            color=TEXT_GREY,
-            fontsize=8,
-        )
+        if any(panels.has_threshold(run) for run in runs.values()):
+            grid[0, 0].annotate(
+                "grey lines: ± s(v) away from reversals",
+                (0.02, 0.04),
+                xycoords="axes fraction",
+                color=TEXT_GREY,
+                fontsize=8,
+            )
         handles, labels = (
             a + b
             for a, b in zip(
@@ -458,8 +459,9 @@ def ribbons_figure(
         panels.ribbons(left[3], part, window=limits, elements=elements)
         _one_time_axis(left)
         axes = left + right
-        over_s = "deflection over s(v)" if "s" in trace.model.chart.inputs else "deflection"
-        second = "threshold ratio" if panels.has_threshold(trace) else over_s
+        second = "first variable"
+        if "s" in trace.model.chart.inputs:
+            second = "threshold ratio" if panels.has_threshold(trace) else "deflection over s(v)"
         names = ["velocity", second, "friction", "active states"]
         if limits[0] > trace.t[0] and crowded:
             names = [f"{name}, last {limits[1] - limits[0]:.3g} s" for name in names]

@@ -263,6 +263,18 @@ def scaled(values: NDArray[np.float64], unit: str) -> tuple[float, str]:
     return SCALES[-1][0], SCALES[-1][1] + unit
 
 
+def _first_variable(trace: Trace, values: NDArray[np.float64]) -> tuple[float, str]:
+    """Return factor and title of the chart's first variable: z is a deflection, m.
+
+    One's own by another name may be anything, a force say: no unit then.
+    """
+    name = trace.model.chart.variables[0]
+    if name != "z":
+        return 1.0, name
+    factor, unit = scaled(values, "m")
+    return factor, f"z [{unit}]"
+
+
 def _look(i: int) -> dict[str, Any]:
     """Return colour and dash of element i."""
     return {
@@ -376,7 +388,7 @@ def deflections(
     window: Window | None = None,
     elements: Sequence[int] | None = None,
 ) -> Artists:
-    """Draw z_i(t) of every element.
+    """Draw z_i(t) of every element, or whatever the chart's first variable is.
 
     Parameters
     ----------
@@ -396,11 +408,13 @@ def deflections(
     """
     chosen = checked_elements(trace, elements)
     part = shown(trace, window)
-    factor, unit = scaled(part.z[:, chosen], "m")
+    factor, title = _first_variable(trace, part.z[:, chosen])
+    name = trace.model.chart.variables[0]
     lines: Artists = []
     for i in chosen:
-        lines += _curve(ax, part.t, factor * part.z[:, i], label=f"$z_{{{i + 1}}}$", **_look(i))
-    ax.set_ylabel(f"z [{unit}]")
+        label = f"$z_{{{i + 1}}}$" if name == "z" else f"{name}{i + 1}"
+        lines += _curve(ax, part.t, factor * part.z[:, i], label=label, **_look(i))
+    ax.set_ylabel(title)
     _time_axis(ax, *checked_window(trace, window))
     return lines
 
@@ -434,10 +448,13 @@ def ratio(
     """
     chosen = checked_elements(trace, elements)
     part = shown(trace, window)
-    over_s = "s" in trace.model.chart.inputs
-    values = part.z / part.s if over_s else part.z
-    threshold = has_threshold(trace)
-    factor, unit = (1.0, "–") if threshold else scaled(values, "m/N" if over_s else "m")
+    values, threshold = part.z, has_threshold(trace)
+    if "s" in trace.model.chart.inputs:
+        values = part.z / part.s
+        factor, unit = (1.0, "–") if threshold else scaled(values, "m/N")
+        title = f"{trace.model.chart.variables[0]} / s(v) [{unit}]"
+    else:
+        factor, title = _first_variable(trace, values)
     lines: Artists = []
     for i in chosen:
         lines += _curve(ax, part.t, factor * values[:, i], label=f"E{i + 1}", **_look(i))
@@ -445,8 +462,7 @@ def ratio(
         lines += [
             ax.axhline(level, color=LINE_GREY, linewidth=0.8, zorder=1) for level in (1.0, -1.0)
         ]
-    deflection = trace.model.chart.variables[0]
-    ax.set_ylabel(f"{deflection} / s(v) [{unit}]" if over_s else f"{deflection} [{unit}]")
+    ax.set_ylabel(title)
     _time_axis(ax, *checked_window(trace, window))
     return lines
 

@@ -263,11 +263,12 @@ def _run(trace: Trace, between: NDArray[np.bool_], frame_of: Sequence[int]) -> d
     for name, block in (blocks | {"s": trace.s, "F": trace.F_elements}).items():
         columns |= {f"{name}{i + 1}": block[:, i] for i in range(n)}
     edges = _edges(chart)
-    inner, inner_title = trace.z, f"{chart.variables[0]} [m]"
+    first = chart.variables[0]
+    inner, inner_title = trace.z, "z [m]" if first == "z" else first
     threshold = bool(edges) and "s" in chart.inputs  # without edges (LuGre) s is none
     if threshold:
         with np.errstate(all="ignore"):
-            inner, inner_title = trace.z / trace.s, f"{chart.variables[0]} / s(v), lines at ±1"
+            inner, inner_title = trace.z / trace.s, f"{first} / s(v), lines at ±1"
     sides, truth, holds = _explained(trace, edges, pool)
     log = _log(trace, edges)
     for entry in log:

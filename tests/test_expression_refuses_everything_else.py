@@ -57,7 +57,7 @@ NO_VALUES = [
     ("v % 2", 1, FOREIGN, GRAMMAR),
     ("z + v // 2", 5, FOREIGN, GRAMMAR),
     ("z + v @ s", 5, FOREIGN, GRAMMAR),
-    ("v | z", 1, FOREIGN, GRAMMAR),
+    ("v | z", 3, FOREIGN, "abs(...), in its place"),
     ("1 + ~v", 5, FOREIGN, GRAMMAR),
     ("...", 1, FOREIGN, GRAMMAR),
     ("await v", 1, FOREIGN, GRAMMAR),
@@ -86,7 +86,7 @@ NO_VALUES = [
     ("abs()", 1, "abs got 0 arguments", "one argument"),
     ("1 + abs(v, z)", 5, "abs got 2 arguments", "one argument"),
     ("min(v)", 1, "min got 1 argument", "two or more arguments"),
-    ("abs(v, x=1)", 1, FOREIGN, GRAMMAR),
+    ("abs(v, x=1)", 9, FOREIGN, "<= or >=, in its place"),
     ("abs(*v)", 5, FOREIGN, GRAMMAR),
     ("abs(**v)", 1, FOREIGN, GRAMMAR),
     # names
@@ -101,7 +101,7 @@ NO_VALUES = [
     ("z\u00a0+\u2003u.real", 5, "attribute", GRAMMAR),
     ("v + \U0001f600", 5, "cannot be read", GRAMMAR),
     ("v + \u20ac + u", 5, "cannot be read", GRAMMAR),
-    ("v \u2212 z", 3, "cannot be read", GRAMMAR),  # a typographer's minus
+    ("v \u2212 z", 3, FOREIGN, "-, in its place"),  # a typographer's minus
     ("v + \ud800", 5, "cannot be read", GRAMMAR),  # half a surrogate pair
     # what is not even Python
     ("", 1, "empty", GRAMMAR),
@@ -111,7 +111,7 @@ NO_VALUES = [
     ("v \\ z", 3, "unexpected", GRAMMAR),
     ("v + \0", 5, "unexpected", GRAMMAR),
     ("v z", 3, "cannot be read", GRAMMAR),
-    ("v = z", 3, "cannot be read", GRAMMAR),
+    ("v = z", 3, FOREIGN, "<= or >=, in its place"),
     ("v)", 2, "cannot be read", GRAMMAR),
     ("1 + v) * (z", 6, "cannot be read", GRAMMAR),
     ("(v", 1, "cannot be read", GRAMMAR),
@@ -142,8 +142,11 @@ NO_CONDITIONS = [
     ("z not in s", 10, "only < <= > >=", "< <= > >="),
     ("z <> s", 3, "cannot be read", GRAMMAR),
     ("z => s", 3, "cannot be read", GRAMMAR),
-    ("z < s && v > 0", 8, "cannot be read", GRAMMAR),
-    ("z < s & v", 5, FOREIGN, GRAMMAR),
+    ("z < s && v > 0", 7, FOREIGN, "and, in its place"),
+    ("abs(v) < s \u2228 z > s", 12, FOREIGN, "or, in its place"),
+    ("!(z < s)", 1, FOREIGN, "not, in its place"),
+    ("z \u2265 s", 3, FOREIGN, ">=, in its place"),
+    ("z < s & v", 7, FOREIGN, "and, in its place"),
     ("z < s, v > 0", 1, FOREIGN, GRAMMAR),
     ("z < s if v > 0 else z > s", 1, "if ... else", GRAMMAR),
     ("any(z < s)", 1, "", ""),
@@ -381,3 +384,15 @@ def test_the_watch_itself_sees_execution(tmp_path: Path) -> None:
         (tmp_path / "canary").touch()
     with pytest.raises(AssertionError), nothing_executed():
         eval("1 + 1")
+
+
+@pytest.mark.parametrize(
+    ("text", "meant"),
+    [("sign(v)", "sgn"), ("Abs(v)", "abs"), ("F_Y * v", "F_y"), ("vc", "v_c"), ("q", None)],
+)
+def test_the_nearest_name_is_asked_for(text: str, meant: str | None) -> None:
+    with pytest.raises(ExpressionError) as caught:
+        parse_value(text, ["v", "v_c", "F_y"])
+    question = f"(did you mean {meant!r}?)"
+    assert (question in caught.value.reason) == (meant is not None)
+    assert ("did you mean" in caught.value.reason) == (meant is not None)

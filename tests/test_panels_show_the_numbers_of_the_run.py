@@ -88,7 +88,11 @@ def test_a_chart_that_does_not_know_s_is_not_held_against_it(ax: Axes) -> None:
     trace = simulate(ChartModel(stop, {"k": 2.0}), Prescribed("0.4"), 2.0)
     (line,) = panels.ratio(ax, trace)
     assert drawn(line)[1].max() == pytest.approx(0.5)
-    assert ax.get_ylabel() == "d [m]"
+    assert ax.get_ylabel() == "d"  # perhaps no deflection, and no metres
+    (line,) = panels.deflections(Figure().subplots(), trace)
+    assert line.get_label() == "d1"
+    beside = figures.compare_laws({"one": trace, "two": trace})
+    assert not any("s(v)" in text.get_text() for text in beside.axes[0].texts)
     (note,) = panels.margins(ax, trace)
     assert "no threshold:\nthis chart has no input s" in note.get_text()
     names = [text.get_text() for a in figures.ribbons_figure(trace).axes for text in a.texts]
