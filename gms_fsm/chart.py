@@ -192,6 +192,12 @@ class Chart:
             raise ChartError(
                 f"{here}: outputs has {_listed(self.outputs)}; it must give exactly 'F', the force"
             )
+        if hasattr(self.outputs["F"], "keys"):
+            raise ChartError(
+                f"{here}: output 'F' is {shown(self.outputs['F'])}; it is one text for all states. "
+                "Where the law differs by state let a variable carry it, for example a variable f "
+                "with the flow 'k * v' in one state and an entry {'f': 'F_c * sgn(v)'} in another"
+            )
         forces = {
             name: _value(text, symbols + derivatives, f"{here}, output {name!r}")
             for name, text in self.outputs.items()

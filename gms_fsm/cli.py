@@ -273,7 +273,11 @@ def _to_check(name: str, law: LawName | None) -> tuple[Chart, tuple[str, ...] | 
             raise ParameterError("check gms needs --law signed or --law published; they differ")
         return gms_element(law.value), None
     if name not in charts:
-        raise ParameterError(f"name is {name!r}; it must be one of gms, {', '.join(charts)}")
+        said = f"name is {name!r}; it" if name else "a name is missing; it"
+        raise ParameterError(
+            f"{said} must be one of gms, {', '.join(charts)} (a chart of your own is checked in "
+            "Python: prove(chart))"
+        )
     if law is not None:
         raise ParameterError(f"check {name} takes no --law; only gms does")
     found = BROKEN.get(name.removeprefix("broken:"))
@@ -316,13 +320,23 @@ def blocks_command(
 def plot_command(
     trace: Annotated[Path, typer.Argument(help="A trace, .npz or .csv.", show_default=False)],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder.")] = Path("figures"),
+    start: Annotated[float | None, typer.Option(help="From t (s).")] = None,
+    end: Annotated[float | None, typer.Option(help="To t (s).")] = None,
 ) -> None:
     """Draw a run: overview, and the story of its break-aways."""
     from plots import figures
 
     run = Trace.load(trace)
     folder = output_folder(output)
-    pictures = {"overview": figures.overview(run), "ribbons": figures.ribbons_figure(run)}
+    window = None
+    if start is not None or end is not None:
+        window = (
+            float(run.t[0]) if start is None else start, float(run.t[-1]) if end is None else end
+        )  # fmt: skip
+    pictures = {
+        "overview": figures.overview(run, window=window),
+        "ribbons": figures.ribbons_figure(run, window=window),
+    }
     for name, figure in pictures.items():
         for ending in ("png", "svg"):
             typer.echo(str(figures.save(figure, folder / f"{name}.{ending}")))

@@ -23,6 +23,7 @@ from typing import TextIO
 from gms_fsm.errors import GMSError, ScenarioError, SessionError
 from gms_fsm.explain import UNITS, Explanation, holds
 from gms_fsm.expression import evaluate
+from gms_fsm.models import parameter_names
 from gms_fsm.scenario import Loaded, load_scenario
 from gms_fsm.session import KINDS, Branch, Breakpoint, Session
 
@@ -817,6 +818,10 @@ class Debugger(cmd.Cmd):
                 v = self.session.watch(value)
                 continue
             what, i = self._pokeable(name)
+            if not what and name in parameter_names(self.session.model):
+                raise SessionError(
+                    f"{name} is a parameter; for another value start a session with another model"
+                )
             if not value or not what:
                 raise SessionError(f"{part!r} cannot be poked; {self._usage('poke')}")
             if what == "state":

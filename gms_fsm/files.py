@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 from collections.abc import Callable, Mapping
@@ -93,9 +94,10 @@ def written_together(files: Mapping[Path, Callable[[IO[bytes]], object]]) -> Non
             for part in temporary.values():
                 part.unlink(missing_ok=True)
     except OSError as error:
-        raise OutputError(
-            f"cannot write {path}: {error.strerror or error}; choose another folder or make room"
-        ) from None
+        advice = "make room" if error.errno == errno.ENOSPC else "choose another folder"
+        if isinstance(error, FileNotFoundError):
+            advice = "make its folder first, or choose another folder"
+        raise OutputError(f"cannot write {path}: {error.strerror or error}; {advice}") from None
 
 
 def leftovers(path: Path) -> list[Path]:

@@ -35,7 +35,7 @@ from itertools import combinations, islice, product
 from typing import Any, Literal, TypeAlias, get_args
 
 from gms_fsm.chart import Chart, Transition
-from gms_fsm.errors import ExpressionError, MissingExtraError, ParameterError
+from gms_fsm.errors import ExpressionError, MissingExtraError, ParameterError, shown
 from gms_fsm.expression import (
     MATLAB_LIKE,
     Binary,
@@ -248,6 +248,8 @@ def prove(chart: Chart, domain: Sequence[str] | None = None) -> Report:
     >>> finding.check, finding.where, finding.counterexample  # doctest: +SKIP
     ('stability', ('slip',), {'C': 1.0, 'v': -1.0, 's': 1.0, 'z': 1.0})
     """
+    if not hasattr(chart, "guards"):
+        raise ParameterError(f"chart is {shown(chart)}; prove takes a Chart, of a model its .chart")
     if domain is None:
         domain = default_domain(chart)
     domain = (domain,) if isinstance(domain, str) else tuple(domain)
@@ -583,17 +585,18 @@ def _determinism(prover: _Prover) -> Iterator[Finding]:
             yield Finding("determinism", "proved", (state.name,), "fewer than two edges leave it")
         for pair in combinations(edges, 2):
             guards = [chart.guards[edge] for edge in pair]
-            yield prover.settle("determinism", (state.name, *pair), _at_once, guards)
+            yield prover.settle("determinism", (state.name, *pair), _at_once, guards, pair[0])
 
 
-def _at_once(prover: _Prover, guards: Sequence[Condition]) -> _Answer:
+def _at_once(prover: _Prover, guards: Sequence[Condition], first: str) -> _Answer:
     reading = _Reading()
     formulas = [reading.truth(guard, prover.still) for guard in guards]
     prover.defined(reading)
     point = prover.example(_names(*guards), *formulas)
     if point is None:
         return _Answer("proved", "never enabled at once")
-    return _refuted("both are enabled at once", point, _enabled(guards, point))
+    text = f"both are enabled at once; the machine takes the earlier, {first}"
+    return _refuted(text, point, _enabled(guards, point))
 
 
 # --------------------------------------------------------------------------- livelock

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 import integrators
+from gms_fsm.chart import Chart
 from gms_fsm.errors import (
     LivelockError,
     NotFiniteError,
@@ -258,7 +259,8 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
             f"the flows on both sides of guard [{guard}] push back over it (chattering); leave a "
             "gap between the guards there and back"
             if time > 0.0
-            else f"guard [{guard}] and a way back hold together; make the guards exclude each other"
+            else f"guard [{guard}] {_way_back(chart, taken)} hold together; make the guards "
+            "exclude each other"
         )
         return LivelockError(
             f"element {error.machine + 1} switched {len(taken)} times "
@@ -282,6 +284,14 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
         f"law, a larger v_c, or other parameters; {kept}",
         trace,
     )
+
+
+def _way_back(chart: Chart, taken: Any) -> str:
+    """Name the other edge of an endless to and fro."""
+    other = next((edge for edge in chart.transitions if edge.name == taken[-2].edge), None)
+    if len(set(taken.edge.tolist())) != 2 or other is None:
+        return "and a way back"
+    return f"and that of {other.name}, [{other.guard}],"
 
 
 def _not_finite(error: NotFinite, recorder: Recording) -> str:

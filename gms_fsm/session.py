@@ -33,7 +33,7 @@ from gms_fsm.explain import Why, explain_state, holds
 from gms_fsm.expression import Condition, Value, evaluate, parse_condition, parse_value
 from gms_fsm.files import written_whole
 from gms_fsm.header import Header
-from gms_fsm.models import Model
+from gms_fsm.models import Model, parameter_names
 from gms_fsm.rigs import Rig
 from gms_fsm.signals import Function
 from gms_fsm.simulate import Run
@@ -935,8 +935,18 @@ class Session:
         ((-1.4, 0.0), 'slip')
         """
         here, chart, n = self.here, self.model.chart, self.model.n
+        for what, given in (("variables", variables), ("state", state)):
+            if given is not None and not isinstance(given, Mapping):
+                raise SessionError(
+                    f"{what} is {shown(given)}; give a mapping, for example "
+                    "variables={'z': {0: 0.1}} or state={0: 'slip'}"
+                )
         variables, state = dict(variables or {}), dict(state or {})
         for name, values in variables.items():
+            if name in parameter_names(self.model):
+                raise SessionError(
+                    f"{name} is a parameter; for another value make another model and session"
+                )
             if name not in chart.variables:
                 raise SessionError(f"no variable {name!r}; there are {', '.join(chart.variables)}")
             if not isinstance(values, Mapping):

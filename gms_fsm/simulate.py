@@ -90,8 +90,8 @@ def simulate(
         Wanted times [s], increasing; the trace has exactly these rows. All accepted steps and
         micro-steps otherwise.
     initial : mapping, optional
-        Any of ``z`` (n,) [m], ``states`` (n,) names, ``v`` [m/s] (not with a prescribed velocity)
-        and ``x`` [m].
+        Any of the chart's variables by name, such as ``z`` (n,) [m], ``states`` (n,) names, ``v``
+        [m/s] (not with a prescribed velocity) and ``x`` [m].
     progress : callable, optional
         Called now and then with the `Moment` reached.
     checkpoint : str or Path, optional

@@ -527,7 +527,10 @@ class Trace:
         with path.open(encoding="utf-8", newline="") as file:
             first = file.readline()
             if not first.startswith("# {"):
-                raise TraceFileError(f"{path}: line 1 must be '# ' and the trace's header")
+                what = "line 1 must be '# ' and the trace's header"
+                if first.startswith("t,element,"):
+                    what = "this is a log of transitions; give the trace itself, .npz or .csv"
+                raise TraceFileError(f"{path}: {what}")
             header = Header.model_validate_json(first[2:])
             table = _read_columns(file, path, 2)
         log = _read_columns(io.StringIO(_log_text(path, header.log)), _log_path(path), 1)

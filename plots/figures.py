@@ -436,14 +436,15 @@ def ribbons_figure(
         Left: v, z / s, F and states over time. Middle: the zoom (left out if nothing ever breaks
         away and `around` is not given). Right: F against v and x.
     """
-    zoom = panels.cascade_window(trace, around, within=within)
     limits = panels.checked_window(trace, window)
     crowded = window is None and len(trace.transitions) > MOST_SPANS * trace.n
     if crowded:
         limits = _last_cycles(trace)
-        if around is None:  # rather a cascade that the left column shows too
-            zoom = panels.cascade_window(shown(trace, limits), within=within) or zoom
     part = shown(trace, limits)
+    # Rather a cascade that the left column shows too.
+    zoom = panels.cascade_window(part if around is None else trace, around, within=within)
+    if zoom is None and window is None:
+        zoom = panels.cascade_window(trace, around, within=within)
     with rc_context(RC):
         figure = Figure(figsize=(13.2 if zoom else 9.6, 9.2), layout="constrained")
         halves = figure.add_gridspec(1, 2, width_ratios=(2.1, 1) if zoom else (1.3, 1))

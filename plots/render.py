@@ -62,6 +62,11 @@ def render(graph: graphviz.Digraph, path: str | Path) -> Path:
     ...     render(statechart(LUGRE), Path(folder, "lugre.dot")).name
     'lugre.dot'
     """
+    if not hasattr(graph, "source"):
+        raise ParameterError(
+            f"graph is {graph!r:.60}; give first the graph, for example from statechart, then the "
+            "path"
+        )
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in PICTURES + TEXTS:

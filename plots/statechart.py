@@ -106,6 +106,8 @@ def statechart(
     >>> "z ≥ s(v)" in statechart(GMS_ELEMENT["signed"], notation="math").source
     True
     """
+    if not hasattr(chart, "guards"):
+        raise ParameterError(f"chart is {chart!r:.60}; give a Chart, of a model its .chart")
     if counts is not None and counts.model.chart != chart:
         raise ParameterError(
             f"counts is a run of the chart {counts.model.chart.name!r}; it must be one of the "

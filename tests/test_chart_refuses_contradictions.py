@@ -73,6 +73,7 @@ def test_a_state_asked_for_by_a_wrong_name_is_refused_with_the_right_ones() -> N
         ({"variables": ()}, ["it has no variables", "give at least one"]),
         ({"outputs": {}}, ["outputs has none", "exactly 'F'"]),
         ({"outputs": {"G": "k"}}, ["outputs has 'G'", "exactly 'F'"]),
+        ({"outputs": {"F": {"stick": "k * z"}}}, ["one text for all states", "a variable f"]),
         ({"outputs": {"F": "k", "G": "k"}}, ["outputs has 'F', 'G'", "exactly 'F'"]),
         # one name, one meaning
         ({"parameters": ("k", "C", "v_c", "k")}, ["'k' is used twice", "parameter"]),

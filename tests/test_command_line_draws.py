@@ -58,6 +58,8 @@ def test_plot_animate_and_replay(folder: Path) -> None:
     said(folder, "animate", "t.npz", "-o", "film.gif", "--frames", "5")
     assert (folder / "film.gif").read_bytes().startswith(b"GIF8")
     pytest.importorskip("uplot", reason="the page needs the extra 'replay'")
+    said(folder, "plot", "t.npz", "-o", "part", "--start", "1", "--end", "2")
+    assert (folder / "part" / "ribbons.svg").is_file()
     said(folder, "replay", "t.npz", "t.npz", "-o", "page.html", "--title", "<b>two</b>")
     page = (folder / "page.html").read_text(encoding="utf-8")
     assert "default-src 'none'" in page

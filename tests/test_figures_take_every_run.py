@@ -158,3 +158,11 @@ print("matplotlib.pyplot" in sys.modules)
             cwd=Path(__file__).parents[1],
         )  # fmt: skip
     assert done.stdout.strip() == "False"
+
+
+def test_the_zoom_lies_in_the_window_that_is_asked_for(runs: dict[str, Trace]) -> None:
+    for window in ((3.0, 7.0), (30.0, 40.0)):
+        figure = figures.ribbons_figure(runs["Fig. 4, published"], window=window)
+        (margins,) = (ax for ax in figure.axes if ax.get_title(loc="left")[:2] == "f)")
+        low, high = margins.get_xlim()
+        assert window[0] <= low < high <= window[1]

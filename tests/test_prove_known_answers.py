@@ -15,7 +15,7 @@ import pytest
 
 pytest.importorskip("z3", reason="needs z3 (extra: check)")
 
-from gms_fsm import Chart, Finding, Report, State, Transition, prove
+from gms_fsm import Chart, Finding, LuGre, Report, State, Stribeck, Transition, prove
 from gms_fsm.charts import LAWS, LUGRE, gms_element
 from gms_fsm.charts.broken import BROKEN
 from gms_fsm.errors import ExpressionError, ParameterError
@@ -206,6 +206,13 @@ def test_a_quotient_counts_only_where_its_denominator_is_not_0() -> None:
     assert "v can be 0" in finding.text
     assert "domain=['v > 0', ...]" in finding.text
     assert prove(chart(go="z / v >= 1"), ["v > 0", "s > 0"]).of("livelock")[0].status == "refuted"
+
+
+def test_what_is_enabled_at_once_says_which_edge_is_taken_and_a_model_is_no_chart() -> None:
+    (finding, *_) = prove(BROKEN["arms"].chart, BROKEN["arms"].domain).refuted
+    assert "the machine takes the earlier, break_away_forward" in finding.text
+    with pytest.raises(ParameterError, match=r"prove takes a Chart, of a model its \.chart"):
+        prove(LuGre(sigma_0=1, sigma_1=1, sigma_2=1, stribeck=Stribeck(1, 2, 3)))  # type: ignore[arg-type]
 
 
 def test_hysteresis_ends_chattering() -> None:

@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 import graphviz
 import pytest
 
-from gms_fsm.charts import GMS_ELEMENT
+from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.errors import OutputError, ParameterError
 from plots.block_diagram import block_diagram
 from plots.render import render
@@ -172,3 +172,12 @@ def test_package_failing_is_an_error(tmp_path: Path, no_program: None) -> None:
     with pytest.raises(OutputError, match="pygraphviz"):
         render(graphviz.Digraph(body=["a -> -> b"]), tmp_path / "chart.svg")
     assert not list(tmp_path.iterdir())
+
+
+def test_what_is_no_graph_no_chart_or_in_no_folder_is_said(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="first the graph"):
+        render("chart.svg", statechart(LUGRE))  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match=r"of a model its \.chart"):
+        statechart("gms")  # type: ignore[arg-type]
+    with pytest.raises(OutputError, match="make its folder first, or choose another"):
+        render(statechart(LUGRE), tmp_path / "none" / "chart.dot")

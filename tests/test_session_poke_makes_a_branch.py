@@ -9,7 +9,7 @@ import pytest
 from gms_fsm import Prescribed, simulate
 from gms_fsm.errors import ChartError, ParameterError, SessionError
 from gms_fsm.session import Session
-from tests.helpers import FIG4_SINE, pulled_mass, stick_slip
+from tests.helpers import FIG4_SINE, open_loop, pulled_mass, stick_slip
 
 
 def _open_loop() -> Session:
@@ -180,3 +180,27 @@ def test_no_such_branch(branch: int) -> None:
     for ask in (session.switch, lambda n: session.compare(0, n)):
         with pytest.raises(SessionError, match="no branch"):
             ask(branch)
+
+
+@pytest.mark.parametrize(
+    ("poked", "words"),
+    [({"variables": "z"}, "variables is 'z'; give a mapping"),
+     ({"state": "slip"}, "state is 'slip'; give a mapping"),
+     ({"variables": {"F_s": {0: 2.0}}}, "F_s is a parameter; for another value make another")],
+)  # fmt: skip
+def test_what_cannot_be_poked_is_said(poked: dict[str, Any], words: str) -> None:
+    session = Session(stick_slip("signed"), open_loop(), 5.0)
+    with pytest.raises(SessionError) as caught:
+        session.poke(**poked)
+    assert words in str(caught.value)
+
+
+def test_both_are_computed_to_their_ends_before_they_are_compared() -> None:
+    session = Session(stick_slip("signed"), open_loop(), 30.0)
+    session.goto(6.0)
+    session.poke({"z": {0: -0.2}})
+    found = session.compare()
+    assert (found.branches, found.t) == ((0, 1), 30.0)
+    assert "until t = 30 s" in str(found)
+    with pytest.raises(SessionError, match="branch 0 has no parent"):
+        session.compare(b=0)
