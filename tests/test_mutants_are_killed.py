@@ -729,7 +729,7 @@ def test_an_infinite_slope_and_a_step_of_nothing_are_told_apart() -> None:
 # --------------------------------------------------------------------------- what nobody can notice
 # Of all mutants these survive, by reason:
 #
-# - Cannot occur: a bend, a depth, a count of steps and `quiet` are never negative, a cursor is never
+# - Cannot occur: a bend, a depth, a count of steps and `quiet` are never negative, a cursor never
 #   beyond its list, a time never behind its stop, no place beyond `NO_CHANGE`, a chain of
 #   comparisons never empty, no atom stands firmer than an atom, what is no sum and no power is `*`
 #   or `/`. So `> 0` and `!= 0`, `>=` and `==`, `<` and `!=` are the same there.
@@ -740,8 +740,9 @@ def test_an_infinite_slope_and_a_step_of_nothing_are_told_apart() -> None:
 #   dense output fitted for a time that is not in the step.
 # - A hint: the grid's index may be too low, a loop climbs from there; a guess in `_bracket` is
 #   clamped into the bracket. Both only take longer.
-# - Names: the numbers of statuses and of `NO_CHANGE`; of the levels of binding only the order counts.
+# - Names: the numbers of statuses and of `NO_CHANGE`; of the levels of binding the order alone
+#   counts.
 # - Scale: a margin times 2 is on the same side of every comparison.
 # - The least tolerance of a bracket matters to a step longer than the times at both its ends.
 # - Follows from the rest: `compare=True` for the trees of a `Chart`, for equal texts give equal
-#   trees; `strict=True` where two lists come from one length; what a reader of values does not meet.
+#   trees; `strict=True` where two lists come from one length; what a reader of values never meets.
