@@ -31,6 +31,7 @@ from gms_fsm.expression import (
     parse_value,
     product_power,
     rough_points,
+    sgn,
     spell,
     split,
     substitute,
@@ -93,6 +94,10 @@ def test_a_tree_and_its_spelling_cannot_be_changed() -> None:
     for part in (*parts, MATLAB_LIKE, comparison, comparison.comparison):
         with pytest.raises(dataclasses.FrozenInstanceError):
             setattr(part, dataclasses.fields(part)[0].name, None)
+
+
+def test_the_sign_of_what_is_no_number_is_zero() -> None:
+    assert [sgn(u) for u in (math.nan, 0.0, -0.0, 5e-324, -5e-324)] == [0.0, 0.0, 0.0, 1.0, -1.0]
 
 
 def test_the_longest_text_has_ten_thousand_characters() -> None:
@@ -192,6 +197,7 @@ def test_small_powers_are_products_until_the_text_grows_too_long() -> None:
         ("-(-a)", "-(-a)", "-(-a)"),
         ("-a * b", "-a * b", "-a * b"),
         ("a**1", "a", "a^1"),
+        ("(a + b)**1", "a + b", "(a + b)^1"),
         ("a**0", "1.0", "a^0"),
         ("(a * b)**2", "a * b * (a * b)", "(a * b)^2"),
         ("(a + b)**2", "(a + b) * (a + b)", "(a + b)^2"),
@@ -731,8 +737,8 @@ def test_an_infinite_slope_and_a_step_of_nothing_are_told_apart() -> None:
 #
 # - Cannot occur: a bend, a depth, a count of steps and `quiet` are never negative, a cursor never
 #   beyond its list, a time never behind its stop, no place beyond `NO_CHANGE`, a chain of
-#   comparisons never empty, no atom stands firmer than an atom, what is no sum and no power is `*`
-#   or `/`. So `> 0` and `!= 0`, `>=` and `==`, `<` and `!=` are the same there.
+#   comparisons never empty, no atom stands firmer than an atom, a number that was read is never
+#   negative, what is no sum and no power is `*` or `/`. So `> 0` and `!= 0`, `>=` and `==`, `<` and `!=` are the same there.
 # - Equality of floats: where two computed numbers are exactly alike, `<` and `<=` differ by a
 #   halving, a look or a redone step, never by the place found.
 # - Read by nobody: scratch is filled before it is read, and may be longer; the place returned with
