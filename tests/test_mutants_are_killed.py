@@ -738,7 +738,8 @@ def test_an_infinite_slope_and_a_step_of_nothing_are_told_apart() -> None:
 # - Cannot occur: a bend, a depth, a count of steps and `quiet` are never negative, a cursor never
 #   beyond its list, a time never behind its stop, no place beyond `NO_CHANGE`, a chain of
 #   comparisons never empty, no atom stands firmer than an atom, a number that was read is never
-#   negative, what is no sum and no power is `*` or `/`. So `> 0` and `!= 0`, `>=` and `==`, `<` and `!=` are the same there.
+#   negative, what is no sum and no power is `*` or `/`. So `> 0` and `!= 0`, `>=` and `==`, `<` and
+#   `!=` are the same there.
 # - Equality of floats: where two computed numbers are exactly alike, `<` and `<=` differ by a
 #   halving, a look or a redone step, never by the place found.
 # - Read by nobody: scratch is filled before it is read, and may be longer; the place returned with
