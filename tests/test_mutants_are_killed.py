@@ -222,6 +222,7 @@ def test_a_value_has_no_more_and_no_fewer_brackets_than_its_order_needs(
 @pytest.mark.parametrize(
     ("text", "python", "matlab"),
     [
+        ("a - b > c and a + b < c", "a - b > c and a + b < c", "a - b > c && a + b < c"),
         ("not a > b and c > 0", "not a > b and c > 0.0", "!(a > b) && c > 0"),
         ("not (a > b and c > 0)", "not (a > b and c > 0.0)", "!(a > b && c > 0)"),
         ("not not a > b", "not not a > b", "!(!(a > b))"),
@@ -735,11 +736,12 @@ def test_an_infinite_slope_and_a_step_of_nothing_are_told_apart() -> None:
 # --------------------------------------------------------------------------- what nobody can notice
 # Of all mutants these survive, by reason:
 #
-# - Cannot occur: a bend, a depth, a count of steps and `quiet` are never negative, a cursor never
-#   beyond its list, a time never behind its stop, no place beyond `NO_CHANGE`, a chain of
-#   comparisons never empty, no atom stands firmer than an atom, a number that was read is never
-#   negative, what is no sum and no power is `*` or `/`. So `> 0` and `!= 0`, `>=` and `==`, `<` and
-#   `!=` are the same there.
+# - Cannot occur: a bend, a depth, a count of steps and `quiet` are never negative, a cursor
+#   never beyond its list, a time never behind its stop, no place beyond `NO_CHANGE`, a chain of
+#   comparisons never empty, no atom stands firmer than an atom, an estimate of the error is
+#   infinite where it is no number, Python knows of no column behind a text's end, a number read is
+#   never negative, what is no sum and no power is `*` or `/`. So `> 0` and `!= 0`, `>=` and `==`,
+#   `<` and `!=` are the same there.
 # - Equality of floats: where two computed numbers are exactly alike, `<` and `<=` differ by a
 #   halving, a look or a redone step, never by the place found.
 # - Read by nobody: scratch is filled before it is read, and may be longer; the place returned with
@@ -752,4 +754,5 @@ def test_an_infinite_slope_and_a_step_of_nothing_are_told_apart() -> None:
 # - Scale: a margin times 2 is on the same side of every comparison.
 # - The least tolerance of a bracket matters to a step longer than the times at both its ends.
 # - Follows from the rest: `compare=True` for the trees of a `Chart`, for equal texts give equal
-#   trees; `strict=True` where two lists come from one length; what a reader of values never meets.
+#   trees; `strict=True` where two lists come from one length; what a reader of values never meets;
+#   how much of a long name is held against the known ones.
