@@ -7,6 +7,7 @@ import importlib
 import os
 import signal
 import threading
+import uuid
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -334,6 +335,8 @@ def sweep(
     collected = _Collected(model, runs, options.get("t_eval"))
     size = max(1, min(AT_ONCE, runs // AT_ONCE))
     chunks = [range(start, min(start + size, runs)) for start in range(0, runs, size)]
+    # Dask takes tasks with equal arguments for one, and a failure of before for its result.
+    name = uuid.uuid4().hex
     with contextlib.ExitStack() as stack:
         if executor is None:
             executor = stack.enter_context(_threads())
@@ -342,9 +345,9 @@ def sweep(
         try:
             with _undisturbed():
                 for chunk in chunks:
-                    part = {name: array[chunk.start : chunk.stop] for name, array in values.items()}
+                    part = {key: array[chunk.start : chunk.stop] for key, array in values.items()}
                     try:
-                        task = executor.submit(_run_chunk, model, rig, t_end, part, options)
+                        task = executor.submit(_run_chunk, model, rig, t_end, part, options, name)
                     except BrokenExecutor as error:  # by a task before this one
                         task = Future()
                         task.set_exception(error)
@@ -424,9 +427,14 @@ class _Result:
 
 
 def _run_chunk(
-    model: Model, rig: Rig, t_end: float, part: Mapping[str, FloatArray], options: Mapping[str, Any]
+    model: Model,
+    rig: Rig,
+    t_end: float,
+    part: Mapping[str, FloatArray],
+    options: Mapping[str, Any],
+    _sweep: str,
 ) -> list[_Result]:
-    """Run some sets of parameters, one after the other."""
+    """Run some sets of parameters, one after the other, for one sweep."""
     results = []
     compiled: CompiledRun | None = None
     for row in range(len(next(iter(part.values())))):

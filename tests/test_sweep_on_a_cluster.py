@@ -34,7 +34,7 @@ def cluster() -> Iterator[Any]:
     """Two worker processes of one thread each."""
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None,
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0",
         silence_logs=logging.CRITICAL,
     ) as made:  # fmt: skip
         yield made
@@ -100,7 +100,7 @@ def test_what_kills_every_worker_is_a_row_that_says_so() -> None:
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 1}),
         distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None,
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0",
             silence_logs=logging.CRITICAL,
         ) as made,
         distributed.Client(made) as client,
