@@ -4,7 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from gms_fsm import GMS, GMSParameters, Prescribed, PulledSlider, Slider, Stribeck, Trace
+from gms_fsm import (
+    GMS,
+    Chart,
+    ChartModel,
+    GMSParameters,
+    Prescribed,
+    PulledSlider,
+    Slider,
+    State,
+    Stribeck,
+    Trace,
+    Transition,
+)
 
 SINE = "0.2*sin(2*pi*t/20)"
 FIG4_SINE = "0.15*sin(2*pi*t/25)"
@@ -67,3 +79,32 @@ def event_sequence(trace: Trace) -> list[tuple[int, str]]:
     """Which element took which edge, in order."""
     log = trace.transitions
     return list(zip(log.element.tolist(), log.edge.tolist(), strict=True))
+
+
+CURVE = Stribeck(F_c=1.0, F_s=1.5, v_s=0.02)
+
+# Stick, creep in pre-sliding, slip with wear w; a reset of z at each arrest.
+WEAR = Chart(
+    "wear",
+    inputs=("v", "s", "t", "x"),
+    variables=("z", "w"),
+    parameters=("k", "C", "v_c", "share"),
+    states=(
+        State("stick", flow={"z": "v", "w": "0"}, entry={"z": "0.5 * z"}),
+        State("creep", flow={"z": "v * (1 - 0.5 * abs(z) / s)", "w": "0"}),
+        State("slip", flow={"z": "C * (sgn(v) - z / s)", "w": "abs(v)"}, exit={"w": "w + 1"}),
+    ),
+    transitions=(
+        Transition("yield_", "stick", "creep", guard="abs(z) >= share * s"),
+        Transition("tear", "creep", "slip", guard="abs(z) >= s and (v > v_c or v < -v_c)"),
+        Transition("heal", "creep", "stick", guard="not abs(z) >= 0.5 * share * s"),
+        Transition("arrest", "slip", "stick", guard="abs(v) <= v_c", actions={"z": "0.8 * z"}),
+    ),
+    outputs={"F": "k * z + 0.1 * dz"},
+)
+
+
+def wear(n: int = 3) -> ChartModel:
+    """A bank of the chart above: three states, two variables, actions of every kind."""
+    values = {"k": np.linspace(1, 2, n), "C": 0.3, "v_c": 1e-6, "share": np.linspace(0.5, 0.7, n)}
+    return ChartModel(WEAR, values, n=n, stribeck=CURVE, weights=np.linspace(0.5, 1, n))

@@ -22,7 +22,6 @@ from gms_fsm import (
     Prescribed,
     PulledSlider,
     State,
-    Stribeck,
     Trace,
     Transition,
     simulate,
@@ -31,45 +30,28 @@ from gms_fsm.charts import gms_element
 from gms_fsm.errors import ChartError, LivelockError, ParameterError
 from gms_fsm.models import Model
 from gms_fsm.rigs import Rig
-from tests.helpers import non_drifting, one_element, open_loop, pulled_mass, same_bits, stick_slip
+from tests.helpers import (
+    CURVE,
+    non_drifting,
+    one_element,
+    open_loop,
+    pulled_mass,
+    same_bits,
+    stick_slip,
+    wear,
+)
 
 pytest.importorskip("numba", reason="needs the extra fast")
 
-CURVE = Stribeck(F_c=1.0, F_s=1.5, v_s=0.02)
 Call = tuple[Any, ...]
-
-RESETS = Chart(
-    "resets",
-    inputs=("v", "s", "t", "x"),
-    variables=("z", "w"),
-    parameters=("k", "C", "v_c", "share"),
-    states=(
-        State("stick", flow={"z": "v", "w": "0"}, entry={"z": "0.5 * z"}),
-        State("creep", flow={"z": "v * (1 - 0.5 * abs(z) / s)", "w": "0"}),
-        State("slip", flow={"z": "C * (sgn(v) - z / s)", "w": "abs(v)"}, exit={"w": "w + 1"}),
-    ),
-    transitions=(
-        Transition("yield_", "stick", "creep", guard="abs(z) >= share * s"),
-        Transition("tear", "creep", "slip", guard="abs(z) >= s and (v > v_c or v < -v_c)"),
-        Transition("heal", "creep", "stick", guard="not abs(z) >= 0.5 * share * s"),
-        Transition("arrest", "slip", "stick", guard="abs(v) <= v_c", actions={"z": "0.8 * z"}),
-    ),
-    outputs={"F": "k * z + 0.1 * dz"},
-)
-
-
-def _resets(n: int = 3) -> ChartModel:
-    values = {"k": np.linspace(1, 2, n), "C": 0.3, "v_c": 1e-6, "share": np.linspace(0.5, 0.7, n)}
-    return ChartModel(RESETS, values, n=n, stribeck=CURVE, weights=np.linspace(0.5, 1, n))
-
 
 CASES: dict[str, tuple[Model, Rig, float]] = {
     "open loop": (stick_slip("signed"), open_loop(), 61.0),
     "published": (stick_slip("published"), Prescribed("0.15*sin(2*pi*t/25)"), 60.0),
     "pulled mass": (*pulled_mass(), 30.0),
     "fig. 3, slipping": (*non_drifting("signed", slipping=True), 20.0),
-    "resets, open loop": (_resets(), Prescribed("0.3*sin(2*pi*t/17)"), 40.0),
-    "resets, closed loop": (_resets(), PulledSlider(1, 2, 0.1), 40.0),
+    "resets, open loop": (wear(), Prescribed("0.3*sin(2*pi*t/17)"), 40.0),
+    "resets, closed loop": (wear(), PulledSlider(1, 2, 0.1), 40.0),
 }
 OPTIONS: dict[str, dict[str, Any]] = {
     "all rows": {},

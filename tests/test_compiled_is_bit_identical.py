@@ -49,6 +49,7 @@ from gms_fsm.rigs import Rig
 from gms_fsm.scenario import load_scenario
 from gms_fsm.signals import Signal, as_signal
 from tests.helpers import (
+    CURVE,
     FIG3_FORCE,
     FIG4_SINE,
     non_drifting,
@@ -57,6 +58,7 @@ from tests.helpers import (
     pulled_mass,
     same_bits,
     stick_slip,
+    wear,
 )
 
 pytest.importorskip("numba", reason="needs the extra fast")
@@ -64,7 +66,6 @@ pytest.importorskip("numba", reason="needs the extra fast")
 from gms_fsm import compiled
 
 ROOT = Path(__file__).parents[1]
-CURVE = Stribeck(F_c=1.0, F_s=1.5, v_s=0.02)
 
 
 # --------------------------------------------------------------------------- comparing
@@ -366,38 +367,13 @@ def test_any_number_of_elements(n: int) -> None:
 
 
 # --------------------------------------------------------------------------- charts of one's own
-WEAR = Chart(
-    "wear, compiled",
-    inputs=("v", "s", "t", "x"),
-    variables=("z", "w"),
-    parameters=("k", "C", "v_c", "share"),
-    states=(
-        State("stick", flow={"z": "v", "w": "0"}, entry={"z": "0.5 * z"}),
-        State("creep", flow={"z": "v * (1 - 0.5 * abs(z) / s)", "w": "0"}),
-        State("slip", flow={"z": "C * (sgn(v) - z / s)", "w": "abs(v)"}, exit={"w": "w + 1"}),
-    ),
-    transitions=(
-        Transition("yield_", "stick", "creep", guard="abs(z) >= share * s"),
-        Transition("tear", "creep", "slip", guard="abs(z) >= s and (v > v_c or v < -v_c)"),
-        Transition("heal", "creep", "stick", guard="not abs(z) >= 0.5 * share * s"),
-        Transition("arrest", "slip", "stick", guard="abs(v) <= v_c", actions={"z": "0.8 * z"}),
-    ),
-    outputs={"F": "k * z + 0.1 * dz"},
-)
-
-
-def _wear(n: int) -> ChartModel:
-    values = {"k": np.linspace(1, 2, n), "C": 0.3, "v_c": 1e-6, "share": np.linspace(0.5, 0.7, n)}
-    return ChartModel(WEAR, values, n=n, stribeck=CURVE, weights=np.linspace(0.5, 1, n))
-
-
 @pytest.mark.parametrize("options", ["dp45", "rk4", "dp45 by step", "rk4 by step"])
 @pytest.mark.parametrize("rig", [Prescribed("0.3*sin(2*pi*t/17)"), PulledSlider(1, 2, 0.1)])
 def test_assignments_entry_and_exit(rig: Rig, options: str) -> None:
     for n in (1, 3):
-        trace = agreed(_wear(n), rig, 40.0, **OPTIONS[options])
+        trace = agreed(wear(n), rig, 40.0, **OPTIONS[options])
         assert {"yield_", "tear"} <= set(trace.transitions.edge.tolist())
-        agreed(_wear(n), rig, 12.0, **OPTIONS[options], t_eval=T_EVAL)
+        agreed(wear(n), rig, 12.0, **OPTIONS[options], t_eval=T_EVAL)
 
 
 def test_a_reset_in_stateflows_order() -> None:

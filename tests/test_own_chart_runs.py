@@ -19,41 +19,13 @@ from gms_fsm import (
     PulledSlider,
     Slider,
     State,
-    Stribeck,
     Trace,
     Transition,
     simulate,
 )
 from gms_fsm.errors import ChartError
 from gms_fsm.rigs import Rig
-from tests.helpers import same_bits
-
-CURVE = Stribeck(F_c=1.0, F_s=1.5, v_s=0.02)
-
-# Stick, creep in pre-sliding, slip with wear w; a reset of z at each arrest.
-WEAR = Chart(
-    "wear",
-    inputs=("v", "s", "t", "x"),
-    variables=("z", "w"),
-    parameters=("k", "C", "v_c", "share"),
-    states=(
-        State("stick", flow={"z": "v", "w": "0"}, entry={"z": "0.5 * z"}),
-        State("creep", flow={"z": "v * (1 - 0.5 * abs(z) / s)", "w": "0"}),
-        State("slip", flow={"z": "C * (sgn(v) - z / s)", "w": "abs(v)"}, exit={"w": "w + 1"}),
-    ),
-    transitions=(
-        Transition("yield_", "stick", "creep", guard="abs(z) >= share * s"),
-        Transition("tear", "creep", "slip", guard="abs(z) >= s and (v > v_c or v < -v_c)"),
-        Transition("heal", "creep", "stick", guard="not abs(z) >= 0.5 * share * s"),
-        Transition("arrest", "slip", "stick", guard="abs(v) <= v_c", actions={"z": "0.8 * z"}),
-    ),
-    outputs={"F": "k * z + 0.1 * dz"},
-)
-
-
-def wear(n: int = 3) -> ChartModel:
-    values = {"k": np.linspace(1, 2, n), "C": 0.3, "v_c": 1e-6, "share": np.linspace(0.5, 0.7, n)}
-    return ChartModel(WEAR, values, n=n, stribeck=CURVE, weights=np.linspace(0.5, 1, n))
+from tests.helpers import CURVE, same_bits, wear
 
 
 def both(model: ChartModel, rig: Rig, t_end: float, **options: Any) -> Trace:
