@@ -251,7 +251,7 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
 
     if error.machine is not None:
         log = trace.transitions
-        taken = log[log.element == error.machine][-integrators.MOST_SWITCHES :]
+        taken = log[log.element == error.machine][-error.times :]
         last = taken[-1]
         guard = next(edge.guard for edge in chart.transitions if edge.name == last.edge)
         time = float(last.t - taken[0].t)
@@ -278,7 +278,7 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
     state = chart.states[error.mode[i]]
     edges = ", ".join(f"{edge.name} [{edge.guard}]" for _, edge in chart.leaving(state.name))
     return LivelockError(
-        f"{' and '.join(error.relations)} changed {integrators.MOST_SWITCHES} times at {scene}: "
+        f"{' and '.join(error.relations)} changed {error.times} times at {scene}: "
         f"element {i + 1} is in {state.name} ({values(i)}), its flow pushes back on both sides and "
         f"no edge leaves ({edges or 'it has none'}): a sliding mode (Filippov); try the signed "
         f"law, a larger v_c, or other parameters; {kept}",

@@ -170,10 +170,17 @@ class Livelock(HybridError):
     """Switches without progress in time, of one machine or of one relation."""
 
     def __init__(
-        self, t: float, y: Vector, mode: list[int], machine: int | None, relations: list[str]
+        self,
+        t: float,
+        y: Vector,
+        mode: list[int],
+        machine: int | None,
+        times: int,
+        relations: list[str],
     ) -> None:
-        super().__init__(f"{MOST_SWITCHES} switches without progress", t, y, mode)
+        super().__init__(f"{times} switches without progress", t, y, mode)
         self.machine = machine
+        self.times = times
         self.relations = relations
 
 
@@ -431,14 +438,15 @@ def failure(happening: int, b: Buffers, relations: list[str]) -> HybridError:
     if happening == kernel.TOO_SMALL:
         return StepTooSmall("step size under the clock's resolution", t, y, mode)
     if happening == loop.MACHINE_LIVELOCK:
-        return Livelock(t, y, mode, counts[loop.MACHINE], [])
+        machine = counts[loop.MACHINE]
+        return Livelock(t, y, mode, machine, memory.switches[machine], [])
     if happening == loop.RELATION_LIVELOCK:
         # A relation in a guard may have changed once more than its machine has switched.
         machine = max(range(len(mode)), key=lambda i: memory.switches[i])
         if memory.switches[machine] >= MOST_SWITCHES // 2:
-            return Livelock(t, y, mode, machine, [])
+            return Livelock(t, y, mode, machine, memory.switches[machine], [])
         often = [name for r, name in enumerate(relations) if memory.changes[r] >= MOST_SWITCHES]
-        return Livelock(t, y, mode, None, often)
+        return Livelock(t, y, mode, None, MOST_SWITCHES, often)
     w = loop.active_relations(b.relations, memory)
     undefined = [relations[r] for r in w.active if w.start[r] != w.start[r]]
     text = f"{undefined[0]} compares NaN" if undefined else "NaN or infinity"

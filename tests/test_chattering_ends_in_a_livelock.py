@@ -4,21 +4,11 @@ Two machines that chatter together move the clock on by some ticks each time; a 
 like that would never end.
 """
 
-import numpy as np
 import pytest
 
-from gms_fsm import ChartModel, Prescribed, Stribeck, simulate
-from gms_fsm.charts.broken import BROKEN
+from gms_fsm import simulate
 from gms_fsm.errors import LivelockError
-
-SLOWING = Prescribed("0.2*cos(2*pi*t/20)")  # so that s rises
-
-
-def memoryless(weights):
-    return ChartModel(
-        BROKEN["memoryless"].chart, {"k": 1.0, "sigma": 0.1, "C": 0.1, "v_c": 1e-6},
-        n=len(weights), stribeck=Stribeck(1.0, 1.5, 0.05), weights=np.array(weights),
-    )  # fmt: skip
+from tests.test_monitors_see_what_happens import SLOWING, memoryless
 
 
 @pytest.mark.parametrize("engine", ["machines", "ifelse", "compiled"])
@@ -40,3 +30,12 @@ def test_the_error_names_the_element_and_says_that_it_chatters(weights, element,
     ):  # fmt: skip
         assert part in text
     assert "sliding mode" not in text
+
+
+def test_what_it_did_before_is_not_counted():
+    """At the start it arrests, seconds before it chatters."""
+    with pytest.raises(LivelockError) as caught:
+        simulate(memoryless([0.5]), SLOWING, 10.0, initial={"states": ["slip"]})
+    log = caught.value.trace.transitions
+    assert log.t[0] == 0.0
+    assert f"switched {len(log) - 1} times in {log.t[-1] - log.t[1]:.3g} s" in str(caught.value)
