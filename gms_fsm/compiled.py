@@ -20,7 +20,7 @@ from gms_fsm.files import written_whole
 from gms_fsm.generated import load
 from gms_fsm.parameters import FloatArray
 from gms_fsm.program import Arguments, Program
-from gms_fsm.signals import piecewise_linear
+from gms_fsm.signals import piecewise_linear, piecewise_slope
 
 __all__ = ["cache_folder", "check_numba", "machine_code", "observe_rows", "packed"]
 
@@ -121,11 +121,11 @@ def _loaded(
     """Load a text from a file of its own; tell whether machine code may be kept beside it."""
     from integrators import compiled
 
-    for helper in (sgn, piecewise_linear):
+    for helper in (sgn, piecewise_linear, piecewise_slope):
         compiled.usable_inside(helper)
     # The name of a module that exists: numba imports it when it loads machine code from disk.
     names: dict[str, Any] = {"piecewise_linear": piecewise_linear, "pow": _power()}
-    names["__name__"] = __name__
+    names |= {"piecewise_slope": piecewise_slope, "__name__": __name__}
     for name, call in callables:
         names[f"{name}_signal"] = _compiled_signal(name, call)
     # A user's function may change without its text changing: such code is not kept.
@@ -184,7 +184,9 @@ def _text_file(source: str) -> Path | None:
     if folder is None:
         return None
     # What else decides the machine code.
-    stamp = compiled.digest(sgn, piecewise_linear, _loaded.__wrapped__, text=source)
+    stamp = compiled.digest(
+        sgn, piecewise_linear, piecewise_slope, _loaded.__wrapped__, text=source
+    )
     path = folder / f"program_{stamp}.py"
     try:
         if not path.exists():
@@ -213,9 +215,9 @@ def _compiled_signal(name: str, call: Callable[[float], float]) -> Any:
 
 
 def observe_rows(
-    program: Program, t: FloatArray, y: FloatArray, mode: NDArray[np.int64], width: int
+    program: Program, t: FloatArray, y: FloatArray, mode: NDArray[np.int64]
 ) -> FloatArray:
-    """Return what `observe` says of many rows.
+    """Return what `observe` says of many rows, all signs as they are seen.
 
     Parameters
     ----------
@@ -223,19 +225,18 @@ def observe_rows(
         The program.
     t, y, mode : ndarray, shapes (rows,), (rows, m), (rows, n)
         The rows.
-    width : int
-        Numbers a row.
 
     Returns
     -------
-    ndarray, shape (rows, width)
+    ndarray, shape (rows, program.seen)
         Bit for bit as the readable engine.
     """
     from integrators import compiled
 
-    table = np.empty((t.size, width))
+    table = np.empty((t.size, program.seen))
     compiled.for_each_row(
         machine_code(program, "observe"), np.ascontiguousarray(t), np.ascontiguousarray(y),
-        np.ascontiguousarray(mode), packed(program.p), table, cache_folder(),
+        np.ascontiguousarray(mode), np.array(program.live), packed(program.p), table,
+        cache_folder(),
     )  # fmt: skip
     return table

@@ -13,13 +13,14 @@ from gms_fsm import compiled
 from gms_fsm.errors import SimulationError
 from gms_fsm.machines import ElementMachines, MachineEngine
 from gms_fsm.models import Model
-from gms_fsm.program import arguments, system
-from gms_fsm.recording import Recording, check_end, explained, observed
+from gms_fsm.observing import observe
+from gms_fsm.program import system
+from gms_fsm.recording import Recording, check_end, check_pace, explained
 from gms_fsm.rigs import Rig
 from gms_fsm.start import Start
 from gms_fsm.trace import Rows, Trace, log_from
 from integrators import hybrid, loop
-from integrators.advance import ROW
+from integrators.advance import ROW, STEPS
 
 __all__ = ["CompiledRun"]
 
@@ -40,10 +41,9 @@ class CompiledRun:
     def __init__(self, start: Start, machines: ElementMachines | None = None) -> None:
         self.start = start
         program = start.program
-        names = ("flow" if start.options.located else "flow_live", "arm", "margins", "switch")
-        self.functions = [
-            compiled.machine_code(program, name) for name in (*names, "act", "observe")
-        ]
+        flow = "flow" if start.options.located else "flow_live"
+        names = (flow, "arm", "margins", "normal", "switch", "act", "observe")
+        self.functions = [compiled.machine_code(program, name) for name in names]
         self.columns = Columns(start)
         self.recorder: Recording = self.columns
         self.engine: MachineEngine | None = None
@@ -65,7 +65,7 @@ class CompiledRun:
         counts: Any = self.buffers.memory.counts
         t, y, mode = self.columns.latest
         if self.engine is not None:
-            self.engine.go_on_from(t, y, mode, self.start.program.p)
+            self.engine.go_on_from(t, y, mode[: self.start.model.n], self.start.program.p)
             if counts[loop.PHASE] == loop.FIRE:  # its callbacks have run, the loop is yet to follow
                 edge = self.start.model.chart.transitions[counts[loop.EDGE]]
                 element = self.engine.machines.elements[counts[loop.MACHINE]]
@@ -103,8 +103,8 @@ class CompiledRun:
             happening = record(
                 (
                     *self.functions, b.method, b.control, b.plan, b.memory, b.y, b.mode, b.held,
-                    columns.p, b.relations, b.out, b.work, columns.log, start.program.first,
-                    STEPS_AT_ONCE, self.engine is not None,
+                    columns.p, b.relations, b.surfaces, b.sliding, b.out, b.work, columns.log,
+                    start.program.first, STEPS_AT_ONCE, self.engine is not None,
                 ),
                 compiled.cache_folder(),
             )  # fmt: skip
@@ -121,9 +121,11 @@ class CompiledRun:
         if happening == loop.DONE:
             check_end(columns)
             return False
-        if happening == loop.FIRING:
+        if happening == loop.ROWS:
+            check_pace(columns, float(b.memory.now[loop.H]), int(b.out.cursor[STEPS]))
+        elif happening == loop.FIRING:
             self._replay(self.engine)
-        elif happening != loop.ROWS:
+        else:
             failed = hybrid.failure(happening, columns.as_lists(), start.program.relations)
             raise explained(failed, columns) from None
         return True
@@ -132,8 +134,9 @@ class CompiledRun:
         """Fire the user's machine as the compiled one is about to."""
         assert engine is not None
         memory, (t, y, mode) = self.columns.buffers.memory, self.columns.latest
+        start = self.columns.start
         if memory.counts[loop.FIRED_ONE] == 0:  # the elements saw these values when asked
-            engine.show(t, y, list(mode), self.columns.start.program.p)
+            engine.show(t, y, list(mode[: start.model.n]), start.program.p)
         engine.trigger(int(memory.counts[loop.EDGE]), int(memory.counts[loop.MACHINE]), t)
 
 
@@ -153,10 +156,10 @@ class Columns:
 
         self.start = start
         self.p = compiled.packed(start.program.p) if p is None else p
-        size, n = start.program.size, start.model.n
+        size, n = start.program.size, start.program.modes
         b = hybrid.buffers(
             system(start.program), start.t_start, start.y, start.mode, start.last, start.options,
-            capacity=0,
+            capacity=0, seen=start.program.seen,
         )  # fmt: skip
         few = max(16, min(1024, 4_000_000 // size))  # rows to begin with
         rows = {"all": few, "t_eval": len(start.options.times or ()), "end": 0}[start.output]
@@ -167,9 +170,9 @@ class Columns:
         self.buffers = dataclasses.replace(
             b,
             method=arrays(b.method),
-            control=b.control._replace(rtol=float(b.control.rtol), atol=float(b.control.atol)),
-            plan=arrays(b.plan),
-            memory=arrays(b.memory), relations=arrays(b.relations), work=arrays(b.work),
+            control=arrays(b.control), plan=arrays(b.plan), memory=arrays(b.memory),
+            relations=arrays(b.relations), surfaces=arrays(b.surfaces), sliding=arrays(b.sliding),
+            work=arrays(b.work),
             out=arrays(b.out)._replace(rows_t=floats(rows), rows_y=floats((rows, size))),
             y=array(b.y),
             mode=array(b.mode, dtype=np.int64),
@@ -178,34 +181,38 @@ class Columns:
         self.log = loop.Log(
             counts=ints(2), t=floats(256), machine=ints(256), edge=ints(256),
             numbers=floats((256, 5)),
-            seen=floats(2 + (2 + len(start.model.chart.variables)) * n),
+            seen=floats(start.program.seen),
             rows_microstep=ints(rows), rows_mode=ints((rows, n)),
             stops_t=floats(stops), stops_microstep=ints(stops), stops_y=floats((stops, size)),
             stops_mode=ints((stops, n)),
         )  # fmt: skip
         if stops:
-            self.log.stops_t[0], self.log.stops_y[0], self.log.stops_mode[0] = (
-                start.t_start, self.buffers.y, self.buffers.mode,
-            )  # fmt: skip
+            modes = start.mode + [0] * start.program.slides
+            self.log.stops_t[0], self.log.stops_y[0] = start.t_start, self.buffers.y
+            self.log.stops_mode[0] = modes
             self.log.counts[STOPS] = 1
 
     def begin_again(self, model: Model, rig: Rig) -> None:
         """Empty the columns and go back to the start, with the numbers of a model and a rig."""
-        p = arguments(model, rig)
-        program = dataclasses.replace(self.start.program, p=p)
-        self.start = dataclasses.replace(self.start, model=model, rig=rig, program=program)
-        self.p = compiled.packed(p)
+        self.start = self.start.with_numbers(model, rig)
+        self.p = compiled.packed(self.start.program.p)
         self.empty()
 
     def empty(self) -> None:
         """Empty the columns and go back to the start."""
-        start, b, log = self.start, self.buffers, self.log
-        memory: Any = b.memory  # arrays
-        watch: Any = b.relations.watch
+        start, log = self.start, self.log
+        b: Any = self.buffers  # arrays
+        memory, sliding = b.memory, b.sliding
         memory.now[:] = hybrid.beginning(start.t_start, start.last)
-        for counts in (memory.counts, memory.switches, memory.changes, watch):
+        for counts in (
+            memory.counts, memory.switches, memory.changes, b.relations.watch, b.out.cursor,
+            sliding.which, sliding.flags, sliding.arrived,
+        ):  # fmt: skip
             counts[:] = 0
-        b.y[:], b.mode[:], b.out.cursor[:] = start.y, start.mode, [0, 0, 0]
+        b.y[:], b.mode[:], memory.anchor[:] = start.y, start.mode, start.y
+        b.control.atol[:] = b.work.floor[:] = start.options.atol
+        control = b.control._replace(time_scale=start.options.time_scale)
+        self.buffers = dataclasses.replace(self.buffers, control=control)
         log.counts[:] = [0, min(1, len(log.stops_t))]
 
     def state(self) -> dict[str, Any]:
@@ -246,26 +253,29 @@ class Columns:
         b: Any = self.buffers
         log: Any = self.log
         fresh = slice(int(b.memory.counts[loop.TAKEN]), int(b.out.cursor[ROW]))
-        log.rows_microstep[fresh], log.rows_mode[fresh] = 0, b.mode
-        b.memory.now[loop.T], b.y[:], b.mode[:] = before
+        t, y, mode = before
+        log.rows_microstep[fresh], log.rows_mode[fresh] = 0, mode
+        b.memory.now[loop.T], b.y[:], b.mode[:] = t, y, mode[: len(b.mode)]
 
     @property
     def latest(self) -> tuple[float, list[float], tuple[int, ...]]:
         """Time, state and modes reached."""
         b: Any = self.buffers
-        return float(b.memory.now[loop.T]), b.y.tolist(), tuple(b.mode.tolist())
+        modes = (*b.mode.tolist(), *b.sliding.flags.tolist())
+        return float(b.memory.now[loop.T]), b.y.tolist(), modes
 
     def as_lists(self) -> hybrid.Buffers:
         """Return the buffers with time, state and modes as Python's own numbers, for messages."""
         b: Any = self.buffers
         memory = b.memory._replace(now=b.memory.now.tolist(), counts=b.memory.counts.tolist())
+        sliding = b.sliding._replace(flags=b.sliding.flags.tolist())
         return dataclasses.replace(
-            self.buffers, memory=memory, y=b.y.tolist(), mode=b.mode.tolist()
+            self.buffers, memory=memory, sliding=sliding, y=b.y.tolist(), mode=b.mode.tolist()
         )
 
     def observe(self, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
         """Return v, F, s, F_i, dz of a state."""
-        return observed(self.start, t, y, mode)
+        return observe(self.start.program, t, y, mode)
 
     def transitions(self) -> Any:
         """Return the transition log."""

@@ -147,6 +147,10 @@ class StepSizeError(SimulationError):
     """The step size fell under the resolution of the clock."""
 
 
+class StepLimitError(SimulationError):
+    """The steps are used up (`max_steps`), or a stiff run would need many more than there are."""
+
+
 class NotFiniteError(SimulationError):
     """A signal or a flow returned NaN or infinity."""
 

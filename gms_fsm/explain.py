@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from gms_fsm.chart import Chart, Transition
 from gms_fsm.expression import MATLAB_LIKE, Condition, Relation, clauses, evaluate, spell
@@ -111,6 +111,8 @@ class Why:
         The one it has just left, if that is the one whose edges these are; else empty.
     edges : tuple of Explanation
         Empty if no edge leaves the state.
+    sigma : mapping of str to float
+        The signs held between -1 and 1, by what is zero there.
     """
 
     element: int
@@ -118,6 +120,7 @@ class Why:
     state: str
     left: str
     edges: tuple[Explanation, ...]
+    sigma: Mapping[str, float] = field(default_factory=dict)
 
     def __iter__(self) -> Iterator[Explanation]:
         return iter(self.edges)
@@ -132,6 +135,7 @@ class Why:
         lines = [f"element {self.element + 1} is in {self.state} at t = {self.t:.9g} s"]
         if self.left:
             lines.append(f"it has just left {self.left}; values are those before that")
+        lines += [f"held on {name} = 0, σ = {u:.2g}" for name, u in self.sigma.items()]
         if not self.edges:
             lines.append("no edge leaves this state")
         return "\n".join([*lines, *map(_verdict, self.edges), *map(_detail, self.edges)])
@@ -211,7 +215,8 @@ def explain(trace: Trace, row: int, element: int) -> Why:
     before = row - 1 if fired else row
     now, asked = (chart.states[int(modes[r])].name for r in (row, before))
     edges = explain_state(chart, asked, values_at(trace, before, element), fired)
-    return Why(element, float(trace.t[row]), now, asked if fired else "", tuple(edges))
+    left = asked if fired else ""
+    return Why(element, float(trace.t[row]), now, left, tuple(edges), trace.sigma(row))
 
 
 def explain_state(
@@ -254,11 +259,17 @@ def explain_state(
 def _edge_taken(trace: Trace, row: int, element: int) -> str:
     """Return the edge whose firing made this row, or an empty text."""
     microstep = int(trace.microstep[row])
-    if microstep == 0:
+    if microstep == 0 or _only_slides(trace, row):
         return ""
     log = trace.transitions[trace.transitions.t == trace.t[row]]
     taken = log[microstep - 1]
     return str(taken.edge) if taken.element == element else ""
+
+
+def _only_slides(trace: Trace, row: int) -> bool:
+    """Tell whether a row differs from the one before by the surfaces slid on alone."""
+    same = row > 0 and trace.t[row - 1] == trace.t[row]
+    return same and bool(trace.microstep[row - 1] == trace.microstep[row])
 
 
 def _clause(part: Condition, values: Mapping[str, float]) -> Clause:

@@ -41,16 +41,19 @@ __all__ = [
     "Spelling",
     "Value",
     "clauses",
+    "derivative",
     "evaluate",
     "names_in",
     "parse_condition",
     "parse_value",
     "product_power",
+    "renamed",
     "rough_points",
     "spell",
     "split",
     "states_in",
     "substitute",
+    "turning_inside",
 ]
 
 LONGEST_TEXT = 10_000  # characters; a chart's text is a line, not a program
@@ -946,6 +949,38 @@ def rough_points(value: Value) -> tuple[Value, ...]:
     return tuple(dict.fromkeys(found))
 
 
+def turning_inside(value: Value, new: Mapping[str, Value]) -> Value:
+    """Return a value with names replaced inside its rough calls only.
+
+    Parameters
+    ----------
+    value : Value
+        For example an output that names the rate dz.
+    new : mapping of str to Value
+        What the names stand for.
+
+    Returns
+    -------
+    Value
+        A tree whose corners are written without these names.
+
+    Examples
+    --------
+    >>> spell(turning_inside(parse_value("k * dz + abs(dz)", ["k", "dz"]), {"dz": Name("v")}))
+    'k * dz + abs(v)'
+    """
+    match value:
+        case Call(function, arguments) if function in ROUGH:
+            return renamed(value, new)
+        case Negative(operand):
+            return Negative(turning_inside(operand, new))
+        case Binary(op, left, right):
+            return Binary(op, turning_inside(left, new), turning_inside(right, new))
+        case Call(function, arguments):
+            return Call(function, tuple(turning_inside(a, new) for a in arguments))
+    return value
+
+
 def _turning(call: Call) -> Value:
     if call.function in ("sgn", "abs"):
         return call.arguments[0]
@@ -960,7 +995,7 @@ def substitute(value: Value, sign_names: Mapping[Value, str]) -> tuple[Value, di
     value : Value
         A flow or a signal.
     sign_names : mapping of Value to str
-        For each of its `rough_points` the name that holds its sign.
+        For its `rough_points` the name that holds the sign; those without one stay as they are.
 
     Returns
     -------
@@ -985,7 +1020,7 @@ def substitute(value: Value, sign_names: Mapping[Value, str]) -> tuple[Value, di
                 return node
             case Call(function, arguments):
                 inner = Call(function, tuple(smooth(a) for a in arguments))
-                if function not in ROUGH:
+                if function not in ROUGH or _turning(node) not in sign_names:
                     return inner
                 name = f"{function}_{sign_names[_turning(node)]}"
                 calls.setdefault(name, inner)
@@ -993,3 +1028,145 @@ def substitute(value: Value, sign_names: Mapping[Value, str]) -> tuple[Value, di
         return node
 
     return smooth(value), calls
+
+
+# --------------------------------------------------------------------------- derivatives
+ZERO, ONE = Number(0.0), Number(1.0)
+
+
+def derivative(value: Value, name: str) -> Value | None:
+    """Return the partial derivative of a value by a name; its corners count as smooth.
+
+    Parameters
+    ----------
+    value : Value
+        A flow, a signal, one side of a guard.
+    name : str
+        By which.
+
+    Returns
+    -------
+    Value or None
+        None where the language cannot write it: a power with the name in its exponent.
+
+    Examples
+    --------
+    >>> print(spell(derivative(parse_value("C * (sgn(v) - z / s)", "Cvzs"), "z")))
+    C * -(1.0 / s)
+    """
+    try:
+        return _derivative(value, name)
+    except ArithmeticError:
+        return None
+
+
+def _derivative(value: Value, name: str) -> Value:
+    if name not in names_in(value):
+        return ZERO
+    match value:
+        case Name():
+            return ONE
+        case Negative(operand):
+            return _minus(ZERO, _derivative(operand, name))
+        case Binary("+", a, b):
+            return _plus(_derivative(a, name), _derivative(b, name))
+        case Binary("-", a, b):
+            return _minus(_derivative(a, name), _derivative(b, name))
+        case Binary("*", a, b):
+            return _plus(_times(_derivative(a, name), b), _times(a, _derivative(b, name)))
+        case Binary("/", a, b):
+            rest = _times(value, _derivative(b, name))
+            return _over(_minus(_derivative(a, name), rest), b)
+        case Binary("**", base, exponent):
+            if name in names_in(exponent):
+                raise ArithmeticError("a logarithm is not part of the language")
+            power = Binary("**", base, _minus(exponent, ONE))
+            return _times(_times(exponent, power), _derivative(base, name))
+        case Call("min" | "max" as function, (a, b)):
+            # The mean of both on the corner itself.
+            du, dw = _derivative(a, name), _derivative(b, name)
+            apart = _times(Call("sgn", (Binary("-", a, b),)), _minus(du, dw))
+            half = Binary("*", Number(0.5), _plus(du, dw))
+            other = Binary("*", Number(0.5), apart)
+            return _minus(half, other) if function == "min" else _plus(half, other)
+        case Call(function, (u,)):
+            return _times(_outer(function, u), _derivative(u, name))
+    raise AssertionError(value)
+
+
+def _outer(function: str, u: Value) -> Value:
+    call = Call(function, (u,))
+    match function:
+        case "abs":
+            return Call("sgn", (u,))
+        case "sgn":
+            return ZERO
+        case "exp":
+            return call
+        case "sqrt":
+            return Binary("/", Number(0.5), call)
+        case "sin":
+            return Call("cos", (u,))
+        case "cos":
+            return Negative(Call("sin", (u,)))
+        case "tanh":
+            return Binary("-", ONE, Binary("*", call, call))
+    raise ArithmeticError(f"no derivative of {function} is known")
+
+
+def _plus(a: Value, b: Value) -> Value:
+    if a == ZERO:
+        return b
+    return a if b == ZERO else Binary("+", a, b)
+
+
+def _minus(a: Value, b: Value) -> Value:
+    if b == ZERO:
+        return a
+    if isinstance(a, Number) and isinstance(b, Number):
+        return Number(a.value - b.value)
+    return Negative(b) if a == ZERO else Binary("-", a, b)
+
+
+def _times(a: Value, b: Value) -> Value:
+    if ZERO in (a, b):
+        return ZERO
+    if a == ONE:
+        return b
+    return a if b == ONE else Binary("*", a, b)
+
+
+def _over(a: Value, b: Value) -> Value:
+    return ZERO if a == ZERO else Binary("/", a, b)
+
+
+def renamed(value: Value, new: Mapping[str, Value]) -> Value:
+    """Return a value with other values in place of some names.
+
+    Parameters
+    ----------
+    value : Value
+        A tree.
+    new : mapping of str to Value
+        By name.
+
+    Returns
+    -------
+    Value
+        Another tree.
+
+    Examples
+    --------
+    >>> spell(renamed(parse_value("k * dz", ["k", "dz"]), {"dz": Name("v")}))
+    'k * v'
+    """
+    match value:
+        case Name(name):
+            return new.get(name, value)
+        case Negative(operand):
+            return Negative(renamed(operand, new))
+        case Binary(op, left, right):
+            return Binary(op, renamed(left, new), renamed(right, new))
+        case Call(function, arguments):
+            return Call(function, tuple(renamed(a, new) for a in arguments))
+    return value

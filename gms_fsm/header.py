@@ -13,6 +13,7 @@ from gms_fsm.errors import SignalError
 from gms_fsm.models import ChartModel, Model
 from gms_fsm.parameters import Stribeck
 from gms_fsm.rigs import Prescribed, PulledSlider, Rig, Slider
+from gms_fsm.scales import Setting
 from gms_fsm.signals import Corners, Formula, Function, Signal
 from gms_fsm.verdicts import Verdict
 
@@ -94,7 +95,7 @@ class Header(_Record):
     format: Literal["gms-fsm trace 1"] = "gms-fsm trace 1"
     model: ModelRecord
     rig: RigRecord
-    settings: dict[str, str | float | None]
+    settings: dict[str, str | float | dict[str, float | list[float]] | None]
     log: str = ""  # in a CSV: the stamp of the transition log that lies beside it
     monitors: dict[str, Annotated[Verdict, Field(discriminator="kind")]] = {}
 
@@ -103,7 +104,7 @@ class Header(_Record):
         cls,
         model: Model,
         rig: Rig,
-        settings: Mapping[str, str | float | None],
+        settings: Mapping[str, Setting],
         monitors: Mapping[str, Verdict] | None = None,
     ) -> Header:
         """Describe a run."""

@@ -198,7 +198,7 @@ class MachineEngine:
         self.chart = machines.model.chart
         self.table = machines.table(self.chart)
         n = len(mode)
-        self.seen = [0.0] * (2 + (2 + len(self.chart.variables)) * n)
+        self.seen, self.live = [0.0] * program.seen, program.live
         self.places = [
             (variable, program.first + j * n) for j, variable in enumerate(self.chart.variables)
         ]
@@ -217,7 +217,7 @@ class MachineEngine:
     def show(self, t: float, y: list[float], mode: list[int], p: Arguments) -> None:
         """Put the present values at hand of every element."""
         seen = self.seen
-        self.program.ieee["observe"](t, y, mode, p, seen)
+        self.program.ieee["observe"](t, y, mode, self.live, p, seen)
         for i, element in enumerate(self.machines.elements):
             element.t, element.x, element.v, element.s = t, y[0], seen[0], seen[2 + i]
             for variable, base in self.places:

@@ -505,8 +505,10 @@ def _passivity(monitor: Passivity, trace: Trace) -> PassivityVerdict:
         end = int(endless[0]) if endless.size else len(lost)
         lost, wound, doubt = lost[:end], wound[:end], doubt[:end]
     turnover = np.abs(lost + wound).sum(axis=0)
-    # The solver knows z and x no better than to atol.
-    blur = k * np.abs(z[: end + 1]).max(axis=0, initial=0.0) * float(trace.settings["atol"] or 0.0)
+    # The solver knows z no better than to its absolute tolerance.
+    allowed: Any = trace.settings["atol"]
+    allowed = allowed[trace.model.chart.variables[0]] if isinstance(allowed, Mapping) else allowed
+    blur = k * np.abs(z[: end + 1]).max(axis=0, initial=0.0) * np.asarray(allowed or 0.0)
     tolerance = monitor.tolerance * turnover + doubt.sum(axis=0) + blur
     n = trace.n
     heat = np.concatenate([np.zeros((1, n)), lost.cumsum(axis=0)])
@@ -634,7 +636,7 @@ def _told(verdict: PassivityVerdict, trace: Trace, lost: FloatArray) -> list[str
         ]
     if made:
         i = max(made, key=lambda i: verdict.made[i])
-        state = chart.states[int(trace.rows.mode[int(lost[:, i].argmin()), i])]
+        state = chart.states[int(trace.modes[int(lost[:, i].argmin()), i])]
         z = chart.variables[0]
         parts.append(
             f"the most made between two times: {_elements([i])}, {verdict.made[i]:.6g} J from "
@@ -649,7 +651,7 @@ def _told(verdict: PassivityVerdict, trace: Trace, lost: FloatArray) -> list[str
 
 # --------------------------------------------------------------------------- coverage
 def _coverage(trace: Trace) -> CoverageVerdict:
-    chart, log, mode = trace.model.chart, trace.transitions, trace.rows.mode
+    chart, log, mode = trace.model.chart, trace.transitions, trace.modes
     inside = {state.name: mode == m for m, state in enumerate(chart.states)}
     states = {name: _each(places) for name, places in inside.items()}
     edges = {

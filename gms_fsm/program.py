@@ -10,7 +10,8 @@ The functions of a program
 ``flow_live``  the same with sgn, abs, min, max as they stand (for guards looked at once a step)
 ``switch``     for each element the first edge whose guard holds, or -1
 ``act``        take an edge: its assignments and the new state
-``observe``    v, F, and per element s, F_i, dz
+``observe``    v, F, and per element s, F_i, dz; signs as given, or as they stand
+``normal``     the gradient of a surface that a motion can slide on (see `integrators.sliding`)
 ``arm``        which comparisons to watch until the next stop, and the signs to hold
 ``margins``    the watched comparisons as numbers that change sign where the comparison does
 
@@ -44,18 +45,22 @@ from gms_fsm.expression import (
     Number,
     Split,
     Value,
+    derivative,
     names_in,
     parse_value,
+    renamed,
     rough_points,
     spell,
     split,
     substitute,
+    turning_inside,
 )
 from gms_fsm.generated import ieee, load, load_careful
 from gms_fsm.models import Model
 from gms_fsm.parameters import as_floats
 from gms_fsm.rigs import Rig
-from gms_fsm.signals import Corners, Formula, Function, Signal, piecewise_linear
+from gms_fsm.signals import Corners, Formula, Function, Signal, piecewise_linear, piecewise_slope
+from integrators import LIVE
 
 __all__ = ["Arguments", "Program", "arguments", "lower", "system"]
 
@@ -79,8 +84,12 @@ class Program:
     p : tuple
         (shared numbers, one list an own parameter, times and values of each corner table): an
         argument of all functions.
+    n : int
+        Number of elements.
     size : int
         Length of the state vector ``y = (x, [v,] variables...)``.
+    seen : int
+        How many numbers ``observe`` fills.
     first : int
         Index in y of the first element's first variable; element i's variable j is at
         ``first + j * n + i``.
@@ -90,6 +99,10 @@ class Program:
         For each relation whether its margin must be positive (or may be zero) to be true.
     relations : list of str
         Each relation in words, for messages.
+    surfaces : integrators.Surfaces
+        Where the motion can slide.
+    surface_names : list of str
+        What is zero on each.
     knots, jumps : list of float
         Times [s] where a signal has a corner, and where it jumps.
     """
@@ -99,13 +112,32 @@ class Program:
     ieee: Mapping[str, Callable[..., Any]]
     callables: Mapping[str, Callable[[float], float]]
     p: Arguments
+    n: int
     size: int
+    seen: int
     first: int
     held: int
     strict: list[bool]
     relations: list[str]
+    surfaces: integrators.Surfaces
+    surface_names: list[str]
     knots: list[float]
     jumps: list[float]
+
+    @property
+    def slides(self) -> int:
+        """How many surfaces there are."""
+        return len(self.surfaces.sign)
+
+    @property
+    def modes(self) -> int:
+        """How many modes a row has: of each element, then whether each surface is slid on."""
+        return self.n + self.slides
+
+    @property
+    def live(self) -> list[float]:
+        """For every sign: as it is seen."""
+        return [LIVE] * self.held
 
 
 def lower(model: Model, rig: Rig) -> Program:
@@ -179,7 +211,9 @@ def _lowered(shape: _Shape) -> Program:
         name: signal.call for name, signal in rig.signals.items() if isinstance(signal, Function)
     }
     title = f"{model.chart.name}, {rig.title}"
-    names: dict[str, Any] = {"piecewise_linear": piecewise_linear}
+    names: dict[str, Any] = {
+        "piecewise_linear": piecewise_linear, "piecewise_slope": piecewise_slope,
+    }  # fmt: skip
     names |= {f"{name}_signal": _guarded(name, call) for name, call in callables.items()}
     namespace, careful = load(title, source, names), load_careful(title, source, names)
     return Program(
@@ -188,13 +222,17 @@ def _lowered(shape: _Shape) -> Program:
         ieee={name: ieee(namespace[name], careful[name]) for name in _FUNCTION_NAMES},
         callables=callables,
         p=([], [], []),
+        n=model.n,
         size=writer.first + model.n * len(model.chart.variables),
+        seen=2 + model.n * (2 + len(model.chart.variables)),
         first=writer.first,
         held=len(writer.shared_rough) + model.n * len(writer.own_rough),
         strict=writer.expand(
             [r.strict for r in writer.shared_relations], [r.strict for r in writer.own_relations]
         ),
         relations=writer.relation_names(),
+        surfaces=writer.surface_table(),
+        surface_names=writer.surface_names(),
         knots=[],
         jumps=[],
     )
@@ -246,17 +284,21 @@ def system(program: Program) -> integrators.System:
         flow_live=functions["flow_live"],
         arm=functions["arm"],
         margins=functions["margins"],
+        normal=functions["normal"],
         p=program.p,
         held=program.held,
         strict=program.strict,
         relations=program.relations,
+        surfaces=program.surfaces,
         knots=program.knots,
         jumps=program.jumps,
     )
 
 
 _DIP = "v dip"  # not an identifier, so no chart can have a name like it
-_FUNCTION_NAMES = ("flow", "flow_live", "switch", "act", "observe", "arm", "margins")
+_FUNCTION_NAMES = (
+    "flow", "flow_live", "switch", "act", "observe", "normal", "arm", "margins",
+)  # fmt: skip
 
 
 def _guarded(name: str, call: Callable[[float], float]) -> Callable[[float], float]:
@@ -280,13 +322,19 @@ class _Lowering:
         self.prescribed = rig.acceleration is None
         self.first = 1 if self.prescribed else 2
         self.stribeck = parse_value(model.stribeck.text, ["F_c", "F_s", "v_s", "v"])
+        # A chart may have names of the rig's: those of the rig are set apart.
+        self.rig_names = {name: Name(f"rig {name}") for name in (*rig.signals, *rig.numbers)}
         self.acceleration = (
             None
             if rig.acceleration is None
-            else parse_value(rig.acceleration, ["t", "x", "v", "F", *rig.signals, *rig.numbers])
+            else renamed(
+                parse_value(rig.acceleration, ["t", "x", "v", "F", *self.rig_names]),
+                self.rig_names,
+            )
         )
         self._collect_numbers()
         self._collect_rough()
+        self._collect_surfaces()
         self._collect_relations()
         self._collect_constants()
 
@@ -296,9 +344,12 @@ class _Lowering:
         self.shared = ["F_c", "F_s", "v_s", "v_dip", "sigma_2", *self.rig.numbers]
         self.own = ["weight"]
         taken = set(self.shared) | set(self.rig.signals) | {f"{s}_signal" for s in self.rig.signals}
-        taken |= {"F_i", "len", "range", "piecewise_linear", "v_dip"}  # of the text itself
+        # Of the text itself.
+        taken |= {"F_i", "len", "range", "piecewise_linear", "piecewise_slope", "v_dip"}
+        taken |= {"surface", "j", "dS"}
         # A chart may call its own parameter F_c or mass: it gets a name of its own in the text.
         self.rename: dict[str, str] = {_DIP: "v_dip"}
+        self.rename |= {apart.id: name for name, apart in self.rig_names.items()}
         chart_names = (*self.chart.variables, *self.chart.parameters)
         for name in chart_names:
             local = name
@@ -317,37 +368,67 @@ class _Lowering:
     def is_shared(self, node: Node) -> bool:
         """Tell whether a tree of the chart has one value for all elements."""
         return all(
-            name in ("t", "x", "v") or self.rename.get(name) in self.shared
+            name in ("t", "x", "v")
+            or name.startswith("rig ")
+            or self.rename.get(name) in self.shared
             for name in names_in(node)
         )
 
     def _collect_rough(self) -> None:
-        # Where a flow or a signal has a corner or a jump, the driver stops and a sign is held.
-        self.signal_rough: list[Value] = []
+        # Where a flow, the force, the rig or a signal has a corner or a jump, the driver stops and
+        # holds a sign. In the rig a sign of F itself stays live: F is known only with the flow.
+        self.rig_rough: list[Value] = []
         for signal in self.rig.signals.values():
             if isinstance(signal, Formula):
-                self.signal_rough += rough_points(signal.tree)
-        self.state_rough = {
-            state.name: tuple(
-                dict.fromkeys(
-                    u
-                    for variable in self.chart.variables
-                    for u in rough_points(self.chart.flows[state.name, variable])
-                )
+                self.rig_rough += rough_points(signal.tree)
+        if self.acceleration is not None:
+            self.rig_rough += [u for u in rough_points(self.acceleration) if "F" not in names_in(u)]
+        self.forces = {}
+        self.state_rough = {}
+        for state in self.chart.states:
+            flows = {v: self.chart.flows[state.name, v] for v in self.chart.variables}
+            rates = {f"d{variable}": tree for variable, tree in flows.items()}
+            self.forces[state.name] = turning_inside(self.chart.forces["F"], rates)
+            texts = [*flows.values(), self.forces[state.name]]
+            self.state_rough[state.name] = tuple(
+                dict.fromkeys(u for tree in texts for u in rough_points(tree))
             )
-            for state in self.chart.states
-        }
         found = [u for rough in self.state_rough.values() for u in rough]
         self.shared_rough = list(
-            dict.fromkeys([*self.signal_rough, *(u for u in found if self.is_shared(u))])
+            dict.fromkeys([*self.rig_rough, *(u for u in found if self.is_shared(u))])
         )
         self.own_rough = list(dict.fromkeys(u for u in found if not self.is_shared(u)))
         self.sign_names: dict[Value, str] = {}
         for number, u in enumerate([*self.shared_rough, *self.own_rough]):
-            label = u.id if isinstance(u, Name) else str(number)
+            label = u.id if isinstance(u, Name) and u.id.isidentifier() else str(number)
             while any(f"{f}_{label}" in self.locals for f in ("sgn", "abs", "min", "max")):
                 label += "_"
             self.sign_names[u] = label
+
+    def _collect_surfaces(self) -> None:
+        self.shared_surfaces = [u for u in self.shared_rough if self._can_be_slid_on(u)]
+        self.own_surfaces = [u for u in self.own_rough if self._can_be_slid_on(u)]
+
+    def _can_be_slid_on(self, u: Value) -> bool:
+        """Tell whether u depends on the state, by ways that have a derivative."""
+        names = names_in(u)
+        if "s" in names:
+            names |= {"v"}
+        states = {"x", *self.chart.variables, *([] if self.prescribed else ["v"])}
+        signals = {name for name in self.rig.signals if self.rig_names[name].id in names}
+        if self.prescribed and "v" in names:
+            signals |= {"v"}
+        return (
+            bool(names & states)
+            and all(derivative(u, name) is not None for name in names)
+            and all(self._has_slope(self.rig.signals[name]) for name in signals)
+        )
+
+    @staticmethod
+    def _has_slope(signal: Signal) -> bool:
+        if isinstance(signal, Formula):
+            return derivative(signal.tree, "t") is not None
+        return isinstance(signal, Corners)
 
     def _collect_relations(self) -> None:
         zero = Number(0.0)
@@ -375,13 +456,48 @@ class _Lowering:
         return [*shared, *(value for value in own for _ in range(self.model.n))]
 
     def relation_names(self) -> list[str]:
+        plain = {apart.id: name for name, apart in self.rig_names.items()}
+
         def text(comparison: Comparison) -> str:
-            return spell(Literal(comparison, True).relation)
+            return spell(Literal(comparison, True).relation, rename=plain)
 
         own = [
             f"{text(r)} of element {i + 1}" for r in self.own_relations for i in range(self.model.n)
         ]
         return [*(text(r) for r in self.shared_relations), *own]
+
+    def surface_names(self) -> list[str]:
+        """Say what is zero on each surface."""
+        plain = {apart.id: name for name, apart in self.rig_names.items()}
+        own = [
+            f"{spell(u, rename=plain)} of element {i + 1}"
+            for u in self.own_surfaces
+            for i in range(self.model.n)
+        ]
+        return [*(spell(u, rename=plain) for u in self.shared_surfaces), *own]
+
+    def surface_table(self) -> integrators.Surfaces:
+        """Return where the surfaces' signs and relations stand."""
+        n = self.model.n
+        number = range(n)
+
+        def relation(u: Value, strict: bool) -> list[int]:
+            wanted = Comparison(u, Number(0.0), strict)
+            if wanted in self.shared_relations:
+                return [self.shared_relations.index(wanted)]
+            first = len(self.shared_relations) + n * self.own_relations.index(wanted)
+            return [first + i for i in number]
+
+        signs = [self.shared_rough.index(u) for u in self.shared_surfaces]
+        for u in self.own_surfaces:
+            first = len(self.shared_rough) + n * self.own_rough.index(u)
+            signs += [first + i for i in number]
+        surfaces = [*self.shared_surfaces, *self.own_surfaces]
+        return integrators.Surfaces(
+            sign=signs,
+            above=[r for u in surfaces for r in relation(u, True)],
+            at_least=[r for u in surfaces for r in relation(u, False)],
+        )
 
     def relation_index(self, comparison: Comparison) -> str:
         if comparison in self.shared_relations:
@@ -420,6 +536,7 @@ class _Lowering:
             self.write_flow(live=False),
             self.write_flow(live=True),
             self.write_observe(),
+            self.write_normal(),
             self.write_arm(),
             self.write_margins(),
         ):
@@ -472,6 +589,8 @@ class _Lowering:
             front.insert(0, "x = y[0]")
         used |= _words(signals)
         setup: list[str] = []
+        if "n" in used:  # the modes behind those of the elements are of surfaces
+            used |= {"weight"}
         needed = [(j, name) for j, name in enumerate(self.shared) if name in used]
         arrays = [(j, name) for j, name in enumerate(self.own) if name in used]
         if needed or arrays or "tables" in used:
@@ -479,7 +598,7 @@ class _Lowering:
         setup += [f"{name} = shared[{j}]" for j, name in needed]
         setup += [f"{name} = own[{j}]" for j, name in arrays]
         if "n" in used:
-            setup.append("n = len(mode)")
+            setup.append("n = len(weight)")
         return lines + ["    " + line for line in [*setup, *signals, *front, *body]]
 
     def signal_lines(self, name: str, signal: Signal, table: int, live: bool) -> list[str]:
@@ -488,31 +607,68 @@ class _Lowering:
         if isinstance(signal, Corners):
             return [f"{name} = piecewise_linear(t, tables[{2 * table}], tables[{2 * table + 1}])"]
         smooth, calls = substitute(signal.tree, self.sign_names)
-        return [*self.rough_lines(calls, live), f"{name} = {spell(smooth)}"]
+        signs = "live" if live else "held"
+        return [*self.rough_lines(calls, signs), f"{name} = {spell(smooth)}"]
 
-    def rough_lines(self, calls: Mapping[str, Call], live: bool) -> list[str]:
-        """Assign the rough calls of a flow: from the held signs, or live."""
+    def rough_lines(self, calls: Mapping[str, Call], signs: str) -> list[str]:
+        """Assign the rough calls of a flow: from "held" signs, "live", or "given" ones.
+
+        A sign that is given may say that it is to be taken live.
+        """
         lines = []
         labels = {label: u for u, label in self.sign_names.items()}
         for name, call in calls.items():
-            if live:
-                lines.append(f"{name} = {self.spell(call)}")
+            live = self.spell(call)
+            if signs == "live":
+                lines.append(f"{name} = {live}")
                 continue
             sign = f"held[{self.held_index(labels[name.partition('_')[2]])}]"
             a = self.spell(call.arguments[0])
             product = self.spell(Binary("*", Name(sign), call.arguments[0]))
             match call.function:
                 case "sgn":
-                    lines.append(f"{name} = {sign}")
+                    value = sign
                 case "abs":
-                    lines.append(f"{name} = {product}")
+                    value = product
                 case "min":
-                    b = self.spell(call.arguments[1])
-                    lines.append(f"{name} = {a} if {sign} <= 0.0 else {b}")
+                    value = f"{a} if {sign} <= 0.0 else {self.spell(call.arguments[1])}"
                 case _:
-                    b = self.spell(call.arguments[1])
-                    lines.append(f"{name} = {a} if {sign} >= 0.0 else {b}")
+                    value = f"{a} if {sign} >= 0.0 else {self.spell(call.arguments[1])}"
+            if signs == "given":
+                value = f"{live} if {sign} == {LIVE} else {value}"
+            lines.append(f"{name} = {value}")
         return lines
+
+    def flow_branches(
+        self, signs: str, *, force: bool
+    ) -> tuple[dict[str, Call], dict[str, list[str]]]:
+        """Return the rough calls that elements share, and by state the lines of flows and force."""
+        shared_calls: dict[str, Call] = {}
+        labels = {label: u for u, label in self.sign_names.items()}
+        branches = {}
+        for state in self.chart.states:
+            own: dict[str, Call] = {}
+
+            def smooth(tree: Value, own: dict[str, Call] = own) -> Value:
+                value, calls = substitute(tree, self.sign_names)
+                for name, call in calls.items():
+                    shared = labels[name.partition("_")[2]] in self.shared_rough
+                    (shared_calls if shared else own).setdefault(name, call)
+                return value
+
+            flows = [
+                f"d{self.rename[v]} = {self.spell(smooth(self.chart.flows[state.name, v]))}"
+                for v in self.chart.variables
+            ]
+            if force and self.force_by_state:
+                flows.append(f"F_i = {self.force(smooth(self.forces[state.name]))}  # (3)")
+            branches[state.name] = [*self.rough_lines(own, signs), *flows]
+        return shared_calls, branches
+
+    @property
+    def force_by_state(self) -> bool:
+        """Whether the force has corners, which differ from state to state."""
+        return any(rough_points(tree) for tree in self.forces.values())
 
     def element_values(self, used: Iterable[str]) -> list[str]:
         """Assign the element's own variables and threshold, as far as they are used."""
@@ -582,37 +738,25 @@ class _Lowering:
         return self.function("act(edge, i, t, y, mode, p)", "Take an edge of element i.", body)
 
     def write_flow(self, live: bool) -> list[str]:
-        shared_calls: dict[str, Call] = {}
-        branches = {}
-        for state in self.chart.states:
-            lines: list[str] = []
-            for variable in self.chart.variables:
-                smooth, calls = substitute(self.chart.flows[state.name, variable], self.sign_names)
-                labels = {label: u for u, label in self.sign_names.items()}
-                own = {}
-                for name, call in calls.items():
-                    if labels[name.partition("_")[2]] in self.shared_rough:
-                        shared_calls.setdefault(name, call)
-                    else:
-                        own[name] = call
-                lines += self.rough_lines(own, live)
-                lines.append(f"d{self.rename[variable]} = {self.spell(smooth)}")
-            branches[state.name] = lines
+        signs = "live" if live else "held"
+        shared_calls, branches = self.flow_branches(signs, force=not self.prescribed)
         inner = self.by_state(branches)
         if not self.prescribed:
-            inner.append(f"F += {self.force()}")  # (3)
+            force = "F_i" if self.force_by_state else f"{self.force(self.chart.forces['F'])}"
+            inner.append(f"F += {force}" + ("" if self.force_by_state else "  # (3)"))
         inner += [f"dy[{self.y_index(v)}] = d{self.rename[v]}" for v in self.chart.variables]
+        ends = ["dy[0] = v"]
+        if self.acceleration is not None:
+            smooth, calls = substitute(self.acceleration, self.sign_names)
+            shared_calls |= calls
+            ends = ["F += sigma_2 * v  # (4)", "dy[0] = v", f"dy[1] = {self.spell(smooth)}"]
         body = [
-            *self.rough_lines(shared_calls, live),
+            *self.rough_lines(shared_calls, signs),
             *([] if self.prescribed else ["F = 0.0"]),
             "for i in range(n):",
             *_indented([*self.element_values(_words(inner)), *inner]),
+            *ends,
         ]
-        if self.acceleration is not None:
-            body += ["F += sigma_2 * v  # (4)", "dy[0] = v",
-                     f"dy[1] = {spell(self.acceleration)}"]  # fmt: skip
-        else:
-            body.append("dy[0] = v")
         name, doc = (
             ("flow_live", "dy = dy/dt, all states frozen, corners and jumps evaluated live.")
             if live
@@ -620,22 +764,19 @@ class _Lowering:
         )
         return self.function(f"{name}(t, y, mode, held, p, dy)", doc, body, live=live)
 
-    def force(self) -> str:
+    def force(self, tree: Value) -> str:
         rename = {**self.rename, **{"d" + v: "d" + self.rename[v] for v in self.chart.variables}}
-        return spell(self.chart.forces["F"], rename=rename)
+        return spell(tree, rename=rename)
 
     def write_observe(self) -> list[str]:
-        branches = {
-            state.name: [
-                f"d{self.rename[v]} = {self.spell(self.chart.flows[state.name, v])}"
-                for v in self.chart.variables
-            ]
-            for state in self.chart.states
-        }
+        shared_calls, branches = self.flow_branches("given", force=True)
         threshold = "s" if "s" in self.chart.inputs else "weight[i] * S"
+        force = (
+            [] if self.force_by_state else [f"F_i = {self.force(self.chart.forces['F'])}  # (3)"]
+        )
         inner = [
             *self.by_state(branches),
-            f"F_i = {self.force()}  # (3)",
+            *force,
             "F += F_i",
             f"out[{self._element_index(2, 0)}] = {threshold}",
             f"out[{self._element_index(2, 1)}] = F_i",
@@ -645,6 +786,7 @@ class _Lowering:
             ),
         ]
         body = [
+            *self.rough_lines(shared_calls, "given"),
             "F = 0.0",
             "for i in range(n):",
             *_indented([*self.element_values(_words(inner)), *inner]),
@@ -652,13 +794,73 @@ class _Lowering:
             "out[1] = F + sigma_2 * v  # (4)",
         ]
         return self.function(
-            "observe(t, y, mode, p, out)",
-            "out = v, F, then for all elements s, F_i and the derivatives.",
+            "observe(t, y, mode, held, p, out)",
+            f"out = v, F, then for all elements s, F_i and the rates; a sign {LIVE} is taken live.",
             body,
         )
 
+    def write_normal(self) -> list[str]:
+        lines: list[str] = []
+        for number, u in enumerate(self.shared_surfaces):
+            word = "elif" if lines else "if"
+            lines += [f"{word} surface == {number}:  # {self.spell(u)}",
+                      *_indented(self.gradient(u))]  # fmt: skip
+        for number, u in enumerate(self.own_surfaces):
+            first = len(self.shared_surfaces)
+            row = f"surface - {first}" if first else "surface"
+            word = "elif" if lines else "if"
+            inner = self.gradient(u)
+            lines += [
+                f"{word} {row} < {number + 1} * n:  # {self.spell(u)}",
+                f"    i = {row} - {number} * n",
+                *_indented([*self.element_values(_words(inner)), *inner]),
+            ]
+        clear = [f"for j in range({self.first + 1} + {len(self.chart.variables)} * n):",
+                 "    out[j] = 0.0"]  # fmt: skip
+        body = [*clear, *lines] if lines else ["pass"]
+        return self.function(
+            "normal(surface, t, y, mode, p, out)",
+            "out = the gradient over y of what is zero on a surface, then its rate in t.",
+            body,
+        )
+
+    def gradient(self, u: Value) -> list[str]:
+        """Write the gradient of u over y, and its rate in t."""
+        time = f"{self.first} + {len(self.chart.variables)} * n"
+        places = {"x": "0", **{v: self.y_index(v) for v in self.chart.variables}}
+        lines = []
+        for name, place in places.items():
+            if name in names_in(u):
+                lines.append(f"out[{place}] = {self.spell(_known(u, name))}")
+        by_v = [self.spell(_known(u, "v"))] if "v" in names_in(u) else []
+        if "s" in names_in(u):
+            slope = spell(_known(self.stribeck, "v"))
+            lines.append(f"dS = {slope}")
+            by_v.append(f"({self.spell(_known(u, 's'))}) * weight[i] * dS")
+        rates = [self.spell(_known(u, "t"))] if "t" in names_in(u) else []
+        if by_v and not self.prescribed:
+            lines.append(f"out[1] = {' + '.join(by_v)}")
+        elif by_v:
+            rates.append(f"({' + '.join(by_v)}) * {self.signal_slope('v')}")
+        rates += [
+            f"({self.spell(_known(u, apart.id))}) * {self.signal_slope(name)}"
+            for name, apart in self.rig_names.items()
+            if name in self.rig.signals and apart.id in names_in(u)
+        ]
+        return lines + ([f"out[{time}] = {' + '.join(rates)}"] if rates else [])
+
+    def signal_slope(self, name: str) -> str:
+        """Spell the rate of a signal."""
+        signals = self.rig.signals
+        signal = signals[name]
+        if isinstance(signal, Formula):
+            return f"({spell(_known(signal.tree, 't'))})"
+        before = list(signals)[: list(signals).index(name)]
+        table = 2 * sum(isinstance(signals[other], Corners) for other in before)
+        return f"piecewise_slope(t, tables[{table}], tables[{table + 1}])"
+
     def write_arm(self) -> list[str]:
-        always = [r for u in self.signal_rough for r in self._sign_relations(u)]
+        always = [r for u in self.rig_rough for r in self._sign_relations(u)]
         if "s" in self.chart.inputs:
             always += self.landmarks()
         body = [f"watch[{self.relation_index(r)}] = 1" for r in dict.fromkeys(always)]
@@ -735,6 +937,13 @@ class _Lowering:
             simple = isinstance(comparison.right, Name | Number | Negative)
             margin = f"{margin} - {right if simple else f'({right})'}"
         return [f"if watch[{index}]:", f"    out[{index}] = {margin}"]
+
+
+def _known(value: Value, name: str) -> Value:
+    """Return a derivative that there is: surfaces without one are not slid on."""
+    found = derivative(value, name)
+    assert found is not None
+    return found
 
 
 def _comparisons(part: Split) -> list[Comparison]:

@@ -16,14 +16,29 @@ from gms_fsm.errors import (
     NotFiniteError,
     SignalEndError,
     SimulationError,
+    StepLimitError,
     StepSizeError,
 )
 from gms_fsm.expression import rough_points
+from gms_fsm.observing import observe, rate
 from gms_fsm.start import Start
 from gms_fsm.trace import Rows, Trace, log_of
-from integrators import Arc, Firing, HybridError, Livelock, NotFinite, StepTooSmall
+from integrators import (
+    Arc,
+    Firing,
+    HybridError,
+    Livelock,
+    NotFinite,
+    Slide,
+    StepTooSmall,
+    TooManySteps,
+)
 
-__all__ = ["Moment", "Recorder", "Recording", "check_end", "explained", "observed"]
+__all__ = ["Moment", "Recorder", "Recording", "check_end", "check_pace", "explained"]
+
+POWERS = 12  # turns of the power iteration
+STABLE = 1.5  # step times fastest rate; explicit methods go to 2 or 3.3, and hover below
+PATIENCE = 5_000  # steps before the pace is looked at
 
 
 class Recording(Protocol):
@@ -42,26 +57,6 @@ class Recording(Protocol):
 
     def trace(self) -> Trace:
         """Return all that was kept."""
-
-
-def observed(start: Start, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
-    """Return v, F, then s, F_i and rates of all elements in a state.
-
-    Parameters
-    ----------
-    start : Start
-        What runs.
-    t, y, mode
-        The state.
-
-    Returns
-    -------
-    list of float
-        As ``observe`` of the program fills it.
-    """
-    out = [0.0] * ((2 + len(start.model.chart.variables)) * start.model.n + 2)
-    start.program.ieee["observe"](t, y, mode, start.program.p, out)
-    return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,11 +97,11 @@ class Recorder:
         self.rows = _Columns([], [], [], [])
         self.stops = _Columns([], [], [], [])
         self.log: list[tuple[Any, ...]] = []
-        self.latest = start.t_start, start.y, tuple(start.mode)
+        self.latest = start.t_start, start.y, (*start.mode, *[0] * start.program.slides)
         if start.output == "t_eval":
-            self.stops.add(start.t_start, 0, list(start.y), tuple(start.mode))
+            self.stops.add(start.t_start, 0, list(start.y), self.latest[2])
 
-    def take(self, happening: Arc | Firing | integrators.Stop) -> None:
+    def take(self, happening: Arc | Firing | Slide | integrators.Stop) -> None:
         """Keep one happening."""
         output = self.start.output
         match happening:
@@ -116,11 +111,12 @@ class Recorder:
                 self.rows.y.extend(states)
                 self.rows.mode.extend([mode] * len(times))
                 self.latest = (times[-1], states[-1], mode)
-            case Firing():
+            case Firing() | Slide():
                 if output != "end":
                     side = self.stops if output == "t_eval" else self.rows
                     side.add(happening.t, happening.microstep, happening.y, happening.mode)
-                self.log.append(self._record(happening))
+                if isinstance(happening, Firing):
+                    self.log.append(self._record(happening))
                 self.latest = (happening.t, happening.y, happening.mode)
             case integrators.Stop(t=t, y=y, mode=mode):
                 if output == "t_eval":
@@ -129,7 +125,7 @@ class Recorder:
 
     def state(self) -> dict[str, Any]:
         """Return what was kept, as arrays, for a checkpoint."""
-        size, n = self.start.program.size, self.start.model.n
+        size, n = self.start.program.size, self.start.program.modes
         tables = {"rows": self.rows, "stops": self.stops}
         kept = {
             f"{name}_{column}": values
@@ -165,12 +161,12 @@ class Recorder:
 
     def observe(self, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
         """Return v, F, s, F_i, dz of a state."""
-        return observed(self.start, t, y, mode)
+        return observe(self.start.program, t, y, mode)
 
     def trace(self) -> Trace:
         """Return all that was kept."""
         start = self.start
-        size, n = start.program.size, start.model.n
+        size, n = start.program.size, start.program.modes
         if start.output == "end":
             self.rows = _Columns([], [], [], [])
             t, y, mode = self.latest
@@ -195,7 +191,11 @@ class Moment:
     def states(self) -> list[str]:
         """Active state of each element."""
         states = self._recording.start.model.chart.states
-        return [states[mode].name for mode in self._recording.latest[2]]
+        return [states[mode].name for mode in self._recording.latest[2][: self._n]]
+
+    @property
+    def _n(self) -> int:
+        return self._recording.start.model.n
 
     @property
     def values(self) -> dict[str, Any]:
@@ -203,7 +203,7 @@ class Moment:
         recording, start = self._recording, self._recording.start
         t, y, mode = recording.latest
         seen = recording.observe(t, y, mode)
-        first, n = start.program.first, start.model.n
+        first, n = start.program.first, self._n
         return {"v": seen[0], "F": seen[1], "z": y[first : first + n], "s": seen[2 : 2 + n]}
 
 
@@ -240,6 +240,12 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
             f"larger rtol/atol, or look for a singular parameter; {kept}",
             trace,
         )
+    if isinstance(error, TooManySteps):
+        return StepLimitError(
+            f"the run has taken max_steps = {recorder.start.options.max_steps} steps and is at "
+            f"{scene}, short of t_end = {recorder.start.t_end!r} s: {_slow(recorder)}; {kept}",
+            trace,
+        )
     if not isinstance(error, Livelock):
         return SimulationError(f"{error} at {scene}; {kept}", trace)
     seen = recorder.observe(error.t, error.y, error.mode)
@@ -271,7 +277,7 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
         )
     rough = [
         i
-        for i, state in enumerate(error.mode)
+        for i, state in enumerate(error.mode[: recorder.start.model.n])
         if any(rough_points(chart.flows[chart.states[state].name, u]) for u in chart.variables)
     ]
     i = rough[0] if rough else 0
@@ -279,10 +285,76 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
     edges = ", ".join(f"{edge.name} [{edge.guard}]" for _, edge in chart.leaving(state.name))
     return LivelockError(
         f"{' and '.join(error.relations)} changed {error.times} times at {scene}: "
-        f"element {i + 1} is in {state.name} ({values(i)}), its flow pushes back on both sides and "
-        f"no edge leaves ({edges or 'it has none'}): a sliding mode (Filippov); try the signed "
-        f"law, a larger v_c, or other parameters; {kept}",
+        f"element {i + 1} is in {state.name} ({values(i)}), its flow pushes back on both sides, "
+        f"no edge leaves ({edges or 'it has none'}), and no value of the sign between -1 and 1 "
+        f"holds it there; look at the parameters and at the flow of {state.name}; {kept}",
         trace,
+    )
+
+
+def _slow(recorder: Recording) -> str:
+    """Say why a run takes many steps."""
+    log = recorder.trace().transitions
+    most = recorder.start.options.max_steps
+    if 10 * len(log) > most:
+        element, count = np.unique(log.element, return_counts=True)
+        worst = int(element[count.argmax()])
+        return (
+            f"element {worst + 1} has switched {int(count.max())} times (chattering); leave a gap "
+            "between its guards there and back, or give a larger max_steps"
+        )
+    return "give a larger max_steps, a larger rtol, or for a stiff run method=scipy Radau"
+
+
+def check_pace(recording: Recording, step: float, steps: int) -> None:
+    """Stop a stiff run that cannot reach its end with the steps that are left.
+
+    Stiff is where stability, not accuracy, keeps the steps small: where the step times the fastest
+    rate of the flow is of the order of one. That rate is found by a power iteration.
+
+    Parameters
+    ----------
+    recording : Recording
+        Of a run under way.
+    step : float
+        Its present step, s.
+    steps : int
+        How many it has tried.
+
+    Raises
+    ------
+    StepLimitError
+        With the advice to use an implicit method.
+    """
+    start = recording.start
+    t, y, mode = recording.latest
+    options = start.options
+    if steps < PATIENCE or options.step or not isinstance(options.method, integrators.Tableau):
+        return
+    if (start.last - t) <= step * (options.max_steps - steps):
+        return
+    program, held = start.program, [0.0] * start.program.held
+    program.ieee["arm"](t, y, mode, program.p, held, [0] * len(program.strict))
+    slope = rate(program, t, y, mode, held)
+    size = np.maximum(np.abs(y), np.array(start.options.atol) / start.options.rtol)
+    size[size == 0.0] = 1.0
+    direction, fastest = np.ones(len(y)), 0.0
+    for _ in range(POWERS):
+        moved = (np.array(y) + 1e-6 * size * direction).tolist()
+        change = (rate(program, t, moved, mode, held) - slope) / (1e-6 * size)
+        fastest = float(np.abs(change).max())
+        if not 0.0 < fastest < math.inf:
+            return
+        direction = change / fastest
+    if step * fastest < STABLE:
+        return
+    raise StepLimitError(
+        f"stiff: the flow has a rate of {fastest:.3g} /s at t = {t!r} s, which holds the steps of "
+        f"this method at {step:.3g} s; to t_end = {start.t_end!r} s it would take "
+        f"{(start.t_end - t) / step:.3g} of them, max_steps is {start.options.max_steps}; use an "
+        'implicit method (method=scipy.integrate.Radau; [run] method = "Radau"), or check C and '
+        "the thresholds; the run up to there is kept in .trace",
+        recording.trace(),
     )
 
 
@@ -302,7 +374,7 @@ def _not_finite(error: NotFinite, recorder: Recording) -> str:
         return "the velocity v is not finite"
     rates = seen[2 + 2 * model.n :]
     for j, variable in enumerate(model.chart.variables):
-        for i, mode in enumerate(error.mode):
+        for i, mode in enumerate(error.mode[: model.n]):
             if not math.isfinite(rates[j * model.n + i]):
                 state = model.chart.states[mode]
                 return (

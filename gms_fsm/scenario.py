@@ -23,6 +23,7 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    PositiveFloat,
     Tag,
     ValidationError,
     model_validator,
@@ -44,6 +45,7 @@ from gms_fsm.parameters import GMSParameters, Stribeck
 from gms_fsm.records import Column, Motion, Record, motion_of, read_record
 from gms_fsm.rigs import Prescribed, PulledSlider, Rig, Slider
 from gms_fsm.signals import Corners, SignalLike, as_signal
+from gms_fsm.start import MOST_STEPS
 
 __all__ = ["DATA_VARIABLE", "Loaded", "Scenario", "load_scenario"]
 
@@ -268,8 +270,13 @@ class RunTable(_Table):
     ] = "dp45"
     step: float | None = Field(None, gt=0, description="fixed step, s")
     rtol: float = Field(1e-6, gt=0)
-    atol: float = Field(1e-9, gt=0)
+    atol: PositiveFloat | dict[str, PositiveFloat | list[PositiveFloat]] | None = Field(
+        None,
+        description="absolute tolerance of all components, or by name { x, v, z }; from the "
+        "model's own scales where left out",
+    )
     max_step: float | None = Field(None, gt=0, description="s")
+    max_steps: int = Field(MOST_STEPS, ge=1, description="a run that needs more is an error")
     events: Literal["located", "step"] = "located"
     engine: Literal["machines", "ifelse", "compiled"] = "machines"
     monitors: list[str] = Field(
@@ -284,7 +291,7 @@ class RunTable(_Table):
         options: dict[str, Any] = {
             "method": getattr(scipy.integrate, self.method) if scipy_method else self.method,
             "step": self.step, "rtol": self.rtol, "atol": self.atol,
-            "events": self.events, "engine": self.engine,
+            "max_steps": self.max_steps, "events": self.events, "engine": self.engine,
         }  # fmt: skip
         if self.max_step is not None:
             options["max_step"] = self.max_step

@@ -278,7 +278,7 @@ class Branch:
 
     def fired(self, row: int) -> Fired | None:
         """Return the firing that made a row, None if none did."""
-        if self.raw(row)[1] == 0:
+        if row not in self.firing_rows(row + 1)[-1:]:
             return None
         _, element, edge, source, target = self.record(row)[:5]
         return Fired(int(element), str(edge), str(source), str(target))
@@ -287,12 +287,12 @@ class Branch:
         """Return the branch so far as a trace."""
         raw = [self.raw(row) for row in range(len(self))]
         recorder = self.run.recorder
-        n = recorder.start.model.n
+        modes = recorder.start.program.modes
         rows = Rows(
             np.array([r[0] for r in raw]),
             np.array([r[1] for r in raw], dtype=np.int64),
             np.array([r[2] for r in raw]),
-            np.array([r[3] for r in raw], dtype=np.int64).reshape(len(raw), n),
+            np.array([r[3] for r in raw], dtype=np.int64).reshape(len(raw), modes),
         )
         return Trace(rows, rows, log_of(self.log()), recorder.start.model, recorder.start.rig,
                      recorder.start.settings)  # fmt: skip
@@ -406,7 +406,7 @@ class Session:
         return Here(
             row, t, microstep, y[0], seen[0], seen[1], tuple(y[first : first + n]),
             tuple(seen[2 : 2 + n]), tuple(seen[2 + n : 2 + 2 * n]),
-            tuple(names[m] for m in mode), located, None if located else self.branch.fired(row),
+            tuple(names[m] for m in mode[:n]), located, None if located else self.branch.fired(row),
         )  # fmt: skip
 
     # ------------------------------------------------------------------ walking

@@ -19,7 +19,7 @@ from gms_fsm.errors import ExpressionError, SignalError, shown
 from gms_fsm.expression import Value, parse_value
 from gms_fsm.parameters import FloatArray
 
-__all__ = ["Corners", "Formula", "Function", "Signal", "SignalLike", "as_signal"]
+__all__ = ["Corners", "Formula", "Function", "Signal", "SignalLike", "as_signal", "piecewise_slope"]
 
 
 @dataclass(frozen=True)
@@ -241,3 +241,35 @@ def piecewise_linear(t: float, times: Sequence[float], values: Sequence[float]) 
     t0 = times[low - 1]
     share = (t - t0) / (times[low] - t0)
     return values[low - 1] + share * (values[low] - values[low - 1])
+
+
+def piecewise_slope(t: float, times: Sequence[float], values: Sequence[float]) -> float:
+    """Return the slope at t of straight lines through corners; 0 outside, right-continuous.
+
+    Parameters
+    ----------
+    t : float
+        s.
+    times, values : sequence of float, shape (m,)
+        The corners, times not decreasing.
+
+    Returns
+    -------
+    float
+        The slope.
+
+    Examples
+    --------
+    >>> piecewise_slope(0.5, [0.0, 1.0, 1.0], [0.0, 2.0, 5.0])
+    2.0
+    """
+    low, high = 0, len(times)
+    while low < high:  # first corner after t
+        middle = (low + high) // 2
+        if times[middle] <= t:
+            low = middle + 1
+        else:
+            high = middle
+    if low == 0 or low == len(times):
+        return 0.0
+    return (values[low] - values[low - 1]) / (times[low] - times[low - 1])

@@ -17,12 +17,14 @@ from gms_fsm.machines import ElementMachines, IfElse, MachineEngine
 from gms_fsm.models import Model
 from gms_fsm.monitors import Monitor, checked, watched
 from gms_fsm.program import system
-from gms_fsm.recording import Moment, Recorder, check_end, explained
+from gms_fsm.recording import Moment, Recorder, check_end, check_pace, explained
 from gms_fsm.rigs import Rig
-from gms_fsm.start import Start
+from gms_fsm.scales import Tolerance
+from gms_fsm.start import MOST_STEPS, Start
 from gms_fsm.trace import Trace
-from integrators import Arc, Firing, HybridError, hybrid
-from integrators.loop import T
+from integrators import Arc, Firing, HybridError, Slide, hybrid
+from integrators.advance import STEPS
+from integrators.loop import H, T
 
 __all__ = ["Moment", "Run", "simulate"]
 
@@ -36,8 +38,9 @@ def simulate(
     method: str | type[Any] = "dp45",
     step: float | None = None,
     rtol: float = 1e-6,
-    atol: float = 1e-9,
+    atol: Tolerance = None,
     max_step: float = math.inf,
+    max_steps: int = MOST_STEPS,
     events: str = "located",
     engine: str | ElementMachines = "machines",
     machines: ElementMachines | None = None,
@@ -68,10 +71,18 @@ def simulate(
     step : float, optional
         Fixed steps of this length [s], the last one cut to t_end; at a located crossing a step is
         cut and the grid is met again after it. A SciPy class is led from grid point to grid point.
-    rtol, atol : float
-        Tolerances of adaptive steps; the error is the largest component's.
+    rtol : float
+        Relative tolerance of adaptive steps; the error is the largest component's.
+    atol : float or mapping, optional
+        Absolute tolerance of all components, or by name: ``x`` [m], ``v`` [m/s], the chart's
+        variables, a number or one per element. What is left out comes from the model's own scales
+        (`gms_fsm.scales`): a tenth of rtol times the smallest deflection at which a guard changes,
+        or times v_c. A component for which the chart has no scale is measured by the largest value
+        it has had. What was used stands in ``Trace.settings``.
     max_step : float
         Longest adaptive step, s. Accuracy does not need it.
+    max_steps : int
+        How many steps may be tried; a run that needs more ends in a `StepLimitError`.
     events : {"located", "step"}
         ``"located"`` finds the place of each switch. ``"step"`` looks at the guards once at the end
         of a step, at most one edge per element, like an if-else in a block diagram: it loses
@@ -118,8 +129,8 @@ def simulate(
     CheckpointError
         If the checkpoint belongs to another run, or is damaged.
     SimulationError
-        If the run cannot go on (`LivelockError`, `StepSizeError`, `NotFiniteError`,
-        `SignalEndError`); its ``trace`` holds the part before.
+        If the run cannot go on (`LivelockError`, `StepSizeError`, `StepLimitError`,
+        `NotFiniteError`, `SignalEndError`); its ``trace`` holds the part before.
 
     Examples
     --------
@@ -140,8 +151,8 @@ def simulate(
             raise ParameterError("engine 'ifelse' asks no machines; leave machines=... out")
     start = Start.of(
         model, rig, t_end, t_start=t_start, method=method, step=step, rtol=rtol, atol=atol,
-        max_step=max_step, events=events, engine=engine, output=output, t_eval=t_eval,
-        initial=initial,
+        max_step=max_step, max_steps=max_steps, events=events, engine=engine, output=output,
+        t_eval=t_eval, initial=initial,
     )  # fmt: skip
     watching = checked(monitors, model, start.output).values() if monitors else ()
     run = CompiledRun(start, machines) if engine == "compiled" else Run(start, machines)
@@ -189,7 +200,7 @@ class Run:
             machines = ElementMachines(start.model) if machines is None else machines
             switch = self.engine = MachineEngine(machines, start.program, start.mode)
         self.recorder = Recorder(start)
-        self.happening: Arc | Firing | integrators.Stop | None = None  # the latest
+        self.happening: Arc | Firing | Slide | integrators.Stop | None = None  # the latest
         made = system(start.program)
         self.buffers = hybrid.buffers(
             made, start.t_start, start.y, start.mode, start.last, start.options
@@ -203,9 +214,9 @@ class Run:
     def go_on_from(self, kept: dict[str, Any]) -> None:
         """Take over what `kept` returned; the buffers are filled already."""
         b = self.buffers
-        self.recorder.put_back(kept, (b.memory.now[T], list(b.y), tuple(b.mode)))
+        self.recorder.put_back(kept, (b.memory.now[T], list(b.y), hybrid.modes_of(b)))
         if self.engine is not None:
-            self.engine.go_on_from(*self.recorder.latest, self.start.program.p)
+            self.engine.go_on_from(b.memory.now[T], list(b.y), b.mode, self.start.program.p)
 
     def advance(self) -> bool:
         """Let the next thing happen.
@@ -224,7 +235,7 @@ class Run:
         try:
             happening = next(self.happenings, None)
         except HybridError as error:
-            recorder.latest = error.t, error.y, tuple(error.mode)
+            recorder.latest = error.t, error.y, error.mode
             raise explained(error, recorder) from None
         except SignalError as error:
             raise SimulationError(
@@ -235,4 +246,7 @@ class Run:
             return False
         self.happening = happening
         recorder.take(happening)
+        if isinstance(happening, Arc):
+            b = self.buffers
+            check_pace(recorder, b.memory.now[H], b.out.cursor[STEPS])
         return True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,14 +14,16 @@ import integrators
 from gms_fsm.errors import ParameterError, SignalError, shown
 from gms_fsm.models import Model
 from gms_fsm.parameters import as_floats, checked_array, checked_scalar
-from gms_fsm.program import Program, lower
+from gms_fsm.program import Program, arguments, lower
 from gms_fsm.rigs import Rig
+from gms_fsm.scales import Setting, Tolerance, scales_of
 from gms_fsm.signals import Corners
 from integrators import Options
 
-__all__ = ["ENGINES", "Start"]
+__all__ = ["ENGINES", "MOST_STEPS", "Start"]
 
 LATEST = 1e9  # s; one tick of a double is then 1e-7 s
+MOST_STEPS = 1_000_000  # of a run, unless told otherwise
 ENGINES = ("machines", "ifelse", "compiled")
 
 
@@ -47,6 +49,8 @@ class Start:
         What to keep.
     settings : mapping
         As they are kept in the trace.
+    atol : float or mapping, optional
+        As it was given.
     """
 
     model: Model
@@ -59,7 +63,8 @@ class Start:
     mode: list[int]
     options: Options
     output: str
-    settings: Mapping[str, str | float | None]
+    settings: Mapping[str, Setting]
+    atol: Tolerance
 
     @classmethod
     def of(
@@ -72,8 +77,9 @@ class Start:
         method: str | type[Any] = "dp45",
         step: float | None = None,
         rtol: float = 1e-6,
-        atol: float = 1e-9,
+        atol: Tolerance = None,
         max_step: float = math.inf,
+        max_steps: int = MOST_STEPS,
         events: str = "located",
         engine: str = "machines",
         output: str | None = None,
@@ -85,9 +91,9 @@ class Start:
 
         Parameters
         ----------
-        model, rig, t_end, t_start, method, step, rtol, atol, max_step, events, engine, output
+        model, rig, t_end, t_start, method, step, rtol, atol, max_step, max_steps, events, engine
             See `gms_fsm.simulate`.
-        t_eval, initial
+        output, t_eval, initial
             See `gms_fsm.simulate`.
         rows_at_once : int
             How many steps an arc holds at most.
@@ -130,20 +136,50 @@ class Start:
                 f"{method.__name__}; use engine='machines' for SciPy's solvers"
             )
         output = _output(output, t_eval)
+        rtol = checked_scalar("rtol", rtol, "> 0")
+        scales = scales_of(model)
+        tolerances, used = _tolerances(model, rig, atol, scales.tolerances(rtol))
         options = _options(
-            method, step, rtol, atol, max_step, events, t_eval, output, t_start, t_end,
-            rows_at_once,
+            method, step, rtol, tolerances, max_step, scales.time, _count(max_steps), events,
+            t_eval, output, t_start, t_end, rows_at_once,
         )  # fmt: skip
         last = _covered(rig, t_start, t_end)
         program = lower(model, rig)
         y, mode = _initial(model, rig, {} if initial is None else initial)
-        settings: dict[str, str | float | None] = {
+        settings: dict[str, Setting] = {
             "method": method if isinstance(method, str) else method.__name__,
-            "step": step, "rtol": rtol, "atol": atol,
-            "max_step": max_step if math.isfinite(max_step) else None,
+            "step": step, "rtol": rtol, "atol": used,
+            "max_step": max_step if math.isfinite(max_step) else None, "max_steps": max_steps,
             "events": events, "engine": engine, "t_start": t_start, "t_end": t_end,
         }  # fmt: skip
-        return cls(model, rig, program, t_start, t_end, last, y, mode, options, output, settings)
+        return cls(
+            model, rig, program, t_start, t_end, last, y, mode, options, output, settings, atol
+        )
+
+    def with_numbers(self, model: Model, rig: Rig) -> Start:
+        """Return the same start with other numbers; signals and initial values stay.
+
+        Parameters
+        ----------
+        model, rig
+            Of the same kind as those before.
+
+        Returns
+        -------
+        Start
+            With the tolerances of the new model.
+        """
+        scales = scales_of(model)
+        default = scales.tolerances(self.options.rtol)
+        tolerances, used = _tolerances(model, rig, self.atol, default)
+        return replace(
+            self,
+            model=model,
+            rig=rig,
+            program=replace(self.program, p=arguments(model, rig)),
+            options=replace(self.options, atol=tolerances, time_scale=scales.time),
+            settings={**self.settings, "atol": used},
+        )
 
 
 def _output(output: str | None, t_eval: ArrayLike | None) -> str:
@@ -160,12 +196,48 @@ def _output(output: str | None, t_eval: ArrayLike | None) -> str:
     return output
 
 
+def _count(max_steps: Any) -> int:
+    if isinstance(max_steps, bool) or not isinstance(max_steps, int) or max_steps < 1:
+        raise ParameterError(
+            f"max_steps is {shown(max_steps)}; it must be a whole number of steps, at least 1"
+        )
+    return max_steps
+
+
+def _tolerances(
+    model: Model, rig: Rig, atol: Tolerance, default: Mapping[str, list[float]]
+) -> tuple[list[float], float | dict[str, float | list[float]]]:
+    """Return the absolute tolerance of each component, and what to say of them."""
+    moved = ("x",) if rig.acceleration is None else ("x", "v")
+    names = (*moved, *model.chart.variables)
+    if atol is not None and not isinstance(atol, Mapping):
+        number = checked_scalar("atol", atol, "> 0")
+        return [number] * (len(moved) + model.n * len(model.chart.variables)), number
+    rows = {name: default[name] for name in names}
+    by_name: Mapping[str, Any] = {} if atol is None else atol
+    for name, given in by_name.items():
+        if name not in rows:
+            raise ParameterError(
+                f"atol has the key {shown(name)}; known are {', '.join(map(repr, names))}"
+            )
+        if np.ndim(given) == 0:
+            rows[name] = [checked_scalar(f"atol[{name!r}]", given, "> 0")] * len(rows[name])
+        else:
+            rows[name] = as_floats(checked_array(f"atol[{name!r}]", given, len(rows[name]), "> 0"))
+    used: dict[str, float | list[float]] = {
+        name: row if name in model.chart.variables else row[0] for name, row in rows.items()
+    }
+    return [each for name in names for each in rows[name]], used
+
+
 def _options(
     method: str | type[Any],
     step: float | None,
     rtol: float,
-    atol: float,
+    atol: list[float],
     max_step: float,
+    time_scale: float,
+    max_steps: int,
     events: str,
     t_eval: ArrayLike | None,
     output: str,
@@ -190,10 +262,13 @@ def _options(
             f"method is {shown(method)}; it must be a name ({', '.join(integrators.METHODS)}) or a "
             "scipy.integrate.OdeSolver class"
         )
+    elif min(atol) == 0.0:
+        raise ParameterError(
+            f"method {method.__name__} needs an absolute tolerance, and the chart gives no scale "
+            "for every component; give one, for example atol=1e-9, or by name atol={'x': 1e-9}"
+        )
     if step is not None:
         step = checked_scalar("step", step, "> 0")
-    rtol = checked_scalar("rtol", rtol, "> 0")
-    atol = checked_scalar("atol", atol, "> 0")
     if max_step != math.inf:
         max_step = checked_scalar("max_step", max_step, "> 0")
     tick = 16.0 * math.ulp(max(abs(t_start), abs(t_end)))
@@ -224,7 +299,10 @@ def _options(
                 "times must increase"
             )
         times = as_floats(wanted)
-    return Options(chosen, step, rtol, atol, max_step, events == "located", times, rows_at_once)
+    located = events == "located"
+    return Options(
+        chosen, step, rtol, atol, max_step, time_scale, max_steps, located, times, rows_at_once
+    )
 
 
 def _covered(rig: Rig, t_start: float, t_end: float) -> float:

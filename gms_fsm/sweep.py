@@ -42,7 +42,10 @@ if TYPE_CHECKING:
 __all__ = ["Sweep", "sweep"]
 
 AT_ONCE = 64  # runs a task, at most
-_OPTIONS = ("t_start", "method", "step", "rtol", "atol", "max_step", "events", "t_eval", "initial")
+_OPTIONS = (
+    "t_start", "method", "step", "rtol", "atol", "max_step", "max_steps", "events", "t_eval",
+    "initial",
+)  # fmt: skip
 _LOG = np.dtype([
     ("run", "i8"), ("t", "f8"), ("element", "i8"), ("edge", "i8"), ("z", "f8"), ("v", "f8"),
     ("s", "f8"), ("F_before", "f8"), ("F_after", "f8"),
@@ -472,7 +475,8 @@ def _result(run: Run | CompiledRun | None, outcome: str, message: str) -> _Resul
     rows = None
     if recorder.start.output == "t_eval":
         rows = {name: getattr(trace, name) for name in ("x", "v", "F", "z")}
-    return _Result(outcome, message, (t, y, mode, recorder.observe(t, y, mode)), log, rows)
+    end = t, y, mode[: recorder.start.model.n], recorder.observe(t, y, mode)
+    return _Result(outcome, message, end, log, rows)
 
 
 def _results(future: Future[list[_Result]], count: int) -> list[_Result]:

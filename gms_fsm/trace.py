@@ -24,9 +24,11 @@ from gms_fsm.errors import MissingExtraError, OutputError, SignalError, TraceFil
 from gms_fsm.files import leftovers, written_together, written_whole
 from gms_fsm.header import Header
 from gms_fsm.models import Model
+from gms_fsm.observing import observe, rate, sigmas
 from gms_fsm.parameters import FloatArray
 from gms_fsm.program import Program, lower
 from gms_fsm.rigs import Rig
+from gms_fsm.scales import Setting
 from gms_fsm.verdicts import Verdict
 
 if TYPE_CHECKING:
@@ -48,7 +50,10 @@ _NUMBERS = ("z", "v", "s", "F_before", "F_after")
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Times, micro-steps, states y and modes, row by row."""
+    """Times, micro-steps, states y and modes, row by row.
+
+    Modes are those of the elements, then for each surface whether the motion slides on it.
+    """
 
     t: FloatArray
     microstep: NDArray[np.int64]
@@ -57,6 +62,10 @@ class Rows:
 
     def __len__(self) -> int:
         return int(self.t.size)
+
+    def at(self, chosen: NDArray[Any] | slice) -> Rows:
+        """Return some of the rows."""
+        return Rows(self.t[chosen], self.microstep[chosen], self.y[chosen], self.mode[chosen])
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +107,7 @@ class Trace:
     transitions: Any
     model: Model
     rig: Rig
-    settings: Mapping[str, str | float | None]
+    settings: Mapping[str, Setting]
     stored: Mapping[str, FloatArray] = field(default_factory=dict, repr=False)
     monitors: Mapping[str, Verdict] = field(default_factory=dict, repr=False)
 
@@ -157,7 +166,12 @@ class Trace:
     @property
     def states(self) -> NDArray[np.str_]:
         """Active state of every element, shape (rows, n)."""
-        return np.array([s.name for s in self.model.chart.states])[self.rows.mode]
+        return np.array([s.name for s in self.model.chart.states])[self.modes]
+
+    @property
+    def modes(self) -> NDArray[np.int64]:
+        """Index of the active state of every element, shape (rows, n)."""
+        return self.rows.mode[:, : self.n]
 
     @property
     def v(self) -> FloatArray:
@@ -188,6 +202,45 @@ class Trace:
     def _first(self) -> int:
         return int(self.rows.y.shape[1]) - self.n * len(self.model.chart.variables)
 
+    @property
+    def sliding(self) -> Any:
+        """Stretches on which a sign is held between -1 and 1 (see `integrators.sliding`).
+
+        Records with ``t_start, t_end`` [s], ``surface`` (what is zero there, such as ``v``) and
+        ``sigma_start, sigma_end``, the sign held at both ends. From the rows, or where these are
+        wanted times from the stops; a run of which only the end was kept has none.
+        """
+        table = _merged(self.rows, self.stops)
+        found = []
+        for k, flags in enumerate(table.mode[:, self.n :].T):
+            edges = np.flatnonzero(np.diff(np.concatenate([[0], flags, [0]])))
+            for first, behind in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+                begun, ended = (self._sigma(table, row, k) for row in (first, behind - 1))
+                name = self.program.surface_names[k]
+                end = float(table.t[min(behind, len(table) - 1)])
+                found.append((float(table.t[first]), end, name, begun, ended))
+        return np.array(found, dtype=_SLIDING).view(np.recarray)
+
+    def sigma(self, row: int) -> dict[str, float]:
+        """Return the signs that are held between -1 and 1 at a row.
+
+        Parameters
+        ----------
+        row : int
+            Row index.
+
+        Returns
+        -------
+        dict of str to float
+            By what is zero there, such as ``v``; empty almost everywhere.
+        """
+        on = np.flatnonzero(self.rows.mode[row, self.n :])
+        return {self.program.surface_names[k]: self._sigma(self.rows, row, int(k)) for k in on}
+
+    def _sigma(self, table: Rows, row: int, surface: int) -> float:
+        t, y, mode = float(table.t[row]), table.y[row].tolist(), table.mode[row].tolist()
+        return sigmas(self.program, t, y, mode)[surface]
+
     @cached_property
     def program(self) -> Program:
         """The generated program behind the run."""
@@ -198,12 +251,13 @@ class Trace:
         # Row by row with scalar functions: the very numbers the run saw.
         if self.stored:
             return self.stored
-        n, width = self.n, 2 + (2 + len(self.model.chart.variables)) * self.n
-        rows, program = self.rows, self.program
+        n, rows, program = self.n, self.rows, self.program
         if self.settings.get("engine") == "compiled":
-            table = observe_rows(program, rows.t, rows.y, rows.mode, width)
+            table = observe_rows(program, rows.t, rows.y, rows.mode)
+            slid = np.flatnonzero(rows.mode[:, n:].any(axis=1))
+            table[slid] = _observe_rows(program, rows.at(slid))
         else:
-            table = _observe_rows(program, rows, width)
+            table = _observe_rows(program, rows)
         return {
             "v": table[:, 0],
             "F": table[:, 1],
@@ -402,7 +456,8 @@ class Trace:
         with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
             header = Header.model_validate_json(str(_member(file, "header")))
             model = header.to_model()
-            width = 8 * model.n * (2 + len(model.chart.variables))  # bytes a row
+            modes = lower(model, header.to_rig()).modes
+            width = 8 * (modes + model.n * (2 + len(model.chart.variables)))  # bytes a row
             tables = {}
             for kind in ("rows", "stops"):
                 t = _member(file, f"{kind}_t")
@@ -426,18 +481,22 @@ class Trace:
         log: Any,
         stored: Mapping[str, FloatArray],
     ) -> Trace:
-        n, m = model.n, rows.t.size
+        n, m, rig = model.n, rows.t.size, header.to_rig()
+        modes = lower(model, rig).modes
         size = (1 if header.rig.prescribed else 2) + n * len(model.chart.variables)
         for kind, table in (("rows", rows), ("stops", stops)):
             count = table.t.size
             _expect(f"{kind} t", table.t, (count,), "f")
             _expect(f"{kind} microstep", table.microstep, (count,), "i")
             _expect(f"{kind} y", table.y, (count, size), "f")
-            _expect(f"{kind} mode", table.mode, (count, n), "i")
+            _expect(f"{kind} mode", table.mode, (count, modes), "i")
             if not (np.diff(table.t) >= 0).all() or not np.isfinite(table.t).all():
                 raise TraceFileError(f"{kind} t: times must be finite and must not go backward")
-            if count and not 0 <= table.mode.min() <= table.mode.max() < len(model.chart.states):
+            states, slid = table.mode[:, :n], table.mode[:, n:]
+            if count and not 0 <= states.min() <= states.max() < len(model.chart.states):
                 raise TraceFileError(f"{kind} mode: a number is not a state of the chart")
+            if slid.size and not 0 <= slid.min() <= slid.max() <= 1:
+                raise TraceFileError(f"{kind} mode: a surface is slid on or not, 1 or 0")
         if m == 0:
             raise TraceFileError("rows: there are none")
         for name, value in stored.items():
@@ -455,8 +514,7 @@ class Trace:
             fired = np.searchsorted(log.t, table.t, "right") - np.searchsorted(log.t, table.t)
             if not ((table.microstep >= 0) & (table.microstep <= fired)).all():
                 raise TraceFileError(f"{kind} microstep: the log has other firings at a time")
-        return cls(rows, stops, log, model, header.to_rig(), header.settings, stored,
-                   header.monitors)  # fmt: skip
+        return cls(rows, stops, log, model, rig, header.settings, stored, header.monitors)
 
     def _header(self) -> Header:
         return Header.of(self.model, self.rig, self.settings, self.monitors)
@@ -468,7 +526,8 @@ class Trace:
         Returns
         -------
         dict of str to ndarray, shape (rows,)
-            ``t, microstep, x, v, F, z1.., state1.., s1.., F1..``.
+            ``t, microstep, x, v, F, z1.., state1.., s1.., F1..``, and ``slides1..``: 1 where the
+            motion slides along a surface.
         """
         table: dict[str, NDArray[Any]] = {
             "t": self.t, "microstep": self.microstep, "x": self.x, "v": self.v, "F": self.F,
@@ -477,6 +536,8 @@ class Trace:
         blocks = [(name, self.variable(name)) for name in variables]
         blocks += [("state", self.states), ("s", self.s), ("F", self.F_elements)]  # type: ignore[list-item]
         blocks.append((f"d{variables[0]}", self.dz))
+        slid = self.rows.mode[:, self.n :]
+        table |= {f"slides{k + 1}": slid[:, k] for k in range(slid.shape[1])}
         for name, values in blocks:
             table |= {column_name(name, i): values[:, i] for i in range(self.n)}
         return table
@@ -547,6 +608,8 @@ class Trace:
         for name in model.chart.variables:
             y += list(block(name).T)
         mode = [[states.index(c) for c in table[column_name("state", i)]] for i in range(model.n)]
+        slid = sum(name.startswith("slides") and name[6:].isdigit() for name in table)
+        mode += [[int(c) for c in table[f"slides{k + 1}"]] for k in range(slid)]
         rows = Rows(
             number("t"),
             np.array([int(c) for c in table["microstep"]], dtype=np.int64),
@@ -659,21 +722,16 @@ def slopes(
     held = [0.0] * program.held
     inside = (0.5 * (y0 + y1)).tolist()
     program.ieee["arm"](0.5 * (t0 + t1), inside, mode, program.p, held, [0] * len(program.strict))
-    found = []
-    for time, y in ((t0, y0), (t1, y1)):
-        dy = [0.0] * program.size
-        program.ieee["flow"](time, y.tolist(), mode, held, program.p, dy)
-        found.append(np.array(dy))
-    return found[0], found[1]
+    at_start, at_end = (rate(program, t, y.tolist(), mode, held) for t, y in ((t0, y0), (t1, y1)))
+    return at_start, at_end
 
 
-def _observe_rows(program: Program, rows: Rows, width: int) -> FloatArray:
-    observe, out, table = program.ieee["observe"], [0.0] * width, np.empty((len(rows), width))
+def _observe_rows(program: Program, rows: Rows) -> FloatArray:
+    table = np.empty((len(rows), program.seen))
     modes = rows.mode.tolist()
     for row, (t, y) in enumerate(zip(rows.t.tolist(), rows.y.tolist(), strict=True)):
         try:
-            observe(t, y, modes[row], program.p, out)
-            table[row] = out
+            table[row] = observe(program, t, y, modes[row])
         except SignalError:  # the row at which a Python function failed
             table[row] = np.nan
     return table
@@ -696,6 +754,10 @@ def _member(file: Any, name: str, most: int | None = None) -> Any:
     return file[name]
 
 
+_SLIDING = np.dtype([
+    ("t_start", "f8"), ("t_end", "f8"), ("surface", "U64"), ("sigma_start", "f8"),
+    ("sigma_end", "f8"),
+])  # fmt: skip
 _LOG_NAMES = ("t", "element", "edge", "source", "target", *_NUMBERS)
 
 

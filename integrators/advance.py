@@ -33,8 +33,10 @@ __all__ = ["Control", "Output", "Work", "advance"]
 # Why the kernel came back.
 REACHED, CROSSED, FULL, TOO_SMALL, NOT_FINITE = 0, 1, 2, 3, 4
 REDO = 0.9  # a crossing before this fraction of an adaptive step has the step done again
+# Of a time: a difference that counts. Four places of its last digit, whatever the run's length.
+TICK = 4.0 * 2.0**-52
 # Places in Output.cursor.
-ROW, NEXT_TIME, NEXT_KNOT = 0, 1, 2
+ROW, NEXT_TIME, NEXT_KNOT, STEPS = 0, 1, 2, 3
 
 
 class Control(NamedTuple):
@@ -43,9 +45,9 @@ class Control(NamedTuple):
     step: float  # fixed grid if > 0, else adaptive
     origin: float  # where the grid starts
     rtol: float
-    atol: float
+    atol: Vector  # shape (m,); 0 for a component without a scale of its own
     max_step: float
-    resolution: float  # smallest difference of times that counts
+    time_scale: float  # of the system, for starting steps; 0 if it has none
 
 
 class Output(NamedTuple):
@@ -55,7 +57,7 @@ class Output(NamedTuple):
     every_step: bool
     rows_t: Vector  # shape (capacity,)
     rows_y: list[Vector]  # shape (capacity, m)
-    cursor: list[int]  # [rows written, next wanted time, next knot]
+    cursor: list[int]  # [rows written, next wanted time, next knot, steps tried]
 
 
 class Work(NamedTuple):
@@ -65,6 +67,7 @@ class Work(NamedTuple):
     y_new: Vector
     f_new: Vector
     error: Vector
+    floor: Vector  # absolute tolerances; without a scale they grow with the component
     dense: Dense
 
 
@@ -76,6 +79,18 @@ def put_row(out: Output, t: float, y: Vector) -> None:
     for j in range(len(y)):
         place[j] = y[j]
     out.cursor[ROW] = row + 1
+
+
+def tick_at(t: float) -> float:
+    """Return the smallest difference of times that counts at t."""
+    return TICK * abs(t)
+
+
+def raise_floor(control: Control, floor: Vector, y: Vector) -> None:
+    """Let the tolerances of components without a scale follow the largest value they have had."""
+    for j in range(len(y)):
+        if control.atol[j] == 0.0:
+            floor[j] = max(floor[j], control.rtol * abs(y[j]))
 
 
 def advance(
@@ -136,6 +151,9 @@ def advance(
     order = method.error_order
     cursor = out.cursor
     infinity = float("inf")
+    scaleless = False
+    for j in range(len(y)):
+        scaleless = scaleless or control.atol[j] == 0.0
     rejected = False
     redone = False
     while True:
@@ -148,7 +166,7 @@ def advance(
         if fixed:
             index = int((t - control.origin) / control.step) + 1
             t_new = control.origin + index * control.step
-            while t_new - t <= control.resolution:
+            while t_new - t <= tick_at(t_new):
                 index += 1
                 t_new = control.origin + index * control.step
         else:
@@ -158,11 +176,13 @@ def advance(
             cursor[NEXT_KNOT] += 1
         if cursor[NEXT_KNOT] < len(knots):
             limit = min(limit, knots[cursor[NEXT_KNOT]])
-        if t_new + control.resolution >= limit:
+        if t_new + tick_at(t_new) >= limit:
             t_new = limit
         if not t_new > t:
             return TOO_SMALL, t, h, error_before
         h_now = t_new - t
+        tick = tick_at(max(abs(t), abs(t_new)))
+        cursor[STEPS] += 1
 
         take_step(flow, method, t, y, f, t_new, mode, held, p, work.k, work.y_new, work.f_new)
         if fixed:
@@ -173,11 +193,11 @@ def advance(
                 return NOT_FINITE, t, h, error_before
         else:
             weigh(method.E, len(method.B), work.f_new, work.k, work.error)
-            error = error_norm(work.error, h_now, y, work.y_new, control.rtol, control.atol)
+            error = error_norm(work.error, h_now, y, work.y_new, control.rtol, work.floor)
             if not error <= 1.0:
                 h = h_now * retry_factor(error, order)
                 rejected = True
-                if h <= control.resolution:
+                if h <= tick:
                     status = TOO_SMALL if error < infinity else NOT_FINITE
                     return status, t, h, error_before
                 continue
@@ -198,8 +218,7 @@ def advance(
             fit_dense(method, h_now, y, work.k, work.y_new, work.f_new, work.dense)
         if near:
             theta = first_change(
-                interpolate, work.dense, margins, t, t_new, work.y_new, mode, p, w,
-                control.resolution,
+                interpolate, work.dense, margins, t, t_new, work.y_new, mode, p, w, tick
             )  # fmt: skip
         if theta < REDO and not fixed and not redone:
             # The stages lay behind the crossing and may have jumped what comes before it: the step
@@ -229,6 +248,8 @@ def advance(
                 f[j] = work.f_new[j]
         t = t_new
         most_steps -= 1
+        if scaleless:
+            raise_floor(control, work.floor, y)
         if out.every_step:
             put_row(out, t, y)
         if theta != NO_CHANGE:

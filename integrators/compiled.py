@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from integrators import advance, crossings, loop, step_size, steps
+from integrators import advance, crossings, loop, sliding, step_size, steps
 
 __all__ = [
     "SIGNATURES",
@@ -38,14 +38,17 @@ __all__ = [
 # Every function that `record` reaches. Those of a step are inlined: a call hands on ten arrays,
 # which takes as long as their work does.
 _OF_A_STEP: tuple[Callable[..., Any], ...] = (
-    advance.put_row, crossings.any_changed, crossings.copy_margins, crossings.first_change,
+    advance.put_row, advance.tick_at, advance.raise_floor, crossings.any_changed,
+    crossings.copy_margins, crossings.first_change,
     crossings.nothing_near, crossings._bracket, crossings._is_quiet, crossings._search,
     step_size.error_norm, step_size.next_factor, step_size.retry_factor,
     steps.fit_dense, steps.interpolate, steps.take_step, steps.weigh,
 )  # fmt: skip
 _OF_AN_ARC: tuple[Callable[..., Any], ...] = (
-    advance.advance, loop.active_relations, loop.go_on, loop._look_at_clock, loop._often_changed,
-    loop._rearm, loop._undefined, step_size.starting_step,
+    advance.advance, loop.active_relations, loop.go_on, loop._begin_arc, loop._listed,
+    loop._no_progress, loop._often_changed, loop._put_modes, loop._rearm, loop._undefined,
+    sliding._sign, sliding._solve, sliding.look, sliding.seize, sliding.flow_on, sliding.margins_on,
+    sliding.slope_on, step_size.starting_step,
 )  # fmt: skip
 _ARRAYS: Mapping[Any, tuple[type[Any], int]] = {
     list[float]: (np.float64, 1),
@@ -62,9 +65,10 @@ SIGNATURES: Mapping[str, str] = {
     "flow_live": "fVIVPV",
     "arm": "fVIPVI",
     "margins": "fVIPIV",
+    "normal": "ifVIPV",
     "switch": "fVIPI",
     "act": "iifVIP",
-    "observe": "fVIPV",
+    "observe": "fVIVPV",
 }
 # IEEE arithmetic: x / 0 is inf or NaN as it is for our Python (see gms_fsm.generated). And no
 # counting of references, which is atomic and took half of the time: nothing is allocated here, all
@@ -155,7 +159,7 @@ def cache_folder(base: Path) -> Path | None:
     import numba
 
     functions: list[Callable[..., Any]] = [loop.record, _machine_code, *_OF_A_STEP, *_OF_AN_ARC]
-    modules = (steps, step_size, crossings, advance, loop)
+    modules = (steps, step_size, crossings, advance, sliding, loop)
     constants = [
         (name, value if isinstance(value, int | float) else getattr(value, "_fields", None))
         for module in modules
@@ -295,7 +299,7 @@ def _record(arguments: tuple[Any, ...], folder: Path | None) -> Any:
 def _compile_record(arguments: tuple[Any, ...], folder: Path | None) -> Any:
     import numba
 
-    names = ("flow", "arm", "margins", "switch", "act", "observe")
+    names = ("flow", "arm", "margins", "normal", "switch", "act", "observe")
     functions = [numba.types.FunctionType(_signature(SIGNATURES[name])) for name in names]
     others = [numba.typeof(argument) for argument in arguments[len(names) :]]
     for helper in (*_OF_A_STEP, *_OF_AN_ARC):
@@ -310,9 +314,9 @@ def _compile_record(arguments: tuple[Any, ...], folder: Path | None) -> Any:
     return result
 
 
-def _each_row(observe: Any, t: Any, y: Any, mode: Any, p: Any, table: Any) -> None:
+def _each_row(observe: Any, t: Any, y: Any, mode: Any, live: Any, p: Any, table: Any) -> None:
     for row in range(len(t)):
-        observe(t[row], y[row], mode[row], p, table[row])
+        observe(t[row], y[row], mode[row], live, p, table[row])
 
 
 @functools.cache
@@ -322,12 +326,12 @@ def _compiled_each_row(folder: Path | None) -> Any:
     kind = _types()
     observe = numba.types.FunctionType(_signature(SIGNATURES["observe"]))
     table, modes = numba.types.float64[:, ::1], numba.types.int64[:, ::1]
-    signature = numba.types.void(observe, kind["V"], table, modes, kind["P"], table)
+    signature = numba.types.void(observe, kind["V"], table, modes, kind["V"], kind["P"], table)
     return _machine_code(signature, _each_row, folder)
 
 
 def for_each_row(
-    observe: Any, t: Any, y: Any, mode: Any, p: Any, table: Any, folder: Path | None
+    observe: Any, t: Any, y: Any, mode: Any, live: Any, p: Any, table: Any, folder: Path | None
 ) -> None:
     """Call a compiled ``observe`` for many rows.
 
@@ -337,6 +341,8 @@ def for_each_row(
         From `compiled`.
     t, y, mode : ndarray, shapes (rows,), (rows, m), (rows, n)
         The rows.
+    live : ndarray, shape (signs,)
+        `integrators.sliding.LIVE` for each sign.
     p : tuple of ndarray
         Parameters.
     table : ndarray, shape (rows, width)
@@ -344,4 +350,4 @@ def for_each_row(
     folder : Path, optional
         Where to keep the machine code.
     """
-    _compiled_each_row(folder)(observe, t, y, mode, p, table)
+    _compiled_each_row(folder)(observe, t, y, mode, live, p, table)

@@ -44,6 +44,7 @@ class Watched(NamedTuple):
     watch: list[int]  # flag a relation, shape (r,)
     active: list[int]  # indices of the flagged ones
     truth: list[bool]  # truth at the arc's start, shape (r,)
+    changed: list[int]  # whether it is another where the arc ended, shape (r,)
     strict: list[bool]  # shape (r,)
     start: Vector  # margins at the step's start, shape (r,)
     end: Vector  # ... at its end
@@ -77,7 +78,7 @@ def watched(strict: list[bool], size: int) -> Watched:
         return [0.0] * r
 
     return Watched(
-        [0] * r, [], [False] * r, strict, vector(), vector(), vector(), vector(), vector(),
+        [0] * r, [], [False] * r, [0] * r, strict, vector(), vector(), vector(), vector(), vector(),
         rights=[vector() for _ in range(DEEPEST + 1)],
         places=[0.0] * (DEEPEST + 1),
         depths=[0] * (DEEPEST + 1),

@@ -7,7 +7,7 @@ listens keeps everything up to there.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -16,6 +16,7 @@ from integrators import loop
 from integrators.advance import Control, Output, Work
 from integrators.crossings import Margins, Watched, watched
 from integrators.loop import MOST_SWITCHES, Memory, Plan
+from integrators.sliding import MOST_SLIDING, Sliding, Surfaces, room_to_slide
 from integrators.steps import Coefficients, Dense, Flow, Vector, coefficients
 from integrators.tableaux import EULER, Tableau
 
@@ -28,10 +29,12 @@ __all__ = [
     "Livelock",
     "NotFinite",
     "Options",
+    "Slide",
     "StepTooSmall",
     "Stop",
     "Switch",
     "System",
+    "TooManySteps",
     "buffers",
     "happenings",
     "run",
@@ -56,6 +59,9 @@ class System:
         ``arm(t, y, mode, p, held, watch)`` fills the held signs and flags relations.
     margins : callable
         ``margins(t, y, mode, p, watch, out)`` fills the margins of flagged relations.
+    normal : callable
+        ``normal(surface, t, y, mode, p, out)`` fills a surface's gradient over y, then its rate in
+        t.
     p : Any
         Parameters, handed on.
     held : int
@@ -64,6 +70,8 @@ class System:
         For each relation whether zero is false.
     relations : list of str
         Their names, for messages.
+    surfaces : Surfaces
+        What can be slid on.
     knots : list of float
         Times that steps may not jump over.
     jumps : list of float
@@ -74,10 +82,12 @@ class System:
     flow_live: Flow
     arm: Callable[..., Any]
     margins: Margins
+    normal: Callable[..., Any]
     p: Any
     held: int
     strict: list[bool]
     relations: list[str]
+    surfaces: Surfaces
     knots: list[float] = field(default_factory=list)
     jumps: list[float] = field(default_factory=list)
 
@@ -102,8 +112,15 @@ class Options:
         A tableau, or a `scipy.integrate.OdeSolver` class.
     step : float, optional
         Fixed step; adaptive when left out.
-    rtol, atol, max_step : float
+    rtol, max_step : float
         Of adaptive steps.
+    atol : list of float, shape (m,)
+        Absolute tolerances of the components; one that is 0 follows the largest value that the
+        component has had, times rtol.
+    time_scale : float
+        Of the system, s; first steps are chosen by it. 0 if it has none.
+    max_steps : int
+        How many steps may be tried.
     located : bool
         Stop at crossings; otherwise the machines are asked once at the end of each step, and take
         at most one edge each.
@@ -116,8 +133,10 @@ class Options:
     method: Tableau | type[Any]
     step: float | None
     rtol: float
-    atol: float
+    atol: list[float]
     max_step: float
+    time_scale: float
+    max_steps: int
     located: bool
     times: list[float] | None
     rows_at_once: int = ROWS_AT_ONCE
@@ -130,7 +149,7 @@ class Arc:
 
     t: list[float]
     y: list[Vector]
-    mode: tuple[int, ...]
+    mode: tuple[int, ...]  # of each machine, then for each surface whether it is slid on
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +157,16 @@ class Stop:
     """A place where an arc ends: a crossing, either side of a jump, the end of the run."""
 
     t: float
+    y: Vector
+    mode: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Slide:
+    """Onto a surface, or off it: the modes from here."""
+
+    t: float
+    microstep: int
     y: Vector
     mode: tuple[int, ...]
 
@@ -159,11 +188,11 @@ class Firing:
 class HybridError(Exception):
     """The run cannot go on; carries the scene."""
 
-    def __init__(self, message: str, t: float, y: Vector, mode: list[int]) -> None:
+    def __init__(self, message: str, t: float, y: Vector, mode: Sequence[int]) -> None:
         super().__init__(message)
         self.t = t
         self.y = list(y)
-        self.mode = list(mode)
+        self.mode = tuple(mode)
 
 
 class Livelock(HybridError):
@@ -173,7 +202,7 @@ class Livelock(HybridError):
         self,
         t: float,
         y: Vector,
-        mode: list[int],
+        mode: Sequence[int],
         machine: int | None,
         times: int,
         relations: list[str],
@@ -192,6 +221,10 @@ class NotFinite(HybridError):
     """The flow returned NaN or infinity."""
 
 
+class TooManySteps(HybridError):
+    """The steps are used up before the end."""
+
+
 # --------------------------------------------------------------------------- the loop
 def run(
     system: System,
@@ -201,7 +234,7 @@ def run(
     mode: list[int],
     t_end: float,
     options: Options,
-) -> Iterator[Arc | Stop | Firing]:
+) -> Iterator[Arc | Stop | Slide | Firing]:
     """Integrate from t to t_end and yield arcs, stops and firings in order.
 
     Parameters
@@ -221,12 +254,12 @@ def run(
 
     Yields
     ------
-    Arc, Stop or Firing
+    Arc, Stop, Slide or Firing
         Arcs hold the rows wanted; firings come one an edge, m of them at one time numbered 1..m.
 
     Raises
     ------
-    Livelock, StepTooSmall, NotFinite
+    Livelock, StepTooSmall, NotFinite, TooManySteps
         When it cannot go on; all before has been yielded.
     """
     return happenings(system, switch, buffers(system, t, y, mode, t_end, options), options)
@@ -234,7 +267,7 @@ def run(
 
 def happenings(
     system: System, switch: Switch, b: Buffers, options: Options
-) -> Iterator[Arc | Stop | Firing]:
+) -> Iterator[Arc | Stop | Slide | Firing]:
     """Go on from where some buffers are; see `run`.
 
     Between two happenings the buffers hold all there is to know of the run (`state_of`).
@@ -248,7 +281,7 @@ def happenings(
 
     Yields
     ------
-    Arc, Stop or Firing
+    Arc, Stop, Slide or Firing
         As `run`.
     """
     flow = system.flow if options.located else system.flow_live
@@ -257,14 +290,14 @@ def happenings(
         from integrators.scipy_arcs import SciPyStepper
 
         solver = SciPyStepper(system, flow, b, options)
-    now, counts, cursor, y, mode = b.memory.now, b.memory.counts, b.out.cursor, b.y, b.mode
+    now, counts, cursor, y = b.memory.now, b.memory.counts, b.out.cursor, b.y
     before: tuple[Vector, tuple[int, ...]] = [], ()
     while True:
         try:
             happening = loop.go_on(
-                flow, system.arm, system.margins, switch.ask, switch.act, b.method, b.control,
-                b.plan, b.memory, y, mode, b.held, system.p, b.relations, b.out, b.work,
-                options.rows_at_once,
+                flow, system.arm, system.margins, system.normal, switch.ask, switch.act, b.method,
+                b.control, b.plan, b.memory, y, b.mode, b.held, system.p, b.relations, b.surfaces,
+                b.sliding, b.out, b.work, options.rows_at_once,
             )  # fmt: skip
             if solver is not None and happening == loop.ADVANCE:
                 solver.advance(options.rows_at_once if options.located else 1)
@@ -272,17 +305,19 @@ def happenings(
             if cursor[kernel.ROW]:
                 yield _take_rows(b)
             raise
-        t = now[loop.T]
+        t, mode = now[loop.T], modes_of(b)
         if happening == loop.ROWS:
             if cursor[kernel.ROW]:
                 yield _take_rows(b)
         elif happening == loop.FIRING:
-            before = list(y), tuple(mode)
+            before = list(y), mode
         elif happening == loop.FIRED:
             machine, edge = counts[loop.MACHINE], counts[loop.EDGE]
-            yield Firing(t, counts[loop.MICROSTEP], machine, edge, *before, list(y), tuple(mode))
+            yield Firing(t, counts[loop.MICROSTEP], machine, edge, *before, list(y), mode)
+        elif happening == loop.SLID:
+            yield Slide(t, counts[loop.MICROSTEP], list(y), mode)
         elif happening in (loop.STOPPED, loop.DONE):
-            yield Stop(t, list(y), tuple(mode))
+            yield Stop(t, list(y), mode)
             if happening == loop.DONE:
                 return
         elif happening != loop.ADVANCE:
@@ -301,6 +336,8 @@ class Buffers:
     mode: list[int]
     held: Vector
     relations: Watched
+    surfaces: Surfaces
+    sliding: Sliding
     out: Output
     work: Work
 
@@ -313,6 +350,7 @@ def buffers(
     t_end: float,
     options: Options,
     capacity: int | None = None,
+    seen: int = 0,
 ) -> Buffers:
     """Make the buffers of a run, as lists.
 
@@ -322,14 +360,20 @@ def buffers(
         As in `run`.
     capacity : int, optional
         Room for rows.
+    seen : int
+        How many numbers `integrators.loop.record` is to observe.
 
     Returns
     -------
     Buffers
         Ready for the first call of `integrators.loop.go_on`.
     """
-    size, n, r = len(y), len(mode), len(system.strict)
-    resolution = 4.0 * math.ulp(max(abs(t), abs(t_end)))
+    size, n = len(y), len(mode)
+    surfaces = system.surfaces
+    most_sliding = min(len(surfaces.sign), MOST_SLIDING)
+    # Behind the system's relations those that end a slide: sigma <= 1 and sigma >= -1.
+    strict = system.strict + [False] * (2 * most_sliding)
+    r = len(strict)
     # A SciPy solver needs no coefficients, but the loop's signature does.
     tableau = options.method if isinstance(options.method, Tableau) else EULER
     jumps = [s for s in system.jumps if options.located and t < s <= t_end]
@@ -348,7 +392,7 @@ def buffers(
             rtol=options.rtol,
             atol=options.atol,
             max_step=options.max_step,
-            resolution=resolution,
+            time_scale=options.time_scale,
         ),
         plan=Plan(
             t_end=t_end,
@@ -357,9 +401,7 @@ def buffers(
             jumps=jumps,
             before_jumps=[math.nextafter(s, -math.inf) for s in jumps],
             knots=system.knots if options.located else [],
-            # About 1e-9 of the run: two machines that chatter together move the clock on by some
-            # ticks each time, and a run that goes on like that would never end.
-            standstill=1e6 * resolution,
+            max_steps=options.max_steps,
         ),
         memory=Memory(
             now=beginning(t, t_end),
@@ -369,23 +411,27 @@ def buffers(
             changes=[0] * r,
             room=[0] * r,
             f=vector(),
+            anchor=list(y),
         ),
         y=list(y),
         mode=list(mode),
         held=[0.0] * system.held,
-        relations=watched(system.strict, size),
+        relations=watched(strict, size),
+        surfaces=surfaces,
+        sliding=room_to_slide(surfaces, size, system.held, r, seen),
         out=Output(
             times=times or [],
             every_step=times is None,
             rows_t=[0.0] * capacity,
             rows_y=[vector() for _ in range(capacity)],
-            cursor=[0, 0, 0],
+            cursor=[0, 0, 0, 0],
         ),
         work=Work(
             k=[vector() for _ in tableau.B],
             y_new=vector(),
             f_new=vector(),
             error=vector(),
+            floor=list(options.atol),
             dense=Dense(vector(), vector(), vector(), vector(), vector()),
         ),
     )
@@ -404,16 +450,33 @@ def state_of(b: Buffers) -> dict[str, Any]:
     dict
         By name; to go on bit for bit, put copies of them back into buffers made alike.
     """
-    w = b.relations
+    w, s = b.relations, b.sliding
     return {
         **b.memory._asdict(), "y": b.y, "mode": b.mode, "held": b.held, "watch": w.watch,
-        "truth": w.truth, "start": w.start, "cursor": b.out.cursor,
+        "truth": w.truth, "start": w.start, "cursor": b.out.cursor, "floor": b.work.floor,
+        "slid": s.flags, "arrived": s.arrived, "which": s.which,
     }  # fmt: skip
+
+
+def modes_of(b: Buffers) -> tuple[int, ...]:
+    """Return the mode of each machine, then for each surface whether it is slid on.
+
+    Parameters
+    ----------
+    b : Buffers
+        Of a run.
+
+    Returns
+    -------
+    tuple of int
+        What rows are kept with.
+    """
+    return (*b.mode, *b.sliding.flags)
 
 
 def beginning(t: float, t_end: float) -> Vector:
     """Return `Memory.now` of a run that has not begun."""
-    return [t, 0.0, 1.0, t_end, -math.inf]
+    return [t, 0.0, 1.0, t_end, t]
 
 
 def failure(happening: int, b: Buffers, relations: list[str]) -> HybridError:
@@ -433,27 +496,34 @@ def failure(happening: int, b: Buffers, relations: list[str]) -> HybridError:
     HybridError
         To be raised.
     """
-    memory, y, mode = b.memory, b.y, b.mode
+    memory = b.memory
     t, counts = memory.now[loop.T], memory.counts
+    scene = t, b.y, modes_of(b)
     if happening == kernel.TOO_SMALL:
-        return StepTooSmall("step size under the clock's resolution", t, y, mode)
+        return StepTooSmall("step size under the clock's resolution", *scene)
+    if happening == loop.TOO_MANY_STEPS:
+        return TooManySteps(f"{b.plan.max_steps} steps are used up", *scene)
     if happening == loop.MACHINE_LIVELOCK:
         machine = counts[loop.MACHINE]
-        return Livelock(t, y, mode, machine, memory.switches[machine], [])
+        return Livelock(*scene, machine, memory.switches[machine], [])
     if happening == loop.RELATION_LIVELOCK:
         # A relation in a guard may have changed once more than its machine has switched.
-        machine = max(range(len(mode)), key=lambda i: memory.switches[i])
+        machine = max(range(len(b.mode)), key=lambda i: memory.switches[i])
         if memory.switches[machine] >= MOST_SWITCHES // 2:
-            return Livelock(t, y, mode, machine, memory.switches[machine], [])
-        often = [name for r, name in enumerate(relations) if memory.changes[r] >= MOST_SWITCHES]
-        return Livelock(t, y, mode, None, MOST_SWITCHES, often)
+            return Livelock(*scene, machine, memory.switches[machine], [])
+        names = [*relations, *["the pull onto a surface"] * (len(memory.changes) - len(relations))]
+        often = [name for r, name in enumerate(names) if memory.changes[r] >= MOST_SWITCHES]
+        return Livelock(*scene, None, MOST_SWITCHES, often)
     w = loop.active_relations(b.relations, memory)
-    undefined = [relations[r] for r in w.active if w.start[r] != w.start[r]]
+    undefined = [
+        name for r, name in enumerate(relations) if r in w.active and w.start[r] != w.start[r]
+    ]
     text = f"{undefined[0]} compares NaN" if undefined else "NaN or infinity"
-    return NotFinite(text, t, y, mode)
+    return NotFinite(text, *scene)
 
 
 def _take_rows(b: Buffers) -> Arc:
     rows = b.out.cursor[kernel.ROW]
     b.out.cursor[kernel.ROW] = 0
-    return Arc(b.out.rows_t[:rows], [list(y) for y in b.out.rows_y[:rows]], tuple(b.mode))
+    states = [list(y) for y in b.out.rows_y[:rows]]
+    return Arc(b.out.rows_t[:rows], states, modes_of(b))

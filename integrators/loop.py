@@ -18,26 +18,42 @@ from integrators.advance import (
     NOT_FINITE,
     REACHED,
     ROW,
+    STEPS,
     TOO_SMALL,
     Control,
     Output,
     Work,
     advance,
     put_row,
+    raise_floor,
 )
 from integrators.crossings import Margins, Watched
-from integrators.step_size import starting_step
+from integrators.sliding import (
+    Held,
+    Sliding,
+    Surfaces,
+    flow_on,
+    look,
+    margins_on,
+    seize,
+)
+from integrators.step_size import error_norm, starting_step
 from integrators.steps import Coefficients, Flow, Vector
 
 __all__ = ["MOST_SWITCHES", "Log", "Memory", "Plan", "go_on", "record"]
 
-MOST_SWITCHES = 100  # of one machine, or of one relation, while time stands still
+MOST_SWITCHES = 100  # of one machine, or of one relation, without progress
+# Switches make no progress where they follow each other by less than this part of the time itself
+CLOCK_STANDS = 1e-9
+# ... or by less than this, while the state moves by less than a tenth of its tolerance a switch.
+CLOCK_CRAWLS = 1e-6
+STATE_STANDS = 0.1
 
 # What happened (TOO_SMALL and NOT_FINITE are the kernel's).
-ROWS, FIRING, FIRED, STOPPED, DONE = 10, 11, 12, 13, 14
-MACHINE_LIVELOCK, RELATION_LIVELOCK, ADVANCE = 15, 16, 17
+ROWS, FIRING, FIRED, STOPPED, DONE, SLID = 10, 11, 12, 13, 14, 15
+MACHINE_LIVELOCK, RELATION_LIVELOCK, ADVANCE, TOO_MANY_STEPS = 16, 17, 18, 19
 # Places in Memory.now.
-T, H, ERROR_BEFORE, T_STOP, SWITCHED = 0, 1, 2, 3, 4
+T, H, ERROR_BEFORE, T_STOP, ANCHOR = 0, 1, 2, 3, 4
 # Places in Memory.counts.
 PLACES = 11
 PHASE, MICROSTEP, MACHINE, EDGE, FIRED_ONE, FRESH, STATUS, JUMP, ACTIVE, TAKEN, NEW_ARC = range(
@@ -56,19 +72,20 @@ class Plan(NamedTuple):
     jumps: Vector  # times at which the flow jumps, increasing
     before_jumps: Vector  # one clock tick before each
     knots: Vector  # times that steps may not jump over
-    standstill: float  # s; progress in time smaller than this is none
+    max_steps: int  # tried, in the whole run
 
 
 class Memory(NamedTuple):
     """What the outer loop remembers between two calls."""
 
-    now: Vector  # [time, step, controller's error, next stop, last switch]
+    now: Vector  # [time, step, controller's error, next stop, since when switches count]
     counts: list[int]  # see the places above
     edges: list[int]  # the enabled edge of each machine, or -1
-    switches: list[int]  # firings of each machine while time stands still
-    changes: list[int]  # changes of each relation while time stands still
+    switches: list[int]  # firings of each machine since then
+    changes: list[int]  # changes of each relation since then
     room: list[int]  # indices of the watched relations
     f: Vector  # slope
+    anchor: Vector  # the state since when switches count
 
 
 class Log(NamedTuple):
@@ -81,7 +98,7 @@ class Log(NamedTuple):
     numbers: list[Vector]  # [own variable, seen 0, own seen, seen 1 before, seen 1 after]
     seen: Vector  # scratch of `observe`
     rows_microstep: list[int]  # beside the rows of Output
-    rows_mode: list[list[int]]
+    rows_mode: list[list[int]]  # of each machine, then for each surface whether it is slid on
     stops_t: Vector
     stops_microstep: list[int]
     stops_y: list[Vector]
@@ -92,6 +109,7 @@ def go_on(
     flow: Flow,
     arm: Callable[..., Any],
     margins: Margins,
+    normal: Callable[..., Any],
     ask: Callable[..., Any],
     act: Callable[..., Any],
     method: Coefficients,
@@ -103,6 +121,8 @@ def go_on(
     held: Vector,
     p: Any,
     relations: Watched,
+    surfaces: Surfaces,
+    sliding: Sliding,
     out: Output,
     work: Work,
     most_steps: int,
@@ -111,7 +131,7 @@ def go_on(
 
     Parameters
     ----------
-    flow, arm, margins : callable
+    flow, arm, margins, normal : callable
         The system.
     ask : callable
         ``ask(t, y, mode, p, edges)`` fills each machine's first enabled edge, or -1.
@@ -119,7 +139,7 @@ def go_on(
         ``act(edge, machine, t, y, mode, p)`` takes an edge.
     method, control, plan
         How to integrate.
-    memory, y, mode, held, p, relations, out, work
+    memory, y, mode, held, p, relations, surfaces, sliding, out, work
         The state of the run, changed in place.
     most_steps : int
         Come back after so many steps at most.
@@ -129,11 +149,13 @@ def go_on(
     int
         ROWS (to be taken, all of the present mode; possibly none when the steps are used up),
         FIRING (before) and FIRED (after an edge), STOPPED (a crossing, either side of a jump),
-        ADVANCE (a foreign solver is to go on), DONE; or the error TOO_SMALL, NOT_FINITE,
-        MACHINE_LIVELOCK, RELATION_LIVELOCK.
+        SLID (onto a surface or off it), ADVANCE (a foreign solver is to go on), DONE; or the error
+        TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK, RELATION_LIVELOCK, TOO_MANY_STEPS.
     """
     now, counts, cursor = memory.now, memory.counts, out.cursor
     w = active_relations(relations, memory)
+    on = Held(flow, margins, normal, p, held, surfaces.sign, sliding.which, sliding.sigma,
+              sliding.table)  # fmt: skip
     while True:
         if cursor[ROW] > counts[TAKEN]:
             return ROWS
@@ -164,15 +186,13 @@ def go_on(
             counts[FRESH] = 1
             counts[PHASE] = PICK
             act(counts[EDGE], i, t, y, mode, p)
-            _look_at_clock(memory, t, plan.standstill)
             memory.switches[i] += 1
-            if memory.switches[i] >= MOST_SWITCHES:
+            if memory.switches[i] >= MOST_SWITCHES and _no_progress(memory, control, work, t, y):
                 counts[PHASE] = AFTER
                 counts[STATUS] = MACHINE_LIVELOCK
             return FIRED
 
         elif phase == SETTLED:
-            counts[MICROSTEP] = 0
             if t >= plan.t_end:
                 counts[PHASE] = FINISH
                 continue
@@ -183,8 +203,11 @@ def go_on(
             if counts[JUMP] < len(plan.jumps):
                 now[T_STOP] = min(now[T_STOP], plan.before_jumps[counts[JUMP]])
             counts[STATUS] = FULL
+            slid = False
             if plan.located:
-                w = _rearm(arm, margins, t, y, mode, held, p, relations, memory)
+                w, slid = _rearm(
+                    arm, margins, t, y, mode, held, p, relations, surfaces, sliding, on, memory
+                )
                 if _undefined(w):
                     counts[PHASE] = AFTER
                     counts[STATUS] = NOT_FINITE
@@ -192,26 +215,24 @@ def go_on(
             if plan.located or counts[FRESH] == 1:
                 counts[NEW_ARC] = 1
                 if not plan.foreign:
-                    flow(t, y, mode, held, p, memory.f)
-                    # Without location the solver knows of no switch: it keeps its step.
-                    if control.step <= 0.0 and (plan.located or now[H] <= 0.0):
-                        now[ERROR_BEFORE] = 1.0
-                        now[H] = starting_step(
-                            flow, t, y, memory.f, mode, held, p, method.error_order,
-                            control.rtol, control.atol, min(control.max_step, now[T_STOP] - t),
-                            work.y_new, work.f_new,
-                        )  # fmt: skip
+                    _begin_arc(method, control, t, y, mode, held, on, memory, work, plan.located)
                 counts[FRESH] = 0
             counts[PHASE] = ARC
+            if slid:
+                return SLID
             if plan.foreign:
                 return ADVANCE
 
         elif phase == ARC:
+            counts[MICROSTEP] = 0
+            if cursor[STEPS] >= plan.max_steps:
+                return TOO_MANY_STEPS
             if not plan.foreign:
-                steps = most_steps if plan.located else 1
+                steps = min(most_steps, plan.max_steps - cursor[STEPS]) if plan.located else 1
                 counts[STATUS], now[T], now[H], now[ERROR_BEFORE] = advance(
-                    flow, margins, method, control, t, y, memory.f, now[H], now[ERROR_BEFORE],
-                    now[T_STOP], plan.knots, mode, held, p, w, out, work, steps,
+                    flow_on, margins_on, method, control, t, y, memory.f, now[H],
+                    now[ERROR_BEFORE], now[T_STOP], plan.knots, mode, held, on, w, out, work,
+                    steps,
                 )  # fmt: skip
             if counts[STATUS] != FULL or not plan.located:
                 counts[PHASE] = AFTER
@@ -229,7 +250,7 @@ def go_on(
             if status == FULL and not plan.located:
                 return ROWS  # perhaps none, but a caller may want to breathe
             if status == CROSSED:
-                if _often_changed(margins, t, y, mode, p, w, memory, plan.standstill):
+                if _often_changed(t, y, mode, w, surfaces, sliding, on, memory, control, work):
                     return RELATION_LIVELOCK
                 return STOPPED
 
@@ -243,6 +264,7 @@ def go_on(
         elif phase == START:
             counts[PHASE] = ASK
             counts[FRESH] = 1
+            raise_floor(control, work.floor, y)
             if out.every_step:
                 put_row(out, t, y)
 
@@ -259,7 +281,8 @@ def go_on(
 def active_relations(relations: Watched, memory: Memory) -> Watched:
     """Return the relations with the active ones listed."""
     return Watched(
-        relations.watch, memory.room[: memory.counts[ACTIVE]], relations.truth, relations.strict,
+        relations.watch, memory.room[: memory.counts[ACTIVE]], relations.truth, relations.changed,
+        relations.strict,
         relations.start, relations.end, relations.low, relations.high, relations.probe,
         relations.rights, relations.places, relations.depths, relations.y_probe,
     )  # fmt: skip
@@ -274,24 +297,77 @@ def _rearm(
     held: Vector,
     p: Any,
     relations: Watched,
+    surfaces: Surfaces,
+    sliding: Sliding,
+    on: Held,
     memory: Memory,
-) -> Watched:
-    """Hold signs, choose what to watch, remember its truth."""
+) -> tuple[Watched, bool]:
+    """Hold signs, choose what to watch and to slide on, remember the truth of what is watched.
+
+    Returns what is watched, and whether other surfaces are slid on than before.
+    """
+    watch = relations.watch
     for a in range(memory.counts[ACTIVE]):
-        relations.watch[memory.room[a]] = 0
-    arm(t, y, mode, p, held, relations.watch)
+        watch[memory.room[a]] = 0
+    arm(t, y, mode, p, held, watch)
+    w = _listed(relations, memory)
+    margins(t, y, mode, p, watch, w.start)
+    slid = False
+    if len(surfaces.sign) > 0:
+        slid = seize(on, surfaces, sliding, t, y, mode, w)
+        count = sliding.which[-1]
+        if count > 0:
+            first = len(watch) - 2 * len(sliding.sigma)
+            for c in range(count):
+                k = sliding.which[c]
+                watch[surfaces.above[k]] = watch[surfaces.at_least[k]] = 0
+                watch[first + 2 * c] = watch[first + 2 * c + 1] = 1
+            w = _listed(relations, memory)
+            margins_on(t, y, mode, on, watch, w.start)
+    for r in w.active:
+        g = w.start[r]
+        w.truth[r] = g > 0.0 or (g == 0.0 and not w.strict[r])
+    for k in range(len(surfaces.sign)):  # one met exactly is left to the side of its sign
+        sign = held[surfaces.sign[k]]
+        if watch[surfaces.above[k]] and sign != 0.0:
+            w.truth[surfaces.above[k]] = w.truth[surfaces.at_least[k]] = sign > 0.0
+    return w, slid
+
+
+def _listed(relations: Watched, memory: Memory) -> Watched:
+    """List the flagged relations."""
     active = 0
     for r in range(len(relations.watch)):
         if relations.watch[r]:
             memory.room[active] = r
             active += 1
     memory.counts[ACTIVE] = active
-    w = active_relations(relations, memory)
-    margins(t, y, mode, p, w.watch, w.start)
-    for r in w.active:
-        g = w.start[r]
-        w.truth[r] = g > 0.0 or (g == 0.0 and not w.strict[r])
-    return w
+    return active_relations(relations, memory)
+
+
+def _begin_arc(
+    method: Coefficients,
+    control: Control,
+    t: float,
+    y: Vector,
+    mode: list[int],
+    held: Vector,
+    on: Held,
+    memory: Memory,
+    work: Work,
+    located: bool,
+) -> None:
+    """Fill the slope and choose the first step of an arc."""
+    now = memory.now
+    flow_on(t, y, mode, held, on, memory.f)
+    # Without location the solver knows of no switch: it keeps its step.
+    if control.step <= 0.0 and (located or now[H] <= 0.0):
+        now[ERROR_BEFORE] = 1.0
+        now[H] = starting_step(
+            flow_on, t, y, memory.f, mode, held, on, method.error_order, control.rtol,
+            work.floor, control.time_scale, min(control.max_step, now[T_STOP] - t), work.y_new,
+            work.f_new,
+        )  # fmt: skip
 
 
 def _undefined(w: Watched) -> bool:
@@ -302,42 +378,62 @@ def _undefined(w: Watched) -> bool:
     return undefined
 
 
-def _look_at_clock(memory: Memory, t: float, standstill: float) -> None:
-    """Forget the counts when time has gone on."""
-    if t - memory.now[SWITCHED] > standstill:
+def _no_progress(memory: Memory, control: Control, work: Work, t: float, y: Vector) -> bool:
+    """Tell whether the switches counted led nowhere; if they led on, count anew from here."""
+    elapsed = t - memory.now[ANCHOR]
+    stands = elapsed <= MOST_SWITCHES * CLOCK_STANDS * abs(t)
+    if not stands and elapsed <= MOST_SWITCHES * CLOCK_CRAWLS * abs(t):
+        moved = work.error
+        for j in range(len(y)):
+            moved[j] = y[j] - memory.anchor[j]
+        distance = error_norm(moved, 1.0, y, memory.anchor, control.rtol, work.floor)
+        stands = distance <= MOST_SWITCHES * STATE_STANDS
+    if not stands:
+        memory.now[ANCHOR] = t
+        for j in range(len(y)):
+            memory.anchor[j] = y[j]
         for i in range(len(memory.switches)):
             memory.switches[i] = 0
         for r in range(len(memory.changes)):
             memory.changes[r] = 0
-    memory.now[SWITCHED] = t
+    return stands
 
 
 def _often_changed(
-    margins: Margins,
     t: float,
     y: Vector,
     mode: list[int],
-    p: Any,
     w: Watched,
+    surfaces: Surfaces,
+    sliding: Sliding,
+    on: Held,
     memory: Memory,
-    standstill: float,
+    control: Control,
+    work: Work,
 ) -> bool:
     """Count the relations that have just changed; tell whether one has too often."""
-    _look_at_clock(memory, t, standstill)
-    margins(t, y, mode, p, w.watch, w.probe)
+    margins_on(t, y, mode, on, w.watch, w.probe)
     often = False
     for r in w.active:
         g = w.probe[r]
         if (g > 0.0 or (g == 0.0 and not w.strict[r])) != w.truth[r]:
             memory.changes[r] += 1
             often = often or memory.changes[r] >= MOST_SWITCHES
-    return often
+            w.changed[r] = 1
+        else:
+            w.changed[r] = 0
+    for k in range(len(surfaces.sign)):
+        above, at_least = surfaces.above[k], surfaces.at_least[k]
+        if w.watch[above] and (w.changed[above] or w.changed[at_least]):
+            sliding.arrived[k] = 1
+    return often and _no_progress(memory, control, work, t, y)
 
 
 def record(
     flow: Flow,
     arm: Callable[..., Any],
     margins: Margins,
+    normal: Callable[..., Any],
     ask: Callable[..., Any],
     act: Callable[..., Any],
     observe: Callable[..., Any],
@@ -350,6 +446,8 @@ def record(
     held: Vector,
     p: Any,
     relations: Watched,
+    surfaces: Surfaces,
+    sliding: Sliding,
     out: Output,
     work: Work,
     log: Log,
@@ -362,8 +460,8 @@ def record(
     Parameters
     ----------
     observe : callable
-        ``observe(t, y, mode, p, seen)``; the log keeps seen[0], seen[1] on both sides of a firing
-        and, of machine i, seen[2 + i] and y[first + i].
+        ``observe(t, y, mode, signs, p, seen)``; the log keeps seen[0], seen[1] on both sides of a
+        firing and, of machine i, seen[2 + i] and y[first + i].
     log : Log
         Filled; with room in ``stops_t`` stops are kept too.
     first : int
@@ -383,6 +481,8 @@ def record(
     cursor, counts, entries = out.cursor, memory.counts, log.counts
     keep_stops = len(log.stops_t) > 0
     seen_at = float("nan")  # the time log.seen is of
+    on = Held(flow, margins, normal, p, held, surfaces.sign, sliding.which, sliding.sigma,
+              sliding.table)  # fmt: skip
     left = most_steps
     while True:
         left -= 1
@@ -391,21 +491,20 @@ def record(
         if entries[0] >= len(log.t) or (keep_stops and entries[1] >= len(log.stops_t)):
             return ROWS
         happening = go_on(
-            flow, arm, margins, ask, act, method, control, plan, memory, y, mode, held, p,
-            relations, out, work, most_steps,
+            flow, arm, margins, normal, ask, act, method, control, plan, memory, y, mode, held, p,
+            relations, surfaces, sliding, out, work, most_steps,
         )  # fmt: skip
         t = memory.now[T]
         if happening == ROWS:
             for row in range(counts[TAKEN], cursor[ROW]):
                 log.rows_microstep[row] = 0
-                for i in range(len(mode)):
-                    log.rows_mode[row][i] = mode[i]
+                _put_modes(mode, sliding, log.rows_mode[row])
             counts[TAKEN] = cursor[ROW]
             if counts[PHASE] == ARC:
                 return ROWS
         elif happening == FIRING:
             if seen_at != t:
-                observe(t, y, mode, p, log.seen)
+                look(observe, arm, on, sliding, t, y, mode, log.seen)
             i = counts[MACHINE]
             row = entries[0]
             log.t[row] = t
@@ -418,27 +517,35 @@ def record(
             if pause:
                 return FIRING
         elif happening == FIRED:
-            observe(t, y, mode, p, log.seen)
+            look(observe, arm, on, sliding, t, y, mode, log.seen)
             seen_at = t
             log.numbers[entries[0]][4] = log.seen[1]
             entries[0] += 1
-            if out.every_step:
-                row = cursor[ROW]
-                put_row(out, t, y)
-                log.rows_microstep[row] = counts[MICROSTEP]
-                for i in range(len(mode)):
-                    log.rows_mode[row][i] = mode[i]
-                counts[TAKEN] = cursor[ROW]
+        elif happening == SLID:
+            seen_at = float("nan")
         elif happening not in (STOPPED, DONE):
             return happening
-        if keep_stops and happening in (FIRED, STOPPED, DONE):
+        if out.every_step and happening in (FIRED, SLID):
+            row = cursor[ROW]
+            put_row(out, t, y)
+            log.rows_microstep[row] = counts[MICROSTEP]
+            _put_modes(mode, sliding, log.rows_mode[row])
+            counts[TAKEN] = cursor[ROW]
+        if keep_stops and happening in (FIRED, SLID, STOPPED, DONE):
             row = entries[1]
             log.stops_t[row] = t
-            log.stops_microstep[row] = counts[MICROSTEP] if happening == FIRED else 0
+            log.stops_microstep[row] = counts[MICROSTEP] if happening in (FIRED, SLID) else 0
             for j in range(len(y)):
                 log.stops_y[row][j] = y[j]
-            for i in range(len(mode)):
-                log.stops_mode[row][i] = mode[i]
+            _put_modes(mode, sliding, log.stops_mode[row])
             entries[1] += 1
         if happening == DONE:
             return DONE
+
+
+def _put_modes(mode: list[int], sliding: Sliding, place: list[int]) -> None:
+    n = len(mode)
+    for i in range(n):
+        place[i] = mode[i]
+    for k in range(len(sliding.flags)):
+        place[n + k] = sliding.flags[k]

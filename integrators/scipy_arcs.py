@@ -22,11 +22,14 @@ from integrators.advance import (
     REACHED,
     REDO,
     ROW,
+    STEPS,
     TOO_SMALL,
     put_row,
+    tick_at,
 )
 from integrators.crossings import NO_CHANGE, copy_margins, first_change
 from integrators.loop import NEW_ARC, STATUS, T_STOP, T, active_relations
+from integrators.sliding import Held, flow_on, margins_on
 
 if TYPE_CHECKING:
     from integrators.hybrid import Buffers, Options, System
@@ -48,7 +51,11 @@ class SciPyStepper:
     def __init__(self, system: System, flow: Flow, buffers: Buffers, options: Options) -> None:
         if not (isinstance(options.method, type) and issubclass(options.method, OdeSolver)):
             raise TypeError(f"method {options.method!r} is not a scipy.integrate.OdeSolver class")
-        self.system, self.flow, self.buffers = system, flow, buffers
+        b = self.buffers = buffers
+        self.on = Held(
+            flow, system.margins, system.normal, system.p, b.held, b.surfaces.sign,
+            b.sliding.which, b.sliding.sigma, b.sliding.table,
+        )  # fmt: skip
         self.options = options
         self.solver: Any = None
 
@@ -69,7 +76,7 @@ class SciPyStepper:
             limit = min(limit, knots[cursor[NEXT_KNOT]])
         if self.options.step:
             index = int((t - b.control.origin) / self.options.step) + 1
-            while b.control.origin + index * self.options.step - t <= b.control.resolution:
+            while (grid := b.control.origin + index * self.options.step) - t <= tick_at(grid):
                 index += 1
             limit = min(limit, b.control.origin + index * self.options.step)
         return limit
@@ -77,11 +84,11 @@ class SciPyStepper:
     def _solver_to(self, limit: float, t: float) -> Any:
         if self.solver is not None and self.solver.t_bound == limit:
             return self.solver
-        b, p = self.buffers, self.system.p
+        b = self.buffers
 
         def slope(time: float, state: NDArray[np.float64]) -> NDArray[np.float64]:
             dy = [0.0] * len(state)
-            self.flow(float(time), state.tolist(), b.mode, b.held, p, dy)
+            flow_on(float(time), state.tolist(), b.mode, b.held, self.on, dy)
             result = np.array(dy)
             if not np.isfinite(result).all():
                 raise FloatingPointError(f"the flow is not finite at t = {float(time)!r}")
@@ -94,20 +101,21 @@ class SciPyStepper:
             np.array(b.y),
             limit,
             rtol=self.options.rtol,
-            atol=self.options.atol,
+            atol=np.array(b.work.floor),
             max_step=self.options.max_step if math.isfinite(self.options.max_step) else np.inf,
         )
 
     def _advance(self, t: float, most_steps: int) -> tuple[int, float]:
         b = self.buffers
         out, y, w = b.out, b.y, active_relations(b.relations, b.memory)
-        cursor, t_stop, resolution = out.cursor, b.memory.now[T_STOP], b.control.resolution
+        cursor, t_stop = out.cursor, b.memory.now[T_STOP]
         redone, ahead = False, math.inf
         while True:
             if t >= t_stop:
                 return REACHED, t
             if most_steps <= 0 or (out.every_step and cursor[ROW] >= len(out.rows_t)):
                 return FULL, t
+            cursor[STEPS] += 1
             try:
                 solver = self._solver_to(min(self._limit(t), ahead), t)
                 solver.step()
@@ -118,6 +126,7 @@ class SciPyStepper:
             self.solver = solver
             t_old, t_new, dense = t, float(solver.t), solver.dense_output()
             y_new = solver.y.tolist()
+            tick = tick_at(max(abs(t), abs(t_new)))
 
             def interpolate(
                 dense: Any, theta: float, place: Vector, t0: float = t_old, t1: float = t_new
@@ -127,10 +136,9 @@ class SciPyStepper:
             theta = NO_CHANGE
             if w.active:
                 theta = first_change(
-                    interpolate, dense, self.system.margins, t, t_new, y_new, b.mode,
-                    self.system.p, w, resolution,
-                )  # fmt: skip
-            if theta < REDO and not redone and theta * (t_new - t) > 1e3 * resolution:
+                    interpolate, dense, margins_on, t, t_new, y_new, b.mode, self.on, w, tick
+                )
+            if theta < REDO and not redone and theta * (t_new - t) > 1e3 * tick:
                 # As in the kernel: the solver's stages lay behind the crossing.
                 self.solver, redone = None, True
                 ahead = t + theta * (t_new - t)

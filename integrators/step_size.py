@@ -20,7 +20,7 @@ INFINITY = float("inf")
 
 
 def error_norm(
-    error: Vector, h: float, y: Vector, y_new: Vector, rtol: float, atol: float
+    error: Vector, h: float, y: Vector, y_new: Vector, rtol: float, atol: Vector
 ) -> float:
     """Return the largest component of h error in units of its tolerance; infinity if not finite.
 
@@ -32,8 +32,10 @@ def error_norm(
         Error estimate per step length, and the state at both ends of the step.
     h : float
         The step's length.
-    rtol, atol : float
-        Tolerances.
+    rtol : float
+        Relative tolerance.
+    atol : list of float, shape (m,)
+        Absolute tolerances; with 0 a component that is 0 at both ends must have no error.
 
     Returns
     -------
@@ -42,15 +44,19 @@ def error_norm(
 
     Examples
     --------
-    >>> error_norm([2e-6], 0.5, [0.0], [1.0], rtol=1e-6, atol=0.0)
+    >>> error_norm([2e-6], 0.5, [0.0], [1.0], rtol=1e-6, atol=[0.0])
     1.0
     """
     worst = 0.0
     for j in range(len(y)):
         size = max(abs(y[j]), abs(y_new[j]))
-        ratio = abs(h * error[j]) / (atol + rtol * size)
-        if not (ratio < INFINITY and size < INFINITY):
+        wrong, allowed = abs(h * error[j]), atol[j] + rtol * size
+        if not (wrong < INFINITY and size < INFINITY):
             return INFINITY
+        if allowed > 0.0:
+            ratio = wrong / allowed
+        else:
+            ratio = 0.0 if wrong == 0.0 else INFINITY
         if ratio > worst:
             worst = ratio
     return worst
@@ -117,12 +123,15 @@ def starting_step(
     p: Any,
     order: int,
     rtol: float,
-    atol: float,
+    atol: Vector,
+    time_scale: float,
     longest: float,
     y_try: Vector,
     f_try: Vector,
 ) -> float:
     """Return the usual starting step, from the size of y, y' and y''.
+
+    No second of its own: with all times multiplied by a power of two it gives that multiple.
 
     Parameters
     ----------
@@ -130,10 +139,14 @@ def starting_step(
         The system at the start.
     order : int
         Exponent of the step's error.
-    rtol, atol : float
-        Tolerances.
+    rtol : float
+        Relative tolerance.
+    atol : list of float, shape (m,)
+        Absolute tolerances.
+    time_scale : float
+        Of the system, s; 0 if it has none.
     longest : float
-        Upper bound.
+        Upper bound, s.
     y_try, f_try : list of float
         Scratch.
 
@@ -144,10 +157,14 @@ def starting_step(
     """
     d0 = error_norm(y, 1.0, y, y, rtol, atol)
     d1 = error_norm(f, 1.0, y, y, rtol, atol)
+    h = longest if time_scale <= 0.0 else min(time_scale, longest)
     if not d1 < INFINITY:
-        return longest
-    h = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
-    h = min(h, longest)
+        return 1e-3 * h
+    if d1 > 0.0:  # until y has moved by a hundredth, or by a tolerance where it is next to zero
+        h = min(h, 0.01 * max(d0, 100.0) / d1)
+    else:  # nothing moves yet
+        h = 1e-6 * h
+    unit = h if time_scale <= 0.0 else time_scale
     for j in range(len(y)):
         y_try[j] = y[j] + h * f[j]
     flow(t + h, y_try, mode, held, p, f_try)
@@ -156,6 +173,6 @@ def starting_step(
     d2 = error_norm(f_try, 1.0, y, y, rtol, atol)
     if not d2 < INFINITY:
         return LEAST * h  # the look ahead went too far
-    steepest = max(d1, d2)
-    better = max(1e-6, h * 1e-3) if steepest <= 1e-15 else (0.01 / steepest) ** (1.0 / order)
+    steepest = max(unit * d1, unit * unit * d2)
+    better = 1e-3 * h if steepest <= 1e-15 else unit * (0.01 / steepest) ** (1.0 / order)
     return min(100.0 * h, better, longest)

@@ -273,7 +273,7 @@ def _run(trace: Trace, between: NDArray[np.bool_], frame_of: Sequence[int]) -> d
     log = _log(trace, edges)
     for entry in log:
         entry["frame"] = frame_of[entry["row"]]
-    mode = trace.rows.mode.T.tolist()
+    mode = trace.modes.T.tolist()
     return {
         "states": [state.name for state in chart.states],
         "edges": edges,

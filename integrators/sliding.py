@@ -1,0 +1,401 @@
+"""Motion along a surface where the flow jumps and pushes back from both sides (Filippov).
+
+A surface is u(t, y) = 0, and the flow depends on the sign of u. Where the flow of either side leads
+onto the surface, the solution goes on along it: with a number sigma from -1 to 1 in place of the
+sign, such that du/dt = 0. It leaves where sigma reaches 1 or -1. Flows that are not linear in the
+sign are combined as Filippov does: the mean of both sides plus sigma times half their difference,
+which is the same where they are linear.
+
+Several surfaces are slid on at once by as many sigmas, from a linear system of that size.
+
+Roads not taken: to let the sign chatter costs a switch a clock tick; to smooth it by a steep ramp
+changes the solution and makes the system stiff.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from integrators.crossings import Margins, Watched
+from integrators.steps import Flow, Vector
+
+__all__ = [
+    "LIVE",
+    "MOST_SLIDING",
+    "Held",
+    "Sliding",
+    "Surfaces",
+    "flow_on",
+    "look",
+    "margins_on",
+    "room_to_slide",
+    "seize",
+    "slope_on",
+]
+
+MOST_SLIDING = 8  # surfaces at once
+LIVE = 2.0  # in place of a held sign: take the sign of what is seen
+BEYOND = 2.0  # sigma is cut here: behind 1 it only has to say that it is
+# Rows of the scratch table behind three a surface (its gradient over y and rate in t; half the
+# difference of both sides; its line of the linear system): du/dt with all their signs 0, how du/dt
+# answers to the own sign, what flows and what is seen on either side, a slope.
+RATES, GAINS, UPPER, LOWER, SEEN_UPPER, SEEN_LOWER, SLOPE = range(7)
+NORMAL, COLUMN, MATRIX = range(3)
+
+
+class Surfaces(NamedTuple):
+    """The surfaces that can be slid on."""
+
+    sign: list[int]  # the place of each one's sign among the held signs, shape (S,)
+    above: list[int]  # its relation u > 0, shape (S,)
+    at_least: list[int]  # its relation u >= 0, shape (S,)
+
+
+class Sliding(NamedTuple):
+    """Which surfaces are slid on, and scratch for it."""
+
+    which: list[int]  # those slid on; in the last place how many, shape (MOST_SLIDING + 1,)
+    sigma: Vector  # in place of their signs, shape (MOST_SLIDING,)
+    table: list[Vector]  # scratch, see the rows above
+    flags: list[int]  # whether each is slid on, shape (S,)
+    arrived: list[int]  # whether each has just been reached, shape (S,)
+    live: Vector  # signs, all to be taken as they are seen
+    watch: list[int]  # flags that nobody reads, shape (r,)
+
+
+class Held(NamedTuple):
+    """A system and the surfaces it slides on, in place of its parameters."""
+
+    flow: Flow
+    margins: Margins
+    normal: Callable[..., Any]  # normal(surface, t, y, mode, p, out): gradient over y, rate in t
+    p: Any
+    held: Vector
+    sign: list[int]
+    which: list[int]
+    sigma: Vector
+    table: list[Vector]
+
+
+def room_to_slide(
+    surfaces: Surfaces,
+    size: int,
+    signs: int,
+    relations: int,
+    seen: int,
+    flags: Sequence[int] = (),
+) -> Sliding:
+    """Return scratch for sliding; small if there is nothing to slide on.
+
+    Parameters
+    ----------
+    surfaces : Surfaces
+        Of the system.
+    size : int
+        Length of the state vector.
+    signs, relations : int
+        How many signs are held, and how many comparisons can be watched.
+    seen : int
+        How many numbers are observed.
+    flags : sequence of int, optional
+        Whether each surface is slid on; on none when left out.
+
+    Returns
+    -------
+    Sliding
+        Of lists.
+    """
+    number = len(surfaces.sign)
+    most = min(number, MOST_SLIDING)
+    on = [k for k, flag in enumerate(flags) if flag]
+    width = max(size + 1, most + 1, seen) if most else 0
+    return Sliding(
+        which=on + [0] * (most - len(on)) + [len(on)],
+        sigma=[0.0] * most,
+        table=[[0.0] * width for _ in range(3 * most + 7)],
+        flags=list(flags) or [0] * number,
+        arrived=[0] * number,
+        live=[LIVE] * signs,
+        watch=[0] * relations,
+    )
+
+
+# --------------------------------------------------------------------------- along the surfaces
+def slope_on(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None:
+    """Fill dy along the surfaces slid on, and the sigmas that keep it there.
+
+    Parameters
+    ----------
+    on : Held
+        The system; the signs held of these surfaces become their sigmas.
+    t, y, mode
+        Handed on.
+    dy : list of float, shape (m,)
+        Filled.
+    """
+    held, p, sign, which, sigma, table = on.held, on.p, on.sign, on.which, on.sigma, on.table
+    most = len(sigma)
+    count = which[most]
+    size = len(y)
+    first = 3 * most
+    rates, gains = table[first + RATES], table[first + GAINS]
+    upper, lower = table[first + UPPER], table[first + LOWER]
+    for c in range(count):
+        held[sign[which[c]]] = 0.0
+    # A mean that is right for any sum of functions of one sign each.
+    if count == 1:
+        for j in range(size):
+            dy[j] = 0.0
+    else:
+        on.flow(t, y, mode, held, p, dy)
+        for j in range(size):
+            dy[j] = (1.0 - count) * dy[j]
+    for c in range(count):
+        k = sign[which[c]]
+        held[k] = 1.0
+        on.flow(t, y, mode, held, p, upper)
+        held[k] = -1.0
+        on.flow(t, y, mode, held, p, lower)
+        held[k] = 0.0
+        column = table[COLUMN * most + c]
+        for j in range(size):
+            dy[j] += 0.5 * (upper[j] + lower[j])
+            column[j] = 0.5 * (upper[j] - lower[j])
+    for r in range(count):
+        g, row = table[NORMAL * most + r], table[MATRIX * most + r]
+        on.normal(which[r], t, y, mode, p, g)
+        rate = g[size]
+        for j in range(size):
+            rate += g[j] * dy[j]
+        row[count] = -rate
+        for c in range(count):
+            column = table[COLUMN * most + c]
+            gain = 0.0
+            for j in range(size):
+                gain += g[j] * column[j]
+            row[c] = gain
+        rates[r], gains[r] = rate, row[r]
+    _solve(table, MATRIX * most, count, sigma)
+    for c in range(count):
+        held[sign[which[c]]] = sigma[c]
+        column = table[COLUMN * most + c]
+        for j in range(size):
+            dy[j] += sigma[c] * column[j]
+    for r in range(count):  # what rounding leaves across the surface: v itself does not move
+        g = table[NORMAL * most + r]
+        rate, square = g[size], 0.0
+        for j in range(size):
+            rate += g[j] * dy[j]
+            square += g[j] * g[j]
+        if square > 0.0 and abs(sigma[r]) < BEYOND:
+            for j in range(size):
+                dy[j] -= g[j] * (rate / square)
+
+
+def _solve(table: list[Vector], first: int, count: int, out: Vector) -> None:
+    """Solve a small linear system, right side in the last column; cut what is beyond."""
+    for c in range(count):
+        best = c
+        for r in range(c + 1, count):
+            if abs(table[first + r][c]) > abs(table[first + best][c]):
+                best = r
+        if best != c:
+            for j in range(count + 1):
+                swapped = table[first + c][j]
+                table[first + c][j] = table[first + best][j]
+                table[first + best][j] = swapped
+        pivot = table[first + c][c]
+        if pivot != 0.0:
+            for r in range(c + 1, count):
+                factor = table[first + r][c] / pivot
+                for j in range(c, count + 1):
+                    table[first + r][j] -= factor * table[first + c][j]
+    for back in range(count):
+        r = count - 1 - back
+        row = table[first + r]
+        rest = row[count]
+        for c in range(r + 1, count):
+            rest -= row[c] * out[c]
+        if row[r] != 0.0:
+            out[r] = min(max(rest / row[r], -BEYOND), BEYOND)
+        else:  # the sign has no hold on it
+            out[r] = 0.0 if rest == 0.0 else BEYOND
+
+
+def flow_on(t: float, y: Vector, mode: list[int], held: Vector, on: Held, dy: Vector) -> None:
+    """Fill dy, along the surfaces if some are slid on: a flow like any other.
+
+    Parameters
+    ----------
+    t, y, mode, held, dy
+        As of a flow.
+    on : Held
+        The system, as the parameters.
+    """
+    if on.which[-1] == 0:
+        on.flow(t, y, mode, held, on.p, dy)
+    else:
+        slope_on(on, t, y, mode, dy)
+
+
+def margins_on(
+    t: float, y: Vector, mode: list[int], on: Held, watch: list[int], out: Vector
+) -> None:
+    """Fill the watched margins; behind them, of each surface slid on, 1 - sigma and 1 + sigma.
+
+    Parameters
+    ----------
+    t, y, mode, watch, out
+        As of margins.
+    on : Held
+        The system, as the parameters.
+    """
+    on.margins(t, y, mode, on.p, watch, out)
+    count, most = on.which[-1], len(on.sigma)
+    if count == 0:
+        return
+    slope_on(on, t, y, mode, on.table[3 * most + SLOPE])
+    first = len(watch) - 2 * most
+    for c in range(count):
+        out[first + 2 * c] = 1.0 - on.sigma[c]
+        out[first + 2 * c + 1] = 1.0 + on.sigma[c]
+
+
+# --------------------------------------------------------------------------- getting on and off
+def seize(
+    on: Held,
+    surfaces: Surfaces,
+    sliding: Sliding,
+    t: float,
+    y: Vector,
+    mode: list[int],
+    w: Watched,
+) -> bool:
+    """Choose the surfaces to slide on from here, and put y onto them.
+
+    Those are candidates that were slid on, have just been reached, or are met exactly. One that
+    does not attract, or whose sigma lies beyond 1, is let go again: its sign is that of the side
+    the flow takes.
+
+    Parameters
+    ----------
+    on : Held
+        The system; the signs held of candidates are set.
+    surfaces, sliding, t, mode
+        What can be slid on, what is; handed on.
+    y : list of float, shape (m,)
+        Moved onto the surfaces, which it has left by rounding only.
+    w : Watched
+        Armed, ``w.start`` filled with margins.
+
+    Returns
+    -------
+    bool
+        Whether other surfaces are slid on than before.
+    """
+    held, which, sigma, table = on.held, on.which, on.sigma, on.table
+    most, size = len(sigma), len(y)
+    rates, gains = table[3 * most + RATES], table[3 * most + GAINS]
+    count = 0
+    for k in range(len(surfaces.sign)):
+        above = surfaces.above[k]
+        met = sliding.flags[k] == 1 or sliding.arrived[k] == 1 or w.start[above] == 0.0
+        sliding.arrived[k] = 0
+        if w.watch[above] and met and count < most:
+            which[count] = k
+            count += 1
+    while count > 0:
+        which[most] = count
+        slope_on(on, t, y, mode, table[3 * most + SLOPE])
+        worst, excess = -1, 0.0
+        for c in range(count):
+            beyond = abs(sigma[c]) - 1.0 if gains[c] < 0.0 else BEYOND
+            if beyond > excess:
+                worst, excess = c, beyond
+        if worst < 0:
+            break
+        k = which[worst]
+        u = w.start[surfaces.above[k]]
+        pushed = sigma[worst] if gains[worst] < 0.0 else rates[worst]
+        held[surfaces.sign[k]] = _sign(pushed if u == 0.0 or sliding.flags[k] == 1 else u)
+        count -= 1
+        which[worst] = which[count]
+    which[most] = count
+    changed = False
+    for k in range(len(surfaces.sign)):
+        slid = 0
+        for c in range(count):
+            if which[c] == k:
+                slid = 1
+        changed = changed or slid != sliding.flags[k]
+        sliding.flags[k] = slid
+    for c in range(count):
+        u, g, square = w.start[surfaces.above[which[c]]], table[NORMAL * most + c], 0.0
+        for j in range(size):
+            square += g[j] * g[j]
+        if u != 0.0 and square > 0.0:
+            for j in range(size):
+                y[j] -= g[j] * (u / square)
+    return changed
+
+
+def _sign(u: float) -> float:
+    if u > 0.0:
+        return 1.0
+    return -1.0 if u < 0.0 else 0.0
+
+
+# --------------------------------------------------------------------------- seeing
+def look(
+    observe: Callable[..., Any],
+    arm: Callable[..., Any],
+    on: Held,
+    sliding: Sliding,
+    t: float,
+    y: Vector,
+    mode: list[int],
+    out: Vector,
+) -> None:
+    """Observe a state: with live signs, but on surfaces with their sigmas.
+
+    Parameters
+    ----------
+    observe : callable
+        ``observe(t, y, mode, signs, p, out)``; a sign that is `LIVE` it takes as it sees it.
+    arm : callable
+        ``arm(t, y, mode, p, held, watch)`` fills the signs held beside those slid on.
+    on, sliding, t, y, mode
+        The system, and what it slides on.
+    out : list of float
+        Filled.
+    """
+    most, live, sign, which = len(on.sigma), sliding.live, on.sign, on.which
+    count = which[most]
+    if count == 0:
+        observe(t, y, mode, live, on.p, out)
+        return
+    arm(t, y, mode, on.p, on.held, sliding.watch)
+    slope_on(on, t, y, mode, on.table[3 * most + SLOPE])
+    upper, lower = on.table[3 * most + SEEN_UPPER], on.table[3 * most + SEEN_LOWER]
+    for c in range(count):
+        live[sign[which[c]]] = 0.0
+    if count == 1:
+        for j in range(len(out)):
+            out[j] = 0.0
+    else:
+        observe(t, y, mode, live, on.p, out)
+        for j in range(len(out)):
+            out[j] = (1.0 - count) * out[j]
+    for c in range(count):
+        k, share = sign[which[c]], min(max(on.sigma[c], -1.0), 1.0)
+        live[k] = 1.0
+        observe(t, y, mode, live, on.p, upper)
+        live[k] = -1.0
+        observe(t, y, mode, live, on.p, lower)
+        live[k] = 0.0
+        for j in range(len(out)):
+            a, b = upper[j], lower[j]
+            out[j] += 0.5 * (a + b) + share * (0.5 * (a - b))
+    for c in range(count):
+        live[sign[which[c]]] = LIVE
