@@ -43,6 +43,9 @@ Setting: TypeAlias = str | float | Mapping[str, float | list[float]] | None  # o
 # The default absolute tolerance is rtol times the scale times this: near zero a component is known
 # to the accuracy that it has at a tenth of its scale.
 SHARE = 0.1
+# A velocity in a guard is a window to pass through, not a size to move by: it counts so many times,
+# and with rtol = 1e-6 the velocity is known to a thousandth of v_c.
+WINDOW = 1e4
 
 
 @dataclass(frozen=True)
@@ -56,13 +59,13 @@ class Scales:
     variables : mapping of str to tuple of float
         For each variable of the chart one per element.
     time : float
-        s: the smallest deflection by the Stribeck velocity, or by the smallest other.
+        s: what the fastest flow takes to relax, s / C for a slipping GMS element.
 
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters
     >>> scales_of(GMS(GMSParameters.paper("stick-slip"), law="signed")).variables["z"]
-    (0.14285714285714288, 0.14285714285714288, 0.14285714285714288, 0.14285714285714288)
+    (0.4, 0.4, 0.4, 0.4)
     """
 
     x: float
@@ -116,10 +119,17 @@ def scales_of(model: Model) -> Scales:
         for name, follows in sizes.follows.items():
             most = max(abs(_number(rate, values)) for rate in follows)
             lengths.append(_divided(found[name][-1], most))
-    v = [*found["v"], curve.v_s] if curve is not None else found["v"]
+    windows = [WINDOW * u for u in found["v"]]
+    v = [*windows, curve.v_s] if curve is not None else windows
     least_x = min((u for u in [*found["x"], *lengths] if u > 0.0), default=0.0)
     least_v = min((u for u in v if u > 0.0), default=0.0)
-    time = _divided(least_x, least_v if curve is None else curve.v_s)
+    speed = least_v if curve is None else curve.v_s
+    rates = [
+        abs(_number(rate, (speed, *values)))
+        for values in zip(thresholds, *numbers, strict=True)
+        for rate in sizes.paces
+    ]
+    time = _divided(1.0, max(rates, default=0.0)) or _divided(least_x, speed)
     variables = {name: tuple(found[name]) for name in chart.variables}
     return Scales(least_x, least_v, variables, time)
 
@@ -135,6 +145,7 @@ class _Sizes:
     reach: Mapping[str, Sequence[tuple[Numbers, Numbers]]]  # margins of guards, and their slopes
     stiffness: Mapping[str, Numbers]  # slopes of the force
     follows: Mapping[str, Sequence[Numbers]]  # by how much a variable changes with x, by state
+    paces: Sequence[Numbers]  # how fast variables relax, of v too
 
 
 class _SameChart:
@@ -158,8 +169,10 @@ def _sizes(key: _SameChart) -> _Sizes:
     rest: dict[str, Value] = dict.fromkeys(("t", *states, *rates), Number(0.0))
     arguments = ", ".join(("s", *chart.parameters))
 
-    def function(tree: Value) -> Numbers:
-        text = f"def number({arguments}):\n    return {spell(renamed(tree, rest))}\n"
+    def function(tree: Value, *, moving: bool = False) -> Numbers:
+        still = {name: zero for name, zero in rest.items() if not (moving and name == "v")}
+        names = f"v, {arguments}" if moving else arguments
+        text = f"def number({names}):\n    return {spell(renamed(tree, still))}\n"
         made: Numbers = load(f"scale in {chart.name}", text)["number"]
         return made
 
@@ -189,7 +202,12 @@ def _sizes(key: _SameChart) -> _Sizes:
         ]
         for name in chart.variables
     }
-    return _Sizes(reach, stiffness, {name: row for name, row in follows.items() if row})
+    paces = [
+        function(rate, moving=True)
+        for (_, name), flow in chart.flows.items()
+        if (rate := derivative(flow, name)) is not None
+    ]
+    return _Sizes(reach, stiffness, {name: row for name, row in follows.items() if row}, paces)
 
 
 def _comparisons(part: Split) -> Iterator[Comparison]:

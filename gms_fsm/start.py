@@ -15,9 +15,10 @@ from gms_fsm.errors import ParameterError, SignalError, shown
 from gms_fsm.models import Model
 from gms_fsm.parameters import as_floats, checked_array, checked_scalar
 from gms_fsm.program import Program, arguments, lower
+from gms_fsm.pulses import waking_times
 from gms_fsm.rigs import Rig
 from gms_fsm.scales import Setting, Tolerance, scales_of
-from gms_fsm.signals import Corners
+from gms_fsm.signals import Corners, Formula
 from integrators import Options
 
 __all__ = ["ENGINES", "MOST_STEPS", "Start"]
@@ -144,7 +145,7 @@ class Start:
             t_eval, output, t_start, t_end, rows_at_once,
         )  # fmt: skip
         last = _covered(rig, t_start, t_end)
-        program = lower(model, rig)
+        program = _watchful(lower(model, rig), rig, t_start, last)
         y, mode = _initial(model, rig, {} if initial is None else initial)
         settings: dict[str, Setting] = {
             "method": method if isinstance(method, str) else method.__name__,
@@ -303,6 +304,17 @@ def _options(
     return Options(
         chosen, step, rtol, atol, max_step, time_scale, max_steps, located, times, rows_at_once
     )
+
+
+def _watchful(program: Program, rig: Rig, t_start: float, t_end: float) -> Program:
+    """Return the program with the places where its formulas wake up as knots."""
+    times = {
+        time
+        for signal in rig.signals.values()
+        if isinstance(signal, Formula)
+        for time in waking_times(signal.tree, t_start, t_end)
+    }
+    return replace(program, knots=sorted({*program.knots, *times})) if times else program
 
 
 def _covered(rig: Rig, t_start: float, t_end: float) -> float:

@@ -32,7 +32,7 @@ from gms_fsm.expression import (
     product_power,
 )
 
-__all__ = ["truths"]
+__all__ = ["truths", "values_of"]
 
 Truths = NDArray[np.bool_]
 
@@ -74,6 +74,33 @@ def truths(
         except (ArithmeticError, ValueError):
             found[at] = False
     return found
+
+
+def values_of(tree: Value, columns: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
+    """Return a value at many places; NaN or infinity where it cannot be computed.
+
+    Parameters
+    ----------
+    tree : Value
+        For example a signal.
+    columns : mapping of str to array_like
+        For every name numbers of one shape.
+
+    Returns
+    -------
+    ndarray
+        Of that shape.
+
+    Examples
+    --------
+    >>> from gms_fsm.expression import parse_value
+    >>> values_of(parse_value("2 * t + 1", ["t"]), {"t": [0.0, 1.0]}).tolist()
+    [1.0, 3.0]
+    """
+    shape = np.broadcast_shapes(*(np.shape(column) for column in columns.values()))
+    with np.errstate(all="ignore"):
+        found = _Reader(columns, shape).value(tree)
+    return np.array(np.broadcast_to(found, shape), dtype=np.float64)
 
 
 class _Reader:

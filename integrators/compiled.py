@@ -45,7 +45,8 @@ _OF_A_STEP: tuple[Callable[..., Any], ...] = (
     steps.fit_dense, steps.interpolate, steps.take_step, steps.weigh,
 )  # fmt: skip
 _OF_AN_ARC: tuple[Callable[..., Any], ...] = (
-    advance.advance, loop.active_relations, loop.go_on, loop._begin_arc, loop._listed,
+    advance.advance, loop.active_relations, loop.go_on, loop._begin_arc, loop._count_anew, loop._listed,
+    loop._look_at_clock,
     loop._no_progress, loop._often_changed, loop._put_modes, loop._rearm, loop._undefined,
     sliding._sign, sliding._solve, sliding.look, sliding.seize, sliding.flow_on, sliding.margins_on,
     sliding.slope_on, step_size.starting_step,

@@ -476,7 +476,7 @@ def modes_of(b: Buffers) -> tuple[int, ...]:
 
 def beginning(t: float, t_end: float) -> Vector:
     """Return `Memory.now` of a run that has not begun."""
-    return [t, 0.0, 1.0, t_end, t]
+    return [t, 0.0, 1.0, t_end, t, -math.inf]
 
 
 def failure(happening: int, b: Buffers, relations: list[str]) -> HybridError:

@@ -53,7 +53,7 @@ STATE_STANDS = 0.1
 ROWS, FIRING, FIRED, STOPPED, DONE, SLID = 10, 11, 12, 13, 14, 15
 MACHINE_LIVELOCK, RELATION_LIVELOCK, ADVANCE, TOO_MANY_STEPS = 16, 17, 18, 19
 # Places in Memory.now.
-T, H, ERROR_BEFORE, T_STOP, ANCHOR = 0, 1, 2, 3, 4
+T, H, ERROR_BEFORE, T_STOP, ANCHOR, SWITCHED = 0, 1, 2, 3, 4, 5
 # Places in Memory.counts.
 PLACES = 11
 PHASE, MICROSTEP, MACHINE, EDGE, FIRED_ONE, FRESH, STATUS, JUMP, ACTIVE, TAKEN, NEW_ARC = range(
@@ -78,7 +78,7 @@ class Plan(NamedTuple):
 class Memory(NamedTuple):
     """What the outer loop remembers between two calls."""
 
-    now: Vector  # [time, step, controller's error, next stop, since when switches count]
+    now: Vector  # [time, step, controller's error, next stop, since when switches count, last]
     counts: list[int]  # see the places above
     edges: list[int]  # the enabled edge of each machine, or -1
     switches: list[int]  # firings of each machine since then
@@ -186,6 +186,7 @@ def go_on(
             counts[FRESH] = 1
             counts[PHASE] = PICK
             act(counts[EDGE], i, t, y, mode, p)
+            _look_at_clock(memory, t, y)
             memory.switches[i] += 1
             if memory.switches[i] >= MOST_SWITCHES and _no_progress(memory, control, work, t, y):
                 counts[PHASE] = AFTER
@@ -378,6 +379,23 @@ def _undefined(w: Watched) -> bool:
     return undefined
 
 
+def _look_at_clock(memory: Memory, t: float, y: Vector) -> None:
+    """Count anew where time has gone on since the last switch."""
+    if t - memory.now[SWITCHED] > CLOCK_CRAWLS * abs(t):
+        _count_anew(memory, t, y)
+    memory.now[SWITCHED] = t
+
+
+def _count_anew(memory: Memory, t: float, y: Vector) -> None:
+    memory.now[ANCHOR] = t
+    for j in range(len(y)):
+        memory.anchor[j] = y[j]
+    for i in range(len(memory.switches)):
+        memory.switches[i] = 0
+    for r in range(len(memory.changes)):
+        memory.changes[r] = 0
+
+
 def _no_progress(memory: Memory, control: Control, work: Work, t: float, y: Vector) -> bool:
     """Tell whether the switches counted led nowhere; if they led on, count anew from here."""
     elapsed = t - memory.now[ANCHOR]
@@ -389,13 +407,7 @@ def _no_progress(memory: Memory, control: Control, work: Work, t: float, y: Vect
         distance = error_norm(moved, 1.0, y, memory.anchor, control.rtol, work.floor)
         stands = distance <= MOST_SWITCHES * STATE_STANDS
     if not stands:
-        memory.now[ANCHOR] = t
-        for j in range(len(y)):
-            memory.anchor[j] = y[j]
-        for i in range(len(memory.switches)):
-            memory.switches[i] = 0
-        for r in range(len(memory.changes)):
-            memory.changes[r] = 0
+        _count_anew(memory, t, y)
     return stands
 
 
@@ -412,6 +424,7 @@ def _often_changed(
     work: Work,
 ) -> bool:
     """Count the relations that have just changed; tell whether one has too often."""
+    _look_at_clock(memory, t, y)
     margins_on(t, y, mode, on, w.watch, w.probe)
     often = False
     for r in w.active:
