@@ -52,17 +52,15 @@ def witness(model: GMS, rig: Prescribed | Slider | PulledSlider, t_end: float) -
     """Run a bank from rest (or along its velocity), everything in stick at z = 0."""
     p, n, signed = model.parameters, model.n, model.law == "signed"
     S, k, sigma, C, v_c = p.stribeck, p.k, p.sigma, p.C, p.v_c
-    corners: list[float] = []
-    drive: Callable[[float], float] | None = None
+    open_loop, corners = isinstance(rig, Prescribed), list[float]()
     if not isinstance(rig, PulledSlider):
-        drive, corners = _signal(rig.signals["v" if isinstance(rig, Prescribed) else "F_a"])
-    open_loop = isinstance(rig, Prescribed)
+        drive, corners = _signal(rig.signals["v" if open_loop else "F_a"])
+
+    def pull(t: float, x: float) -> float:
+        return rig.stiffness * (rig.speed * t - x) if isinstance(rig, PulledSlider) else drive(t)
 
     def v_of(t: float, y: np.ndarray) -> float:
-        if not open_loop:
-            return 0.0 if slides else float(y[1])
-        assert drive is not None
-        return drive(t)
+        return drive(t) if open_loop else 0.0 if slides else float(y[1])
 
     def s_of(v: float) -> np.ndarray:
         return p.weights * (S.F_c + (S.F_s - S.F_c) * math.exp(-((v / S.v_s) ** 2)))
@@ -73,14 +71,7 @@ def witness(model: GMS, rig: Prescribed | Slider | PulledSlider, t_end: float) -
         ratio = z / s_of(v)
         dz = np.where(slip, C * (sign - ratio) if signed else sign * C * (1 - ratio), v)
         F = float(np.sum(k * z + sigma * dz)) + p.sigma_2 * v
-        if open_loop:
-            return np.array([v, 0.0, *dz])
-        if isinstance(rig, PulledSlider):
-            pull = rig.stiffness * (rig.speed * t - y[0])
-        else:
-            assert drive is not None
-            pull = drive(t)
-        return np.array([v, (pull - F) / rig.mass, *dz])
+        return np.array([v, 0.0 if open_loop else (pull(t, y[0]) - F) / rig.mass, *dz])
 
     def holding(t: float, y: np.ndarray) -> float:
         """Return the sigma that keeps dv/dt = 0; dv/dt is linear in it."""
@@ -100,7 +91,7 @@ def witness(model: GMS, rig: Prescribed | Slider | PulledSlider, t_end: float) -
     bits = np.sign(gaps(0.0, y))
     said = Witnessed([], [], 0.0, 0.0, y[2:], 0.0)
 
-    def ask() -> bool:
+    def ask() -> None:
         """Fire all that is enabled; the bits of v and z are known."""
         over, under = bits[5 : 5 + n] >= 0, bits[5 + n :] <= 0
         fast, back = bits[0] > 0, bits[1] < 0
@@ -113,7 +104,6 @@ def witness(model: GMS, rig: Prescribed | Slider | PulledSlider, t_end: float) -
         for i in np.flatnonzero(edges):
             said.transitions.append((t, int(i), edges[i]))
             slip[i] = not slip[i]
-        return any(edges)
 
     while t < t_end:
         ask()
@@ -131,8 +121,7 @@ def witness(model: GMS, rig: Prescribed | Slider | PulledSlider, t_end: float) -
         sign, turned = float(bits[2]), NOTHING
         solver = DOP853(
             lambda t, y, sign=sign, held=slides: slope(t, y, holding(t, y) if held else sign),
-            t, y, stop,
-            rtol=RTOL, atol=1e-11 * size, max_step=min(t_end / 200, stop - t),
+            t, y, stop, rtol=RTOL, atol=1e-11 * size, max_step=min(t_end / 200, stop - t),
         )  # fmt: skip
         while solver.status == "running" and turned == NOTHING:
             assert solver.step() is None, f"DOP853 gives up at t = {solver.t}"
