@@ -16,7 +16,8 @@ from tests.helpers import pulled_mass
 from tests.trials import JUDGED, Trial, reference, trial
 from tests.witness import witness
 
-ENGINE = "compiled" if importlib.util.find_spec("numba") else "ifelse"
+HAS_NUMBA = bool(importlib.util.find_spec("numba"))
+ENGINE = "compiled" if HAS_NUMBA else "ifelse"
 
 CARRIAGE = Trial(
     "a carriage", 0, 0,
@@ -71,6 +72,7 @@ def test_the_pulled_mass() -> None:
     agrees(Trial("pulled mass", 0, 0, *pulled_mass(), 60.0))
 
 
+@pytest.mark.skipif(not HAS_NUMBA, reason="needs the extra fast: Python takes half a minute")
 @pytest.mark.parametrize("family", JUDGED)
 def test_a_trial_of_each_family(family: str) -> None:
     sample = (trial(family, 14, index) for index in range(100))
