@@ -6,7 +6,8 @@
 #   make lint    formatting, style, types, import contracts
 #   make core    the tests with only the required dependencies
 #   make bench   speed and error against C, SciPy, CVODE and PathSim
-#   make soak    hard use: fuzzing, kills, a million transitions; SOAK_MINUTES=10 for each fuzzer
+#   make soak    hard use: fuzzing, kills, a million transitions, 2,000 runs judged by a reference;
+#                SOAK_MINUTES=10 for each fuzzer
 #   make gallery the pictures kept under docs/, shown in docs/gallery.md
 #   make docs    the documentation -> folder site/, to be opened from disk
 PYTHON ?= python3

@@ -1,9 +1,9 @@
 """Hard use for minutes and hours: ``python -m tests.soak --minutes 10``, or ``make soak``.
 
 The three fuzz bodies for so many minutes each, 200 kills at random moments, a run of a million
-transitions, new random runs of tests/test_hard_random_runs.py. Each part runs in processes of its
-own, under a limit of memory and with a watch on time; what is found is printed with the line that
-repeats it, and the exit code is 1.
+transitions, new random runs of tests/test_hard_random_runs.py and of tests/trials.py. Each part
+runs in processes of its own, under a limit of memory and with a watch on time; what is found is
+printed with the line that repeats it, and the exit code is 1.
 """
 
 from __future__ import annotations
@@ -205,16 +205,31 @@ def random_runs(seed: int, examples: int) -> bool:
     return done.returncode == 0
 
 
+def trials(seed: int, count: int) -> bool:
+    """Judge new random runs at defaults by the reference; the child prints what is wrong."""
+    from tests.trials import FAMILIES
+
+    began = time.monotonic()
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.trials", "--count", str(-(-count // len(FAMILIES))),
+         "--seed", str(seed)],
+        cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False,
+    )  # fmt: skip
+    print(f"{count} trials in {time.monotonic() - began:.0f} s\n{done.stdout}", end="", flush=True)
+    return done.returncode == 0
+
+
 # --------------------------------------------------------------------------- all of it
 def main() -> None:
     """Run the parts asked for; exit with 1 if anything was found."""
-    parts = ("expression", "scenario", "trace", "kill", "million", "runs")
+    parts = ("expression", "scenario", "trace", "kill", "million", "runs", "trials")
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=10.0, help="for each of the three")
     parser.add_argument("--seed", type=int, default=random.SystemRandom().randrange(10**9))
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--examples", type=int, default=300, help="of each kind of random run")
     parser.add_argument("--transitions", type=int, default=1_000_000)
+    parser.add_argument("--trials", type=int, default=2000, help="random runs to judge")
     parser.add_argument("--only", choices=parts, action="append")
     parser.add_argument("--input", type=int, help="repeat this input of the one part given")
     parser.add_argument("--child", type=float, help=argparse.SUPPRESS)
@@ -239,6 +254,7 @@ def main() -> None:
         "kill": lambda: killing(given.seed, given.kills),
         "million": lambda: million(given.transitions),
         "runs": lambda: random_runs(given.seed, given.examples),
+        "trials": lambda: trials(given.seed, given.trials),
     }
     good = [work[part]() for part in given.only or parts]
     print("nothing found" if all(good) else "see FINDING above")

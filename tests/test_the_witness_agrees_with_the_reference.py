@@ -1,0 +1,79 @@
+"""The reference of the random trials is checked by a witness that shares no code with it.
+
+The witness itself is held to two cases whose outcome was found by others: a carriage that never
+breaks away, and a mass that is held on v = 0 for a tenth of a millisecond.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+
+import numpy as np
+import pytest
+
+from gms_fsm import GMS, GMSParameters, PulledSlider, Slider, Stribeck
+from tests.helpers import pulled_mass
+from tests.trials import JUDGED, Trial, reference, trial
+from tests.witness import witness
+
+HAS_NUMBA = bool(importlib.util.find_spec("numba"))
+ENGINE = "compiled" if HAS_NUMBA else "ifelse"
+
+CARRIAGE = Trial(
+    "a carriage", 0, 0,
+    GMS(
+        GMSParameters([4e6], [3e3], [1e-5], sigma_2=250, stribeck=Stribeck(8, 9.5, 5e-4),
+                      v_c=7.3e-7, weights=[1 / 4e6]),
+        law="signed",
+    ),
+    PulledSlider(40, 1600, 1.8e-3), 8.0,
+)  # fmt: skip
+HELD = Trial(
+    "held on v = 0", 0, 0,
+    GMS(
+        GMSParameters([82e3, 146e3, 110e3], [29, 2.6, 114], [2.8e-3, 2.16e-3, 1.53e-3], sigma_2=1.3,
+                      stribeck=Stribeck(2.88, 3.155, 8.8e-3), v_c=3.3e-6,
+                      weights=[3.9e-6, 3e-6, 2.15e-6]),
+        law="signed",
+    ),
+    Slider(1.4, "2.9*sin(4.7*t)"), 4.0,
+)  # fmt: skip
+
+
+def agrees(one: Trial) -> None:
+    """Assert the same edges at the same times, and the same end."""
+    exact, seen = reference(one, ENGINE), witness(one.model, one.rig, one.t_end)
+    assert not exact.failed
+    assert exact.sequence == tuple((element, edge) for _, element, edge in seen.transitions)
+    times = np.array([t for t, _, _ in seen.transitions])
+    np.testing.assert_allclose(exact.t, times, rtol=0, atol=1e-8 * one.t_end)
+    np.testing.assert_allclose(exact.end, [seen.x, seen.v, *seen.z], rtol=1e-5, atol=1e3 * one.atol)
+
+
+def test_a_carriage_that_never_breaks_away() -> None:
+    seen = witness(CARRIAGE.model, CARRIAGE.rig, CARRIAGE.t_end)
+    assert seen.transitions == []
+    assert seen.v == pytest.approx(7.197e-7, rel=1e-3)
+    assert seen.peak == pytest.approx(1.198e-6, rel=1e-3)
+    agrees(CARRIAGE)
+
+
+def test_a_mass_held_on_standstill() -> None:
+    seen = witness(HELD.model, HELD.rig, HELD.t_end)
+    assert len(seen.transitions) == 14
+    ((begin, end),) = seen.sliding
+    assert begin == pytest.approx(0.3322785, abs=5e-8)
+    assert end == pytest.approx(0.3323773, abs=5e-8)
+    assert (end, 2, "arrest") in seen.transitions
+    agrees(HELD)
+
+
+def test_the_pulled_mass() -> None:
+    agrees(Trial("pulled mass", 0, 0, *pulled_mass(), 60.0))
+
+
+@pytest.mark.skipif(not HAS_NUMBA, reason="needs the extra fast: Python takes half a minute")
+@pytest.mark.parametrize("family", JUDGED)
+def test_a_trial_of_each_family(family: str) -> None:
+    sample = (trial(family, 14, index) for index in range(100))
+    agrees(next(one for one in sample if 6 <= len(reference(one, ENGINE).sequence) <= 20))

@@ -1,0 +1,542 @@
+"""Random runs at default tolerances against a reference: is the sequence of switches the same?
+
+``python -m tests.trials --family pulled --count 500 --seed 1`` prints each run that is wrong or
+fails, with the line that repeats it, and a table.
+
+Families, all of one to six elements, thresholds as shares/k or free:
+
+``pulled``      the pulled mass of the tests, every parameter spread over decades
+``forced``      a mass under a force of sines or ramps
+``sines``       a prescribed velocity of sines, now and then of ramps
+``literature``  k 1e5..1e7 N/m, thresholds of micrometres, v_c 1e-7..1e-5 m/s, 0.5..100 kg
+``undamped``    any of these with sigma = 0; its outcome is told, not judged
+
+A part of each has the published law and is counted by itself. A trial is a pure function of
+(family, seed, index). The formulas of t come from a small pool, because each new text has to be
+compiled; the model is drawn around them, which amounts to the same.
+
+The judge
+---------
+The reference is our own engine at rtol 1e-12 and an atol far under thresholds and v_c
+(`tests.witness` checks it). A default run is *right* if its sequence of (element, edge) is the
+reference's. It is *wrong* only where the run is well conditioned: the reference keeps its sequence
+at rtol 1e-11, and when every parameter is changed by 1e-5 of itself, up or down at random, four
+times over; and no gap between switches of two elements changes by half of itself meanwhile. Why
+1e-5: the default rtol is 1e-6 a step, a run has ten to a hundred steps between two switches, so the
+solver may move a switch as far as such a change does. What differs and only keeps its sequence
+under changes of 1e-6 is *close*: no verdict, but listed. All else is *ill*: counted, not judged.
+
+Switching times and the state at the end are figures, not verdicts.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+import zlib
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gms_fsm import (
+    GMS,
+    GMSParameters,
+    Prescribed,
+    PulledSlider,
+    Slider,
+    Stribeck,
+    Trace,
+    simulate,
+)
+from gms_fsm.errors import GMSError, SimulationError
+
+JUDGED = ("pulled", "forced", "sines", "literature")
+FAMILIES = (*JUDGED, "undamped")
+# Text, amplitude, angular frequency (rad/s).
+FORCES = (
+    ("2.9*sin(4.7*t)", 2.9, 4.7),
+    ("12*sin(1.7*t) + 5*sin(4.3*t + 0.5)", 15.0, 1.7),
+    ("0.9*sin(9*t)", 0.9, 9.0),
+    ("0.02*sin(83*t) + 0.01*cos(31*t)", 0.025, 83.0),
+    ("300*sin(0.6*t)", 300.0, 0.6),
+)
+SPEEDS = (
+    ("0.2*sin(2*pi*t/20)", 0.2, 0.314),
+    ("1e-3*sin(7*t) + 4e-4*sin(17.9*t + 0.6)", 1.2e-3, 7.0),
+    ("2e-5*sin(1.3*t) + 8e-6", 2e-5, 1.3),
+    ("0.05*cos(40*t)", 0.05, 40.0),
+    ("3*sin(2*t)*sin(0.37*t)", 3.0, 2.0),
+)
+PUBLISHED = 0.15  # share
+WORK = 2e4  # t_end in units of the fastest time; a reference then takes a second at most
+CALLS = 40  # of progress until a run is given up; the compiled engine calls every 20,000 steps
+NUDGES, NUDGE, SMALL_NUDGE = 4, 1e-5, 1e-6
+LARGE = 1e-4  # an error of the end state worth counting
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A run, and how to get it again."""
+
+    family: str
+    seed: int
+    index: int
+    model: GMS
+    rig: Prescribed | Slider | PulledSlider
+    t_end: float
+
+    @property
+    def again(self) -> str:
+        """The line that repeats it."""
+        return (
+            f"python -m tests.trials --family {self.family} --seed {self.seed} --index {self.index}"
+        )
+
+    @property
+    def atol(self) -> float:
+        """Of the reference: far under all that is compared, in m and m/s."""
+        p = self.model.parameters
+        return float(1e-10 * min(np.min(p.weights) * p.stribeck.F_c, p.v_c))
+
+    def __str__(self) -> str:
+        p, rig = self.model.parameters, self.rig
+        if isinstance(rig, PulledSlider):
+            rigged = f"PulledSlider({rig.mass!r}, {rig.stiffness!r}, {rig.speed!r})"
+        else:
+            given = rig.velocity if isinstance(rig, Prescribed) else rig.force
+            mass = "" if isinstance(rig, Prescribed) else f"{rig.mass!r}, "
+            rigged = f"{type(rig).__name__}({mass}{given!r})"
+        return (
+            f"GMS(GMSParameters({p.k.tolist()}, {p.sigma.tolist()}, {p.C.tolist()}, "
+            f"sigma_2={p.sigma_2!r}, stribeck={p.stribeck!r}, v_c={p.v_c!r}, "
+            f"weights={p.weights.tolist()}), law={self.model.law!r}), {rigged}, {self.t_end!r}"
+        )
+
+
+# --------------------------------------------------------------------------- drawing
+class Draw:
+    """A source of numbers."""
+
+    def __init__(self, *key: int) -> None:
+        self.source = np.random.default_rng(key)
+
+    def decades(self, low: float, high: float, size: int | None = None) -> Any:
+        """Return 10**u, u between low and high."""
+        u = 10.0 ** self.source.uniform(low, high, size)
+        return float(u) if size is None else u
+
+    def chance(self, share: float) -> bool:
+        """Return True so often."""
+        return bool(self.source.random() < share)
+
+    def one_of(self, choices: Sequence[Any]) -> Any:
+        """Return one of them."""
+        return choices[int(self.source.integers(len(choices)))]
+
+
+def trial(family: str, seed: int, index: int) -> Trial:
+    """Return one run of a family."""
+    draw = Draw(zlib.crc32(family.encode()), seed, index)
+    law = "published" if draw.chance(PUBLISHED) else "signed"
+    kind = draw.one_of(JUDGED) if family == "undamped" else family
+    made = {"pulled": pulled, "forced": forced, "sines": sines, "literature": literature}[kind]
+    model, rig, t_end = made(draw, law)
+    if family == "undamped":
+        p = model.parameters
+        model = GMS(_bank(p.k, 0 * p.k, p.C, p.sigma_2, p.stribeck, p.v_c, p.weights), law=law)
+    return Trial(family, seed, index, model, rig, t_end)
+
+
+def _bank(k: Any, sigma: Any, C: Any, sigma_2: float, curve: Stribeck, v_c: float, weights: Any
+          ) -> GMSParameters:  # fmt: skip
+    return GMSParameters(k, sigma, C, sigma_2=sigma_2, stribeck=curve, v_c=v_c, weights=weights)
+
+
+def _elements(draw: Draw, k_total: float) -> tuple[Any, Any]:
+    """Return stiffness and weights of one to six elements."""
+    n = int(draw.source.integers(1, 7))
+    k = draw.decades(-0.7, 0.7, n)
+    k *= k_total / k.sum()
+    shares = np.full(n, 1 / n) if draw.chance(0.2) else draw.source.dirichlet(np.full(n, 3.0))
+    weights = shares / k
+    return k, weights if draw.chance(0.7) else weights * draw.decades(-0.5, 0.5, n)
+
+
+def _curve(draw: Draw, F_c: float, v_s: float, most: float = 0.3) -> Stribeck:
+    return Stribeck(F_c, F_c * (1 + draw.decades(-1.3, most)), v_s)
+
+
+def _fastest(model: GMS, mass: float, stiffness: float = 0.0) -> float:
+    """Return the fastest rate of a model on a mass, 1/s."""
+    p = model.parameters
+    rates = [
+        math.sqrt((p.k.sum() + stiffness) / mass),
+        (p.sigma.sum() + p.sigma_2) / mass,
+        np.max(p.C / (p.weights * p.stribeck.F_c)),
+    ]
+    return float(max(rates))
+
+
+def _ramps(draw: Draw, amplitude: float, omega: float) -> tuple[list[tuple[float, float]], float]:
+    """Return ramps to and fro, and their end."""
+    count = int(draw.source.integers(3, 10))
+    times = np.cumsum(draw.source.uniform(0.3, 1.0, count)) * math.pi / omega
+    sides = (-1.0) ** np.arange(count) * draw.one_of([1, -1])
+    values = amplitude * sides * draw.source.uniform(0.2, 1.0, count)
+    corners = [(0.0, 0.0), *zip(times.tolist(), values.tolist(), strict=True)]
+    return corners, float(times[-1])
+
+
+def _driven(draw: Draw, pool: Sequence[Any], law: str) -> tuple[Any, float, float, float]:
+    """Return a signal, its amplitude and angular frequency, and an end."""
+    if draw.chance(0.3):
+        amplitude, omega = draw.decades(-2, 2), draw.decades(-1, 2)
+        corners, end = _ramps(draw, amplitude, omega)
+        return corners, amplitude, omega, end
+    text, amplitude, omega = draw.one_of(pool if law == "signed" else pool[:2])
+    cycles = draw.source.uniform(1.5, 5.0)  # about four switches of an element in each
+    return text, amplitude, omega, cycles * 2 * math.pi / omega
+
+
+def pulled(draw: Draw, law: Any) -> tuple[GMS, PulledSlider, float]:
+    """Draw around the pulled mass."""
+    F_c, mass, k_total = draw.decades(-1, 1), draw.decades(-1, 1), draw.decades(0.5, 3)
+    stiffness = k_total * draw.decades(-2.5, -0.5)
+    omega = math.sqrt(stiffness / mass)
+    speed = F_c / (mass * omega) * draw.decades(-2, 0)
+    k, weights = _elements(draw, k_total)
+    curve = _curve(draw, F_c, speed * draw.decades(-1.3, 0.7))
+    sigma = 2 * np.sqrt(k * mass) * draw.decades(-2, -0.3, k.size)
+    C = weights * F_c * omega * draw.decades(-0.7, 1.5, k.size)
+    model = GMS(
+        _bank(k, sigma, C, mass * omega * draw.decades(-2, 0), curve,
+              speed * draw.decades(-6, -3), weights), law=law,
+    )  # fmt: skip
+    return model, *_pulled(PulledSlider(mass, stiffness, speed), model)
+
+
+def _pulled(rig: PulledSlider, model: GMS) -> tuple[PulledSlider, float]:
+    """Return a rig fast enough to slip in the time that the work allows, and an end."""
+    curve = model.stribeck
+    longest = WORK / _fastest(model, rig.mass, rig.stiffness)
+    rig = replace(rig, speed=max(rig.speed, 3 * curve.F_s / (rig.stiffness * longest)))
+    load = rig.stiffness * rig.speed  # N/s
+    period = 2 * (curve.F_s - curve.F_c) / load + 2 * math.pi * math.sqrt(rig.mass / rig.stiffness)
+    cycles = min(10.0, max(3.0, 20.0 / model.n))
+    return rig, min(longest, 1.2 * curve.F_s / load + cycles * period)
+
+
+def forced(draw: Draw, law: Any) -> tuple[GMS, Slider, float]:
+    """Draw a mass under a force."""
+    mass = draw.decades(-1, 1)
+    force, amplitude, omega, end = _driven(draw, FORCES, law)
+    speed = amplitude / (mass * omega)
+    k, weights = _elements(draw, mass * (omega * draw.decades(0.3, 1.8)) ** 2)
+    F_c = amplitude * draw.source.uniform(0.2, 0.9)
+    curve = _curve(draw, F_c, speed * draw.decades(-2.5, -0.3), most=0.0)
+    sigma = 2 * np.sqrt(k * mass) * draw.decades(-2, -0.3, k.size)
+    C = weights * F_c * omega * draw.decades(-0.5, 2, k.size)
+    model = GMS(
+        _bank(k, sigma, C, mass * omega * draw.decades(-2, 0), curve,
+              speed * draw.decades(-7, -3.5), weights), law=law,
+    )  # fmt: skip
+    return model, Slider(mass, force), min(end, WORK / _fastest(model, mass))
+
+
+def sines(draw: Draw, law: Any) -> tuple[GMS, Prescribed, float]:
+    """Draw a bank under a prescribed velocity."""
+    velocity, speed, omega, end = _driven(draw, SPEEDS, law)
+    F_c = draw.decades(-1, 1)
+    k, weights = _elements(draw, F_c * omega / speed * draw.decades(0.0, 2.0))
+    curve = _curve(draw, F_c, speed * draw.decades(-2.5, -0.3))
+    sigma = draw.decades(-2, 0, k.size) * k / omega
+    C = weights * F_c * omega * draw.decades(-0.5, 2, k.size)
+    model = GMS(
+        _bank(k, sigma, C, F_c / speed * draw.decades(-2, 0), curve,
+              speed * draw.decades(-7, -3.5), weights), law=law,
+    )  # fmt: skip
+    return model, Prescribed(velocity), end
+
+
+def literature(draw: Draw, law: Any) -> tuple[GMS, PulledSlider | Slider, float]:
+    """Draw numbers as they are published for machine tools: stiff, light thresholds."""
+    mass = draw.decades(-0.3, 2)
+    k, weights = _elements(draw, draw.decades(5, 7))
+    sigma = 2 * np.sqrt(k * mass) * draw.decades(-3, 0) * draw.decades(-0.5, 0, k.size)
+    is_pulled = draw.chance(0.5)
+    if is_pulled:
+        F_c = draw.decades(0, 1)
+    else:
+        force, amplitude, _, end = _driven(draw, FORCES[:3], law)
+        F_c = amplitude * draw.source.uniform(0.4, 1.0)
+    curve = _curve(draw, F_c, draw.decades(-4, -2), most=-0.3)
+    # Slow attraction as published (m/s), or a rate of the threshold.
+    C = (
+        draw.decades(-5.3, -2.5, k.size) if draw.chance(0.5)
+        else weights * F_c * draw.decades(0.5, 3, k.size)
+    )  # fmt: skip
+    model = GMS(
+        _bank(k, sigma, C, draw.decades(0, 2.5), curve, draw.decades(-7, -5), weights), law=law
+    )
+    if is_pulled:
+        rig = PulledSlider(mass, draw.decades(2.5, 4.5), draw.decades(-3.5, -2))
+        return model, *_pulled(rig, model)
+    return model, Slider(mass, force), min(end, WORK / _fastest(model, mass))
+
+
+# --------------------------------------------------------------------------- running
+class TooLong(Exception):
+    """A run takes more steps than a trial may."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a run did: its switches, its end (x, v, z), or the class of error it failed with."""
+
+    sequence: tuple[tuple[int, str], ...]
+    t: Any
+    end: Any
+    failed: str
+    seconds: float
+
+
+def run(trial: Trial, engine: str = "compiled", **options: float) -> Outcome:
+    """Run a trial at the defaults, or with options of `simulate`."""
+    calls, began, failed = 0, time.perf_counter(), ""
+
+    def patience(_: object) -> None:
+        nonlocal calls
+        calls += 1
+        if engine == "compiled" and calls > CALLS:
+            raise TooLong
+
+    trace: Trace | None = None
+    try:
+        trace = simulate(
+            trial.model, trial.rig, trial.t_end, engine=engine, output="end", progress=patience,
+            **options,
+        )  # fmt: skip
+    except SimulationError as error:
+        trace, failed = error.trace, type(error).__name__
+    except (GMSError, TooLong) as error:
+        failed = type(error).__name__
+    seconds = time.perf_counter() - began
+    if trace is None:
+        return Outcome((), np.empty(0), np.empty(0), failed, seconds)
+    log = trace.transitions
+    sequence = tuple(zip(log.element.tolist(), log.edge.tolist(), strict=True))
+    end = np.array([trace.x[-1], trace.v[-1], *trace.z[-1]])
+    return Outcome(sequence, np.array(log.t), end, failed, seconds)
+
+
+def reference(trial: Trial, engine: str = "compiled", rtol: float = 1e-12) -> Outcome:
+    """Run a trial as exactly as our own engine can."""
+    return run(trial, engine, rtol=rtol, atol=trial.atol)
+
+
+def nudged(trial: Trial, number: int, size: float) -> Trial:
+    """Return a trial with every parameter changed by `size` of itself, up or down."""
+    draw = Draw(zlib.crc32(trial.family.encode()), trial.seed, trial.index, number + 1)
+
+    def near(value: Any) -> Any:
+        signs = draw.source.choice([1.0, -1.0], np.shape(value))
+        return value * (1 + size * signs)
+
+    p, rig = trial.model.parameters, trial.rig
+    F_c, rise = near(p.stribeck.F_c), near(p.stribeck.F_s - p.stribeck.F_c)
+    curve = Stribeck(F_c, F_c + rise, near(p.stribeck.v_s))
+    bank = _bank(
+        near(p.k), near(p.sigma), near(p.C), near(p.sigma_2), curve, near(p.v_c), near(p.weights)
+    )
+    if isinstance(rig, PulledSlider):
+        rig = PulledSlider(near(rig.mass), near(rig.stiffness), near(rig.speed))
+    elif isinstance(rig, Slider):
+        rig = Slider(near(rig.mass), rig.force)
+    return replace(trial, model=GMS(bank, law=trial.model.law), rig=rig)
+
+
+# --------------------------------------------------------------------------- judging
+def is_steady(trial: Trial, exact: Outcome, size: float, engine: str = "compiled") -> bool:
+    """Tell whether the reference keeps its sequence, and its gaps, under changes of that size."""
+    others = [reference(trial, engine, rtol=1e-11)]
+    others += [reference(nudged(trial, i, size), engine) for i in range(NUDGES)]
+    elements = np.array([element for element, _ in exact.sequence])
+    between = elements[1:] != elements[:-1]
+    gaps = np.diff(exact.t)[between]
+    for other in others:
+        if other.failed or other.sequence != exact.sequence:
+            return False
+        if np.any(np.abs(np.diff(other.t)[between] - gaps) > 0.5 * gaps):
+            return False
+    return True
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A verdict with its figures.
+
+    `late` is the largest error of a switching time in units of t_end; `off` the largest error of
+    the end state, x and z in units of the value plus the smallest threshold, v of the value plus
+    v_s. Both are NaN unless the sequences are equal.
+    """
+
+    trial: Trial
+    verdict: str  # right, wrong, close, ill, failed, reference failed
+    default: Outcome
+    exact: Outcome
+    late: float = math.nan
+    off: float = math.nan
+
+
+def judge(trial: Trial, engine: str = "compiled", **options: float) -> Judged:
+    """Compare a run at the defaults (or with options, to test the judge) with the reference."""
+    default, exact = run(trial, engine, **options), reference(trial, engine)
+    if exact.failed or default.failed:
+        return Judged(trial, "reference failed" if exact.failed else "failed", default, exact)
+    late = off = math.nan
+    same = default.sequence == exact.sequence
+    if same:
+        p = trial.model.parameters
+        threshold = np.min(p.weights) * p.stribeck.F_c
+        scale = np.array([threshold, p.stribeck.v_s, *np.full(trial.model.n, threshold)])
+        late = float(np.max(np.abs(default.t - exact.t), initial=0.0) / trial.t_end)
+        off = float(np.max(np.abs(default.end - exact.end) / (np.abs(exact.end) + scale)))
+    if is_steady(trial, exact, NUDGE, engine):
+        verdict = "right" if same else "wrong"
+    elif not same and is_steady(trial, exact, SMALL_NUDGE, engine):
+        verdict = "close"
+    else:
+        verdict = "ill"
+    return Judged(trial, verdict, default, exact, late, off)
+
+
+def is_finding(judged: Judged) -> bool:
+    """Tell whether a verdict is a fault: a wrong sequence, or a run that cannot go on."""
+    if judged.trial.family not in JUDGED:
+        return False
+    failed = judged.default.failed or judged.exact.failed
+    return judged.verdict == "wrong" or (bool(failed) and judged.trial.model.law == "signed")
+
+
+# --------------------------------------------------------------------------- printing
+def said(judged: Judged) -> str:
+    """Return a line about a run that is not right, and the line that repeats it."""
+    default, exact = judged.default, judged.exact
+    what = f"{judged.verdict}: {len(default.sequence)} switches, the reference has "
+    what += f"{len(exact.sequence)}"
+    if default.failed or exact.failed:
+        what += f"; default: {default.failed or 'ends'}, reference: {exact.failed or 'ends'}"
+    else:
+        pairs = list(zip(default.sequence, exact.sequence, strict=False))
+        first = next((i for i, (a, b) in enumerate(pairs) if a != b), len(pairs))
+        for name, outcome in (("ours", default), ("reference", exact)):
+            if first < len(outcome.sequence):
+                element, edge = outcome.sequence[first]
+                what += f"; {name}: element {element} {edge} at {outcome.t[first]:.9g} s"
+    return f"{what} ({judged.trial.model.law} law)\n  {judged.trial.again}"
+
+
+def table(found: Iterable[Judged]) -> str:
+    """Return the summary: a row a family and law."""
+    head = (
+        f"{'family':22} {'runs':>5} {'right':>6} {'wrong':>6} {'close':>6} {'ill':>5} "
+        f"{'(differ)':>8} {'failed':>7} {'ref. f.':>7} {'switches':>9} {'late':>8} {'off':>8} "
+        f"{'>1e-4':>6} {'ms':>6} {'ref. ms':>8}"
+    )
+    groups: dict[tuple[str, str], list[Judged]] = {}
+    for judged in found:
+        groups.setdefault((judged.trial.family, judged.trial.model.law), []).append(judged)
+    lines = [head]
+    for (family, law), group in sorted(groups.items()):
+        count = Counter(judged.verdict for judged in group)
+        differ = sum(j.verdict == "ill" and math.isnan(j.off) for j in group)
+        right = [j for j in group if j.verdict == "right"]
+        switches = [len(j.exact.sequence) for j in group]
+        off = [j.off for j in right] or [math.nan]
+        lines.append(
+            f"{family + ', ' + law:22} {len(group):5} {count['right']:6} {count['wrong']:6} "
+            f"{count['close']:6} {count['ill']:5} {differ:8} {count['failed']:7} "
+            f"{count['reference failed']:7} {np.median(switches):9.0f} "
+            f"{max((j.late for j in right), default=math.nan):8.1e} {max(off):8.1e} "
+            f"{sum(u > LARGE for u in off):6} "
+            f"{1e3 * np.median([j.default.seconds for j in group]):6.1f} "
+            f"{1e3 * np.median([j.exact.seconds for j in group]):8.1f}"
+        )
+    return "\n".join(lines)
+
+
+def witnessed(trial: Trial, engine: str = "compiled") -> str:
+    """Return how the reference differs from the witness; empty where it does not."""
+    from tests.witness import witness
+
+    exact = reference(trial, engine)
+    seen = witness(trial.model, trial.rig, trial.t_end)
+    if exact.failed:
+        return f"the reference fails ({exact.failed}), the witness slides {seen.sliding[:3]}"
+    if exact.sequence != tuple((element, edge) for _, element, edge in seen.transitions):
+        return f"{len(exact.sequence)} switches, the witness has {len(seen.transitions)}"
+    late = np.max(np.abs(exact.t - [t for t, _, _ in seen.transitions]), initial=0.0)
+    return "" if late < 1e-8 * trial.t_end else f"a switch is {late:.2g} s late"
+
+
+def details(trial: Trial, engine: str) -> str:
+    """Return all about one trial."""
+    judged = judge(trial, engine)
+    lines = [str(trial), said(judged)]
+    for name, outcome in (("default", judged.default), ("reference", judged.exact)):
+        lines.append(f"{name}: {outcome.failed or 'to the end'}, end (x, v, z) = {outcome.end}")
+        lines += [
+            f"  {t:.12g} s  element {element}  {edge}"
+            for t, (element, edge) in zip(outcome.t, outcome.sequence, strict=True)
+        ]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Judge so many runs of each family asked for."""
+    parser = argparse.ArgumentParser(description="Random runs against a reference.")
+    parser.add_argument("--family", choices=FAMILIES, action="append", help="default: all")
+    parser.add_argument("--count", type=int, default=100, help="runs of each family")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--index", type=int, help="this one run, in full")
+    parser.add_argument("--engine", default="compiled")
+    parser.add_argument("--witness", action="store_true",
+                        help="check the reference instead, by tests.witness")  # fmt: skip
+    given = parser.parse_args()
+    families = given.family or FAMILIES
+    if given.index is not None:
+        for family in families:
+            one = trial(family, given.seed, given.index)
+            if given.witness:
+                print(witnessed(one, given.engine) or "the witness agrees")
+            else:
+                print(details(one, given.engine))
+        return
+    found, findings = [], 0
+    for family in families:
+        for index in range(given.count):
+            one = trial(family, given.seed, index)
+            if given.witness:
+                differs = witnessed(one, given.engine)
+                findings += bool(differs)
+                if differs:
+                    print(f"{differs}\n  {one.again} --witness", flush=True)
+                continue
+            judged = judge(one, given.engine)
+            found.append(judged)
+            findings += is_finding(judged)
+            if judged.verdict not in ("right", "ill"):
+                print(("FINDING " if is_finding(judged) else "") + said(judged), flush=True)
+    if found:
+        print(table(found))
+    print(f"{findings} findings, seed {given.seed}")
+    sys.exit(1 if findings else 0)
+
+
+if __name__ == "__main__":
+    main()
