@@ -57,11 +57,11 @@ def _sizes(trace: Trace) -> Iterator[str]:
     stroke, fastest = float(np.ptp(trace.x)), float(np.abs(trace.v).max())
     deflected = float(np.abs(trace.z / thresholds).max())
     if not len(trace.transitions):
-        if 0.0 < fastest <= scales.v:
+        if 0.0 < fastest <= scales.speed:
             bound = "v_c" if "v_c" in model.values else "the smallest speed in a guard"
             yield (
                 f"no transition: the speed stays below {bound} (largest |v| {fastest:.3g} m/s, "
-                f"{bound} {scales.v:.3g} m/s)"
+                f"{bound} {scales.speed:.3g} m/s)"
             )
         elif 0.0 < deflected < NEAR:
             yield (

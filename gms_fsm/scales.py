@@ -43,9 +43,9 @@ Setting: TypeAlias = str | float | Mapping[str, float | list[float]] | None  # o
 # The default absolute tolerance is rtol times the scale times this: near zero a component is known
 # to the accuracy that it has at a tenth of its scale.
 SHARE = 0.1
-# A velocity in a guard is a window to pass through, not a size to move by: it counts so many times,
-# and with rtol = 1e-6 the velocity is known to a thousandth of v_c.
-WINDOW = 1e4
+# A velocity in a guard is a window to pass through, not a size to move by: it counts so many times.
+# With rtol = 1e-6 the velocity is then known to 1e-5 v_c; coarser, a creep just under v_c is off.
+WINDOW = 1e2
 
 
 @dataclass(frozen=True)
@@ -58,6 +58,8 @@ class Scales:
         m and m/s.
     variables : mapping of str to tuple of float
         For each variable of the chart one per element.
+    speed : float
+        m/s: the smallest speed in a guard, v_c for a GMS element.
     time : float
         s: what the fastest flow takes to relax, s / C for a slipping GMS element.
 
@@ -71,6 +73,7 @@ class Scales:
     x: float
     v: float
     variables: Mapping[str, tuple[float, ...]]
+    speed: float
     time: float
 
     def tolerances(self, rtol: float) -> dict[str, list[float]]:
@@ -131,7 +134,8 @@ def scales_of(model: Model) -> Scales:
     ]
     time = _divided(1.0, max(rates, default=0.0)) or _divided(least_x, speed)
     variables = {name: tuple(found[name]) for name in chart.variables}
-    return Scales(least_x, least_v, variables, time)
+    slowest = min((u for u in found["v"] if u > 0.0), default=0.0)
+    return Scales(least_x, least_v, variables, slowest, time)
 
 
 # --------------------------------------------------------------------------- what a chart says
@@ -173,7 +177,7 @@ def _sizes(key: _SameChart) -> _Sizes:
         still = {name: zero for name, zero in rest.items() if not (moving and name == "v")}
         names = f"v, {arguments}" if moving else arguments
         text = f"def number({names}):\n    return {spell(renamed(tree, still))}\n"
-        made: Numbers = load(f"scale in {chart.name}", text)["number"]
+        made: Numbers = load(f"scale in {chart.name}", text, {"sgn": _to_the_right})["number"]
         return made
 
     guards = chart.guards.values()
@@ -216,6 +220,11 @@ def _comparisons(part: Split) -> Iterator[Comparison]:
     else:
         for each in part[1]:
             yield from _comparisons(each)
+
+
+def _to_the_right(u: float) -> float:
+    """Return the sign of u as seen from above: the slope of abs(z) at 0 is 1."""
+    return 1.0 if u >= 0.0 else -1.0
 
 
 def _number(function: Numbers, values: Sequence[float]) -> float:
