@@ -984,7 +984,8 @@ def turning_inside(value: Value, new: Mapping[str, Value]) -> Value:
 def _turning(call: Call) -> Value:
     if call.function in ("sgn", "abs"):
         return call.arguments[0]
-    return Binary("-", call.arguments[0], call.arguments[1])
+    a, b = call.arguments
+    return a if b == Number(0.0) else Binary("-", a, b)
 
 
 def substitute(value: Value, sign_names: Mapping[Value, str]) -> tuple[Value, dict[str, Call]]:

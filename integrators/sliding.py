@@ -305,6 +305,7 @@ def seize(
         if w.watch[above] and met and count < most:
             which[count] = k
             count += 1
+    candidates = count
     while count > 0:
         which[most] = count
         slope_on(on, t, y, mode, table[3 * most + SLOPE])
@@ -320,8 +321,20 @@ def seize(
         pushed = sigma[worst] if gains[worst] < 0.0 else rates[worst]
         held[surfaces.sign[k]] = _sign(pushed if u == 0.0 or sliding.flags[k] == 1 else u)
         count -= 1
-        which[worst] = which[count]
+        which[worst], which[count] = which[count], k
     which[most] = count
+    if candidates > count:
+        dy, g = table[3 * most + SLOPE], table[3 * most + RATES]
+        flow_on(t, y, mode, held, on, dy)
+        for c in range(count, candidates):
+            # On a surface that another one keeps it on, such as a mere corner at v = 0 beside
+            # sgn(v), it goes to neither side.
+            on.normal(which[c], t, y, mode, on.p, g)
+            rate = g[size]
+            for j in range(size):
+                rate += g[j] * dy[j]
+            if rate == 0.0 and w.start[surfaces.above[which[c]]] == 0.0:
+                held[surfaces.sign[which[c]]] = 0.0
     changed = False
     for k in range(len(surfaces.sign)):
         slid = 0

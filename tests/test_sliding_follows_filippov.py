@@ -1,0 +1,254 @@
+"""Where both sides push back onto v = 0 the run goes on along it, with the sign that keeps it there.
+
+An element that slips with |z| >= s while v changes sign cannot arrest; sgn(v) then chatters, and the
+run ended in a livelock error.
+"""
+
+import numpy as np
+import pytest
+from scipy.integrate import RK45, Radau
+
+from gms_fsm import (
+    GMS,
+    Chart,
+    ChartModel,
+    GMSParameters,
+    PulledSlider,
+    Session,
+    Slider,
+    State,
+    Stribeck,
+    Trace,
+    simulate,
+)
+from gms_fsm.explain import explain
+from tests.helpers import same_bits
+
+ENGINES = ["machines", "ifelse", "compiled"]
+BANK = GMS(
+    GMSParameters(
+        [82e3, 146e3, 110e3], [29, 2.6, 114], [2.8e-3, 2.16e-3, 1.53e-3], sigma_2=1.3,
+        stribeck=Stribeck(2.88, 3.155, 8.8e-3), v_c=3.3e-6, weights=[3.9e-6, 3e-6, 2.15e-6],
+    ),
+    law="signed",
+)  # fmt: skip
+PUSHED = Slider(1.4, "2.9*sin(4.7*t)")
+
+
+def coulomb(outputs: str = "F_c * sgn(v)") -> ChartModel:
+    """Return Coulomb friction without stiction."""
+    chart = Chart(
+        "Coulomb friction", inputs=("v", "x"), variables=("z",), parameters=("F_c",),
+        states=(State("on", flow={"z": "0"}),), transitions=(), outputs={"F": outputs},
+    )  # fmt: skip
+    return ChartModel(chart, {"F_c": 1.0})
+
+
+def needs(engine: str) -> str:
+    """Skip without numba."""
+    if engine == "compiled":
+        pytest.importorskip("numba", reason="needs the extra fast")
+    return engine
+
+
+# --------------------------------------------------------------------------- the bank
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_slipping_element_holds_v_at_zero_until_it_arrests(engine):
+    """Times from an independent hybrid loop around DOP853."""
+    trace = simulate(BANK, PUSHED, 4.0, engine=needs(engine))
+    assert len(trace.transitions) == 14
+    (slide,) = trace.sliding
+    assert slide.surface == "v"
+    assert slide.t_start == pytest.approx(0.33227853, abs=5e-7)
+    assert slide.t_end == pytest.approx(0.33237728, abs=5e-7)
+    assert slide.t_end in trace.transitions.t[trace.transitions.edge == "arrest"]
+    on = (trace.microstep == 0) & (trace.rows.mode[:, 3] == 1)
+    assert (trace.v[on] == 0.0).all()
+    assert np.abs(trace.F[on] - 2.9 * np.sin(4.7 * trace.t[on])).max() < 1e-12
+
+
+def test_the_engines_agree_to_the_last_bit():
+    pytest.importorskip("numba", reason="needs the extra fast")
+    one = simulate(BANK, PUSHED, 0.6, engine="machines")
+    assert len(one.sliding) == 1
+    for engine in ("ifelse", "compiled"):
+        same_bits(one, simulate(BANK, PUSHED, 0.6, engine=engine))
+
+
+def test_finer_tolerances_move_the_slide_by_as_little_as_the_rest():
+    coarse, fine = (simulate(BANK, PUSHED, 0.4, engine="ifelse", rtol=r) for r in (1e-6, 1e-10))
+    for name in ("t_start", "t_end", "sigma_start", "sigma_end"):
+        assert coarse.sliding[name][0] == pytest.approx(fine.sliding[name][0], rel=1e-4)
+
+
+# --------------------------------------------------------------------------- Coulomb friction
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_mass_on_coulomb_friction_waits_for_its_spring(engine):
+    """At rest until the spring pulls with F_c, then v = speed (1 - cos): exact."""
+    trace = simulate(coulomb(), PulledSlider(1.0, 2.0, 0.1), 10.0, engine=needs(engine))
+    slide = trace.sliding[0]
+    assert (slide.t_start, slide.sigma_start) == (0.0, 0.0)
+    assert slide.t_end == pytest.approx(1.0 / (2.0 * 0.1), abs=1e-12)
+    assert slide.sigma_end == pytest.approx(1.0, abs=1e-9)
+    free = trace.t > slide.t_end
+    w = np.sqrt(2.0)
+    exact = 0.1 * (1.0 - np.cos(w * (trace.t[free] - 5.0)))
+    assert np.abs(trace.v[free] - exact).max() < 1e-6
+    on = trace.rows.mode[:, 1] == 1
+    assert on.sum() > 5
+    assert np.abs(trace.F[on] - 2.0 * 0.1 * trace.t[on]).max() < 1e-12
+
+
+def test_it_comes_to_rest_and_stays():
+    """Pushed once: decelerated by F_c / m, it stops after v^2 / 2 and is held for ever."""
+    trace = simulate(coulomb(), Slider(1.0, "0"), 5.0, initial={"v": 2.0})
+    (slide,) = trace.sliding
+    assert slide.t_start == pytest.approx(2.0, abs=1e-12)
+    assert slide.t_end == 5.0
+    assert trace.x[-1] == pytest.approx(2.0, abs=1e-9)
+    assert trace.v[-1] == 0.0
+    assert trace.F[-1] == 0.0
+
+
+def test_it_turns_round_without_a_stop_where_the_push_is_stronger():
+    trace = simulate(coulomb(), Slider(1.0, "-3"), 3.0, initial={"v": 1.0})
+    assert len(trace.sliding) == 0
+    assert trace.v[-1] == pytest.approx(-2.0 * (3.0 - 0.25), abs=1e-9)
+
+
+@pytest.mark.parametrize("text", ["max(v, 0) + F_c * sgn(v)", "min(0, v) + F_c * sgn(v)", "F_c * sgn(v) + 0.3 * abs(v)"])
+def test_other_corners_at_the_same_place_do_not_hinder_it(text):
+    trace = simulate(coulomb(text), Slider(1.0, "0.5"), 5.0, initial={"v": 1.0})
+    assert len(trace.sliding) == 1
+    assert trace.v[-1] == 0.0
+    assert trace.F[-1] == pytest.approx(0.5, abs=1e-15)
+
+
+def test_a_flow_that_is_not_linear_in_the_sign_is_combined_from_both_sides():
+    """F = 1 or -1/4 by the side: sigma is (2 F_a - 3/4) / (5/4), and F is F_a."""
+    model = coulomb("F_c * (sgn(v) + 0.6 * sgn(v) * sgn(v)) / 1.6")
+    trace = simulate(model, Slider(1.0, "0.5"), 3.0)
+    (slide,) = trace.sliding
+    assert slide.sigma_start == pytest.approx((2 * 0.5 - 0.75) / 1.25, abs=1e-12)
+    assert trace.F[-1] == pytest.approx(0.5, abs=1e-15)
+
+
+class Belt:
+    """A mass on a belt that moves."""
+
+    title = "mass on a belt"
+    acceleration = "(stiffness * (0 - x) - F - F_b * sgn(v - w)) / mass"
+
+    def __init__(self, w: str) -> None:
+        from gms_fsm.signals import as_signal
+
+        self.signals = {"w": as_signal(w)}
+        self.numbers = {"mass": 1.0, "stiffness": 4.0, "F_b": 1.0}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(
+    ("w", "place"), [("0.1", lambda t: 0.1 * t), ("0.1 * cos(t)", lambda t: 0.1 * np.sin(t))]
+)
+def test_a_mass_rides_on_a_belt_along_a_surface_that_moves(engine, w, place):
+    """In a text of the rig; the sign's argument depends on a signal."""
+    free = coulomb("0 * F_c")
+    initial = {"v": 0.1}
+    trace = simulate(free, Belt(w), 1.2, engine=needs(engine), initial=initial)
+    assert trace.sliding[0].surface == "v - w"
+    on = trace.rows.mode[:, 1] == 1
+    assert on.sum() >= 5
+    assert np.abs(trace.x[on] - place(trace.t[on])).max() < 1e-7
+    same_bits(trace, simulate(free, Belt(w), 1.2, engine="ifelse", initial=initial))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_elements_come_to_rest_on_surfaces_of_their_own(engine):
+    """dz = -C sgn(z) reaches 0 in a finite time, each element by itself, two of them together."""
+    chart = Chart(
+        "runs down", inputs=("v",), variables=("z",), parameters=("C",),
+        states=(State("on", flow={"z": "v - C * sgn(z)"}),), transitions=(), outputs={"F": "z"},
+    )  # fmt: skip
+    model = ChartModel(chart, {"C": [1.0, 2.0, 2.0, 0.1]}, n=4)
+    trace = simulate(model, Slider(1e9, "0"), 2.0, engine=needs(engine),
+                     initial={"z": [1.0, 1.0, -1.0, 1.0]})  # fmt: skip
+    names = {str(r.surface): float(r.t_start) for r in trace.sliding}
+    assert names == pytest.approx(
+        {"z of element 1": 1.0, "z of element 2": 0.5, "z of element 3": 0.5}, abs=1e-6
+    )
+    assert trace.z[-1] == pytest.approx([0.0, 0.0, 0.0, 0.8], abs=1e-6)
+
+
+# --------------------------------------------------------------------------- where it is seen
+def test_files_keep_it(tmp_path):
+    trace = simulate(BANK, PUSHED, 0.4, engine="ifelse")
+    for name in ("a.npz", "a.csv"):
+        back = Trace.load(trace.save(tmp_path / name))
+        assert back.sliding.tolist() == trace.sliding.tolist()
+        assert np.array_equal(back.rows.mode, trace.rows.mode)
+        assert np.array_equal(back.F, trace.F)
+
+
+@pytest.mark.parametrize("engine", ["ifelse", "compiled"])
+def test_wanted_times_and_samples_lie_on_it(engine):
+    whole = simulate(BANK, PUSHED, 0.4, engine=needs(engine))
+    slide = whole.sliding[0]
+    times = np.linspace(slide.t_start, slide.t_end, 7)[1:-1]
+    wanted = simulate(BANK, PUSHED, 0.4, engine=engine, t_eval=times)
+    for trace in (wanted, whole.sample(times)):
+        assert (trace.v == 0.0).all()
+        assert np.abs(trace.F - 2.9 * np.sin(4.7 * times)).max() < 1e-12
+    assert wanted.sliding.tolist() == whole.sliding.tolist()
+    assert len(simulate(BANK, PUSHED, 0.4, engine=engine, output="end").sliding) == 0
+
+
+def test_why_says_so():
+    trace = simulate(coulomb(), PulledSlider(1.0, 2.0, 0.1), 10.0)
+    row = int(np.flatnonzero(trace.t > 3.0)[0])
+    sigma = 2.0 * 0.1 * trace.t[row]
+    why = explain(trace, row, 0)
+    assert why.sigma == {"v": pytest.approx(sigma, abs=1e-12)}
+    assert f"held on v = 0, σ = {sigma:.2g}" in str(why)
+
+
+def test_a_session_walks_over_it():
+    session = Session(BANK, PUSHED, 0.4)
+    session.proceed()
+    rows = session.branch.trace()
+    same_bits(rows, simulate(BANK, PUSHED, 0.4))
+    (first,) = np.flatnonzero(np.diff(rows.rows.mode[:, 3]) == 1) + 1
+    assert session.at(int(first)).fired is None
+    assert session.at(int(first)).v == 0.0
+
+
+def test_a_checkpoint_within_it_goes_on_bit_for_bit(tmp_path):
+    from gms_fsm.checkpoint import Keeper
+    from gms_fsm.simulate import Run
+    from gms_fsm.start import Start
+
+    start = Start.of(BANK, PUSHED, 0.4, rows_at_once=1)
+    run = Run(start)
+    while not any(run.recorder.latest[2][3:]):
+        run.advance()
+    run.advance()
+    keeper = Keeper(run, tmp_path / "run.check", 0.0)
+    keeper.look()
+    other = Run(start)
+    Keeper(other, tmp_path / "run.check", 1e9)
+    while other.advance():
+        pass
+    while run.advance():
+        pass
+    same_bits(run.recorder.trace(), other.recorder.trace())
+
+
+@pytest.mark.parametrize("method", [RK45, Radau])
+def test_solvers_of_scipy_slide_too(method):
+    trace = simulate(BANK, PUSHED, 0.4, method=method)
+    assert trace.sliding.t_start[0] == pytest.approx(0.3322785, abs=3e-6)
+    assert len(trace.transitions) == 4
+
+
+def test_fixed_steps_slide_too():
+    trace = simulate(coulomb(), PulledSlider(1.0, 2.0, 0.1), 6.0, method="rk4", step=0.0173)
+    assert trace.sliding.t_end[0] == pytest.approx(5.0, abs=1e-9)
