@@ -80,11 +80,12 @@ class _Columns:
         self.mode.append(mode)
 
     def rows(self, size: int, n: int) -> Rows:
+        count = min(map(len, vars(self).values()))  # Ctrl-C may come between two columns
         return Rows(
-            np.array(self.t, dtype=np.float64),
-            np.array(self.microstep, dtype=np.int64),
-            np.array(self.y, dtype=np.float64).reshape(len(self.t), size),
-            np.array(self.mode, dtype=np.int64).reshape(len(self.t), n),
+            np.array(self.t[:count], dtype=np.float64),
+            np.array(self.microstep[:count], dtype=np.int64),
+            np.array(self.y[:count], dtype=np.float64).reshape(count, size),
+            np.array(self.mode[:count], dtype=np.int64).reshape(count, n),
         )
 
 
@@ -117,10 +118,11 @@ class Recorder:
                 self.rows.mode.extend([mode] * len(times))
                 self.latest = (times[-1], states[-1], mode)
             case Firing():
+                # First the log: no row may show a firing that it has not.
+                self.log.append(self._record(happening))
                 if output != "end":
                     side = self.stops if output == "t_eval" else self.rows
                     side.add(happening.t, happening.microstep, happening.y, happening.mode)
-                self.log.append(self._record(happening))
                 self.latest = (happening.t, happening.y, happening.mode)
             case integrators.Stop(t=t, y=y, mode=mode):
                 if output == "t_eval":

@@ -22,6 +22,7 @@ from gms_fsm.rigs import Rig
 from gms_fsm.start import Start
 from gms_fsm.trace import Trace
 from integrators import Arc, Firing, HybridError, hybrid
+from integrators.advance import ROW
 from integrators.loop import T
 
 __all__ = ["Moment", "Run", "simulate"]
@@ -97,7 +98,8 @@ def simulate(
     checkpoint : str or Path, optional
         A file for the state of a long run, written now and then. If it is there when the run
         starts, the run goes on from it, bit for bit as if it had not been interrupted; at the end
-        the file is removed.
+        the file is removed. A signal may be a Python function over plain values: another function
+        is refused.
     checkpoint_every : float
         s of the computer's time between two checkpoints.
     monitors : str or iterable of str or Monitor
@@ -116,10 +118,14 @@ def simulate(
     ParameterError, SignalError
         If an argument breaks its rule.
     CheckpointError
-        If the checkpoint belongs to another run, or is damaged.
+        If the checkpoint belongs to another run or another program, or is damaged.
+    OutputError
+        If there is to be a checkpoint and the rig is of a class of your own.
     SimulationError
         If the run cannot go on (`LivelockError`, `StepSizeError`, `NotFiniteError`,
         `SignalEndError`); its ``trace`` holds the part before.
+    KeyboardInterrupt
+        On Ctrl-C; its ``trace`` holds the part before, perhaps without a row.
 
     Examples
     --------
@@ -155,6 +161,9 @@ def simulate(
     except SimulationError as error:
         if watching:
             error.trace = watched(error.trace, watching, error)
+        raise
+    except KeyboardInterrupt as error:
+        error.trace = run.recorder.trace()  # type: ignore[attr-defined]
         raise
     if keeper is not None:
         keeper.finish()
@@ -230,6 +239,10 @@ class Run:
             raise SimulationError(
                 f"{error}; the run up to there is kept", recorder.trace()
             ) from None
+        except KeyboardInterrupt:  # within a step; the rows before may have taken an hour
+            if self.buffers.out.cursor[ROW]:
+                recorder.take(hybrid.take_rows(self.buffers))
+            raise
         if happening is None:
             check_end(recorder)
             return False
