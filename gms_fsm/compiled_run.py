@@ -106,7 +106,7 @@ class CompiledRun:
                     columns.p, b.relations, b.out, b.work, columns.log, start.program.first,
                     STEPS_AT_ONCE, self.engine is not None,
                 ),
-                compiled.cache_folder(),
+                compiled.store(),
             )  # fmt: skip
         except Exception as error:
             if not start.program.callables:
