@@ -11,7 +11,10 @@ from __future__ import annotations
 import dis
 import functools
 import hashlib
+import os
+import site
 import sys
+import sysconfig
 from collections.abc import Iterator
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
@@ -23,6 +26,10 @@ from gms_fsm.errors import SignalError
 __all__ = ["identity"]
 
 _PLAIN = (type(None), bool, int, float, complex, str, bytes, type(...))
+_PATHS = [sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")]
+_PLACES = tuple(  # where libraries are installed
+    f"{path}{os.sep}" for path in (*_PATHS, *site.getsitepackages(), site.getusersitepackages())
+)
 _CODE = ("co_code", "co_names", "co_varnames", "co_freevars", "co_cellvars", "co_flags",
          "co_argcount", "co_posonlyargcount", "co_kwonlyargcount", "co_exceptiontable")  # fmt: skip
 
@@ -84,14 +91,12 @@ def _parts(value: Any, inside: tuple[int, ...]) -> Iterator[bytes]:
     yield type(value).__name__.encode()
     if type(value) in _PLAIN:
         yield repr(value).encode()
-    elif isinstance(value, ModuleType | FunctionType) or _in_library(value):
-        known = _library_name(value)
-        if known:
-            yield known.encode()
-        elif isinstance(value, FunctionType):
-            yield from _function_parts(value, inside)
-        else:
-            raise _unknown(value)
+    elif isinstance(value, ModuleType) and _library(value):
+        yield _library(value).encode()
+    elif _in_library(value):
+        yield f"{value.__qualname__} of {_library(sys.modules[value.__module__])}".encode()
+    elif isinstance(value, FunctionType):
+        yield from _function_parts(value, inside)
     elif isinstance(value, np.ndarray | np.generic) and not value.dtype.hasobject:
         yield repr((value.dtype.descr, value.shape)).encode()
         yield value.tobytes()
@@ -129,10 +134,16 @@ def _function_parts(function: FunctionType, inside: tuple[int, ...]) -> Iterator
         if name in found:  # else a builtin
             found = found[name]
             # What a module or class of the user's holds may change without its name.
-            while attributes and isinstance(found, ModuleType | type) and not _library_name(found):
+            while attributes and _holds_names(found):
                 found = getattr(found, attributes.pop(0), None)
             yield ".".join(path).encode()
             yield from _parts(found, inside)
+
+
+def _holds_names(value: Any) -> bool:
+    if isinstance(value, ModuleType):
+        return not _library(value)
+    return isinstance(value, type) and not _in_library(value)
 
 
 def _globals_read(code: CodeType) -> Iterator[tuple[str, ...]]:
@@ -153,18 +164,20 @@ def _globals_read(code: CodeType) -> Iterator[tuple[str, ...]]:
 
 
 def _in_library(value: Any) -> bool:
-    """Tell whether a value is what a library has under the value's own name."""
-    found: Any = sys.modules.get(getattr(value, "__module__", None) or "")
+    """Tell whether a value is what a module of a library has under the value's own name."""
+    module = sys.modules.get(getattr(value, "__module__", None) or "")
+    if module is None or not _library(module):
+        return False
+    found: Any = module
     for name in str(getattr(value, "__qualname__", "?")).split("."):
         found = getattr(found, name, None)
-    return found is value and bool(_library_name(value))
+    return found is value
 
 
-def _library_name(value: Any) -> str:
-    """Return name and version of a module of a library, or of what is in one; else nothing."""
-    module = value.__name__ if isinstance(value, ModuleType) else value.__module__ or ""
-    top = module.partition(".")[0]
-    version = getattr(sys.modules.get(top), "__version__", None)
-    if top == "__main__" or (version is None and top not in sys.stdlib_module_names):
+def _library(module: ModuleType) -> str:
+    """Return name and version of a module that is installed, nothing of one of the user's."""
+    place = getattr(module, "__file__", None)
+    if module.__name__ not in sys.builtin_module_names and not (place or "").startswith(_PLACES):
         return ""
-    return f"{module}.{getattr(value, '__qualname__', '')} {version}"
+    top = sys.modules.get(module.__name__.partition(".")[0])
+    return f"{module.__name__} {getattr(top, '__version__', '')}"

@@ -281,7 +281,7 @@ def _read(file: Any) -> Sweep:
     found = {name: member(file, name, 8 * runs * n) for name in own}
     floats |= {name: (runs, n)[: array.ndim] for name, array in found.items()}
     for shapes, width in ((texts, 4 * _LONGEST), (floats, 8)):
-        for name in shapes.keys() - found.keys():
+        for name in [name for name in shapes if name not in found]:
             found[name] = member(file, name, width * math.prod(shapes[name]))
     found |= {"t": t, "times": times, "edges": edges}
     floats |= {"t": (runs,), "times": (rows,)}

@@ -137,6 +137,21 @@ def test_another_value_in_a_module_or_class_of_ones_own_is_another_function(
     assert identity(names["call"]) != before
 
 
+def test_a_function_of_a_package_under_way_is_known_by_its_code_not_by_its_version(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    found = []
+    for turn, rate in enumerate((0.1, 0.2)):
+        name = f"lab_of_mine_{turn}"
+        (tmp_path / f"{name}.py").write_text(
+            f"__version__ = '1.0'\ndef inner(t):\n    return {rate} * t\n"
+            "def call(t):\n    return inner(t)\n"
+        )
+        found.append(identity(__import__(name).call))
+    assert found[0] != found[1]
+
+
 def test_a_function_that_calls_itself_has_an_identity() -> None:
     names: dict[str, Any] = {}
     exec("def call(t):\n    return 1.0 if t < 1 else call(t - 1)\n", names)
