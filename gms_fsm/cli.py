@@ -22,7 +22,7 @@ from gms_fsm.chart import Chart
 from gms_fsm.charts import LUGRE, gms_element
 from gms_fsm.charts.broken import BROKEN
 from gms_fsm.errors import GMSError, ParameterError
-from gms_fsm.files import output_folder, written_whole
+from gms_fsm.files import no_input, output_folder, written_whole
 from gms_fsm.live import LiveView
 from gms_fsm.models import GMS, Model
 from gms_fsm.parameters import GMSParameters
@@ -31,9 +31,11 @@ from gms_fsm.prove import Report, prove
 from gms_fsm.report import monitor_lines, run_scenario, velocity_note
 from gms_fsm.rigs import Prescribed, PulledSlider, Rig, Slider
 from gms_fsm.scenario import Scenario, load_scenario
-from gms_fsm.trace import Trace
+from gms_fsm.trace import Trace, files_of
 
 __all__ = ["app", "main"]
+
+INTERRUPTED = 130  # the exit code of what Ctrl-C has ended, by custom
 
 
 @dataclass
@@ -156,8 +158,12 @@ def run_command(
     loaded = load_scenario(scenario, overrides or [])
     folder = Path("out") / scenario.stem if output is None else output
     start, end = loaded.arguments["t_start"], loaded.arguments["t_end"]
-    with LiveView(Console(stderr=True), start, end, detail=live) as view:
-        trace, files = run_scenario(loaded, folder, view, checkpoint=checkpoint)
+    try:
+        with LiveView(Console(stderr=True), start, end, detail=live) as view:
+            trace, files = run_scenario(loaded, folder, view, checkpoint=checkpoint)
+    except KeyboardInterrupt as error:
+        _plain_warning(str(error) or "interrupted")
+        raise typer.Exit(INTERRUPTED) from None
     if loaded.motion is not None and (note := velocity_note(trace, loaded.motion)):
         _plain_warning(note)
     typer.echo(f"{len(trace.transitions)} transitions; {len(files)} files in {folder}")
@@ -289,17 +295,21 @@ def _write_report(report: Report, folder: Path) -> list[Path]:
     import plots
 
     text = f"{report}\n".encode()
+    stems = [f"{number}-{found.check}" for number, found in enumerate(report.refuted, start=1)]
+    endings = ("svg", "png", "dot")
+    output_folder(
+        folder, ["report.txt", *(f"{stem}.{ending}" for stem in stems for ending in endings)]
+    )
     written = [written_whole(folder / "report.txt", lambda file: file.write(text))]
     edges = report.chart.guards
-    for number, finding in enumerate(report.refuted, start=1):
+    for stem, finding in zip(stems, report.refuted, strict=True):
         marked = [part for part in finding.where if part in edges] or finding.where
         what = f"{finding.check}, {finding.case}" if finding.case else finding.check
         note = textwrap.wrap(f"{what}: {finding.text}", 50)
         note += textwrap.wrap(finding.example, 50)
         graph = plots.statechart(report.chart, marked=marked, note="\n".join(note))
         for ending in ("svg", "png"):
-            path = folder / f"{number}-{finding.check}.{ending}"
-            written.append(plots.render(graph, path))
+            written.append(plots.render(graph, folder / f"{stem}.{ending}"))
     return list(dict.fromkeys(written))
 
 
@@ -327,18 +337,18 @@ def plot_command(
     from plots import figures
 
     run = Trace.load(trace)
-    folder = output_folder(output)
+    names, endings = ("overview", "ribbons"), ("png", "svg")
+    folder = output_folder(output, [f"{name}.{ending}" for name in names for ending in endings])
     window = None
     if start is not None or end is not None:
         window = (
             float(run.t[0]) if start is None else start, float(run.t[-1]) if end is None else end
         )  # fmt: skip
-    pictures = {
-        "overview": figures.overview(run, window=window),
-        "ribbons": figures.ribbons_figure(run, window=window),
-    }
-    for name, figure in pictures.items():
-        for ending in ("png", "svg"):
+    pictures = (
+        figures.overview(run, window=window), figures.ribbons_figure(run, window=window)
+    )  # fmt: skip
+    for name, figure in zip(names, pictures, strict=True):
+        for ending in endings:
             typer.echo(str(figures.save(figure, folder / f"{name}.{ending}")))
 
 
@@ -355,6 +365,7 @@ def animate_command(
     """Make a film of the chart at work, beside the force."""
     from plots.animation import animate
 
+    no_input(output, *files_of(trace))
     run = Trace.load(trace)
     with Progress(console=Console(stderr=True)) as bar:
         task = bar.add_task("frames", total=frames)
@@ -377,6 +388,7 @@ def replay_command(
     """Write a run as one web page that is stepped, scrubbed and explained."""
     from plots.replay import write_replay
 
+    no_input(output, *files_of(trace), *([] if other is None else files_of(other)))
     second = None if other is None else Trace.load(other)
     names = [] if other is None else [trace.stem, other.stem]
     page = write_replay(output, Trace.load(trace), second, title=title, names=names)

@@ -14,15 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm.errors import MissingExtraError, OutputError, SignalError
+from gms_fsm.errors import MissingExtraError, SignalError
 from gms_fsm.expression import sgn
-from gms_fsm.files import written_whole
 from gms_fsm.generated import load
 from gms_fsm.parameters import FloatArray
 from gms_fsm.program import Arguments, Program
 from gms_fsm.signals import piecewise_linear, piecewise_slope
+from gms_fsm.store import Store
 
-__all__ = ["cache_folder", "check_numba", "machine_code", "observe_rows", "packed"]
+__all__ = ["check_numba", "machine_code", "observe_rows", "packed", "store"]
 
 Packed = tuple[FloatArray, FloatArray, FloatArray]
 _lock = threading.RLock()  # a sweep asks from several threads
@@ -106,19 +106,20 @@ def _machine_code(
 ) -> Any:
     from integrators import compiled
 
-    functions, in_a_file = _loaded(source, callables)
-    function = functions[name]
+    function = _loaded(source, callables)[name]
     # The linker knows machine code from disk by its function's name alone: without a name of its
     # own the flow of one program would be run in place of another's.
-    function.__qualname__ = f"{name}_{compiled.digest(text=source)}"
-    return compiled.compiled(name, function, cache_folder() if in_a_file else None)
+    stamp = compiled.digest(sgn, piecewise_linear, _loaded.__wrapped__, text=source)
+    function.__qualname__ = f"{name}_{stamp}"
+    # A user's function may change without its text changing: such code is not kept.
+    return compiled.compiled(name, function, None if callables else store())
 
 
 @functools.lru_cache(maxsize=64)
 def _loaded(
     source: str, callables: tuple[tuple[str, Callable[[float], float]], ...]
-) -> tuple[dict[str, Any], bool]:
-    """Load a text from a file of its own; tell whether machine code may be kept beside it."""
+) -> dict[str, Any]:
+    """Load a text with what machine code can call."""
     from integrators import compiled
 
     for helper in (sgn, piecewise_linear, piecewise_slope):
@@ -128,9 +129,7 @@ def _loaded(
     names |= {"piecewise_slope": piecewise_slope, "__name__": __name__}
     for name, call in callables:
         names[f"{name}_signal"] = _compiled_signal(name, call)
-    # A user's function may change without its text changing: such code is not kept.
-    path = None if callables else _text_file(source)
-    return load("compiled program", source, names, path), path is not None
+    return load("compiled program", source, names)
 
 
 @functools.cache
@@ -158,42 +157,20 @@ def _power() -> Any:
 
 
 @functools.cache
-def cache_folder() -> Path | None:
-    """Return the folder machine code is kept in, None where none can be written.
+def store() -> Store | None:
+    """Return where machine code is kept, None where nothing can be.
 
     It is the platform's folder for caches, or NUMBA_CACHE_DIR.
 
     Returns
     -------
-    Path or None
-        An existing folder.
+    Store or None
+        Ready.
     """
     from platformdirs import user_cache_path
 
-    from integrators import compiled
-
     given = os.environ.get("NUMBA_CACHE_DIR")
-    return compiled.cache_folder(Path(given) if given else user_cache_path("gms-fsm"))
-
-
-def _text_file(source: str) -> Path | None:
-    """Write a generated text where numba's cache can refer to it; None where nothing can be."""
-    from integrators import compiled
-
-    folder = cache_folder()
-    if folder is None:
-        return None
-    # What else decides the machine code.
-    stamp = compiled.digest(
-        sgn, piecewise_linear, piecewise_slope, _loaded.__wrapped__, text=source
-    )
-    path = folder / f"program_{stamp}.py"
-    try:
-        if not path.exists():
-            written_whole(path, lambda file: file.write(source.encode()))
-    except OutputError:
-        return None
-    return path
+    return Store.at((Path(given) if given else user_cache_path("gms-fsm")) / "machine-code")
 
 
 def _compiled_signal(name: str, call: Callable[[float], float]) -> Any:
@@ -236,7 +213,6 @@ def observe_rows(
     table = np.empty((t.size, program.seen))
     compiled.for_each_row(
         machine_code(program, "observe"), np.ascontiguousarray(t), np.ascontiguousarray(y),
-        np.ascontiguousarray(mode), np.array(program.live), packed(program.p), table,
-        cache_folder(),
+        np.ascontiguousarray(mode), np.array(program.live), packed(program.p), table, store(),
     )  # fmt: skip
     return table

@@ -15,7 +15,7 @@ from gms_fsm.machines import ElementMachines, MachineEngine
 from gms_fsm.models import Model
 from gms_fsm.observing import observe
 from gms_fsm.program import system
-from gms_fsm.recording import Recording, check_end, check_pace, explained
+from gms_fsm.recording import PATIENCE, Recording, check_end, check_pace, explained
 from gms_fsm.rigs import Rig
 from gms_fsm.start import Start
 from gms_fsm.trace import Rows, Trace, log_from
@@ -106,7 +106,7 @@ class CompiledRun:
                     columns.p, b.relations, b.surfaces, b.sliding, b.out, b.work, columns.log,
                     start.program.first, STEPS_AT_ONCE, self.engine is not None,
                 ),
-                compiled.cache_folder(),
+                compiled.store(),
             )  # fmt: skip
         except Exception as error:
             if not start.program.callables:
@@ -122,7 +122,8 @@ class CompiledRun:
             check_end(columns)
             return False
         if happening == loop.ROWS:
-            check_pace(columns, float(b.memory.now[loop.H]), int(b.out.cursor[STEPS]))
+            if b.out.cursor[STEPS] >= PATIENCE:
+                check_pace(columns, columns.as_lists())
         elif happening == loop.FIRING:
             self._replay(self.engine)
         else:

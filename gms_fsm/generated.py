@@ -11,7 +11,6 @@ import hashlib
 import linecache
 import math
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from types import CodeType, SimpleNamespace
 from typing import Any
 
@@ -23,9 +22,7 @@ from gms_fsm.expression import NAMESPACE
 __all__ = ["ieee", "load", "load_careful"]
 
 
-def load(
-    title: str, source: str, names: Mapping[str, Any] | None = None, path: Path | None = None
-) -> dict[str, Any]:
+def load(title: str, source: str, names: Mapping[str, Any] | None = None) -> dict[str, Any]:
     r"""Run generated text and return what it defines.
 
     Parameters
@@ -36,8 +33,6 @@ def load(
         Python text.
     names : mapping, optional
         Objects it may use besides the functions of the expression language.
-    path : Path, optional
-        A file that holds this very text; its lines are then found there.
 
     Returns
     -------
@@ -50,8 +45,7 @@ def load(
     6.0
     """
     namespace: dict[str, Any] = {**NAMESPACE, **(names or {})}
-    code = _compiled(title, source) if path is None else compile(source, str(path), "exec")
-    exec(code, namespace)
+    exec(_compiled(title, source), namespace)
     return namespace
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from gms_fsm.chart import Chart, State, Transition
-from gms_fsm.errors import SignalError
+from gms_fsm.errors import OutputError, SignalError
 from gms_fsm.models import ChartModel, Model
 from gms_fsm.parameters import Stribeck
 from gms_fsm.rigs import Prescribed, PulledSlider, Rig, Slider
@@ -76,10 +76,16 @@ SignalRecord = Annotated[
 ]
 
 
+RigKind = Literal["Prescribed", "Slider", "PulledSlider"]
+RIGS: Mapping[type, RigKind] = {
+    Prescribed: "Prescribed", Slider: "Slider", PulledSlider: "PulledSlider",
+}  # fmt: skip
+
+
 class RigRecord(_Record):
     """A rig's numbers and signals."""
 
-    kind: Literal["Prescribed", "Slider", "PulledSlider"]
+    kind: RigKind
     numbers: dict[str, float]
     signals: dict[str, SignalRecord]
 
@@ -107,7 +113,7 @@ class Header(_Record):
         settings: Mapping[str, Setting],
         monitors: Mapping[str, Verdict] | None = None,
     ) -> Header:
-        """Describe a run."""
+        """Describe a run; a rig of another class than ours raises an `OutputError`."""
         chart = model.chart
         return cls(
             model=ModelRecord(
@@ -125,7 +131,7 @@ class Header(_Record):
                 sigma_2=model.sigma_2,
             ),
             rig=RigRecord(
-                kind=type(rig).__name__,
+                kind=_kind(rig),
                 numbers=dict(rig.numbers),
                 signals={name: _signal_record(signal) for name, signal in rig.signals.items()},
             ),
@@ -160,6 +166,16 @@ class Header(_Record):
                 return Slider(numbers["mass"], signals["F_a"])
             case "PulledSlider":
                 return PulledSlider(**numbers)
+
+
+def _kind(rig: Rig) -> RigKind:
+    # The class itself: one of another's making may have the name of ours.
+    if type(rig) not in RIGS:
+        raise OutputError(
+            f"the rig is a {type(rig).__qualname__}, a class of your own, which a file cannot "
+            f"hold; it can hold {', '.join(RIGS.values())} of gms_fsm"
+        )
+    return RIGS[type(rig)]
 
 
 def _signal_record(signal: Signal) -> FormulaRecord | CornersRecord | FunctionRecord:

@@ -36,6 +36,8 @@ VELOCITY = "0.15*sin(2*pi*t/25)"
 FIG3_END, FIG4_END = 30.0, 100.0  # s
 PAPER_STEP, PAPER_RTOL = 1e-3, 1e-4  # the paper's ode45 settings; atol is not printed
 SAMPLES_PER_SECOND = 200  # of the common grid on which forces are subtracted
+CHARTS = ("chart_element", "chart_bank", "chart_lugre", "block_diagram")
+FIGURES = ("fig3", "fig3_slipping", "fig4", "fig4_laws", "residual")
 
 Progress = Callable[[str, float], object]
 
@@ -492,12 +494,15 @@ def write(
     SimulationError
         If a run cannot go on; its part so far is written to ``partial.npz``.
     """
-    folder = output_folder(folder)
-    for name in ("traces", "transitions"):
-        output_folder(folder / name)
+    chosen = experiments(force, velocity)
+    drawn = [f"{name}.{ending}" for name in CHARTS for ending in ("svg", "png", "dot")]
+    drawn += [f"{name}.{ending}" for name in FIGURES for ending in ("png", "svg")]
+    folder = output_folder(folder, ["claims.md", "partial.npz", *drawn])
+    output_folder(folder / "traces", [f"{experiment.name}.npz" for experiment in chosen])
+    output_folder(folder / "transitions", [f"{experiment.name}.csv" for experiment in chosen])
     traces: dict[str, Trace] = {}
     files: list[Path] = []
-    for experiment in experiments(force, velocity):
+    for experiment in chosen:
         name = experiment.name
         try:
             traces[name] = run_one(experiment, progress)

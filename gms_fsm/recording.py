@@ -32,13 +32,16 @@ from integrators import (
     Slide,
     StepTooSmall,
     TooManySteps,
+    hybrid,
 )
+from integrators.advance import STEPS
+from integrators.loop import H
 
-__all__ = ["Moment", "Recorder", "Recording", "check_end", "check_pace", "explained"]
+__all__ = ["PATIENCE", "Moment", "Recorder", "Recording", "check_end", "check_pace", "explained"]
 
 POWERS = 12  # turns of the power iteration
 STABLE = 1.5  # step times fastest rate; explicit methods go to 2 or 3.3, and hover below
-PATIENCE = 5_000  # steps before the pace is looked at
+PATIENCE = 5_000  # steps between two looks at the pace
 
 
 class Recording(Protocol):
@@ -75,11 +78,12 @@ class _Columns:
         self.mode.append(mode)
 
     def rows(self, size: int, n: int) -> Rows:
+        count = min(map(len, vars(self).values()))  # Ctrl-C may come between two columns
         return Rows(
-            np.array(self.t, dtype=np.float64),
-            np.array(self.microstep, dtype=np.int64),
-            np.array(self.y, dtype=np.float64).reshape(len(self.t), size),
-            np.array(self.mode, dtype=np.int64).reshape(len(self.t), n),
+            np.array(self.t[:count], dtype=np.float64),
+            np.array(self.microstep[:count], dtype=np.int64),
+            np.array(self.y[:count], dtype=np.float64).reshape(count, size),
+            np.array(self.mode[:count], dtype=np.int64).reshape(count, n),
         )
 
 
@@ -112,11 +116,12 @@ class Recorder:
                 self.rows.mode.extend([mode] * len(times))
                 self.latest = (times[-1], states[-1], mode)
             case Firing() | Slide():
+                # First the log: no row may show a firing that it has not.
+                if isinstance(happening, Firing):
+                    self.log.append(self._record(happening))
                 if output != "end":
                     side = self.stops if output == "t_eval" else self.rows
                     side.add(happening.t, happening.microstep, happening.y, happening.mode)
-                if isinstance(happening, Firing):
-                    self.log.append(self._record(happening))
                 self.latest = (happening.t, happening.y, happening.mode)
             case integrators.Stop(t=t, y=y, mode=mode):
                 if output == "t_eval":
@@ -306,7 +311,7 @@ def _slow(recorder: Recording) -> str:
     return "give a larger max_steps, a larger rtol, or for a stiff run method=scipy Radau"
 
 
-def check_pace(recording: Recording, step: float, steps: int) -> None:
+def check_pace(recording: Recording, buffers: hybrid.Buffers) -> None:
     """Stop a stiff run that cannot reach its end with the steps that are left.
 
     Stiff is where stability, not accuracy, keeps the steps small: where the step times the fastest
@@ -316,10 +321,8 @@ def check_pace(recording: Recording, step: float, steps: int) -> None:
     ----------
     recording : Recording
         Of a run under way.
-    step : float
-        Its present step, s.
-    steps : int
-        How many it has tried.
+    buffers : integrators.hybrid.Buffers
+        Where it is.
 
     Raises
     ------
@@ -329,9 +332,10 @@ def check_pace(recording: Recording, step: float, steps: int) -> None:
     start = recording.start
     t, y, mode = recording.latest
     options = start.options
-    if steps < PATIENCE or options.step or not isinstance(options.method, integrators.Tableau):
+    step, left = buffers.memory.now[H], options.max_steps - buffers.out.cursor[STEPS]
+    if options.step or not isinstance(options.method, integrators.Tableau):
         return
-    if (start.last - t) <= step * (options.max_steps - steps):
+    if start.last - t <= step * left:
         return
     program, held = start.program, [0.0] * start.program.held
     program.ieee["arm"](t, y, mode, program.p, held, [0] * len(program.strict))

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from gms_fsm.errors import GMSError, MissingExtraError, ScenarioError, SimulationError
-from gms_fsm.files import output_folder, written_whole
+from gms_fsm.files import no_input, output_folder, written_whole
 from gms_fsm.models import GMS
 from gms_fsm.parameters import FloatArray
 from gms_fsm.records import Motion, Record
@@ -25,6 +27,7 @@ __all__ = [
     "compare",
     "dwell_times",
     "monitor_lines",
+    "plain",
     "run_scenario",
     "summary_text",
 ]
@@ -116,13 +119,22 @@ def run_scenario(
     Raises
     ------
     OutputError
-        If the folder cannot be written.
+        If the folder cannot be written, or one of the files is there and not ours, or is read
+        here.
     SimulationError
         If the run cannot go on; its part so far is written to ``partial.npz``.
+    KeyboardInterrupt
+        On Ctrl-C; the part so far is written to ``partial.npz``, and the text says so.
     ScenarioError
         If `simulate` refuses an argument.
     """
-    folder = output_folder(folder)
+    output = loaded.scenario.output
+    names = ["summary.md", "trace.npz", "transitions.csv", "partial.npz"]
+    names += [f"overview.{ending}" for ending in output.figures]
+    names += ["trace.csv", "trace.transitions.csv"] if output.csv else []
+    folder = output_folder(folder, names)
+    for name in names:
+        no_input(folder / name, loaded.path, *([loaded.record.path] if loaded.record else []))
     try:
         trace = simulate(
             loaded.model, loaded.rig, progress=progress,
@@ -142,11 +154,28 @@ def run_scenario(
         raise
     except GMSError as error:
         raise ScenarioError(f"{loaded.path}: {error}") from None
+    except KeyboardInterrupt as error:
+        part: Any = getattr(error, "trace", ())  # none before the run has begun
+        error.args = ("interrupted before the first row; nothing is written",)
+        if len(part):
+            kept = part.save(folder / "partial.npz")
+            error.args = (f"interrupted at t = {part.t[-1]:.6g} s; the run so far is in {kept}",)
+        raise
+    saved = trace.save(folder / "trace.npz")  # first of all: nothing after it can lose the run
+    try:
+        return trace, _reported(loaded, trace, folder, saved)
+    except KeyboardInterrupt as error:
+        error.args = (f"interrupted; the run is in {saved}",)
+        raise
+
+
+def _reported(loaded: Loaded, trace: Trace, folder: Path, saved: Path) -> list[Path]:
+    """Write what a person wants to know of a run; return all files."""
     log = trace.transitions_csv().encode()
     text = summary_text(loaded, trace).encode()
     files = [
         written_whole(folder / "summary.md", lambda file: file.write(text)),
-        trace.save(folder / "trace.npz"),
+        saved,
         written_whole(folder / "transitions.csv", lambda file: file.write(log)),
     ]
     if loaded.scenario.output.csv:
@@ -154,8 +183,8 @@ def run_scenario(
     try:
         files += _draw(loaded, trace, folder)
     except MissingExtraError as error:
-        warnings.warn(f"no figure was drawn: {error}", stacklevel=2)
-    return trace, files
+        warnings.warn(f"no figure was drawn: {error}", stacklevel=3)
+    return files
 
 
 def _draw(loaded: Loaded, trace: Trace, folder: Path) -> list[Path]:
@@ -196,11 +225,11 @@ def summary_text(loaded: Loaded, trace: Trace) -> str:
         f"{name} = {value}" for name, value in trace.settings.items() if value is not None
     )
     lines = [
-        f"# {loaded.title}",
+        f"# {plain(' '.join(loaded.title.split()))}",
         "",
-        *([loaded.scenario.notes.strip(), ""] if loaded.scenario.notes.strip() else []),
-        f"- model: {trace.model.title}",
-        f"- rig: {trace.rig.title}",
+        *([plain(loaded.scenario.notes.strip()), ""] if loaded.scenario.notes.strip() else []),
+        f"- model: {plain(trace.model.title)}",
+        f"- rig: {plain(trace.rig.title)}",
         f"- parameters: {_parameters(trace)}",
         f"- run: {settings}",
         f"- result: {len(trace)} rows, {len(trace.transitions)} transitions, F from "
@@ -213,6 +242,34 @@ def summary_text(loaded: Loaded, trace: Trace) -> str:
     if loaded.record is not None and loaded.motion is not None:
         lines += ["", *_measurement(loaded.record, loaded.motion, trace)]
     return "\n".join(lines) + "\n"
+
+
+def plain(text: str) -> str:
+    r"""Return a text as Markdown that shows this very text, whoever wrote it.
+
+    Parameters
+    ----------
+    text : str
+        Of one line or several; each stays a line.
+
+    Returns
+    -------
+    str
+        Without HTML, links, pictures or anything else that Markdown makes of a text.
+
+    Examples
+    --------
+    >>> print(plain("F_c < 2 N, *new* ![x](y)"))
+    F_c &lt; 2 N, \*new\* !\[x\](y)
+    """
+    lines = []
+    for line in text.splitlines():
+        shown = "".join(c if c.isprintable() else " " for c in line).strip()
+        shown = re.sub(r"[\\`*\[\]|~$#]", r"\\\g<0>", shown)
+        shown = re.sub(r"(?<![^\W_])_|_(?![^\W_])", r"\\_", shown)  # not in F_c, which is plain
+        shown = shown.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+        lines.append(re.sub(r"^(\d*)([-+=.)])", r"\1\\\2", shown))  # a list, a rule, a heading
+    return "\n".join(lines)
 
 
 def monitor_lines(trace: Trace) -> list[str]:
@@ -264,7 +321,7 @@ def _element_table(trace: Trace) -> list[str]:
 
 
 def _measurement(record: Record, motion: Motion, trace: Trace) -> list[str]:
-    lines = [f"## Against the measurement ({record.path.name})", ""]
+    lines = [f"## Against the measurement ({plain(record.path.name)})", ""]
     comparison = compare(trace, record)
     if comparison is None:
         lines.append("- the record has no force: nothing to compare with")
@@ -273,7 +330,7 @@ def _measurement(record: Record, motion: Motion, trace: Trace) -> list[str]:
             f"- **R² = {comparison.r2:.4f}, RMSE = {comparison.rmse:.4g} N** on {comparison.rows} "
             "rows (parameters as given; nothing was fitted)"
         )
-    lines += [f"- {note}" for note in (*record.notes, *motion.notes)]
+    lines += [f"- {plain(note)}" for note in (*record.notes, *motion.notes)]
     doubts = what_it_cannot_tell(trace, motion)
     if doubts:
         lines += ["", "### What this record cannot tell", "", *(f"- {doubt}" for doubt in doubts)]

@@ -1089,6 +1089,8 @@ class Session:
         ------
         SessionError
             If a signal is a Python function, the method a class, or the engine your own machines.
+        OutputError
+            If the rig is of a class of your own, or the file cannot be written.
         """
         if any(isinstance(signal, Function) for signal in self.rig.signals.values()):
             raise SessionError("a signal is a Python function, which a file cannot hold")

@@ -17,14 +17,14 @@ from gms_fsm.machines import ElementMachines, IfElse, MachineEngine
 from gms_fsm.models import Model
 from gms_fsm.monitors import Monitor, checked, watched
 from gms_fsm.program import system
-from gms_fsm.recording import Moment, Recorder, check_end, check_pace, explained
+from gms_fsm.recording import PATIENCE, Moment, Recorder, check_end, check_pace, explained
 from gms_fsm.rigs import Rig
 from gms_fsm.scales import Tolerance
 from gms_fsm.start import MOST_STEPS, Start
 from gms_fsm.trace import Trace
 from integrators import Arc, Firing, HybridError, Slide, hybrid
-from integrators.advance import STEPS
-from integrators.loop import H, T
+from integrators.advance import ROW, STEPS
+from integrators.loop import T
 
 __all__ = ["Moment", "Run", "simulate"]
 
@@ -108,7 +108,8 @@ def simulate(
     checkpoint : str or Path, optional
         A file for the state of a long run, written now and then. If it is there when the run
         starts, the run goes on from it, bit for bit as if it had not been interrupted; at the end
-        the file is removed.
+        the file is removed. A signal may be a Python function over plain values: another function
+        is refused.
     checkpoint_every : float
         s of the computer's time between two checkpoints.
     monitors : str or iterable of str or Monitor
@@ -127,10 +128,14 @@ def simulate(
     ParameterError, SignalError
         If an argument breaks its rule.
     CheckpointError
-        If the checkpoint belongs to another run, or is damaged.
+        If the checkpoint belongs to another run or another program, or is damaged.
+    OutputError
+        If there is to be a checkpoint and the rig is of a class of your own.
     SimulationError
         If the run cannot go on (`LivelockError`, `StepSizeError`, `StepLimitError`,
         `NotFiniteError`, `SignalEndError`); its ``trace`` holds the part before.
+    KeyboardInterrupt
+        On Ctrl-C; its ``trace`` holds the part before, perhaps without a row.
 
     Examples
     --------
@@ -167,6 +172,9 @@ def simulate(
         if watching:
             error.trace = watched(error.trace, watching, error)
         raise
+    except KeyboardInterrupt as error:
+        error.trace = run.recorder.trace()  # type: ignore[attr-defined]
+        raise
     if keeper is not None:
         keeper.finish()
     trace = run.recorder.trace()
@@ -199,7 +207,7 @@ class Run:
         if start.settings["engine"] != "ifelse":
             machines = ElementMachines(start.model) if machines is None else machines
             switch = self.engine = MachineEngine(machines, start.program, start.mode)
-        self.recorder = Recorder(start)
+        self.recorder, self.next_look = Recorder(start), PATIENCE
         self.happening: Arc | Firing | Slide | integrators.Stop | None = None  # the latest
         made = system(start.program)
         self.buffers = hybrid.buffers(
@@ -241,12 +249,16 @@ class Run:
             raise SimulationError(
                 f"{error}; the run up to there is kept", recorder.trace()
             ) from None
+        except KeyboardInterrupt:  # within a step; the rows before may have taken an hour
+            if self.buffers.out.cursor[ROW]:
+                recorder.take(hybrid.take_rows(self.buffers))
+            raise
         if happening is None:
             check_end(recorder)
             return False
         self.happening = happening
         recorder.take(happening)
-        if isinstance(happening, Arc):
-            b = self.buffers
-            check_pace(recorder, b.memory.now[H], b.out.cursor[STEPS])
+        if isinstance(happening, Arc) and self.buffers.out.cursor[STEPS] >= self.next_look:
+            self.next_look = self.buffers.out.cursor[STEPS] + PATIENCE
+            check_pace(recorder, self.buffers)
         return True

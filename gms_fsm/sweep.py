@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import math
 import os
 import signal
 import threading
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gms_fsm.archives import member
 from gms_fsm.compiled import check_numba
 from gms_fsm.compiled_run import CompiledRun
 from gms_fsm.errors import (
@@ -25,6 +27,8 @@ from gms_fsm.errors import (
     OutputError,
     ParameterError,
     TraceFileError,
+    cut,
+    shown,
     why,
 )
 from gms_fsm.files import written_whole
@@ -201,12 +205,14 @@ class Sweep:
         """
         path = Path(path)
         if path.suffix == ".npz":
-            arrays: dict[str, Any] = {
-                f"parameter_{name}": values for name, values in self.parameters.items()
-            }
+            from gms_fsm import __version__
+
+            arrays: dict[str, Any] = {"format": np.array(_FORMAT), "program": __version__}
+            arrays |= {f"parameter_{name}": values for name, values in self.parameters.items()}
             arrays |= {f"rows_{name}": values for name, values in self.rows.items()}
             arrays |= {name: getattr(self, name) for name in _SAVED}
-            arrays |= {"transitions": np.asarray(self.transitions), "edges": np.array(self.edges)}
+            arrays |= {"transitions": np.asarray(self.transitions), "elements": self.z.shape[1]}
+            arrays["edges"] = np.array(self.edges, dtype=np.str_)
             return written_whole(path, lambda file: np.savez_compressed(file, **arrays))
         if path.suffix == ".parquet":
             pandas = _imported("pandas", "sweep")
@@ -237,22 +243,13 @@ class Sweep:
         Raises
         ------
         TraceFileError
-            If the file is missing, damaged, or not a sweep; nothing in it is executed.
+            If the file is missing, damaged, or not a sweep of this format; nothing in it is
+            executed.
         """
         try:
             # Opened here: np.load leaves a damaged file open.
             with Path(path).open("rb") as raw, np.load(raw, allow_pickle=False) as file:
-                arrays = {name: file[name] for name in file.files}
-            groups: dict[str, dict[str, Any]] = {"parameter": {}, "rows": {}}
-            for name in list(arrays):
-                group, _, rest = name.partition("_")
-                if group in groups:
-                    groups[group][rest] = arrays.pop(name)
-            return cls(
-                parameters=groups["parameter"], rows=groups["rows"],
-                transitions=arrays["transitions"].astype(_LOG, casting="no").view(np.recarray),
-                edges=tuple(arrays["edges"].tolist()), **{name: arrays[name] for name in _SAVED},
-            )  # fmt: skip
+                return _read(file)
         except FileNotFoundError:
             raise TraceFileError(
                 f"{path}: there is no such file; check its name and the folder"
@@ -263,7 +260,55 @@ class Sweep:
             ) from None
 
 
+# --------------------------------------------------------------------------- files
+_FORMAT = "gms-fsm sweep 1"
 _SAVED = ("outcome", "message", "t", "x", "v", "F", "z", "states", "times")
+_LONGEST = 1000  # characters of a text
+
+
+def _read(file: Any) -> Sweep:
+    """Read an open archive: no array larger than that of a sweep of so many runs, all checked."""
+    stamp = str(member(file, "format"))
+    if stamp != _FORMAT:
+        program = cut(str(member(file, "program")))
+        raise ValueError(f"format {shown(stamp)} of gms-fsm {program}, not {_FORMAT!r}")
+    t, times, edges = (member(file, name) for name in ("t", "times", "edges"))
+    runs, rows, n = t.size, times.size, int(member(file, "elements", 8))
+    texts = {"outcome": (runs,), "message": (runs,), "states": (runs, n)}
+    floats: dict[str, tuple[int, ...]] = dict.fromkeys(("x", "v", "F"), (runs,))
+    floats["z"] = (runs, n)
+    if rows:
+        floats |= {f"rows_{name}": (runs, rows) for name in ("x", "v", "F")}
+        floats["rows_z"] = (runs, rows, n)
+    own = [name for name in file.files if name.startswith("parameter_")]
+    found = {name: member(file, name, 8 * runs * n) for name in own}
+    floats |= {name: (runs, n)[: array.ndim] for name, array in found.items()}
+    for shapes, width in ((texts, 4 * _LONGEST), (floats, 8)):
+        for name in [name for name in shapes if name not in found]:
+            found[name] = member(file, name, width * math.prod(shapes[name]))
+    found |= {"t": t, "times": times, "edges": edges}
+    floats |= {"t": (runs,), "times": (rows,)}
+    texts["edges"] = (len(edges),)
+    for name, array in found.items():
+        shape, kind = (texts[name], "U") if name in texts else (floats[name], "f")
+        if array.shape != shape or array.dtype.kind != kind:
+            raise ValueError(f"{name} is {array.dtype} {array.shape}; a sweep has {kind} {shape}")
+    log = member(file, "transitions")
+    if log.ndim != 1 or log.dtype != _LOG:
+        raise ValueError("the transition log has other columns than a sweep has")
+    for name, count in (("run", runs), ("element", n), ("edge", len(edges))):
+        if log.size and not 0 <= log[name].min() <= log[name].max() < count:
+            raise ValueError(f"the transition log: {name} must be within 0 to {count - 1}")
+    if not (own and runs and n and (np.diff(log["run"]) >= 0).all()):
+        raise ValueError("no run, no parameter, or runs not in order")
+    groups = {
+        group: {name.removeprefix(group): found[name] for name in found if name.startswith(group)}
+        for group in ("parameter_", "rows_")
+    }
+    return Sweep(
+        parameters=groups["parameter_"], rows=groups["rows_"], edges=tuple(edges.tolist()),
+        transitions=log.view(np.recarray), **{name: found[name] for name in _SAVED},
+    )  # fmt: skip
 
 
 def sweep(
@@ -351,7 +396,9 @@ def sweep(
                     part = {key: array[chunk.start : chunk.stop] for key, array in values.items()}
                     try:
                         task = executor.submit(_run_chunk, model, rig, t_end, part, options, name)
-                    except BrokenExecutor as error:  # by a task before this one
+                    except Exception as error:
+                        if not isinstance(error, BrokenExecutor):  # by a task before this one
+                            error = _NotSent(f"{type(error).__name__}: {error}")
                         task = Future()
                         task.set_exception(error)
                     waiting[task] = chunk
@@ -456,7 +503,7 @@ def _run_chunk(
             while run.advance():
                 pass
         except GMSError as error:
-            outcome, message = type(error).__name__, str(error)
+            outcome, message = type(error).__name__, cut(str(error), _LONGEST - 10)
         results.append(_result(run, outcome, message))
     return results
 
@@ -479,14 +526,25 @@ def _result(run: Run | CompiledRun | None, outcome: str, message: str) -> _Resul
     return _Result(outcome, message, end, log, rows)
 
 
+class _NotSent(Exception):
+    """A task has not come as far as a worker: something in it cannot be pickled."""
+
+
 def _results(future: Future[list[_Result]], count: int) -> list[_Result]:
     """Return what a task brought; one that was lost makes rows that say so."""
     try:
         return future.result()
+    except _NotSent as error:
+        message = (
+            f"the run could not be sent to a worker ({cut(str(error))}); give signals as "
+            "expressions of t or as arrays, or use threads (executor=None)"
+        )
+        lost = _Result("NotSent", message, None, np.empty(0, dtype=_LOG), None)
+        return [lost] * count
     except Exception as error:  # a broken pool, a worker out of memory, what cannot be pickled
         message = (
-            f"the worker failed: {type(error).__name__}: {error}; run these again, or use threads "
-            "(executor=None)"
+            f"the worker failed: {type(error).__name__}: {cut(str(error), _LONGEST // 2)}; run "
+            "these again, or use threads (executor=None)"
         )
         lost = _Result(type(error).__name__, message, None, np.empty(0, dtype=_LOG), None)
         return [lost] * count

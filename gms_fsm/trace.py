@@ -19,9 +19,10 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gms_fsm.archives import member
 from gms_fsm.compiled import observe_rows
 from gms_fsm.errors import MissingExtraError, OutputError, SignalError, TraceFileError, why
-from gms_fsm.files import leftovers, written_together, written_whole
+from gms_fsm.files import in_turn, leftovers, written_together, written_whole
 from gms_fsm.header import Header
 from gms_fsm.models import Model
 from gms_fsm.observing import observe, rate, sigmas
@@ -39,6 +40,7 @@ __all__ = [
     "Trace",
     "column_name",
     "dwell_times",
+    "files_of",
     "interpolated",
     "log_from",
     "log_of",
@@ -385,7 +387,8 @@ class Trace:
         Raises
         ------
         OutputError
-            If the folder cannot be written or the ending is another.
+            If the folder cannot be written, the ending is another, or the rig is of a class of
+            your own.
         """
         path = Path(path)
         if path.suffix == ".npz":
@@ -454,21 +457,21 @@ class Trace:
     @classmethod
     def _load_npz(cls, path: Path) -> Trace:
         with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
-            header = Header.model_validate_json(str(_member(file, "header")))
+            header = Header.model_validate_json(str(member(file, "header")))
             model = header.to_model()
             modes = lower(model, header.to_rig()).modes
             width = 8 * (modes + model.n * (2 + len(model.chart.variables)))  # bytes a row
             tables = {}
             for kind in ("rows", "stops"):
-                t = _member(file, f"{kind}_t")
+                t = member(file, f"{kind}_t")
                 names = [f"{kind}_{name}" for name in ("microstep", "y", "mode")]
-                tables[kind] = Rows(t, *(_member(file, name, width * t.size) for name in names))
+                tables[kind] = Rows(t, *(member(file, name, width * t.size) for name in names))
             rows = tables["rows"].t.size
             stored = {
-                name: _member(file, f"observed_{name}", width * rows)
+                name: member(file, f"observed_{name}", width * rows)
                 for name in ("v", "F", "s", "F_elements", "dz")
             }
-            log = _member(file, "transitions").view(np.recarray)
+            log = member(file, "transitions").view(np.recarray)
         return cls._checked(header, model, tables["rows"], tables["stops"], log, stored)
 
     @classmethod
@@ -585,6 +588,11 @@ class Trace:
 
     @classmethod
     def _load_csv(cls, path: Path) -> Trace:
+        with in_turn(path.parent, shared=True):  # rows and log of one run, not one of each
+            return cls._read_csv(path)
+
+    @classmethod
+    def _read_csv(cls, path: Path) -> Trace:
         with path.open(encoding="utf-8", newline="") as file:
             first = file.readline()
             if not first.startswith("# {"):
@@ -737,23 +745,6 @@ def _observe_rows(program: Program, rows: Rows) -> FloatArray:
     return table
 
 
-_ROOM = 2**26  # bytes that any array of a file may have
-_DENSEST = 200  # times: no header, column of times or log is packed tighter than this
-
-
-def _member(file: Any, name: str, most: int | None = None) -> Any:
-    """Read an array of an archive, if it unpacks to no more bytes than a trace's would."""
-    members = {info.filename: info for info in file.zip.infolist()}
-    member = members.get(name) or members[f"{name}.npy"]
-    most = _ROOM + (_DENSEST * member.compress_size if most is None else most)
-    if member.file_size > most:
-        raise TraceFileError(
-            f"{name} unpacks to {member.file_size} bytes; in a trace of this length it has at most "
-            f"{most}"
-        )
-    return file[name]
-
-
 _SLIDING = np.dtype([
     ("t_start", "f8"), ("t_end", "f8"), ("surface", "U64"), ("sigma_start", "f8"),
     ("sigma_end", "f8"),
@@ -833,6 +824,11 @@ def _found_in(rows: Rows, stops: Rows) -> NDArray[np.bool_]:
 def column_name(name: str, i: int) -> str:
     """Return the column's name of element i: z1, but z1_1 for a variable that is called z1."""
     return f"{name}{'_' if name[-1].isdigit() or name[-1] == '_' else ''}{i + 1}"
+
+
+def files_of(path: Path) -> list[Path]:
+    """Return the files that a trace lies in: one, or for ``.csv`` the log beside it too."""
+    return [path, _log_path(path)] if path.suffix == ".csv" else [path]
 
 
 def _log_path(path: Path) -> Path:

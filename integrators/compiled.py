@@ -1,24 +1,22 @@
 """`integrators.loop.record` as machine code: the very same functions, through numba.
 
 The system's functions come in as addresses of functions with fixed signatures, so that the loop is
-compiled once per machine and cached on disk, whatever it integrates.
+compiled once per machine and kept, whatever it integrates.
 """
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import gc
 import hashlib
+import pickle
 import sys
-import tempfile
 import threading
 import time
 import typing
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from types import CodeType
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -26,10 +24,11 @@ from integrators import advance, crossings, loop, sliding, step_size, steps
 
 __all__ = [
     "SIGNATURES",
+    "Store",
     "arrays",
-    "cache_folder",
     "compiled",
     "digest",
+    "edition",
     "for_each_row",
     "record",
     "usable_inside",
@@ -45,9 +44,9 @@ _OF_A_STEP: tuple[Callable[..., Any], ...] = (
     steps.fit_dense, steps.interpolate, steps.take_step, steps.weigh,
 )  # fmt: skip
 _OF_AN_ARC: tuple[Callable[..., Any], ...] = (
-    advance.advance, loop.active_relations, loop.go_on, loop._begin_arc, loop._count_anew, loop._listed,
-    loop._look_at_clock,
-    loop._no_progress, loop._often_changed, loop._put_modes, loop._rearm, loop._undefined,
+    advance.advance, loop.active_relations, loop.go_on, loop._begin_arc, loop._count_anew,
+    loop._listed, loop._look_at_clock, loop._no_progress, loop._often_changed, loop._put_modes,
+    loop._rearm, loop._undefined,
     sliding._sign, sliding._solve, sliding.look, sliding.seize, sliding.flow_on, sliding.margins_on,
     sliding.slope_on, step_size.starting_step,
 )  # fmt: skip
@@ -114,7 +113,19 @@ def _array(value: Any, hint: Any) -> Any:
     return table
 
 
-# --------------------------------------------------------------------------- the cache on disk
+# --------------------------------------------------------------------------- what is kept
+class Store(Protocol):
+    """Where machine code is kept. What comes out is what was put in: wrong bits end the process."""
+
+    def __hash__(self) -> int: ...
+
+    def get(self, name: str) -> bytes | None:
+        """Return what is kept under a name, None if there is nothing."""
+
+    def put(self, name: str, content: bytes) -> None:
+        """Keep bytes under a name, if that is possible."""
+
+
 def digest(*functions: Callable[..., Any], text: str = "") -> str:
     """Return a short name for what some functions do.
 
@@ -143,71 +154,98 @@ def digest(*functions: Callable[..., Any], text: str = "") -> str:
     return stamp.hexdigest()[:16]
 
 
-def cache_folder(base: Path) -> Path | None:
-    """Return the folder to keep compiled code in, or None if it cannot be written.
-
-    Parameters
-    ----------
-    base : Path
-        Its parent. The folder's name changes with this package's source and with the versions of
-        Python and numba.
+def edition() -> str:
+    """Return a short name for what the loop computes, whoever runs it.
 
     Returns
     -------
-    Path or None
-        An existing folder.
-    """
-    import numba
+    str
+        It changes with the loop's source and with the version of Python.
 
-    functions: list[Callable[..., Any]] = [loop.record, _machine_code, *_OF_A_STEP, *_OF_AN_ARC]
+    Examples
+    --------
+    >>> len(edition())
+    16
+    """
+    functions: list[Callable[..., Any]] = [loop.record, *_OF_A_STEP, *_OF_AN_ARC]
     modules = (steps, step_size, crossings, advance, sliding, loop)
     constants = [
         (name, value if isinstance(value, int | float) else getattr(value, "_fields", None))
         for module in modules
         for name, value in vars(module).items()
     ]
-    parts = sys.version, numba.__version__, _OPTIONS, SIGNATURES, constants
-    folder = base / digest(*functions, text=repr(parts))
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return folder
-    except OSError:
-        return None
+    return digest(*functions, text=repr((sys.version, constants)))
 
 
 _lock = threading.RLock()  # of numba's settings, and so that nothing is compiled twice
 
 
-def _machine_code(signature: Any, function: Callable[..., Any], folder: Path | None) -> Any:
-    """Compile a function, or load what was kept of it in a folder."""
+class _Kept:
+    """Stands in for numba's own cache, which loads whatever its files hold."""
+
+    cache_path = None
+
+    def __init__(self, function: Callable[..., Any], store: Store | None, notice: str) -> None:
+        self.function, self.store, self.notice = function, store, notice
+        self.missed = False
+
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        """Return a result that was kept, None to have it compiled."""
+        from numba.core.compiler import CompileResult
+
+        target.refresh()
+        kept = None if self.store is None else self.store.get(self._name(signature, target))
+        if kept is not None:
+            try:
+                return CompileResult._rebuild(target, *pickle.loads(kept))
+            except Exception:  # kept by a numba that differs from this one in more than its number
+                pass
+        self.missed = True
+        if self.notice:
+            print(self.notice, file=sys.stderr)
+        return None
+
+    def save_overload(self, signature: Any, result: Any) -> None:
+        """Keep a result."""
+        from numba.core.serialize import dumps
+
+        if self.store is not None:
+            name = self._name(signature, result.target_context)
+            self.store.put(name, dumps(result._reduce()))
+
+    def _name(self, signature: Any, target: Any) -> str:
+        import numba
+
+        # The processor too: a folder may be shared between machines.
+        what = signature, target.codegen().magic_tuple(), numba.__version__, _OPTIONS
+        function = self.function
+        text = repr((what, edition(), function.__module__, function.__qualname__))
+        return f"{function.__qualname__}-{digest(function, text=text)}"
+
+
+def _machine_code(
+    signature: Any, function: Callable[..., Any], store: Store | None, notice: str = ""
+) -> Any:
+    """Compile a function, or load what was kept of it in a store."""
     import numba
 
-    jit = functools.partial(numba.njit, signature, nogil=True, **_OPTIONS)
     config = numba.config
     with _lock:
-        before = config.CACHE_DIR, config.LOOP_VECTORIZE
+        before = config.LOOP_VECTORIZE
         # Vectorized loops cost a fifth at n = 4, and gain only where n is in the hundreds.
-        config.CACHE_DIR, config.LOOP_VECTORIZE = str(folder or ""), 0
+        config.LOOP_VECTORIZE = 0
         collecting = gc.isenabled()
         gc.disable()  # compiling makes objects by the million and no garbage worth looking for
         try:
-            return jit(cache=folder is not None)(function)
-        except Exception:  # a damaged file, a full disk: it only costs time, and not for ever
-            _forget(function, folder)
-            return jit()(function)
+            dispatcher = numba.njit(nogil=True, **_OPTIONS)(function)
+            dispatcher._cache = _Kept(function, store, notice)
+            dispatcher.compile(signature)
+            dispatcher.disable_compile()
+            return dispatcher
         finally:
-            config.CACHE_DIR, config.LOOP_VECTORIZE = before
+            config.LOOP_VECTORIZE = before
             if collecting:
                 gc.enable()
-
-
-def _forget(function: Callable[..., Any], folder: Path | None) -> None:
-    """Remove what was kept of a function, so that the next program keeps it anew."""
-    stem = Path(function.__code__.co_filename).stem
-    with contextlib.suppress(OSError):
-        for file in folder.rglob(f"{stem}.{function.__qualname__}-*.nb?") if folder else ():
-            file.unlink(missing_ok=True)
 
 
 # --------------------------------------------------------------------------- compiling
@@ -246,7 +284,7 @@ def _signature(letters: str) -> Any:
     return types.void(*(_types()[letter] for letter in letters))
 
 
-def compiled(name: str, function: Callable[..., None], folder: Path | None) -> Any:
+def compiled(name: str, function: Callable[..., None], store: Store | None) -> Any:
     """Return a system's function as machine code.
 
     Parameters
@@ -254,8 +292,8 @@ def compiled(name: str, function: Callable[..., None], folder: Path | None) -> A
     name : str
         A key of `SIGNATURES`.
     function : callable
-        Its text lies in a file if it is to be kept.
-    folder : Path, optional
+        Its qualified name is that of no other function: the linker knows it by nothing else.
+    store : Store, optional
         Where to keep it.
 
     Returns
@@ -263,17 +301,17 @@ def compiled(name: str, function: Callable[..., None], folder: Path | None) -> A
     callable
         With the fixed signature.
     """
-    return _machine_code(_signature(SIGNATURES[name]), function, folder)
+    return _machine_code(_signature(SIGNATURES[name]), function, store)
 
 
-def record(arguments: tuple[Any, ...], folder: Path | None) -> int:
+def record(arguments: tuple[Any, ...], store: Store | None) -> int:
     """Call `integrators.loop.record` as machine code; it releases the GIL.
 
     Parameters
     ----------
     arguments : tuple
         Its arguments: compiled functions, arrays and numbers.
-    folder : Path, optional
+    store : Store, optional
         Where to keep the machine code.
 
     Returns
@@ -281,23 +319,23 @@ def record(arguments: tuple[Any, ...], folder: Path | None) -> int:
     int
         What it returns.
     """
-    machine_code: Callable[..., int] = _record(arguments, folder)
+    machine_code: Callable[..., int] = _record(arguments, store)
     return machine_code(*arguments)
 
 
 _compiled_record: list[Any] = []
 
 
-def _record(arguments: tuple[Any, ...], folder: Path | None) -> Any:
+def _record(arguments: tuple[Any, ...], store: Store | None) -> Any:
     if _compiled_record:
         return _compiled_record[0]
     with _lock:
         if not _compiled_record:
-            _compiled_record.append(_compile_record(arguments, folder))
+            _compiled_record.append(_compile_record(arguments, store))
         return _compiled_record[0]
 
 
-def _compile_record(arguments: tuple[Any, ...], folder: Path | None) -> Any:
+def _compile_record(arguments: tuple[Any, ...], store: Store | None) -> Any:
     import numba
 
     names = ("flow", "arm", "margins", "normal", "switch", "act", "observe")
@@ -305,12 +343,12 @@ def _compile_record(arguments: tuple[Any, ...], folder: Path | None) -> Any:
     others = [numba.typeof(argument) for argument in arguments[len(names) :]]
     for helper in (*_OF_A_STEP, *_OF_AN_ARC):
         usable_inside(helper, inlined=helper in _OF_A_STEP)
-    known = folder is not None and any(folder.rglob("loop.record-*.nbi"))
-    if not known:
-        print("gms-fsm: compiling the engine, once on this machine ...", file=sys.stderr)
     start = time.perf_counter()
-    result = _machine_code(numba.types.int64(*functions, *others), loop.record, folder)
-    if not known:
+    result = _machine_code(
+        numba.types.int64(*functions, *others), loop.record, store,
+        "gms-fsm: compiling the engine, once on this machine ...",
+    )  # fmt: skip
+    if result._cache.missed:
         print(f"gms-fsm: compiled in {time.perf_counter() - start:.1f} s", file=sys.stderr)
     return result
 
@@ -321,18 +359,18 @@ def _each_row(observe: Any, t: Any, y: Any, mode: Any, live: Any, p: Any, table:
 
 
 @functools.cache
-def _compiled_each_row(folder: Path | None) -> Any:
+def _compiled_each_row(store: Store | None) -> Any:
     import numba
 
     kind = _types()
     observe = numba.types.FunctionType(_signature(SIGNATURES["observe"]))
     table, modes = numba.types.float64[:, ::1], numba.types.int64[:, ::1]
     signature = numba.types.void(observe, kind["V"], table, modes, kind["V"], kind["P"], table)
-    return _machine_code(signature, _each_row, folder)
+    return _machine_code(signature, _each_row, store)
 
 
 def for_each_row(
-    observe: Any, t: Any, y: Any, mode: Any, live: Any, p: Any, table: Any, folder: Path | None
+    observe: Any, t: Any, y: Any, mode: Any, live: Any, p: Any, table: Any, store: Store | None
 ) -> None:
     """Call a compiled ``observe`` for many rows.
 
@@ -348,7 +386,7 @@ def for_each_row(
         Parameters.
     table : ndarray, shape (rows, width)
         Filled.
-    folder : Path, optional
+    store : Store, optional
         Where to keep the machine code.
     """
-    _compiled_each_row(folder)(observe, t, y, mode, live, p, table)
+    _compiled_each_row(store)(observe, t, y, mode, live, p, table)

@@ -39,6 +39,7 @@ __all__ = [
     "happenings",
     "run",
     "state_of",
+    "take_rows",
 ]
 
 ROWS_AT_ONCE = 512  # a buffer
@@ -303,12 +304,12 @@ def happenings(
                 solver.advance(options.rows_at_once if options.located else 1)
         except Exception:
             if cursor[kernel.ROW]:
-                yield _take_rows(b)
+                yield take_rows(b)
             raise
         t, mode = now[loop.T], modes_of(b)
         if happening == loop.ROWS:
             if cursor[kernel.ROW]:
-                yield _take_rows(b)
+                yield take_rows(b)
         elif happening == loop.FIRING:
             before = list(y), mode
         elif happening == loop.FIRED:
@@ -522,7 +523,19 @@ def failure(happening: int, b: Buffers, relations: list[str]) -> HybridError:
     return NotFinite(text, *scene)
 
 
-def _take_rows(b: Buffers) -> Arc:
+def take_rows(b: Buffers) -> Arc:
+    """Take the rows that wait in the buffers; only whole ones are counted there.
+
+    Parameters
+    ----------
+    b : Buffers
+        Of the run.
+
+    Returns
+    -------
+    Arc
+        Perhaps without rows.
+    """
     rows = b.out.cursor[kernel.ROW]
     b.out.cursor[kernel.ROW] = 0
     states = [list(y) for y in b.out.rows_y[:rows]]

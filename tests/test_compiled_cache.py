@@ -1,14 +1,15 @@
 """Machine code is kept on disk, and whatever happens to it there costs time and nothing else.
 
 Another process does not compile again; two may start at once; an unwritable folder or a damaged
-file is survived; changed source goes to another folder; programs that were compiled in different
-processes are never taken for each other. Without numba the words say what to install, and the
-machines run.
+file is survived, down to a single wrong bit; changed source has another name; programs that were
+compiled in different processes are never taken for each other. Without numba the words say what to
+install, and the machines run.
 """
 
 from __future__ import annotations
 
 import os
+import random
 import subprocess
 import sys
 import textwrap
@@ -21,6 +22,7 @@ import pytest
 
 from gms_fsm import Prescribed, compiled, simulate
 from gms_fsm.program import lower
+from gms_fsm.store import Store
 from integrators import compiled as machine
 from integrators import loop, step_size
 from tests.helpers import open_loop, stick_slip
@@ -83,7 +85,7 @@ def _rows(folder: Path, *velocities: str) -> str:
 
 
 def _kept(folder: Path) -> set[Path]:
-    return {path for path in folder.rglob("*.nb?") if path.stat().st_size}
+    return {path for path in folder.rglob("*") if path.is_file()}
 
 
 # --------------------------------------------------------------------------- once on this machine
@@ -101,8 +103,8 @@ def test_two_processes_that_start_at_once_both_succeed(
     folder, said = warm
     assert [out for out, _ in said] == ["equal 24\n"] * 2
     assert any(NOTE in err for _, err in said), "the wait is explained"
-    assert [path.name for path in _kept(folder) if path.match("loop.record-*.nbi")]
-    assert not list(folder.rglob("*.part")), "no half files are left"
+    assert len([path for path in _kept(folder) if path.match("record-*")]) == 1
+    assert not list(folder.rglob(".*")), "no half files are left"
 
 
 def test_the_next_process_does_not_compile_again(
@@ -116,14 +118,29 @@ def test_the_next_process_does_not_compile_again(
 
 
 def test_a_damaged_cache_only_costs_time(warm: tuple[Path, list[tuple[str, str]]]) -> None:
-    """Every file of it: the indices are garbage, the code is cut short."""
+    """Every file of it: garbage, or cut short."""
     folder = warm[0]
-    for path in _kept(folder):
+    for turn, path in enumerate(sorted(_kept(folder))):
         content = path.read_bytes()
-        path.write_bytes(b"garbage" * 9 if path.suffix == ".nbi" else content[: len(content) // 2])
+        path.write_bytes(b"garbage" * 9 if turn % 2 else content[: len(content) // 2])
     out, err = _ended(_start(RUN, NUMBA_CACHE_DIR=str(folder)))
     assert out == "equal 24\n"
     assert "Traceback" not in err
+
+
+def test_a_wrong_bit_anywhere_is_found_before_the_code_is_loaded(
+    warm: tuple[Path, list[tuple[str, str]]],
+) -> None:
+    """Unfound, every fifth of them ends the process. Each process here has one in each file."""
+    folder, source = warm[0], random.Random(14)
+    whole = _kept(folder)
+    for _ in range(3):
+        small = [path for path in whole if not path.match("record-*")]  # that one takes 10 s
+        for path in small:
+            _flip(path, source)
+        assert _ended(_start(RUN, NUMBA_CACHE_DIR=str(folder))) == ("equal 24\n", "")
+        assert _kept(folder) == set(whole)
+        assert all(Store(path.parent).get(path.name) for path in whole), "all are made anew"
 
 
 # --------------------------------------------------------------------------- damage of every kind
@@ -135,7 +152,7 @@ def _forget_all() -> None:
 @pytest.fixture
 def observe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], Any]]:
     """Compile one function of a program as a new process would, with a cache of its own; try it."""
-    monkeypatch.setattr(compiled, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(compiled, "store", lambda: Store.at(tmp_path))
     program = lower(stick_slip("signed"), Prescribed("0.1*t"))
     y, mode = [0.1, 0.2, 0.3, 0.2, 0.1], [0, 1, 0, 1]
     wanted = [0.0] * 14
@@ -150,6 +167,17 @@ def observe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
 
     yield once
     _forget_all()
+
+
+def _flip(path: Path, source: random.Random) -> None:
+    content = bytearray(path.read_bytes())
+    bit = source.randrange(8 * len(content))
+    content[bit // 8] ^= 1 << bit % 8
+    path.write_bytes(content)
+
+
+def _flipped(path: Path) -> None:
+    _flip(path, random.Random(3))
 
 
 def _truncated(path: Path) -> None:
@@ -170,52 +198,52 @@ def _another_kind(path: Path) -> None:
     path.mkdir()
 
 
-@pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
-@pytest.mark.parametrize("damage", [_truncated, _empty, _garbage, _another_kind])
+def _another_name(path: Path) -> None:
+    """What is whole, but was kept for another function."""
+    Store(path.parent).put("other", b"content")
+    path.write_bytes((path.parent / "other").read_bytes())
+    (path.parent / "other").unlink()
+
+
+def _unreadable(path: Path) -> None:
+    """What was put there whole, by somebody whose bytes mean something else."""
+    Store(path.parent).put(path.name, b"something else")
+
+
+DAMAGES = [_flipped, _truncated, _empty, _garbage, _another_name, _unreadable]
+
+
+@pytest.mark.parametrize("damage", [*DAMAGES, _another_kind])
 def test_a_damaged_file_is_survived(
-    damage: Callable[[Path], None], suffix: str, observe: Callable[[], Any], tmp_path: Path
+    damage: Callable[[Path], None], observe: Callable[[], Any], tmp_path: Path
 ) -> None:
     observe()
-    (path,) = [path for path in _kept(tmp_path) if path.suffix == suffix]
+    (path,) = _kept(tmp_path)
+    damage(path)
+    assert not observe().stats.cache_hits
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_cache_is_made_anew(
+    damage: Callable[[Path], None], observe: Callable[[], Any], tmp_path: Path
+) -> None:
+    """It costs the time once, not each time."""
+    observe()
+    (path,) = _kept(tmp_path)
     damage(path)
     observe()
-
-
-@pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
-def test_a_damaged_cache_is_made_anew(
-    suffix: str, observe: Callable[[], Any], tmp_path: Path
-) -> None:
-    """It costs the time once or twice, not each time."""
-    observe()
-    whole = {path: path.stat().st_size for path in _kept(tmp_path)}
-    assert len(whole) == 2
-    for path in whole:
-        if path.suffix == suffix:
-            _truncated(path)
-    observe()  # removes what it cannot read
-    observe()  # keeps its own
-    assert {path: path.stat().st_size for path in _kept(tmp_path)} == whole
-    assert observe().stats.cache_hits, "the third time it is there"
+    assert _kept(tmp_path) == {path}
+    assert observe().stats.cache_hits
 
 
 def test_a_folder_that_cannot_be_written_only_costs_time(tmp_path: Path) -> None:
     in_the_way = tmp_path / "file"
     in_the_way.write_text("not a folder")
     for folder in (in_the_way, in_the_way / "below", Path("/proc/no such place")):
-        assert machine.cache_folder(folder) is None
+        assert Store.at(folder) is None
     assert "Traceback" not in _rows(in_the_way / "below", "0.1*t")
     assert in_the_way.read_text() == "not a folder"
     assert list(tmp_path.iterdir()) == [in_the_way]
-
-
-def test_a_text_in_the_cache_that_was_tampered_with_is_not_run(
-    observe: Callable[[], Any], tmp_path: Path
-) -> None:
-    """The text beside machine code is there for numba's bookkeeping; it is never imported."""
-    observe()
-    (text,) = tmp_path.glob("program_*.py")
-    text.write_text("raise SystemExit('from the cache')\n")
-    observe()
 
 
 # --------------------------------------------------------------------------- no mix-up
@@ -229,15 +257,11 @@ def test_programs_compiled_in_different_processes_are_told_apart(tmp_path: Path)
     assert _kept(tmp_path) == before
 
 
-def test_the_folder_is_the_same_in_every_process(tmp_path: Path) -> None:
-    code = "from gms_fsm import compiled; print(compiled.cache_folder())"
-    names = {
-        _ended(_start(code, NUMBA_CACHE_DIR=str(tmp_path), PYTHONHASHSEED=seed))[0]
-        for seed in ("0", "1", "random")
-    }
-    (name,) = names
-    assert Path(name.strip()).parent == tmp_path
-    assert Path(name.strip()).is_dir()
+def test_the_names_are_the_same_in_every_process(tmp_path: Path) -> None:
+    for seed in ("0", "1", "random"):
+        out, _ = _ended(_start(ROWS, "0.1*t", NUMBA_CACHE_DIR=str(tmp_path), PYTHONHASHSEED=seed))
+        assert out == "equal\n"
+    assert len(_kept(tmp_path)) == 2  # the program's observe, and what calls it for each row
 
 
 # --------------------------------------------------------------------------- changed source
@@ -256,41 +280,44 @@ def _changes(patch: pytest.MonkeyPatch) -> dict[str, Callable[[], None]]:
         "the loop": lambda: patch.setattr(loop, "record", _other),
         "a number": lambda: patch.setattr(step_size, "SAFETY", 0.8),
         "a limit": lambda: patch.setattr(loop, "MOST_SWITCHES", 99),
-        "the order of an argument": lambda: patch.setattr(
-            machine, "SIGNATURES", {**machine.SIGNATURES, "act": "fiiVIP"}
-        ),
-        "an option": lambda: patch.setattr(machine, "_OPTIONS", {"error_model": "python"}),
-        "numba": lambda: patch.setattr(numba, "__version__", "0.0"),
         "Python": lambda: patch.setattr(sys, "version", "4.0"),
     }
 
 
-def test_changed_source_gives_another_folder(tmp_path: Path) -> None:
-    usual = machine.cache_folder(tmp_path)
-    assert machine.cache_folder(tmp_path) == usual is not None
+def test_changed_source_is_another_edition() -> None:
+    usual = machine.edition()
     found = {"nothing": usual}
     with pytest.MonkeyPatch.context() as patch:
         names = list(_changes(patch))
     for name in names:
         with pytest.MonkeyPatch.context() as patch:
             _changes(patch)[name]()
-            found[name] = machine.cache_folder(tmp_path)
+            found[name] = machine.edition()
     assert len(set(found.values())) == len(found), found
-    assert machine.cache_folder(tmp_path) == usual
+    assert machine.edition() == usual
 
 
-def test_another_text_gives_another_file() -> None:
-    if compiled.cache_folder() is None:
-        pytest.skip("no cache can be written here")
-    files = [compiled._text_file(source) for source in ("a = 1\n", "a = 2\n", "a = 1\n")]
-    try:
-        assert files[0] == files[2] != files[1]
-        assert files[0] is not None
-        assert files[0].read_text() == "a = 1\n"
-    finally:
-        for path in set(files):
-            if path is not None:
-                path.unlink()
+def test_another_edition_signature_option_or_numba_is_kept_under_another_name(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from numba.core.registry import cpu_target
+
+    def name(signature: Any = "iifVIP", function: Any = _other) -> str:
+        return machine._Kept(function, None, "")._name(signature, cpu_target.target_context)
+
+    def sum_of(a: Any, b: Any) -> Any:
+        return a + b
+
+    found = [name(), name("fiiVIP"), name(function=sum_of)]
+    for place, attribute, value in (
+        (machine, "edition", lambda: "another"), (machine, "_OPTIONS", {"error_model": "python"}),
+        (numba, "__version__", "0.0"),
+    ):  # fmt: skip
+        with monkeypatch.context() as patch:
+            patch.setattr(place, attribute, value)
+            found.append(name())
+    assert len(set(found)) == len(found)
+    assert name() == found[0]
 
 
 def test_a_digest_follows_code_and_constants_but_not_the_place() -> None:
@@ -335,7 +362,7 @@ def test_settings_of_numba_are_as_they_were_whoever_compiles() -> None:
 
         def rows() -> None:
             begin.wait()
-            machine._compiled_each_row(compiled.cache_folder())
+            machine._compiled_each_row(compiled.store())
 
         threads = [threading.Thread(target=work) for work in (system, rows, rows, system)]
         for thread in threads:

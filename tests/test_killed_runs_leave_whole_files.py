@@ -2,7 +2,8 @@
 
 Writers write two known things in turns, again and again, and are killed with SIGKILL at a random
 moment; then every file is the one thing or the other, to the last bit. What a kill leaves besides
-is named ``.<file>.<number>.part`` and disturbs nobody. About 25 kills here, 200 in tests/soak.py.
+is named ``.<file>.<random>.gms-fsm-part`` and is gone after the next run. About 25 kills here, 200
+in tests/soak.py.
 """
 
 from __future__ import annotations
@@ -29,13 +30,13 @@ import pytest
 from gms_fsm import Prescribed, Sweep, Trace, simulate, sweep
 from gms_fsm.cli import main
 from gms_fsm.errors import OutputError
-from gms_fsm.files import leftovers, output_folder, written_together, written_whole
+from gms_fsm.files import LIST, leftovers, written_together, written_whole
 from gms_fsm.session import Session
 from tests.helpers import pulled_mass, same_bits, stick_slip
 from tests.scenario_files import OPEN_LOOP
 
 ROOT = Path(__file__).resolve().parents[1]
-PARTS = re.compile(r"\..+\.[0-9]+\.part|\.gms-fsm-probe")
+PARTS = re.compile(r"\..+\.[0-9a-f]{16}\.gms-fsm-(part|rest)")
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and SIGKILL")
 
 
@@ -256,10 +257,11 @@ def kill_and_look(name: str, share: float, folder: Path) -> list[str]:
     assert process.stdout.readline() == "gone\n"
     known = {path.name for path in folder.rglob("*")}
     writer.look(folder)
-    left = sorted(name for name in known if name.startswith("."))
+    left = sorted(name for name in known if name.startswith(".") and name != LIST)
     assert [name for name in left if not PARTS.fullmatch(name)] == []
     writer.write(folder, 1)  # the next run goes about its work as if nothing had been
     writer.look(folder)
+    assert {path.name for path in folder.rglob(".*")} <= {LIST}
     return left
 
 
@@ -326,9 +328,12 @@ def test_line_ends_do_not_part_rows_and_log(tmp_path: Path) -> None:
 
 
 def test_leftovers_are_those_of_the_file_alone(tmp_path: Path) -> None:
-    for name in (".a.npz.12.part", ".a.npz.x.part", ".b.npz.12.part", "a.npz.12.part", ".a.npz"):
+    mark = f"{7:016x}"
+    names = [f".a.csv.{mark}.gms-fsm-rest", f".a.csv.{mark}.gms-fsm-part", ".a.csv.7.gms-fsm-rest",
+             f".b.csv.{mark}.gms-fsm-rest", f"a.csv.{mark}.gms-fsm-rest", ".a.csv"]  # fmt: skip
+    for name in names:
         (tmp_path / name).touch()
-    assert [path.name for path in leftovers(tmp_path / "a.npz")] == [".a.npz.12.part"]
+    assert [path.name for path in leftovers(tmp_path / "a.csv")] == names[:1]
 
 
 def test_files_written_together_are_all_old_if_one_cannot_be_written(tmp_path: Path) -> None:
@@ -343,11 +348,3 @@ def test_files_written_together_are_all_old_if_one_cannot_be_written(tmp_path: P
         written_together({paths[0]: lambda file: file.write(b"new"), paths[1]: fails})
     assert [path.read_bytes() for path in paths] == [b"old", b"old"]
     assert len(list(tmp_path.iterdir())) == 2
-
-
-def test_a_probe_that_was_left_does_not_disturb(tmp_path: Path) -> None:
-    (tmp_path / ".gms-fsm-probe").write_bytes(b"")
-    (tmp_path / ".run.npz.1.part").write_bytes(b"half of")
-    assert output_folder(tmp_path) == tmp_path
-    _traces()[0].save(tmp_path / "run.npz")
-    same_bits(Trace.load(tmp_path / "run.npz"), _traces()[0])

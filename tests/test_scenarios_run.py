@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import Trace
+from gms_fsm.files import LIST
 from gms_fsm.report import compare, measured_force, run_scenario
 from gms_fsm.scenario import Loaded, load_scenario
 from tests.helpers import same_bits
@@ -38,7 +39,7 @@ def _figures() -> None:
 
 def check_report(loaded: Loaded, trace: Trace, files: list[Path], folder: Path) -> str:
     """Assert what every report has; return the summary."""
-    assert set(files) == set(folder.iterdir())
+    assert {*files, folder / LIST} == set(folder.iterdir())
     assert files[0] == folder / "summary.md"
     names = {path.name for path in files}
     assert {"summary.md", "trace.npz", "transitions.csv", "overview.png", "overview.svg"} <= names

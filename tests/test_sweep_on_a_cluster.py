@@ -1,6 +1,6 @@
 """A sweep on a Dask cluster of processes survives a killed worker: every result arrives once.
 
-What kills its worker each time it is tried is a row that says so.
+What kills its worker each time it is tried is a row that says so, and so is what cannot be sent.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import os
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from typing import Any
@@ -15,9 +16,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import sweep
+from gms_fsm import Prescribed, sweep
 from gms_fsm.sweep import _Collected
-from tests.helpers import pulled_mass
+from tests.helpers import pulled_mass, stick_slip
 
 distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
 
@@ -118,3 +119,26 @@ def test_what_kills_every_worker_is_a_row_that_says_so() -> None:
     assert set(again.outcome) == {"ok"}
     np.testing.assert_array_equal(again.F, here.F)  # compiled over there, by machines here
     assert again.transitions.tolist() == here.transitions.tolist()
+
+
+@quiet
+def test_a_signal_that_cannot_be_sent_is_a_row_that_says_so(cluster: Any) -> None:
+    lock = threading.Lock()
+
+    def velocity(t: float) -> float:
+        with lock:
+            return 0.1 * t
+
+    model, values = stick_slip("signed"), {"F_s": np.linspace(1.5, 1.9, 130)}
+    with distributed.Client(cluster) as client:
+        executor = client.get_executor()
+        lost = sweep(model, Prescribed(velocity), 3.0, values, executor=executor, engine="machines")
+        found = sweep(model, Prescribed("0.1*t"), 3.0, values, executor=executor, engine="machines")
+    assert set(lost.outcome) == {"NotSent"}
+    assert len(lost) == 130
+    assert np.isnan(lost.F).all()
+    for text in set(lost.message):
+        assert text.startswith("the run could not be sent to a worker (TypeError: ")
+        assert text.endswith("give signals as expressions of t or as arrays, or use threads "
+                             "(executor=None)")  # fmt: skip
+    assert set(found.outcome) == {"ok"}, "the cluster is none the worse for it"

@@ -22,10 +22,10 @@ def read(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let engine="compiled" run the text."""
     module = gms_fsm.compiled
     monkeypatch.setattr(module, "machine_code", lambda program, name: program.ieee[name])
-    monkeypatch.setattr(module, "cache_folder", lambda: None)
+    monkeypatch.setattr(module, "store", lambda: None)
     kernel = integrators.compiled
-    monkeypatch.setattr(kernel, "record", lambda arguments, folder: loop.record(*arguments))
-    monkeypatch.setattr(kernel, "_compiled_each_row", lambda folder: kernel._each_row)
+    monkeypatch.setattr(kernel, "record", lambda arguments, store: loop.record(*arguments))
+    monkeypatch.setattr(kernel, "_compiled_each_row", lambda store: kernel._each_row)
 
 
 @pytest.mark.parametrize(

@@ -156,7 +156,9 @@ def teach(number: int, folder: str | Path) -> Taught:
         If a picture or the page is left out because an extra is not installed.
     """
     chosen = lesson(number)
-    folder = output_folder(folder)
+    folder = output_folder(
+        folder, [f"lesson_{number}.{ending}" for ending in ("txt", "png", "svg", "html")]
+    )
     result = chosen.run()
     text = ("\n".join(result.lines()) + "\n").encode()
     files = [written_whole(folder / f"lesson_{number}.txt", lambda file: file.write(text))]

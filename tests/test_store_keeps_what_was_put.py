@@ -1,0 +1,90 @@
+"""A store gives back what was put into it, to the last bit, or nothing; whoever uses it at once.
+
+One bit anywhere is found, in name, checksum and content. What it finds damaged it removes, so that
+it is made anew. It does not know what the bytes are.
+"""
+
+from __future__ import annotations
+
+import random
+import threading
+from pathlib import Path
+
+import pytest
+
+from gms_fsm.store import Store
+
+CONTENT = random.Random(1).randbytes(300)
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Store:
+    made = Store.at(tmp_path / "new" / "folder")
+    assert made is not None
+    return made
+
+
+def test_every_single_bit_is_looked_at(store: Store) -> None:
+    store.put("one", CONTENT)
+    path = store.folder / "one"
+    whole = path.read_bytes()
+    for bit in range(8 * len(whole)):
+        changed = bytearray(whole)
+        changed[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(changed)
+        assert store.get("one") is None
+        assert not path.exists()
+    store.put("one", CONTENT)
+    assert store.get("one") == CONTENT
+
+
+@pytest.mark.parametrize("length", [0, 1, 31, 32, 33, 331])
+def test_what_is_cut_short_is_not_whole(store: Store, length: int) -> None:
+    store.put("one", CONTENT)
+    path = store.folder / "one"
+    path.write_bytes(path.read_bytes()[:length])
+    assert store.get("one") is None
+
+
+def test_nothing_is_something_too(store: Store) -> None:
+    assert store.get("none") is None
+    store.put("none", b"")
+    assert store.get("none") == b""
+
+
+def test_a_file_does_not_stand_for_another(store: Store) -> None:
+    store.put("one", CONTENT)
+    (store.folder / "one").rename(store.folder / "two")
+    assert store.get("two") is None
+
+
+def test_a_full_disk_keeps_nothing_and_says_nothing(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.replace", full)
+    store.put("one", CONTENT)
+    assert store.get("one") is None
+    assert list(store.folder.iterdir()) == []
+
+
+def test_threads_that_write_and_read_at_once_see_whole_things(store: Store) -> None:
+    contents = [bytes([number]) * 100_000 for number in range(3)]
+    store.put("one", contents[0])
+    wrong: list[int] = []
+
+    def write(content: bytes) -> None:
+        for _ in range(100):
+            store.put("one", content)
+            if store.get("one") not in contents:
+                wrong.append(1)
+
+    threads = [threading.Thread(target=write, args=(content,)) for content in contents]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert wrong == []
+    assert [path.name for path in store.folder.iterdir()] == ["one"]
