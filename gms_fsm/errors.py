@@ -155,6 +155,10 @@ class SignalEndError(SimulationError):
     """A sampled signal ends before the run does."""
 
 
+class CallbackError(SimulationError):
+    """A callback changed what it may only look at: values, or the state of an element."""
+
+
 class UnitError(GMSError, ValueError):
     """A unit is unknown, or measures something else."""
 

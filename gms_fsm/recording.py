@@ -12,6 +12,7 @@ import numpy as np
 import integrators
 from gms_fsm.chart import Chart
 from gms_fsm.errors import (
+    CallbackError,
     LivelockError,
     NotFiniteError,
     SignalEndError,
@@ -19,11 +20,12 @@ from gms_fsm.errors import (
     StepSizeError,
 )
 from gms_fsm.expression import rough_points
+from gms_fsm.machines import Meddling
 from gms_fsm.start import Start
 from gms_fsm.trace import Rows, Trace, log_of
 from integrators import Arc, Firing, HybridError, Livelock, NotFinite, StepTooSmall
 
-__all__ = ["Moment", "Recorder", "Recording", "check_end", "explained", "observed"]
+__all__ = ["Moment", "Recorder", "Recording", "check_end", "explained", "meddled", "observed"]
 
 
 class Recording(Protocol):
@@ -284,6 +286,24 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
         f"law, a larger v_c, or other parameters; {kept}",
         trace,
     )
+
+
+def meddled(error: Meddling, recorder: Recording) -> CallbackError:
+    """Put what a callback did into an error with the trace.
+
+    Parameters
+    ----------
+    error : Meddling
+        From the machines.
+    recorder : Recording
+        What was kept.
+
+    Returns
+    -------
+    CallbackError
+        With the trace.
+    """
+    return CallbackError(f"{error}; the run up to there is kept in .trace", recorder.trace())
 
 
 def _way_back(chart: Chart, taken: Any) -> str:

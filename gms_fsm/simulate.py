@@ -13,11 +13,11 @@ import integrators
 from gms_fsm.checkpoint import Keeper
 from gms_fsm.compiled_run import CompiledRun
 from gms_fsm.errors import ParameterError, SignalError, SimulationError
-from gms_fsm.machines import ElementMachines, IfElse, MachineEngine
+from gms_fsm.machines import ElementMachines, IfElse, MachineEngine, Meddling
 from gms_fsm.models import Model
 from gms_fsm.monitors import Monitor, checked, watched
 from gms_fsm.program import system
-from gms_fsm.recording import Moment, Recorder, check_end, explained
+from gms_fsm.recording import Moment, Recorder, check_end, explained, meddled
 from gms_fsm.rigs import Rig
 from gms_fsm.start import Start
 from gms_fsm.trace import Trace
@@ -119,7 +119,7 @@ def simulate(
         If the checkpoint belongs to another run, or is damaged.
     SimulationError
         If the run cannot go on (`LivelockError`, `StepSizeError`, `NotFiniteError`,
-        `SignalEndError`); its ``trace`` holds the part before.
+        `SignalEndError`, `CallbackError`); its ``trace`` holds the part before.
 
     Examples
     --------
@@ -230,6 +230,8 @@ class Run:
             raise SimulationError(
                 f"{error}; the run up to there is kept", recorder.trace()
             ) from None
+        except Meddling as error:
+            raise meddled(error, recorder) from error.__cause__
         if happening is None:
             check_end(recorder)
             return False
