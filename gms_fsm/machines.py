@@ -102,6 +102,11 @@ class ElementMachines:
     """
 
     def __init__(self, model: Model, element: type[Element] = Element) -> None:
+        if not hasattr(model, "chart"):
+            raise ParameterError(
+                f"model is {shown(model)}; it must be a model, for example GMS(parameters, "
+                "law='signed')"
+            )
         chart = model.chart
         self.model = model
         self.guards = {edge: Guard(edge, guard) for edge, guard in chart.guards.items()}

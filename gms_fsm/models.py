@@ -232,7 +232,12 @@ class ChartModel:
     title: str = field(default="", kw_only=True)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.n, int) or self.n < 1:
+        if not isinstance(self.chart, Chart):
+            raise ParameterError(
+                f"chart is {shown(self.chart)}; it must be a gms_fsm.Chart (the transitions "
+                "machine is made from it: ElementMachines(model).machine)"
+            )
+        if isinstance(self.n, bool) or not isinstance(self.n, int) or self.n < 1:
             raise ParameterError(
                 f"n is {self.n!r}; a bank has a whole number of elements, at least one"
             )
@@ -250,6 +255,11 @@ class ChartModel:
                     f"chart {self.chart.name!r} wants the input {name!r}; "
                     f"a model supplies {', '.join(SUPPLIED)}"
                 )
+        if not isinstance(self.values, Mapping):
+            raise ParameterError(
+                f"values is {shown(self.values)}; it must give a number for each parameter of the "
+                "chart, for example {'k': 1.0}"
+            )
         wanted, given = set(self.chart.parameters), set(self.values)
         if wanted != given:
             raise ParameterError(

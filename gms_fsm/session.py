@@ -886,9 +886,12 @@ class Session:
         return sources[edge]
 
     def _check_element(self, element: int) -> None:
-        if not 0 <= element < self.model.n:
+        whole = isinstance(element, int | np.integer) and not isinstance(element, bool)
+        if not whole or not 0 <= element < self.model.n:
+            edges = [edge.name for edge in self.model.chart.transitions]
+            hint = f" (an edge is asked for by edge={element!r})" if element in edges else ""
             raise SessionError(
-                f"no element {element!r}; there are 0 to {self.model.n - 1} (counted from 0 in "
+                f"no element {shown(element)}{hint}; there are 0 to {self.model.n - 1} (counted from 0 in "
                 "Python, from 1 in text)"
             )
 

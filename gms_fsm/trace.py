@@ -20,7 +20,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.compiled import observe_rows
-from gms_fsm.errors import MissingExtraError, OutputError, SignalError, TraceFileError, why
+from gms_fsm.errors import (
+    MissingExtraError,
+    OutputError,
+    ParameterError,
+    SignalError,
+    TraceFileError,
+    shown,
+    why,
+)
 from gms_fsm.files import leftovers, written_together, written_whole
 from gms_fsm.header import Header
 from gms_fsm.models import Model
@@ -35,6 +43,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Rows",
     "Trace",
+    "check_trace",
     "column_name",
     "dwell_times",
     "interpolated",
@@ -42,6 +51,25 @@ __all__ = [
     "log_of",
     "slopes",
 ]
+
+def check_trace(trace: object) -> None:
+    """Raise if something that is to be drawn is no trace.
+
+    Parameters
+    ----------
+    trace : object
+        What was given.
+
+    Raises
+    ------
+    ParameterError
+        Saying what it is and how a trace is made.
+    """
+    if not isinstance(trace, Trace):
+        raise ParameterError(
+            f"trace is {shown(trace)}; it must be a Trace, from simulate(...) or Trace.load(path)"
+        )
+
 
 _NUMBERS = ("z", "v", "s", "F_before", "F_after")
 
@@ -149,7 +177,17 @@ class Trace:
         -------
         ndarray, shape (rows, n)
             Its values.
+
+        Raises
+        ------
+        ParameterError
+            If the chart has no such variable.
         """
+        variables = self.model.chart.variables
+        if name not in variables:
+            raise ParameterError(
+                f"name is {shown(name)}; the chart has the variables {', '.join(variables)}"
+            )
         start = self._first + self.model.chart.variables.index(name) * self.n
         block: FloatArray = self.rows.y[:, start : start + self.n]
         return block

@@ -19,7 +19,7 @@ import numpy as np
 
 from gms_fsm.errors import MissingExtraError, ParameterError
 from gms_fsm.files import written_whole
-from gms_fsm.trace import Trace
+from gms_fsm.trace import Trace, check_trace
 from plots.live_chart import LiveChart
 from plots.statechart import Sheet
 from plots.style import CHART_THEMES, RC, ChartTheme
@@ -110,6 +110,7 @@ def animate(
     Traceback (most recent call last):
     gms_fsm.errors.ParameterError: frames is 1; it must be a whole number of at least 2
     """
+    check_trace(trace)
     path = Path(path)
     if path.suffix.lower() != ".gif":
         raise ParameterError(f"path is {str(path)!r}; an animation must end in .gif")

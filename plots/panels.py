@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.errors import MissingExtraError, ParameterError, SignalError
-from gms_fsm.trace import Rows, Trace
+from gms_fsm.trace import Rows, Trace, check_trace
 from plots.style import (
     BLUE,
     ELEMENT_COLOURS,
@@ -193,8 +193,9 @@ def checked_window(trace: Trace, window: Window | None) -> Window:
     Raises
     ------
     ParameterError
-        If it is not two times, the earlier one first, that overlap the run.
+        If it is not two times, the earlier one first, that overlap the run; if there is no run.
     """
+    check_trace(trace)
     first, last = float(trace.t[0]), float(trace.t[-1])
     if window is None:
         return first, last
@@ -607,6 +608,7 @@ def cascade_window(
     ParameterError
         If `around` is not in the run or `within` is not positive.
     """
+    check_trace(trace)
     first, last = float(trace.t[0]), float(trace.t[-1])
     if not _is_number(within) or not within > 0:
         raise ParameterError(f"within is {within!r}; it must be a time > 0 s")

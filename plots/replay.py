@@ -31,7 +31,7 @@ from gms_fsm.errors import MissingExtraError, ParameterError, SignalError, Trace
 from gms_fsm.explain import explain_state, values_at
 from gms_fsm.expression import MATLAB_LIKE, Relation, clauses, spell
 from gms_fsm.files import written_whole
-from gms_fsm.trace import Rows, Trace
+from gms_fsm.trace import Rows, Trace, check_trace
 from plots.render import drawn
 from plots.statechart import Row, Sheet, element_id, part_id
 from plots.style import (
@@ -208,8 +208,10 @@ def replay_html(
     MissingExtraError
         If uPlot is not installed.
     """
-    plot_script, plot_style = _uplot()
     traces = [trace] if other is None else [trace, other]
+    for each in traces:
+        check_trace(each)
+    plot_script, plot_style = _uplot()
     if len(names) not in (0, len(traces)):
         raise ParameterError(f"{len(traces)} run(s) but names = {list(names)!r}; give one each")
     pictures = [_chart_svg(each.model.chart, each.n) for each in traces]

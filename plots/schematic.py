@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.errors import MissingExtraError, ParameterError
-from gms_fsm.trace import Trace
+from gms_fsm.trace import Trace, check_trace
 from plots import panels
 from plots.style import (
     BLUE,
@@ -82,6 +82,8 @@ def schematic(
     ParameterError
         If the row is not there, or there are too many elements to draw.
     """
+    if trace is not None:
+        check_trace(trace)
     n = elements if trace is None else trace.n
     if not isinstance(n, (int, np.integer)) or isinstance(n, bool) or not 1 <= n <= MOST:
         raise ParameterError(f"elements is {n!r}; a schematic shows 1 to {MOST} elements")
