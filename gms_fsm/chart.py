@@ -62,6 +62,7 @@ class State:
     exit: Mapping[str, str] = field(default_factory=dict)
 
     def __new__(cls, *_: Any, **given: Any) -> State:
+        """Refuse what is no part of a state, in our words."""
         for name in sorted(given.keys() - {each.name for each in fields(cls)}):
             raise ChartError(
                 f"state {shown(given.get('name', '?'))}: a State takes name, flow, entry and exit, "
@@ -224,12 +225,12 @@ class Chart:
     # ------------------------------------------------------------------ checks
     def _check_names(self) -> None:
         here = f"chart {self.name!r}"
-        for each, kind, example in (
+        for each, wanted, example in (
             ("states", State, "State('stick', flow={'z': 'v'})"),
             ("transitions", Transition, "Transition('slips', 'stick', 'slip', guard='z > s')"),
         ):
             for given in getattr(self, each):
-                if not isinstance(given, kind):
+                if not isinstance(given, wanted):
                     raise ChartError(f"{here}: {each} has {shown(given)}; write it as {example}")
         if not self.states:
             raise ChartError(f"{here}: it has no states; give at least one")

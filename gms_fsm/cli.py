@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import enum
 import json
 import sys
 import textwrap
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -51,6 +53,13 @@ class _Verbs(TyperGroup):
         if "--debug" in options:
             args = ["--debug", *(a for a in options if a != "--debug"), *args[len(options) :]]
         return super().parse_args(ctx, args)
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:  # pydantic's words, as newer versions of typer pass on
+            error.message = error.message.removeprefix("Value error, ")
+            raise
 
 
 app = typer.Typer(
@@ -98,6 +107,17 @@ def root(
     context.ensure_object(Wishes).debug = debug
 
 
+@contextlib.contextmanager
+def _progress(*columns: Any, console: Console) -> Iterator[Progress]:
+    """Give progress bars that whoever has something to show starts: none before an error."""
+    bars = Progress(*columns or Progress.get_default_columns(), console=console)
+    try:
+        yield bars
+    finally:
+        if bars.live.is_started:
+            bars.stop()
+
+
 @app.command("paper")
 def paper_command(
     output: Annotated[
@@ -113,11 +133,12 @@ def paper_command(
     """Run the paper's two experiments; write figures, traces, logs and claims.md."""
     console = Console(stderr=True)
     columns = (TextColumn("{task.description:<22}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console) as bars:
+    with _progress(*columns, console=console) as bars:
         tasks: dict[str, TaskID] = {}
 
         def show(name: str, done: float) -> None:
             if name not in tasks:
+                bars.start()
                 tasks[name] = bars.add_task(name, total=1.0)
             bars.update(tasks[name], completed=done)
 
@@ -205,7 +226,9 @@ def chart_command(
     name: Annotated[ChartName, typer.Argument(help="Which chart.", show_default=False)],
     output: Annotated[
         Path,
-        typer.Option("--output", "-o", help="Ends in .svg, .png, .pdf, .dot or .mmd (Mermaid)."),
+        typer.Option(
+            "--output", "-o", help="Ends in .svg, .png, .pdf, .dot, .gv or .mmd (Mermaid)."
+        ),
     ] = Path("chart.svg"),
     law: Annotated[LawName | None, typer.Option(help="Slip law of the GMS chart.")] = None,
     elements: Annotated[int, typer.Option(help="How many elements, as parallel states.")] = 1,
@@ -216,21 +239,15 @@ def chart_command(
 ) -> None:
     """Draw a state chart."""
     import plots
-    from plots.mermaid import mermaid
 
     if name == ChartName.gms and law is None:
         raise ParameterError("chart gms needs --law signed or --law published; they differ")
     chart = LUGRE if law is None else gms_element(law.value)
-    if output.suffix == ".mmd":
-        text = mermaid(chart).encode()
-        written = written_whole(output, lambda file: file.write(text))
-    else:
-        graph = plots.statechart(
-            chart, elements, notation=notation.value, direction=direction.value,
-            theme=theme.value, names=names,
-        )  # fmt: skip
-        written = plots.render(graph, output)
-    typer.echo(str(written))
+    graph = plots.statechart(
+        chart, elements, notation=notation.value, direction=direction.value, theme=theme.value,
+        names=names,
+    )  # fmt: skip
+    typer.echo(str(plots.render(graph, output)))
 
 
 @app.command("check")
@@ -306,7 +323,7 @@ def _write_report(report: Report, folder: Path) -> list[Path]:
 @app.command("blocks")
 def blocks_command(
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="Ends in .svg, .png, .pdf or .dot.")
+        Path, typer.Option("--output", "-o", help="Ends in .svg, .png, .pdf, .dot or .gv.")
     ] = Path("blocks.svg"),
     elements: Annotated[int, typer.Option(help="How many elements.")] = 4,
 ) -> None:
@@ -356,12 +373,14 @@ def animate_command(
     from plots.animation import animate
 
     run = Trace.load(trace)
-    with Progress(console=Console(stderr=True)) as bar:
+    with _progress(console=Console(stderr=True)) as bar:
         task = bar.add_task("frames", total=frames)
-        film = animate(
-            run, output, frames=frames, t_start=start, t_end=end,
-            progress=lambda done, _: bar.update(task, completed=done),
-        )  # fmt: skip
+
+        def show(done: int, _: int) -> None:
+            bar.start()
+            bar.update(task, completed=done)
+
+        film = animate(run, output, frames=frames, t_start=start, t_end=end, progress=show)
     typer.echo(str(film))
 
 
@@ -405,19 +424,19 @@ def debug_command(
 @app.command("lesson")
 def lesson_command(
     number: Annotated[
-        int | None, typer.Argument(help="Which one; left out, all are listed.", show_default=False)
-    ] = None,
+        str, typer.Argument(help="Which one; left out, all are listed.", show_default=False)
+    ] = "",
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder.")] = Path("lessons"),
 ) -> None:
     """Run a lesson: a picture, a replay page, and five lines with the measured figures."""
-    from gms_fsm.lessons import LESSONS, teach
+    from gms_fsm.lessons import listed, numbered, teach
 
-    if number is None:
-        for key, each in LESSONS.items():
-            typer.echo(f"{key}  {each.TITLE}: {each.QUESTION}")
+    if not number:
+        typer.echo(listed())
         return
-    with Console(stderr=True).status(f"running lesson {number}"):
-        taught = teach(number, output)
+    chosen = numbered(number)
+    with Console(stderr=True).status(f"running lesson {chosen}"):
+        taught = teach(chosen, output)
     for line in taught.lines:
         typer.echo(line)
     typer.echo()

@@ -239,7 +239,7 @@ class ChartModel:
             )
         if isinstance(self.n, bool) or not isinstance(self.n, int) or self.n < 1:
             raise ParameterError(
-                f"n is {self.n!r}; a bank has a whole number of elements, at least one"
+                f"n is {shown(self.n)}; a bank has a whole number of elements, at least one"
             )
         curve: Any = self.stribeck
         if curve is None and "s" not in self.chart.inputs:

@@ -201,12 +201,13 @@ class Moment:
 
     @property
     def values(self) -> dict[str, Any]:
-        """``v`` [m/s] and ``F`` [N]; ``z`` and ``s`` [m], one an element."""
+        """``x`` [m], ``v`` [m/s] and ``F`` [N]; ``z`` and ``s`` [m], one an element."""
         recording, start = self._recording, self._recording.start
         t, y, mode = recording.latest
         seen = recording.observe(t, y, mode)
         first, n = start.program.first, start.model.n
-        return {"v": seen[0], "F": seen[1], "z": y[first : first + n], "s": seen[2 : 2 + n]}
+        elements = {"z": y[first : first + n], "s": seen[2 : 2 + n]}
+        return {"x": y[0], "v": seen[0], "F": seen[1], **elements}
 
 
 # --------------------------------------------------------------------------- explaining

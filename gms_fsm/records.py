@@ -349,11 +349,11 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
     """
     time = record.columns["time"]
     if smoothing is not None and not smoothing >= 0.0:
-        raise RecordError(f"{record.path}: smoothing is {smoothing!r} s; it must be >= 0")
+        raise RecordError(f"{record.path}: smoothing is {shown(smoothing)} s; it must be >= 0")
     interval = float(np.median(np.diff(time)))
     if smoothing is not None and smoothing > time[-1] - time[0]:
         raise RecordError(
-            f"{record.path}: smoothing is {smoothing!r} s, longer than the record "
+            f"{record.path}: smoothing is {shown(smoothing)} s, longer than the record "
             f"({time[-1] - time[0]:.6g} s); give less"
         )
     if "velocity" in record.columns:

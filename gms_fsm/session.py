@@ -502,7 +502,7 @@ class Session:
         branch = self.branch
         start = branch.raw(0)[0]
         if not t >= start:
-            raise SessionError(f"t = {t!r} s lies before the start, {start!r} s")
+            raise SessionError(f"t = {shown(t)} s lies before the start, {start!r} s")
         branch.between = None
         while branch.raw(len(branch) - 1)[0] <= t and branch.pull():
             pass
@@ -888,11 +888,12 @@ class Session:
     def _check_element(self, element: int) -> None:
         whole = isinstance(element, int | np.integer) and not isinstance(element, bool)
         if not whole or not 0 <= element < self.model.n:
-            edges = [edge.name for edge in self.model.chart.transitions]
-            hint = f" (an edge is asked for by edge={element!r})" if element in edges else ""
+            said = shown(element)
+            if said in [repr(edge.name) for edge in self.model.chart.transitions]:
+                said += f" (an edge is asked for by edge={said})"
             raise SessionError(
-                f"no element {shown(element)}{hint}; there are 0 to {self.model.n - 1} (counted from 0 in "
-                "Python, from 1 in text)"
+                f"no element {said}; there are 0 to {self.model.n - 1} (counted from 0 in Python, "
+                "from 1 in text)"
             )
 
     # ------------------------------------------------------------------ branches

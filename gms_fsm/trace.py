@@ -52,6 +52,7 @@ __all__ = [
     "slopes",
 ]
 
+
 def check_trace(trace: object) -> None:
     """Raise if something that is to be drawn is no trace.
 
@@ -269,7 +270,7 @@ class Trace:
 
         Raises
         ------
-        ValueError
+        ParameterError
             If a time lies outside the run.
         SignalError
             If the trace comes from a file and its signal was a Python function.
@@ -277,11 +278,12 @@ class Trace:
         wanted = np.atleast_1d(np.asarray(times, dtype=np.float64))
         table = _merged(self.rows, self.stops)
         if wanted.ndim != 1 or wanted.size == 0:
-            raise ValueError(f"times has shape {wanted.shape}; give a flat, non-empty list")
+            raise ParameterError(f"times has shape {wanted.shape}; give a flat, non-empty list")
         outside = wanted[~((wanted >= table.t[0]) & (wanted <= table.t[-1]))]
         if outside.size:
-            raise ValueError(
-                f"time {outside[0]!r} s lies outside the run, {table.t[0]!r} to {table.t[-1]!r} s"
+            raise ParameterError(
+                f"time {shown(outside[0])} s lies outside the run, {shown(table.t[0])} to "
+                f"{shown(table.t[-1])} s"
             )
         left = np.searchsorted(table.t, wanted, side="right") - 1
         y = np.array([self._between(table, int(i), t) for i, t in zip(left, wanted, strict=True)])
