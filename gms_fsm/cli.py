@@ -266,7 +266,10 @@ def check_command(
     ] = None,
     names: Annotated[bool, typer.Option("--list", help="Say what can be checked.")] = False,
 ) -> None:
-    """Prove a chart free of contradictions, or refute it by an example; then exit with 1."""
+    """Prove a chart free of contradictions, or refute it by an example; then exit with 1.
+
+    What the order of the edges settles is said, and is no refutation.
+    """
     if names:
         typer.echo("gms --law signed, gms --law published, lugre, and as demonstrations:")
         for broken, what in BROKEN.items():
@@ -302,15 +305,16 @@ def _to_check(name: str, law: LawName | None) -> tuple[Chart, tuple[str, ...] | 
 
 
 def _write_report(report: Report, folder: Path) -> list[Path]:
-    """Write a report, and for each thing refuted the chart with the place marked."""
+    """Write a report, and a chart with the place marked for what is refuted or settled by order."""
     import plots
 
     text = f"{report}\n".encode()
     written = [written_whole(folder / "report.txt", lambda file: file.write(text))]
     edges = report.chart.guards
-    for number, finding in enumerate(report.refuted, start=1):
+    for number, finding in enumerate([*report.refuted, *report.settled], start=1):
         marked = [part for part in finding.where if part in edges] or finding.where
-        what = f"{finding.check}, {finding.case}" if finding.case else finding.check
+        settled = finding.status if finding in report.settled else ""
+        what = ", ".join(part for part in (finding.check, finding.case, settled) if part)
         note = textwrap.wrap(f"{what}: {finding.text}", 50)
         note += textwrap.wrap(finding.example, 50)
         graph = plots.statechart(report.chart, marked=marked, note="\n".join(note))
