@@ -25,6 +25,7 @@ from gms_fsm.charts import LUGRE, gms_element
 from gms_fsm.charts.broken import BROKEN
 from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.files import output_folder, written_whole
+from gms_fsm.generated import standalone
 from gms_fsm.live import LiveView
 from gms_fsm.models import GMS, Model
 from gms_fsm.parameters import GMSParameters
@@ -455,14 +456,14 @@ def code_command(
         RigName.prescribed
     ),
 ) -> None:
-    """Print the if-else program generated from the GMS chart (the paper's Fig. 2c)."""
+    """Print the if-else program made from the GMS chart (the paper's Fig. 2c); it runs alone."""
     rigs: dict[RigName, Rig] = {
         RigName.prescribed: Prescribed(paper.VELOCITY),
         RigName.slider: Slider(1.0, paper.FORCE),
         RigName.pulled: PulledSlider(1.0, 2.0, 0.1),
     }
     model: Model = GMS(GMSParameters.paper("stick-slip"), law=law.value)
-    typer.echo(lower(model, rigs[rig]).source, nl=False)
+    typer.echo(standalone(lower(model, rigs[rig]).source), nl=False)
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""``gms-fsm check`` prints what is proved, settled by order or refuted; scripts read its exit code."""
+"""``gms-fsm check`` prints what is proved, settled by order, refuted; its exit code tells a script."""
 
 from __future__ import annotations
 
