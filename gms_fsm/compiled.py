@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib.util
+import math
 import os
 import re
 import threading
@@ -124,7 +125,9 @@ def _loaded(
     for helper in (sgn, piecewise_linear):
         compiled.usable_inside(helper)
     # The name of a module that exists: numba imports it when it loads machine code from disk.
-    names: dict[str, Any] = {"piecewise_linear": piecewise_linear, "pow": _power()}
+    names: dict[str, Any] = {
+        "piecewise_linear": piecewise_linear, "pow": _power(), "nan": math.nan
+    }  # fmt: skip
     names["__name__"] = __name__
     for name, call in callables:
         names[f"{name}_signal"] = _compiled_signal(name, call)

@@ -113,14 +113,16 @@ def standalone(source: str) -> str:
                 used.add(name)
             case ast.Name(id=name) | ast.arg(arg=name) | ast.FunctionDef(name=name):
                 own.add(name)
-    known = {**NAMESPACE, "piecewise_linear": piecewise_linear}
+    known: dict[str, Any] = {
+        **NAMESPACE, "piecewise_linear": piecewise_linear, "nan": math.nan
+    }  # fmt: skip
     missing = sorted(used - own - set(dir(builtins)))
     if foreign := [name for name in missing if name not in known]:
         raise ParameterError(
             f"{', '.join(foreign)}: a Python function, which no text can hold; give the signal as "
             "a formula or as corners"
         )
-    borrowed = [name for name in missing if inspect.isbuiltin(known[name])]
+    borrowed = [name for name in missing if known[name] is getattr(math, name, None)]
     parts = [f"from math import {', '.join(borrowed)}\n"] if borrowed else []
     parts += ["\n" + _bare(known[name]) for name in missing if name not in borrowed]
     head, body = _split_head(source)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from types import TracebackType
 
@@ -105,12 +106,13 @@ class LiveView:
                 self.names.append(state)
             colour = COLOURS[self.names.index(state) % len(COLOURS)]
             ratio = abs(z) / s
-            filled = min(BAR, round(BAR * ratio))
+            bare = math.isnan(ratio)  # without a curve there is no threshold
+            filled = 0 if bare else min(BAR, round(BAR * ratio))
             # The state is a word as well as a colour, the bar a length as well as a number.
             table.add_row(
                 f"E{i + 1}",
                 Text(state.upper() if self.names.index(state) else state, style=colour),
-                f"{ratio:.3f}",
+                "" if bare else f"{ratio:.3f}",
                 Text("█" * filled + "░" * (BAR - filled), style=colour),
                 f"{z:+.4e}",
             )

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -132,7 +133,7 @@ def lower(model: Model, rig: Rig) -> Program:
     """
     signals = rig.signals.values()
     shape = (
-        repr(model.chart), model.stribeck.text, model.n,
+        repr(model.chart), model.stribeck is None, model.n,
         tuple(np.ndim(model.values[name]) for name in model.chart.parameters),
         rig.title, rig.acceleration, tuple(rig.numbers), tuple(rig.signals),
         tuple(_spelling(s) for s in signals),
@@ -179,7 +180,7 @@ def _lowered(shape: _Shape) -> Program:
         name: signal.call for name, signal in rig.signals.items() if isinstance(signal, Function)
     }
     title = f"{model.chart.name}, {rig.title}"
-    names: dict[str, Any] = {"piecewise_linear": piecewise_linear}
+    names: dict[str, Any] = {"piecewise_linear": piecewise_linear, "nan": math.nan}
     names |= {f"{name}_signal": _guarded(name, call) for name, call in callables.items()}
     namespace, careful = load(title, source, names), load_careful(title, source, names)
     return Program(
@@ -214,7 +215,8 @@ def arguments(model: Model, rig: Rig) -> Arguments:
         See `Program`.
     """
     curve, values = model.stribeck, [model.values[name] for name in model.chart.parameters]
-    shared = [curve.F_c, curve.F_s, curve.v_s, curve.dip, model.sigma_2, *rig.numbers.values()]
+    shared = [] if curve is None else [curve.F_c, curve.F_s, curve.v_s, curve.dip]
+    shared += [model.sigma_2, *rig.numbers.values()]
     shared += [float(value) for value in values if np.ndim(value) == 0]
     own = [as_floats(model.weights)]
     own += [as_floats(np.asarray(value)) for value in values if np.ndim(value) > 0]
@@ -279,7 +281,9 @@ class _Lowering:
         self.model, self.rig, self.chart = model, rig, model.chart
         self.prescribed = rig.acceleration is None
         self.first = 1 if self.prescribed else 2
-        self.stribeck = parse_value(model.stribeck.text, ["F_c", "F_s", "v_s", "v"])
+        self.curve = None
+        if model.stribeck is not None:
+            self.curve = parse_value(model.stribeck.text, ["F_c", "F_s", "v_s", "v"])
         self.acceleration = (
             None
             if rig.acceleration is None
@@ -293,10 +297,11 @@ class _Lowering:
     # ------------------------------------------------------------------ collecting
     def _collect_numbers(self) -> None:
         # In the order of `arguments`.
-        self.shared = ["F_c", "F_s", "v_s", "v_dip", "sigma_2", *self.rig.numbers]
+        self.shared = [] if self.curve is None else ["F_c", "F_s", "v_s", "v_dip"]
+        self.shared += ["sigma_2", *self.rig.numbers]
         self.own = ["weight"]
         taken = set(self.shared) | set(self.rig.signals) | {f"{s}_signal" for s in self.rig.signals}
-        taken |= {"F_i", "len", "range", "piecewise_linear", "v_dip"}  # of the text itself
+        taken |= {"F_i", "len", "range", "piecewise_linear", "v_dip", "nan"}  # of the text itself
         # A chart may call its own parameter F_c or mass: it gets a name of its own in the text.
         self.rename: dict[str, str] = {_DIP: "v_dip"}
         chart_names = (*self.chart.variables, *self.chart.parameters)
@@ -456,8 +461,8 @@ class _Lowering:
         used = _words(body)
         lines = [f"def {signature}:", f'    """{doc}"""']
         front: list[str] = []
-        if "S" in used:
-            front.append(f"S = {spell(self.stribeck)}  # (2)")
+        if "S" in used and self.curve is not None:
+            front.append(f"S = {spell(self.curve)}  # (2)")
             used |= _words(front)
         if "v" in used:
             front.insert(0, "v = y[1]") if not self.prescribed else None
@@ -632,7 +637,8 @@ class _Lowering:
             ]
             for state in self.chart.states
         }
-        threshold = "s" if "s" in self.chart.inputs else "weight[i] * S"
+        without = "nan" if self.curve is None else "weight[i] * S"
+        threshold = "s" if "s" in self.chart.inputs else without
         inner = [
             *self.by_state(branches),
             f"F_i = {self.force()}  # (3)",

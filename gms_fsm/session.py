@@ -522,8 +522,9 @@ class Session:
         """
         elements, variables = range(1, self.model.n + 1), self.model.chart.variables
         bare = variables if self.model.n == 1 else ()
-        numbered = (f"{name}{i}" for name in (*variables, "s", "F") for i in elements)
-        return ["t", "x", "v", "F", "s", *bare, *numbered]
+        threshold = () if self.model.stribeck is None else ("s",)
+        numbered = (f"{name}{i}" for name in (*variables, *threshold, "F") for i in elements)
+        return ["t", "x", "v", "F", *threshold, *bare, *numbered]
 
     def parse(self, text: str) -> Condition:
         """Read a condition such as ``"z1 > 0.3 and state(2) == slip"``.

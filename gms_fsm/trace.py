@@ -205,7 +205,7 @@ class Trace:
 
     @property
     def s(self) -> FloatArray:
-        """Thresholds, shape (rows, n), m."""
+        """Thresholds, shape (rows, n), m; NaN where the model has no Stribeck curve."""
         return self._observed["s"]
 
     @property

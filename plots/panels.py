@@ -1006,6 +1006,10 @@ def stribeck(
         s(v); s(v) + sigma_2 |v| if there is viscous friction; the steady rows; the measured points.
     """
     model, part = trace.model, shown(trace, window)
+    if model.stribeck is None:
+        raise ParameterError(
+            f"{model.title}: its chart has no input s, and so no Stribeck curve to draw"
+        )
     points = None if measured is None else checked_points(measured)
     speeds = np.abs(part.v)
     steady = (np.abs(part.dz) < 0.01 * speeds[:, None]).all(axis=1)

@@ -260,9 +260,11 @@ def _run(trace: Trace, between: NDArray[np.bool_], frame_of: Sequence[int]) -> d
     """Return what the page stores of a run; `frame_of` its rows on the page's common time."""
     chart, n, pool = trace.model.chart, trace.n, _Pool()
     columns = {"x": trace.x, "v": trace.v, "F": trace.F}
-    columns["s"] = trace.s[:, 0] / float(trace.model.weights[0])  # the Stribeck curve
     blocks = {name: trace.variable(name) for name in chart.variables}
-    for name, block in (blocks | {"s": trace.s, "F": trace.F_elements}).items():
+    if trace.model.stribeck is not None:
+        columns["s"] = trace.s[:, 0] / float(trace.model.weights[0])  # the curve itself
+        blocks["s"] = trace.s
+    for name, block in (blocks | {"F": trace.F_elements}).items():
         columns |= {f"{name}{i + 1}": block[:, i] for i in range(n)}
     edges = _edges(chart)
     first = chart.variables[0]

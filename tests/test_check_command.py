@@ -1,4 +1,4 @@
-"""``gms-fsm check`` prints what is proved, settled by order, refuted; its exit code tells a script."""
+"""``gms-fsm check`` prints what is proved or not; its exit code tells a script what is refuted."""
 
 from __future__ import annotations
 
