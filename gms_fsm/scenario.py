@@ -209,6 +209,7 @@ class SignalRecordTable(_Table):
     file: str
     time: ColumnTable
     value: ColumnTable
+    where: str = Field("", description='which rows count, for example "time > 0.5 s"')
     delimiter: Delimiter | None = None
 
 
@@ -471,10 +472,11 @@ def _signal(path: Path, given: SignalField, key: str, quantity: str) -> SignalLi
         # The value column is read as the quantity it stands for, so that units are checked.
         columns = {"time": given.time.build(), quantity: given.value.build()}
         try:
-            record = read_record(file, columns, delimiter=given.delimiter)
+            record = read_record(file, columns, given.where, given.delimiter)
         except UnitError as error:
             raise ScenarioError(f"{path}: {key}: {error}") from None
-        return Corners(record.columns["time"], record.columns[quantity], held=False)
+        rows = record.chosen
+        return Corners(record.columns["time"][rows], record.columns[quantity][rows], held=False)
     try:
         if isinstance(given, list):
             return as_signal([(t, value) for t, value in given])
