@@ -51,9 +51,7 @@ class LiveView:
         self.live = Live(self.bar, console=console, auto_refresh=False)
 
     def __enter__(self) -> LiveView:
-        if self.console.is_terminal:
-            self.live.__enter__()
-        return self
+        return self  # drawing begins with the first moment: no empty bar before an error
 
     def __exit__(
         self,
@@ -64,7 +62,7 @@ class LiveView:
         if self.console.is_terminal:
             if self.latest is not None:
                 self.show(self.latest)  # the end is always drawn
-            self.live.__exit__(kind, error, trace)
+            self.live.stop()
         elif self.detail and self.latest is not None:
             self.console.print(self.table(self.latest))  # a log gets the end only
 
@@ -83,6 +81,7 @@ class LiveView:
         """Draw now."""
         self.bar.update(self.task, completed=moment.t - self.t_start, t=moment.t)
         shown = Group(self.table(moment), self.bar) if self.detail else self.bar
+        self.live.start()
         self.live.update(shown, refresh=True)
 
     def table(self, moment: Moment) -> Table:

@@ -6,17 +6,20 @@ written; no other library's prefix, no empty line of a progress bar, no number i
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Any
 
 import graphviz
 import numpy as np
 import pytest
+from rich.console import Console
 
 from gms_fsm import Prescribed, Session, Trace, simulate
 from gms_fsm.charts import LUGRE, gms_element
-from gms_fsm.errors import ParameterError, ScenarioError, shown
+from gms_fsm.errors import OutputError, ParameterError, ScenarioError, shown
 from gms_fsm.lessons import LESSONS
+from gms_fsm.live import LiveView
 from gms_fsm.scenario import load_scenario
 from gms_fsm.simulate import Moment
 from plots import block_diagram, mermaid, render, statechart
@@ -190,6 +193,18 @@ def test_no_bar_before_an_error(arguments: tuple[str, ...], tmp_path: Path) -> N
     assert done.returncode == 2
     assert done.stderr.startswith("error: "), done.stderr
     assert done.stdout == ""
+
+
+def test_no_bar_of_a_run_that_does_not_begin() -> None:
+    screen = io.StringIO()
+    console = Console(file=screen, force_terminal=True, width=80)
+    with pytest.raises(OutputError), LiveView(console, 0.0, 1.0, detail=False):
+        raise OutputError("cannot make the folder")
+    assert screen.getvalue() == ""
+    model, rig = pulled_mass()
+    with LiveView(console, 0.0, 1.0, detail=False) as view:
+        simulate(model, rig, 1.0, progress=view)
+    assert "t = 1.00 s" in screen.getvalue()
 
 
 # --------------------------------------------------------------------------- values in messages
