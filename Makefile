@@ -5,18 +5,20 @@
 #   make coverage  all tests, and what of the three packages they run
 #   make lint    formatting, style, types, import contracts
 #   make core    the tests with only the required dependencies
+#   make lowest  the tests near a dependency, with the lowest versions that pyproject.toml allows
 #   make bench   speed and error against C, SciPy, CVODE and PathSim
 #   make soak    hard use: fuzzing, kills, a million transitions, 2,000 runs judged by a reference;
 #                SOAK_MINUTES=10 for each fuzzer
 #   make gallery the pictures kept under docs/, shown in docs/gallery.md
 #   make docs    the documentation -> folder site/, to be opened from disk
 PYTHON ?= python3
+LOWEST_PYTHON ?= python3.11
 VENV ?= .venv
 RUN := $(VENV)/bin
 SOAK_MINUTES ?= 10
 PIP := $(RUN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: help paper test coverage lint core bench soak gallery docs clean
+.PHONY: help paper test coverage lint core lowest bench soak gallery docs clean
 .DEFAULT_GOAL := test
 
 $(VENV)/bin/python:
@@ -44,7 +46,15 @@ help:
 
 .venv-core/stamp: pyproject.toml
 	$(PYTHON) -m venv .venv-core
-	.venv-core/bin/python -m pip --disable-pip-version-check --quiet install -e . pytest pytest-xdist hypothesis
+	.venv-core/bin/python -m pip --disable-pip-version-check --quiet install -e ".[test]"
+	@touch $@
+
+# The lowest versions have wheels for the lowest Python only; uv chooses them.
+.venv-lowest/stamp: pyproject.toml
+	@command -v $(LOWEST_PYTHON) >/dev/null || { echo "make lowest needs Python 3.11; set LOWEST_PYTHON"; exit 1; }
+	$(LOWEST_PYTHON) -m venv --clear .venv-lowest
+	.venv-lowest/bin/python -m pip --disable-pip-version-check --quiet install uv
+	.venv-lowest/bin/uv pip install --quiet --python .venv-lowest/bin/python --resolution lowest-direct -e ".[all,cluster,test]"
 	@touch $@
 
 paper: $(VENV)/all.stamp
@@ -65,6 +75,15 @@ lint: $(VENV)/dev.stamp
 core: .venv-core/stamp
 	.venv-core/bin/python -m pytest -n auto tests gms_fsm integrators
 
+# transitions; typer and pydantic; numba; scipy; pandas, pyarrow, xarray, distributed; z3; the drawing libraries
+LOWEST_TESTS := callbacks_* command_line* overrides_* scenarios_run compiled_* engines_agree_* scipy_* \
+    trace_files_* sweep_* check_command prove_* rendering_* statechart* block_diagram_* panels_* figures_* \
+    animation_* replay_stores_* lessons_taught
+
+lowest: .venv-lowest/stamp
+	.venv-lowest/bin/uv pip freeze --python .venv-lowest/bin/python
+	.venv-lowest/bin/python -m pytest -n auto $(foreach name,$(LOWEST_TESTS),$(wildcard tests/test_$(name).py)) gms_fsm integrators plots
+
 bench: $(VENV)/bench.stamp
 	$(RUN)/python benchmarks/compare.py
 	$(RUN)/python benchmarks/live_frames.py
@@ -81,4 +100,4 @@ docs: $(VENV)/docs.stamp
 	$(RUN)/sphinx-build --quiet --fail-on-warning --keep-going -d .docs-cache/doctrees docs site
 
 clean:
-	rm -rf $(VENV) .venv-core .docs-cache paper site build *.egg-info
+	rm -rf $(VENV) .venv-core .venv-lowest .docs-cache paper site build *.egg-info

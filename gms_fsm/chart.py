@@ -9,7 +9,8 @@ from __future__ import annotations
 import keyword
 import unicodedata
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from typing import Any
 
 from gms_fsm.errors import ChartError, ExpressionError, shown
 from gms_fsm.expression import (
@@ -60,9 +61,19 @@ class State:
     entry: Mapping[str, str] = field(default_factory=dict)
     exit: Mapping[str, str] = field(default_factory=dict)
 
+    def __new__(cls, *_: Any, **given: Any) -> State:
+        """Refuse what is no part of a state, in our words."""
+        for name in sorted(given.keys() - {each.name for each in fields(cls)}):
+            raise ChartError(
+                f"state {shown(given.get('name', '?'))}: a State takes name, flow, entry and exit, "
+                f"not {name!r}; states do not nest, so write one state for each combination"
+            )
+        return object.__new__(cls)
+
     def __post_init__(self) -> None:
         for each in ("flow", "entry", "exit"):  # nobody else keeps a hand on a frozen chart
-            object.__setattr__(self, each, dict(getattr(self, each)))
+            texts = _texts(getattr(self, each), f"state {shown(self.name)}: {each}")
+            object.__setattr__(self, each, texts)
 
 
 @dataclass(frozen=True)
@@ -93,7 +104,8 @@ class Transition:
     actions: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "actions", dict(self.actions))
+        texts = _texts(self.actions, f"edge {shown(self.name)}: actions")
+        object.__setattr__(self, "actions", texts)
 
 
 @dataclass(frozen=True)
@@ -160,8 +172,11 @@ class Chart:
                     f"chart {self.name!r}: {each} is {text}, not a tuple; write it with a comma: "
                     f"({text},)"
                 )
+            if not isinstance(given, Iterable):
+                raise ChartError(f"chart {self.name!r}: {each} is {shown(given)}; give a tuple")
             object.__setattr__(self, each, tuple(given))
-        object.__setattr__(self, "outputs", dict(self.outputs))
+        outputs = _texts(self.outputs, f"chart {self.name!r}: outputs")
+        object.__setattr__(self, "outputs", outputs)
         self._check_names()
         symbols = self.inputs + self.variables + self.parameters
         here = f"chart {self.name!r}"
@@ -210,6 +225,13 @@ class Chart:
     # ------------------------------------------------------------------ checks
     def _check_names(self) -> None:
         here = f"chart {self.name!r}"
+        for each, wanted, example in (
+            ("states", State, "State('stick', flow={'z': 'v'})"),
+            ("transitions", Transition, "Transition('slips', 'stick', 'slip', guard='z > s')"),
+        ):
+            for given in getattr(self, each):
+                if not isinstance(given, wanted):
+                    raise ChartError(f"{here}: {each} has {shown(given)}; write it as {example}")
         if not self.states:
             raise ChartError(f"{here}: it has no states; give at least one")
         if not self.variables:
@@ -318,6 +340,15 @@ class Chart:
             For example ``"|v| <= v_c && |z| < s"``.
         """
         return spell(self.guards[edge], MATLAB_LIKE)
+
+
+def _texts(given: object, owner: str) -> dict[str, str]:
+    """Return a copy of a mapping of names to texts."""
+    if not isinstance(given, Mapping):
+        raise ChartError(
+            f"{owner} is {shown(given)}; it gives a text for each name, for example {{'z': 'v'}}"
+        )
+    return dict(given)
 
 
 def _check_name(name: str, kind: str, here: str) -> None:

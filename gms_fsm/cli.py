@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import enum
 import json
 import sys
 import textwrap
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -23,6 +25,7 @@ from gms_fsm.charts import LUGRE, gms_element
 from gms_fsm.charts.broken import BROKEN
 from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.files import no_input, output_folder, written_whole
+from gms_fsm.generated import standalone
 from gms_fsm.live import LiveView
 from gms_fsm.models import GMS, Model
 from gms_fsm.parameters import GMSParameters
@@ -53,6 +56,13 @@ class _Verbs(TyperGroup):
         if "--debug" in options:
             args = ["--debug", *(a for a in options if a != "--debug"), *args[len(options) :]]
         return super().parse_args(ctx, args)
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:  # pydantic's words, as newer versions of typer pass on
+            error.message = error.message.removeprefix("Value error, ")
+            raise
 
 
 app = typer.Typer(
@@ -100,6 +110,17 @@ def root(
     context.ensure_object(Wishes).debug = debug
 
 
+@contextlib.contextmanager
+def _progress(*columns: Any, console: Console) -> Iterator[Progress]:
+    """Give progress bars that whoever has something to show starts: none before an error."""
+    bars = Progress(*columns or Progress.get_default_columns(), console=console)
+    try:
+        yield bars
+    finally:
+        if bars.live.is_started:
+            bars.stop()
+
+
 @app.command("paper")
 def paper_command(
     output: Annotated[
@@ -115,11 +136,12 @@ def paper_command(
     """Run the paper's two experiments; write figures, traces, logs and claims.md."""
     console = Console(stderr=True)
     columns = (TextColumn("{task.description:<22}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console) as bars:
+    with _progress(*columns, console=console) as bars:
         tasks: dict[str, TaskID] = {}
 
         def show(name: str, done: float) -> None:
             if name not in tasks:
+                bars.start()
                 tasks[name] = bars.add_task(name, total=1.0)
             bars.update(tasks[name], completed=done)
 
@@ -211,7 +233,9 @@ def chart_command(
     name: Annotated[ChartName, typer.Argument(help="Which chart.", show_default=False)],
     output: Annotated[
         Path,
-        typer.Option("--output", "-o", help="Ends in .svg, .png, .pdf, .dot or .mmd (Mermaid)."),
+        typer.Option(
+            "--output", "-o", help="Ends in .svg, .png, .pdf, .dot, .gv or .mmd (Mermaid)."
+        ),
     ] = Path("chart.svg"),
     law: Annotated[LawName | None, typer.Option(help="Slip law of the GMS chart.")] = None,
     elements: Annotated[int, typer.Option(help="How many elements, as parallel states.")] = 1,
@@ -222,21 +246,15 @@ def chart_command(
 ) -> None:
     """Draw a state chart."""
     import plots
-    from plots.mermaid import mermaid
 
     if name == ChartName.gms and law is None:
         raise ParameterError("chart gms needs --law signed or --law published; they differ")
     chart = LUGRE if law is None else gms_element(law.value)
-    if output.suffix == ".mmd":
-        text = mermaid(chart).encode()
-        written = written_whole(output, lambda file: file.write(text))
-    else:
-        graph = plots.statechart(
-            chart, elements, notation=notation.value, direction=direction.value,
-            theme=theme.value, names=names,
-        )  # fmt: skip
-        written = plots.render(graph, output)
-    typer.echo(str(written))
+    graph = plots.statechart(
+        chart, elements, notation=notation.value, direction=direction.value, theme=theme.value,
+        names=names,
+    )  # fmt: skip
+    typer.echo(str(plots.render(graph, output)))
 
 
 @app.command("check")
@@ -255,7 +273,10 @@ def check_command(
     ] = None,
     names: Annotated[bool, typer.Option("--list", help="Say what can be checked.")] = False,
 ) -> None:
-    """Prove a chart free of contradictions, or refute it by an example; then exit with 1."""
+    """Prove a chart free of contradictions, or refute it by an example; then exit with 1.
+
+    What the order of the edges settles is said, and is no refutation.
+    """
     if names:
         typer.echo("gms --law signed, gms --law published, lugre, and as demonstrations:")
         for broken, what in BROKEN.items():
@@ -291,20 +312,22 @@ def _to_check(name: str, law: LawName | None) -> tuple[Chart, tuple[str, ...] | 
 
 
 def _write_report(report: Report, folder: Path) -> list[Path]:
-    """Write a report, and for each thing refuted the chart with the place marked."""
+    """Write a report, and a chart with the place marked for what is refuted or settled by order."""
     import plots
 
     text = f"{report}\n".encode()
-    stems = [f"{number}-{found.check}" for number, found in enumerate(report.refuted, start=1)]
+    found = [*report.refuted, *report.settled]
+    stems = [f"{number}-{finding.check}" for number, finding in enumerate(found, start=1)]
     endings = ("svg", "png", "dot")
     output_folder(
         folder, ["report.txt", *(f"{stem}.{ending}" for stem in stems for ending in endings)]
     )
     written = [written_whole(folder / "report.txt", lambda file: file.write(text))]
     edges = report.chart.guards
-    for stem, finding in zip(stems, report.refuted, strict=True):
+    for stem, finding in zip(stems, found, strict=True):
         marked = [part for part in finding.where if part in edges] or finding.where
-        what = f"{finding.check}, {finding.case}" if finding.case else finding.check
+        settled = finding.status if finding in report.settled else ""
+        what = ", ".join(part for part in (finding.check, finding.case, settled) if part)
         note = textwrap.wrap(f"{what}: {finding.text}", 50)
         note += textwrap.wrap(finding.example, 50)
         graph = plots.statechart(report.chart, marked=marked, note="\n".join(note))
@@ -316,7 +339,7 @@ def _write_report(report: Report, folder: Path) -> list[Path]:
 @app.command("blocks")
 def blocks_command(
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="Ends in .svg, .png, .pdf or .dot.")
+        Path, typer.Option("--output", "-o", help="Ends in .svg, .png, .pdf, .dot or .gv.")
     ] = Path("blocks.svg"),
     elements: Annotated[int, typer.Option(help="How many elements.")] = 4,
 ) -> None:
@@ -367,12 +390,14 @@ def animate_command(
 
     no_input(output, *files_of(trace))
     run = Trace.load(trace)
-    with Progress(console=Console(stderr=True)) as bar:
+    with _progress(console=Console(stderr=True)) as bar:
         task = bar.add_task("frames", total=frames)
-        film = animate(
-            run, output, frames=frames, t_start=start, t_end=end,
-            progress=lambda done, _: bar.update(task, completed=done),
-        )  # fmt: skip
+
+        def show(done: int, _: int) -> None:
+            bar.start()
+            bar.update(task, completed=done)
+
+        film = animate(run, output, frames=frames, t_start=start, t_end=end, progress=show)
     typer.echo(str(film))
 
 
@@ -417,19 +442,19 @@ def debug_command(
 @app.command("lesson")
 def lesson_command(
     number: Annotated[
-        int | None, typer.Argument(help="Which one; left out, all are listed.", show_default=False)
-    ] = None,
+        str, typer.Argument(help="Which one; left out, all are listed.", show_default=False)
+    ] = "",
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder.")] = Path("lessons"),
 ) -> None:
     """Run a lesson: a picture, a replay page, and five lines with the measured figures."""
-    from gms_fsm.lessons import LESSONS, teach
+    from gms_fsm.lessons import listed, numbered, teach
 
-    if number is None:
-        for key, each in LESSONS.items():
-            typer.echo(f"{key}  {each.TITLE}: {each.QUESTION}")
+    if not number:
+        typer.echo(listed())
         return
-    with Console(stderr=True).status(f"running lesson {number}"):
-        taught = teach(number, output)
+    chosen = numbered(number)
+    with Console(stderr=True).status(f"running lesson {chosen}"):
+        taught = teach(chosen, output)
     for line in taught.lines:
         typer.echo(line)
     typer.echo()
@@ -444,14 +469,14 @@ def code_command(
         RigName.prescribed
     ),
 ) -> None:
-    """Print the if-else program generated from the GMS chart (the paper's Fig. 2c)."""
+    """Print the if-else program made from the GMS chart (the paper's Fig. 2c); it runs alone."""
     rigs: dict[RigName, Rig] = {
         RigName.prescribed: Prescribed(paper.VELOCITY),
         RigName.slider: Slider(1.0, paper.FORCE),
         RigName.pulled: PulledSlider(1.0, 2.0, 0.1),
     }
     model: Model = GMS(GMSParameters.paper("stick-slip"), law=law.value)
-    typer.echo(lower(model, rigs[rig]).source, nl=False)
+    typer.echo(standalone(lower(model, rigs[rig]).source), nl=False)
 
 
 def main() -> None:

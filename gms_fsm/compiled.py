@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib.util
+import math
 import os
 import re
 import threading
@@ -125,8 +126,10 @@ def _loaded(
     for helper in (sgn, piecewise_linear, piecewise_slope):
         compiled.usable_inside(helper)
     # The name of a module that exists: numba imports it when it loads machine code from disk.
-    names: dict[str, Any] = {"piecewise_linear": piecewise_linear, "pow": _power()}
-    names |= {"piecewise_slope": piecewise_slope, "__name__": __name__}
+    names: dict[str, Any] = {
+        "piecewise_linear": piecewise_linear, "piecewise_slope": piecewise_slope,
+        "pow": _power(), "nan": math.nan, "__name__": __name__,
+    }  # fmt: skip
     for name, call in callables:
         names[f"{name}_signal"] = _compiled_signal(name, call)
     return load("compiled program", source, names)

@@ -11,11 +11,11 @@ import numpy as np
 
 from gms_fsm import compiled
 from gms_fsm.errors import SimulationError
-from gms_fsm.machines import ElementMachines, MachineEngine
+from gms_fsm.machines import ElementMachines, MachineEngine, Meddling
 from gms_fsm.models import Model
 from gms_fsm.observing import observe
 from gms_fsm.program import system
-from gms_fsm.recording import PATIENCE, Recording, check_end, check_pace, explained
+from gms_fsm.recording import PATIENCE, Recording, check_end, check_pace, explained, meddled
 from gms_fsm.rigs import Rig
 from gms_fsm.start import Start
 from gms_fsm.trace import Rows, Trace, log_from
@@ -68,8 +68,7 @@ class CompiledRun:
             self.engine.go_on_from(t, y, mode[: self.start.model.n], self.start.program.p)
             if counts[loop.PHASE] == loop.FIRE:  # its callbacks have run, the loop is yet to follow
                 edge = self.start.model.chart.transitions[counts[loop.EDGE]]
-                element = self.engine.machines.elements[counts[loop.MACHINE]]
-                self.engine.machines.machine.set_state(edge.target, element)
+                self.engine.set_state(int(counts[loop.MACHINE]), edge.target)
 
     def begin_again(self, model: Model, rig: Rig) -> None:
         """Start over with other numbers; signals and initial values stay.
@@ -138,7 +137,10 @@ class CompiledRun:
         start = self.columns.start
         if memory.counts[loop.FIRED_ONE] == 0:  # the elements saw these values when asked
             engine.show(t, y, list(mode[: start.model.n]), start.program.p)
-        engine.trigger(int(memory.counts[loop.EDGE]), int(memory.counts[loop.MACHINE]), t)
+        try:
+            engine.trigger(int(memory.counts[loop.EDGE]), int(memory.counts[loop.MACHINE]), t)
+        except Meddling as error:
+            raise meddled(error, self.columns) from error.__cause__
 
 
 class Columns:

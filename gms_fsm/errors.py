@@ -27,13 +27,26 @@ def cut(text: str, longest: int = LONGEST_SHOWN) -> str:
 def shown(value: object) -> str:
     """Return a value as a message can show it: its text in Python, cut where it is long.
 
+    Numbers of numpy are written as plain numbers: 20.0, not np.float64(20.0).
+
     >>> shown("abc")
     "'abc'"
     """
     try:
-        return cut(repr(value))
+        return cut(repr(_plain(value)))
     except (RecursionError, ValueError):  # nested too deeply; a whole number of 5,000 digits
         return "..."
+
+
+def _plain(value: object) -> object:
+    """Return numbers of numpy as Python's own, inside tuples, lists and mappings too."""
+    if type(value) is tuple:
+        return tuple(map(_plain, value))
+    if type(value) is list:
+        return list(map(_plain, value))
+    if type(value) is dict:
+        return {_plain(key): _plain(each) for key, each in value.items()}
+    return value.item() if getattr(value, "shape", None) == () else value  # type: ignore[attr-defined]
 
 
 def why(error: BaseException) -> str:
@@ -157,6 +170,10 @@ class NotFiniteError(SimulationError):
 
 class SignalEndError(SimulationError):
     """A sampled signal ends before the run does."""
+
+
+class CallbackError(SimulationError):
+    """A callback changed what it may only look at: values, or the state of an element."""
 
 
 class UnitError(GMSError, ValueError):

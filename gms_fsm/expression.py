@@ -7,6 +7,7 @@ and only nodes on an allow-list survive; code is generated from the checked tree
 
 Grammar: numbers, declared names, ``pi``, ``+ - * / **``, ``< <= > >=`` (chains are split),
 ``and or not``, ``abs exp sqrt sgn min max sin cos tanh``. ``==`` on floats is refused.
+``pow(a, b)``, as code prints some powers, is read as ``a**b``.
 """
 
 from __future__ import annotations
@@ -388,17 +389,24 @@ class _Reader:
                     _OPERATORS[type(op)], self.value(left, depth), self.value(right, depth)
                 )
             case ast.Call(func=ast.Name(id=function), args=arguments, keywords=[]):
+                self.known(node, function)
                 return self.call(node, function, arguments, depth)
             case ast.Compare() | ast.BoolOp() | ast.UnaryOp(op=ast.Not()):
                 raise self.refuse("a comparison stands where a number is needed", node)
         raise self.refuse(f"{_plain(node)} is not part of the language", node)
 
-    def call(self, node: ast.expr, function: str, arguments: list[ast.expr], depth: int) -> Call:
-        if function not in FUNCTIONS:
+    def known(self, node: ast.expr, function: str) -> None:
+        if function not in NAMESPACE:
             raise self.refuse(
                 f"unknown function {shown(function)}{_meant(function, FUNCTIONS)}", node,
                 "the functions " + ", ".join(FUNCTIONS),
             )  # fmt: skip
+
+    def call(self, node: ast.expr, function: str, arguments: list[ast.expr], depth: int) -> Value:
+        if function == "pow":
+            if len(arguments) != 2:
+                raise self.refuse(f"pow got {len(arguments)} arguments", node, "two arguments")
+            return Binary("**", self.value(arguments[0], depth), self.value(arguments[1], depth))
         several = function in ("min", "max")
         if (len(arguments) < 2) if several else (len(arguments) != 1):
             wanted = "two or more arguments" if several else "one argument"
@@ -458,6 +466,9 @@ class _Reader:
             case ast.UnaryOp(op=ast.Not(), operand=operand):
                 return Not(self.condition(operand, depth))
             case ast.Constant() | ast.Name() | ast.BinOp() | ast.UnaryOp() | ast.Call():
+                match node:
+                    case ast.Call(func=ast.Name(id=function)):  # after(0.2), say
+                        self.known(node, function)
                 raise self.refuse(
                     "a number stands where a comparison is needed", node, "for example v > v_c"
                 )
@@ -626,7 +637,7 @@ def _power(
     other = inner if level > _LEVEL["*"] else f"({inner})"
     product = " * ".join([first] + [other] * (abs(whole) - 1))
     if whole < 0:
-        return f"1.0 / ({product})", _LEVEL["/"]
+        return f"1.0 / {other if whole == -1 else f'({product})'}", _LEVEL["/"]
     return product, _LEVEL["*"]
 
 
@@ -662,7 +673,7 @@ def _parts(node: Value) -> int:
         case Binary("**", base, exponent):
             parts = _parts(base)  # once: a power of a power of a power would double the work
             whole = _fitting_power(parts, exponent)
-            return parts + _parts(exponent) if whole is None else parts * max(1, abs(whole))
+            return parts + _parts(exponent) if whole is None else max(1, parts * abs(whole))
         case Negative(operand):
             return _parts(operand)
         case Binary(_, left, right):

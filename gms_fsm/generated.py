@@ -6,8 +6,10 @@ The only place where text becomes code, and it is always our own text, printed f
 from __future__ import annotations
 
 import ast
+import builtins
 import functools
 import hashlib
+import inspect
 import linecache
 import math
 from collections.abc import Callable, Mapping
@@ -16,10 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm.errors import GMSError
+from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.expression import NAMESPACE
+from gms_fsm.signals import piecewise_linear, piecewise_slope
 
-__all__ = ["ieee", "load", "load_careful"]
+__all__ = ["ieee", "load", "load_careful", "standalone"]
 
 
 def load(title: str, source: str, names: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -65,6 +68,80 @@ def load_careful(title: str, source: str, names: Mapping[str, Any] | None = None
     namespace: dict[str, Any] = {**NAMESPACE, **(names or {}), **_IEEE, "_wide": _wide}
     exec(_compiled(title, source, careful=True), namespace)
     return namespace
+
+
+def standalone(source: str) -> str:
+    r"""Return generated text as a program of its own, with the imports and functions that it uses.
+
+    Parameters
+    ----------
+    source : str
+        From `gms_fsm.program.lower`.
+
+    Returns
+    -------
+    str
+        Python text that needs nothing but Python.
+
+    Raises
+    ------
+    ParameterError
+        If a signal in it is a Python function of the user's, which no text can hold.
+
+    Examples
+    --------
+    >>> print(standalone("# twice\ndef twice(u):\n    return 2.0 * sqrt(u)\n"))
+    # twice
+    <BLANKLINE>
+    from math import sqrt
+    <BLANKLINE>
+    <BLANKLINE>
+    def twice(u):
+        return 2.0 * sqrt(u)
+    <BLANKLINE>
+    """
+    used, own = set[str](), set[str]()
+    for node in ast.walk(ast.parse(source)):
+        match node:
+            case ast.Name(id=name, ctx=ast.Load()):
+                used.add(name)
+            case ast.Name(id=name) | ast.arg(arg=name) | ast.FunctionDef(name=name):
+                own.add(name)
+    known: dict[str, Any] = {
+        **NAMESPACE, "piecewise_linear": piecewise_linear, "piecewise_slope": piecewise_slope,
+        "nan": math.nan,
+    }  # fmt: skip
+    missing = sorted(used - own - set(dir(builtins)))
+    if foreign := [name for name in missing if name not in known]:
+        raise ParameterError(
+            f"{', '.join(foreign)}: a Python function, which no text can hold; give the signal as "
+            "a formula or as corners"
+        )
+    borrowed = [name for name in missing if known[name] is getattr(math, name, None)]
+    parts = [f"from math import {', '.join(borrowed)}\n"] if borrowed else []
+    parts += ["\n" + _bare(known[name]) for name in missing if name not in borrowed]
+    head, body = _split_head(source)
+    return "\n".join([head, *parts, "\n" + body.lstrip("\n")])
+
+
+def _split_head(source: str) -> tuple[str, str]:
+    """Split the comments that a text begins with from the rest."""
+    lines = source.splitlines(keepends=True)
+    end = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
+    return "".join(lines[:end]), "".join(lines[end:])
+
+
+def _bare(function: Callable[..., Any]) -> str:
+    """Return a function's text without annotations, its docstring cut to the first line."""
+    tree = ast.parse(inspect.getsource(function))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.arg):
+            node.annotation = None
+        if isinstance(node, ast.FunctionDef):
+            node.returns = None
+            first = (ast.get_docstring(node) or "").partition("\n")[0]
+            node.body[0] = ast.Expr(ast.Constant(first))
+    return ast.unparse(ast.fix_missing_locations(tree)) + "\n"
 
 
 @functools.lru_cache(maxsize=256)

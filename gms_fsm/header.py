@@ -45,7 +45,7 @@ class ModelRecord(_Record):
     chart: ChartRecord
     values: dict[str, float | list[float]]
     weights: list[float]
-    stribeck: Stribeck
+    stribeck: Stribeck | None
     sigma_2: float
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from types import TracebackType
 
@@ -50,9 +51,7 @@ class LiveView:
         self.live = Live(self.bar, console=console, auto_refresh=False)
 
     def __enter__(self) -> LiveView:
-        if self.console.is_terminal:
-            self.live.__enter__()
-        return self
+        return self  # drawing begins with the first moment: no empty bar before an error
 
     def __exit__(
         self,
@@ -63,7 +62,7 @@ class LiveView:
         if self.console.is_terminal:
             if self.latest is not None:
                 self.show(self.latest)  # the end is always drawn
-            self.live.__exit__(kind, error, trace)
+            self.live.stop()
         elif self.detail and self.latest is not None:
             self.console.print(self.table(self.latest))  # a log gets the end only
 
@@ -82,6 +81,7 @@ class LiveView:
         """Draw now."""
         self.bar.update(self.task, completed=moment.t - self.t_start, t=moment.t)
         shown = Group(self.table(moment), self.bar) if self.detail else self.bar
+        self.live.start()
         self.live.update(shown, refresh=True)
 
     def table(self, moment: Moment) -> Table:
@@ -105,12 +105,13 @@ class LiveView:
                 self.names.append(state)
             colour = COLOURS[self.names.index(state) % len(COLOURS)]
             ratio = abs(z) / s
-            filled = min(BAR, round(BAR * ratio))
+            bare = math.isnan(ratio)  # without a curve there is no threshold
+            filled = 0 if bare else min(BAR, round(BAR * ratio))
             # The state is a word as well as a colour, the bar a length as well as a number.
             table.add_row(
                 f"E{i + 1}",
                 Text(state.upper() if self.names.index(state) else state, style=colour),
-                f"{ratio:.3f}",
+                "" if bare else f"{ratio:.3f}",
                 Text("█" * filled + "░" * (BAR - filled), style=colour),
                 f"{z:+.4e}",
             )

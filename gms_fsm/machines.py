@@ -10,16 +10,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
-from transitions import Machine
+from transitions import Machine, MachineError
 
 from gms_fsm.chart import Chart
-from gms_fsm.errors import ChartError, ParameterError
+from gms_fsm.errors import ChartError, ParameterError, shown
 from gms_fsm.expression import PYTHON, Condition, names_in, spell
 from gms_fsm.generated import ieee, load, load_careful
 from gms_fsm.models import Model
 from gms_fsm.program import Arguments, Program
 
-__all__ = ["Element", "ElementMachines", "Engine", "IfElse"]
+__all__ = ["Element", "ElementMachines", "Engine", "IfElse", "Meddling"]
 
 
 class Element:
@@ -27,8 +27,9 @@ class Element:
 
     Callbacks find here what they need: ``t`` [s], ``x`` [m], ``v`` [m/s], the threshold ``s``, each
     variable (``z`` [m]) and each parameter (``k``, ``sigma``, ``C``, ``v_c``) of the chart, the
-    current ``state`` and the element's ``index`` counted from 0. Derive from it to give elements
-    methods that `transitions` calls by name, such as ``on_enter_slip(self, event)``.
+    current ``state`` and the element's ``index`` counted from 0. Parameters are read-only: the run
+    is integrated with those of the model. Derive from it to give elements methods that
+    `transitions` calls by name, such as ``on_enter_slip(self, event)``.
     """
 
     # No __slots__ and no generated __eq__: transitions fails on the first and registers equal
@@ -39,6 +40,17 @@ class Element:
     x: float
     v: float
     s: float
+    _fixed: frozenset[str] = frozenset()
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in self._fixed:
+            raise ParameterError(
+                f"element {self.index + 1}: {name} is set to {shown(value)}, but parameters of an "
+                "element are read-only: the flow would not follow. Change them between runs "
+                "(with_values(model, ...)), or make the number a variable of the chart with the "
+                "flow '0' and assign it in an action"
+            )
+        object.__setattr__(self, name, value)
 
 
 class Guard:
@@ -90,6 +102,11 @@ class ElementMachines:
     """
 
     def __init__(self, model: Model, element: type[Element] = Element) -> None:
+        if not hasattr(model, "chart"):
+            raise ParameterError(
+                f"model is {shown(model)}; it must be a model, for example GMS(parameters, "
+                "law='signed')"
+            )
         chart = model.chart
         self.model = model
         self.guards = {edge: Guard(edge, guard) for edge, guard in chart.guards.items()}
@@ -169,9 +186,11 @@ def _new_element(kind: type[Element], model: Model, index: int) -> Element:
             "one; use @dataclass(eq=False)"
         )
     element = kind()
-    element.index = index
+    values = vars(element)  # past __setattr__, as an __init__ may have set these names
+    values["index"] = index
     for name, value in model.values.items():
-        setattr(element, name, float(value if isinstance(value, float | int) else value[index]))
+        values[name] = float(value if isinstance(value, float | int) else value[index])
+    values["_fixed"] = frozenset(model.values) | {"index"}
     return element
 
 
@@ -190,6 +209,10 @@ class Engine(Protocol):
         """Take an edge."""
 
 
+class Meddling(Exception):
+    """A callback changed what it may only look at; whoever holds the run says it to the user."""
+
+
 class MachineEngine:
     """Asks and fires the `transitions` machines."""
 
@@ -202,6 +225,8 @@ class MachineEngine:
         self.places = [
             (variable, program.first + j * n) for j, variable in enumerate(self.chart.variables)
         ]
+        self.seen_by = [vars(element) for element in machines.elements]
+        self.states = [""] * n
         self.set_states(mode)
 
     def go_on_from(self, t: float, y: list[float], mode: Sequence[int], p: Arguments) -> None:
@@ -211,17 +236,23 @@ class MachineEngine:
 
     def set_states(self, mode: Sequence[int]) -> None:
         """Put every element into a state, without callbacks."""
-        for element, state in zip(self.machines.elements, mode, strict=True):
-            self.machines.machine.set_state(self.chart.states[state].name, element)
+        for i, state in enumerate(mode):
+            self.set_state(i, self.chart.states[state].name)
+
+    def set_state(self, machine: int, state: str) -> None:
+        """Put one element into a state, without callbacks."""
+        self.machines.machine.set_state(state, self.machines.elements[machine])
+        self.states[machine] = state
 
     def show(self, t: float, y: list[float], mode: list[int], p: Arguments) -> None:
         """Put the present values at hand of every element."""
         seen = self.seen
         self.program.ieee["observe"](t, y, mode, self.live, p, seen)
-        for i, element in enumerate(self.machines.elements):
-            element.t, element.x, element.v, element.s = t, y[0], seen[0], seen[2 + i]
+        x, v = y[0], seen[0]
+        for i, values in enumerate(self.seen_by):  # past __setattr__, which would cost time
+            values["t"], values["x"], values["v"], values["s"] = t, x, v, seen[2 + i]
             for variable, base in self.places:
-                setattr(element, variable, y[base + i])
+                values[variable] = y[base + i]
 
     def ask(
         self, t: float, y: list[float], mode: list[int], p: Arguments, edges: list[int]
@@ -241,18 +272,40 @@ class MachineEngine:
         """Take an edge through `transitions`, so that callbacks run."""
         self.trigger(edge, machine, t)
         self.program.ieee["act"](edge, machine, t, y, mode, p)
-        mode[machine] = self.chart.state_index(self.machines.elements[machine].state)
 
     def trigger(self, edge: int, machine: int, t: float) -> None:
-        """Fire the machine's edge on the values it was asked with."""
-        row = self.chart.transitions[edge]
+        """Fire the machine's edge on the values it was asked with.
+
+        Raises
+        ------
+        Meddling
+            If a callback changed these values, or a state.
+        """
+        row, elements = self.chart.transitions[edge], self.machines.elements
+        here = f"element {machine + 1}, edge {row.name!r} at t = {t!r} s"
         # The trigger evaluates the guard once more; assignments come after, as in Stateflow, where
         # the whole set was chosen before any of them.
-        if not getattr(self.machines.elements[machine], row.name)():
-            raise ChartError(
-                f"element {machine + 1}: edge {row.name!r} was enabled at t = {t!r} s but a "
-                "callback changed the element's values before it fired; callbacks may only look"
+        try:
+            fired = getattr(elements[machine], row.name)()
+        except MachineError as error:
+            raise Meddling(
+                f"{here}: a callback moved a state ({error.value}); {ONLY_LOOK}"
+            ) from error
+        if not fired:
+            raise Meddling(
+                f"{here}: the edge was enabled, but a callback changed the element's values before "
+                f"it fired; {ONLY_LOOK}"
             )
+        self.states[machine] = row.target
+        for i, (element, state) in enumerate(zip(elements, self.states, strict=True)):
+            if element.state != state:
+                raise Meddling(
+                    f"{here}: a callback put element {i + 1} into state {shown(element.state)}, "
+                    f"but the chart has it in {state!r}; {ONLY_LOOK}"
+                )
+
+
+ONLY_LOOK = "callbacks may only look; write the switch into the chart, as an edge with a guard"
 
 
 class IfElse:

@@ -46,8 +46,8 @@ class Model(Protocol):
         """Threshold weights, shape (n,), m/N; ``s_i = weights[i] * s(v)``."""
 
     @property
-    def stribeck(self) -> Stribeck:
-        """The common Stribeck curve."""
+    def stribeck(self) -> Stribeck | None:
+        """The common Stribeck curve; None where the chart has no input ``s``."""
 
     @property
     def sigma_2(self) -> float:
@@ -201,7 +201,7 @@ class ChartModel:
     n : int, optional
         Number of elements; 1 when left out.
     stribeck : Stribeck, optional
-        The curve behind the input ``s``; needed only by charts that have this input.
+        The curve behind the input ``s``; None for charts without this input.
     sigma_2 : float
         Viscous friction, Ns/m, >= 0.
     weights : array_like, shape (n,), optional
@@ -226,23 +226,26 @@ class ChartModel:
     chart: Chart
     values: Mapping[str, float | FloatArray]
     n: int = field(default=1, kw_only=True)
-    stribeck: Stribeck = field(default=None, kw_only=True)  # type: ignore[assignment]
+    stribeck: Stribeck | None = field(default=None, kw_only=True)
     sigma_2: float = field(default=0.0, kw_only=True)
     weights: FloatArray = field(default=None, kw_only=True)  # type: ignore[arg-type]
     title: str = field(default="", kw_only=True)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.n, int) or self.n < 1:
+        if not isinstance(self.chart, Chart):
             raise ParameterError(
-                f"n is {self.n!r}; a bank has a whole number of elements, at least one"
+                f"chart is {shown(self.chart)}; it must be a gms_fsm.Chart (the transitions "
+                "machine is made from it: ElementMachines(model).machine)"
+            )
+        if isinstance(self.n, bool) or not isinstance(self.n, int) or self.n < 1:
+            raise ParameterError(
+                f"n is {shown(self.n)}; a bank has a whole number of elements, at least one"
             )
         curve: Any = self.stribeck
-        if curve is None and "s" not in self.chart.inputs:
-            object.__setattr__(self, "stribeck", Stribeck(1.0, 1.0, 1.0))  # nobody reads it
-        elif not isinstance(curve, Stribeck):
+        if not isinstance(curve, Stribeck) and (curve is not None or "s" in self.chart.inputs):
             raise ParameterError(
-                f"chart {self.chart.name!r} has the input s, and stribeck is {shown(curve)}; give "
-                "its curve, stribeck=Stribeck(F_c, F_s, v_s)"
+                f"chart {self.chart.name!r}: stribeck is {shown(curve)}; for the input s give its "
+                "curve, stribeck=Stribeck(F_c, F_s, v_s), and leave it out for a chart without s"
             )
         for name in self.chart.inputs:
             if name not in SUPPLIED:
@@ -250,6 +253,11 @@ class ChartModel:
                     f"chart {self.chart.name!r} wants the input {name!r}; "
                     f"a model supplies {', '.join(SUPPLIED)}"
                 )
+        if not isinstance(self.values, Mapping):
+            raise ParameterError(
+                f"values is {shown(self.values)}; it must give a number for each parameter of the "
+                "chart, for example {'k': 1.0}"
+            )
         wanted, given = set(self.chart.parameters), set(self.values)
         if wanted != given:
             raise ParameterError(
@@ -282,13 +290,16 @@ def parameter_names(model: Model) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        The chart's parameters and what all models share.
+        The chart's parameters and what all models share: ``sigma_2``, and where there is a Stribeck
+        curve its numbers and the weights.
 
     Examples
     --------
     >>> parameter_names(GMS(GMSParameters.paper("stick-slip"), law="signed"))
     ('k', 'sigma', 'C', 'v_c', 'weights', 'sigma_2', 'F_c', 'F_s', 'v_s')
     """
+    if model.stribeck is None:
+        return tuple(dict.fromkeys([*model.values, "sigma_2"]))
     weights = () if isinstance(model, LuGre) else ("weights",)
     return tuple(dict.fromkeys([*model.values, *weights, "sigma_2", "F_c", "F_s", "v_s"]))
 
@@ -330,13 +341,15 @@ def with_values(model: Model, values: Mapping[str, ArrayLike]) -> Model:
     def common(name: str, old: float) -> float:
         return old if name in model.values else number(name, old)
 
-    old = model.stribeck
-    stribeck = Stribeck(common("F_c", old.F_c), common("F_s", old.F_s), common("v_s", old.v_s))
+    stribeck = old = model.stribeck
+    if old is not None:
+        stribeck = Stribeck(common("F_c", old.F_c), common("F_s", old.F_s), common("v_s", old.v_s))
     shared: Any = {"stribeck": stribeck, "sigma_2": common("sigma_2", model.sigma_2)}
     if isinstance(model, LuGre):
         own: Any = {name: number(name, float(value)) for name, value in model.values.items()}
         return LuGre(**own, **shared)
-    weights = model.weights if "weights" in model.values else array("weights", model.weights)
+    fixed = old is None or "weights" in model.values
+    weights = model.weights if fixed else array("weights", model.weights)
     if isinstance(model, GMS):
         p = model.parameters
         arrays = [array(name, getattr(p, name)) for name in ("k", "sigma", "C")]

@@ -296,8 +296,9 @@ def watched(trace: Trace, monitors: Iterable[Monitor], error: Exception | None =
 # --------------------------------------------------------------------------- names and values
 def _read(monitor: Invariant, model: Model) -> Condition:
     chart, numbers = model.chart, range(1, model.n + 1)
-    names = ["t", "x", "v", "F", "s", *chart.variables, *chart.parameters]
-    names += [f"{name}{i}" for name in (*chart.variables, "s", "F") for i in numbers]
+    threshold = () if model.stribeck is None else ("s",)
+    names = ["t", "x", "v", "F", *threshold, *chart.variables, *chart.parameters]
+    names += [f"{name}{i}" for name in (*chart.variables, *threshold, "F") for i in numbers]
     states = [state.name for state in chart.states]
     try:
         return parse_condition(monitor.text, names, states, model.n, own_state=True)
@@ -467,7 +468,8 @@ def _episodes(monitor: Chattering, trace: Trace) -> tuple[Episode, ...]:
         meanwhile = log[taken[0] : taken[-1] + 1]
         others = np.unique(meanwhile["edge"][meanwhile["element"] == i]).tolist()
         edge = str(names[code])
-        values = {variable: float(first.z), "s": float(first.s), "v": float(first.v)}
+        seen = {variable: float(first.z), "s": float(first.s), "v": float(first.v)}
+        values = {name: value for name, value in seen.items() if not math.isnan(value)}
         back, end = tuple(other for other in others if other != edge), float(log["t"][taken[-1]])
         episodes.append(Episode(i, edge, back, len(taken), float(first.t), end, values))
     return tuple(episodes)

@@ -246,7 +246,7 @@ def _judge_figure_3(traces: Mapping[str, Trace]) -> list[Claim]:
             "Fig. 3b", "GMS is bounded: it does not drift",
             f"x between {1e3 * low:.3f} and {1e3 * high:.3f} mm in every cycle after 10 s, drift "
             f"{drift:.1e} m/s. With Table I element 1 would need k_1 F_s = "
-            f"{float(gms.model.values['k'][0]) * gms.model.stribeck.F_s:.0f} N to slip",  # type: ignore[index]
+            f"{float(gms.model.values['k'][0]) * gms.model.stribeck.F_s:.0f} N to slip",  # type: ignore[index, union-attr]
             f"holds only {spring_only}" if abs(drift) < 1e-9 else "differs",
         ),
         Claim(

@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -164,7 +165,7 @@ def lower(model: Model, rig: Rig) -> Program:
     """
     signals = rig.signals.values()
     shape = (
-        repr(model.chart), model.stribeck.text, model.n,
+        repr(model.chart), model.stribeck is None, model.n,
         tuple(np.ndim(model.values[name]) for name in model.chart.parameters),
         rig.title, rig.acceleration, tuple(rig.numbers), tuple(rig.signals),
         tuple(_spelling(s) for s in signals),
@@ -212,7 +213,7 @@ def _lowered(shape: _Shape) -> Program:
     }
     title = f"{model.chart.name}, {rig.title}"
     names: dict[str, Any] = {
-        "piecewise_linear": piecewise_linear, "piecewise_slope": piecewise_slope,
+        "piecewise_linear": piecewise_linear, "piecewise_slope": piecewise_slope, "nan": math.nan,
     }  # fmt: skip
     names |= {f"{name}_signal": _guarded(name, call) for name, call in callables.items()}
     namespace, careful = load(title, source, names), load_careful(title, source, names)
@@ -252,7 +253,8 @@ def arguments(model: Model, rig: Rig) -> Arguments:
         See `Program`.
     """
     curve, values = model.stribeck, [model.values[name] for name in model.chart.parameters]
-    shared = [curve.F_c, curve.F_s, curve.v_s, curve.dip, model.sigma_2, *rig.numbers.values()]
+    shared = [] if curve is None else [curve.F_c, curve.F_s, curve.v_s, curve.dip]
+    shared += [model.sigma_2, *rig.numbers.values()]
     shared += [float(value) for value in values if np.ndim(value) == 0]
     own = [as_floats(model.weights)]
     own += [as_floats(np.asarray(value)) for value in values if np.ndim(value) > 0]
@@ -321,7 +323,9 @@ class _Lowering:
         self.model, self.rig, self.chart = model, rig, model.chart
         self.prescribed = rig.acceleration is None
         self.first = 1 if self.prescribed else 2
-        self.stribeck = parse_value(model.stribeck.text, ["F_c", "F_s", "v_s", "v"])
+        self.curve = None
+        if model.stribeck is not None:
+            self.curve = parse_value(model.stribeck.text, ["F_c", "F_s", "v_s", "v"])
         # A chart may have names of the rig's: those of the rig are set apart.
         self.rig_names = {name: Name(f"rig {name}") for name in (*rig.signals, *rig.numbers)}
         self.acceleration = (
@@ -341,12 +345,13 @@ class _Lowering:
     # ------------------------------------------------------------------ collecting
     def _collect_numbers(self) -> None:
         # In the order of `arguments`.
-        self.shared = ["F_c", "F_s", "v_s", "v_dip", "sigma_2", *self.rig.numbers]
+        self.shared = [] if self.curve is None else ["F_c", "F_s", "v_s", "v_dip"]
+        self.shared += ["sigma_2", *self.rig.numbers]
         self.own = ["weight"]
         taken = set(self.shared) | set(self.rig.signals) | {f"{s}_signal" for s in self.rig.signals}
         # Of the text itself.
         taken |= {"F_i", "len", "range", "piecewise_linear", "piecewise_slope", "v_dip"}
-        taken |= {"surface", "j", "dS"}
+        taken |= {"surface", "j", "dS", "nan"}
         # A chart may call its own parameter F_c or mass: it gets a name of its own in the text.
         self.rename: dict[str, str] = {_DIP: "v_dip"}
         self.rename |= {apart.id: name for name, apart in self.rig_names.items()}
@@ -573,8 +578,8 @@ class _Lowering:
         used = _words(body)
         lines = [f"def {signature}:", f'    """{doc}"""']
         front: list[str] = []
-        if "S" in used:
-            front.append(f"S = {spell(self.stribeck)}  # (2)")
+        if "S" in used and self.curve is not None:
+            front.append(f"S = {spell(self.curve)}  # (2)")
             used |= _words(front)
         if "v" in used:
             front.insert(0, "v = y[1]") if not self.prescribed else None
@@ -770,7 +775,8 @@ class _Lowering:
 
     def write_observe(self) -> list[str]:
         shared_calls, branches = self.flow_branches("given", force=True)
-        threshold = "s" if "s" in self.chart.inputs else "weight[i] * S"
+        without = "nan" if self.curve is None else "weight[i] * S"
+        threshold = "s" if "s" in self.chart.inputs else without
         force = (
             [] if self.force_by_state else [f"F_i = {self.force(self.chart.forces['F'])}  # (3)"]
         )
@@ -834,7 +840,8 @@ class _Lowering:
                 lines.append(f"out[{place}] = {self.spell(_known(u, name))}")
         by_v = [self.spell(_known(u, "v"))] if "v" in names_in(u) else []
         if "s" in names_in(u):
-            slope = spell(_known(self.stribeck, "v"))
+            assert self.curve is not None  # charts with s have one
+            slope = spell(_known(self.curve, "v"))
             lines.append(f"dS = {slope}")
             by_v.append(f"({self.spell(_known(u, 's'))}) * weight[i] * dS")
         rates = [self.spell(_known(u, "t"))] if "t" in names_in(u) else []

@@ -3,7 +3,9 @@
 Theory of operation. Every text of the chart becomes a formula over the real numbers, and the solver
 z3 is asked for a point where the statement fails. *Proved* means that there is none within the
 domain. *Refuted* comes with one such point; its numbers are exact in floats, and every guard named
-was evaluated there. *Undecided* comes with the reason.
+was evaluated there. *Settled by order*: two edges are enabled at once, as such a point shows, and
+the machine takes the earlier one of the chart; no fault, but another order is another model.
+*Undecided* comes with the reason.
 
 - Over the reals, not floats: a proof says nothing about rounding.
 - Over points, not trajectories: a refuting point need not lie on the path of any run.
@@ -13,12 +15,12 @@ was evaluated there. *Undecided* comes with the reason.
 - ``sgn``, ``abs``, ``min`` and ``max`` are split by case, whole powers are products. ``exp``,
   ``sqrt``, ``sin``, ``cos``, ``tanh`` and other powers are not encoded: undecided. A quotient
   counts only where the domain proves its denominator nonzero.
-- Priorities are not used: two edges that are enabled at once are a finding, though the machine
-  would take the first.
+- Priorities settle what is enabled at once, and hide edges; the other checks do not use them.
 
-The checks. *determinism*: no two edges of one state are enabled at once. *livelock*: no edge and a
-way back are enabled at one point. *reachability*, of the graph and the guards alone: every state
-can be entered and left, every guard can hold. *chattering*: no two states whose flows cross the
+The checks. *determinism*: no two edges of one state are enabled at once, or their order settles
+which is taken. *livelock*: no edge and a way back are enabled at one point. *reachability*, of the
+graph and the guards alone: every state can be entered and left, every guard can hold where no
+earlier edge goes first. *chattering*: no two states whose flows cross the
 surfaces of the guards between them in opposite directions, each into the other's guard (to first
 order in time; edges that assign variables are undecided). *stability*: no state has an unstable
 equilibrium, for flows linear in the variable.
@@ -63,7 +65,7 @@ from gms_fsm.expression import Literal as Comparative
 __all__ = ["CHECKS", "Check", "Finding", "Report", "Status", "default_domain", "prove"]
 
 Check: TypeAlias = Literal["determinism", "livelock", "reachability", "chattering", "stability"]
-Status: TypeAlias = Literal["proved", "refuted", "undecided"]
+Status: TypeAlias = Literal["proved", "settled by order", "refuted", "undecided"]
 CHECKS: tuple[Check, ...] = get_args(Check)
 
 PATIENCE = 5.0  # s, for one question to z3
@@ -96,16 +98,16 @@ class Finding:
     ----------
     check : {"determinism", "livelock", "reachability", "chattering", "stability"}
         What was asked.
-    status : {"proved", "refuted", "undecided"}
+    status : {"proved", "settled by order", "refuted", "undecided"}
         The answer.
     where : tuple of str
         The states and edges it is about, in the order they are passed.
     text : str
         The answer in words.
     counterexample : mapping of str to float
-        A point that refutes the statement, name by name, exact in floats; rates of inputs are
-        called ``ds/dt``. Empty if nothing is refuted, or if no point is needed (a state that no
-        edge enters).
+        A point that refutes the statement, or at which the order settles it, name by name, exact
+        in floats; rates of inputs are called ``ds/dt``. Empty if there is none, or if no point is
+        needed (a state that no edge enters).
     case : str
         What of a state is meant, for stability: ``"z for v < 0"``.
     """
@@ -152,6 +154,11 @@ class Report:
     def refuted(self) -> tuple[Finding, ...]:
         """The findings that are refuted."""
         return tuple(f for f in self.findings if f.status == "refuted")
+
+    @property
+    def settled(self) -> tuple[Finding, ...]:
+        """The findings that the order of the edges settles."""
+        return tuple(f for f in self.findings if f.status == "settled by order")
 
     def of(self, check: Check) -> tuple[Finding, ...]:
         """Return the findings of one check.
@@ -567,9 +574,13 @@ def _enabled(guards: Sequence[Condition], point: Mapping[str, float]) -> bool:
 
 
 def _refuted(text: str, point: Mapping[str, float], seen: bool = True) -> _Answer:
+    return _by_example("refuted", text, point, seen)
+
+
+def _by_example(status: Status, text: str, point: Mapping[str, float], seen: bool) -> _Answer:
     if not seen:
         raise _Undecided(f"fails over the reals at {_listed(point)}, but rounding hides it there")
-    return _Answer("refuted", text, point)
+    return _Answer(status, text, point)
 
 
 def _names(*trees: Value | Condition) -> frozenset[str]:
@@ -596,7 +607,7 @@ def _at_once(prover: _Prover, guards: Sequence[Condition], first: str) -> _Answe
     if point is None:
         return _Answer("proved", "never enabled at once")
     text = f"both are enabled at once; the machine takes the earlier, {first}"
-    return _refuted(text, point, _enabled(guards, point))
+    return _by_example("settled by order", text, point, _enabled(guards, point))
 
 
 # --------------------------------------------------------------------------- livelock
@@ -678,8 +689,8 @@ def _comes_back(chart: Chart, cycle: Sequence[Transition], point: Mapping[str, f
 def _reachability(prover: _Prover) -> Iterator[Finding]:
     chart = prover.chart
     guards = {
-        edge: prover.settle("reachability", (edge,), _can_hold, guard)
-        for edge, guard in chart.guards.items()
+        edge.name: prover.settle("reachability", (edge.name,), _can_hold, edge)
+        for edge in chart.transitions
     }
     possible = [e for e in chart.transitions if guards[e.name].status != "refuted"]
     certain = [e for e in possible if guards[e.name].status == "proved"]
@@ -692,12 +703,23 @@ def _reachability(prover: _Prover) -> Iterator[Finding]:
     yield from guards.values()
 
 
-def _can_hold(prover: _Prover, guard: Condition) -> _Answer:
-    reading = _Reading()
-    formula = reading.truth(guard, prover.still)
+def _can_hold(prover: _Prover, edge: Transition) -> _Answer:
+    chart, reading = prover.chart, _Reading()
+    formula = reading.truth(chart.guards[edge.name], prover.still)
     prover.defined(reading)
     if prover.find(formula) is None:
-        return _Answer("refuted", f"its guard can never hold: {_shown(guard)}")
+        return _Answer("refuted", f"its guard can never hold: {_shown(chart.guards[edge.name])}")
+    earlier = []
+    for _, other in chart.leaving(edge.source):
+        if other.name == edge.name:
+            break
+        earlier.append(other.name)
+    hidden = [reading.truth(Not(chart.guards[name]), prover.still) for name in earlier]
+    prover.defined(reading)
+    if prover.find(formula, *hidden) is None:
+        names = ", ".join(earlier)
+        text = f"never taken: wherever its guard holds, an earlier edge goes first ({names})"
+        return _Answer("refuted", text)
     return _Answer("proved", "its guard can hold")
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import integrators
 from gms_fsm.chart import Chart
 from gms_fsm.errors import (
+    CallbackError,
     LivelockError,
     NotFiniteError,
     SignalEndError,
@@ -20,6 +21,7 @@ from gms_fsm.errors import (
     StepSizeError,
 )
 from gms_fsm.expression import rough_points
+from gms_fsm.machines import Meddling
 from gms_fsm.observing import observe, rate
 from gms_fsm.start import Start
 from gms_fsm.trace import Rows, Trace, log_of
@@ -37,7 +39,16 @@ from integrators import (
 from integrators.advance import STEPS
 from integrators.loop import H
 
-__all__ = ["PATIENCE", "Moment", "Recorder", "Recording", "check_end", "check_pace", "explained"]
+__all__ = [
+    "PATIENCE",
+    "Moment",
+    "Recorder",
+    "Recording",
+    "check_end",
+    "check_pace",
+    "explained",
+    "meddled",
+]
 
 POWERS = 12  # turns of the power iteration
 STABLE = 1.5  # step times fastest rate; explicit methods go to 2 or 3.3, and hover below
@@ -204,12 +215,13 @@ class Moment:
 
     @property
     def values(self) -> dict[str, Any]:
-        """``v`` [m/s] and ``F`` [N]; ``z`` and ``s`` [m], one an element."""
+        """``x`` [m], ``v`` [m/s] and ``F`` [N]; ``z`` and ``s`` [m], one an element."""
         recording, start = self._recording, self._recording.start
         t, y, mode = recording.latest
         seen = recording.observe(t, y, mode)
         first, n = start.program.first, self._n
-        return {"v": seen[0], "F": seen[1], "z": y[first : first + n], "s": seen[2 : 2 + n]}
+        elements = {"z": y[first : first + n], "s": seen[2 : 2 + n]}
+        return {"x": y[0], "v": seen[0], "F": seen[1], **elements}
 
 
 # --------------------------------------------------------------------------- explaining
@@ -360,6 +372,24 @@ def check_pace(recording: Recording, buffers: hybrid.Buffers) -> None:
         "the thresholds; the run up to there is kept in .trace",
         recording.trace(),
     )
+
+
+def meddled(error: Meddling, recorder: Recording) -> CallbackError:
+    """Put what a callback did into an error with the trace.
+
+    Parameters
+    ----------
+    error : Meddling
+        From the machines.
+    recorder : Recording
+        What was kept.
+
+    Returns
+    -------
+    CallbackError
+        With the trace.
+    """
+    return CallbackError(f"{error}; the run up to there is kept in .trace", recorder.trace())
 
 
 def _way_back(chart: Chart, taken: Any) -> str:

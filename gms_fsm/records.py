@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,10 @@ LONGEST_LINE = 100_000  # characters
 LONGEST_FILE = 5_000_000  # rows
 STRETCH = 40  # rows in which standstill is looked for
 GAP = 5.0  # intervals longer than this many median ones are reported
+
+
+LOADS = ("force", "normal")  # needed where a row counts; motion is needed everywhere between
+Words: TypeAlias = dict[tuple[int, str], str]  # cells that are no numbers, by row and quantity
 
 
 @dataclass(frozen=True)
@@ -90,14 +95,16 @@ def read_record(
     columns : mapping of str to Column
         For ``time`` and any of ``position``, ``velocity``, ``force``, ``normal``.
     where : str, optional
-        Which rows count, for example ``"normal > 4.5 N"``: a condition on the quantities.
+        Which rows count, for example ``"normal > 4.5 N"``: a condition on the quantities. It is
+        looked at first: a cell in a row that does not count need not be a number.
     delimiter : str, optional
         One character; tab, semicolon or comma are found out when left out.
 
     Returns
     -------
     Record
-        In SI units, from the first to the last row that counts.
+        In SI units, from the first to the last row that counts; between them without the rows that
+        do not count and have no time or no place.
 
     Raises
     ------
@@ -108,7 +115,7 @@ def read_record(
     path = Path(path)
     if "time" not in columns:
         raise RecordError(f"{path}: no column for 'time' is given")
-    cells = _read_cells(path, columns, delimiter)
+    cells, words = _read_cells(path, columns, delimiter)
     values = {
         quantity: column.sign * factor(quantity, column.unit) * cells[quantity]
         for quantity, column in columns.items()
@@ -120,16 +127,28 @@ def read_record(
             f"{path}: no row fulfils where = {shown(where)}; choose another condition"
         )
     first, last = np.flatnonzero(chosen)[[0, -1]]
-    part = {quantity: value[first : last + 1] for quantity, value in values.items()}
-    chosen = chosen[first : last + 1]
-    _check(path, columns, part, chosen, int(first) + 2)
+    moving = [value for quantity, value in values.items() if quantity not in LOADS]
+    kept = chosen | np.isfinite(moving).all(axis=0)
+    kept[:first] = kept[last + 1 :] = False
+    numbers = np.flatnonzero(kept) + 2
+    part = {quantity: value[kept] for quantity, value in values.items()}
+    selected, chosen = chosen, chosen[kept]
+    _check(path, columns, part, chosen, numbers, words)
     notes = []
-    if last - first + 1 < rows or not chosen.all():
+    if not selected.all():
         notes.append(
             f"{int(chosen.sum())} of {rows} rows count (where = {shown(where)}); the motion uses "
             f"rows {first + 2} to {last + 2}"
         )
-    notes += _gaps(part["time"], int(first) + 2)
+    if words:
+        row, quantity = min(words, key=lambda place: place[0])
+        notes.append(
+            f"{len(words)} cell(s) in rows that do not count are no numbers, the first in row "
+            f"{row}, column {shown(columns[quantity].name)}: {shown(words[row, quantity])}"
+        )
+    if last - first + 1 > numbers.size:
+        notes.append(f"{last - first + 1 - numbers.size} row(s) without time or place are left out")
+    notes += _gaps(part["time"], numbers)
     return Record(path, part, chosen, int(first) + 2, tuple(notes))
 
 
@@ -166,7 +185,8 @@ def _lines(path: Path) -> Iterator[str]:
 
 def _read_cells(
     path: Path, columns: Mapping[str, Column], delimiter: str | None
-) -> dict[str, FloatArray]:
+) -> tuple[dict[str, FloatArray], Words]:
+    """Return the numbers, NaN for a cell that holds none, and the words that stand there."""
     lines = _lines(path)
     head_line = next(lines, "")
     if not head_line.strip():
@@ -178,12 +198,16 @@ def _read_cells(
     for quantity, column in columns.items():
         if head.count(column.name) != 1:
             what = "no column" if column.name not in head else "several columns"
+            advice = f"name the right one: {quantity} = {{ column = ... }}"
+            if len(head) == 1:
+                advice = "if these are several columns, say what divides them: delimiter = ..."
             raise RecordError(
                 f"{path}: {what} {shown(column.name)} (for {quantity}); columns: "
-                f"{cut(', '.join(map(repr, head)), 1000)}"
+                f"{cut(', '.join(map(repr, head)), 1000)}; {advice}"
             )
         places[quantity] = head.index(column.name)
     found: dict[str, list[float]] = {quantity: [] for quantity in columns}
+    words: Words = {}
     number = 1
     try:
         for row in csv.reader(lines, delimiter=delimiter):
@@ -193,7 +217,8 @@ def _read_cells(
             if len(row) != len(head):
                 raise RecordError(
                     f"{path}: row {number} has {len(row)} cells, the head line has {len(head)}; "
-                    "give each row as many (a decimal comma needs another delimiter)"
+                    "give each row as many, or say what divides the columns: delimiter = ... (a "
+                    "decimal comma is not read; write a point)"
                 )
             for quantity, place in places.items():
                 try:
@@ -201,15 +226,13 @@ def _read_cells(
                         raise ValueError
                     found[quantity].append(float(row[place]))
                 except ValueError:
-                    raise RecordError(
-                        f"{path}: row {number}, column {shown(columns[quantity].name)}: "
-                        f"{shown(row[place])} is not a number (a decimal point is a point)"
-                    ) from None
+                    found[quantity].append(math.nan)
+                    words[number, quantity] = cut(row[place])
     except csv.Error as error:
         raise RecordError(f"{path}: row {number + 1} cannot be read ({error})") from None
     if number < 3:
         raise RecordError(f"{path}: {number - 1} row(s) of data; at least 2 are needed")
-    return {quantity: np.array(values) for quantity, values in found.items()}
+    return {quantity: np.array(values) for quantity, values in found.items()}, words
 
 
 def _chosen(
@@ -229,7 +252,7 @@ def _chosen(
         if name not in values:
             raise RecordError(
                 f"{path}: where = {shown(where)} uses {name!r}, which has no column; "
-                "name its column, or leave it out"
+                f"name its column, {name} = {{ column = ..., unit = ... }}, or leave {name} out"
             )
     table = zip(*(values[name].tolist() for name in names), strict=True)
     try:
@@ -248,31 +271,47 @@ def _check(
     columns: Mapping[str, Column],
     part: Mapping[str, FloatArray],
     chosen: NDArray[np.bool_],
-    first_row: int,
+    numbers: NDArray[np.int64],
+    words: Words,
 ) -> None:
+    # The motion needs every row between the first and the last; force only where it counts.
+    needed = {
+        quantity: set(numbers[chosen if quantity in LOADS else slice(None)].tolist())
+        for quantity in (part if words else ())
+    }
+    wrong = [place for place in words if place[0] in needed[place[1]]]
+    if wrong:
+        row, quantity = min(wrong, key=lambda place: place[0])
+        raise RecordError(
+            f"{path}: row {row}, column {shown(columns[quantity].name)}: "
+            f"{shown(words[row, quantity])} is not a number (a decimal point is a point); mend it, "
+            "or leave the row out by where = ..., a condition that does not hold there"
+        )
     for quantity, value in part.items():
-        # The motion needs every row between the first and the last; force only where it counts.
-        needed = chosen if quantity in ("force", "normal") else np.ones(value.size, dtype=bool)
-        bad = np.flatnonzero(~np.isfinite(value) & needed)
+        bad = np.flatnonzero(~np.isfinite(value) & (chosen | (quantity not in LOADS)))
         if bad.size:
             raise RecordError(
-                f"{path}: {_rows(bad + first_row)}, column {shown(columns[quantity].name)}: not a "
-                "finite number; take the rows out or leave them out by where = ..."
+                f"{path}: {_rows(numbers[bad])}, column {shown(columns[quantity].name)}: not a "
+                "finite number; take the rows out, or leave them out by where = ..., a condition "
+                "that does not hold there"
             )
     time = part["time"]
     back = np.flatnonzero(np.diff(time) <= 0)
     if back.size:
         i = int(back[0])
         raise RecordError(
-            f"{path}: time does not increase after {_rows(back + first_row)} (row "
-            f"{i + first_row}: {float(time[i])!r} s, next: {float(time[i + 1])!r} s); sort the "
+            f"{path}: time does not increase after {_rows(numbers[back])} (row "
+            f"{numbers[i]}: {float(time[i])!r} s, next: {float(time[i + 1])!r} s); sort the "
             "rows and take doubles out"
         )
     if time.size < 5:
-        raise RecordError(f"{path}: only {time.size} rows count; at least 5 are needed")
+        raise RecordError(
+            f"{path}: only {time.size} rows count; at least 5 are needed (which rows count is said "
+            "by where = ...)"
+        )
 
 
-def _gaps(time: FloatArray, first_row: int) -> list[str]:
+def _gaps(time: FloatArray, numbers: NDArray[np.int64]) -> list[str]:
     steps = np.diff(time)
     usual = float(np.median(steps))
     gaps = np.flatnonzero(steps > GAP * usual)
@@ -280,7 +319,7 @@ def _gaps(time: FloatArray, first_row: int) -> list[str]:
         return []
     return [
         f"{gaps.size} gap(s) in time, longer than {GAP:g} median intervals of {usual:.6g} s, after "
-        f"{_rows(gaps + first_row)} (the longest {steps.max():.6g} s): the motion is interpolated"
+        f"{_rows(numbers[gaps])} (the longest {steps.max():.6g} s): the motion is interpolated"
     ]
 
 
@@ -349,11 +388,11 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
     """
     time = record.columns["time"]
     if smoothing is not None and not smoothing >= 0.0:
-        raise RecordError(f"{record.path}: smoothing is {smoothing!r} s; it must be >= 0")
+        raise RecordError(f"{record.path}: smoothing is {shown(smoothing)} s; it must be >= 0")
     interval = float(np.median(np.diff(time)))
     if smoothing is not None and smoothing > time[-1] - time[0]:
         raise RecordError(
-            f"{record.path}: smoothing is {smoothing!r} s, longer than the record "
+            f"{record.path}: smoothing is {shown(smoothing)} s, longer than the record "
             f"({time[-1] - time[0]:.6g} s); give less"
         )
     if "velocity" in record.columns:
@@ -364,7 +403,8 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
         tau = 4.0 * interval if smoothing is None else smoothing
     else:
         raise RecordError(
-            f"{record.path}: neither a position nor a velocity column is given; name one of them"
+            f"{record.path}: neither a position nor a velocity column is given; name one of them: "
+            "position = { column = ..., unit = ... }"
         )
     # The spline is blind to the origin; without its offset the sums keep their digits.
     shift = float(raw[0])
@@ -373,7 +413,8 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
     except (ArithmeticError, ValueError) as error:  # LinAlgError is a ValueError
         raise RecordError(
             f"{record.path}: no smoothing spline fits the {given} column ({cut(str(error))}); "
-            "look for values or times that are far out"
+            "look for values or times that are far out and leave their rows out by where = ..., or "
+            "set another smoothing = ... (s)"
         ) from None
     smooth = spline(time) + shift
     if given == "position":
@@ -395,7 +436,8 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
     if not np.isfinite([velocity, position]).all():
         raise RecordError(
             f"{record.path}: the {given} column has values too large to make a motion of, up to "
-            f"{float(np.abs(raw).max()):.3g} (SI); look for cells that are far out"
+            f"{float(np.abs(raw).max()):.3g} (SI); look for cells that are far out, and leave "
+            "their rows out by where = ..."
         )
     return Motion(time, velocity, position, tau, _standstill(velocity), tuple(notes))
 

@@ -292,10 +292,12 @@ def monitor_lines(trace: Trace) -> list[str]:
 
 
 def _parameters(trace: Trace) -> str:
-    curve = dataclasses.asdict(trace.model.stribeck)
-    numbers = {**trace.model.values, **curve, "sigma_2": trace.model.sigma_2}
+    model = trace.model
+    curve = {} if model.stribeck is None else dataclasses.asdict(model.stribeck)
+    numbers = {**model.values, **curve, "sigma_2": model.sigma_2}
     shown = [f"{name} = {_number(value)}" for name, value in numbers.items()]
-    return ", ".join([*shown, f"weights = {_number(trace.model.weights)} m/N"])
+    weights = [] if model.stribeck is None else [f"weights = {_number(model.weights)} m/N"]
+    return ", ".join([*shown, *weights])
 
 
 def _number(value: float | FloatArray) -> str:

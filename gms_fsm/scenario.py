@@ -56,6 +56,10 @@ DEEPEST_KEY = 6  # parts
 _ENDLESS_KEY = re.compile(
     r"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){20}"""
 )
+_TEXT_OR_COMMENT = re.compile(r""""[^"]*"?|'[^']*'?|#.*""")
+_HALF_A_NUMBER = re.compile(  # a digit on one side of the point only
+    r"(?<![\w.+-])([+-]?)(?:(\d+)\.|\.(\d+))((?:[eE][+-]?\d+)?)(?![\w.])"
+)
 SCIPY_METHODS = ("RK45", "DOP853", "Radau", "BDF", "LSODA")
 
 
@@ -207,6 +211,7 @@ class SignalRecordTable(_Table):
     file: str
     time: ColumnTable
     value: ColumnTable
+    where: str = Field("", description='which rows count, for example "time > 0.5 s"')
     delimiter: Delimiter | None = None
 
 
@@ -399,6 +404,11 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
     """
     path = Path(path)
     data = _parse(path)
+    if not data:
+        raise ScenarioError(
+            f"{path}: the file is empty; a scenario has at least the tables [model], [rig] and "
+            "[run] (the folder scenarios/ has examples, gms-fsm schema prints all keys)"
+        )
     for override in overrides:
         _override(data, override)
     try:
@@ -469,10 +479,11 @@ def _signal(path: Path, given: SignalField, key: str, quantity: str) -> SignalLi
         # The value column is read as the quantity it stands for, so that units are checked.
         columns = {"time": given.time.build(), quantity: given.value.build()}
         try:
-            record = read_record(file, columns, delimiter=given.delimiter)
+            record = read_record(file, columns, given.where, given.delimiter)
         except UnitError as error:
             raise ScenarioError(f"{path}: {key}: {error}") from None
-        return Corners(record.columns["time"], record.columns[quantity], held=False)
+        rows = record.chosen
+        return Corners(record.columns["time"][rows], record.columns[quantity][rows], held=False)
     try:
         if isinstance(given, list):
             return as_signal([(t, value) for t, value in given])
@@ -550,7 +561,19 @@ def _parse(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # a number of 5,000 digits is a ValueError
-        raise ScenarioError(f"{path}: not valid TOML: {cut(str(error))}") from None
+        hint = _with_digits(text)
+        raise ScenarioError(f"{path}: not valid TOML: {cut(str(error))}{hint}") from None
+
+
+def _with_digits(text: str) -> str:
+    """Return advice on the first number of a text that TOML does not take: .25 or 5."""
+    for number, line in enumerate(text.splitlines(), start=1):
+        found = _HALF_A_NUMBER.search(_TEXT_OR_COMMENT.sub("", line))
+        if found:
+            sign, whole, part, exponent = found.groups()
+            better = f"{sign}{whole or 0}.{part or 0}{exponent}"
+            return f"; line {number}: write {better}, not {found[0]}"
+    return ""
 
 
 def _override(data: dict[str, Any], override: str) -> None:
@@ -571,6 +594,9 @@ def _override(data: dict[str, Any], override: str) -> None:
         value = tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         value = text.strip()
+        hint = _with_digits(text)
+        if hint and (value[0] in "[{" or _HALF_A_NUMBER.fullmatch(value)):
+            raise ScenarioError(f"--set {cut(override)}: not valid TOML{hint}") from None
     except (ValueError, RecursionError) as error:
         raise ScenarioError(f"--set {cut(override)}: {cut(str(error))}") from None
     table = data
@@ -612,7 +638,8 @@ def _explained(error: ValidationError, data: dict[str, Any]) -> str:
     kind = first["type"]
     if kind == "extra_forbidden":
         valid = _valid_keys(places[:-1], data)
-        near = difflib.get_close_matches(places[-1][:LONGEST_SHOWN], valid, n=1)
+        wanted = places[-1][:LONGEST_SHOWN]
+        near = difflib.get_close_matches(wanted, valid, n=1) or _elsewhere(wanted, data)
         hint = f"did you mean {near[0]!r}? " if near else ""
         return f"{key} = {shown(value)}: unknown key; {hint}valid here: {', '.join(valid)}{more}"
     if kind == "missing":
@@ -629,6 +656,14 @@ def _explained(error: ValidationError, data: dict[str, Any]) -> str:
     if isinstance(value, dict):
         return f"[{key}] {text}{more}" if key else f"{text}{more}"
     return f"{key} = {shown(value)}: {text}{more}"
+
+
+def _elsewhere(key: str, data: dict[str, Any]) -> list[str]:
+    """Return the nearest key of another table, with its table."""
+    everywhere = ("run", "initial", "output")
+    tables = [name for name in Scenario.model_fields if name in data or name in everywhere]
+    places = {name: f"{table}.{name}" for table in tables for name in _valid_keys([table], data)}
+    return [places[name] for name in difflib.get_close_matches(key, places, n=1)]
 
 
 def _valid_keys(places: list[str], data: dict[str, Any]) -> list[str]:

@@ -502,7 +502,7 @@ class Session:
         branch = self.branch
         start = branch.raw(0)[0]
         if not t >= start:
-            raise SessionError(f"t = {t!r} s lies before the start, {start!r} s")
+            raise SessionError(f"t = {shown(t)} s lies before the start, {start!r} s")
         branch.between = None
         while branch.raw(len(branch) - 1)[0] <= t and branch.pull():
             pass
@@ -522,8 +522,9 @@ class Session:
         """
         elements, variables = range(1, self.model.n + 1), self.model.chart.variables
         bare = variables if self.model.n == 1 else ()
-        numbered = (f"{name}{i}" for name in (*variables, "s", "F") for i in elements)
-        return ["t", "x", "v", "F", "s", *bare, *numbered]
+        threshold = () if self.model.stribeck is None else ("s",)
+        numbered = (f"{name}{i}" for name in (*variables, *threshold, "F") for i in elements)
+        return ["t", "x", "v", "F", *threshold, *bare, *numbered]
 
     def parse(self, text: str) -> Condition:
         """Read a condition such as ``"z1 > 0.3 and state(2) == slip"``.
@@ -886,10 +887,14 @@ class Session:
         return sources[edge]
 
     def _check_element(self, element: int) -> None:
-        if not 0 <= element < self.model.n:
+        whole = isinstance(element, int | np.integer) and not isinstance(element, bool)
+        if not whole or not 0 <= element < self.model.n:
+            said = shown(element)
+            if said in [repr(edge.name) for edge in self.model.chart.transitions]:
+                said += f" (an edge is asked for by edge={said})"
             raise SessionError(
-                f"no element {element!r}; there are 0 to {self.model.n - 1} (counted from 0 in "
-                "Python, from 1 in text)"
+                f"no element {said}; there are 0 to {self.model.n - 1} (counted from 0 in Python, "
+                "from 1 in text)"
             )
 
     # ------------------------------------------------------------------ branches

@@ -13,11 +13,19 @@ import integrators
 from gms_fsm.checkpoint import Keeper
 from gms_fsm.compiled_run import CompiledRun
 from gms_fsm.errors import ParameterError, SignalError, SimulationError
-from gms_fsm.machines import ElementMachines, IfElse, MachineEngine
+from gms_fsm.machines import ElementMachines, IfElse, MachineEngine, Meddling
 from gms_fsm.models import Model
 from gms_fsm.monitors import Monitor, checked, watched
 from gms_fsm.program import system
-from gms_fsm.recording import PATIENCE, Moment, Recorder, check_end, check_pace, explained
+from gms_fsm.recording import (
+    PATIENCE,
+    Moment,
+    Recorder,
+    check_end,
+    check_pace,
+    explained,
+    meddled,
+)
 from gms_fsm.rigs import Rig
 from gms_fsm.scales import Tolerance
 from gms_fsm.start import MOST_STEPS, Start
@@ -133,7 +141,7 @@ def simulate(
         If there is to be a checkpoint and the rig is of a class of your own.
     SimulationError
         If the run cannot go on (`LivelockError`, `StepSizeError`, `StepLimitError`,
-        `NotFiniteError`, `SignalEndError`); its ``trace`` holds the part before.
+        `NotFiniteError`, `SignalEndError`, `CallbackError`); its ``trace`` holds the part before.
     KeyboardInterrupt
         On Ctrl-C; its ``trace`` holds the part before, perhaps without a row.
 
@@ -253,6 +261,8 @@ class Run:
             if self.buffers.out.cursor[ROW]:
                 recorder.take(hybrid.take_rows(self.buffers))
             raise
+        except Meddling as error:
+            raise meddled(error, recorder) from error.__cause__
         if happening is None:
             check_end(recorder)
             return False

@@ -371,8 +371,6 @@ def sweep(
         )
     if engine == "compiled":
         check_numba()
-    values = _values(model, rig, parameters)
-    runs = len(next(iter(values.values())))
     for name in options:
         if name not in _OPTIONS:
             raise ParameterError(
@@ -380,6 +378,8 @@ def sweep(
             )
     options = {**options, "engine": engine, "output": output}
     Start.of(model, rig, t_end, **options)  # what is wrong for all is said once, here
+    values = _values(model, rig, parameters)
+    runs = len(next(iter(values.values())))
     collected = _Collected(model, runs, options.get("t_eval"))
     size = max(1, min(AT_ONCE, runs // AT_ONCE))
     chunks = [range(start, min(start + size, runs)) for start in range(0, runs, size)]
@@ -417,6 +417,11 @@ def _values(
     model: Model, rig: Rig, parameters: Mapping[str, ArrayLike] | pandas.DataFrame
 ) -> dict[str, FloatArray]:
     """Check names and shapes."""
+    if not hasattr(parameters, "keys"):
+        raise ParameterError(
+            f"parameters is {shown(parameters)}; it must give values by name, for example "
+            "{'k': [1.0, 2.0]}: sweep(model, rig, t_end, parameters)"
+        )
     known = (*parameter_names(model), *rig.numbers)
     given = {str(name): parameters[name] for name in parameters}
     if not isinstance(parameters, Mapping):

@@ -21,7 +21,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.archives import member
 from gms_fsm.compiled import observe_rows
-from gms_fsm.errors import MissingExtraError, OutputError, SignalError, TraceFileError, why
+from gms_fsm.errors import (
+    MissingExtraError,
+    OutputError,
+    ParameterError,
+    SignalError,
+    TraceFileError,
+    shown,
+    why,
+)
 from gms_fsm.files import in_turn, leftovers, written_together, written_whole
 from gms_fsm.header import Header
 from gms_fsm.models import Model
@@ -38,6 +46,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Rows",
     "Trace",
+    "check_trace",
     "column_name",
     "dwell_times",
     "files_of",
@@ -46,6 +55,26 @@ __all__ = [
     "log_of",
     "slopes",
 ]
+
+
+def check_trace(trace: object) -> None:
+    """Raise if something that is to be drawn is no trace.
+
+    Parameters
+    ----------
+    trace : object
+        What was given.
+
+    Raises
+    ------
+    ParameterError
+        Saying what it is and how a trace is made.
+    """
+    if not isinstance(trace, Trace):
+        raise ParameterError(
+            f"trace is {shown(trace)}; it must be a Trace, from simulate(...) or Trace.load(path)"
+        )
+
 
 _NUMBERS = ("z", "v", "s", "F_before", "F_after")
 
@@ -160,7 +189,17 @@ class Trace:
         -------
         ndarray, shape (rows, n)
             Its values.
+
+        Raises
+        ------
+        ParameterError
+            If the chart has no such variable.
         """
+        variables = self.model.chart.variables
+        if name not in variables:
+            raise ParameterError(
+                f"name is {shown(name)}; the chart has the variables {', '.join(variables)}"
+            )
         start = self._first + self.model.chart.variables.index(name) * self.n
         block: FloatArray = self.rows.y[:, start : start + self.n]
         return block
@@ -182,7 +221,7 @@ class Trace:
 
     @property
     def s(self) -> FloatArray:
-        """Thresholds, shape (rows, n), m."""
+        """Thresholds, shape (rows, n), m; NaN where the model has no Stribeck curve."""
         return self._observed["s"]
 
     @property
@@ -287,7 +326,7 @@ class Trace:
 
         Raises
         ------
-        ValueError
+        ParameterError
             If a time lies outside the run.
         SignalError
             If the trace comes from a file and its signal was a Python function.
@@ -295,11 +334,12 @@ class Trace:
         wanted = np.atleast_1d(np.asarray(times, dtype=np.float64))
         table = _merged(self.rows, self.stops)
         if wanted.ndim != 1 or wanted.size == 0:
-            raise ValueError(f"times has shape {wanted.shape}; give a flat, non-empty list")
+            raise ParameterError(f"times has shape {wanted.shape}; give a flat, non-empty list")
         outside = wanted[~((wanted >= table.t[0]) & (wanted <= table.t[-1]))]
         if outside.size:
-            raise ValueError(
-                f"time {outside[0]!r} s lies outside the run, {table.t[0]!r} to {table.t[-1]!r} s"
+            raise ParameterError(
+                f"time {shown(outside[0])} s lies outside the run, {shown(table.t[0])} to "
+                f"{shown(table.t[-1])} s"
             )
         left = np.searchsorted(table.t, wanted, side="right") - 1
         y = np.array([self._between(table, int(i), t) for i, t in zip(left, wanted, strict=True)])

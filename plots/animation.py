@@ -17,9 +17,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from gms_fsm.errors import MissingExtraError, ParameterError
+from gms_fsm.errors import MissingExtraError, ParameterError, shown
 from gms_fsm.files import written_whole
-from gms_fsm.trace import Trace
+from gms_fsm.trace import Trace, check_trace
 from plots.live_chart import LiveChart
 from plots.statechart import Sheet
 from plots.style import CHART_THEMES, RC, ChartTheme
@@ -110,21 +110,22 @@ def animate(
     Traceback (most recent call last):
     gms_fsm.errors.ParameterError: frames is 1; it must be a whole number of at least 2
     """
+    check_trace(trace)
     path = Path(path)
     if path.suffix.lower() != ".gif":
         raise ParameterError(f"path is {str(path)!r}; an animation must end in .gif")
     if isinstance(frames, bool) or not isinstance(frames, int) or frames < 2:
-        raise ParameterError(f"frames is {frames!r}; it must be a whole number of at least 2")
+        raise ParameterError(f"frames is {shown(frames)}; it must be a whole number of at least 2")
     if not 0 < fps <= FASTEST:
-        raise ParameterError(f"fps is {fps!r}; it must be above 0 and at most {FASTEST}")
+        raise ParameterError(f"fps is {shown(fps)}; it must be above 0 and at most {FASTEST}")
     Sheet(trace.model.chart, notation, "TB", theme)  # refuses wrong options before any work
     first, last = float(trace.t.min()), float(trace.t.max())
     begin = first if t_start is None else t_start
     end = last if t_end is None else t_end
     if not first <= begin < end <= last:
         raise ParameterError(
-            f"t_start is {begin!r} s and t_end is {end!r} s; they must lie within the run, "
-            f"{first:g} to {last:g} s, in this order"
+            f"t_start is {shown(begin)} s and t_end is {shown(end)} s; they must lie within the "
+            f"run, {first:g} to {last:g} s, in this order"
         )
     rows = trace.sample(np.linspace(begin, end, frames))
     chart = LiveChart(rows, elements, notation=notation, theme=theme)

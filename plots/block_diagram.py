@@ -20,7 +20,7 @@ from itertools import pairwise
 
 import graphviz
 
-from gms_fsm.errors import ParameterError
+from gms_fsm.errors import ParameterError, shown
 from plots.style import (
     BLUE,
     BLUE_TINT,
@@ -76,9 +76,9 @@ def block_diagram(elements: int = 4) -> graphviz.Digraph:
     >>> graph.engine, sum("class=integrator" in line for line in graph.body)
     ('neato', 2)
     """
-    if elements < 1 or elements % 1 != 0:
+    if isinstance(elements, bool) or not isinstance(elements, int) or elements < 1:
         raise ParameterError(
-            f"elements is {elements!r}; a model has a whole number of elements, at least 1"
+            f"elements is {shown(elements)}; a model has a whole number of elements, at least 1"
         )
     graph = graphviz.Digraph(
         name="block diagram",

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
 from gms_fsm.files import written_whole
-from gms_fsm.trace import Trace
+from gms_fsm.trace import Trace, check_trace
 from plots import panels
 from plots.panels import SMOOTH, Window, shown
 from plots.style import BLUE, INK, LINE_GREY, PALE_GREY, RC, TEXT_GREY, VERMILION
@@ -334,6 +334,7 @@ def overview(
     Figure
         On the left over time, on the right F against x and v.
     """
+    check_trace(trace)
     begin, end = _last_cycles(trace) if window is None else panels.checked_window(trace, window)
     whole = window is None and begin == trace.t[0]
     part = shown(trace, window)

@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
+from gms_fsm.errors import MissingExtraError, OutputError, ParameterError, shown
 from gms_fsm.explain import values_at
 from gms_fsm.expression import Condition, clauses, evaluate
 from gms_fsm.trace import Trace
@@ -178,7 +178,8 @@ class LiveChart:
         times = self.trace.t
         if not times.min() <= t <= times.max():
             raise ParameterError(
-                f"t is {t!r} s; it must lie within the run, {times.min():g} to {times.max():g} s"
+                f"t is {shown(t)} s; it must lie within the run, {times.min():g} to "
+                f"{times.max():g} s"
             )
         # Not a bisection: the rows of Trace.sample come in the order they were asked for.
         before = np.flatnonzero(times <= t)
@@ -324,7 +325,7 @@ def live_statechart(
     '<svg'
     """
     if (row is None) == (t is None):
-        raise ParameterError(f"row is {row!r} and t is {t!r}; give exactly one of them")
+        raise ParameterError(f"row is {shown(row)} and t is {shown(t)}; give exactly one of them")
     chart = LiveChart(
         trace, elements, notation=notation, theme=theme, values=values, direction=direction
     )

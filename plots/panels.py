@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.errors import MissingExtraError, ParameterError, SignalError
-from gms_fsm.trace import Rows, Trace
+from gms_fsm.errors import shown as written
+from gms_fsm.trace import Rows, Trace, check_trace
 from plots.style import (
     BLUE,
     ELEMENT_COLOURS,
@@ -193,8 +194,9 @@ def checked_window(trace: Trace, window: Window | None) -> Window:
     Raises
     ------
     ParameterError
-        If it is not two times, the earlier one first, that overlap the run.
+        If it is not two times, the earlier one first, that overlap the run; if there is no run.
     """
+    check_trace(trace)
     first, last = float(trace.t[0]), float(trace.t[-1])
     if window is None:
         return first, last
@@ -204,8 +206,8 @@ def checked_window(trace: Trace, window: Window | None) -> Window:
         begin, end = last, first
     if not (first <= begin < end <= last):
         raise ParameterError(
-            f"window is {window!r}; it must be two times (t0, t1) with t0 < t1 inside the run, "
-            f"{first:g} to {last:g} s"
+            f"window is {written(window)}; it must be two times (t0, t1) with t0 < t1 inside the "
+            f"run, {first:g} to {last:g} s"
         )
     return begin, end
 
@@ -229,8 +231,8 @@ def checked_elements(trace: Trace, elements: Iterable[int] | None) -> list[int]:
         0 <= min(chosen) <= max(chosen) < trace.n
     ):  # fmt: skip
         raise ParameterError(
-            f"elements is {elements!r}; it must be a list of different whole numbers from 0 to "
-            f"{trace.n - 1} (labels count from 1)"
+            f"elements is {written(elements)}; it must be a list of different whole numbers from 0 "
+            f"to {trace.n - 1} (labels count from 1)"
         )
     return [int(i) for i in chosen]
 
@@ -607,12 +609,13 @@ def cascade_window(
     ParameterError
         If `around` is not in the run or `within` is not positive.
     """
+    check_trace(trace)
     first, last = float(trace.t[0]), float(trace.t[-1])
     if not _is_number(within) or not within > 0:
-        raise ParameterError(f"within is {within!r}; it must be a time > 0 s")
+        raise ParameterError(f"within is {written(within)}; it must be a time > 0 s")
     if around is not None and not (_is_number(around) and first <= around <= last):
         raise ParameterError(
-            f"around is {around!r}; it must be a time in the run, {first:g} to {last:g} s"
+            f"around is {written(around)}; it must be a time in the run, {first:g} to {last:g} s"
         )
     log = trace.transitions
     leaving = log.source == trace.model.chart.default_state.name
@@ -1003,6 +1006,10 @@ def stribeck(
         s(v); s(v) + sigma_2 |v| if there is viscous friction; the steady rows; the measured points.
     """
     model, part = trace.model, shown(trace, window)
+    if model.stribeck is None:
+        raise ParameterError(
+            f"{model.title}: its chart has no input s, and so no Stribeck curve to draw"
+        )
     points = None if measured is None else checked_points(measured)
     speeds = np.abs(part.v)
     steady = (np.abs(part.dz) < 0.01 * speeds[:, None]).all(axis=1)
@@ -1050,8 +1057,8 @@ def checked_points(measured: tuple[ArrayLike, ArrayLike]) -> tuple[Any, Any]:
         good = False
     if not good:
         raise ParameterError(
-            f"measured is {measured!r}; it must be two equally long flat lists of finite numbers: "
-            "velocities [m/s] and friction [N]"
+            f"measured is {written(measured)}; it must be two equally long flat lists of finite "
+            "numbers: velocities [m/s] and friction [N]"
         )
     return v, F
 
@@ -1086,7 +1093,7 @@ def difference(
         The line.
     """
     if not _is_number(floor) or not 0 < floor < np.inf:
-        raise ParameterError(f"floor is {floor!r}; it must be a force > 0 N")
+        raise ParameterError(f"floor is {written(floor)}; it must be a force > 0 N")
     if np.shape(times) != np.shape(values) or np.ndim(times) != 1 or not np.size(times):
         raise ParameterError(
             f"times has shape {np.shape(times)}, the difference {np.shape(values)}; they must be "

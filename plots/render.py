@@ -11,17 +11,27 @@ import re
 import shutil
 import subprocess
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 
 import graphviz
 
 from gms_fsm.errors import OutputError, ParameterError
 from gms_fsm.files import written_whole
+from plots.mermaid import mermaid
+from plots.statechart import ChartGraph
 
-__all__ = ["drawn", "render"]
+__all__ = ["FORMATS", "drawn", "render"]
 
-PICTURES = (".svg", ".png", ".pdf")
-TEXTS = (".dot", ".gv")
+# What a file can be, by its suffix. Mermaid text is made of state charts only.
+FORMATS: Mapping[str, str] = {
+    ".svg": "a picture",
+    ".png": "a picture",
+    ".pdf": "a picture",
+    ".dot": "DOT text",
+    ".gv": "DOT text",
+    ".mmd": "Mermaid text",
+}
 PNG_DPI = "144"  # twice a screen point: crisp on dense displays
 
 
@@ -34,7 +44,8 @@ def render(graph: graphviz.Digraph, path: str | Path) -> Path:
         For example from `plots.statechart.statechart`.
     path : str or Path
         Ends with ``.svg``, ``.png`` or ``.pdf`` for a picture, ``.dot`` or ``.gv`` for the DOT
-        text. The folder has to exist. A file of that name is replaced as a whole or not at all.
+        text; of a state chart also ``.mmd`` for Mermaid text. The folder has to exist. A file of
+        that name is replaced as a whole or not at all.
 
     Returns
     -------
@@ -69,16 +80,22 @@ def render(graph: graphviz.Digraph, path: str | Path) -> Path:
         )
     path = Path(path)
     suffix = path.suffix.lower()
-    if suffix not in PICTURES + TEXTS:
-        raise ParameterError(
-            f"path is {str(path)!r}; its suffix must be one of {', '.join(PICTURES)} for a "
-            f"picture or {', '.join(TEXTS)} for the DOT text"
-        )
-    picture = None if suffix in TEXTS else drawn(graph, suffix[1:])
+    texts = {"DOT text": graph.source}
+    if isinstance(graph, ChartGraph):
+        texts["Mermaid text"] = mermaid(graph.chart)
+    kinds = {s: kind for s, kind in FORMATS.items() if kind in ("a picture", *texts)}
+    if suffix not in kinds:
+        listed = [
+            f"{', '.join(s for s in kinds if kinds[s] == kind)} for {kind}"
+            for kind in dict.fromkeys(kinds.values())
+        ]
+        raise ParameterError(f"path is {str(path)!r}; it must end in {' or '.join(listed)}")
+    if kinds[suffix] in texts:
+        text = texts[kinds[suffix]].encode()
+        return written_whole(path, lambda file: file.write(text))
+    picture = drawn(graph, suffix[1:])
     if picture is not None:
         written_whole(path, lambda file: file.write(picture))
-    elif suffix in TEXTS:
-        written_whole(path, lambda file: file.write(graph.source.encode()))
     else:
         path = path.with_suffix(".dot")
         written_whole(path, lambda file: file.write(graph.source.encode()))

@@ -31,7 +31,7 @@ from gms_fsm.errors import MissingExtraError, ParameterError, SignalError, Trace
 from gms_fsm.explain import explain_state, values_at
 from gms_fsm.expression import MATLAB_LIKE, Relation, clauses, spell
 from gms_fsm.files import written_whole
-from gms_fsm.trace import Rows, Trace
+from gms_fsm.trace import Rows, Trace, check_trace
 from plots.render import drawn
 from plots.statechart import Row, Sheet, element_id, part_id
 from plots.style import (
@@ -208,8 +208,10 @@ def replay_html(
     MissingExtraError
         If uPlot is not installed.
     """
-    plot_script, plot_style = _uplot()
     traces = [trace] if other is None else [trace, other]
+    for each in traces:
+        check_trace(each)
+    plot_script, plot_style = _uplot()
     if len(names) not in (0, len(traces)):
         raise ParameterError(f"{len(traces)} run(s) but names = {list(names)!r}; give one each")
     pictures = [_chart_svg(each.model.chart, each.n) for each in traces]
@@ -258,9 +260,11 @@ def _run(trace: Trace, between: NDArray[np.bool_], frame_of: Sequence[int]) -> d
     """Return what the page stores of a run; `frame_of` its rows on the page's common time."""
     chart, n, pool = trace.model.chart, trace.n, _Pool()
     columns = {"x": trace.x, "v": trace.v, "F": trace.F}
-    columns["s"] = trace.s[:, 0] / float(trace.model.weights[0])  # the Stribeck curve
     blocks = {name: trace.variable(name) for name in chart.variables}
-    for name, block in (blocks | {"s": trace.s, "F": trace.F_elements}).items():
+    if trace.model.stribeck is not None:
+        columns["s"] = trace.s[:, 0] / float(trace.model.weights[0])  # the curve itself
+        blocks["s"] = trace.s
+    for name, block in (blocks | {"F": trace.F_elements}).items():
         columns |= {f"{name}{i + 1}": block[:, i] for i in range(n)}
     edges = _edges(chart)
     first = chart.variables[0]

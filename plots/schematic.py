@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm.errors import MissingExtraError, ParameterError
-from gms_fsm.trace import Trace
+from gms_fsm.errors import MissingExtraError, ParameterError, shown
+from gms_fsm.trace import Trace, check_trace
 from plots import panels
 from plots.style import (
     BLUE,
@@ -82,16 +82,18 @@ def schematic(
     ParameterError
         If the row is not there, or there are too many elements to draw.
     """
+    if trace is not None:
+        check_trace(trace)
     n = elements if trace is None else trace.n
     if not isinstance(n, (int, np.integer)) or isinstance(n, bool) or not 1 <= n <= MOST:
-        raise ParameterError(f"elements is {n!r}; a schematic shows 1 to {MOST} elements")
+        raise ParameterError(f"elements is {shown(n)}; a schematic shows 1 to {MOST} elements")
     if trace is not None and (
         not isinstance(row, (int, np.integer))
         or isinstance(row, bool)
         or not -len(trace) <= row < len(trace)
     ):
         raise ParameterError(
-            f"row is {row!r}; it must be a whole number from {-len(trace)} to {len(trace) - 1}"
+            f"row is {shown(row)}; it must be a whole number from {-len(trace)} to {len(trace) - 1}"
         )
     drawn: list[Artist] = []
     shift = np.zeros(n)

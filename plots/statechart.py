@@ -23,7 +23,7 @@ from math import ceil, sqrt
 import graphviz
 
 from gms_fsm.chart import Chart, State, Transition
-from gms_fsm.errors import ParameterError
+from gms_fsm.errors import ParameterError, shown
 from gms_fsm.expression import (
     MATLAB_LIKE,
     Both,
@@ -37,7 +37,7 @@ from gms_fsm.expression import (
 from gms_fsm.trace import Trace, dwell_times
 from plots.style import CHART_THEMES, MONO, SANS, ChartTheme
 
-__all__ = ["statechart"]
+__all__ = ["ChartGraph", "statechart"]
 
 NOTATIONS = ("stateflow", "math")
 DIRECTIONS = {"TB": "top to bottom", "LR": "left to right"}
@@ -48,6 +48,12 @@ ROOM_PER_EDGE = {"TB": 45, "LR": 16}
 LONGEST_LINE = 52  # characters; longer texts are wrapped
 MARKED = "2.6"  # points, of lines that point something out
 DOT, TRUE, FALSE, UNKNOWN = "●", "✓", "✗", "?"
+
+
+class ChartGraph(graphviz.Digraph):  # type: ignore[misc]
+    """A picture of a state chart that knows its chart, so that it can be other text as well."""
+
+    chart: Chart
 
 
 def statechart(
@@ -156,18 +162,18 @@ def chosen(elements: int | Sequence[int], n: int | None = None) -> tuple[int, ..
         numbers = tuple(_whole(number, "elements") for number in elements)
         if not numbers or min(numbers) < 0 or len(set(numbers)) < len(numbers):
             raise ParameterError(
-                f"elements is {elements!r}; it must be element numbers counted from 0, at least "
-                f"one and none twice{limit}"
+                f"elements is {shown(elements)}; it must be element numbers counted from 0, at "
+                f"least one and none twice{limit}"
             )
     else:
         count = _whole(elements, "elements")
         if count < 1:
             raise ParameterError(
-                f"elements is {elements!r}; a chart has a whole number of elements, at least 1"
+                f"elements is {shown(elements)}; a chart has a whole number of elements, at least 1"
             )
         numbers = tuple(range(count))
     if n is not None and max(numbers) >= n:
-        raise ParameterError(f"elements is {elements!r}; there is no such element{limit}")
+        raise ParameterError(f"elements is {shown(elements)}; there is no such element{limit}")
     return numbers
 
 
@@ -176,7 +182,7 @@ def _whole(number: object, name: str) -> int:
         return operator.index(number)  # type: ignore[arg-type]  # that is what is tried
     except TypeError:
         raise ParameterError(
-            f"{name} is {number!r}; a chart has a whole number of elements, at least 1"
+            f"{name} is {shown(number)}; a chart has a whole number of elements, at least 1"
         ) from None
 
 
@@ -205,7 +211,7 @@ def one_of(name: str, value: str, allowed: Iterable[str]) -> str:
     words = tuple(allowed)
     if value not in words:
         listed = " or ".join(repr(word) for word in words)
-        raise ParameterError(f"{name} is {value!r}; it must be {listed}")
+        raise ParameterError(f"{name} is {shown(value)}; it must be {listed}")
     return value
 
 
@@ -436,7 +442,7 @@ class Sheet:
             The picture.
         """
         ink = self.colours.ink
-        graph = graphviz.Digraph(
+        graph = ChartGraph(
             name=graphviz.escape(_printable(self.chart.name)),
             graph_attr={
                 "fontname": SANS,
@@ -450,6 +456,7 @@ class Sheet:
             node_attr={"fontname": SANS, "shape": "plain"},
             edge_attr={"color": ink, "arrowsize": "0.7", "penwidth": "1.1"},
         )
+        graph.chart = self.chart
         if foot:
             last = [[Piece(line, "value")] for line in foot.splitlines()]
             below = [*values, *last] if bare else last

@@ -294,13 +294,10 @@ def _use_tree(tree: Node, text: str, parse: Callable[[str], Node]) -> None:
         for reader in (split, rough_points):
             with contextlib.suppress(AttributeError, TypeError):  # of the other kind of tree
                 reader(tree)  # type: ignore[operator]
-    if "pow(" in printed:  # a function of the printed code, not of the language
-        again = tree
-    else:
-        again = tree
-        # The products of a power may be longer or deeper than a text may be.
-        with _only("nested too deeply", "characters"):
-            again = parse(printed)
+    again = tree
+    # The products of a power may be longer or deeper than a text may be.
+    with _only("nested too deeply", "characters"):
+        again = parse(printed)
     for values in VALUES:
         known = {**values, **STATES}
         assert _same(_computed(tree, known), _computed(again, known)), (text, printed, values)

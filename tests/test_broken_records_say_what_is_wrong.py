@@ -44,7 +44,9 @@ def row(number: int, text: str) -> bytes:
 # what is broken -> the record's bytes, and what the message must say besides the file
 CONTENTS: dict[str, tuple[bytes, tuple[str, ...]]] = {
     # cells
-    "text in a number column": (row(5, "0.03,abc,1"), ("row 5", "column 'x'", "'abc'", "number")),
+    "text in a number column": (
+        row(5, "0.03,abc,1"), ("row 5", "column 'x'", "'abc'", "number", "where = "),
+    ),
     "an empty cell": (row(5, "0.03,,1"), ("row 5", "column 'x'", "''", "number")),
     "a unit in a cell": (row(5, "0.03,1 mm,1"), ("row 5", "column 'x'", "'1 mm'", "number")),
     "a hexadecimal number": (row(5, "0x3,1,1"), ("row 5", "column 't'", "'0x3'", "number")),
@@ -59,7 +61,7 @@ CONTENTS: dict[str, tuple[bytes, tuple[str, ...]]] = {
         ("rows 2, 3, 4, 5, 6 and 15 more", "column 'x'", "finite"),
     ),
     # rows
-    "a row that is too short": (row(5, "0.03,1"), ("row 5", "2 cells", "3")),
+    "a row that is too short": (row(5, "0.03,1"), ("row 5", "2 cells", "3", "delimiter = ")),
     "a row that is too long": (row(5, "0.03,1,2,3"), ("row 5", "4 cells", "3")),
     "an empty row": (row(5, ""), ("row 5", "empty")),
     "an empty last row": (GOOD.encode() + b"\n", ("row 62", "empty")),
@@ -84,7 +86,12 @@ CONTENTS: dict[str, tuple[bytes, tuple[str, ...]]] = {
         table(["t", "x", "F"], -EVEN, EVEN, EVEN).encode(), ("after rows 2, 3, 4, 5, 6 and 54",),
     ),
     # heads
-    "a missing column": (b"t,pos,F\n0,0,0\n1,1,1\n", ("no column 'x'", "'t', 'pos', 'F'")),
+    "a missing column": (
+        b"t,pos,F\n0,0,0\n1,1,1\n", ("no column 'x'", "'t', 'pos', 'F'", "position = {"),
+    ),
+    "columns divided by |": (
+        GOOD.replace(",", "|").encode(), ("no column 't'", "'t|x|F'", "delimiter = "),
+    ),
     "a column twice": (b"t,x,F,x\n0,0,0,0\n1,1,1,1\n", ("several columns 'x'",)),
     "no head line": (GOOD.partition("\n")[2].encode(), ("no column 't'", "'0.0'")),
     "units in the second line": (
@@ -135,7 +142,7 @@ TABLES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     ),
     "no time": (('time = { column = "t", unit = "s" }\n', ""), ("record.time is missing",)),
     "no motion": (
-        ('position = { column = "x", unit = "mm" }\n', ""), ("position", "velocity"),
+        ('position = { column = "x", unit = "mm" }\n', ""), ("velocity", "position = {"),
     ),
     "another folder": (
         ('"own.csv"', '"../own.csv"'), ("broken.toml", "'../own.csv'", "outside", "GMS_FSM_DATA"),
@@ -169,7 +176,7 @@ TABLES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     ),
     "a selection of one row": (
         ('file = "own.csv"', 'file = "own.csv"\nwhere = "force > 0.9999 N"'),
-        ("own.csv", "only 1 rows", "at least 5"),
+        ("own.csv", "only 1 rows", "at least 5", "where = "),
     ),
     "a selection by an unknown name": (
         ('file = "own.csv"', 'file = "own.csv"\nwhere = "F > 1 N"'),
@@ -177,7 +184,7 @@ TABLES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     ),
     "a selection by a column that is not given": (
         ('file = "own.csv"', 'file = "own.csv"\nwhere = "normal > 4.5 N"'),
-        ("own.csv", "where", "'normal > 4.5 N'", "no column"),
+        ("own.csv", "where", "'normal > 4.5 N'", "no column", "normal = {"),
     ),
     "a selection in an unknown unit": (
         ('file = "own.csv"', 'file = "own.csv"\nwhere = "force > 1 lb"'),
@@ -332,6 +339,7 @@ def test_the_program_itself_says_one_line(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert done.stdout == ""
     assert done.stderr.splitlines() == [
-        "error: own.csv: row 5, column 'x': 'abc' is not a number (a decimal point is a point)"
+        "error: own.csv: row 5, column 'x': 'abc' is not a number (a decimal point is a point); "
+        "mend it, or leave the row out by where = ..., a condition that does not hold there"
     ]
     nothing_written(tmp_path, {"scenario.toml", "own.csv"})

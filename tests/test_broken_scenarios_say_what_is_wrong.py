@@ -210,8 +210,8 @@ CHANGES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
 
 # files that are no scenario at all
 BYTES: dict[str, tuple[bytes, tuple[str, ...]]] = {
-    "an empty file": (b"", ("model is missing",)),
-    "only a comment": (b"# later\n", ("model is missing",)),
+    "an empty file": (b"", ("the file is empty",)),
+    "only a comment": (b"# later\n", ("the file is empty",)),
     "half a table head": (OPEN_LOOP.replace("[run]", "[run").encode(), ("not valid TOML", "line")),
     "a key twice": ((OPEN_LOOP + "figures = []\n").encode(), ("not valid TOML", "line")),
     "binary": (bytes(range(256)) * 10, ("not UTF-8",)),

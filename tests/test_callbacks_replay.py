@@ -27,7 +27,7 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.charts import gms_element
-from gms_fsm.errors import ChartError, LivelockError, ParameterError
+from gms_fsm.errors import CallbackError, ChartError, LivelockError, ParameterError
 from gms_fsm.models import Model
 from gms_fsm.rigs import Rig
 from tests.helpers import (
@@ -236,7 +236,8 @@ def test_a_callback_that_changes_the_values_before_the_guard_is_refused() -> Non
         event.model.v = 0.0
 
     machines.machine.prepare_event = [stop]
-    with pytest.raises(ChartError, match=r"element 1: edge 'break_away_forward'.*only look"):
+    said = r"element 1, edge 'break_away_forward' at t = .*changed the element's values.*only look"
+    with pytest.raises(CallbackError, match=said):
         simulate(machines.model, open_loop(), 20.0, engine="compiled", machines=machines)
 
 

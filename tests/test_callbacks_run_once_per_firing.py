@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import GMS, Element, ElementMachines, Prescribed, Trace, simulate
-from gms_fsm.errors import ChartError, ParameterError
+from gms_fsm.errors import CallbackError, ChartError, ParameterError
 from tests.helpers import one_element, open_loop, pulled_mass, same_bits, stick_slip
 
 Call = tuple[str, float, int, str, float, float, float]
@@ -256,8 +256,10 @@ def test_a_callback_that_changes_the_values_before_the_guard_is_refused(model: G
         event.model.v = 0.0
 
     machines.machine.prepare_event = [stop]
-    with pytest.raises(ChartError, match=r"element 1: edge 'break_away_forward'.*only look"):
+    said = r"element 1, edge 'break_away_forward' at t = .*changed the element's values.*only look"
+    with pytest.raises(CallbackError, match=said) as caught:
         simulate(model, open_loop(), 20.0, engine=machines)
+    assert len(caught.value.trace) > 1
 
 
 def test_what_a_callback_writes_afterwards_does_not_reach_the_run(model: GMS) -> None:

@@ -28,8 +28,9 @@ def test_code_prints_the_generated_program(law: str) -> None:
     done = run("code", "--law", law)
     assert done.returncode == 0, done.stderr
     model = GMS(GMSParameters.paper("stick-slip"), law=law)  # type: ignore[arg-type]
-    assert done.stdout == lower(model, Prescribed("0.15*sin(2*pi*t/25)")).source
-    compile(done.stdout, "printed", "exec")
+    head, _, body = lower(model, Prescribed("0.15*sin(2*pi*t/25)")).source.partition("\n\n")
+    assert done.stdout.startswith(head)
+    assert done.stdout.endswith(body)
 
 
 def test_code_for_other_rigs() -> None:

@@ -87,6 +87,7 @@ NO_VALUES = [
     ("1 + abs(v, z)", 5, "abs got 2 arguments", "one argument"),
     ("min(v)", 1, "min got 1 argument", "two or more arguments"),
     ("abs(v, x=1)", 9, FOREIGN, "<= or >=, in its place"),
+    ("pow(v)", 1, "pow got 1 arguments", "two arguments"),
     ("abs(*v)", 5, FOREIGN, GRAMMAR),
     ("abs(**v)", 1, FOREIGN, GRAMMAR),
     # names
@@ -126,6 +127,10 @@ NO_VALUES = [
 
 NO_CONDITIONS = [
     ("z", 1, COMPARISON_WANTED, "v > v_c"),
+    ("after(0.2)", 1, "unknown function 'after'", "abs, exp, sqrt"),
+    ("z < s and after(0.2)", 11, "unknown function 'after'", "abs, exp, sqrt"),
+    ("abs(z)", 1, COMPARISON_WANTED, "v > v_c"),
+    ("pow(z, 2)", 1, COMPARISON_WANTED, "v > v_c"),
     ("z + 1", 1, COMPARISON_WANTED, "v > v_c"),
     ("z < s and v", 11, COMPARISON_WANTED, "v > v_c"),
     ("z < s or not 1", 14, COMPARISON_WANTED, "v > v_c"),

@@ -126,7 +126,7 @@ BROKEN: list[tuple[Callable[..., object], dict[str, Any], list[str]]] = [
     (own, {"sigma_2": -1}, ["sigma_2 is -1.0", ">= 0"]),
     (own, {"weights": (1, -1)}, ["weights[1] (element 2) is -1.0", "> 0"]),
     (own, {"weights": (1,)}, ["weights has 1 entries", "2"]),
-    (own, {"stribeck": None}, ["has the input s", "stribeck is None", "Stribeck(F_c, F_s, v_s)"]),
+    (own, {"stribeck": None}, ["for the input s", "stribeck is None", "Stribeck(F_c, F_s, v_s)"]),
     (own, {"chart": WANTS_U}, ["'u'", "t, x, v, s"]),
     # the model and the rigs
     (GMS, {"parameters": {}, "law": "signed"}, ["parameters is {}", "GMSParameters"]),

@@ -141,7 +141,9 @@ def test_memoryless_guards_chatter_while_s_rises() -> None:
 def test_with_s_equal_0_both_arms_hold_unless_the_velocity_tells_them_apart() -> None:
     arms = ("break_away_forward", "break_away_backward")
     found = report("arms")
-    finding = only(found, "determinism")
+    assert found.refuted == ()
+    (finding,) = found.settled
+    assert (finding.check, finding.status) == ("determinism", "settled by order")
     assert finding.where == ("stick", *arms)
     assert finding.counterexample == {"s": 0, "z": 0}
     assert both_hold(found.chart, arms, finding.counterexample)
@@ -157,7 +159,8 @@ def test_with_s_equal_0_both_arms_hold_unless_the_velocity_tells_them_apart() ->
 
 def test_each_broken_reading_says_what_is_wrong() -> None:
     for name, broken in BROKEN.items():
-        finding = report(name).refuted[0]
+        found = report(name)
+        finding = (found.refuted or found.settled)[0]
         word = "at once" if finding.check == "determinism" else finding.check
         assert word in broken.wrong
 
@@ -209,7 +212,7 @@ def test_a_quotient_counts_only_where_its_denominator_is_not_0() -> None:
 
 
 def test_what_is_enabled_at_once_says_which_edge_is_taken_and_a_model_is_no_chart() -> None:
-    (finding, *_) = prove(BROKEN["arms"].chart, BROKEN["arms"].domain).refuted
+    (finding,) = prove(BROKEN["arms"].chart, BROKEN["arms"].domain).settled
     assert "the machine takes the earlier, break_away_forward" in finding.text
     with pytest.raises(ParameterError, match=r"prove takes a Chart, of a model its \.chart"):
         prove(LuGre(sigma_0=1, sigma_1=1, sigma_2=1, stribeck=Stribeck(1, 2, 3)))  # type: ignore[arg-type]
@@ -289,6 +292,43 @@ def test_states_and_guards_without_use_are_found() -> None:
         (("two",), "no chain of edges leads to it"),
         (("three",), "no chain of edges leads to it"),
     }
+
+
+def test_order_settles_which_edge_is_taken_and_can_hide_one() -> None:
+    first, second, back = (
+        Transition("far", "one", "two", "z >= 2 * s"),
+        Transition("near", "one", "two", "z >= s"),
+        Transition("back", "two", "one", "z < 0"),
+    )
+    found = prove(chart(transitions=(first, second, back)))
+    (finding,) = found.settled
+    assert found.refuted == ()
+    assert (finding.check, finding.where) == ("determinism", ("one", "far", "near"))
+    assert finding.text == "both are enabled at once; the machine takes the earlier, far"
+    assert both_hold(found.chart, ("far", "near"), finding.counterexample)
+    assert str(finding).startswith("settled by order  one, far, near: both are enabled")
+    assert "1 settled by order, 0 refuted" in str(found)
+    # The other way round the nearer one goes first wherever the far one could.
+    hidden = prove(chart(transitions=(second, first, back)))
+    assert [f.where for f in hidden.settled] == [("one", "near", "far")]
+    dead = only(hidden, "reachability")
+    assert dead.where == ("far",)
+    said = "never taken: wherever its guard holds, an earlier edge goes first (near)"
+    assert dead.text == said
+
+
+def test_a_state_behind_a_hidden_edge_is_never_entered() -> None:
+    edges = (
+        Transition("stay", "one", "two", "v > 0 or v <= 0"),
+        Transition("leave", "one", "three", "z > s"),
+        Transition("back", "two", "one", "z < 0"),
+        Transition("home", "three", "one", "z < 0"),
+    )
+    found = prove(
+        chart(states=(*states()["states"], State("three", {"z": "0"})), transitions=edges)
+    )
+    dead = {f.where for f in found.refuted if f.check == "reachability"}
+    assert dead == {("leave",), ("three",)}
 
 
 @pytest.mark.parametrize(
@@ -372,7 +412,7 @@ def test_the_report_says_what_was_asked_and_of_what() -> None:
     text = str(found)
     assert text.startswith("GMS element, published law\nassumed: s > 0, C > 0, v_c > 0\n")
     assert "over the reals, not floats" in text
-    assert "18 proved, 1 refuted, 0 undecided" in text
+    assert "18 proved, 0 settled by order, 1 refuted, 0 undecided" in text
     assert "for example at C = 1, v = -1, s = 1, z = 1" in text
     assert str(prove(gms_element("published"))) == text
 

@@ -74,8 +74,8 @@ BROKEN: Mapping[str, Broken] = {
             Transition("break_away_backward", "stick", "slip", guard="z <= -s"),
             Transition("arrest", "slip", "stick", guard="abs(v) <= v_c and abs(z) < s"),
         ),
-        "With s = 0 both break-away arms hold at once at z = 0, and which is taken is left to "
-        "priority.",
+        "With s = 0 both break-away arms hold at once at z = 0, and nothing but the order of the "
+        "edges settles which is taken.",
         domain=("s >= 0", "v_c > 0", "C > 0"),
     ),
 }

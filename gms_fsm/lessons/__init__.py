@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from gms_fsm.errors import MissingExtraError, ParameterError
+from gms_fsm.errors import MissingExtraError, ParameterError, shown
 from gms_fsm.files import output_folder, written_whole
 from gms_fsm.lessons import (
     l1_hysteresis,
@@ -41,7 +41,7 @@ from gms_fsm.trace import Trace
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["LESSONS", "Lesson", "Result", "Taught", "lesson", "teach"]
+__all__ = ["LESSONS", "Lesson", "Result", "Taught", "lesson", "listed", "numbered", "teach"]
 
 
 class Result(Protocol):
@@ -119,12 +119,42 @@ def lesson(number: int) -> Lesson:
     >>> lesson(7).TITLE
     'Frictional lag'
     """
-    try:
-        return LESSONS[number]
-    except KeyError:
-        raise ParameterError(
-            f"there is no lesson {number!r}; they are numbered {min(LESSONS)} to {max(LESSONS)}"
-        ) from None
+    return LESSONS[numbered(str(number))]
+
+
+def numbered(text: str) -> int:
+    """Return the number of a lesson that was asked for by a text.
+
+    Parameters
+    ----------
+    text : str
+        For example ``"7"``.
+
+    Returns
+    -------
+    int
+        A key of `LESSONS`.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such lesson; all are listed.
+    """
+    for number in LESSONS:
+        if text == str(number):
+            return number
+    raise ParameterError(f"there is no lesson {shown(text)}; these are there:\n{listed()}")
+
+
+def listed() -> str:
+    """Return the lessons, a line each.
+
+    Returns
+    -------
+    str
+        Number, title and question.
+    """
+    return "\n".join(f"{key}  {each.TITLE}: {each.QUESTION}" for key, each in LESSONS.items())
 
 
 def teach(number: int, folder: str | Path) -> Taught:

@@ -249,7 +249,9 @@ def figure(result: Result) -> Figure:
         loop = axes["c"]
         panels.portrait(loop, trace, window=window)
         v = np.linspace(0.0, 0.38, 400)
-        steady = trace.model.stribeck(v) + SIGMA_2 * v
+        curve = trace.model.stribeck
+        assert curve is not None  # of a GMS bank
+        steady = curve(v) + SIGMA_2 * v
         loop.plot(v, steady, color=LINE_GREY, linestyle="--", linewidth=1.2, zorder=1)
         loop.set_title("c) friction against velocity")
         loop.set_ylim(0.6, 1.55)

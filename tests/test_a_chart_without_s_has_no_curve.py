@@ -1,0 +1,176 @@
+"""A chart without the input s has no Stribeck curve: none is invented, offered, printed or saved.
+
+Whatever shows thresholds copes: they are NaN in the trace and absent where people read.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from gms_fsm import (
+    Chart,
+    ChartModel,
+    Prescribed,
+    PulledSlider,
+    Session,
+    State,
+    Stribeck,
+    Trace,
+    Transition,
+    simulate,
+)
+from gms_fsm.errors import ExpressionError, ParameterError
+from gms_fsm.generated import standalone
+from gms_fsm.live import LiveView
+from gms_fsm.models import parameter_names, with_values
+from gms_fsm.program import arguments, lower
+from gms_fsm.report import _parameters
+from gms_fsm.simulate import Moment
+from gms_fsm.sweep import Sweep, sweep
+from tests.helpers import same_bits
+
+CHART = Chart(
+    "a latch", ("v",), ("z",), ("k", "F_c"),
+    (State("free", {"z": "v"}), State("fixed", {"z": "-z"})),
+    (
+        Transition("catch", "free", "fixed", "z > F_c"),
+        Transition("release", "fixed", "free", "z < 0.5 * F_c"),
+    ),
+    {"F": "k * z"},
+)  # fmt: skip
+RIG = Prescribed("0.2")
+
+
+@pytest.fixture(scope="module")
+def model() -> ChartModel:
+    return ChartModel(CHART, {"k": [1.0, 2.0], "F_c": 0.1}, n=2)
+
+
+@pytest.fixture(scope="module")
+def trace(model: ChartModel) -> Trace:
+    return simulate(model, RIG, 5.0, monitors="all")
+
+
+def test_none_is_invented(model: ChartModel) -> None:
+    assert model.stribeck is None
+    wrong: Any = 1.0
+    with pytest.raises(ParameterError, match=r"stribeck is 1\.0; .* leave it out"):
+        ChartModel(CHART, {"k": 1.0, "F_c": 0.1}, stribeck=wrong)
+
+
+def test_a_curve_of_the_users_is_kept() -> None:
+    curve = Stribeck(1.0, 1.5, 0.1)
+    model = ChartModel(CHART, {"k": 1.0, "F_c": 0.1}, stribeck=curve)
+    assert model.stribeck == curve
+    assert simulate(model, Prescribed("0"), 1.0).s.tolist()[0] == [1.5]
+
+
+def test_no_number_of_it_is_in_the_program(model: ChartModel) -> None:
+    program = lower(model, PulledSlider(1.0, 2.0, 0.1))
+    shared, own, _ = arguments(model, PulledSlider(1.0, 2.0, 0.1))
+    assert shared == [0.0, 1.0, 2.0, 0.1, 0.1]  # sigma_2, mass, stiffness, speed, F_c
+    assert own == [[1.0, 1.0], [1.0, 2.0]]
+    for word in ("F_s", "v_s", "exp", " S ", "weight"):
+        assert word not in program.source
+    assert "from math import nan\n" in standalone(program.source)
+
+
+def test_nothing_is_offered_for_varying(model: ChartModel) -> None:
+    assert parameter_names(model) == ("k", "F_c", "sigma_2")
+    other = with_values(model, {"F_c": 0.3, "F_s": 9.0, "weights": 7.0})
+    assert other.stribeck is None
+    assert other.values["F_c"] == 0.3
+    assert other.weights.tolist() == [1.0, 1.0]
+    for name in ("F_s", "v_s", "weights"):
+        with pytest.raises(ParameterError, match=f"'{name}'; known here are k, F_c, sigma_2$"):
+            sweep(model, RIG, 3.0, {name: [1.0, 2.0]}, engine="machines")
+
+
+def test_a_sweep_over_its_own_f_c(model: ChartModel, tmp_path: Path) -> None:
+    result = sweep(model, RIG, 3.0, {"F_c": [0.1, 0.2]}, engine="machines")
+    assert result.outcome.tolist() == ["ok", "ok"]
+    assert result.transition_count.tolist() == [
+        len(simulate(with_values(model, {"F_c": F_c}), RIG, 3.0).transitions) for F_c in (0.1, 0.2)
+    ]
+    again = Sweep.load(result.save(tmp_path / "sweep.npz"))
+    assert again.transitions.tobytes() == result.transitions.tobytes()
+
+
+@pytest.mark.parametrize("engine", ["ifelse", "compiled"])
+def test_engines_agree(model: ChartModel, trace: Trace, engine: str) -> None:
+    if engine == "compiled":
+        pytest.importorskip("numba")
+    other = simulate(model, RIG, 5.0, engine=engine)
+    same_bits(other, trace)
+    assert len(trace.transitions) == 20
+    assert np.isnan(other.s).all()
+    assert np.isnan(other.transitions.s).all()
+
+
+@pytest.mark.parametrize("ending", ["npz", "csv"])
+def test_files_say_so_too(trace: Trace, ending: str, tmp_path: Path) -> None:
+    read = Trace.load(trace.save(tmp_path / f"run.{ending}"))
+    assert read.model.stribeck is None
+    same_bits(read, trace)
+
+
+def test_conditions_do_not_know_s(model: ChartModel, tmp_path: Path) -> None:
+    session = Session(model, RIG, 5.0)
+    session.next_transition()
+    assert session.names == ["t", "x", "v", "F", "z1", "z2", "F1", "F2"]
+    for text in ("s > 1", "z1 > s1"):
+        with pytest.raises(ExpressionError, match="unknown name 's"):
+            session.parse(text)
+    assert "catch fired here" in str(session.why(0))
+    with pytest.raises(ExpressionError, match="unknown name 's'"):
+        simulate(model, RIG, 1.0, monitors="abs(z) <= s")
+    again = Session.load(session.save(tmp_path / "walk.session"))
+    assert again.model.stribeck is None
+    assert again.here.t == session.here.t
+
+
+def test_what_people_read_names_no_curve(trace: Trace) -> None:
+    assert _parameters(trace) == "k = [1, 2], F_c = 0.1, sigma_2 = 0"
+    for text in (str(trace), *(verdict.text for verdict in trace.monitors.values())):
+        assert "nan" not in text
+
+
+def test_the_live_table_shows_no_ratio(model: ChartModel) -> None:
+    console = Console(record=True, width=100, force_terminal=False)
+    view = LiveView(console, 0.0, 5.0, detail=True)
+    moments: list[Moment] = []
+    simulate(model, RIG, 5.0, progress=moments.append)
+    console.print(view.table(moments[-1]))
+    said = console.export_text()
+    assert "E2" in said
+    assert "nan" not in said
+
+
+def test_pictures(trace: Trace, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
+    from matplotlib.figure import Figure
+
+    from plots import figures, panels
+
+    for number, draw in enumerate(
+        (figures.overview, figures.ribbons_figure, figures.cascade_figure)
+    ):
+        figures.save(draw(trace), tmp_path / f"{number}.png")
+    with pytest.raises(ParameterError, match="a latch: its chart has no input s, and so no"):
+        panels.stribeck(Figure().subplots(), trace)
+
+
+def test_the_replay_page_has_no_s(trace: Trace) -> None:
+    pytest.importorskip("uplot", reason="the page needs the extra 'replay'")
+    from plots.replay import replay_html
+
+    data = replay_html(trace).partition('id="data">')[2].partition("</script>")[0]
+    (run,) = json.loads(data)["runs"]
+    assert set(run["names"]) == {"t", "x", "v", "F", "z1", "z2", "F1", "F2"}
+    assert "NaN" not in data

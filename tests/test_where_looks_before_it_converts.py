@@ -1,0 +1,119 @@
+"""A cell in a row that ``where`` leaves out need not be a number, and what helps is named.
+
+Instruments write units under the heads, words where a sensor was off, and remarks at the end.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gms_fsm.errors import RecordError
+from gms_fsm.records import Column, Record, read_record
+from gms_fsm.scenario import load_scenario
+from tests.scenario_files import OPEN_LOOP
+
+COLUMNS = {
+    "time": Column("t", "s"), "position": Column("x", "mm"), "force": Column("F", "N"),
+}  # fmt: skip
+ROWS = [f"{0.01 * i:.2f},{0.5 * i:.1f},{i % 7}" for i in range(20)]  # rows 2 to 21 of the file
+
+
+def _read(tmp_path: Path, changes: dict[int, str], where: str = "") -> Record:
+    """Read the table with some rows changed; the head line is row 1."""
+    lines = ["t,x,F", *ROWS]
+    for number, text in changes.items():
+        lines[number - 1] = text
+    path = tmp_path / "own.csv"
+    path.write_text("\n".join(lines) + "\n")
+    return read_record(path, COLUMNS, where)
+
+
+def test_units_under_the_heads(tmp_path: Path) -> None:
+    record = _read(tmp_path, {2: "s,mm,N"}, "time >= 0 s")
+    assert (len(record), record.first_row) == (19, 3)
+    np.testing.assert_array_equal(
+        record.columns["time"], [float(r.split(",")[0]) for r in ROWS[1:]]
+    )
+    assert any("3 cell(s)" in note and "row 2" in note and "'s'" in note for note in record.notes)
+
+
+def test_words_before_and_after(tmp_path: Path) -> None:
+    changes = {2: "0.00,n/a,off", 3: "0.01,n/a,off", 21: "end,of,file"}
+    record = _read(tmp_path, changes, "time > 0.015 s")
+    assert (len(record), record.first_row) == (17, 4)
+    assert all(np.isfinite(column).all() for column in record.columns.values())
+
+
+def test_the_force_may_be_a_word_where_it_does_not_count(tmp_path: Path) -> None:
+    record = _read(tmp_path, {10: "0.08,4.0,overload"}, "force < 100 N")
+    assert len(record) == 20
+    assert np.flatnonzero(~record.chosen).tolist() == [8]
+    assert record.columns["position"][8] == 0.004
+
+
+@pytest.mark.parametrize("cell", ["lost", "nan", "inf", ""])
+def test_a_row_without_a_place_between_rows_that_count(tmp_path: Path, cell: str) -> None:
+    record = _read(tmp_path, {10: f"0.08,{cell},1"}, "time < 0.075 s or time > 0.085 s")
+    assert len(record) == 19
+    assert 0.08 not in record.columns["time"]
+    assert record.chosen.all()
+    assert any("1 row(s) without time or place" in note for note in record.notes)
+
+
+def test_row_numbers_stay_those_of_the_file(tmp_path: Path) -> None:
+    where = "time < 0.075 s or time > 0.085 s"
+    with pytest.raises(RecordError, match=r"after row 14 \(row 14: 0\.12 s, next: 0\.12 s\)"):
+        _read(tmp_path, {10: "0.08,lost,1", 15: "0.12,1,1"}, where)
+    with pytest.raises(RecordError, match="row 15, column 'F': not a finite number"):
+        _read(tmp_path, {10: "0.08,lost,1", 15: "0.13,1,nan"}, where)
+
+
+@pytest.mark.parametrize(
+    ("changes", "where", "said"),
+    [
+        ({10: "0.08,lost,1"}, "", "row 10, column 'x': 'lost' is not a number"),
+        ({10: "0.08,lost,1"}, "time > 0.05 s", "row 10, column 'x': 'lost' is not a number"),
+        ({10: "0.08,1,off", 4: "0.02,x,1"}, "", "row 4, column 'x': 'x' is not a number"),
+        ({10: "late,1,1"}, "position > 0 mm", "row 10, column 't': 'late' is not a number"),
+        ({10: "0.08,1,off"}, "not force > 3 N", "row 10, column 'F': 'off' is not a number"),
+        ({10: "0.08,nan,1"}, "", "row 10, column 'x': not a finite number"),
+    ],
+)
+def test_in_a_row_that_counts_it_is_an_error_that_names_the_way_out(
+    tmp_path: Path, changes: dict[int, str], where: str, said: str
+) -> None:
+    with pytest.raises(RecordError, match=rf"{said}.*leave .* out by where = \.\.\., a condition"):
+        _read(tmp_path, changes, where)
+
+
+def test_the_way_out_that_is_named_is_one(tmp_path: Path) -> None:
+    """Each of these is refused with the advice, and runs when it is followed."""
+    for text in ("0.08,lost,1", "0.08,nan,1", "0.08,1,off"):
+        with pytest.raises(RecordError, match=r"row 10.*where = "):
+            _read(tmp_path, {10: text})
+        assert len(_read(tmp_path, {10: text}, "time < 0.075 s or time > 0.085 s")) >= 19
+
+
+def test_a_measured_signal_has_where_too(tmp_path: Path) -> None:
+    (tmp_path / "own.csv").write_text("\n".join(["t,v", "s,m/s", *_signal_rows()]) + "\n")
+    signal = (
+        '{ file = "own.csv", time = { column = "t", unit = "s" }, value = { column = "v", '
+        'unit = "m/s" }, WHERE }'
+    )
+    path = tmp_path / "own.toml"
+    path.write_text(OPEN_LOOP.replace('"0.1*sin(t)"', signal.replace(", WHERE", "")))
+    with pytest.raises(RecordError, match=r"row 2, column 't': 's' is not a number.*where = "):
+        load_scenario(path)
+    path.write_text(
+        OPEN_LOOP.replace('"0.1*sin(t)"', signal.replace("WHERE", 'where = "velocity < 9 m/s"'))
+    )
+    corners = load_scenario(path).rig.signals["v"]
+    assert corners.times.tolist() == [0.0, 0.5, 1.5, 2.0, 3.0]  # type: ignore[union-attr]
+    assert corners.values.tolist() == [0.0, 0.1, 0.3, 0.4, 0.6]  # type: ignore[union-attr]
+
+
+def _signal_rows() -> list[str]:
+    return ["0,0", "0.5,0.1", "1.0,off", "1.5,0.3", "2.0,0.4", "2.5,99", "3.0,0.6"]
