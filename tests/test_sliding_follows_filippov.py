@@ -1,7 +1,7 @@
-"""Where both sides push back onto v = 0 the run goes on along it, with the sign that keeps it there.
+"""Where both sides push back onto v = 0 a run goes on along it, with the sign that keeps it there.
 
-An element that slips with |z| >= s while v changes sign cannot arrest; sgn(v) then chatters, and the
-run ended in a livelock error.
+An element that slips with |z| >= s while v changes sign cannot arrest; sgn(v) then chatters, and
+the run ended in a livelock error.
 """
 
 import numpy as np
@@ -116,7 +116,9 @@ def test_it_turns_round_without_a_stop_where_the_push_is_stronger():
     assert trace.v[-1] == pytest.approx(-2.0 * (3.0 - 0.25), abs=1e-9)
 
 
-@pytest.mark.parametrize("text", ["max(v, 0) + F_c * sgn(v)", "min(0, v) + F_c * sgn(v)", "F_c * sgn(v) + 0.3 * abs(v)"])
+@pytest.mark.parametrize(
+    "text", ["max(v, 0) + F_c * sgn(v)", "min(0, v) + F_c * sgn(v)", "F_c * sgn(v) + 0.3 * abs(v)"]
+)
 def test_other_corners_at_the_same_place_do_not_hinder_it(text):
     trace = simulate(coulomb(text), Slider(1.0, "0.5"), 5.0, initial={"v": 1.0})
     assert len(trace.sliding) == 1
