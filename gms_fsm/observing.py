@@ -15,7 +15,7 @@ from gms_fsm.parameters import FloatArray
 from gms_fsm.program import Program
 from integrators import Held, Sliding, look, room_to_slide, slope_on
 
-__all__ = ["observe", "rate", "sigmas"]
+__all__ = ["armed", "observe", "rate", "sigmas"]
 
 
 def observe(program: Program, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
@@ -62,13 +62,29 @@ def sigmas(program: Program, t: float, y: list[float], mode: Sequence[int]) -> l
     """
     found = [math.nan] * program.slides
     if any(mode[program.n :]):
-        held = [0.0] * program.held
-        program.ieee["arm"](t, y, mode, program.p, held, [0] * len(program.strict))
-        on, _ = _sliding(program, mode, held)
+        on, _ = _sliding(program, mode, armed(program, t, y, mode))
         slope_on(on, t, y, list(mode), [0.0] * program.size)
         for c in range(on.which[-1]):
             found[on.which[c]] = min(max(on.sigma[c], -1.0), 1.0)
     return found
+
+
+def armed(program: Program, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
+    """Return the signs that an arc from a state would hold.
+
+    Parameters
+    ----------
+    program, t, y, mode
+        As in `observe`.
+
+    Returns
+    -------
+    list of float
+        -1, 0 or 1; of the surfaces slid on not yet their sigmas.
+    """
+    held = [0.0] * program.held
+    program.ieee["arm"](t, y, mode, program.p, held, [0] * len(program.strict))
+    return held
 
 
 def rate(

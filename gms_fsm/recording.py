@@ -22,7 +22,7 @@ from gms_fsm.errors import (
 )
 from gms_fsm.expression import rough_points
 from gms_fsm.machines import Meddling
-from gms_fsm.observing import observe, rate
+from gms_fsm.observing import armed, observe, rate
 from gms_fsm.start import Start
 from gms_fsm.trace import Rows, Trace, log_of
 from integrators import (
@@ -349,8 +349,8 @@ def check_pace(recording: Recording, buffers: hybrid.Buffers) -> None:
         return
     if start.last - t <= step * left:
         return
-    program, held = start.program, [0.0] * start.program.held
-    program.ieee["arm"](t, y, mode, program.p, held, [0] * len(program.strict))
+    program = start.program
+    held = armed(program, t, y, mode)
     slope = rate(program, t, y, mode, held)
     size = np.maximum(np.abs(y), np.array(start.options.atol) / start.options.rtol)
     size[size == 0.0] = 1.0

@@ -6,7 +6,7 @@ import dataclasses
 import math
 import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,8 +16,10 @@ import numpy as np
 from gms_fsm.errors import GMSError, MissingExtraError, ScenarioError, SimulationError
 from gms_fsm.files import no_input, output_folder, written_whole
 from gms_fsm.models import GMS
+from gms_fsm.notes import notes_on
 from gms_fsm.parameters import FloatArray
 from gms_fsm.records import Motion, Record
+from gms_fsm.scales import Setting
 from gms_fsm.scenario import Loaded
 from gms_fsm.simulate import Moment, simulate
 from gms_fsm.trace import Trace, dwell_times
@@ -222,7 +224,7 @@ def summary_text(loaded: Loaded, trace: Trace) -> str:
         the measurement cannot tell.
     """
     settings = ", ".join(
-        f"{name} = {value}" for name, value in trace.settings.items() if value is not None
+        f"{name} = {_setting(value)}" for name, value in trace.settings.items() if value is not None
     )
     lines = [
         f"# {plain(' '.join(loaded.title.split()))}",
@@ -234,6 +236,8 @@ def summary_text(loaded: Loaded, trace: Trace) -> str:
         f"- run: {settings}",
         f"- result: {len(trace)} rows, {len(trace.transitions)} transitions, F from "
         f"{trace.F.min():.4g} to {trace.F.max():.4g} N",
+        *_held(trace),
+        *(f"- note: {note}" for note in notes_on(trace)),
         "",
         *_element_table(trace),
     ]
@@ -242,6 +246,26 @@ def summary_text(loaded: Loaded, trace: Trace) -> str:
     if loaded.record is not None and loaded.motion is not None:
         lines += ["", *_measurement(loaded.record, loaded.motion, trace)]
     return "\n".join(lines) + "\n"
+
+
+def _setting(value: Setting) -> str:
+    """Show a setting; the tolerance of each component by its name."""
+    if not isinstance(value, Mapping):
+        return str(value)
+    return "(" + ", ".join(f"{name} {_number(np.array(u))}" for name, u in value.items()) + ")"
+
+
+def _held(trace: Trace) -> list[str]:
+    """Say where a sign was held between -1 and 1."""
+    stretches = trace.sliding
+    if not len(stretches):
+        return []
+    seconds = float((stretches.t_end - stretches.t_start).sum())
+    names = " and ".join(f"{name} = 0" for name in dict.fromkeys(stretches.surface.tolist()))
+    return [
+        f"- held on {names}: {len(stretches)} times, {seconds:.4g} s in all, first at t = "
+        f"{float(stretches.t_start[0]):.6g} s (a sliding mode: the sign is a number from -1 to 1)"
+    ]
 
 
 def plain(text: str) -> str:

@@ -33,12 +33,13 @@ from gms_fsm.errors import (
 from gms_fsm.files import in_turn, leftovers, written_together, written_whole
 from gms_fsm.header import Header
 from gms_fsm.models import Model
-from gms_fsm.observing import observe, rate, sigmas
+from gms_fsm.observing import armed, observe, rate, sigmas
 from gms_fsm.parameters import FloatArray
 from gms_fsm.program import Program, lower
 from gms_fsm.rigs import Rig
 from gms_fsm.scales import Setting
 from gms_fsm.verdicts import Verdict
+from integrators import LIVE
 
 if TYPE_CHECKING:
     import pandas
@@ -299,6 +300,7 @@ class Trace:
             table[slid] = _observe_rows(program, rows.at(slid))
         else:
             table = _observe_rows(program, rows)
+        _show_from_before(program, rows, table)
         return {
             "v": table[:, 0],
             "F": table[:, 1],
@@ -767,11 +769,28 @@ def slopes(
         At the first row and at the second.
     """
     # Signs as they hold inside the interval; at its ends they may just be turning.
-    held = [0.0] * program.held
-    inside = (0.5 * (y0 + y1)).tolist()
-    program.ieee["arm"](0.5 * (t0 + t1), inside, mode, program.p, held, [0] * len(program.strict))
+    held = armed(program, 0.5 * (t0 + t1), (0.5 * (y0 + y1)).tolist(), mode)
     at_start, at_end = (rate(program, t, y.tolist(), mode, held) for t, y in ((t0, y0), (t1, y1)))
     return at_start, at_end
+
+
+def _show_from_before(program: Program, rows: Rows, table: FloatArray) -> None:
+    """Observe the rows at which a slide begins as the arc before them did.
+
+    They lie a rounding behind the surface, where the sign as it is seen is that of the other side.
+    """
+    slid = rows.mode[:, program.n :]
+    begins = np.flatnonzero((np.diff(slid, axis=0) > 0).any(axis=1) & (np.diff(rows.t) == 0.0))
+    for row in begins[begins > 0].tolist():
+        t0, t1 = float(rows.t[row - 1]), float(rows.t[row])
+        if t0 < t1 and not slid[row].any():
+            middle = (0.5 * (rows.y[row - 1] + rows.y[row])).tolist()
+            mode = rows.mode[row].tolist()
+            held = armed(program, 0.5 * (t0 + t1), middle, mode)
+            signs = [u if u else LIVE for u in held]
+            out = [0.0] * program.seen
+            program.ieee["observe"](t1, rows.y[row].tolist(), mode, signs, program.p, out)
+            table[row] = out
 
 
 def _observe_rows(program: Program, rows: Rows) -> FloatArray:

@@ -546,7 +546,8 @@ def ribbons(
     Returns
     -------
     list of Artist
-        One collection a state and element; then the names, each of which shows where it fits.
+        One collection per state and element; then the names, each of which shows where it fits;
+        then a band for each stretch on which a sign is held, such as on v = 0.
     """
     chosen = checked_elements(trace, elements)
     begin, end = checked_window(trace, window)
@@ -579,7 +580,22 @@ def ribbons(
     )
     ax.tick_params(axis="y", length=0)
     _time_axis(ax, begin, end)
-    return [*drawn, *names]
+    return [*drawn, *names, *_held_bands(ax, trace, (begin, end))]
+
+
+def _held_bands(ax: Axes, trace: Trace, window: Window) -> Artists:
+    """Mark the stretches along a surface; microseconds wide, they show as a line."""
+    drawn: dict[str, Artists] = {}
+    for stretch in trace.sliding:
+        begin, end = max(window[0], float(stretch.t_start)), min(window[1], float(stretch.t_end))
+        if begin <= end:
+            label = f"held on {stretch.surface} = 0"
+            text = "" if label in drawn else label
+            drawn.setdefault(label, []).append(
+                ax.axvspan(begin, end, facecolor="none", edgecolor="black", hatch="xxx",
+                           linewidth=0.8, zorder=3, label=text)
+            )  # fmt: skip
+    return [band for bands in drawn.values() for band in bands]
 
 
 # --------------------------------------------------------------------------- cascades

@@ -1,4 +1,4 @@
-"""How long a run is to be does not change what it computes before: the clock's ticks are those of t.
+"""How long a run is to be does not change what it computes before: its ticks are those of t.
 
 Its resolution was that of t_end: another horizon moved forces by 5e-8 N.
 """

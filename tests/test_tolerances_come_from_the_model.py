@@ -75,7 +75,7 @@ def test_without_guards_the_scale_is_the_deflection_that_carries_the_friction():
     ],
 )
 def test_charts_of_ones_own_have_the_scales_of_their_guards(guard, scale):
-    """The distance, by its slope, at which a comparison turns; where it turns at 0 there is none."""
+    """How far from 0 a comparison turns, by its slope; one that turns at 0 has none."""
     chart = Chart(
         "own", inputs=("t", "v"), variables=("z",), parameters=("k",),
         states=(State("a", flow={"z": "2 * v"}), State("b", flow={"z": "0"})),

@@ -85,7 +85,9 @@ def test_a_dict_is_no_equation() -> None:
     _refused(ExpressionError, said, lambda: _chart(states=(State("stick", flow=wrong),)))
 
 
-@pytest.mark.parametrize("wrong", [Machine(), Machine, MODEL, "GMS"], ids=["machine", "class", "model", "text"])
+@pytest.mark.parametrize(
+    "wrong", [Machine(), Machine, MODEL, "GMS"], ids=["machine", "class", "model", "text"]
+)
 def test_a_model_is_made_of_a_chart(wrong: Any) -> None:
     said = r"chart is .*it must be a gms_fsm.Chart .*ElementMachines"
     _refused(ParameterError, said, lambda: ChartModel(wrong, {"k": 1.0}))
