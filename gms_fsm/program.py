@@ -594,16 +594,14 @@ class _Lowering:
             front.insert(0, "x = y[0]")
         used |= _words(signals)
         setup: list[str] = []
-        if "n" in used:  # the modes behind those of the elements are of surfaces
-            used |= {"weight"}
         needed = [(j, name) for j, name in enumerate(self.shared) if name in used]
         arrays = [(j, name) for j, name in enumerate(self.own) if name in used]
-        if needed or arrays or "tables" in used:
+        if needed or arrays or used & {"n", "tables"}:
             setup.append("shared, own, tables = p")
         setup += [f"{name} = shared[{j}]" for j, name in needed]
         setup += [f"{name} = own[{j}]" for j, name in arrays]
         if "n" in used:
-            setup.append("n = len(weight)")
+            setup.append("n = len(own[0])")  # behind the elements' modes stand the surfaces'
         return lines + ["    " + line for line in [*setup, *signals, *front, *body]]
 
     def signal_lines(self, name: str, signal: Signal, table: int, live: bool) -> list[str]:

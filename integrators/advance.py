@@ -33,6 +33,7 @@ __all__ = ["Control", "Output", "Work", "advance"]
 # Why the kernel came back.
 REACHED, CROSSED, FULL, TOO_SMALL, NOT_FINITE = 0, 1, 2, 3, 4
 REDO = 0.9  # a crossing before this fraction of an adaptive step has the step done again
+AT_ONCE = 1e3  # ticks; a crossing that is nearer comes at once
 # Of a time: a difference that counts. Four places of its last digit, whatever the run's length.
 TICK = 4.0 * 2.0**-52
 # Places in Output.cursor.
@@ -220,9 +221,10 @@ def advance(
             theta = first_change(
                 interpolate, work.dense, margins, t, t_new, work.y_new, mode, p, w, tick
             )  # fmt: skip
-        if theta < REDO and not fixed and not redone:
+        if theta < REDO and theta * h_now > AT_ONCE * tick and not fixed and not redone:
             # The stages lay behind the crossing and may have jumped what comes before it: the step
-            # up to the crossing is done for its own sake.
+            # up to the crossing is done for its own sake. Not where it is next to none: rounding
+            # may then take the crossing back, and a run would creep on by ticks.
             h = theta * h_now
             redone = True
             continue

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.integrate import OdeSolver
 
 from integrators.advance import (
+    AT_ONCE,
     CROSSED,
     FULL,
     NEXT_KNOT,
@@ -138,7 +139,7 @@ class SciPyStepper:
                 theta = first_change(
                     interpolate, dense, margins_on, t, t_new, y_new, b.mode, self.on, w, tick
                 )
-            if theta < REDO and not redone and theta * (t_new - t) > 1e3 * tick:
+            if theta < REDO and not redone and theta * (t_new - t) > AT_ONCE * tick:
                 # As in the kernel: the solver's stages lay behind the crossing.
                 self.solver, redone = None, True
                 ahead = t + theta * (t_new - t)

@@ -17,6 +17,7 @@ from gms_fsm import (
     Trace,
     Transition,
 )
+from gms_fsm.signals import as_signal
 
 SINE = "0.2*sin(2*pi*t/20)"
 FIG4_SINE = "0.15*sin(2*pi*t/25)"
@@ -102,6 +103,21 @@ WEAR = Chart(
     ),
     outputs={"F": "k * z + 0.1 * dz"},
 )
+
+
+class FunctionBelt:
+    """A mass on a belt whose speed is a Python function; friction of 1 N between them."""
+
+    title = "mass on a belt"
+    acceleration = "(-F - sgn(v - w)) / mass"
+
+    def __init__(self) -> None:
+        self.signals = {"w": as_signal(_belt)}
+        self.numbers = {"mass": 1.0}
+
+
+def _belt(t: float) -> float:
+    return 0.1 + 0.0 * t
 
 
 def wear(n: int = 3) -> ChartModel:

@@ -54,10 +54,10 @@ ROWS = """
     y, mode = np.full((50, 5), 0.1), np.zeros((50, 4), dtype=np.int64)
     for velocity in sys.argv[1:]:
         program = lower(model, Prescribed(velocity))
-        found = compiled.observe_rows(program, t, y, mode, 14)
+        found = compiled.observe_rows(program, t, y, mode)
         for row in range(50):
             out = [0.0] * 14
-            program.ieee["observe"](t[row], y[row].tolist(), [0] * 4, program.p, out)
+            program.ieee["observe"](t[row], y[row].tolist(), [0] * 4, program.live, program.p, out)
             assert found[row].tolist() == out, velocity
     print("equal")
 """
@@ -156,7 +156,7 @@ def observe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
     program = lower(stick_slip("signed"), Prescribed("0.1*t"))
     y, mode = [0.1, 0.2, 0.3, 0.2, 0.1], [0, 1, 0, 1]
     wanted = [0.0] * 14
-    program.ieee["observe"](2.0, y, mode, program.p, wanted)
+    program.ieee["observe"](2.0, y, mode, program.live, program.p, wanted)
 
     def once() -> Any:
         _forget_all()

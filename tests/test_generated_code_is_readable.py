@@ -134,7 +134,7 @@ def test_a_traceback_shows_the_line_that_failed() -> None:
     program = lower(stick_slip("signed"), Prescribed("1/t"))
     out = [0.0] * 100
     with pytest.raises(ZeroDivisionError) as caught:
-        program.functions["observe"](0.0, [0.0] * 5, [0] * 4, program.p, out)
+        program.functions["observe"](0.0, [0.0] * 5, [0] * 4, program.live, program.p, out)
     shown = "".join(traceback.format_exception(caught.value))
     assert "v = 1.0 / t" in shown
     assert "in observe" in shown
