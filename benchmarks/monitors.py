@@ -19,7 +19,7 @@ MONITORS = ("all", "abs(z) <= 1.6*s")
 
 
 def run(monitors: tuple[str, ...]) -> Trace:
-    """72 transitions of four elements, 1849 rows."""
+    """72 transitions of four elements, 2049 rows."""
     k = np.array([40.0, 30.0, 20.0, 10.0])
     parameters = GMSParameters(
         k, [0.4, 0.3, 0.2, 0.1], [0.02] * 4, sigma_2=0.4, v_c=1e-6, weights=1 / (4 * k),

@@ -195,7 +195,7 @@ class Debugger(cmd.Cmd):
     GMS, 4 elements, published law; prescribed velocity, to t = 100 s
     help shows the commands, where shows everything, quit leaves.
     (t=0.0000 s) next
-    row 17, t = 4.91276067 s, micro-step 1: v = 0.141608 m/s, F = 1.34657 N
+    row 12, t = 4.91276067 s, micro-step 1: v = 0.141608 m/s, F = 1.34657 N
       element 1: stick -> slip by break_away_forward
     (t=4.9128 s) quit
     """

@@ -153,7 +153,7 @@ class SimulationError(GMSError, RuntimeError):
 
 
 class LivelockError(SimulationError):
-    """States switch again and again while time stands still."""
+    """States switch again and again without progress of time, or of time and state."""
 
 
 class StepSizeError(SimulationError):

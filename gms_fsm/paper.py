@@ -683,8 +683,8 @@ def claims_text(traces: Mapping[str, Trace], force: str = FORCE, velocity: str =
             "- the text of the guards: our reading of Section II-D (`gms-fsm code` prints them)",
             "- LuGre: sigma_0 = 1000 N/m, sigma_1 = 31.6 Ns/m, and the column's F_s, F_c, v_s, "
             "sigma_2",
-            "- the absolute tolerance (1e-9); where not said otherwise rtol is 1e-6 and switches "
-            "are located",
+            "- the absolute tolerances, from the models' own scales (`gms_fsm.scales`); where not "
+            "said otherwise rtol is 1e-6 and switches are located",
             "- the run with weights w_i = 0.25/k_i, in which an element slips (`fig3_slipping`)",
             "",
             "## Runs",

@@ -332,7 +332,7 @@ class Session:
     >>> round(here.t, 3), here.fired.element, here.fired.edge, here.states[0]
     (4.913, 0, 'break_away_forward', 'slip')
     >>> print(here)
-    row 17, t = 4.91276067 s, micro-step 1: v = 0.141608 m/s, F = 1.34657 N
+    row 12, t = 4.91276067 s, micro-step 1: v = 0.141608 m/s, F = 1.34657 N
       element 1: stick -> slip by break_away_forward
     """
 

@@ -88,7 +88,7 @@ def test_a_section_says_when_shows_what_and_says_what_to_do(
     section = SECTIONS[kind.__name__]
     assert len(section.partition("```")[0].split()) > 5  # when it is raised
     shown = printed[kind.__name__]
-    if kind is SimulationError:  # the root of four; its example shows the trace that is kept
+    if kind is SimulationError:  # the root of others; its example shows the trace that is kept
         assert ".trace" in section
         assert "*Do:*" not in section
         return
