@@ -257,7 +257,8 @@ class Columns:
         log: Any = self.log
         fresh = slice(int(b.memory.counts[loop.TAKEN]), int(b.out.cursor[ROW]))
         t, y, mode = before
-        log.rows_microstep[fresh], log.rows_mode[fresh] = 0, mode
+        modes = [*b.mode.tolist(), *b.sliding.flags.tolist()]
+        log.rows_microstep[fresh], log.rows_mode[fresh] = 0, modes
         b.memory.now[loop.T], b.y[:], b.mode[:] = t, y, mode[: len(b.mode)]
 
     @property

@@ -320,7 +320,7 @@ def _slow(recorder: Recording) -> str:
             f"element {worst + 1} has switched {int(count.max())} times (chattering); leave a gap "
             "between its guards there and back, or give a larger max_steps"
         )
-    return "give a larger max_steps, a larger rtol, or for a stiff run method=scipy Radau"
+    return "give a larger max_steps, a larger rtol, or for a stiff run method=scipy.integrate.Radau"
 
 
 def check_pace(recording: Recording, buffers: hybrid.Buffers) -> None:

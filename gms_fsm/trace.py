@@ -528,6 +528,7 @@ class Trace:
     ) -> Trace:
         n, m, rig = model.n, rows.t.size, header.to_rig()
         modes = lower(model, rig).modes
+        rows, stops = (_with_slides(table, n, modes) for table in (rows, stops))
         size = (1 if header.rig.prescribed else 2) + n * len(model.chart.variables)
         for kind, table in (("rows", rows), ("stops", stops)):
             count = table.t.size
@@ -772,6 +773,14 @@ def slopes(
     held = armed(program, 0.5 * (t0 + t1), (0.5 * (y0 + y1)).tolist(), mode)
     at_start, at_end = (rate(program, t, y.tolist(), mode, held) for t, y in ((t0, y0), (t1, y1)))
     return at_start, at_end
+
+
+def _with_slides(rows: Rows, n: int, modes: int) -> Rows:
+    """Return rows with flags of the surfaces; files from before there were any have none."""
+    if rows.mode.ndim != 2 or rows.mode.shape[1] != n or modes == n:
+        return rows
+    none = np.zeros((len(rows.mode), modes - n), dtype=np.int64)
+    return replace(rows, mode=np.concatenate([rows.mode, none], axis=1))
 
 
 def _show_from_before(program: Program, rows: Rows, table: FloatArray) -> None:

@@ -364,10 +364,11 @@ def _begin_arc(
     # Without location the solver knows of no switch: it keeps its step.
     if control.step <= 0.0 and (located or now[H] <= 0.0):
         now[ERROR_BEFORE] = 1.0
+        # Where the system has a scale, how far there is to go does not count: the kernel cuts.
+        scale = control.time_scale if control.time_scale > 0.0 else now[T_STOP] - t
         now[H] = starting_step(
             flow_on, t, y, memory.f, mode, held, on, method.error_order, control.rtol,
-            work.floor, control.time_scale, min(control.max_step, now[T_STOP] - t), work.y_new,
-            work.f_new,
+            work.floor, scale, control.max_step, work.y_new, work.f_new,
         )  # fmt: skip
 
 

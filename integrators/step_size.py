@@ -144,7 +144,7 @@ def starting_step(
     atol : list of float, shape (m,)
         Absolute tolerances.
     time_scale : float
-        Of the system, s; 0 if it has none.
+        Of the system, s, > 0.
     longest : float
         Upper bound, s.
     y_try, f_try : list of float
@@ -157,14 +157,13 @@ def starting_step(
     """
     d0 = error_norm(y, 1.0, y, y, rtol, atol)
     d1 = error_norm(f, 1.0, y, y, rtol, atol)
-    h = longest if time_scale <= 0.0 else min(time_scale, longest)
+    h = min(time_scale, longest)
     if not d1 < INFINITY:
         return 1e-3 * h
     if d1 > 0.0:  # until y has moved by a hundredth, or by a tolerance where it is next to zero
         h = min(h, 0.01 * max(d0, 100.0) / d1)
     else:  # nothing moves yet
         h = 1e-6 * h
-    unit = h if time_scale <= 0.0 else time_scale
     for j in range(len(y)):
         y_try[j] = y[j] + h * f[j]
     flow(t + h, y_try, mode, held, p, f_try)
@@ -173,6 +172,6 @@ def starting_step(
     d2 = error_norm(f_try, 1.0, y, y, rtol, atol)
     if not d2 < INFINITY:
         return LEAST * h  # the look ahead went too far
-    steepest = max(unit * d1, unit * unit * d2)
-    better = 1e-3 * h if steepest <= 1e-15 else unit * (0.01 / steepest) ** (1.0 / order)
+    steepest = max(time_scale * d1, time_scale * time_scale * d2)
+    better = 1e-3 * h if steepest <= 1e-15 else time_scale * (0.01 / steepest) ** (1.0 / order)
     return min(100.0 * h, better, longest)

@@ -49,7 +49,7 @@ for t, y, mode, held in STATES:
     dy, edges, seen = [0.0] * len(y), [0] * len(mode), [0.0] * SEEN
     flow(t, y, mode, held, P, dy)
     switch(t, y, mode, P, edges)
-    observe(t, y, mode, P, seen)
+    observe(t, y, mode, LIVE, P, seen)
     live = [0.0] * len(y)
     flow_live(t, y, mode, held, P, live)
     results.append([dy, edges, seen, live])
@@ -78,7 +78,7 @@ def _engine(program: Program, states: list[list[Any]], seen: int) -> list[Any]:
         dy, edges, out, live = [0.0] * len(y), [0] * len(mode), [0.0] * seen, [0.0] * len(y)
         f["flow"](t, y, mode, held, p, dy)
         f["switch"](t, y, mode, p, edges)
-        f["observe"](t, y, mode, p, out)
+        f["observe"](t, y, mode, program.live, p, out)
         f["flow_live"](t, y, mode, held, p, live)
         results.append([[float(u).hex() for u in part] for part in (dy, edges, out, live)])
     return results
@@ -88,7 +88,7 @@ def _compare(model: Model, rig: Rig, text: str, t_end: float) -> None:
     program = lower(model, rig)
     states = _states(model, rig, program, t_end)
     seen = 2 + (2 + len(model.chart.variables)) * model.n
-    given = f"STATES, P, SEEN = {states!r}, {program.p!r}, {seen}\n"
+    given = f"STATES, P, SEEN, LIVE = {states!r}, {program.p!r}, {seen}, {program.live!r}\n"
     done = subprocess.run(
         [sys.executable, "-I", "-S", "-c", text + "\n\n" + given + ASK],
         capture_output=True, text=True, check=False,

@@ -10,7 +10,7 @@ import pytest
 
 from gms_fsm import Trace
 from gms_fsm.files import LIST
-from gms_fsm.report import compare, measured_force, run_scenario
+from gms_fsm.report import compare, measured_force, plain, run_scenario
 from gms_fsm.scenario import Loaded, load_scenario
 from tests.helpers import same_bits
 
@@ -60,7 +60,7 @@ def check_report(loaded: Loaded, trace: Trace, files: list[Path], folder: Path) 
     assert "weights = [" in summary
     assert f"{len(trace.transitions)} transitions" in summary
     assert "| element | stick [s] | slip [s] | break_away_forward |" in summary
-    assert loaded.scenario.notes.strip() in summary
+    assert plain(loaded.scenario.notes.strip()) in summary
     return summary
 
 
@@ -151,7 +151,7 @@ def test_the_tribometer_explains_the_measurement(
     assert found.r2 == pytest.approx(1 - np.mean(error**2) / force.var(), rel=1e-9)
     summary = files[0].read_text(encoding="utf-8")
     assert f"R² = {found.r2:.4f}" in summary
-    assert "where = 'normal > 4.5 N'" in summary
+    assert plain("where = 'normal > 4.5 N'") in summary
     assert "time constant 0.02 s" in summary
 
 

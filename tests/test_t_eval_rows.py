@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gms_fsm import simulate
+from gms_fsm import Chart, ChartModel, Prescribed, State, Transition, simulate
 from tests.helpers import non_drifting, open_loop, pulled_mass, stick_slip
 
 CASES = {
@@ -80,9 +80,13 @@ def test_rows_between_steps_are_as_good_as_the_steps(case):
 
 def test_a_transition_at_the_end_is_in_the_last_row():
     """t_end on a transition: the row at t_end comes after the firing."""
-    model, rig, T = CASES["open loop, signed"]
-    t = float(simulate(model, rig, T).transitions.t[0])
-    full = simulate(model, rig, t)
-    trace = simulate(model, rig, t, t_eval=[0.0, t])
-    assert len(full.transitions) == len(trace.transitions) == 4
-    assert trace.states[-1].tolist() == full.states[-1].tolist() == ["slip"] * 4
+    chart = Chart(
+        "by the clock", ("t",), ("z",), ("k",),
+        (State("early", {"z": "1"}), State("late", {"z": "0"})),
+        (Transition("go", "early", "late", guard="t >= 2"),), {"F": "k * z"},
+    )  # fmt: skip
+    model, rig = ChartModel(chart, {"k": 1.0}, n=2), Prescribed("0.1")
+    full = simulate(model, rig, 2.0)
+    trace = simulate(model, rig, 2.0, t_eval=[0.0, 2.0])
+    assert full.transitions.t.tolist() == trace.transitions.t.tolist() == [2.0, 2.0]
+    assert trace.states[-1].tolist() == full.states[-1].tolist() == ["late"] * 2

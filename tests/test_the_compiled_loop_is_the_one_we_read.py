@@ -13,6 +13,7 @@ from gms_fsm import Slider, simulate
 from gms_fsm.errors import LivelockError
 from integrators import loop
 from tests.helpers import one_element, open_loop, pulled_mass, stick_slip
+from tests.test_monitors_see_what_happens import SLOWING, memoryless
 
 TIMES = np.linspace(0.0, 20.0, 41)
 
@@ -50,13 +51,24 @@ def test_the_same_rows_and_the_same_log(case, options, read):
         np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name))
 
 
-def test_what_ends_a_run_ends_it_at_the_same_place(read):
+def test_it_slides_along_the_same_rows(read):
     model = one_element("published", F_c=1.0, F_s=1.5, v_s=0.05, C=0.1, sigma=5.0, k=1.0)
     start = {"z": [-2.5], "states": ["slip"], "v": 0.05}
+    runs = [
+        simulate(model, Slider(1.0, "-2.4 - 2*t"), 5.0, initial=start, engine=engine)
+        for engine in ("compiled", "ifelse")
+    ]
+    assert len(runs[0].sliding) == 1
+    for name in ("t", "microstep", "y", "mode"):
+        np.testing.assert_array_equal(*(getattr(run.rows, name) for run in runs))
+
+
+def test_what_ends_a_run_ends_it_at_the_same_place(read):
+    model, rig = memoryless([0.5, 0.4]), SLOWING
     scenes = []
     for engine in ("compiled", "ifelse"):
         with pytest.raises(LivelockError) as caught:
-            simulate(model, Slider(1.0, -2.4), 5.0, initial=start, engine=engine)
+            simulate(model, rig, 10.0, engine=engine)
         scenes.append((str(caught.value), caught.value.trace))
     (text, ours), (same, theirs) = scenes
     assert text == same

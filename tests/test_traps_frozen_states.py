@@ -61,13 +61,14 @@ def test_the_flow_sees_one_mode_a_step(case, method):
 
     system = integrators.System(
         flow=flow, flow_live=program.ieee["flow_live"], arm=program.ieee["arm"],
-        margins=program.ieee["margins"], p=program.p, held=program.held,
-        strict=program.strict, relations=program.relations,
+        margins=program.ieee["margins"], normal=program.ieee["normal"], p=program.p,
+        held=program.held, strict=program.strict, relations=program.relations,
+        surfaces=program.surfaces,
     )  # fmt: skip
     switch = IfElse(program)
     options = integrators.Options(
-        integrators.METHODS[method], 0.0501 if method == "rk4" else None, 1e-6, 1e-9, math.inf,
-        True, None,
+        integrators.METHODS[method], 0.0501 if method == "rk4" else None, 1e-6,
+        [1e-9] * program.size, math.inf, 1.0, 100_000, True, None,
     )  # fmt: skip
     arcs = firings = 0
     y = [0.0] * program.size
