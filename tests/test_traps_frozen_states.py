@@ -77,7 +77,7 @@ def test_the_flow_sees_one_mode_a_step(case, method):
             firings += 1
         elif isinstance(happening, integrators.Arc):
             arcs += 1
-            assert set(modes) <= {happening.mode}
+            assert set(modes) <= {happening.mode[:4]}  # behind them stand the surfaces
         if not isinstance(happening, integrators.Stop):
             modes.clear()
     assert firings > 10
