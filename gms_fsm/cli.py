@@ -28,6 +28,7 @@ from gms_fsm.files import no_input, output_folder, written_whole
 from gms_fsm.generated import standalone
 from gms_fsm.live import LiveView
 from gms_fsm.models import GMS, Model
+from gms_fsm.notes import notes_on
 from gms_fsm.parameters import GMSParameters
 from gms_fsm.program import lower
 from gms_fsm.prove import Report, prove
@@ -191,6 +192,8 @@ def run_command(
     typer.echo(f"{len(trace.transitions)} transitions; {len(files)} files in {folder}")
     for line in monitor_lines(trace):
         typer.echo(line)
+    for note in notes_on(trace):
+        typer.echo(f"note: {note}")
     typer.echo(f"start with {files[0]}")
 
 
