@@ -163,21 +163,21 @@ def test_moves() -> None:
 
 def test_next_says_that_there_is_no_other() -> None:
     said = answers(FIG_4, "goto 99.9", "next", "next", "next")[3]
-    assert said.startswith("no transition before the end\nrow 351, t = 100 s")
+    assert said.startswith("no transition before the end\nrow 349, t = 100 s")
 
 
 def test_until_says_where_and_whether() -> None:
     said = answers(FIG_4, "u z1 > 0.123", "u state(1) == slip", "u z1 > 99")
     assert said[0].startswith("between rows 8 and 9, t = 2.60048553")
     assert "element 1: stick -> slip by break_away_forward" in said[1]
-    assert said[2].startswith("it does not become true before the end\nrow 351, t = 100 s")
+    assert said[2].startswith("it does not become true before the end\nrow 349, t = 100 s")
 
 
 def test_until_stays_where_it_is_true_already_and_for_good() -> None:
     said = answers(FIG_4, "goto 25", "u t > 1", "s", "u t > 30", "u t > 30", "u t > 30.1")
     stays = "it is true here already and does not become true again; until waits for it to become"
     assert " ".join(said[1].split()) == " ".join(f"{stays} true {said[0]}".split())
-    assert said[2].startswith("row 78")
+    assert said[2].startswith("row 77")
     assert "t = 30 s" in said[3]
     assert " ".join(said[4].split()).startswith(stays)
     assert said[4].endswith(said[3])  # the located place, too, is kept
@@ -221,7 +221,7 @@ def test_breakpoints() -> None:
         FIG_4, "c", "goto 0", "b", "b arrest 2", "b enter slip element 3 if v < 0 hits 2",
         "b tested break_away_forward all", "breaks", "clear 3", "c", "c", "clear all", "b",
     )  # fmt: skip
-    assert said[0].startswith("no breakpoint is set\nrow 351")
+    assert said[0].startswith("no breakpoint is set\nrow 349")
     assert said[2] == "no breakpoint is set"
     assert said[3] == "breakpoint 1: fires arrest, element 2"
     assert said[4] == "breakpoint 2: enter slip, element 3, if v < 0, from hit 2 on"
@@ -240,7 +240,7 @@ def test_poke_by_expression_and_branches(tmp_path: Path) -> None:
         FIG_4, "goto 25", "poke z1 = -0.9*s1 state4=slip", "p z1 / s1", "why 1", "next", "branch 0",
         "branches", "run", "compare 0 1",
     )  # fmt: skip
-    assert said[1].startswith("branch 1, from branch 0: z1 = -1.35, state 4 = slip\nrow 78")
+    assert said[1].startswith("branch 1, from branch 0: z1 = -1.35, state 4 = slip\nrow 77")
     assert said[2] == "-0.9"
     assert "arrest fires next: every clause is true." in said[3]
     assert "element 1: slip -> stick by arrest" in said[4]
@@ -265,7 +265,7 @@ def test_save_and_load(tmp_path: Path) -> None:
     )  # fmt: skip
     assert said[5].startswith("written to")
     assert "2 branches" in said[9]
-    assert "row 78, t = 24.9999735 s" in said[9]
+    assert "row 77, t = 24.9999735 s" in said[9]
     assert "watch 1: z1 = 0" in said[9]
     assert "> 1  " in said[10]
     assert said[11] == "  1  fires arrest, all elements; seen 0"
@@ -296,7 +296,7 @@ def test_list_draws_the_chart_of_the_chosen_element() -> None:
 
 def test_where_shows_every_element_and_the_states_over_time() -> None:
     said = answers(FIG_4, "goto 100", "goto 25", "where")[2].splitlines()
-    assert said[0] == "t = 24.9999735 s, row 77, micro-step 3, branch 0"
+    assert said[0] == "t = 24.9999735 s, row 76, micro-step 3, branch 0"
     assert " ".join(said[3].split()) == "> 1 slip -2.276 1.5 1.517 [########> -1.669 1:yn"
     assert said[6].split()[-1] == "1:yy*"
     ribbons = {line.split()[0]: line[6:] for line in said if line.startswith(" E")}
@@ -328,7 +328,7 @@ def test_an_empty_line_repeats_a_move_only_when_typed() -> None:
 def test_comments_are_passed_over() -> None:
     said = answers(FIG_4, "# find the row", "goto 25")
     assert said[0] == ""
-    assert said[1].startswith("row 77")
+    assert said[1].startswith("row 76")
 
 
 def test_the_end_of_input_is_a_quiet_quit() -> None:
