@@ -105,6 +105,18 @@ WEAR = Chart(
 )
 
 
+def banging(gap: float) -> ChartModel:
+    """Return an element driven to and fro between two guards that are `gap` apart."""
+    chart = Chart(
+        "to and fro", inputs=("v",), variables=("z",), parameters=("gap",),
+        states=(State("up", flow={"z": "1"}), State("down", flow={"z": "-1"})),
+        transitions=(Transition("fall", "up", "down", guard="z >= 1"),
+                     Transition("rise", "down", "up", guard="z <= 1 - gap")),
+        outputs={"F": "z"},
+    )  # fmt: skip
+    return ChartModel(chart, {"gap": gap})
+
+
 class FunctionBelt:
     """A mass on a belt whose speed is a Python function; friction of 1 N between them."""
 

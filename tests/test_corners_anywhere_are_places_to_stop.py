@@ -1,7 +1,7 @@
 """Corners and jumps in outputs and in a rig's equation are stopped at, as those in flows are.
 
-A run with `F = "F_c * sgn(v)"` came to t = 0.015 of 5 s and kept gigabytes; a corner in a rig's text
-cost the method its order.
+A run with `F = "F_c * sgn(v)"` came to t = 0.015 of 5 s and kept gigabytes; a corner in a rig's
+text cost the method its order.
 """
 
 import numpy as np

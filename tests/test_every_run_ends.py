@@ -21,7 +21,7 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.errors import LivelockError, ParameterError, StepLimitError
-from tests.helpers import pulled_mass
+from tests.helpers import banging, pulled_mass
 
 ENGINES = ["machines", "ifelse", "compiled"]
 
@@ -31,18 +31,6 @@ def stiff(C: float) -> GMS:
     p = GMSParameters([4e6], [0], [C], sigma_2=250, stribeck=Stribeck(8, 9.5, 5e-4), v_c=7.3e-7,
                       weights=[1 / 4e6])  # fmt: skip
     return GMS(p, law="signed")
-
-
-def banging(gap: float) -> ChartModel:
-    """Return an element driven to and fro between two guards that are `gap` apart."""
-    chart = Chart(
-        "to and fro", inputs=("v",), variables=("z",), parameters=("gap",),
-        states=(State("up", flow={"z": "1"}), State("down", flow={"z": "-1"})),
-        transitions=(Transition("fall", "up", "down", guard="z >= 1"),
-                     Transition("rise", "down", "up", guard="z <= 1 - gap")),
-        outputs={"F": "z"},
-    )  # fmt: skip
-    return ChartModel(chart, {"gap": gap})
 
 
 def needs(engine):

@@ -214,14 +214,19 @@ def attempt(model: Any, rig: Any, t_end: float, **given: Any) -> tuple[Trace, st
         return error.trace, type(error).__name__
 
 
+def onto_or_off_a_surface(trace: Trace) -> Any:
+    """Tell which rows show that a slide begins or ends: at the micro-step of the row before."""
+    changes = (np.diff(trace.rows.mode[:, trace.n :], axis=0) != 0).any(axis=1)
+    return np.concatenate([[False], changes])
+
+
 def rows_and_log_agree(trace: Trace) -> None:
     """Every firing has its row, and between firings no state changes."""
     t, microstep, states, log = trace.t, trace.microstep, trace.states, trace.transitions
     assert np.isfinite(trace.rows.y).all()
     assert (np.diff(t) >= 0).all()
     assert microstep[0] == 0
-    # Onto a surface or off it: a row of its own, at the same micro-step.
-    slid = np.concatenate([[False], (np.diff(trace.rows.mode[:, trace.n :], axis=0) != 0).any(1)])
+    slid = onto_or_off_a_surface(trace)
     assert (np.diff(t)[slid[1:]] == 0.0).all()
     fired = np.flatnonzero((microstep > 0) & ~slid)
     assert len(fired) == len(log)
@@ -240,15 +245,15 @@ def rows_and_log_agree(trace: Trace) -> None:
         assert record.s == trace.s[row - 1, i]
         assert record.F_before == trace.F[row - 1]
         assert record.F_after == trace.F[row]
-    quiet = np.flatnonzero(microstep[1:] == 0) + 1
+    quiet = np.flatnonzero((microstep[1:] == 0) & ~slid[1:]) + 1
     assert (states[quiet] == states[quiet - 1]).all()
     assert (trace.rows.y[quiet] == trace.rows.y[quiet - 1])[t[quiet] == t[quiet - 1]].all()
 
 
 def guards_say_so(trace: Trace) -> None:
     """A firing's guard was true, no guard before it in its state was."""
-    for row in np.flatnonzero(trace.microstep > 0).tolist():
-        i = int(np.flatnonzero(trace.rows.mode[row] != trace.rows.mode[row - 1])[0])
+    for row in np.flatnonzero((trace.microstep > 0) & ~onto_or_off_a_surface(trace)).tolist():
+        i = int(np.flatnonzero(trace.modes[row] != trace.modes[row - 1])[0])
         edges = explain(trace, row, i)
         taken = [edge.fired for edge in edges].index(True)
         assert edges[taken].holds

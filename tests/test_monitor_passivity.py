@@ -200,7 +200,7 @@ def test_the_published_law_makes_energy_in_fig_4() -> None:
     assert found.deficit[2:] == (0.0, 0.0)
     assert not found.ok
     for part in (
-        "element 1 (element 2 too) had made 2.15853 J out of nothing by t = 75 s",
+        "element 1 (element 2 too) had made 2.15852 J out of nothing by t = 75 s",
         "mostly in slip, where dz = sgn(v) * C * (1 - z / s)", "try law='signed'",
     ):  # fmt: skip
         assert part in found.text

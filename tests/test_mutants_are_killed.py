@@ -40,6 +40,7 @@ from gms_fsm.machines import Element, ElementMachines, Guard
 from integrators import advance as kernel
 from integrators.crossings import NO_CHANGE, first_change, nothing_near, watched
 from integrators.hybrid import Buffers, Options, System, buffers
+from integrators.sliding import Surfaces
 from integrators.step_size import next_factor
 from integrators.tableaux import DP45, RK4
 from tests.helpers import pulled_mass, stick_slip
@@ -555,9 +556,13 @@ class _Run:
             assert margin is not None, "nothing is watched, and margins are asked for"
             out[0] = margin(t, y[0])
 
-        system = System(flow, flow, lambda *_: None, margins, None, 0, [False], ["g"], list(knots))
+        nothing = Surfaces([], [], [])
+        system = System(
+            flow, flow, lambda *_: None, margins, lambda *_: None, None, 0, [False], ["g"],
+            nothing, list(knots),
+        )  # fmt: skip
         method = RK4 if step else DP45
-        options = Options(method, step, tolerance, tolerance, max_step, True, times)
+        options = Options(method, step, tolerance, [tolerance], max_step, 0.0, 10**6, True, times)
         self.b: Buffers = buffers(system, origin, [1.0], [], 100.0, options, capacity)
         self.system, self.y, self.t = system, [1.0], t
         self.f = [slope(t, 1.0)]
@@ -598,7 +603,7 @@ def test_fixed_steps_end_on_the_grid_wherever_they_begin() -> None:
 
 @pytest.mark.parametrize("share", [0.5, 1.0])
 def test_no_sliver_is_stepped_at_either_end(share: float) -> None:
-    sliver = share * _Run().b.control.resolution
+    sliver = share * kernel.tick_at(0.125)
     run = _Run(step=0.25, t=0.5 - sliver)
     run.to(1.0 + sliver)
     assert run.rows == [0.75, 1.0 + sliver]
@@ -729,7 +734,7 @@ def test_an_infinite_slope_and_a_step_of_nothing_are_told_apart() -> None:
     cliff = _Run(lambda t, y: math.inf if 0.778 < y < 0.779 else -y, step=0.25)
     assert cliff.to(1.0)[:2] == (kernel.NOT_FINITE, 0.0)
     assert _Run(t=1.0).to(2.0, h=1e-30)[:2] == (kernel.TOO_SMALL, 1.0)
-    blind = _Run(lambda t, y: 1e200 * math.sin(1e30 * t), tolerance=1e-12)
+    blind = _Run(lambda t, y: 1e200 * math.sin(1e30 * t), tolerance=1e-12, t=0.5)
     assert blind.to(1.0)[0] == kernel.TOO_SMALL
 
 
