@@ -12,7 +12,7 @@ import functools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Generic, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,6 +37,7 @@ from gms_fsm.parameters import as_floats
 
 __all__ = ["Scales", "Setting", "Tolerance", "scales_of"]
 
+T = TypeVar("T")
 Tolerance: TypeAlias = float | Mapping[str, ArrayLike] | None  # absolute, as it is given
 Setting: TypeAlias = str | float | Mapping[str, float | list[float]] | None  # of a run, as kept
 
@@ -106,8 +107,14 @@ def scales_of(model: Model) -> Scales:
     Scales
         From its guards, its force and its curve.
     """
+    return _scales_of(_Same(model))
+
+
+@functools.lru_cache(maxsize=64)
+def _scales_of(key: _Same[Model]) -> Scales:
+    model = key.it
     chart = model.chart
-    sizes = _sizes(_SameChart(chart))
+    sizes = _sizes(_Same(chart))
     curve = model.stribeck if "s" in chart.inputs else None
     numbers = [as_floats(np.broadcast_to(value, model.n)) for value in model.values.values()]
     thresholds = [0.0] * model.n if curve is None else as_floats(model.weights * curve.F_c)
@@ -152,22 +159,22 @@ class _Sizes:
     paces: Sequence[Numbers]  # how fast variables relax, of v too
 
 
-class _SameChart:
-    """A chart by identity: as data it cannot be hashed."""
+class _Same(Generic[T]):
+    """A chart or a model by identity: as data it cannot be hashed."""
 
-    def __init__(self, chart: Chart) -> None:
-        self.chart = chart
+    def __init__(self, it: T) -> None:
+        self.it = it
 
     def __hash__(self) -> int:
-        return id(self.chart)
+        return id(self.it)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _SameChart) and other.chart is self.chart
+        return isinstance(other, _Same) and other.it is self.it
 
 
 @functools.lru_cache(maxsize=64)
-def _sizes(key: _SameChart) -> _Sizes:
-    chart = key.chart
+def _sizes(key: _Same[Chart]) -> _Sizes:
+    chart = key.it
     states = ("x", "v", *chart.variables)
     rates = [f"d{name}" for name in chart.variables]
     rest: dict[str, Value] = dict.fromkeys(("t", *states, *rates), Number(0.0))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import gc
 import hashlib
+import inspect
 import pickle
 import sys
 import threading
@@ -41,13 +42,14 @@ _OF_A_STEP: tuple[Callable[..., Any], ...] = (
     crossings.copy_margins, crossings.first_change,
     crossings.nothing_near, crossings._bracket, crossings._is_quiet, crossings._search,
     step_size.error_norm, step_size.next_factor, step_size.retry_factor,
+    sliding.flow_on, sliding.margins_on,
     steps.fit_dense, steps.interpolate, steps.take_step, steps.weigh,
 )  # fmt: skip
 _OF_AN_ARC: tuple[Callable[..., Any], ...] = (
     advance.advance, loop.active_relations, loop.go_on, loop._begin_arc, loop._count_anew,
     loop._listed, loop._look_at_clock, loop._no_progress, loop._often_changed, loop._put_modes,
     loop._rearm, loop._undefined,
-    sliding._sign, sliding._solve, sliding.look, sliding.seize, sliding.flow_on, sliding.margins_on,
+    sliding._sign, sliding._solve, sliding.look, sliding.seize,
     sliding.slope_on, step_size.starting_step,
 )  # fmt: skip
 _ARRAYS: Mapping[Any, tuple[type[Any], int]] = {
@@ -320,7 +322,42 @@ def record(arguments: tuple[Any, ...], store: Store | None) -> int:
         What it returns.
     """
     machine_code: Callable[..., int] = _record(arguments, store)
-    return machine_code(*arguments)
+    count = len(_OF_A_SYSTEM)
+    return machine_code(*map(_address, arguments[:count]), *arguments[count:])
+
+
+# What `record` calls of a system, by its place among the arguments.
+_OF_A_SYSTEM = ("flow", "arm", "margins", "normal", "switch", "act", "observe")
+
+
+@functools.lru_cache(maxsize=1024)
+def _address(function: Any) -> int:
+    """Return where the machine code of a compiled function lies."""
+    (code,) = function.overloads.values()
+    address: int = code.library.get_pointer_to_function(code.fndesc.llvm_func_name)
+    return address
+
+
+def _function_at(signature: Any) -> Any:
+    """Return what makes a function of an address, in machine code.
+
+    Handed over as itself, numba unpickles a function's type twice at every call: 27 us each.
+    """
+    from numba import types
+    from numba.core import cgutils
+    from numba.extending import intrinsic
+
+    kind = types.FunctionType(signature)
+
+    def make(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        function = cgutils.create_struct_proxy(kind)(context, builder)
+        function.jit_addr = builder.inttoptr(arguments[0], function.jit_addr.type)
+        return function._getvalue()
+
+    def function_at(_typing: Any, _address: Any) -> Any:
+        return kind(types.int64), make
+
+    return intrinsic(function_at)
 
 
 _compiled_record: list[Any] = []
@@ -338,14 +375,22 @@ def _record(arguments: tuple[Any, ...], store: Store | None) -> Any:
 def _compile_record(arguments: tuple[Any, ...], store: Store | None) -> Any:
     import numba
 
-    names = ("flow", "arm", "margins", "normal", "switch", "act", "observe")
-    functions = [numba.types.FunctionType(_signature(SIGNATURES[name])) for name in names]
-    others = [numba.typeof(argument) for argument in arguments[len(names) :]]
-    for helper in (*_OF_A_STEP, *_OF_AN_ARC):
+    for helper in (*_OF_A_STEP, *_OF_AN_ARC, loop.record):
         usable_inside(helper, inlined=helper in _OF_A_STEP)
+    # The name of a module that exists: numba imports it when it loads machine code from disk.
+    namespace: dict[str, Any] = {"run": loop.record, "__name__": __name__}
+    names = list(inspect.signature(loop.record).parameters)
+    handed = names.copy()
+    for place, name in enumerate(_OF_A_SYSTEM):
+        namespace[f"at_{name}"] = _function_at(_signature(SIGNATURES[name]))
+        handed[place] = f"at_{name}({names[place]})"
+    text = f"def record({', '.join(names)}):\n    return run({', '.join(handed)})\n"
+    exec(text, namespace)
+    addresses = [numba.types.int64] * len(_OF_A_SYSTEM)
+    others = [numba.typeof(argument) for argument in arguments[len(_OF_A_SYSTEM) :]]
     start = time.perf_counter()
     result = _machine_code(
-        numba.types.int64(*functions, *others), loop.record, store,
+        numba.types.int64(*addresses, *others), namespace["record"], store,
         "gms-fsm: compiling the engine, once on this machine ...",
     )  # fmt: skip
     if result._cache.missed:
