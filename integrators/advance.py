@@ -177,12 +177,12 @@ def advance(
             cursor[NEXT_KNOT] += 1
         if cursor[NEXT_KNOT] < len(knots):
             limit = min(limit, knots[cursor[NEXT_KNOT]])
-        if t_new + tick_at(t_new) >= limit:
+        tick = TICK * max(abs(t), abs(t_new))
+        if t_new + tick >= limit:
             t_new = limit
         if not t_new > t:
             return TOO_SMALL, t, h, error_before
         h_now = t_new - t
-        tick = tick_at(max(abs(t), abs(t_new)))
         cursor[STEPS] += 1
 
         take_step(flow, method, t, y, f, t_new, mode, held, p, work.k, work.y_new, work.f_new)

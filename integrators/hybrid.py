@@ -16,7 +16,15 @@ from integrators import loop
 from integrators.advance import Control, Output, Work
 from integrators.crossings import Margins, Watched, watched
 from integrators.loop import MOST_SWITCHES, Memory, Plan
-from integrators.sliding import MOST_SLIDING, Sliding, Surfaces, room_to_slide
+from integrators.sliding import (
+    MOST_SLIDING,
+    Held,
+    Sliding,
+    Surfaces,
+    flow_on,
+    margins_on,
+    room_to_slide,
+)
 from integrators.steps import Coefficients, Dense, Flow, Vector, coefficients
 from integrators.tableaux import EULER, Tableau
 
@@ -293,12 +301,19 @@ def happenings(
         solver = SciPyStepper(system, flow, b, options)
     now, counts, cursor, y = b.memory.now, b.memory.counts, b.out.cursor, b.y
     before: tuple[Vector, tuple[int, ...]] = [], ()
+    s = b.sliding
+    on = Held(flow, system.margins, system.normal, system.p, b.held, b.surfaces.sign, s.which,
+              s.sigma, s.table)  # fmt: skip
+    plainly: tuple[Flow, Margins, Any] = flow, system.margins, system.p
+    along: tuple[Flow, Margins, Any] = flow_on, margins_on, on
     while True:
+        ride, seen, q = along if s.which[-1] else plainly
         try:
             happening = loop.go_on(
                 flow, system.arm, system.margins, system.normal, switch.ask, switch.act, b.method,
                 b.control, b.plan, b.memory, y, b.mode, b.held, system.p, b.relations, b.surfaces,
-                b.sliding, b.out, b.work, options.rows_at_once,
+                b.sliding, b.out, b.work, ride, seen, q,
+                options.rows_at_once,
             )  # fmt: skip
             if solver is not None and happening == loop.ADVANCE:
                 solver.advance(options.rows_at_once if options.located else 1)

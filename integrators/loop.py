@@ -60,7 +60,7 @@ PHASE, MICROSTEP, MACHINE, EDGE, FIRED_ONE, FRESH, STATUS, JUMP, ACTIVE, TAKEN, 
     PLACES
 )
 # Phases.
-START, ASK, PICK, FIRE, SETTLED, ARC, AFTER, JUMPING, FINISH, END = range(10)
+START, ASK, PICK, FIRE, SETTLED, BEGIN, ARC, AFTER, JUMPING, FINISH, END = range(11)
 
 
 class Plan(NamedTuple):
@@ -125,6 +125,9 @@ def go_on(
     sliding: Sliding,
     out: Output,
     work: Work,
+    ride: Flow,
+    seen: Margins,
+    on: Any,
     most_steps: int,
 ) -> int:
     """Run until something happens.
@@ -141,6 +144,9 @@ def go_on(
         How to integrate.
     memory, y, mode, held, p, relations, surfaces, sliding, out, work
         The state of the run, changed in place.
+    ride, seen, on
+        How to flow, what is watched, and their parameters: `flow_on`, `margins_on` and a `Held`.
+        While nothing is slid on, `flow`, `margins` and `p` do the same in less time.
     most_steps : int
         Come back after so many steps at most.
 
@@ -154,8 +160,8 @@ def go_on(
     """
     now, counts, cursor = memory.now, memory.counts, out.cursor
     w = active_relations(relations, memory)
-    on = Held(flow, margins, normal, p, held, surfaces.sign, sliding.which, sliding.sigma,
-              sliding.table)  # fmt: skip
+    held_on = Held(flow, margins, normal, p, held, surfaces.sign, sliding.which, sliding.sigma,
+                   sliding.table)  # fmt: skip
     while True:
         if cursor[ROW] > counts[TAKEN]:
             return ROWS
@@ -207,20 +213,26 @@ def go_on(
             slid = False
             if plan.located:
                 w, slid = _rearm(
-                    arm, margins, t, y, mode, held, p, relations, surfaces, sliding, on, memory
-                )
+                    arm, margins, t, y, mode, held, p, relations, surfaces, sliding, held_on,
+                    memory,
+                )  # fmt: skip
                 if _undefined(w):
                     counts[PHASE] = AFTER
                     counts[STATUS] = NOT_FINITE
                     continue
+            counts[PHASE] = BEGIN
+            if slid:
+                return SLID
+
+        elif phase == BEGIN:
             if plan.located or counts[FRESH] == 1:
                 counts[NEW_ARC] = 1
                 if not plan.foreign:
-                    _begin_arc(method, control, t, y, mode, held, on, memory, work, plan.located)
+                    _begin_arc(
+                        ride, method, control, t, y, mode, held, on, memory, work, plan.located
+                    )
                 counts[FRESH] = 0
             counts[PHASE] = ARC
-            if slid:
-                return SLID
             if plan.foreign:
                 return ADVANCE
 
@@ -231,7 +243,7 @@ def go_on(
             if not plan.foreign:
                 steps = min(most_steps, plan.max_steps - cursor[STEPS]) if plan.located else 1
                 counts[STATUS], now[T], now[H], now[ERROR_BEFORE] = advance(
-                    flow_on, margins_on, method, control, t, y, memory.f, now[H],
+                    ride, seen, method, control, t, y, memory.f, now[H],
                     now[ERROR_BEFORE], now[T_STOP], plan.knots, mode, held, on, w, out, work,
                     steps,
                 )  # fmt: skip
@@ -251,7 +263,9 @@ def go_on(
             if status == FULL and not plan.located:
                 return ROWS  # perhaps none, but a caller may want to breathe
             if status == CROSSED:
-                if _often_changed(t, y, mode, w, surfaces, sliding, on, memory, control, work):
+                if _often_changed(
+                    seen, t, y, mode, w, surfaces, sliding, on, memory, control, work
+                ):
                     return RELATION_LIVELOCK
                 return STOPPED
 
@@ -347,27 +361,28 @@ def _listed(relations: Watched, memory: Memory) -> Watched:
 
 
 def _begin_arc(
+    ride: Flow,
     method: Coefficients,
     control: Control,
     t: float,
     y: Vector,
     mode: list[int],
     held: Vector,
-    on: Held,
+    on: Any,
     memory: Memory,
     work: Work,
     located: bool,
 ) -> None:
     """Fill the slope and choose the first step of an arc."""
     now = memory.now
-    flow_on(t, y, mode, held, on, memory.f)
+    ride(t, y, mode, held, on, memory.f)
     # Without location the solver knows of no switch: it keeps its step.
     if control.step <= 0.0 and (located or now[H] <= 0.0):
         now[ERROR_BEFORE] = 1.0
         # Where the system has a scale, how far there is to go does not count: the kernel cuts.
         scale = control.time_scale if control.time_scale > 0.0 else now[T_STOP] - t
         now[H] = starting_step(
-            flow_on, t, y, memory.f, mode, held, on, method.error_order, control.rtol,
+            ride, t, y, memory.f, mode, held, on, method.error_order, control.rtol,
             work.floor, scale, control.max_step, work.y_new, work.f_new,
         )  # fmt: skip
 
@@ -413,20 +428,21 @@ def _no_progress(memory: Memory, control: Control, work: Work, t: float, y: Vect
 
 
 def _often_changed(
+    seen: Margins,
     t: float,
     y: Vector,
     mode: list[int],
     w: Watched,
     surfaces: Surfaces,
     sliding: Sliding,
-    on: Held,
+    on: Any,
     memory: Memory,
     control: Control,
     work: Work,
 ) -> bool:
     """Count the relations that have just changed; tell whether one has too often."""
     _look_at_clock(memory, t, y)
-    margins_on(t, y, mode, on, w.watch, w.probe)
+    seen(t, y, mode, on, w.watch, w.probe)
     often = False
     for r in w.active:
         g = w.probe[r]
@@ -506,7 +522,7 @@ def record(
             return ROWS
         happening = go_on(
             flow, arm, margins, normal, ask, act, method, control, plan, memory, y, mode, held, p,
-            relations, surfaces, sliding, out, work, most_steps,
+            relations, surfaces, sliding, out, work, flow_on, margins_on, on, most_steps,
         )  # fmt: skip
         t = memory.now[T]
         if happening == ROWS:

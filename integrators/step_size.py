@@ -50,13 +50,13 @@ def error_norm(
     worst = 0.0
     for j in range(len(y)):
         size = max(abs(y[j]), abs(y_new[j]))
-        wrong, allowed = abs(h * error[j]), atol[j] + rtol * size
-        if not (wrong < INFINITY and size < INFINITY):
-            return INFINITY
+        allowed = atol[j] + rtol * size
         if allowed > 0.0:
-            ratio = wrong / allowed
+            ratio = abs(h * error[j]) / allowed
         else:
-            ratio = 0.0 if wrong == 0.0 else INFINITY
+            ratio = 0.0 if error[j] == 0.0 else INFINITY
+        if not (ratio < INFINITY and size < INFINITY):
+            return INFINITY
         if ratio > worst:
             worst = ratio
     return worst

@@ -98,8 +98,8 @@ def test_memoryless_guards_chatter() -> None:
     assert (episode.t_first, episode.t_last) == (taken.t[0], taken.t[-1])
     assert episode.values == {"z": taken.z[0], "v": taken.v[0]}
     for part in (
-        "element 2 took break_away, and back arrest,", f"{episode.count} times in ",
-        "t = 0.502079", "z = 0.1, s = 0.1", "[|z| >= s]", "[|z| < s]", "gap", "v_c",
+        "element 1 took fall, and back rise,", f"{episode.count} times in ", "from t = 1 s",
+        "z = 1", "[z >= 1]", "[z <= 1 - gap]", "leave a gap between them",
     ):  # fmt: skip
         assert part in found.text
 
