@@ -213,6 +213,7 @@ class Columns:
         ):  # fmt: skip
             counts[:] = 0
         b.y[:], b.mode[:], memory.anchor[:] = start.y, start.mode, start.y
+        sliding.live[:] = start.program.live
         b.control.atol[:] = b.work.floor[:] = start.options.atol
         control = b.control._replace(time_scale=start.options.time_scale)
         self.buffers = dataclasses.replace(self.buffers, control=control)

@@ -1,7 +1,9 @@
 """A finished run: rows, micro-steps, the transition log, and what it was made from.
 
-m firings at one time give m + 1 rows: micro-step 0 before, then one after each firing. With wanted
-times (`t_eval`) the rows are exactly those times, right-continuous; the log is always complete.
+m firings at one time give m + 1 rows: micro-step 0 before, then one after each firing. Where a
+slide along a surface begins or ends there is one more, at the micro-step of the row before. With
+wanted times (`t_eval`) the rows are exactly those times, right-continuous; the log is always
+complete.
 """
 
 from __future__ import annotations
@@ -253,11 +255,17 @@ class Trace:
         wanted times from the stops; a run of which only the end was kept has none.
         """
         table = _merged(self.rows, self.stops)
-        found = []
+        found: list[tuple[Any, ...]] = []
+        if len(table) < 2:
+            return np.array(found, dtype=_SLIDING).view(np.recarray)
         for k, flags in enumerate(table.mode[:, self.n :].T):
             edges = np.flatnonzero(np.diff(np.concatenate([[0], flags, [0]])))
             for first, behind in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-                begun, ended = (self._sigma(table, row, k) for row in (first, behind - 1))
+                # The last row of the stretch itself: no firing or jump of a signal is behind it.
+                last = int(np.searchsorted(table.t, table.t[behind - 1]))
+                if last > first and table.t[last] in self.program.jumps:
+                    last -= 1
+                begun, ended = (self._sigma(table, row, k) for row in (first, max(first, last)))
                 name = self.program.surface_names[k]
                 end = float(table.t[min(behind, len(table) - 1)])
                 found.append((float(table.t[first]), end, name, begun, ended))
@@ -300,7 +308,7 @@ class Trace:
             table[slid] = _observe_rows(program, rows.at(slid))
         else:
             table = _observe_rows(program, rows)
-        _show_from_before(program, rows, table)
+        _show_one_side(program, rows, table)
         return {
             "v": table[:, 0],
             "F": table[:, 1],
@@ -783,22 +791,28 @@ def _with_slides(rows: Rows, n: int, modes: int) -> Rows:
     return replace(rows, mode=np.concatenate([rows.mode, none], axis=1))
 
 
-def _show_from_before(program: Program, rows: Rows, table: FloatArray) -> None:
-    """Observe the rows at which a slide begins as the arc before them did.
+def _show_one_side(program: Program, rows: Rows, table: FloatArray) -> None:
+    """Observe the rows beside a slide as the arc did that they belong to.
 
-    They lie a rounding behind the surface, where the sign as it is seen is that of the other side.
+    They lie on the surface or a rounding behind it, where the sign as it is seen is not the one
+    that was held: before a slide that of the arc before, after it that of the arc that follows.
     """
-    slid = rows.mode[:, program.n :]
-    begins = np.flatnonzero((np.diff(slid, axis=0) > 0).any(axis=1) & (np.diff(rows.t) == 0.0))
-    for row in begins[begins > 0].tolist():
-        t0, t1 = float(rows.t[row - 1]), float(rows.t[row])
-        if t0 < t1 and not slid[row].any():
-            middle = (0.5 * (rows.y[row - 1] + rows.y[row])).tolist()
-            mode = rows.mode[row].tolist()
-            held = armed(program, 0.5 * (t0 + t1), middle, mode)
-            signs = [u if u else LIVE for u in held]
+    t, slid = rows.t, rows.mode[:, program.n :]
+    turns = np.flatnonzero((np.diff(slid, axis=0) != 0).any(axis=1) & (np.diff(t) == 0.0))
+    for first in turns.tolist():
+        before, after = np.searchsorted(t, t[first]) - 1, np.searchsorted(t, t[first], "right")
+        for row, other, joined in ((first, before, 1), (first + 1, after, -1)):
+            changed = np.flatnonzero(np.diff(slid[first : first + 2], axis=0)[0] == joined)
+            if slid[row].any() or not changed.size or not 0 <= other < len(rows):
+                continue
+            mode, signs = rows.mode[row].tolist(), program.live
+            held = armed(program, float(t[other]), rows.y[other].tolist(), mode)
+            for place in (program.surfaces.sign[k] for k in changed):
+                signs[place] = held[place] or LIVE
             out = [0.0] * program.seen
-            program.ieee["observe"](t1, rows.y[row].tolist(), mode, signs, program.p, out)
+            program.ieee["observe"](
+                float(t[row]), rows.y[row].tolist(), mode, signs, program.p, out
+            )
             table[row] = out
 
 

@@ -221,7 +221,8 @@ def go_on(
                     counts[STATUS] = NOT_FINITE
                     continue
             counts[PHASE] = BEGIN
-            if slid:
+            if slid:  # y lies on the surface now: whoever compares with it has to be asked again
+                counts[PHASE] = ASK
                 return SLID
 
         elif phase == BEGIN:

@@ -34,7 +34,7 @@ __all__ = [
     "slope_on",
 ]
 
-MOST_SLIDING = 8  # surfaces at once
+MOST_SLIDING = 32  # surfaces at once
 LIVE = 2.0  # in place of a held sign: take the sign of what is seen
 BEYOND = 2.0  # sigma is cut here: behind 1 it only has to say that it is
 # Rows of the scratch table behind three a surface (its gradient over y and rate in t; half the
@@ -333,8 +333,14 @@ def seize(
             rate = g[size]
             for j in range(size):
                 rate += g[j] * dy[j]
-            if rate == 0.0 and w.start[surfaces.above[which[c]]] == 0.0:
+            u, square = w.start[surfaces.above[which[c]]], 0.0
+            for j in range(size):
+                square += g[j] * g[j]
+            if rate == 0.0 and u == 0.0:
                 held[surfaces.sign[which[c]]] = 0.0
+            elif sliding.flags[which[c]] == 1 and square > 0.0:  # left without what errors added
+                for j in range(size):
+                    y[j] -= g[j] * (u / square)
     changed = False
     for k in range(len(surfaces.sign)):
         slid = 0

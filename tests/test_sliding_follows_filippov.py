@@ -19,6 +19,7 @@ from gms_fsm import (
     State,
     Stribeck,
     Trace,
+    Transition,
     simulate,
 )
 from gms_fsm.explain import explain
@@ -179,6 +180,55 @@ def test_elements_come_to_rest_on_surfaces_of_their_own(engine):
         {"z of element 1": 1.0, "z of element 2": 0.5, "z of element 3": 0.5}, abs=1e-6
     )
     assert trace.z[-1] == pytest.approx([0.0, 0.0, 0.0, 0.8], abs=1e-6)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("guard", ["v >= 0 and z > 4", "abs(v) <= 0 and z > 4", "v <= 0 and z > 4"])
+@pytest.mark.parametrize("v0", [2.0, 1.7, -1.7, 0.3])
+def test_guards_that_compare_with_the_surface_are_asked_on_it(guard, v0, engine):
+    """A rounding beside it another comparison keeps them false, and they were not looked at."""
+    chart = Chart(
+        "waits", inputs=("v",), variables=("z",), parameters=("F_c",),
+        states=(State("a", flow={"z": "1"}), State("b", flow={"z": "1"})),
+        transitions=(Transition("go", "a", "b", guard=guard),), outputs={"F": "F_c * sgn(v)"},
+    )  # fmt: skip
+    model = ChartModel(chart, {"F_c": 1.0})
+    trace = simulate(model, Slider(1.0, "0"), 8.0, engine=needs(engine), initial={"v": v0})
+    assert trace.transitions.t.tolist() == [pytest.approx(4.0, abs=1e-9)]
+
+
+@pytest.mark.parametrize("v0", np.linspace(0.31, 2.9, 30))
+def test_the_force_beside_a_slide_is_that_of_the_arc(v0):
+    """Not that of the sign as it looks on the surface: no dip of F_c on either side."""
+    trace = simulate(coulomb(), Slider(1.0, [(0, 0), (4, 0), (5, 3)]), 6.0, initial={"v": v0})
+    (slide,) = trace.sliding
+    assert (trace.F[trace.t <= slide.t_start - 1e-12] == 1.0).all()
+    on = trace.rows.mode[:, 1] == 1
+    first, last = np.flatnonzero(on)[[0, -1]]
+    assert trace.F[first - 1] == 1.0
+    assert trace.F[last] == pytest.approx(1.0, abs=1e-9)
+    assert (trace.F[last + 1 :] == 1.0).all()
+
+
+def test_sigma_at_the_end_is_that_before_a_firing_or_a_jump():
+    trace = simulate(BANK, PUSHED, 0.4)
+    row = int(np.flatnonzero(trace.rows.mode[:, 3])[-1])
+    while trace.microstep[row]:
+        row -= 1
+    assert trace.sliding.sigma_end[0] == trace.sigma(row)["v"] < 1.0
+    jump = simulate(coulomb(), Slider(1.0, ([0, 1, 1, 3.0], [0.5, 0.5, 2.0, 2.0])), 3.0)
+    assert jump.sliding.sigma_end[0] == pytest.approx(0.5, abs=1e-12)
+
+
+def test_twenty_elements_slide_at_once():
+    chart = Chart(
+        "runs down", inputs=("v",), variables=("z",), parameters=("C",),
+        states=(State("on", flow={"z": "v - C * sgn(z)"}),), transitions=(), outputs={"F": "z"},
+    )  # fmt: skip
+    model = ChartModel(chart, {"C": np.linspace(1.0, 2.0, 20)}, n=20)
+    trace = simulate(model, Slider(1e9, "0"), 2.0, initial={"z": [1.0] * 20})
+    assert len(trace.sliding) == 20
+    assert (trace.z[-1] == 0.0).all()
 
 
 # --------------------------------------------------------------------------- where it is seen
