@@ -33,6 +33,7 @@ __all__ = ["Control", "Output", "Work", "advance"]
 # Why the kernel came back.
 REACHED, CROSSED, FULL, TOO_SMALL, NOT_FINITE = 0, 1, 2, 3, 4
 REDO = 0.9  # a crossing before this fraction of an adaptive step has the step done again
+SMALLEST = 1e-280  # an absolute tolerance: smaller numbers lose their digits
 AT_ONCE = 1e3  # ticks; a crossing that is nearer comes at once
 # Of a time: a difference that counts. Four places of its last digit, whatever the run's length.
 TICK = 4.0 * 2.0**-52
@@ -91,7 +92,7 @@ def raise_floor(control: Control, floor: Vector, y: Vector) -> None:
     """Let the tolerances of components without a scale follow the largest value they have had."""
     for j in range(len(y)):
         if control.atol[j] == 0.0:
-            floor[j] = max(floor[j], control.rtol * abs(y[j]))
+            floor[j] = max(floor[j], control.rtol * abs(y[j]), SMALLEST)
 
 
 def advance(

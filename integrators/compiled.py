@@ -9,7 +9,6 @@ from __future__ import annotations
 import functools
 import gc
 import hashlib
-import inspect
 import pickle
 import sys
 import threading
@@ -377,20 +376,29 @@ def _compile_record(arguments: tuple[Any, ...], store: Store | None) -> Any:
 
     for helper in (*_OF_A_STEP, *_OF_AN_ARC, loop.record):
         usable_inside(helper, inlined=helper in _OF_A_STEP)
-    # The name of a module that exists: numba imports it when it loads machine code from disk.
-    namespace: dict[str, Any] = {"run": loop.record, "__name__": __name__}
-    names = list(inspect.signature(loop.record).parameters)
-    handed = names.copy()
-    for place, name in enumerate(_OF_A_SYSTEM):
-        namespace[f"at_{name}"] = _function_at(_signature(SIGNATURES[name]))
-        handed[place] = f"at_{name}({names[place]})"
-    text = f"def record({', '.join(names)}):\n    return run({', '.join(handed)})\n"
-    exec(text, namespace)
+    at_flow, at_arm, at_margins, at_normal, at_switch, at_act, at_observe = (
+        _function_at(_signature(SIGNATURES[name])) for name in _OF_A_SYSTEM
+    )
+    run = loop.record
+
+    def record(
+        flow: Any, arm: Any, margins: Any, normal: Any, switch: Any, act: Any, observe: Any,
+        method: Any, control: Any, plan: Any, memory: Any, y: Any, mode: Any, held: Any, p: Any,
+        relations: Any, surfaces: Any, sliding: Any, out: Any, work: Any, log: Any, first: Any,
+        most_steps: Any, pause: Any,
+    ) -> Any:  # fmt: skip
+        return run(
+            at_flow(flow), at_arm(arm), at_margins(margins), at_normal(normal), at_switch(switch),
+            at_act(act), at_observe(observe), method, control, plan, memory, y, mode, held, p,
+            relations, surfaces, sliding, out, work, log, first, most_steps, pause,
+        )  # fmt: skip
+
+    record.__qualname__ = "record"  # under which it is kept
     addresses = [numba.types.int64] * len(_OF_A_SYSTEM)
     others = [numba.typeof(argument) for argument in arguments[len(_OF_A_SYSTEM) :]]
     start = time.perf_counter()
     result = _machine_code(
-        numba.types.int64(*addresses, *others), namespace["record"], store,
+        numba.types.int64(*addresses, *others), record, store,
         "gms-fsm: compiling the engine, once on this machine ...",
     )  # fmt: skip
     if result._cache.missed:

@@ -78,6 +78,8 @@ def trace(tmp_path: Path) -> Trace:
 def test_the_input_is_no_output(
     verb: str, output: str, refused: Callable[..., str], trace: Trace
 ) -> None:
+    if verb == "animate":
+        pytest.importorskip("matplotlib", reason="needs the extra plots")
     Path("link").symlink_to("t.npz")
     os.link("t.npz", "hard")
     before = Path("t.npz").read_bytes()
@@ -152,6 +154,8 @@ OTHERS = {
 def test_no_command_writes_over_a_file_of_ones_own(
     case: str, refused: Callable[..., str], trace: Trace
 ) -> None:
+    if case == "figures":
+        pytest.importorskip("matplotlib", reason="needs the extra plots")
     arguments, name = OTHERS[case]
     place = Path("mine") / name
     place.parent.mkdir(parents=True)
@@ -230,6 +234,8 @@ def _folder(path: Path) -> None:
 def test_nothing_but_a_file_is_replaced_by_a_file(
     verb: str, name: str, make: Callable[[Path], None], refused: Callable[..., str], trace: Trace
 ) -> None:
+    if verb == "replay":
+        pytest.importorskip("uplot", reason="needs the extra replay")
     make(Path(name))
     before = os.lstat(name)
     arguments = {"chart": ["lugre"], "blocks": [], "replay": ["t.npz"]}[verb]
