@@ -17,6 +17,7 @@ __all__ = ["error_norm", "next_factor", "retry_factor", "starting_step"]
 SAFETY = 0.9
 LEAST, MOST = 0.2, 10.0  # a step shrinks or grows by no more than this
 INFINITY = float("inf")
+NO_TOLERANCE = 1e100
 
 
 def error_norm(
@@ -158,7 +159,7 @@ def starting_step(
     d0 = error_norm(y, 1.0, y, y, rtol, atol)
     d1 = error_norm(f, 1.0, y, y, rtol, atol)
     h = min(time_scale, longest)
-    if not d1 < INFINITY:
+    if not d1 * h < NO_TOLERANCE:  # y is 0 and has no scale: nothing to measure by
         return 1e-3 * h
     if d1 > 0.0:  # until y has moved by a hundredth, or by a tolerance where it is next to zero
         h = min(h, 0.01 * max(d0, 100.0) / d1)
