@@ -124,7 +124,7 @@ def test_a_strike_between_any_two_lines_of_the_recorder_leaves_a_whole_trace(
 
 
 # --------------------------------------------------------------------------- the command line
-LONG = OPEN_LOOP.replace("t_end = 1.0", "t_end = 1e8")
+LONG = OPEN_LOOP.replace("t_end = 1.0", "t_end = 1e8\nmax_steps = 1_000_000_000")
 
 
 @pytest.mark.parametrize("engine", ["machines", "compiled"])
