@@ -352,8 +352,7 @@ def check_pace(recording: Recording, buffers: hybrid.Buffers) -> None:
     program = start.program
     held = armed(program, t, y, mode)
     slope = rate(program, t, y, mode, held)
-    size = np.maximum(np.abs(y), np.array(start.options.atol) / start.options.rtol)
-    size[size == 0.0] = 1.0
+    size = np.maximum(np.abs(y), np.array(buffers.work.floor) / options.rtol)
     direction, fastest = np.ones(len(y)), 0.0
     for _ in range(POWERS):
         moved = (np.array(y) + 1e-6 * size * direction).tolist()

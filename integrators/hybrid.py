@@ -294,16 +294,16 @@ def happenings(
         As `run`.
     """
     flow = system.flow if options.located else system.flow_live
+    s = b.sliding
+    on = Held(flow, system.margins, system.normal, system.p, b.held, b.surfaces.sign, s.which,
+              s.sigma, s.table)  # fmt: skip
     solver = None
     if b.plan.foreign:
         from integrators.scipy_arcs import SciPyStepper
 
-        solver = SciPyStepper(system, flow, b, options)
+        solver = SciPyStepper(on, b, options)
     now, counts, cursor, y = b.memory.now, b.memory.counts, b.out.cursor, b.y
     before: tuple[Vector, tuple[int, ...]] = [], ()
-    s = b.sliding
-    on = Held(flow, system.margins, system.normal, system.p, b.held, b.surfaces.sign, s.which,
-              s.sigma, s.table)  # fmt: skip
     plainly: tuple[Flow, Margins, Any] = flow, system.margins, system.p
     along: tuple[Flow, Margins, Any] = flow_on, margins_on, on
     while True:

@@ -33,8 +33,8 @@ from integrators.loop import NEW_ARC, STATUS, T_STOP, T, active_relations
 from integrators.sliding import Held, flow_on, margins_on
 
 if TYPE_CHECKING:
-    from integrators.hybrid import Buffers, Options, System
-    from integrators.steps import Flow, Vector
+    from integrators.hybrid import Buffers, Options
+    from integrators.steps import Vector
 
 __all__ = ["SciPyStepper"]
 
@@ -44,20 +44,15 @@ class SciPyStepper:
 
     Parameters
     ----------
-    system, flow, buffers, options
-        The run. With a fixed ``step`` the solver is led from grid point to grid point (it keeps its
-        error control, so it may take several steps to each).
+    on, buffers, options
+        The system on its surfaces, and the run. With a fixed ``step`` the solver is led from grid
+        point to grid point (it keeps its error control, so it may take several steps to each).
     """
 
-    def __init__(self, system: System, flow: Flow, buffers: Buffers, options: Options) -> None:
+    def __init__(self, on: Held, buffers: Buffers, options: Options) -> None:
         if not (isinstance(options.method, type) and issubclass(options.method, OdeSolver)):
             raise TypeError(f"method {options.method!r} is not a scipy.integrate.OdeSolver class")
-        b = self.buffers = buffers
-        self.on = Held(
-            flow, system.margins, system.normal, system.p, b.held, b.surfaces.sign,
-            b.sliding.which, b.sliding.sigma, b.sliding.table,
-        )  # fmt: skip
-        self.options = options
+        self.on, self.buffers, self.options = on, buffers, options
         self.solver: Any = None
 
     def advance(self, most_steps: int) -> None:

@@ -241,6 +241,19 @@ def test_files_keep_it(tmp_path):
         assert np.array_equal(back.F, trace.F)
 
 
+def test_files_from_before_there_were_slides_are_read(tmp_path):
+    """Their rows have no flags of surfaces: no motion along one."""
+    trace = simulate(BANK, PUSHED, 0.3, engine="ifelse")
+    assert len(trace.sliding) == 0
+    path = trace.save(tmp_path / "a.npz")
+    with np.load(path) as file:
+        arrays = dict(file)
+    for kind in ("rows_mode", "stops_mode"):
+        arrays[kind] = arrays[kind][:, :3]
+    np.savez(tmp_path / "old.npz", **arrays)
+    same_bits(trace, Trace.load(tmp_path / "old.npz"))
+
+
 @pytest.mark.parametrize("engine", ["ifelse", "compiled"])
 def test_wanted_times_and_samples_lie_on_it(engine):
     whole = simulate(BANK, PUSHED, 0.4, engine=needs(engine))
