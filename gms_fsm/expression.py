@@ -42,6 +42,7 @@ __all__ = [
     "Spelling",
     "Value",
     "clauses",
+    "comparisons",
     "derivative",
     "evaluate",
     "names_in",
@@ -933,6 +934,29 @@ def split(condition: Condition, holds: bool = True) -> Split:
             positive = op in (">", ">=")
             strict = op in (">", "<=")  # a <= b is the negation of a > b
             return Literal(Comparison(left, right, strict), positive == holds)
+
+
+def comparisons(part: Split) -> tuple[Comparison, ...]:
+    """Return the atomic comparisons of a split condition.
+
+    Parameters
+    ----------
+    part : Literal or (str, tuple)
+        From `split`.
+
+    Returns
+    -------
+    tuple of Comparison
+        In the order of the text, with repetitions.
+
+    Examples
+    --------
+    >>> [spell(c.left) for c in comparisons(split(parse_condition("z >= s and v > 0", "zsv")))]
+    ['z', 'v']
+    """
+    if isinstance(part, Literal):
+        return (part.comparison,)
+    return tuple(c for each in part[1] for c in comparisons(each))
 
 
 # --------------------------------------------------------------------------- corners and jumps

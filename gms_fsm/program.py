@@ -46,6 +46,7 @@ from gms_fsm.expression import (
     Number,
     Split,
     Value,
+    comparisons,
     derivative,
     names_in,
     parse_value,
@@ -439,7 +440,7 @@ class _Lowering:
         zero = Number(0.0)
         wanted: list[Comparison] = []
         for edge in self.chart.transitions:
-            wanted += _comparisons(split(self.chart.guards[edge.name]))
+            wanted += comparisons(split(self.chart.guards[edge.name]))
         for u in [*self.shared_rough, *self.own_rough]:
             wanted += [Comparison(u, zero, strict=True), Comparison(u, zero, strict=False)]
         if "s" in self.chart.inputs:
@@ -949,12 +950,6 @@ def _known(value: Value, name: str) -> Value:
     found = derivative(value, name)
     assert found is not None
     return found
-
-
-def _comparisons(part: Split) -> list[Comparison]:
-    if isinstance(part, Literal):
-        return [part.comparison]
-    return [c for each in part[1] for c in _comparisons(each)]
 
 
 def _words(lines: Iterable[str]) -> set[str]:

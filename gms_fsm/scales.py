@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeAlias, TypeVar
 
@@ -20,11 +20,9 @@ from numpy.typing import ArrayLike
 from gms_fsm.chart import Chart
 from gms_fsm.expression import (
     Binary,
-    Comparison,
-    Literal,
     Number,
-    Split,
     Value,
+    comparisons,
     derivative,
     names_in,
     renamed,
@@ -190,7 +188,7 @@ def _sizes(key: _Same[Chart]) -> _Sizes:
     guards = chart.guards.values()
     margins = [
         Binary("-", each.left, each.right)
-        for each in dict.fromkeys(c for guard in guards for c in _comparisons(split(guard)))
+        for each in dict.fromkeys(c for guard in guards for c in comparisons(split(guard)))
     ]
     reach = {
         name: [
@@ -219,14 +217,6 @@ def _sizes(key: _Same[Chart]) -> _Sizes:
         if (rate := derivative(flow, name)) is not None
     ]
     return _Sizes(reach, stiffness, {name: row for name, row in follows.items() if row}, paces)
-
-
-def _comparisons(part: Split) -> Iterator[Comparison]:
-    if isinstance(part, Literal):
-        yield part.comparison
-    else:
-        for each in part[1]:
-            yield from _comparisons(each)
 
 
 def _to_the_right(u: float) -> float:
