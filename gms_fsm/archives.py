@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from gms_fsm.errors import TraceFileError
+from gms_fsm.parsing import PARSER
 
 __all__ = ["member"]
 
@@ -44,4 +45,5 @@ def member(file: Any, name: str, most: int | None = None) -> Any:
             f"{name} unpacks to {found.file_size} bytes; in a file of this length it has at most "
             f"{most}"
         )
-    return file[name]
+    with PARSER:
+        return file[name]

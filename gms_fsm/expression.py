@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from gms_fsm.errors import ExpressionError, shown
+from gms_fsm.parsing import PARSER
 
 __all__ = [
     "MATLAB_LIKE",
@@ -305,7 +306,7 @@ def _tree(text: str) -> ast.expr:
     if lead == len(flat):
         raise ExpressionError("the text is empty", text, 1, _GRAMMAR)
     try:
-        with warnings.catch_warnings():
+        with PARSER, warnings.catch_warnings():
             warnings.simplefilter("error")  # "1and v" is a warning to Python, a mistake here
             body = ast.parse(flat[lead:], mode="eval").body
     except SyntaxError as error:

@@ -20,6 +20,7 @@ import numpy as np
 
 from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.expression import NAMESPACE
+from gms_fsm.parsing import PARSER
 from gms_fsm.signals import piecewise_linear, piecewise_slope
 
 __all__ = ["ieee", "load", "load_careful", "standalone"]
@@ -101,7 +102,7 @@ def standalone(source: str) -> str:
     <BLANKLINE>
     """
     used, own = set[str](), set[str]()
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(_tree(source)):
         match node:
             case ast.Name(id=name, ctx=ast.Load()):
                 used.add(name)
@@ -124,6 +125,12 @@ def standalone(source: str) -> str:
     return "\n".join([head, *parts, "\n" + body.lstrip("\n")])
 
 
+def _tree(source: str) -> ast.Module:
+    """Parse a text, alone."""
+    with PARSER:
+        return ast.parse(source)
+
+
 def _split_head(source: str) -> tuple[str, str]:
     """Split the comments that a text begins with from the rest."""
     lines = source.splitlines(keepends=True)
@@ -133,7 +140,7 @@ def _split_head(source: str) -> tuple[str, str]:
 
 def _bare(function: Callable[..., Any]) -> str:
     """Return a function's text without annotations, its docstring cut to the first line."""
-    tree = ast.parse(inspect.getsource(function))
+    tree = _tree(inspect.getsource(function))
     for node in ast.walk(tree):
         if isinstance(node, ast.arg):
             node.annotation = None
@@ -152,7 +159,7 @@ def _compiled(title: str, source: str, careful: bool = False) -> CodeType:
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
     if not careful:
         return compile(source, filename, "exec")
-    tree = ast.fix_missing_locations(_WideNumbers().visit(ast.parse(source)))
+    tree = ast.fix_missing_locations(_WideNumbers().visit(_tree(source)))
     return compile(tree, filename, "exec")
 
 
