@@ -42,9 +42,9 @@ from gms_fsm import (
     simulate,
     sweep,
 )
-from gms_fsm.compiled_run import CompiledRun
 from gms_fsm.errors import MissingExtraError, ParameterError
-from gms_fsm.start import Start
+from gms_fsm.run._compiled_run import CompiledRun
+from gms_fsm.run.start import Start
 
 ROWS = 6001
 NONE = np.empty(0)
@@ -91,9 +91,14 @@ MISSING = (ImportError, MissingExtraError, ParameterError, OSError, subprocess.C
 def model_and_rig(case: Case) -> tuple[GMS, Any]:
     """Return a case in gms-fsm's words."""
     parameters = GMSParameters(
-        case.k, case.sigma, case.C, sigma_2=case.sigma_2, v_c=case.v_c, weights=case.w,
+        case.k,
+        case.sigma,
+        case.C,
+        sigma_2=case.sigma_2,
+        v_c=case.v_c,
+        weights=case.w,
         stribeck=Stribeck(case.F_c, case.F_s, case.v_s),
-    )  # fmt: skip
+    )
     rig = Prescribed(case.signal) if case.signal else PulledSlider(1.0, 2.0, 0.1)
     return GMS(parameters, law="signed"), rig
 
@@ -242,9 +247,14 @@ def bank(n: int, spread: bool) -> GMS:
     w = np.linspace(0.0025, 0.0175, n) if spread and n > 1 else np.full(n, 0.01)
     share = np.full(n, 1 / n)
     parameters = GMSParameters(
-        share / w, share, np.full(n, 0.02), sigma_2=0.4, v_c=1e-6, weights=w,
+        share / w,
+        share,
+        np.full(n, 0.02),
+        sigma_2=0.4,
+        v_c=1e-6,
+        weights=w,
         stribeck=Stribeck(1.0, 1.5, 0.05),
-    )  # fmt: skip
+    )
     return GMS(parameters, law="signed")
 
 
@@ -266,10 +276,11 @@ def size(rounds: int) -> Table:
         table.append(tuple(line))
     return Table(
         "Cost against the number of elements",
-        ("elements", "together", "transitions", "spread", "transitions"), table,
+        ("elements", "together", "transitions", "spread", "transitions"),
+        table,
         'Pulled mass, 12 s (one break-away, one arrest), compiled, `output="end"`. Together: equal '
         "thresholds, all elements switch at one instant. Spread: each has an instant of its own.",
-    )  # fmt: skip
+    )
 
 
 def length(rounds: int) -> Table:
@@ -285,9 +296,10 @@ def length(rounds: int) -> Table:
         table.append((*line, f"{count:,}"))
     return Table(
         "Cost against the length of the run",
-        ("length", "end", "a second", "all rows", "a second", "transitions"), table,
+        ("length", "end", "a second", "all rows", "a second", "transitions"),
+        table,
         "Pulled mass, compiled.",
-    )  # fmt: skip
+    )
 
 
 # --------------------------------------------------------------------------- sweeps
@@ -312,18 +324,22 @@ def sweeps(rounds: int) -> Table:
         table.append((f"{threads}", f"{rate:,.0f}", f"{wrong} of {count:,}", f"{failed}"))
     return Table(
         f"Sweep: {count:,} pulled masses, 60 s each, end states",
-        ("threads", "runs a second", "wrong event sequences", "failed"), table,
+        ("threads", "runs a second", "wrong event sequences", "failed"),
+        table,
         "k varied by 20 %, w = 1/(4k), rtol 1e-6; right is rtol 1e-12.",
-    )  # fmt: skip
+    )
 
 
 # --------------------------------------------------------------------------- in child processes
 def child(task: str, **environment: str) -> dict[str, float]:
     """Run a task of `TASKS` in a process of its own."""
     done = subprocess.run(
-        [sys.executable, __file__, "--task", task], env={**os.environ, **environment}, check=True,
-        capture_output=True, text=True,
-    )  # fmt: skip
+        [sys.executable, __file__, "--task", task],
+        env={**os.environ, **environment},
+        check=True,
+        capture_output=True,
+        text=True,
+    )
     result: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
     return result
 
@@ -381,9 +397,11 @@ def memory(_: int) -> Table:
         grew = found["after"] - found["before"]
         table.append((TASKS[task][0], f"{found['before']:.0f} MB", f"{grew:.1f} MB"))
     return Table(
-        "Peak memory, compiled engine", ("", "warm process", "more at its peak"), table,
+        "Peak memory, compiled engine",
+        ("", "warm process", "more at its peak"),
+        table,
         "Pulled mass; the largest resident size of a process of its own.",
-    )  # fmt: skip
+    )
 
 
 def first(_: int) -> Table:
@@ -395,17 +413,23 @@ def first(_: int) -> Table:
             for name, task in steps
         ]
     return Table(
-        "First compiled run of a process", ("", "time"), table,
+        "First compiled run of a process",
+        ("", "time"),
+        table,
         "Importing numba included. Cold: nothing on disk. New chart: the engine is on disk, this "
         "chart on this rig is not.",
-    )  # fmt: skip
+    )
 
 
 SECTIONS: dict[str, Callable[[int], Table]] = {
     "closed": lambda rounds: runs(PULLED_MASS, rounds),
     "open": lambda rounds: runs(OPEN_LOOP, rounds),
-    "size": size, "length": length, "sweeps": sweeps, "memory": memory, "first": first,
-}  # fmt: skip
+    "size": size,
+    "length": length,
+    "sweeps": sweeps,
+    "memory": memory,
+    "first": first,
+}
 
 
 def machine() -> str:

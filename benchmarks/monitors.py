@@ -12,7 +12,7 @@ import time
 import numpy as np
 
 from gms_fsm import GMS, GMSParameters, PulledSlider, Stribeck, Trace, simulate
-from gms_fsm.monitors import examine
+from gms_fsm.traces.monitors import examine
 
 ROUNDS = 40
 MONITORS = ("all", "abs(z) <= 1.6*s")
@@ -22,9 +22,14 @@ def run(monitors: tuple[str, ...]) -> Trace:
     """72 transitions of four elements, 2049 rows."""
     k = np.array([40.0, 30.0, 20.0, 10.0])
     parameters = GMSParameters(
-        k, [0.4, 0.3, 0.2, 0.1], [0.02] * 4, sigma_2=0.4, v_c=1e-6, weights=1 / (4 * k),
+        k,
+        [0.4, 0.3, 0.2, 0.1],
+        [0.02] * 4,
+        sigma_2=0.4,
+        v_c=1e-6,
+        weights=1 / (4 * k),
         stribeck=Stribeck(F_c=1.0, F_s=1.5, v_s=0.05),
-    )  # fmt: skip
+    )
     model = GMS(parameters, law="signed")
     return simulate(model, PulledSlider(1.0, 2.0, 0.1), 60.0, monitors=monitors)
 

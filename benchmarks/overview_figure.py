@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from gms_fsm import GMS, GMSParameters, Prescribed, Trace, simulate
-from gms_fsm.paper import FIG4_END, VELOCITY
+from gms_fsm.app.paper import FIG4_END, VELOCITY
 from plots import figures
 
 ROWS = 100_000

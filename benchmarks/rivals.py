@@ -86,15 +86,32 @@ class Case:
 
 
 PULLED_MASS = Case(
-    "Pulled mass, closed loop, 60 s", 60.0, 72, np.array([40.0, 30.0, 20.0, 10.0]),
-    np.array([0.4, 0.3, 0.2, 0.1]), np.full(4, 0.02), 1 / (4 * np.array([40.0, 30.0, 20.0, 10.0])),
-    sigma_2=0.4, F_c=1.0, F_s=1.5, v_s=0.05,
-)  # fmt: skip
+    "Pulled mass, closed loop, 60 s",
+    60.0,
+    72,
+    np.array([40.0, 30.0, 20.0, 10.0]),
+    np.array([0.4, 0.3, 0.2, 0.1]),
+    np.full(4, 0.02),
+    1 / (4 * np.array([40.0, 30.0, 20.0, 10.0])),
+    sigma_2=0.4,
+    F_c=1.0,
+    F_s=1.5,
+    v_s=0.05,
+)
 OPEN_LOOP = Case(
-    "Table I stick-slip, open loop, 61 s", 61.0, 48, np.full(4, 0.7),
-    np.array([0.3, 0.4, 0.5, 0.6]), np.array([0.1, 0.05, 0.025, 1e-4]), np.ones(4),
-    sigma_2=0.1, F_c=0.4, F_s=1.5, v_s=1e-3, signal="0.2*sin(2*pi*t/20)",
-)  # fmt: skip
+    "Table I stick-slip, open loop, 61 s",
+    61.0,
+    48,
+    np.full(4, 0.7),
+    np.array([0.3, 0.4, 0.5, 0.6]),
+    np.array([0.1, 0.05, 0.025, 1e-4]),
+    np.ones(4),
+    sigma_2=0.1,
+    F_c=0.4,
+    F_s=1.5,
+    v_s=1e-3,
+    signal="0.2*sin(2*pi*t/20)",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,9 +184,15 @@ def scipy_by_hand(
             event.terminal = True  # type: ignore[attr-defined]
         arc = solve_ivp(
             lambda t, y, slips=slips, sign=sign: case.slope(t, y, slips, sign),
-            (t, case.t_end), y, method="RK45", rtol=rtol, atol=atol, events=events,
-            dense_output=times.size > 0, max_step=max_step,
-        )  # fmt: skip
+            (t, case.t_end),
+            y,
+            method="RK45",
+            rtol=rtol,
+            atol=atol,
+            events=events,
+            dense_output=times.size > 0,
+            max_step=max_step,
+        )
         t, y = arc.t[-1], arc.y[:, -1]
         upto = np.searchsorted(times, t, side="right")
         if upto > row:
@@ -198,9 +221,14 @@ def sundials(case: Case, times: Array, rtol: float = 1e-6, atol: float = 1e-9) -
         out[2 * n :] = (v - case.v_c, v + case.v_c, v) if log.slips.any() else 1.0
 
     solver = CVODE(
-        slope, method="Adams", rtol=rtol, atol=atol, eventsfn=roots, num_events=2 * n + 3,
+        slope,
+        method="Adams",
+        rtol=rtol,
+        atol=atol,
+        eventsfn=roots,
+        num_events=2 * n + 3,
         max_num_steps=100_000,
-    )  # fmt: skip
+    )
     t, y, z, row = 0.0, case.start(), np.empty((times.size, n)), 0
     while t < case.t_end:
         sign = np.sign(case.velocity(t, y))
@@ -252,9 +280,15 @@ def pathsim(case: Case, times: Array, rtol: float = 1e-6, atol: float = 1e-9) ->
     scope = Scope(sampling_period=times[1] - times[0] if times.size else None)
     wires = [Connection(bank[j], scope[j]) for j in range(case.first + n)]
     simulation = Simulation(
-        [bank, scope], wires, events, dt=1e-3, Solver=RKDP54, log=False,
-        tolerance_lte_rel=rtol, tolerance_lte_abs=atol,
-    )  # fmt: skip
+        [bank, scope],
+        wires,
+        events,
+        dt=1e-3,
+        Solver=RKDP54,
+        log=False,
+        tolerance_lte_rel=rtol,
+        tolerance_lte_abs=atol,
+    )
     switch(0.0)
     simulation.run(case.t_end)
     t, y = scope.read()

@@ -84,8 +84,9 @@ def keep_bars(*arguments: Any) -> None:
 def mend_ways_back(app: Sphinx, page: str, _: str, context: dict[str, Any], __: Any) -> None:
     """Let a source page lead back to objects that are documented under a shorter name.
 
-    Sphinx takes one module's name for all objects of a source file, though ``gms_fsm.trace.Trace``
-    is ``gms_fsm.Trace`` in its documentation and ``gms_fsm.trace.dwell_times`` is not.
+    Sphinx takes one module's name for all objects of a source file, though
+    ``gms_fsm.traces.trace.Trace`` is ``gms_fsm.Trace`` in its documentation and
+    ``gms_fsm.traces.trace.dwell_times`` is not.
     """
     if not page.startswith("_modules/") or "body" not in context:
         return

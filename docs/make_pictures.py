@@ -25,11 +25,11 @@ from gms_fsm import (
     simulate,
     sweep,
 )
+from gms_fsm._files import written_whole
+from gms_fsm.app.paper import FIG4_END, VELOCITY
+from gms_fsm.app.scenario import load_scenario
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.broken import BROKEN
-from gms_fsm.files import written_whole
-from gms_fsm.paper import FIG4_END, VELOCITY
-from gms_fsm.scenario import load_scenario
 from plots import figures, panels
 from plots.schematic import schematic_figure
 from plots.style import BLUE, INK, LINE_GREY, RC, TEXT_ORANGE, VERMILION
@@ -122,9 +122,11 @@ def element_figure() -> Figure:
         panels.force(force, trace)
         panels.ribbons(states, trace)
         for ax, title in (
-            (velocity, "a) the slider moves to and fro"), (ratio, "b) deflection over threshold"),
-            (force, "c) force"), (states, "d) state"),
-        ):  # fmt: skip
+            (velocity, "a) the slider moves to and fro"),
+            (ratio, "b) deflection over threshold"),
+            (force, "c) force"),
+            (states, "d) state"),
+        ):
             ax.set_title(title)
             if ax is not states:
                 ax.set_xlabel("")
@@ -147,11 +149,21 @@ def microstep_figure(trace: Trace) -> Figure:
         for record, number in zip(log, range(1, 5), strict=True):
             by_step.annotate(
                 f"element {record.element + 1}\n{record.source} → {record.target}",
-                (number, record.F_after), (4, 7), textcoords="offset points", ha="left",
-                fontsize=8, color=TEXT_ORANGE,
-            )  # fmt: skip
-        by_step.annotate("before", (0, log.F_before[0]), (0, -14), textcoords="offset points",
-                         ha="center", fontsize=8)  # fmt: skip
+                (number, record.F_after),
+                (4, 7),
+                textcoords="offset points",
+                ha="left",
+                fontsize=8,
+                color=TEXT_ORANGE,
+            )
+        by_step.annotate(
+            "before",
+            (0, log.F_before[0]),
+            (0, -14),
+            textcoords="offset points",
+            ha="center",
+            fontsize=8,
+        )
         by_step.set(xlabel="micro-step", ylabel="F [N]", xticks=range(5), xlim=(-0.5, 5.3))
         by_step.margins(y=0.25)
     return figure
@@ -173,23 +185,34 @@ def crossing_figure() -> Figure:
         looks = (
             (once, VERMILION, "s--", "guards looked at once a step"),
             (located, BLUE, "o-", "located"),
-        )  # fmt: skip
+        )
         for trace, colour, look, name in looks:
             keep = (trace.t > true - 1.9 * step) & (trace.t < true + 2.9 * step)
             ax.plot(
-                trace.t[keep], trace.z[keep, 0] - trace.s[keep, 0], look, color=colour, label=name,
-                markersize=7, markerfacecolor="white" if colour == VERMILION else colour,
-            )  # fmt: skip
+                trace.t[keep],
+                trace.z[keep, 0] - trace.s[keep, 0],
+                look,
+                color=colour,
+                label=name,
+                markersize=7,
+                markerfacecolor="white" if colour == VERMILION else colour,
+            )
         ax.axhline(0, color=LINE_GREY, linewidth=0.9, zorder=0)
         for time, text, colour, height in (
-            (true, "z >= s becomes true", BLUE, 0.97), (found, "it is noticed", TEXT_ORANGE, 0.62),
-        ):  # fmt: skip
+            (true, "z >= s becomes true", BLUE, 0.97),
+            (found, "it is noticed", TEXT_ORANGE, 0.62),
+        ):
             ax.axvline(time, color=LINE_GREY, linestyle=":", linewidth=0.9, zorder=0)
             ax.annotate(
-                f"{text}\nt = {time:.2f} s", (time, height), (-6 if colour == BLUE else 6, 0),
-                xycoords=("data", "axes fraction"), textcoords="offset points",
-                ha="right" if colour == BLUE else "left", va="top", color=colour,
-            )  # fmt: skip
+                f"{text}\nt = {time:.2f} s",
+                (time, height),
+                (-6 if colour == BLUE else 6, 0),
+                xycoords=("data", "axes fraction"),
+                textcoords="offset points",
+                ha="right" if colour == BLUE else "left",
+                va="top",
+                color=colour,
+            )
         ax.set(
             xlabel="t [s]", ylabel="z − s [m]", title=f"{model.title}: fixed steps of {step:g} s"
         )
@@ -209,17 +232,21 @@ AGEING = Chart(  # docs/howto/own-chart.md explains it
     ),
     transitions=(
         Transition(
-            "break_away_forward", "stick", "slip",
+            "break_away_forward",
+            "stick",
+            "slip",
             guard="z >= s * (1 + beta * r / (r + tau)) and v > v_c",
         ),
         Transition(
-            "break_away_backward", "stick", "slip",
+            "break_away_backward",
+            "stick",
+            "slip",
             guard="z <= -s * (1 + beta * r / (r + tau)) and v < -v_c",
         ),
         Transition("arrest", "slip", "stick", guard="abs(v) <= v_c"),
     ),
     outputs={"F": "k * z"},
-)  # fmt: skip
+)
 
 
 def draw_howto() -> None:
@@ -237,17 +264,22 @@ def draw_howto() -> None:
 def sweep_figure() -> Figure:
     """Draw where a pulled mass sticks and slips: arrests in 60 s over speed and v_s."""
     parameters = GMSParameters.from_shares(
-        [0.4, 0.3, 0.2, 0.1], [40, 30, 20, 10], C=2.0, stribeck=Stribeck(1.0, 1.5, 0.05),
-        v_c=1e-6, sigma=[0.4, 0.3, 0.2, 0.1], sigma_2=0.4,
-    )  # fmt: skip
+        [0.4, 0.3, 0.2, 0.1],
+        [40, 30, 20, 10],
+        C=2.0,
+        stribeck=Stribeck(1.0, 1.5, 0.05),
+        v_c=1e-6,
+        sigma=[0.4, 0.3, 0.2, 0.1],
+        sigma_2=0.4,
+    )
     speed, v_s = np.meshgrid(np.linspace(0.02, 0.3, 40), np.geomspace(5e-3, 0.2, 40))
     result: Sweep = sweep(
-        GMS(parameters, law="signed"), PulledSlider(1.0, 2.0, 0.1), 60.0,
+        GMS(parameters, law="signed"),
+        PulledSlider(1.0, 2.0, 0.1),
+        60.0,
         {"speed": speed.ravel(), "v_s": v_s.ravel()},
-    )  # fmt: skip
-    arrests = result.transitions["run"][
-        result.transitions["edge"] == result.edges.index("arrest")
-    ]  # fmt: skip
+    )
+    arrests = result.transitions["run"][result.transitions["edge"] == result.edges.index("arrest")]
     counts = np.bincount(arrests, minlength=len(result)).reshape(speed.shape)
     with rc_context(RC):
         figure = Figure(figsize=(6.0, 3.8), layout="constrained")

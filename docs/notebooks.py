@@ -30,7 +30,7 @@ from jupyter_client.manager import AsyncKernelManager
 from nbclient import NotebookClient
 from traitlets import Type
 
-from gms_fsm.lessons import LESSONS
+from gms_fsm.app.lessons import LESSONS
 
 logging.getLogger("traitlets").setLevel(logging.WARNING)  # not a line for each notebook
 
@@ -65,19 +65,31 @@ def composed(number: int) -> str:
     replay = f'"lesson_{number}_replay.html"'
     cells = [
         ("markdown", f"# Lesson {number}: {module.TITLE}\n\n{_escaped(text)}"),
-        ("code", f"# %matplotlib inline\n# %config InlineBackend.figure_formats = ['retina']\n"
-                 f"import textwrap\n\nfrom gms_fsm.lessons import lesson\n\n"
-                 f"this = lesson({number})\nresult = this.run()\n"
-                 'for line in result.lines():\n    print(textwrap.fill(line, 84), end="\\n\\n")'),
+        (
+            "code",
+            f"# %matplotlib inline\n# %config InlineBackend.figure_formats = ['retina']\n"
+            f"import textwrap\n\nfrom gms_fsm.app.lessons import lesson\n\n"
+            f"this = lesson({number})\nresult = this.run()\n"
+            'for line in result.lines():\n    print(textwrap.fill(line, 84), end="\\n\\n")',
+        ),
         ("code", "this.figure(result)"),
-        ("markdown", f"## How it was run\n\nThis is `run()` of `{module.__name__}`:\n\n"
-                     f"```python\n{source}```"),
-        ("markdown", "## Step through it\n\nA page in which the runs are stepped, scrubbed and "
-                     "explained guard by guard:"),
-        ("code", "from plots import write_replay\n\nruns = result.replayed\n"
-                 f'print(write_replay({replay}, *runs.values(), title="Lesson {number}", '
-                 "names=list(runs)))"),
-    ]  # fmt: skip
+        (
+            "markdown",
+            f"## How it was run\n\nThis is `run()` of `{module.__name__}`:\n\n"
+            f"```python\n{source}```",
+        ),
+        (
+            "markdown",
+            "## Step through it\n\nA page in which the runs are stepped, scrubbed and "
+            "explained guard by guard:",
+        ),
+        (
+            "code",
+            "from plots import write_replay\n\nruns = result.replayed\n"
+            f'print(write_replay({replay}, *runs.values(), title="Lesson {number}", '
+            "names=list(runs)))",
+        ),
+    ]
     return "\n\n".join(_cell(kind, body) for kind, body in cells) + "\n\n" + _more(number)
 
 
@@ -146,9 +158,13 @@ def executed(text: str, folder: Path) -> Any:
     notebook.cells.insert(0, nbformat.v4.new_code_cell(STRICT))
     notebook.metadata["kernelspec"] = {"name": "python3", "display_name": "Python 3"}
     NotebookClient(
-        notebook, timeout=600, kernel_name="python3", kernel_manager_class=_Manager,
-        extra_arguments=["--log-level=CRITICAL"], resources={"metadata": {"path": str(folder)}},
-    ).execute()  # fmt: skip
+        notebook,
+        timeout=600,
+        kernel_name="python3",
+        kernel_manager_class=_Manager,
+        extra_arguments=["--log-level=CRITICAL"],
+        resources={"metadata": {"path": str(folder)}},
+    ).execute()
     del notebook.cells[0]
     for cell in notebook.cells:
         cell["id"] = hashlib.sha256(cell.source.encode()).hexdigest()[:8]
@@ -235,8 +251,9 @@ def write_all(folder: Path) -> None:
     stamps.mkdir(exist_ok=True)
     sources = [Path(__file__)]
     for package in ("gms_fsm", "integrators", "plots"):
-        sources += sorted(path for path in (ROOT / package).rglob("*.*") if "__pycache__" not in
-                          path.parts)  # fmt: skip
+        sources += sorted(
+            path for path in (ROOT / package).rglob("*.*") if "__pycache__" not in path.parts
+        )
     common = b"".join(path.read_bytes() for path in sources)
     for number in LESSONS:
         text, name = composed(number), f"lesson_{number}"

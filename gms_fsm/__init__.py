@@ -3,6 +3,8 @@
 The Generalized Maxwell Slip model, every element a `transitions` machine with guarded stick/slip
 edges, run by fixed- or adaptive-step integrators with located crossings.
 
+Every name below is imported when it is first asked for.
+
 >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
 >>> trace = simulate(GMS(GMSParameters.paper("stick-slip"), law="published"),
 ...                  Prescribed("0.15*sin(2*pi*t/25)"), 20.0)
@@ -10,42 +12,88 @@ edges, run by fixed- or adaptive-step integrators with located crossings.
 ['break_away_forward', 'break_away_forward', 'break_away_forward', 'break_away_forward']
 """
 
-from gms_fsm.chart import Chart, State, Transition
-from gms_fsm.errors import GMSError, SimulationError
-from gms_fsm.machines import Element, ElementMachines
-from gms_fsm.models import GMS, ChartModel, LuGre
-from gms_fsm.parameters import GMSParameters, Stribeck
-from gms_fsm.prove import Finding, Report, prove
-from gms_fsm.rigs import Prescribed, PulledSlider, Slider
-from gms_fsm.session import Session
-from gms_fsm.simulate import simulate
-from gms_fsm.sweep import Sweep, sweep
-from gms_fsm.trace import Trace
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from gms_fsm import _neighbours as _neighbours
+from gms_fsm._version import __version__ as __version__
 
-__all__ = [
-    "GMS",
-    "Chart",
-    "ChartModel",
-    "Element",
-    "ElementMachines",
-    "Finding",
-    "GMSError",
-    "GMSParameters",
-    "LuGre",
-    "Prescribed",
-    "PulledSlider",
-    "Report",
-    "Session",
-    "SimulationError",
-    "Slider",
-    "State",
-    "Stribeck",
-    "Sweep",
-    "Trace",
-    "Transition",
-    "prove",
-    "simulate",
-    "sweep",
-]
+if TYPE_CHECKING:
+    from gms_fsm.charts.chart import Chart as Chart
+    from gms_fsm.charts.chart import State as State
+    from gms_fsm.charts.chart import Transition as Transition
+    from gms_fsm.charts.parameters import GMSParameters as GMSParameters
+    from gms_fsm.charts.parameters import Stribeck as Stribeck
+    from gms_fsm.errors import ChartError as ChartError
+    from gms_fsm.errors import CheckpointError as CheckpointError
+    from gms_fsm.errors import ExpressionError as ExpressionError
+    from gms_fsm.errors import GMSError as GMSError
+    from gms_fsm.errors import MissingExtraError as MissingExtraError
+    from gms_fsm.errors import OutputError as OutputError
+    from gms_fsm.errors import ParameterError as ParameterError
+    from gms_fsm.errors import RecordError as RecordError
+    from gms_fsm.errors import ScenarioError as ScenarioError
+    from gms_fsm.errors import SessionError as SessionError
+    from gms_fsm.errors import SignalError as SignalError
+    from gms_fsm.errors import TraceFileError as TraceFileError
+    from gms_fsm.errors import UnitError as UnitError
+    from gms_fsm.inspection.prove import Finding as Finding
+    from gms_fsm.inspection.prove import Report as Report
+    from gms_fsm.inspection.prove import prove as prove
+    from gms_fsm.inspection.session import Session as Session
+    from gms_fsm.run.machines import Element as Element
+    from gms_fsm.run.machines import ElementMachines as ElementMachines
+    from gms_fsm.run.simulate import simulate as simulate
+    from gms_fsm.run.sweep import Sweep as Sweep
+    from gms_fsm.run.sweep import sweep as sweep
+    from gms_fsm.systems.models import GMS as GMS
+    from gms_fsm.systems.models import ChartModel as ChartModel
+    from gms_fsm.systems.models import LuGre as LuGre
+    from gms_fsm.systems.models import Model as Model
+    from gms_fsm.systems.rigs import Prescribed as Prescribed
+    from gms_fsm.systems.rigs import PulledSlider as PulledSlider
+    from gms_fsm.systems.rigs import Rig as Rig
+    from gms_fsm.systems.rigs import Slider as Slider
+    from gms_fsm.systems.signals import Signal as Signal
+    from gms_fsm.traces.failures import CallbackError as CallbackError
+    from gms_fsm.traces.failures import LivelockError as LivelockError
+    from gms_fsm.traces.failures import NotFiniteError as NotFiniteError
+    from gms_fsm.traces.failures import SignalEndError as SignalEndError
+    from gms_fsm.traces.failures import SimulationError as SimulationError
+    from gms_fsm.traces.failures import StepLimitError as StepLimitError
+    from gms_fsm.traces.failures import StepSizeError as StepSizeError
+    from gms_fsm.traces.trace import Trace as Trace
+
+# The same names again, for Python; type checkers read those above. A test holds the two together.
+_HOMES = {
+    "charts.chart": "Chart State Transition",
+    "charts.parameters": "GMSParameters Stribeck",
+    "errors": "ChartError CheckpointError ExpressionError GMSError MissingExtraError OutputError "
+    "ParameterError RecordError ScenarioError SessionError SignalError TraceFileError UnitError",
+    "inspection.prove": "Finding Report prove",
+    "inspection.session": "Session",
+    "run.machines": "Element ElementMachines",
+    "run.simulate": "simulate",
+    "run.sweep": "Sweep sweep",
+    "systems.models": "ChartModel GMS LuGre Model",
+    "systems.rigs": "Prescribed PulledSlider Rig Slider",
+    "systems.signals": "Signal",
+    "traces.failures": "CallbackError LivelockError NotFiniteError SignalEndError SimulationError "
+    "StepLimitError StepSizeError",
+    "traces.trace": "Trace",
+}
+_HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
+
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'gms_fsm' has no attribute {name!r}")
+    found = getattr(import_module(f"gms_fsm.{_HOME[name]}"), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOME})

@@ -1,16 +1,10 @@
-"""Every error of the product, in one hierarchy.
+"""Every error of the product has one base; those that hold a run are in `gms_fsm.traces.failures`.
 
 A user's mistake is a `GMSError`: its text says what is wrong, where, with which value, and what to
 do. The command line prints that text and exits with code 2; Python callers can catch the one base.
 """
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from gms_fsm.trace import Trace
-
 
 LONGEST_SHOWN = 120  # characters of a value in a message
 
@@ -134,46 +128,6 @@ class OutputError(GMSError, OSError):
 
 class MissingExtraError(GMSError, ImportError):
     """An optional dependency is not installed; the text says which extra brings it."""
-
-
-class SimulationError(GMSError, RuntimeError):
-    """A run could not go on; `trace` holds all that was computed up to there.
-
-    Parameters
-    ----------
-    message : str
-        What happened, where, with which values, and what to try.
-    trace : Trace
-        The part of the run before the error.
-    """
-
-    def __init__(self, message: str, trace: Trace) -> None:
-        super().__init__(message)
-        self.trace = trace
-
-
-class LivelockError(SimulationError):
-    """States switch again and again without progress of time, or of time and state."""
-
-
-class StepSizeError(SimulationError):
-    """The step size fell under the resolution of the clock."""
-
-
-class StepLimitError(SimulationError):
-    """The steps are used up (`max_steps`), or a stiff run would need many more than there are."""
-
-
-class NotFiniteError(SimulationError):
-    """A signal or a flow returned NaN or infinity."""
-
-
-class SignalEndError(SimulationError):
-    """A sampled signal ends before the run does."""
-
-
-class CallbackError(SimulationError):
-    """A callback changed what it may only look at: values, or the state of an element."""
 
 
 class UnitError(GMSError, ValueError):

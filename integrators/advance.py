@@ -221,7 +221,7 @@ def advance(
         if near:
             theta = first_change(
                 interpolate, work.dense, margins, t, t_new, work.y_new, mode, p, w, tick
-            )  # fmt: skip
+            )
         if theta < REDO and theta * h_now > AT_ONCE * tick and not fixed and not redone:
             # The stages lay behind the crossing and may have jumped what comes before it: the step
             # up to the crossing is done for its own sake. Not where it is next to none: rounding

@@ -45,12 +45,25 @@ _OF_A_STEP: tuple[Callable[..., Any], ...] = (
     steps.fit_dense, steps.interpolate, steps.take_step, steps.weigh,
 )  # fmt: skip
 _OF_AN_ARC: tuple[Callable[..., Any], ...] = (
-    advance.advance, loop.active_relations, loop.go_on, loop._begin_arc, loop._count_anew,
-    loop._listed, loop._look_at_clock, loop._no_progress, loop._often_changed, loop._put_modes,
-    loop._rearm, loop._undefined,
-    sliding._sign, sliding._solve, sliding.look, sliding.seize,
-    sliding.slope_on, step_size.starting_step,
-)  # fmt: skip
+    advance.advance,
+    loop.active_relations,
+    loop.go_on,
+    loop._begin_arc,
+    loop._count_anew,
+    loop._listed,
+    loop._look_at_clock,
+    loop._no_progress,
+    loop._often_changed,
+    loop._put_modes,
+    loop._rearm,
+    loop._undefined,
+    sliding._sign,
+    sliding._solve,
+    sliding.look,
+    sliding.seize,
+    sliding.slope_on,
+    step_size.starting_step,
+)
 _ARRAYS: Mapping[Any, tuple[type[Any], int]] = {
     list[float]: (np.float64, 1),
     tuple[float, ...]: (np.float64, 1),
@@ -71,9 +84,9 @@ SIGNATURES: Mapping[str, str] = {
     "act": "iifVIP",
     "observe": "fVIVPV",
 }
-# IEEE arithmetic: x / 0 is inf or NaN as it is for our Python (see gms_fsm.generated). And no
-# counting of references, which is atomic and took half of the time: nothing is allocated here, all
-# arrays belong to the caller.
+# IEEE arithmetic: x / 0 is inf or NaN as it is for our Python (pairs with the caller's own
+# numbers that do not raise). And no counting of references, which is atomic and took half of the
+# time: nothing is allocated here, all arrays belong to the caller.
 _OPTIONS: Mapping[str, Any] = {"error_model": "numpy", "_nrt": False}
 _hints: Callable[[type], Mapping[str, Any]] = functools.cache(typing.get_type_hints)
 
@@ -382,25 +395,68 @@ def _compile_record(arguments: tuple[Any, ...], store: Store | None) -> Any:
     run = loop.record
 
     def record(
-        flow: Any, arm: Any, margins: Any, normal: Any, switch: Any, act: Any, observe: Any,
-        method: Any, control: Any, plan: Any, memory: Any, y: Any, mode: Any, held: Any, p: Any,
-        relations: Any, surfaces: Any, sliding: Any, out: Any, work: Any, log: Any, first: Any,
-        most_steps: Any, pause: Any,
-    ) -> Any:  # fmt: skip
+        flow: Any,
+        arm: Any,
+        margins: Any,
+        normal: Any,
+        switch: Any,
+        act: Any,
+        observe: Any,
+        method: Any,
+        control: Any,
+        plan: Any,
+        memory: Any,
+        y: Any,
+        mode: Any,
+        held: Any,
+        p: Any,
+        relations: Any,
+        surfaces: Any,
+        sliding: Any,
+        out: Any,
+        work: Any,
+        log: Any,
+        first: Any,
+        most_steps: Any,
+        pause: Any,
+    ) -> Any:
         return run(
-            at_flow(flow), at_arm(arm), at_margins(margins), at_normal(normal), at_switch(switch),
-            at_act(act), at_observe(observe), method, control, plan, memory, y, mode, held, p,
-            relations, surfaces, sliding, out, work, log, first, most_steps, pause,
-        )  # fmt: skip
+            at_flow(flow),
+            at_arm(arm),
+            at_margins(margins),
+            at_normal(normal),
+            at_switch(switch),
+            at_act(act),
+            at_observe(observe),
+            method,
+            control,
+            plan,
+            memory,
+            y,
+            mode,
+            held,
+            p,
+            relations,
+            surfaces,
+            sliding,
+            out,
+            work,
+            log,
+            first,
+            most_steps,
+            pause,
+        )
 
     record.__qualname__ = "record"  # under which it is kept
     addresses = [numba.types.int64] * len(_OF_A_SYSTEM)
     others = [numba.typeof(argument) for argument in arguments[len(_OF_A_SYSTEM) :]]
     start = time.perf_counter()
     result = _machine_code(
-        numba.types.int64(*addresses, *others), record, store,
+        numba.types.int64(*addresses, *others),
+        record,
+        store,
         "gms-fsm: compiling the engine, once on this machine ...",
-    )  # fmt: skip
+    )
     if result._cache.missed:
         print(f"gms-fsm: compiled in {time.perf_counter() - start:.1f} s", file=sys.stderr)
     return result

@@ -78,12 +78,21 @@ def watched(strict: list[bool], size: int) -> Watched:
         return [0.0] * r
 
     return Watched(
-        [0] * r, [], [False] * r, [0] * r, strict, vector(), vector(), vector(), vector(), vector(),
+        [0] * r,
+        [],
+        [False] * r,
+        [0] * r,
+        strict,
+        vector(),
+        vector(),
+        vector(),
+        vector(),
+        vector(),
         rights=[vector() for _ in range(DEEPEST + 1)],
         places=[0.0] * (DEEPEST + 1),
         depths=[0] * (DEEPEST + 1),
         y_probe=[0.0] * size,
-    )  # fmt: skip
+    )
 
 
 def any_changed(w: Watched, margin: Vector) -> bool:

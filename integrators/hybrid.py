@@ -295,8 +295,17 @@ def happenings(
     """
     flow = system.flow if options.located else system.flow_live
     s = b.sliding
-    on = Held(flow, system.margins, system.normal, system.p, b.held, b.surfaces.sign, s.which,
-              s.sigma, s.table)  # fmt: skip
+    on = Held(
+        flow,
+        system.margins,
+        system.normal,
+        system.p,
+        b.held,
+        b.surfaces.sign,
+        s.which,
+        s.sigma,
+        s.table,
+    )
     solver = None
     if b.plan.foreign:
         from integrators.scipy_arcs import SciPyStepper
@@ -310,11 +319,30 @@ def happenings(
         ride, seen, q = along if s.which[-1] else plainly
         try:
             happening = loop.go_on(
-                flow, system.arm, system.margins, system.normal, switch.ask, switch.act, b.method,
-                b.control, b.plan, b.memory, y, b.mode, b.held, system.p, b.relations, b.surfaces,
-                b.sliding, b.out, b.work, ride, seen, q,
+                flow,
+                system.arm,
+                system.margins,
+                system.normal,
+                switch.ask,
+                switch.act,
+                b.method,
+                b.control,
+                b.plan,
+                b.memory,
+                y,
+                b.mode,
+                b.held,
+                system.p,
+                b.relations,
+                b.surfaces,
+                b.sliding,
+                b.out,
+                b.work,
+                ride,
+                seen,
+                q,
                 options.rows_at_once,
-            )  # fmt: skip
+            )
             if solver is not None and happening == loop.ADVANCE:
                 solver.advance(options.rows_at_once if options.located else 1)
         except Exception:
@@ -468,10 +496,19 @@ def state_of(b: Buffers) -> dict[str, Any]:
     """
     w, s = b.relations, b.sliding
     return {
-        **b.memory._asdict(), "y": b.y, "mode": b.mode, "held": b.held, "watch": w.watch,
-        "truth": w.truth, "start": w.start, "cursor": b.out.cursor, "floor": b.work.floor,
-        "slid": s.flags, "arrived": s.arrived, "which": s.which,
-    }  # fmt: skip
+        **b.memory._asdict(),
+        "y": b.y,
+        "mode": b.mode,
+        "held": b.held,
+        "watch": w.watch,
+        "truth": w.truth,
+        "start": w.start,
+        "cursor": b.out.cursor,
+        "floor": b.work.floor,
+        "slid": s.flags,
+        "arrived": s.arrived,
+        "which": s.which,
+    }
 
 
 def modes_of(b: Buffers) -> tuple[int, ...]:

@@ -160,8 +160,9 @@ def go_on(
     """
     now, counts, cursor = memory.now, memory.counts, out.cursor
     w = active_relations(relations, memory)
-    held_on = Held(flow, margins, normal, p, held, surfaces.sign, sliding.which, sliding.sigma,
-                   sliding.table)  # fmt: skip
+    held_on = Held(
+        flow, margins, normal, p, held, surfaces.sign, sliding.which, sliding.sigma, sliding.table
+    )
     while True:
         if cursor[ROW] > counts[TAKEN]:
             return ROWS
@@ -213,9 +214,8 @@ def go_on(
             slid = False
             if plan.located:
                 w, slid = _rearm(
-                    arm, margins, t, y, mode, held, p, relations, surfaces, sliding, held_on,
-                    memory,
-                )  # fmt: skip
+                    arm, margins, t, y, mode, held, p, relations, surfaces, sliding, held_on, memory
+                )
                 if _undefined(w):
                     counts[PHASE] = AFTER
                     counts[STATUS] = NOT_FINITE
@@ -244,10 +244,25 @@ def go_on(
             if not plan.foreign:
                 steps = min(most_steps, plan.max_steps - cursor[STEPS]) if plan.located else 1
                 counts[STATUS], now[T], now[H], now[ERROR_BEFORE] = advance(
-                    ride, seen, method, control, t, y, memory.f, now[H],
-                    now[ERROR_BEFORE], now[T_STOP], plan.knots, mode, held, on, w, out, work,
+                    ride,
+                    seen,
+                    method,
+                    control,
+                    t,
+                    y,
+                    memory.f,
+                    now[H],
+                    now[ERROR_BEFORE],
+                    now[T_STOP],
+                    plan.knots,
+                    mode,
+                    held,
+                    on,
+                    w,
+                    out,
+                    work,
                     steps,
-                )  # fmt: skip
+                )
             if counts[STATUS] != FULL or not plan.located:
                 counts[PHASE] = AFTER
             else:
@@ -297,11 +312,21 @@ def go_on(
 def active_relations(relations: Watched, memory: Memory) -> Watched:
     """Return the relations with the active ones listed."""
     return Watched(
-        relations.watch, memory.room[: memory.counts[ACTIVE]], relations.truth, relations.changed,
+        relations.watch,
+        memory.room[: memory.counts[ACTIVE]],
+        relations.truth,
+        relations.changed,
         relations.strict,
-        relations.start, relations.end, relations.low, relations.high, relations.probe,
-        relations.rights, relations.places, relations.depths, relations.y_probe,
-    )  # fmt: skip
+        relations.start,
+        relations.end,
+        relations.low,
+        relations.high,
+        relations.probe,
+        relations.rights,
+        relations.places,
+        relations.depths,
+        relations.y_probe,
+    )
 
 
 def _rearm(
@@ -383,9 +408,21 @@ def _begin_arc(
         # Where the system has a scale, how far there is to go does not count: the kernel cuts.
         scale = control.time_scale if control.time_scale > 0.0 else now[T_STOP] - t
         now[H] = starting_step(
-            ride, t, y, memory.f, mode, held, on, method.error_order, control.rtol,
-            work.floor, scale, control.max_step, work.y_new, work.f_new,
-        )  # fmt: skip
+            ride,
+            t,
+            y,
+            memory.f,
+            mode,
+            held,
+            on,
+            method.error_order,
+            control.rtol,
+            work.floor,
+            scale,
+            control.max_step,
+            work.y_new,
+            work.f_new,
+        )
 
 
 def _undefined(w: Watched) -> bool:
@@ -512,8 +549,9 @@ def record(
     cursor, counts, entries = out.cursor, memory.counts, log.counts
     keep_stops = len(log.stops_t) > 0
     seen_at = float("nan")  # the time log.seen is of
-    on = Held(flow, margins, normal, p, held, surfaces.sign, sliding.which, sliding.sigma,
-              sliding.table)  # fmt: skip
+    on = Held(
+        flow, margins, normal, p, held, surfaces.sign, sliding.which, sliding.sigma, sliding.table
+    )
     left = most_steps
     while True:
         left -= 1
@@ -522,9 +560,30 @@ def record(
         if entries[0] >= len(log.t) or (keep_stops and entries[1] >= len(log.stops_t)):
             return ROWS
         happening = go_on(
-            flow, arm, margins, normal, ask, act, method, control, plan, memory, y, mode, held, p,
-            relations, surfaces, sliding, out, work, flow_on, margins_on, on, most_steps,
-        )  # fmt: skip
+            flow,
+            arm,
+            margins,
+            normal,
+            ask,
+            act,
+            method,
+            control,
+            plan,
+            memory,
+            y,
+            mode,
+            held,
+            p,
+            relations,
+            surfaces,
+            sliding,
+            out,
+            work,
+            flow_on,
+            margins_on,
+            on,
+            most_steps,
+        )
         t = memory.now[T]
         if happening == ROWS:
             for row in range(counts[TAKEN], cursor[ROW]):

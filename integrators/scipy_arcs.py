@@ -145,8 +145,9 @@ class SciPyStepper:
             else:
                 copy_margins(w, w.end, w.start)
             while cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] < t_new:
-                put_row(out, out.times[cursor[NEXT_TIME]],
-                        dense(out.times[cursor[NEXT_TIME]]).tolist())  # fmt: skip
+                put_row(
+                    out, out.times[cursor[NEXT_TIME]], dense(out.times[cursor[NEXT_TIME]]).tolist()
+                )
                 cursor[NEXT_TIME] += 1
             if theta < 1.0:
                 interpolate(dense, theta, y)

@@ -21,7 +21,7 @@ from plots.statechart import statechart
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from gms_fsm.trace import Trace
+    from gms_fsm.traces.trace import Trace
 
 __all__ = [
     "LiveChart",

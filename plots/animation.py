@@ -17,9 +17,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from gms_fsm._files import written_whole
 from gms_fsm.errors import MissingExtraError, ParameterError, shown
-from gms_fsm.files import written_whole
-from gms_fsm.trace import Trace, check_trace
+from gms_fsm.traces.trace import Trace, check_trace
 from plots.live_chart import LiveChart
 from plots.statechart import Sheet
 from plots.style import CHART_THEMES, RC, ChartTheme

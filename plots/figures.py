@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from gms_fsm._files import written_whole
 from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
-from gms_fsm.files import written_whole
-from gms_fsm.trace import Trace, check_trace
+from gms_fsm.traces.trace import Trace, check_trace
 from plots import panels
 from plots.panels import SMOOTH, Window, shown
 from plots.style import BLUE, INK, LINE_GREY, PALE_GREY, RC, TEXT_GREY, VERMILION
@@ -160,9 +160,14 @@ def figure_3(
                 ax.set_ylim(min(0.0, trace.F.min()) - 0.03 * limit, limit)
                 ax.annotate(
                     f"peak {trace.F[peak]:.2f} N\nat t = {trace.t[peak]:.3f} s",
-                    (x_peak, limit), (-8, -4), textcoords="offset points",
-                    ha="right", va="top", color=TEXT_GREY, fontsize=8,
-                )  # fmt: skip
+                    (x_peak, limit),
+                    (-8, -4),
+                    textcoords="offset points",
+                    ha="right",
+                    va="top",
+                    color=TEXT_GREY,
+                    fontsize=8,
+                )
         if len(phases) > 1:
             axes[1].legend(loc="upper left")
         figure.suptitle(title, x=0.01, ha="left")
@@ -370,16 +375,24 @@ def _add_measured(ax: Axes, loop: Axes, measured: Measured, trace: Trace, window
     inside = (measured.t >= window[0]) & (measured.t <= window[1])
     ax.lines[0].set(color=BLUE, label="model", zorder=3)
     ax.plot(
-        measured.t[inside], measured.F[inside], color=VERMILION, linewidth=1.0, label="measured",
+        measured.t[inside],
+        measured.F[inside],
+        color=VERMILION,
+        linewidth=1.0,
+        label="measured",
         rasterized=bool(inside.sum() > panels.VECTOR_ROWS),
-    )  # fmt: skip
+    )
     _legend_above(ax)
     factor, _ = panels.scaled(trace.x - trace.x[0], "m")
     loop.lines[0].set(linewidth=0.9, zorder=3, rasterized=True)
     loop.plot(
-        factor * (measured.x - trace.x[0]), measured.F, color=VERMILION, linewidth=0.5, alpha=0.7,
+        factor * (measured.x - trace.x[0]),
+        measured.F,
+        color=VERMILION,
+        linewidth=0.5,
+        alpha=0.7,
         rasterized=True,
-    )  # fmt: skip
+    )
 
 
 def _head(trace: Trace, title: str) -> str:
@@ -389,9 +402,14 @@ def _head(trace: Trace, title: str) -> str:
 def _legend_above(ax: Axes) -> None:
     """Put the legend beside the title, where no curve is."""
     ax.legend(
-        loc="lower right", bbox_to_anchor=(1, 1), ncols=6, borderaxespad=0.1, columnspacing=1.2,
-        handlelength=2.2, handletextpad=0.5,
-    )  # fmt: skip
+        loc="lower right",
+        bbox_to_anchor=(1, 1),
+        ncols=6,
+        borderaxespad=0.1,
+        columnspacing=1.2,
+        handlelength=2.2,
+        handletextpad=0.5,
+    )
 
 
 def _last_cycles(trace: Trace) -> Window:
@@ -451,9 +469,12 @@ def ribbons_figure(
         halves = figure.add_gridspec(1, 2, width_ratios=(2.1, 1) if zoom else (1.3, 1))
         parts = [figure.add_subfigure(halves[0, column]) for column in (0, 1)]
         grid = parts[0].subplots(
-            4, 2 if zoom else 1, squeeze=False, width_ratios=(1.45, 1) if zoom else None,
+            4,
+            2 if zoom else 1,
+            squeeze=False,
+            width_ratios=(1.45, 1) if zoom else None,
             height_ratios=(1, 1.2, 1.2, 1),
-        )  # fmt: skip
+        )
         left, right = list(grid[:, 0]), list(parts[1].subplots(2, 1))
         panels.velocity(left[0], part, window=limits)
         panels.ratio(left[1], part, window=limits, elements=elements)

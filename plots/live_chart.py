@@ -18,9 +18,9 @@ from xml.etree import ElementTree
 import numpy as np
 
 from gms_fsm.errors import MissingExtraError, OutputError, ParameterError, shown
-from gms_fsm.explain import values_at
-from gms_fsm.expression import Condition, clauses, evaluate
-from gms_fsm.trace import Trace
+from gms_fsm.inspection.explain import values_at
+from gms_fsm.language.expression import Condition, clauses, evaluate
+from gms_fsm.traces.trace import Trace
 from plots.render import drawn
 from plots.statechart import (
     FALSE,

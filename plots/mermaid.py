@@ -11,8 +11,8 @@ import json
 import re
 from collections.abc import Iterator
 
-from gms_fsm.chart import Chart, State
-from gms_fsm.expression import MATLAB_LIKE, spell
+from gms_fsm.charts.chart import Chart, State
+from gms_fsm.language.expression import MATLAB_LIKE, spell
 
 __all__ = ["mermaid"]
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 from io import BytesIO
 from typing import Any
 
-from gms_fsm.chart import Chart
+from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import MissingExtraError
-from gms_fsm.models import GMS, ChartModel, LuGre, Model
-from gms_fsm.trace import Trace
+from gms_fsm.systems.models import GMS, ChartModel, LuGre, Model
+from gms_fsm.traces.trace import Trace
 from plots.render import drawn
 from plots.statechart import statechart
 

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.errors import MissingExtraError, ParameterError, SignalError
 from gms_fsm.errors import shown as written
-from gms_fsm.trace import Rows, Trace, check_trace
+from gms_fsm.traces.trace import Rows, Trace, check_trace
 from plots.style import (
     BLUE,
     ELEMENT_COLOURS,
@@ -227,9 +227,12 @@ def checked_elements(trace: Trace, elements: Iterable[int] | None) -> list[int]:
     except TypeError:
         chosen = []
     whole = all(isinstance(i, (int, np.integer)) and not isinstance(i, bool) for i in chosen)
-    if not chosen or not whole or len(set(chosen)) < len(chosen) or not (
-        0 <= min(chosen) <= max(chosen) < trace.n
-    ):  # fmt: skip
+    if (
+        not chosen
+        or not whole
+        or len(set(chosen)) < len(chosen)
+        or not (0 <= min(chosen) <= max(chosen) < trace.n)
+    ):
         raise ParameterError(
             f"elements is {written(elements)}; it must be a list of different whole numbers from 0 "
             f"to {trace.n - 1} (labels count from 1)"
@@ -477,10 +480,20 @@ class _SpanName(Text):
 
     def __init__(self, ax: Axes, begin: float, end: float, height: float, name: str) -> None:
         super().__init__(
-            (begin + end) / 2, height, name, ha="center", va="center", fontsize=7.5, color=INK,
-            bbox={"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none",
-                  "alpha": 0.85},
-        )  # fmt: skip
+            (begin + end) / 2,
+            height,
+            name,
+            ha="center",
+            va="center",
+            fontsize=7.5,
+            color=INK,
+            bbox={
+                "boxstyle": "round,pad=0.12",
+                "facecolor": "white",
+                "edgecolor": "none",
+                "alpha": 0.85,
+            },
+        )
         self.span = (begin, end)
         self.set_in_layout(False)
         ax.add_artist(self)
@@ -592,9 +605,17 @@ def _held_bands(ax: Axes, trace: Trace, window: Window) -> Artists:
             label = f"held on {stretch.surface} = 0"
             text = "" if label in drawn else label
             drawn.setdefault(label, []).append(
-                ax.axvspan(begin, end, facecolor="none", edgecolor="black", hatch="xxx",
-                           linewidth=0.8, zorder=3, label=text)
-            )  # fmt: skip
+                ax.axvspan(
+                    begin,
+                    end,
+                    facecolor="none",
+                    edgecolor="black",
+                    hatch="xxx",
+                    linewidth=0.8,
+                    zorder=3,
+                    label=text,
+                )
+            )
     return [band for bands in drawn.values() for band in bands]
 
 
@@ -711,10 +732,17 @@ def marks(
     for members, t0, t1 in groups:
         drawn.append(
             ax.annotate(
-                _joined(members), ((t0 + t1) / 2, 1.0), (0, 2), xycoords=ax.get_xaxis_transform(),
-                textcoords="offset points", ha="center", va="bottom", fontsize=8, color=INK,
+                _joined(members),
+                ((t0 + t1) / 2, 1.0),
+                (0, 2),
+                xycoords=ax.get_xaxis_transform(),
+                textcoords="offset points",
+                ha="center",
+                va="bottom",
+                fontsize=8,
+                color=INK,
             )
-        )  # fmt: skip
+        )
     return drawn
 
 
@@ -762,10 +790,15 @@ def margins(
         missing = "input s" if trace.model.chart.transitions else "edges"
         return [
             ax.text(
-                0.5, 0.5, f"no threshold:\nthis chart has no {missing}", ha="center", va="center",
-                transform=ax.transAxes, color=TEXT_GREY,
+                0.5,
+                0.5,
+                f"no threshold:\nthis chart has no {missing}",
+                ha="center",
+                va="center",
+                transform=ax.transAxes,
+                color=TEXT_GREY,
             )
-        ]  # fmt: skip
+        ]
     limits = checked_window(trace, cascade_window(trace) if window is None else window)
     part = shown(trace, limits)
     values = 1 - np.abs(part.z / part.s)
@@ -781,9 +814,14 @@ def margins(
         mine = log[log.element == i]
         if mine.size:
             dots += ax.plot(
-                mine.t, factor * (1 - np.abs(mine.z / mine.s)), "o", color=_look(i)["color"],
-                markersize=4, clip_on=False, zorder=4,
-            )  # fmt: skip
+                mine.t,
+                factor * (1 - np.abs(mine.z / mine.s)),
+                "o",
+                color=_look(i)["color"],
+                markersize=4,
+                clip_on=False,
+                zorder=4,
+            )
     lines.append(ax.axhline(0.0, color=LINE_GREY, linewidth=0.8, zorder=1))
     ax.set_ylabel(f"10$^{power}$ (1 − |z|/s) [–]" if power else "1 − |z|/s [–]")
     _time_axis(ax, *limits)
@@ -827,10 +865,18 @@ def cascade(
     log = _in_window(trace, limits, chosen)
     lines = _curve(ax, part.t, part.F, color=INK)
     dots = [
-        *ax.plot(log.t, log.F_before, "o", markersize=4.5, color=INK, markerfacecolor="white",
-                 label="F before", zorder=3),
+        *ax.plot(
+            log.t,
+            log.F_before,
+            "o",
+            markersize=4.5,
+            color=INK,
+            markerfacecolor="white",
+            label="F before",
+            zorder=3,
+        ),
         *ax.plot(log.t, log.F_after, "o", markersize=4.5, color=INK, label="F after", zorder=4),
-    ]  # fmt: skip
+    ]
     ax.set_ylabel("F [N]")
     _time_axis(ax, *limits)
     return [*lines, *dots, *marks(ax, trace, window=limits, elements=chosen)]
@@ -851,10 +897,14 @@ def _by_slipping(
     # From light green to dark violet: the more elements slip, the darker, in grey too.
     shades = ListedColormap(colormaps["viridis_r"](np.linspace(0.18, 1.0, count + 1)))
     lines = LineCollection(
-        pieces, cmap=shades, norm=BoundaryNorm(np.arange(-0.5, count + 1.0), count + 1),
-        array=away[cuts[:-1]], linewidths=1.6, capstyle="round",
+        pieces,
+        cmap=shades,
+        norm=BoundaryNorm(np.arange(-0.5, count + 1.0), count + 1),
+        array=away[cuts[:-1]],
+        linewidths=1.6,
+        capstyle="round",
         rasterized=len(points) > VECTOR_ROWS,
-    )  # fmt: skip
+    )
     if not trace.model.chart.transitions:  # one state: nothing to count
         lines.set_array(None)
         lines.set_color(BLUE)
@@ -983,9 +1033,15 @@ def hysteresis(
         now = (part.t >= begin) & (part.t <= end)
         colour, dash = looks[number % len(looks)]
         lines += _curve(
-            ax, factor * x[now], part.F[now], color=colour, linestyle=dash, label=name,
-            zorder=3 - number % 3, linewidth=1.6 if number < 2 else 0.9,
-        )  # fmt: skip
+            ax,
+            factor * x[now],
+            part.F[now],
+            color=colour,
+            linestyle=dash,
+            label=name,
+            zorder=3 - number % 3,
+            linewidth=1.6 if number < 2 else 0.9,
+        )
         begin = end
     return lines
 
@@ -1043,14 +1099,27 @@ def stribeck(
             ax, factor * v, curve + model.sigma_2 * v, color=INK, label=r"s(v) + $\sigma_2$ |v|"
         )
     drawn += ax.plot(
-        factor * speeds[steady], np.abs(part.F[steady]), "s", markersize=5, color=STATE_FILLS[0],
-        markeredgewidth=0, label="run, sliding steadily", rasterized=True, zorder=1,
-    )  # fmt: skip
+        factor * speeds[steady],
+        np.abs(part.F[steady]),
+        "s",
+        markersize=5,
+        color=STATE_FILLS[0],
+        markeredgewidth=0,
+        label="run, sliding steadily",
+        rasterized=True,
+        zorder=1,
+    )
     if points is not None:
         drawn += ax.plot(
-            factor * points[0], points[1], "o", markersize=4.5, color=VERMILION,
-            markerfacecolor="white", label="measured", zorder=4,
-        )  # fmt: skip
+            factor * points[0],
+            points[1],
+            "o",
+            markersize=4.5,
+            color=VERMILION,
+            markerfacecolor="white",
+            label="measured",
+            zorder=4,
+        )
     ax.set(xlabel=f"|v| [{unit}]", ylabel="|F| [N]")
     if log:
         ax.set(xscale="log", xlim=(factor * low, 1.15 * factor * top))

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import graphviz
 
+from gms_fsm._files import written_whole
 from gms_fsm.errors import OutputError, ParameterError
-from gms_fsm.files import written_whole
 from plots.mermaid import mermaid
 from plots.statechart import ChartGraph
 

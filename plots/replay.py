@@ -26,12 +26,12 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm.chart import Chart
+from gms_fsm._files import written_whole
+from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import MissingExtraError, ParameterError, SignalError, TraceFileError
-from gms_fsm.explain import explain_state, values_at
-from gms_fsm.expression import MATLAB_LIKE, Relation, clauses, spell
-from gms_fsm.files import written_whole
-from gms_fsm.trace import Rows, Trace, check_trace
+from gms_fsm.inspection.explain import explain_state, values_at
+from gms_fsm.language.expression import MATLAB_LIKE, Relation, clauses, spell
+from gms_fsm.traces.trace import Rows, Trace, check_trace
 from plots.render import drawn
 from plots.statechart import Row, Sheet, element_id, part_id
 from plots.style import (
@@ -281,10 +281,15 @@ def _run(trace: Trace, between: NDArray[np.bool_], frame_of: Sequence[int]) -> d
     return {
         "states": [state.name for state in chart.states],
         "edges": edges,
-        "names": {"t": pool.add(trace.t, digits=17),  # 17 digits tell all numbers apart
-                  **{name: pool.add(column) for name, column in columns.items()}},
-        "inner": {"title": inner_title, "bounds": [1, -1] if threshold else [],
-                  "columns": [pool.add(inner[:, i]) for i in range(n)]},
+        "names": {
+            "t": pool.add(trace.t, digits=17),  # 17 digits tell all numbers apart
+            **{name: pool.add(column) for name, column in columns.items()},
+        },
+        "inner": {
+            "title": inner_title,
+            "bounds": [1, -1] if threshold else [],
+            "columns": [pool.add(inner[:, i]) for i in range(n)],
+        },
         "mode": mode,
         "pieces": [_pieces(trace.t.tolist(), mode[i]) for i in range(n)],
         "microstep": trace.microstep.tolist(),
@@ -292,16 +297,28 @@ def _run(trace: Trace, between: NDArray[np.bool_], frame_of: Sequence[int]) -> d
         "sides": sides,
         "truth": truth,
         "stops": [
-            [[frame_of[row] for row in _stops(mode[i], holds[i][k], edge["source"], [
-                entry["row"] for entry in log
-                if not entry["made"] and (entry["element"], entry["edge"]) == (i, k)
-            ])] for k, edge in enumerate(edges)]
+            [
+                [
+                    frame_of[row]
+                    for row in _stops(
+                        mode[i],
+                        holds[i][k],
+                        edge["source"],
+                        [
+                            entry["row"]
+                            for entry in log
+                            if not entry["made"] and (entry["element"], entry["edge"]) == (i, k)
+                        ],
+                    )
+                ]
+                for k, edge in enumerate(edges)
+            ]
             for i in range(n)
         ],
         "log": log,
         "fired": {e["row"]: [e["element"], e["edge"]] for e in log if e["made"]},
         "pool": pool.columns,
-    }  # fmt: skip
+    }
 
 
 def _edges(chart: Chart) -> list[dict[str, Any]]:

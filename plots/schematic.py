@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.errors import MissingExtraError, ParameterError, shown
-from gms_fsm.trace import Trace, check_trace
+from gms_fsm.traces.trace import Trace, check_trace
 from plots import panels
 from plots.style import (
     BLUE,
@@ -216,10 +216,16 @@ def _contact(
     alone = chart is not None and not chart.transitions  # one state: neither stick nor slip
     full = PALE_GREY if alone else BLUE
     box = Rectangle(
-        (contact - CONTACT / 2, ground), CONTACT, GROUND + 0.22, linewidth=1.4, zorder=3,
-        facecolor=full if held else PAPER, edgecolor=full if held else VERMILION,
-        linestyle="-" if held else "--", gid=f"contact {i + 1}",
-    )  # fmt: skip
+        (contact - CONTACT / 2, ground),
+        CONTACT,
+        GROUND + 0.22,
+        linewidth=1.4,
+        zorder=3,
+        facecolor=full if held else PAPER,
+        edgecolor=full if held else VERMILION,
+        linestyle="-" if held else "--",
+        gid=f"contact {i + 1}",
+    )
     drawn.append(ax.add_patch(box))
     colour = INK if trace is None or alone else TEXT_GREEN if held else TEXT_ORANGE
     label = f"E{i + 1}" if trace is None else f"E{i + 1} {name}"
@@ -240,9 +246,15 @@ def _deflection(
     """Draw the distance from the contact's place at rest, and its name."""
     rest, height = WALL - REST, y - GROUND - 0.22
     drawn: list[Artist] = [
-        *ax.plot([rest, rest], [y - GROUND, height - 0.08], color=LINE_GREY, linewidth=0.8,
-                 linestyle=":", zorder=1),
-    ]  # fmt: skip
+        *ax.plot(
+            [rest, rest],
+            [y - GROUND, height - 0.08],
+            color=LINE_GREY,
+            linewidth=0.8,
+            linestyle=":",
+            zorder=1,
+        )
+    ]
     label = f"$z_{{{i + 1}}}$"
     if trace is not None:
         factor, unit = panels.scaled(trace.z[row], "m")
@@ -251,10 +263,9 @@ def _deflection(
         drawn.append(_arrow(ax, (contact, height), (rest, height), INK, size=7))
     drawn.append(
         ax.text(
-            min(contact, rest) - 0.12, height, label, ha="right", va="center",
-            fontsize=8, color=INK,
+            min(contact, rest) - 0.12, height, label, ha="right", va="center", fontsize=8, color=INK
         )
-    )  # fmt: skip
+    )
     return drawn
 
 
@@ -297,7 +308,14 @@ def _arrow(
     ax: Axes, start: tuple[float, float], end: tuple[float, float], colour: str, size: float = 11
 ) -> Artist:
     arrow = FancyArrowPatch(
-        start, end, arrowstyle="-|>", mutation_scale=size, color=colour, linewidth=1.2,
-        shrinkA=0, shrinkB=0, zorder=5,
-    )  # fmt: skip
+        start,
+        end,
+        arrowstyle="-|>",
+        mutation_scale=size,
+        color=colour,
+        linewidth=1.2,
+        shrinkA=0,
+        shrinkB=0,
+        zorder=5,
+    )
     return ax.add_patch(arrow)

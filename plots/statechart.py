@@ -22,9 +22,9 @@ from math import ceil, sqrt
 
 import graphviz
 
-from gms_fsm.chart import Chart, State, Transition
+from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ParameterError, shown
-from gms_fsm.expression import (
+from gms_fsm.language.expression import (
     MATLAB_LIKE,
     Both,
     Condition,
@@ -34,7 +34,7 @@ from gms_fsm.expression import (
     clauses,
     spell,
 )
-from gms_fsm.trace import Trace, dwell_times
+from gms_fsm.traces.trace import Trace, dwell_times
 from plots.style import CHART_THEMES, MONO, SANS, ChartTheme
 
 __all__ = ["ChartGraph", "statechart"]
@@ -124,9 +124,7 @@ def statechart(
     for name in pointed:
         one_of("marked", name, parts)
     tally = Tally(counts) if counts else None
-    sheet = Sheet(
-        chart, notation, direction, theme, tally, marked=frozenset(pointed), names=names
-    )  # fmt: skip
+    sheet = Sheet(chart, notation, direction, theme, tally, marked=frozenset(pointed), names=names)
     numbers = chosen(elements, None if counts is None else counts.n)
     bare = elements == 1 and (counts is None or counts.n == 1)
     return sheet.graph(numbers, bare=bare, foot=note)
@@ -634,8 +632,10 @@ class Sheet:
             taken = bool(self.tally.firings[number, edge.name])
             text = self.tally.of_edge(number, edge.name)
             rows.append([Piece(text, "count" if taken else "never")])
-        return [[Piece(str(priority) if i == 0 else " ", "priority"), *row]
-                for i, row in enumerate(rows)]  # fmt: skip
+        return [
+            [Piece(str(priority) if i == 0 else " ", "priority"), *row]
+            for i, row in enumerate(rows)
+        ]
 
     def _clause_lines(self, part: Condition, inside: bool) -> list[str]:
         """Return a clause as lines: each alternative begins one, and a long text is wrapped."""
@@ -644,8 +644,10 @@ class Sheet:
             # The brackets that the guard has as one text.
             return _wrapped(f"({text})" if inside and isinstance(part, Both) else text)
         texts = [self.write.text(operand) for operand in part.operands]
-        texts = [f"({text})" if isinstance(operand, Either) else text
-                 for text, operand in zip(texts, part.operands, strict=True)]  # fmt: skip
+        texts = [
+            f"({text})" if isinstance(operand, Either) else text
+            for text, operand in zip(texts, part.operands, strict=True)
+        ]
         texts[:-1] = [f"{text} {self.write.words[Either]}" for text in texts[:-1]]
         if inside:  # one of several clauses: && binds tighter than ||
             texts[0], texts[-1] = f"({texts[0]}", f"{texts[-1]})"

@@ -32,8 +32,13 @@ MONO = "DejaVu Sans Mono,Menlo,Consolas,Liberation Mono,monospace"
 # dashes repeat after 42 elements only.
 ELEMENT_COLOURS = (BLUE, VERMILION, "#009E73", "#CC79A7", "#E69F00", "#56B4E9", INK)
 ELEMENT_DASHES: tuple[str | tuple[int, tuple[float, ...]], ...] = (
-    "-", "--", ":", "-.", (0, (7.0, 1.5, 1.0, 1.5, 1.0, 1.5)), (0, (9.0, 4.0)),
-)  # fmt: skip
+    "-",
+    "--",
+    ":",
+    "-.",
+    (0, (7.0, 1.5, 1.0, 1.5, 1.0, 1.5)),
+    (0, (9.0, 4.0)),
+)
 # States: the default state is plain, the next ones are hatched as well as coloured.
 STATE_FILLS = ("#CFE3F2", "#F7CDB0", "#CDEBE0", "#F1D9E7", "#FAE8C0")
 STATE_EDGES = (BLUE, VERMILION, "#009E73", "#CC79A7", "#E69F00")
@@ -86,11 +91,27 @@ class ChartTheme:
 
 CHART_THEMES: Mapping[str, ChartTheme] = {
     "light": ChartTheme(
-        INK, TEXT_GREY, LINE_GREY, PALE_GREY, PAPER,
-        BLUE, BLUE_TINT, VERMILION, TEXT_GREEN, TEXT_GREY,
+        INK,
+        TEXT_GREY,
+        LINE_GREY,
+        PALE_GREY,
+        PAPER,
+        BLUE,
+        BLUE_TINT,
+        VERMILION,
+        TEXT_GREEN,
+        TEXT_GREY,
     ),
     "dark": ChartTheme(
-        "#E6E8EB", "#9AA1AB", "#79808A", "#565C66", "#15181D",
-        "#56B4E9", "#12344A", "#FF8A3D", "#3FCB9A", "#9AA1AB",
+        "#E6E8EB",
+        "#9AA1AB",
+        "#79808A",
+        "#565C66",
+        "#15181D",
+        "#56B4E9",
+        "#12344A",
+        "#FF8A3D",
+        "#3FCB9A",
+        "#9AA1AB",
     ),
-}  # fmt: skip
+}

@@ -26,17 +26,17 @@ from typing import Any, TypeVar
 import numpy as np
 
 from gms_fsm import LuGre, Prescribed, Slider, Stribeck, Trace, simulate
+from gms_fsm.app.scenario import load_scenario
 from gms_fsm.errors import (
     ExpressionError,
     GMSError,
     MissingExtraError,
     RecordError,
     ScenarioError,
-    SimulationError,
     TraceFileError,
 )
-from gms_fsm.explain import explain
-from gms_fsm.expression import (
+from gms_fsm.inspection.explain import explain
+from gms_fsm.language.expression import (
     FUNCTIONS,
     MATLAB_LIKE,
     Node,
@@ -48,11 +48,11 @@ from gms_fsm.expression import (
     spell,
     split,
 )
-from gms_fsm.generated import load
-from gms_fsm.scenario import load_scenario
-from gms_fsm.simulate import Run
-from gms_fsm.start import Start
-from gms_fsm.trace import dwell_times
+from gms_fsm.lowering._generated import load
+from gms_fsm.run.simulate import Run
+from gms_fsm.run.start import Start
+from gms_fsm.traces.failures import SimulationError
+from gms_fsm.traces.trace import dwell_times
 from tests.helpers import pulled_mass, stick_slip
 from tests.scenario_files import MEASURED, OPEN_LOOP, sine_table
 
@@ -120,10 +120,39 @@ def _is_a_message(error: GMSError) -> None:
 
 # --------------------------------------------------------------------------- text
 NUMBERS = [
-    "0", "1", "-1", "0.5", "1e-3", "1e-300", "1e-400", "1e300", "1e308", "1e309", "1e999", "nan",
-    "inf", "-inf", "-0.0", "1e5000", "9" * 310, "9" * 5000, "0x1f", "1_0", "1__0", "1.", ".5", "00",
-    "1e", "0b1", "0o7", "1E+05", "2j", "4.9e-324", "1.7976931348623157e308", "123456789012345678",
-]  # fmt: skip
+    "0",
+    "1",
+    "-1",
+    "0.5",
+    "1e-3",
+    "1e-300",
+    "1e-400",
+    "1e300",
+    "1e308",
+    "1e309",
+    "1e999",
+    "nan",
+    "inf",
+    "-inf",
+    "-0.0",
+    "1e5000",
+    "9" * 310,
+    "9" * 5000,
+    "0x1f",
+    "1_0",
+    "1__0",
+    "1.",
+    ".5",
+    "00",
+    "1e",
+    "0b1",
+    "0o7",
+    "1E+05",
+    "2j",
+    "4.9e-324",
+    "1.7976931348623157e308",
+    "123456789012345678",
+]
 MARKS = [
     "+", "-", "*", "/", "**", "<", "<=", ">", ">=", "==", "!=", "(", ")", "[", "]", "{", "}", ",",
     ".", ":", ";", "=", ":=", "'", '"', '"""', "#", "\\", "@", "%", "&", "|", "~", "^", "!", "?",
@@ -132,18 +161,50 @@ MARKS = [
     "\U0001f600", "e\u0301", "\uff36",
 ]  # fmt: skip
 WORDS = [
-    "z", "s", "v", "v_c", "t", "u", "pi", "and", "or", "not", "if", "else", "lambda", "for", "in",
-    "is", "await", "None", "True", "False", "__import__", "os", "exec", "state", "stick", "slip",
+    "z",
+    "s",
+    "v",
+    "v_c",
+    "t",
+    "u",
+    "pi",
+    "and",
+    "or",
+    "not",
+    "if",
+    "else",
+    "lambda",
+    "for",
+    "in",
+    "is",
+    "await",
+    "None",
+    "True",
+    "False",
+    "__import__",
+    "os",
+    "exec",
+    "state",
+    "stick",
+    "slip",
     *FUNCTIONS,
-]  # fmt: skip
+]
 TOKENS = NUMBERS + MARKS + WORDS
 NAMES = ("z", "s", "v", "v_c")
 VALID_TEXTS = [
-    "z >= s and v > v_c", "abs(v) <= v_c and abs(z) < s", "sgn(v) * v_c * (1 - z / s)", "v**2 + 1",
-    "min(z, max(s, v), 3) * exp(-(v / v_c)**2)", "not (z < s or v > 0) and 0 < v < 1",
-    "state(1) == slip and state(2) != stick", "z", "-z**-2", "tanh(cos(sin(sqrt(abs(z)))))",
-    "0.2*sin(2*pi*v/20)", "((z**3)**4)**5 - z**0.5",
-]  # fmt: skip
+    "z >= s and v > v_c",
+    "abs(v) <= v_c and abs(z) < s",
+    "sgn(v) * v_c * (1 - z / s)",
+    "v**2 + 1",
+    "min(z, max(s, v), 3) * exp(-(v / v_c)**2)",
+    "not (z < s or v > 0) and 0 < v < 1",
+    "state(1) == slip and state(2) != stick",
+    "z",
+    "-z**-2",
+    "tanh(cos(sin(sqrt(abs(z)))))",
+    "0.2*sin(2*pi*v/20)",
+    "((z**3)**4)**5 - z**0.5",
+]
 
 
 def _mutated_text(choices: Choices, text: str) -> str:
@@ -175,12 +236,32 @@ def _nested(choices: Choices) -> str:
     """Nest deeply, chain long, or both."""
     text = choices.one_of(["v", "z < s", "", "1"])
     for _ in range(1 + choices.below(4)):
-        before, after = choices.one_of([
-            ("(", ")"), ("abs(", ")"), ("-", ""), ("not ", ""), ("", "**2"), ("", "+v"),
-            ("min(", ",v)"), ("min(", ",v" * 48 + ")"), ("max(v,", ",z,s)"), ("v if z else ", ""),
-            ("[", "]"), ("{", "}"), ("f'{", "}'"), ("", " < v"), ("", " and z < s"), ("", "*(v"),
-            ("lambda: ", ""), ("state(", ")"), ("v**", ""), ("(", "**8)"), ("", ".a"), ("", "()"),
-        ])  # fmt: skip
+        before, after = choices.one_of(
+            [
+                ("(", ")"),
+                ("abs(", ")"),
+                ("-", ""),
+                ("not ", ""),
+                ("", "**2"),
+                ("", "+v"),
+                ("min(", ",v)"),
+                ("min(", ",v" * 48 + ")"),
+                ("max(v,", ",z,s)"),
+                ("v if z else ", ""),
+                ("[", "]"),
+                ("{", "}"),
+                ("f'{", "}'"),
+                ("", " < v"),
+                ("", " and z < s"),
+                ("", "*(v"),
+                ("lambda: ", ""),
+                ("state(", ")"),
+                ("v**", ""),
+                ("(", "**8)"),
+                ("", ".a"),
+                ("", "()"),
+            ]
+        )
         times = choices.one_of([1, 3, 30, 58, 59, 60, 61, 100, 300, 1000, 5000])
         if times * (len(before) + len(after)) > 60_000:
             times = 60_000 // (len(before) + len(after))
@@ -405,14 +486,46 @@ PLAIN = [
     ["slip", "stick"], "m", "mm", "um", "s", "ms", "N", "kN", "x", "F", 0.05, 1, -1,
 ]  # fmt: skip
 OVERRIDES = [
-    "model.law=published", "run.t_end=1", "run.engine=compiled", "rig.velocity=t", "a=b", "=", "a",
-    "run.t_end=", "run.t_end=1\nx=2", "model=3", "model.k.a=1", "run.t_end=[", "a.b.c.d.e.f.g=1",
-    "run.method='LSODA'", "record.where=force > 0 N", "run..t_end=1", "'run'.t_end=1",
-]  # fmt: skip
+    "model.law=published",
+    "run.t_end=1",
+    "run.engine=compiled",
+    "rig.velocity=t",
+    "a=b",
+    "=",
+    "a",
+    "run.t_end=",
+    "run.t_end=1\nx=2",
+    "model=3",
+    "model.k.a=1",
+    "run.t_end=[",
+    "a.b.c.d.e.f.g=1",
+    "run.method='LSODA'",
+    "record.where=force > 0 N",
+    "run..t_end=1",
+    "'run'.t_end=1",
+]
 CELLS = [
-    "", "nan", "inf", "-inf", "1e999", "1e300", "-1e300", "1e-320", "x", "1,5", '"1"', '"', "0_3",
-    "0", "-0.0", "1" * 400, " 1 ", "\u0661", "0x1", "None",
-]  # fmt: skip
+    "",
+    "nan",
+    "inf",
+    "-inf",
+    "1e999",
+    "1e300",
+    "-1e300",
+    "1e-320",
+    "x",
+    "1,5",
+    '"1"',
+    '"',
+    "0_3",
+    "0",
+    "-0.0",
+    "1" * 400,
+    " 1 ",
+    "\u0661",
+    "0x1",
+    "None",
+]
 
 
 @functools.cache
@@ -652,11 +765,30 @@ def _valid_traces() -> list[dict[str, bytes]]:
 
 
 HEADERS = [
-    *[value for value in NASTY if not isinstance(value, datetime.date | datetime.time)], None,
-    "formula", "corners", "function", "compiled", "located", "step", 10**15, "__import__('os')",
-    "1 +", "z", ["v"], ["z", "z"], [{"name": "a", "flow": {"z": "v"}}], {"z": "v"}, "Slider",
-    "PulledSlider", {"k": [1.0]}, {"engine": None}, [0.0] * 4, "stick", "z >= s",
-]  # fmt: skip
+    *[value for value in NASTY if not isinstance(value, datetime.date | datetime.time)],
+    None,
+    "formula",
+    "corners",
+    "function",
+    "compiled",
+    "located",
+    "step",
+    10**15,
+    "__import__('os')",
+    "1 +",
+    "z",
+    ["v"],
+    ["z", "z"],
+    [{"name": "a", "flow": {"z": "v"}}],
+    {"z": "v"},
+    "Slider",
+    "PulledSlider",
+    {"k": [1.0]},
+    {"engine": None},
+    [0.0] * 4,
+    "stick",
+    "z >= s",
+]
 
 
 _UNFIT = (ValueError, TypeError, OverflowError, RuntimeError)

@@ -17,7 +17,7 @@ from gms_fsm import (
     Trace,
     Transition,
 )
-from gms_fsm.signals import as_signal
+from gms_fsm.systems.signals import as_signal
 
 SINE = "0.2*sin(2*pi*t/20)"
 FIG4_SINE = "0.15*sin(2*pi*t/25)"
@@ -58,9 +58,16 @@ def non_drifting(law: str, *, slipping: bool = False) -> tuple[GMS, Slider]:
 
 
 def one_element(
-    law: str, *, F_c: float = 1.0, F_s: float = 1.5, v_s: float = 0.05, C: float = 0.1,
-    v_c: float = 1e-6, sigma: float = 0.1, k: float = 1.0,
-) -> GMS:  # fmt: skip
+    law: str,
+    *,
+    F_c: float = 1.0,
+    F_s: float = 1.5,
+    v_s: float = 0.05,
+    C: float = 0.1,
+    v_c: float = 1e-6,
+    sigma: float = 0.1,
+    k: float = 1.0,
+) -> GMS:
     """One element with everything at hand."""
     parameters = GMSParameters(
         [k], [sigma], [C], sigma_2=0.0, stribeck=Stribeck(F_c, F_s, v_s), v_c=v_c
@@ -108,12 +115,17 @@ WEAR = Chart(
 def banging(gap: float) -> ChartModel:
     """Return an element driven to and fro between two guards that are `gap` apart."""
     chart = Chart(
-        "to and fro", inputs=("v",), variables=("z",), parameters=("gap",),
+        "to and fro",
+        inputs=("v",),
+        variables=("z",),
+        parameters=("gap",),
         states=(State("up", flow={"z": "1"}), State("down", flow={"z": "-1"})),
-        transitions=(Transition("fall", "up", "down", guard="z >= 1"),
-                     Transition("rise", "down", "up", guard="z <= 1 - gap")),
+        transitions=(
+            Transition("fall", "up", "down", guard="z >= 1"),
+            Transition("rise", "down", "up", guard="z <= 1 - gap"),
+        ),
         outputs={"F": "z"},
-    )  # fmt: skip
+    )
     return ChartModel(chart, {"gap": gap})
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from gms_fsm.lessons import Lesson, Result
+from gms_fsm.app.lessons import Lesson, Result
 
 
 def check_lines(result: Result) -> None:

@@ -29,23 +29,33 @@ OPERATORS = (
     + ["NumberReplacer", "ZeroIterationForLoop"]
 )
 PHYSICS = [
-    "traps_boundary_values", "traps_velocity_window", "traps_true_and_false_again",
-    "traps_frozen_states", "traps_sign_discontinuity", "constant_velocity_closed_forms",
-]  # fmt: skip
+    "traps_boundary_values",
+    "traps_velocity_window",
+    "traps_true_and_false_again",
+    "traps_frozen_states",
+    "traps_sign_discontinuity",
+    "constant_velocity_closed_forms",
+]
 NEAR = {  # module: its tests, the quickest to notice first
-    "gms_fsm/chart.py": [
-        "mutants_are_killed", "chart_refuses_contradictions", "gms_chart_is_the_papers",
+    "gms_fsm/charts/chart.py": [
+        "mutants_are_killed",
+        "chart_refuses_contradictions",
+        "gms_chart_is_the_papers",
     ],
-    "gms_fsm/machines.py": [
-        "mutants_are_killed", "callbacks_run_once_per_firing", "gms_chart_is_the_papers",
+    "gms_fsm/run/machines.py": [
+        "mutants_are_killed",
+        "callbacks_run_once_per_firing",
+        "gms_chart_is_the_papers",
     ],
     "integrators/advance.py": ["mutants_are_killed", *PHYSICS, "convergence_orders"],
     "integrators/crossings.py": ["mutants_are_killed", *PHYSICS],
-    "gms_fsm/expression.py": [
-        "mutants_are_killed", "expression_refuses_everything_else",
-        "expression_evaluates_like_python", "gms_chart_is_the_papers",
+    "gms_fsm/language/expression.py": [
+        "mutants_are_killed",
+        "expression_refuses_everything_else",
+        "expression_evaluates_like_python",
+        "gms_chart_is_the_papers",
     ],
-}  # fmt: skip
+}
 
 
 def mutants(source):

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from gms_fsm.cli import main
-from gms_fsm.debugger import run_debugger
-from gms_fsm.scenario import load_scenario
+from gms_fsm.app.cli import main
+from gms_fsm.app.debugger import run_debugger
+from gms_fsm.app.scenario import load_scenario
 
 ROOT = Path(__file__).parents[1]
 FENCE = re.compile(

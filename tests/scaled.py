@@ -23,11 +23,11 @@ from gms_fsm import (
     Trace,
     simulate,
 )
-from gms_fsm.expression import Binary, Call, Name, Negative, Number, Value, spell
-from gms_fsm.models import Model
-from gms_fsm.rigs import Rig
-from gms_fsm.scenario import Loaded
-from gms_fsm.signals import Corners, Formula, Signal
+from gms_fsm.app.scenario import Loaded
+from gms_fsm.language.expression import Binary, Call, Name, Negative, Number, Value, spell
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.rigs import Rig
+from gms_fsm.systems.signals import Corners, Formula, Signal
 
 AXES = ("length", "force", "time")
 
@@ -45,9 +45,10 @@ class Case:
         """Return a scenario's case; an absolute tolerance only where the file gives one."""
         given = loaded.scenario.run.model_fields_set
         arguments = {
-            name: value for name, value in loaded.arguments.items()
+            name: value
+            for name, value in loaded.arguments.items()
             if name not in ("atol", "rtol") or name in given
-        }  # fmt: skip
+        }
         return cls(loaded.model, loaded.rig, arguments)
 
     def run(self, engine: str) -> Trace:
@@ -118,15 +119,22 @@ def _model(model: Model, u: _Units) -> Model:
     curve = _curve(model.stribeck, u)
     if isinstance(model, LuGre):
         return LuGre(
-            sigma_0=u.stiffness * model.sigma_0, sigma_1=u.damping * model.sigma_1,
-            sigma_2=u.damping * model.sigma_2, stribeck=curve,
-        )  # fmt: skip
+            sigma_0=u.stiffness * model.sigma_0,
+            sigma_1=u.damping * model.sigma_1,
+            sigma_2=u.damping * model.sigma_2,
+            stribeck=curve,
+        )
     assert isinstance(model, GMS)
     p = model.parameters
     parameters = GMSParameters(
-        u.stiffness * p.k, u.damping * p.sigma, u.speed * p.C, sigma_2=u.damping * p.sigma_2,
-        stribeck=curve, v_c=u.speed * p.v_c, weights=p.weights / u.stiffness,
-    )  # fmt: skip
+        u.stiffness * p.k,
+        u.damping * p.sigma,
+        u.speed * p.C,
+        sigma_2=u.damping * p.sigma_2,
+        stribeck=curve,
+        v_c=u.speed * p.v_c,
+        weights=p.weights / u.stiffness,
+    )
     return GMS(parameters, law=model.law)
 
 
@@ -190,11 +198,13 @@ def other_bits(
     if len(trace) != len(base):
         return [f"{len(trace)} rows instead of {len(base)}"]
     differ = [
-        name for name, factor in scales.items()
+        name
+        for name, factor in scales.items()
         if not np.array_equal(getattr(trace, name), factor * getattr(base, name))
-    ]  # fmt: skip
+    ]
     log = {"t": time, "z": length, "v": length / time}
     return differ + [
-        f"log.{name}" for name, factor in log.items()
+        f"log.{name}"
+        for name, factor in log.items()
         if not np.array_equal(trace.transitions[name], factor * base.transitions[name])
-    ]  # fmt: skip
+    ]

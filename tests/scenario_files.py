@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gms_fsm.cli import main
+from gms_fsm.app.cli import main
 
 OPEN_LOOP = """\
 title = "open loop"

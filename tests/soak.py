@@ -93,9 +93,13 @@ def fuzz_here(name: str, seed: int, seconds: float, watch: Path) -> dict[str, fl
                 break
     faulthandler.cancel_dump_traceback_later()
     return {
-        "inputs": index, "accepted": accepted, "slowest": slowest, "MB": _used() / 2**20,
-        "grown": (_used() - warm) / 2**20, "findings": found,
-    }  # fmt: skip
+        "inputs": index,
+        "accepted": accepted,
+        "slowest": slowest,
+        "MB": _used() / 2**20,
+        "grown": (_used() - warm) / 2**20,
+        "findings": found,
+    }
 
 
 def _again(name: str, seed: int, index: int) -> str:
@@ -116,9 +120,14 @@ def fuzzing(name: str, seed: int, minutes: float) -> bool:
         limit = 60 * minutes + 2 * SLOWEST + 60
         try:
             done = subprocess.run(
-                command, cwd=ROOT, env=surroundings, stdout=subprocess.PIPE, text=True,
-                timeout=limit, check=False,
-            )  # fmt: skip
+                command,
+                cwd=ROOT,
+                env=surroundings,
+                stdout=subprocess.PIPE,
+                text=True,
+                timeout=limit,
+                check=False,
+            )
         except subprocess.TimeoutExpired:
             print(f"FINDING no end: {_again(name, seed, _index(watch))}")
             return False
@@ -190,11 +199,20 @@ def random_runs(seed: int, examples: int) -> bool:
     with tempfile.TemporaryDirectory() as folder:  # for machine code that nobody needs again
         surroundings = {"GMS_FSM_EXAMPLES": str(examples), "NUMBA_CACHE_DIR": folder}
         done = subprocess.run(
-            [sys.executable, "-m", "pytest", "-q", "tests/test_hard_random_runs.py",
-             f"--hypothesis-seed={seed}"],
-            cwd=ROOT, env={**os.environ, **surroundings}, stdout=subprocess.PIPE, text=True,
+            [
+                sys.executable,
+                "-m",
+                "pytest",
+                "-q",
+                "tests/test_hard_random_runs.py",
+                f"--hypothesis-seed={seed}",
+            ],
+            cwd=ROOT,
+            env={**os.environ, **surroundings},
+            stdout=subprocess.PIPE,
+            text=True,
             check=False,
-        )  # fmt: skip
+        )
     print(
         f"random runs: {examples} of each kind in {time.monotonic() - began:.0f} s, seed {seed}: "
         + done.stdout.strip().splitlines()[-1],
@@ -211,10 +229,20 @@ def trials(seed: int, count: int) -> bool:
 
     began = time.monotonic()
     done = subprocess.run(
-        [sys.executable, "-m", "tests.trials", "--count", str(-(-count // len(FAMILIES))),
-         "--seed", str(seed)],
-        cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False,
-    )  # fmt: skip
+        [
+            sys.executable,
+            "-m",
+            "tests.trials",
+            "--count",
+            str(-(-count // len(FAMILIES))),
+            "--seed",
+            str(seed),
+        ],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
     print(f"{count} trials in {time.monotonic() - began:.0f} s\n{done.stdout}", end="", flush=True)
     return done.returncode == 0
 

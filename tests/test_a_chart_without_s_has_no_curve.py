@@ -25,25 +25,28 @@ from gms_fsm import (
     Transition,
     simulate,
 )
+from gms_fsm.app.live import LiveView
+from gms_fsm.app.report import _parameters
 from gms_fsm.errors import ExpressionError, ParameterError
-from gms_fsm.generated import standalone
-from gms_fsm.live import LiveView
-from gms_fsm.models import parameter_names, with_values
-from gms_fsm.program import arguments, lower
-from gms_fsm.report import _parameters
-from gms_fsm.simulate import Moment
-from gms_fsm.sweep import Sweep, sweep
+from gms_fsm.lowering._generated import standalone
+from gms_fsm.lowering.program import arguments, lower
+from gms_fsm.run.simulate import Moment
+from gms_fsm.run.sweep import Sweep, sweep
+from gms_fsm.systems.models import parameter_names, with_values
 from tests.helpers import same_bits
 
 CHART = Chart(
-    "a latch", ("v",), ("z",), ("k", "F_c"),
+    "a latch",
+    ("v",),
+    ("z",),
+    ("k", "F_c"),
     (State("free", {"z": "v"}), State("fixed", {"z": "-z"})),
     (
         Transition("catch", "free", "fixed", "z > F_c"),
         Transition("release", "fixed", "free", "z < 0.5 * F_c"),
     ),
     {"F": "k * z"},
-)  # fmt: skip
+)
 RIG = Prescribed("0.2")
 
 

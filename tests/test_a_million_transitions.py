@@ -33,9 +33,13 @@ def run(engine: str, transitions: int, **options: float) -> Trace:
     """Run so many periods that at least so many transitions fire; keep the end only."""
     periods = -(-transitions // EACH_PERIOD) + 1
     return simulate(
-        stick_slip("signed"), open_loop(), periods * PERIOD + 1.0, engine=engine, output="end",
+        stick_slip("signed"),
+        open_loop(),
+        periods * PERIOD + 1.0,
+        engine=engine,
+        output="end",
         **options,
-    )  # fmt: skip
+    )
 
 
 def peak(engine: str, transitions: int, **options: float) -> tuple[int, Trace]:
@@ -95,9 +99,12 @@ def in_a_child(engine: str, transitions: int) -> Figures:
     """Run in a process of its own and ask the operating system what it used."""
     code = f"from {__name__} import measured; measured({engine!r}, {transitions})"
     done = subprocess.run(
-        [sys.executable, "-c", code], cwd=Path(__file__).parents[1], stdout=subprocess.PIPE,
-        text=True, check=True,
-    )  # fmt: skip
+        [sys.executable, "-c", code],
+        cwd=Path(__file__).parents[1],
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+    )
     count, seconds, most = done.stdout.split()
     return Figures(int(count), float(seconds), int(most))
 

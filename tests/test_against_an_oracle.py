@@ -58,8 +58,16 @@ def oracle(law, C, weight, F_c, F_s, v_s, times, speeds):
                 def gap(u, z_of=z_of, sign=sign):
                     return sign * z_of(u) - s_of(u)
             else:
-                arc = solve_ivp(slip, (t, b), [z], "DOP853", rtol=1e-11, atol=1e-13, args=(sign,),
-                                dense_output=True)  # fmt: skip
+                arc = solve_ivp(
+                    slip,
+                    (t, b),
+                    [z],
+                    "DOP853",
+                    rtol=1e-11,
+                    atol=1e-13,
+                    args=(sign,),
+                    dense_output=True,
+                )
 
                 def z_of(u, arc=arc):
                     return float(arc.sol(u)[0])
@@ -125,17 +133,26 @@ def test_same_events_same_deflections(case):
         assume([e[1:] for e in near] == [e[1:] for e in events])
     n = len(case["C"])
     parameters = GMSParameters(
-        [1.0] * n, [0.1] * n, case["C"], sigma_2=0.1,
-        stribeck=Stribeck(case["F_c"], case["F_s"], case["v_s"]), v_c=V_C, weights=case["weights"],
-    )  # fmt: skip
+        [1.0] * n,
+        [0.1] * n,
+        case["C"],
+        sigma_2=0.1,
+        stribeck=Stribeck(case["F_c"], case["F_s"], case["v_s"]),
+        v_c=V_C,
+        weights=case["weights"],
+    )
     times = case["times"]
     trace = simulate(
-        GMS(parameters, law=case["law"]), Prescribed(list(zip(times, case["speeds"], strict=True))),
-        times[-1], rtol=1e-9, atol=1e-12,
-    )  # fmt: skip
+        GMS(parameters, law=case["law"]),
+        Prescribed(list(zip(times, case["speeds"], strict=True))),
+        times[-1],
+        rtol=1e-9,
+        atol=1e-12,
+    )
     assert event_sequence(trace) == [(i, edge) for _, i, edge in events]
-    np.testing.assert_allclose(trace.transitions.t, [t for t, _, _ in events], rtol=0,
-                               atol=1e-6 * times[-1])  # fmt: skip
+    np.testing.assert_allclose(
+        trace.transitions.t, [t for t, _, _ in events], rtol=0, atol=1e-6 * times[-1]
+    )
     np.testing.assert_allclose(trace.z[-1], z, rtol=0, atol=1e-6 * max(1.0, np.abs(z).max()))
 
 
@@ -152,5 +169,7 @@ def test_the_oracle_meets_all_edges():
         [0.5, 0.4, -0.6, 0.5],
     )
     assert {edge for _, _, edge in events} == {
-        "break_away_forward", "break_away_backward", "arrest"
-    }  # fmt: skip
+        "break_away_forward",
+        "break_away_backward",
+        "arrest",
+    }

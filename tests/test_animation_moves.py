@@ -85,8 +85,12 @@ def test_the_active_state_moves_with_the_run(tmp_path: Path) -> None:
         """Height of the border of the active state."""
         wanted = tuple(round(255 * part) for part in to_rgb(colours.active))
         width, height = picture.size
-        rows = [y for y in range(height) for x in range(0, width, 2)
-                if picture.getpixel((x, y)) == wanted]  # fmt: skip
+        rows = [
+            y
+            for y in range(height)
+            for x in range(0, width, 2)
+            if picture.getpixel((x, y)) == wanted
+        ]
         return sum(rows) / len(rows)
 
     assert centre(after) > centre(before) + 50  # slip lies under stick
@@ -103,8 +107,13 @@ def test_one_layout_serves_all_frames(tmp_path: Path, monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(plots.live_chart, "drawn", counted)
     told: list[tuple[int, int]] = []
-    animate(bank(), tmp_path / "run.gif", elements=[1], frames=20,
-            progress=lambda *each: told.append(each))  # fmt: skip
+    animate(
+        bank(),
+        tmp_path / "run.gif",
+        elements=[1],
+        frames=20,
+        progress=lambda *each: told.append(each),
+    )
     assert len(calls) == 1
     assert told == [(k, 20) for k in range(1, 21)]
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from gms_fsm import GMS, GMSParameters, LuGre, Prescribed, PulledSlider, Slider, Stribeck
-from gms_fsm.rigs import Rig
-from gms_fsm.scenario import load_scenario
-from gms_fsm.signals import Formula
+from gms_fsm.app.scenario import load_scenario
+from gms_fsm.systems.rigs import Rig
+from gms_fsm.systems.signals import Formula
 from tests.helpers import pulled_mass
 from tests.scaled import AXES, Case, factors, other_bits, scaled, sequence
 from tests.test_scenarios_run import SHIPPED, data_folder
@@ -67,12 +67,15 @@ def test_pulled_mass_of_any_size(length: float) -> None:
 
 
 @pytest.mark.parametrize("axis", AXES)
-@pytest.mark.parametrize("rig", [
-    PulledSlider(1.0, 2.0, 0.1),
-    Slider(1.0, "max(1.4*sin(-t), t**2/9)"),
-    Slider(1.0, [(0, 0), (1, 2.0), (3, -1.0)]),
-    Prescribed("0.2*sin(2*pi*t/20)"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "rig",
+    [
+        PulledSlider(1.0, 2.0, 0.1),
+        Slider(1.0, "max(1.4*sin(-t), t**2/9)"),
+        Slider(1.0, [(0, 0), (1, 2.0), (3, -1.0)]),
+        Prescribed("0.2*sin(2*pi*t/20)"),
+    ],
+)
 def test_fixed_steps_scale_to_the_bit(axis: str, rig: Rig) -> None:
     """Without tolerances there is nothing to set but the units: `scaled` has them right."""
     model, _ = pulled_mass()
@@ -93,7 +96,8 @@ def test_a_wrong_unit_is_seen() -> None:
     right = scaled(case, **by)
     assert isinstance(right.model, GMS)
     p, old = right.model.parameters, model.parameters
-    wrong = GMSParameters(old.k, p.sigma, p.C, sigma_2=p.sigma_2, stribeck=p.stribeck, v_c=p.v_c,
-                          weights=p.weights)  # fmt: skip
+    wrong = GMSParameters(
+        old.k, p.sigma, p.C, sigma_2=p.sigma_2, stribeck=p.stribeck, v_c=p.v_c, weights=p.weights
+    )
     trace = Case(GMS(wrong, law="signed"), right.rig, right.arguments).run("ifelse")
     assert {"x", "v", "z", "F"} <= set(other_bits(trace, case.run("ifelse"), **by))

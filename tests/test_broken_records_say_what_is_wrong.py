@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import Trace
-from gms_fsm.files import LIST
+from gms_fsm._files import LIST
 from tests.scenario_files import (
     MEASURED,
     CommandLine,
@@ -45,7 +45,8 @@ def row(number: int, text: str) -> bytes:
 CONTENTS: dict[str, tuple[bytes, tuple[str, ...]]] = {
     # cells
     "text in a number column": (
-        row(5, "0.03,abc,1"), ("row 5", "column 'x'", "'abc'", "number", "where = "),
+        row(5, "0.03,abc,1"),
+        ("row 5", "column 'x'", "'abc'", "number", "where = "),
     ),
     "an empty cell": (row(5, "0.03,,1"), ("row 5", "column 'x'", "''", "number")),
     "a unit in a cell": (row(5, "0.03,1 mm,1"), ("row 5", "column 'x'", "'1 mm'", "number")),
@@ -73,42 +74,42 @@ CONTENTS: dict[str, tuple[bytes, tuple[str, ...]]] = {
     "a comment below": (GOOD.encode() + b"# the end\n", ("row 62", "1 cells", "3")),
     "a quote that never closes": (row(5, '"0.03,1,1'), ("row 5",)),
     "a quote that never closes, and a long file": (
-        row(5, '"0.03,1,1') + b"0,0,0\n" * 50_000, ("row 5", "field"),
+        row(5, '"0.03,1,1') + b"0,0,0\n" * 50_000,
+        ("row 5", "field"),
     ),
     # time
     "time that goes backward": (
-        row(10, "0.01,1,1"), ("after row 9", "0.07", "0.01", "does not increase"),
+        row(10, "0.01,1,1"),
+        ("after row 9", "0.07", "0.01", "does not increase"),
     ),
-    "time that stands still": (
-        row(10, "0.07,1,1"), ("after row 9", "0.07", "does not increase"),
-    ),
+    "time that stands still": (row(10, "0.07,1,1"), ("after row 9", "0.07", "does not increase")),
     "time that falls all along": (
-        table(["t", "x", "F"], -EVEN, EVEN, EVEN).encode(), ("after rows 2, 3, 4, 5, 6 and 54",),
+        table(["t", "x", "F"], -EVEN, EVEN, EVEN).encode(),
+        ("after rows 2, 3, 4, 5, 6 and 54",),
     ),
     # heads
     "a missing column": (
-        b"t,pos,F\n0,0,0\n1,1,1\n", ("no column 'x'", "'t', 'pos', 'F'", "position = {"),
+        b"t,pos,F\n0,0,0\n1,1,1\n",
+        ("no column 'x'", "'t', 'pos', 'F'", "position = {"),
     ),
     "columns divided by |": (
-        GOOD.replace(",", "|").encode(), ("no column 't'", "'t|x|F'", "delimiter = "),
+        GOOD.replace(",", "|").encode(),
+        ("no column 't'", "'t|x|F'", "delimiter = "),
     ),
     "a column twice": (b"t,x,F,x\n0,0,0,0\n1,1,1,1\n", ("several columns 'x'",)),
     "no head line": (GOOD.partition("\n")[2].encode(), ("no column 't'", "'0.0'")),
-    "units in the second line": (
-        row(2, "s,mm,N"), ("row 2", "column 't'", "'s'", "number"),
-    ),
+    "units in the second line": (row(2, "s,mm,N"), ("row 2", "column 't'", "'s'", "number")),
     # sizes
     "an empty file": (b"", ("line 1 is empty", "name the columns")),
     "an empty first line": (b"\n" + GOOD.encode(), ("line 1 is empty", "name the columns")),
     "a head line only": (b"t,x,F\n", ("0 row(s)", "at least")),
     "one row": (b"t,x,F\n0,0,0\n", ("1 row(s)", "at least")),
     "four rows": (b"t,x,F\n0,0,0\n1,1,1\n2,2,2\n3,3,3\n", ("4 rows", "at least 5")),
-    "a line of 2 MB": (
-        b"t,x,F\n0,0," + b"1" * 2_000_000 + b"\n", ("line 2", "longer than 100000"),
-    ),
+    "a line of 2 MB": (b"t,x,F\n0,0," + b"1" * 2_000_000 + b"\n", ("line 2", "longer than 100000")),
     "a head line of 2 MB": (b"t" * 2_000_000, ("line 1", "longer than 100000")),
     "a line of 2 MB far down": (
-        GOOD.encode() + b"7" * 2_000_000, ("line 62", "longer than 100000"),
+        GOOD.encode() + b"7" * 2_000_000,
+        ("line 62", "longer than 100000"),
     ),
     # not a text table
     "binary": (bytes(range(256)) * 50, ("line 1", "binary")),
@@ -117,57 +118,62 @@ CONTENTS: dict[str, tuple[bytes, tuple[str, ...]]] = {
     "Latin-1": (GOOD.replace("F", "µ", 1).encode("latin-1"), ("line 1", "UTF-8")),
     "a picture": (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", ("line 1", "UTF-8")),
     "an archive": (b"PK\x03\x04\x14\0\x06\0", ("line 1", "binary")),
-}  # fmt: skip
+}
 
 # what is broken -> (old, new) text of the scenario, and what the message must say
 TABLES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     "an unknown unit": (
-        ('"mm"', '"furlong"'), ("broken.toml", "record", "'furlong'", "m, cm, mm, um, nm, in"),
+        ('"mm"', '"furlong"'),
+        ("broken.toml", "record", "'furlong'", "m, cm, mm, um, nm, in"),
     ),
     "a unit of something else": (
-        ('"mm"', '"ms"'), ("broken.toml", "record", "'ms'", "time", "position", "m, cm, mm"),
+        ('"mm"', '"ms"'),
+        ("broken.toml", "record", "'ms'", "time", "position", "m, cm, mm"),
     ),
     "a unit in capitals": (('"mm"', '"MM"'), ("broken.toml", "'MM'", "m, cm, mm")),
     "no unit": ((', unit = "mm"', ""), ("broken.toml", "record.position.unit is missing")),
-    "a typo": (
-        ('"N" }', '"N", sgin = -1 }'), ("record.force.sgin", "-1", "did you mean 'sign'?"),
-    ),
+    "a typo": (('"N" }', '"N", sgin = -1 }'), ("record.force.sgin", "-1", "did you mean 'sign'?")),
     "a sign of 2": (('"N" }', '"N", sign = 2 }'), ("record.force.sign", "2", "1 or -1")),
     "an unknown quantity": (("force =", "friction ="), ("record.friction", "unknown key", "force")),
     "another column": (
-        ('column = "x"', 'column = "pos"'), ("own.csv", "'pos'", "position", "'t', 'x', 'F'"),
+        ('column = "x"', 'column = "pos"'),
+        ("own.csv", "'pos'", "position", "'t', 'x', 'F'"),
     ),
     "a column that looks like markup": (
-        ('column = "x"', 'column = "[bold]x:warning:"'), ("own.csv", "'[bold]x:warning:'"),
+        ('column = "x"', 'column = "[bold]x:warning:"'),
+        ("own.csv", "'[bold]x:warning:'"),
     ),
     "no time": (('time = { column = "t", unit = "s" }\n', ""), ("record.time is missing",)),
-    "no motion": (
-        ('position = { column = "x", unit = "mm" }\n', ""), ("velocity", "position = {"),
-    ),
+    "no motion": (('position = { column = "x", unit = "mm" }\n', ""), ("velocity", "position = {")),
     "another folder": (
-        ('"own.csv"', '"../own.csv"'), ("broken.toml", "'../own.csv'", "outside", "GMS_FSM_DATA"),
+        ('"own.csv"', '"../own.csv"'),
+        ("broken.toml", "'../own.csv'", "outside", "GMS_FSM_DATA"),
     ),
     "an absolute path": (('"own.csv"', '"/etc/passwd"'), ("'/etc/passwd'", "outside")),
-    "out and in again": (
-        ('"own.csv"', '"sub/../../own.csv"'), ("'sub/../../own.csv'", "outside"),
-    ),
+    "out and in again": (('"own.csv"', '"sub/../../own.csv"'), ("'sub/../../own.csv'", "outside")),
     "no such file": (
-        ('"own.csv"', '"gone.csv"'), ("broken.toml", "'gone.csv'", "no such file", "GMS_FSM_DATA"),
+        ('"own.csv"', '"gone.csv"'),
+        ("broken.toml", "'gone.csv'", "no such file", "GMS_FSM_DATA"),
     ),
     "a negative smoothing": (
-        ('file = "own.csv"', 'file = "own.csv"\nsmoothing = -1.0'), ("record.smoothing", "-1.0"),
+        ('file = "own.csv"', 'file = "own.csv"\nsmoothing = -1.0'),
+        ("record.smoothing", "-1.0"),
     ),
     "a smoothing beyond all bounds": (
-        ('file = "own.csv"', 'file = "own.csv"\nsmoothing = 1e100'), ("smoothing", "1e+100"),
+        ('file = "own.csv"', 'file = "own.csv"\nsmoothing = 1e100'),
+        ("smoothing", "1e+100"),
     ),
     "two delimiters": (
-        ('file = "own.csv"', 'file = "own.csv"\ndelimiter = ";;"'), ("record.delimiter", "';;'"),
+        ('file = "own.csv"', 'file = "own.csv"\ndelimiter = ";;"'),
+        ("record.delimiter", "';;'"),
     ),
     "a wrong delimiter": (
-        ('file = "own.csv"', 'file = "own.csv"\ndelimiter = ";"'), ("own.csv", "'t,x,F'"),
+        ('file = "own.csv"', 'file = "own.csv"\ndelimiter = ";"'),
+        ("own.csv", "'t,x,F'"),
     ),
     "a line end as delimiter": (
-        ('file = "own.csv"', 'file = "own.csv"\ndelimiter = "\\n"'), ("delimiter",),
+        ('file = "own.csv"', 'file = "own.csv"\ndelimiter = "\\n"'),
+        ("delimiter",),
     ),
     # the selection
     "a selection that nothing fulfils": (
@@ -212,15 +218,15 @@ TABLES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     ),
     # the run over it
     "a start before the record": (
-        ("[output]", "[run]\nt_start = -1.0\n[output]"), ("0.59", "-1.0", "within the record"),
+        ("[output]", "[run]\nt_start = -1.0\n[output]"),
+        ("0.59", "-1.0", "within the record"),
     ),
-    "a start after the record": (
-        ("[output]", "[run]\nt_start = 0.7\n[output]"), ("0.59", "0.7"),
-    ),
+    "a start after the record": (("[output]", "[run]\nt_start = 0.7\n[output]"), ("0.59", "0.7")),
     "an end before the record": (
-        ("[output]", "[run]\nt_end = -0.7\n[output]"), ("t_end", "-0.7", "later"),
+        ("[output]", "[run]\nt_end = -0.7\n[output]"),
+        ("t_end", "-0.7", "later"),
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("broken", CONTENTS)
@@ -332,10 +338,13 @@ def test_the_program_itself_says_one_line(tmp_path: Path) -> None:
     (tmp_path / "scenario.toml").write_text(MEASURED)
     (tmp_path / "own.csv").write_bytes(row(5, "0.03,abc,1"))
     done = subprocess.run(
-        [sys.executable, "-c", "from gms_fsm.cli import main; main()", "run", "scenario.toml"],
-        capture_output=True, text=True, cwd=tmp_path, check=False,
+        [sys.executable, "-c", "from gms_fsm.app.cli import main; main()", "run", "scenario.toml"],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        check=False,
         env={**os.environ, "COLUMNS": "80", "PYTHONPATH": str(Path(__file__).parents[1])},
-    )  # fmt: skip
+    )
     assert done.returncode == 2
     assert done.stdout == ""
     assert done.stderr.splitlines() == [

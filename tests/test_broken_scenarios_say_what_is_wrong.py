@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import Trace
-from gms_fsm.files import LIST
+from gms_fsm._files import LIST
 from tests.scenario_files import (
     OPEN_LOOP,
     CommandLine,
@@ -120,66 +120,71 @@ CHANGES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     "an end before the start": (("t_end = 1.0", "t_end = -1.0"), ("t_end", "-1.0", "later")),
     "no time at all": (("t_end = 1.0", "t_end = 0.0"), ("t_end", "0.0", "later")),
     "a negative step": (
-        ("t_end = 1.0", "t_end = 1.0\nstep = -0.1"), ("run.step", "-0.1", "greater than 0"),
+        ("t_end = 1.0", "t_end = 1.0\nstep = -0.1"),
+        ("run.step", "-0.1", "greater than 0"),
     ),
     "a step under the clock": (
-        ("t_end = 1.0", "t_end = 1.0\nmax_step = 1e-18"), ("max_step", "1e-18", "clock"),
+        ("t_end = 1.0", "t_end = 1.0\nmax_step = 1e-18"),
+        ("max_step", "1e-18", "clock"),
     ),
     "no step for a method without error estimate": (
-        ("t_end = 1.0", 't_end = 1.0\nmethod = "rk4"'), ("method", "'rk4'", "step"),
+        ("t_end = 1.0", 't_end = 1.0\nmethod = "rk4"'),
+        ("method", "'rk4'", "step"),
     ),
     "events per step without a step": (
-        ("t_end = 1.0", 't_end = 1.0\nevents = "step"'), ("events", "'step'", "max_step"),
+        ("t_end = 1.0", 't_end = 1.0\nevents = "step"'),
+        ("events", "'step'", "max_step"),
     ),
     "a tolerance of 0": (("t_end = 1.0", "t_end = 1.0\nrtol = 0.0"), ("run.rtol", "greater")),
     "a negative stiffness": (
-        ("[100.0, 50.0]", "[100.0, -50.0]"), ("[model] k", "element 2", "-50.0", "> 0"),
+        ("[100.0, 50.0]", "[100.0, -50.0]"),
+        ("[model] k", "element 2", "-50.0", "> 0"),
     ),
-    "less stiction than friction": (
-        ("F_s = 1.5", "F_s = 0.5"), ("F_s", "0.5", "F_s >= F_c"),
-    ),
+    "less stiction than friction": (("F_s = 1.5", "F_s = 0.5"), ("F_s", "0.5", "F_s >= F_c")),
     "a mass of 0": (
         ('kind = "prescribed"\nvelocity =', 'kind = "slider"\nmass = 0.0\nforce ='),
         ("[rig] mass", "0.0", "> 0"),
     ),
-    "a row a picosecond": (
-        ("figures = []", "every = 1e-12"), ("output.every", "1e-12", "rows"),
-    ),
+    "a row a picosecond": (("figures = []", "every = 1e-12"), ("output.every", "1e-12", "rows")),
     "a negative row distance": (("figures = []", "every = -1.0"), ("output.every", "-1.0")),
     # lengths
     "too many C": (("[0.1, 0.1]", "[0.1, 0.1, 0.1]"), ("[model] C", "3 entries", "2 elements")),
     "no elements": (("[100.0, 50.0]", "[]"), ("[model] k", "empty")),
     "too few initial z": (
-        ("[output]", "[initial]\nz = [0.0]\n[output]"), ("initial", "z", "1 entries", "2 elements"),
+        ("[output]", "[initial]\nz = [0.0]\n[output]"),
+        ("initial", "z", "1 entries", "2 elements"),
     ),
     "an unknown initial state": (
         ("[output]", '[initial]\nstates = ["stick", "slide"]\n[output]'),
         ("'slide'", "'stick', 'slip'"),
     ),
     "an initial velocity of a prescribed motion": (
-        ("[output]", "[initial]\nv = 0.1\n[output]"), ("initial", "'v'", "0.1", "prescribes"),
+        ("[output]", "[initial]\nv = 0.1\n[output]"),
+        ("initial", "'v'", "0.1", "prescribes"),
     ),
     # forms of parameters
-    "preset and parameters": (
-        (MODEL, PAPER + "v_c = 1e-6\n"), ("[model] preset", "take out v_c"),
-    ),
+    "preset and parameters": ((MODEL, PAPER + "v_c = 1e-6\n"), ("[model] preset", "take out v_c")),
     "shares that are not everything": (
-        (SHARES[0], "C = 2.0\nshares = [0.5, 0.4]"), ("[model]", "shares", "0.9", "add up to 1"),
+        (SHARES[0], "C = 2.0\nshares = [0.5, 0.4]"),
+        ("[model]", "shares", "0.9", "add up to 1"),
     ),
     "too many shares": (
         (SHARES[0], "C = 2.0\nshares = [0.5, 0.3, 0.2]"),
         ("[model]", "shares", "3 entries", "2 elements"),
     ),
     "a negative share": (
-        (SHARES[0], "C = 2.0\nshares = [1.5, -0.5]"), ("[model]", "shares", "-0.5", "> 0"),
+        (SHARES[0], "C = 2.0\nshares = [1.5, -0.5]"),
+        ("[model]", "shares", "-0.5", "> 0"),
     ),
     "shares with a list of C": (
-        (SHARES[0], "C = [0.1, 0.1]\nshares = [0.5, 0.5]"), ("[model] shares", "one number C"),
+        (SHARES[0], "C = [0.1, 0.1]\nshares = [0.5, 0.5]"),
+        ("[model] shares", "one number C"),
     ),
     "one C for all": (("C = [0.1, 0.1]", "C = 2.0"), ("[model] C", "list", "shares")),
     # signals
     "an expression that ends early": (
-        ("sin(t)", "sin(t"), ("rig.velocity", "'0.1*sin(t'", "column"),
+        ("sin(t)", "sin(t"),
+        ("rig.velocity", "'0.1*sin(t'", "column"),
     ),
     "an unknown name": (("sin(t)", "sin(x)"), ("rig.velocity", "column 9", "'x'", "names t")),
     "a name that is an emoji elsewhere": (("0.1*sin(t)", ":warning:"), ("':warning:'",)),
@@ -188,7 +193,8 @@ CHANGES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
         ("rig.velocity", "__import__", "column 1"),
     ),
     "a corner of three numbers": (
-        ('"0.1*sin(t)"', "[[0.0, 0.0, 1.0], [1.0, 1.0, 2.0]]"), ("rig.velocity", "[0.0, 0.0, 1.0]"),
+        ('"0.1*sin(t)"', "[[0.0, 0.0, 1.0], [1.0, 1.0, 2.0]]"),
+        ("rig.velocity", "[0.0, 0.0, 1.0]"),
     ),
     "one corner": (('"0.1*sin(t)"', "[[0.0, 0.1]]"), ("rig.velocity", "[[0.0, 0.1]]", "at least")),
     "no corner": (('"0.1*sin(t)"', "[]"), ("rig.velocity", "[]", "(t, value)")),
@@ -198,15 +204,17 @@ CHANGES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     ),
     # sizes
     "a very long expression": (
-        ("0.1*sin(t)", "t + " * 50_000 + "x"), ("rig.velocity", "t + t + t"),
+        ("0.1*sin(t)", "t + " * 50_000 + "x"),
+        ("rig.velocity", "t + t + t"),
     ),
     "a very long value of an unknown key": (
-        ("t_end = 1.0", f"t_end = 1.0\nend = '{'a' * 100_000}'"), ("run.end", "unknown key"),
+        ("t_end = 1.0", f"t_end = 1.0\nend = '{'a' * 100_000}'"),
+        ("run.end", "unknown key"),
     ),
     "a deep expression": (("0.1*sin(t)", "(" * 5000 + "t" + ")" * 5000), ("rig.velocity",)),
     "a number of 5000 digits": (("t_end = 1.0", f"t_end = 1{'0' * 5000}"), ()),
     "a key 3000 tables deep": (("[run]", f"{'a.' * 3000}b = 1\n[run]"), ()),
-}  # fmt: skip
+}
 
 # files that are no scenario at all
 BYTES: dict[str, tuple[bytes, tuple[str, ...]]] = {
@@ -324,10 +332,13 @@ def test_a_measured_signal_that_is_too_short_keeps_its_part(
 def process(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     root = str(Path(__file__).parents[1])
     return subprocess.run(
-        [sys.executable, "-c", "from gms_fsm.cli import main; main()", *arguments],
-        capture_output=True, text=True, cwd=cwd, check=False,
+        [sys.executable, "-c", "from gms_fsm.app.cli import main; main()", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        check=False,
         env={**os.environ, "COLUMNS": "200", "PYTHONPATH": root},
-    )  # fmt: skip
+    )
 
 
 def test_the_program_itself_says_one_line(tmp_path: Path) -> None:

@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 
 from gms_fsm import GMS, Element, ElementMachines, Prescribed, Trace, simulate
-from gms_fsm.errors import CallbackError, ParameterError
+from gms_fsm.errors import ParameterError
+from gms_fsm.traces.failures import CallbackError
 from tests.helpers import open_loop, same_bits, stick_slip
 
 ENGINES = ["machines", "compiled"]

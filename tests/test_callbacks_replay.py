@@ -27,9 +27,10 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.charts import gms_element
-from gms_fsm.errors import CallbackError, ChartError, LivelockError, ParameterError
-from gms_fsm.models import Model
-from gms_fsm.rigs import Rig
+from gms_fsm.errors import ChartError, ParameterError
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.rigs import Rig
+from gms_fsm.traces.failures import CallbackError, LivelockError
 from tests.helpers import (
     CURVE,
     non_drifting,
@@ -121,26 +122,37 @@ def test_the_values_are_those_of_the_log() -> None:
 
 def test_the_second_firing_at_one_time_sees_what_the_first_assigned() -> None:
     chart = Chart(
-        "chain", ("t",), ("z",), (),
+        "chain",
+        ("t",),
+        ("z",),
+        (),
         (State("a", {"z": "0"}), State("b", {"z": "0"}), State("c", {"z": "0"})),
         (
             Transition("one", "a", "b", "t >= 1", actions={"z": "10 * z"}),
             Transition("two", "b", "c", "z > 5"),
         ),
         {"F": "z"},
-    )  # fmt: skip
+    )
     model = ChartModel(chart, {}, n=3, stribeck=CURVE)
     seen = []
     for engine in ("machines", "compiled"):
         machines, calls = _watched(model)
         simulate(
-            model, Prescribed("0"), 2.0, engine=engine, machines=machines,
+            model,
+            Prescribed("0"),
+            2.0,
+            engine=engine,
+            machines=machines,
             initial={"z": [1.0, 0.1, 2.0]},
-        )  # fmt: skip
+        )
         exits = [call for call in calls if call[0] == "on_exit"]
         assert [call[1:3] for call in exits] == [
-            ("one", 0), ("one", 1), ("one", 2), ("two", 0), ("two", 2),
-        ]  # fmt: skip
+            ("one", 0),
+            ("one", 1),
+            ("one", 2),
+            ("two", 0),
+            ("two", 2),
+        ]
         assert [call[8] for call in exits] == [1.0, 0.1, 2.0, 10.0, 20.0]
         assert [e.state for e in machines.elements] == ["c", "b", "c"]
         seen.append(calls)
@@ -171,9 +183,13 @@ def test_every_element_starts_in_its_own_state() -> None:
     states = ["stick", "slip", "slip", "stick"]
     initial = {"states": states, "z": [0.0, 0.1, 0.2, 0.3]}
     simulate(
-        machines.model, Prescribed("0.1"), 0.5, engine="compiled", machines=machines,
+        machines.model,
+        Prescribed("0.1"),
+        0.5,
+        engine="compiled",
+        machines=machines,
         initial=initial,
-    )  # fmt: skip
+    )
     assert [e.state for e in machines.elements] == states
     assert calls == [], "being put into the initial state is no firing"
 
@@ -272,9 +288,14 @@ def test_a_livelock_was_seen_by_the_callbacks_too() -> None:
         Transition("arrest", "slip", "stick", guard="abs(v) <= v_c and abs(z) < 10 * s"),
     )
     chart = Chart(
-        "broken", sound.inputs, sound.variables, sound.parameters, sound.states, edges,
+        "broken",
+        sound.inputs,
+        sound.variables,
+        sound.parameters,
+        sound.states,
+        edges,
         sound.outputs,
-    )  # fmt: skip
+    )
     values = {"k": 1, "sigma": 0.1, "C": 0.1, "v_c": 0.2}
     model = ChartModel(chart, values, n=2, stribeck=CURVE, weights=[2, 1])
     seen = []

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from gms_fsm import GMS, Element, ElementMachines, Prescribed, Trace, simulate
-from gms_fsm.errors import CallbackError, ChartError, ParameterError
+from gms_fsm.errors import ChartError, ParameterError
+from gms_fsm.traces.failures import CallbackError
 from tests.helpers import one_element, open_loop, pulled_mass, same_bits, stick_slip
 
 Call = tuple[str, float, int, str, float, float, float]
@@ -199,9 +200,12 @@ def test_every_element_starts_in_its_own_state(model: GMS) -> None:
         getattr(machines.machine, register)(_note(register, calls))
     states = ["stick", "slip", "slip", "stick"]
     trace = simulate(
-        model, Prescribed("0.1"), 0.5, engine=machines,
+        model,
+        Prescribed("0.1"),
+        0.5,
+        engine=machines,
         initial={"states": states, "z": [0.0, 0.1, 0.2, 0.3]},
-    )  # fmt: skip
+    )
     assert trace.states[0].tolist() == states
     assert trace.z[0].tolist() == [0.0, 0.1, 0.2, 0.3]
     assert calls == [], "being put into the initial state is no firing"

@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
-from gms_fsm.chart import RESERVED, Chart, State, Transition
+from gms_fsm.charts.chart import RESERVED, Chart, State, Transition
 from gms_fsm.errors import ChartError, ExpressionError
-from gms_fsm.expression import CONSTANTS, FUNCTIONS, spell
+from gms_fsm.language.expression import CONSTANTS, FUNCTIONS, spell
 
 STICK = State("stick", flow={"z": "v"})
 SLIP = State("slip", flow={"z": "C * (sgn(v) - z / s)"})
@@ -26,10 +26,14 @@ BACK = Transition("back", "slip", "stick", guard="abs(v) <= v_c")
 def chart(**changes: Any) -> Chart:
     """A sound chart, with changes."""
     sound: dict[str, Any] = {
-        "name": "rubber", "inputs": ("v", "s"), "variables": ("z",),
-        "parameters": ("k", "C", "v_c"), "states": (STICK, SLIP), "transitions": (GO, BACK),
+        "name": "rubber",
+        "inputs": ("v", "s"),
+        "variables": ("z",),
+        "parameters": ("k", "C", "v_c"),
+        "states": (STICK, SLIP),
+        "transitions": (GO, BACK),
         "outputs": {"F": "k * z + 0.1 * dz"},
-    }  # fmt: skip
+    }
     return Chart(**{**sound, **changes})
 
 
@@ -111,7 +115,7 @@ def test_a_state_asked_for_by_a_wrong_name_is_refused_with_the_right_ones() -> N
         ({"parameters": ("k", "C", "v_c", "e\u0301")}, ["NFKC"]),
         (edge(name="\U0001d467"), ["NFKC"]),
     ],
-)  # fmt: skip
+)
 def test_a_contradiction_is_refused_with_its_place(
     changes: dict[str, Any], words: list[str]
 ) -> None:

@@ -7,7 +7,7 @@ like that would never end.
 import pytest
 
 from gms_fsm import simulate
-from gms_fsm.errors import LivelockError
+from gms_fsm.traces.failures import LivelockError
 from tests.test_monitors_see_what_happens import SLOWING, memoryless
 
 
@@ -25,9 +25,12 @@ def test_the_error_names_the_element_and_says_that_it_chatters(weights, element,
     assert 50 <= len(log) <= 100
     assert 0.0 < log.t[-1] - log.t[0] < 1e-8
     for part in (
-        f"element {element} switched {len(log)} times in ", f"at t = {t}", "chattering",
-        f"last by '{log.edge[-1]}' from {log.source[-1]} to {log.target[-1]}", "leave a gap",
-    ):  # fmt: skip
+        f"element {element} switched {len(log)} times in ",
+        f"at t = {t}",
+        "chattering",
+        f"last by '{log.edge[-1]}' from {log.source[-1]} to {log.target[-1]}",
+        "leave a gap",
+    ):
         assert part in text
     assert "sliding mode" not in text
 

@@ -10,13 +10,17 @@ from xml.etree import ElementTree
 import pytest
 
 import plots
+from gms_fsm._files import LIST
 from gms_fsm.charts.broken import BROKEN
 from gms_fsm.errors import ParameterError
-from gms_fsm.files import LIST
 from tests.scenario_files import CommandLine, command_line, one_message
 
-EXPECTED = {"overlap": "livelock", "literal": "livelock", "memoryless": "chattering",
-            "arms": "determinism"}  # fmt: skip
+EXPECTED = {
+    "overlap": "livelock",
+    "literal": "livelock",
+    "memoryless": "chattering",
+    "arms": "determinism",
+}
 
 
 @pytest.fixture
@@ -134,8 +138,11 @@ def test_without_z3_the_message_names_the_extra(
 # --------------------------------------------------------------------------- marked charts
 def classes(path: Path) -> dict[str, set[str]]:
     """The classes of each named part of an SVG."""
-    return {node.get("id", ""): set(node.get("class", "").split())
-            for node in ElementTree.parse(path).iter() if node.get("class")}  # fmt: skip
+    return {
+        node.get("id", ""): set(node.get("class", "").split())
+        for node in ElementTree.parse(path).iter()
+        if node.get("class")
+    }
 
 
 def marked(path: Path) -> set[str]:

@@ -21,10 +21,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-import gms_fsm
 from gms_fsm import Prescribed, Session, Slider, simulate
 from gms_fsm.errors import CheckpointError, OutputError, ParameterError, SignalError
-from gms_fsm.identity import identity
+from gms_fsm.run._identity import identity
 from integrators import loop
 from tests.helpers import open_loop, same_bits, stick_slip
 
@@ -44,7 +43,7 @@ ENGINES = [
 @pytest.fixture(autouse=True)
 def _short_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have a compiled run come back often enough to be interrupted."""
-    monkeypatch.setattr("gms_fsm.compiled_run.STEPS_AT_ONCE", 60)
+    monkeypatch.setattr("gms_fsm.run._compiled_run.STEPS_AT_ONCE", 60)
 
 
 def begun(path: Path, rig: Any, engine: str = "machines", **options: Any) -> None:
@@ -56,9 +55,15 @@ def begun(path: Path, rig: Any, engine: str = "machines", **options: Any) -> Non
 
     with pytest.raises(InterruptedError):
         simulate(
-            stick_slip("signed"), rig, 25.0, engine=engine, checkpoint=path, checkpoint_every=0.0,
-            progress=stop, **options,
-        )  # fmt: skip
+            stick_slip("signed"),
+            rig,
+            25.0,
+            engine=engine,
+            checkpoint=path,
+            checkpoint_every=0.0,
+            progress=stop,
+            **options,
+        )
 
 
 def goes_on(path: Path, rig: Any, engine: str = "machines", **options: Any) -> None:
@@ -163,7 +168,7 @@ def test_another_process_gives_the_same_identity() -> None:
 import math, numpy as np
 from math import cos
 from numpy import sin
-from gms_fsm.identity import identity
+from gms_fsm.run._identity import identity
 TABLE, LEVEL = np.linspace(0, 1, 5), 0.25
 def inner(t, *, scale=(1, 2.5)):
     return scale[0] * LEVEL * math.sin(t) + cos(t) + sin(t)
@@ -174,11 +179,15 @@ print(identity(outer("four")))
 """
     found = {
         subprocess.run(
-            [sys.executable, "-c", code], cwd=ROOT, env={**os.environ, "PYTHONHASHSEED": seed},
-            capture_output=True, text=True, check=True,
+            [sys.executable, "-c", code],
+            cwd=ROOT,
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            capture_output=True,
+            text=True,
+            check=True,
         ).stdout
         for seed in ("0", "1", "2")
-    }  # fmt: skip
+    }
     assert len(found) == 1
 
 
@@ -262,7 +271,7 @@ def test_a_rig_of_ones_own_is_refused_in_words(kind: str, tmp_path: Path) -> Non
 def test_another_version_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "run.checkpoint"
     with monkeypatch.context() as patch:
-        patch.setattr(gms_fsm, "__version__", "0.0.7")
+        patch.setattr("gms_fsm._version.__version__", "0.0.7")
         begun(path, open_loop())
     with pytest.raises(CheckpointError, match=r"begun by gms-fsm 0\.0\.7 .* this is gms-fsm "):
         goes_on(path, open_loop())

@@ -17,10 +17,10 @@ import pytest
 import scipy.integrate
 
 from gms_fsm import ElementMachines, Prescribed, Trace, simulate
-from gms_fsm.checkpoint import Keeper
+from gms_fsm.app.report import run_scenario
+from gms_fsm.app.scenario import load_scenario
 from gms_fsm.errors import CheckpointError, OutputError, ParameterError
-from gms_fsm.report import run_scenario
-from gms_fsm.scenario import load_scenario
+from gms_fsm.run._checkpoint import Keeper
 from tests.helpers import open_loop, pulled_mass, same_bits, stick_slip
 
 ENGINES = [
@@ -56,21 +56,27 @@ def interrupted(path: Path, after: int, *arguments: Any, **options: Any) -> Trac
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(
     "options",
-    [{}, {"t_eval": np.linspace(0, 25, 333)}, {"output": "end"}, {"method": "rk4", "step": 0.0101},
-     {"events": "step", "max_step": 0.05}],
+    [
+        {},
+        {"t_eval": np.linspace(0, 25, 333)},
+        {"output": "end"},
+        {"method": "rk4", "step": 0.0101},
+        {"events": "step", "max_step": 0.05},
+    ],
     ids=["all", "t_eval", "end", "rk4", "step"],
-)  # fmt: skip
+)
 def test_interrupted_again_and_again(
     engine: str, options: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gms_fsm.compiled_run.STEPS_AT_ONCE", 60)
+    monkeypatch.setattr("gms_fsm.run._compiled_run.STEPS_AT_ONCE", 60)
     model, rig = pulled_mass()
     whole = simulate(model, rig, 25.0, engine=engine, **options)
     path, rounds, trace = tmp_path / "run.checkpoint", 0, None
     while trace is None:
         rounds += 1
-        trace = interrupted(path, 3 if engine == "compiled" else 17, model, rig, 25.0,
-                            engine=engine, **options)  # fmt: skip
+        trace = interrupted(
+            path, 3 if engine == "compiled" else 17, model, rig, 25.0, engine=engine, **options
+        )
     assert rounds > 1
     assert not path.exists()
     same_bits(trace, whole)
@@ -137,11 +143,14 @@ def begun(path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"rtol": 1e-7}, "another"), ({"t_end": 26.0}, "another"), ({"output": "end"}, "another"),
-        ({"model": stick_slip("published")}, "another"), ({"rig": Prescribed("0.2")}, "another"),
+        ({"rtol": 1e-7}, "another"),
+        ({"t_end": 26.0}, "another"),
+        ({"output": "end"}, "another"),
+        ({"model": stick_slip("published")}, "another"),
+        ({"rig": Prescribed("0.2")}, "another"),
         ({"initial": {"x": 1.0}}, "another"),
     ],
-)  # fmt: skip
+)
 def test_a_checkpoint_of_another_run_is_refused(
     change: dict[str, Any], words: str, tmp_path: Path
 ) -> None:
@@ -172,9 +181,12 @@ def test_a_damaged_checkpoint_is_refused(damage: str, tmp_path: Path) -> None:
 def test_a_scipy_solver_cannot_be_kept(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="history"):
         simulate(
-            stick_slip("signed"), open_loop(), 5.0, method=scipy.integrate.Radau,
+            stick_slip("signed"),
+            open_loop(),
+            5.0,
+            method=scipy.integrate.Radau,
             checkpoint=tmp_path / "run.checkpoint",
-        )  # fmt: skip
+        )
 
 
 def test_a_folder_that_is_not_there_is_said_before_the_run(tmp_path: Path) -> None:
@@ -204,10 +216,21 @@ def test_the_command_line_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         run_scenario(loaded, tmp_path, stop, checkpoint=True)
     assert (tmp_path / "run.checkpoint").exists()
     done = subprocess.run(
-        [sys.executable, "-c", "from gms_fsm.cli import main; main()", "run", str(loaded.path),
-         "-o", str(tmp_path), "--checkpoint", "--set", "output.figures=[]"],
-        capture_output=True, text=True,
-    )  # fmt: skip
+        [
+            sys.executable,
+            "-c",
+            "from gms_fsm.app.cli import main; main()",
+            "run",
+            str(loaded.path),
+            "-o",
+            str(tmp_path),
+            "--checkpoint",
+            "--set",
+            "output.figures=[]",
+        ],
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stderr
     assert not (tmp_path / "run.checkpoint").exists()
     whole = simulate(loaded.model, loaded.rig, **loaded.arguments)

@@ -11,16 +11,19 @@ import pytest
 
 import gms_fsm
 from gms_fsm import GMS, GMSParameters, Prescribed
-from gms_fsm.program import lower
+from gms_fsm.lowering.program import lower
 
 
 def run(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     root = str(Path(__file__).parents[1])
     return subprocess.run(
-        [sys.executable, "-c", "from gms_fsm.cli import main; main()", *arguments],
-        capture_output=True, text=True, cwd=cwd, check=False,
+        [sys.executable, "-c", "from gms_fsm.app.cli import main; main()", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        check=False,
         env={**os.environ, "COLUMNS": "200", "PYTHONPATH": root},
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize("law", ["signed", "published"])

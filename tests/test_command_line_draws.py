@@ -53,8 +53,11 @@ def test_chart_and_blocks(folder: Path) -> None:
 def test_plot_animate_and_replay(folder: Path) -> None:
     lines = said(folder, "plot", "t.npz", "-o", "figures").split()
     assert {Path(line).name for line in lines} == {
-        "overview.png", "overview.svg", "ribbons.png", "ribbons.svg"
-    }  # fmt: skip
+        "overview.png",
+        "overview.svg",
+        "ribbons.png",
+        "ribbons.svg",
+    }
     said(folder, "animate", "t.npz", "-o", "film.gif", "--frames", "5")
     assert (folder / "film.gif").read_bytes().startswith(b"GIF8")
     pytest.importorskip("uplot", reason="the page needs the extra 'replay'")

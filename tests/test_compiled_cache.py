@@ -20,9 +20,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import Prescribed, compiled, simulate
-from gms_fsm.program import lower
-from gms_fsm.store import Store
+from gms_fsm import Prescribed, simulate
+from gms_fsm.lowering import _compiled as compiled
+from gms_fsm.lowering._store import Store
+from gms_fsm.lowering.program import lower
 from integrators import compiled as machine
 from integrators import loop, step_size
 from tests.helpers import open_loop, stick_slip
@@ -47,8 +48,9 @@ RUN = """
 ROWS = """
     import sys
     import numpy as np
-    from gms_fsm import GMS, GMSParameters, Prescribed, compiled
-    from gms_fsm.program import lower
+    from gms_fsm import GMS, GMSParameters, Prescribed
+    from gms_fsm.lowering import _compiled as compiled
+    from gms_fsm.lowering.program import lower
     model = GMS(GMSParameters.paper("stick-slip"), law="signed")
     t = np.linspace(0.0, 3.0, 50)
     y, mode = np.full((50, 5), 0.1), np.zeros((50, 4), dtype=np.int64)
@@ -66,9 +68,12 @@ ROWS = """
 def _start(code: str, *arguments: str, **environment: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, "-W", "error", "-c", textwrap.dedent(code), *arguments],
-        cwd=ROOT, env={**os.environ, **environment}, text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )  # fmt: skip
+        cwd=ROOT,
+        env={**os.environ, **environment},
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
 
 
 def _ended(process: subprocess.Popen[str]) -> tuple[str, str]:
@@ -311,9 +316,10 @@ def test_another_edition_signature_option_or_numba_is_kept_under_another_name(
 
     found = [name(), name("fiiVIP"), name(function=sum_of)]
     for place, attribute, value in (
-        (machine, "edition", lambda: "another"), (machine, "_OPTIONS", {"error_model": "python"}),
+        (machine, "edition", lambda: "another"),
+        (machine, "_OPTIONS", {"error_model": "python"}),
         (numba, "__version__", "0.0"),
-    ):  # fmt: skip
+    ):
         with monkeypatch.context() as patch:
             patch.setattr(place, attribute, value)
             found.append(name())
@@ -349,8 +355,9 @@ def test_settings_of_numba_are_as_they_were_whoever_compiles() -> None:
         import threading
         import numba
         import numpy as np
-        from gms_fsm import GMS, GMSParameters, Prescribed, compiled
-        from gms_fsm.program import lower
+        from gms_fsm import GMS, GMSParameters, Prescribed
+        from gms_fsm.lowering import _compiled as compiled
+        from gms_fsm.lowering.program import lower
         from integrators import compiled as machine
 
         before = numba.config.CACHE_DIR, numba.config.LOOP_VECTORIZE

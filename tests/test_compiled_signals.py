@@ -16,10 +16,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import Prescribed, Slider, Trace, compiled, simulate, sweep
-from gms_fsm.errors import NotFiniteError, SignalError, SimulationError
-from gms_fsm.rigs import Rig
-from gms_fsm.store import Store
+from gms_fsm import Prescribed, Slider, Trace, simulate, sweep
+from gms_fsm.errors import SignalError
+from gms_fsm.lowering import _compiled as compiled
+from gms_fsm.lowering._store import Store
+from gms_fsm.systems.rigs import Rig
+from gms_fsm.traces.failures import NotFiniteError, SimulationError
 from tests.helpers import event_sequence, non_drifting, same_bits, stick_slip
 
 numba = pytest.importorskip("numba", reason="needs the extra fast")
@@ -82,11 +84,17 @@ def _close(a: Trace, b: Trace) -> None:
 @pytest.mark.parametrize(
     "function",
     [
-        _sine, _of_numpy, _with_branches, _whole_numbers, _louder(0.3), _jitted, _jitted_eagerly,
+        _sine,
+        _of_numpy,
+        _with_branches,
+        _whole_numbers,
+        _louder(0.3),
+        _jitted,
+        _jitted_eagerly,
         _calls_compiled,
     ],
     ids=lambda function: getattr(function, "__name__", ""),
-)  # fmt: skip
+)
 def test_what_numba_can_compile_gives_the_same_trace(function: Signal) -> None:
     model, rig = stick_slip("signed"), Prescribed(function)
     traces = [simulate(model, rig, 9.0, engine=engine) for engine in ("machines", "compiled")]
@@ -181,9 +189,7 @@ REFUSED = {
 
 @pytest.mark.parametrize("kind", REFUSED)
 def test_what_numba_cannot_compile_is_refused_by_its_name(kind: str) -> None:
-    rigs: dict[str, Rig] = {
-        "v": Prescribed(REFUSED[kind]), "F_a": Slider(1.0, REFUSED[kind])
-    }  # fmt: skip
+    rigs: dict[str, Rig] = {"v": Prescribed(REFUSED[kind]), "F_a": Slider(1.0, REFUSED[kind])}
     for name, rig in rigs.items():
         with pytest.raises(SignalError) as caught:
             simulate(stick_slip("signed"), rig, 1.0, engine="compiled")
@@ -240,9 +246,14 @@ def test_with_the_end_only_time_and_state_belong_together() -> None:
     """The run raises amid steps; what is kept is a state that was reached at the time beside it."""
     with pytest.raises(SimulationError) as caught:
         simulate(
-            stick_slip("signed"), Prescribed(_too_late), 20.0, engine="compiled", output="end",
-            method="rk4", step=1e-2,
-        )  # fmt: skip
+            stick_slip("signed"),
+            Prescribed(_too_late),
+            20.0,
+            engine="compiled",
+            output="end",
+            method="rk4",
+            step=1e-2,
+        )
     end = caught.value.trace
     t = float(end.t[-1])
     assert 0.0 <= t <= 7.0
@@ -259,9 +270,13 @@ def test_the_next_run_is_not_disturbed() -> None:
 
 def test_in_a_sweep_it_is_the_outcome_of_its_run() -> None:
     result = sweep(
-        stick_slip("signed"), Prescribed(_too_late), 20.0, {"sigma_2": [0.1, 0.2, 0.1]},
-        output="t_eval", t_eval=[0.0, 1.0, 5.0, 10.0],
-    )  # fmt: skip
+        stick_slip("signed"),
+        Prescribed(_too_late),
+        20.0,
+        {"sigma_2": [0.1, 0.2, 0.1]},
+        output="t_eval",
+        t_eval=[0.0, 1.0, 5.0, 10.0],
+    )
     assert result.outcome.tolist() == ["SimulationError"] * 3
     assert result.transition_count.tolist() == [4] * 3
     assert np.isfinite(result.rows["F"][:, :3]).all()

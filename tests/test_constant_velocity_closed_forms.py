@@ -42,16 +42,22 @@ def test_a_slipping_element_follows_its_exponential(law, v, share, method):
     z0, T = share * s, 5 * s / C
     times = np.linspace(0.0, T, 41)
     trace = simulate(
-        one_element(law, C=C, sigma=sigma), Prescribed(v), T, t_eval=times,
-        initial={"z": [z0], "states": ["slip"]}, **TIGHT, **method,
-    )  # fmt: skip
+        one_element(law, C=C, sigma=sigma),
+        Prescribed(v),
+        T,
+        t_eval=times,
+        initial={"z": [z0], "states": ["slip"]},
+        **TIGHT,
+        **method,
+    )
     expected = slip_closed_form(law, v, z0, times)
     np.testing.assert_allclose(trace.z[:, 0], expected, rtol=1e-9, atol=1e-9 * s)
     assert len(trace.transitions) == 0
 
 
-@pytest.mark.parametrize("method", [*METHODS, {"method": "rk4", "step": 7e-3}],
-                         ids=lambda m: str(m["method"]))  # fmt: skip
+@pytest.mark.parametrize(
+    "method", [*METHODS, {"method": "rk4", "step": 7e-3}], ids=lambda m: str(m["method"])
+)
 @pytest.mark.parametrize("v", VELOCITIES)
 @pytest.mark.parametrize("law", ["signed", "published"])
 def test_a_sticking_element_breaks_away_at_t_star(law, v, method):
@@ -61,9 +67,14 @@ def test_a_sticking_element_breaks_away_at_t_star(law, v, method):
     T = t_star + 2 * s / C
     times = np.union1d(np.linspace(0.0, t_star * (1 - 1e-9), 20), np.linspace(t_star, T, 21)[1:])
     trace = simulate(
-        one_element(law, C=C, sigma=sigma), Prescribed(v), T, t_eval=times,
-        initial={"z": [z0]}, **TIGHT, **method,
-    )  # fmt: skip
+        one_element(law, C=C, sigma=sigma),
+        Prescribed(v),
+        T,
+        t_eval=times,
+        initial={"z": [z0]},
+        **TIGHT,
+        **method,
+    )
     edge = "break_away_forward" if v > 0 else "break_away_backward"
     assert event_sequence(trace) == [(0, edge)]
     assert trace.transitions.t[0] == pytest.approx(t_star, rel=1e-12)

@@ -38,9 +38,13 @@ def test_order_on_smooth_flow(method):
     steps, errors = T / (2 * SIZES), []
     for h in steps:
         trace = simulate(
-            model, Slider(1.0, f"2*sin({w}*t)"), T, method=method, step=float(h),
+            model,
+            Slider(1.0, f"2*sin({w}*t)"),
+            T,
+            method=method,
+            step=float(h),
             initial={"x": x0, "v": v0, "z": [x0, x0]},
-        )  # fmt: skip
+        )
         assert len(trace.transitions) == 0
         errors.append(np.hypot(trace.x[-1] - exact[0], trace.v[-1] - exact[1]))
     assert fitted_slope(steps, np.array(errors)) >= ORDERS[method] - 0.3
@@ -63,9 +67,7 @@ def test_order_across_a_break_away(method):
     exact = F_c - 2 * F_c * np.exp(C * (T - t_star) / F_c)
     steps, errors, places = t_star / (3 * SIZES + 0.37), [], []
     for h in steps:
-        trace = simulate(
-            model, Prescribed("-0.5 - 0.2*sin(2*t)"), T, method=method, step=float(h)
-        )  # fmt: skip
+        trace = simulate(model, Prescribed("-0.5 - 0.2*sin(2*t)"), T, method=method, step=float(h))
         assert event_sequence(trace) == [(0, "break_away_backward")]
         errors.append(abs(trace.z[-1, 0] - exact))
         places.append(abs(trace.transitions.t[0] - t_star))

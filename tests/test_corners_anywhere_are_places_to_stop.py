@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, Slider, State, simulate
-from gms_fsm.program import lower
-from gms_fsm.signals import as_signal
+from gms_fsm.lowering.program import lower
+from gms_fsm.systems.signals import as_signal
 from tests.helpers import same_bits
 
 ENGINES = ["machines", "ifelse", "compiled"]
@@ -17,9 +17,14 @@ ENGINES = ["machines", "ifelse", "compiled"]
 
 def force(text: str, **parameters: float) -> ChartModel:
     chart = Chart(
-        "a force", inputs=("v", "x", "t"), variables=("z",), parameters=tuple(parameters),
-        states=(State("on", flow={"z": "v"}),), transitions=(), outputs={"F": text},
-    )  # fmt: skip
+        "a force",
+        inputs=("v", "x", "t"),
+        variables=("z",),
+        parameters=tuple(parameters),
+        states=(State("on", flow={"z": "v"}),),
+        transitions=(),
+        outputs={"F": text},
+    )
     return ChartModel(chart, parameters)
 
 
@@ -43,8 +48,14 @@ def needs(engine):
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_buffer_in_a_rigs_equation_is_met_exactly(engine):
     """Free flight at 1 m/s, half a swing of 10 rad/s in the spring, flight back."""
-    trace = simulate(force("0 * gap", gap=7.0), Buffer(), 2.0, engine=needs(engine),
-                     initial={"v": 1.0}, rtol=1e-9)  # fmt: skip
+    trace = simulate(
+        force("0 * gap", gap=7.0),
+        Buffer(),
+        2.0,
+        engine=needs(engine),
+        initial={"v": 1.0},
+        rtol=1e-9,
+    )
     assert np.abs(trace.t - 0.5).min() < 1e-12
     assert np.abs(trace.t - (0.5 + np.pi / 10)).min() < 1e-8
     assert trace.v[-1] == pytest.approx(-1.0, abs=1e-8)

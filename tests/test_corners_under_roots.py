@@ -20,9 +20,10 @@ CORNERS = {
     "max(0, sin(t))**1.5": (lambda t: max(0.0, math.sin(t)) ** 1.5, np.pi * np.arange(1, 4)),
     "sqrt(2 - min(2, t)) - 1": (lambda t: math.sqrt(2.0 - min(2.0, t)) - 1.0, np.array([2.0])),
     "sqrt(abs(abs(t - 3) - 1))": (
-        lambda t: math.sqrt(abs(abs(t - 3.0) - 1.0)), np.array([2.0, 3.0, 4.0]),
+        lambda t: math.sqrt(abs(abs(t - 3.0) - 1.0)),
+        np.array([2.0, 3.0, 4.0]),
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("engine", ["machines", "ifelse"])

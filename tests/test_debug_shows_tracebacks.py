@@ -126,11 +126,14 @@ def test_help_names_it(gms_fsm: CommandLine) -> None:
 @pytest.mark.parametrize("debug", [False, True])
 def test_in_a_shell(debug: bool, tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-c", "from gms_fsm.cli import main; main()", "run", "none.toml"]
+        [sys.executable, "-c", "from gms_fsm.app.cli import main; main()", "run", "none.toml"]
         + ["--debug"] * debug,
-        capture_output=True, text=True, cwd=tmp_path, check=False,
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        check=False,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
+    )
     assert done.returncode == (1 if debug else 2)
     assert ("Traceback" in done.stderr) == debug
     assert "none.toml: no such file" in done.stderr

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from gms_fsm import Prescribed
-from gms_fsm.debugger import ALIASES, COMMANDS, Debugger
-from gms_fsm.session import Session
+from gms_fsm.app.debugger import ALIASES, COMMANDS, Debugger
+from gms_fsm.inspection.session import Session
 from tests.helpers import FIG4_SINE, stick_slip
 from tests.test_debugger_transcripts import FIG_4, PULLED, answers, talk
 
@@ -47,9 +47,18 @@ def test_the_overview_names_every_command() -> None:
 
 @pytest.mark.parametrize(
     ("alias", "name"),
-    [("s", "step"), ("b", "break"), ("n", "next"), ("c", "continue"), ("u", "until"),
-     ("w", "where"), ("p", "print"), ("l", "list"), ("q", "quit")],
-)  # fmt: skip
+    [
+        ("s", "step"),
+        ("b", "break"),
+        ("n", "next"),
+        ("c", "continue"),
+        ("u", "until"),
+        ("w", "where"),
+        ("p", "print"),
+        ("l", "list"),
+        ("q", "quit"),
+    ],
+)
 def test_letters_are_those_of_pdb(alias: str, name: str) -> None:
     assert ALIASES[alias] == name
 
@@ -156,8 +165,15 @@ def test_an_unexpected_failure_does_not_end_the_session(monkeypatch: pytest.Monk
 def test_moves() -> None:
     said = answers(FIG_4, "s", "step 3", "back", "back 100", "goto 12.5", "prev", "prev", "n")
     assert [text.split(",")[0] for text in said] == [
-        "row 1", "row 4", "row 3", "row 0", "row 32", "row 31", "row 30", "row 31"
-    ]  # fmt: skip
+        "row 1",
+        "row 4",
+        "row 3",
+        "row 0",
+        "row 32",
+        "row 31",
+        "row 30",
+        "row 31",
+    ]
     assert "element 4: slip -> stick by arrest" in said[4]
 
 
@@ -200,9 +216,17 @@ def test_at_the_end_there_is_only_back(command: str) -> None:
 
 def test_print_and_watch() -> None:
     said = answers(
-        FIG_4, "p s1", "p state(1) == stick and z1 < 1", "p not t > -1", "watch z1 / s1",
-        "watch state(2) == slip", "watch", "goto 25", "unwatch 1", "unwatch all",
-    )  # fmt: skip
+        FIG_4,
+        "p s1",
+        "p state(1) == stick and z1 < 1",
+        "p not t > -1",
+        "watch z1 / s1",
+        "watch state(2) == slip",
+        "watch",
+        "goto 25",
+        "unwatch 1",
+        "unwatch all",
+    )
     assert said[:3] == ["1.5", "true", "false"]
     assert said[5] == "  watch 1: z1 / s1 = 0\n  watch 2: state(2) == slip = false"
     assert "  watch 1: z1 / s1 = -1.51743" in said[6]
@@ -218,9 +242,20 @@ def test_a_watch_that_cannot_be_computed_does_not_disturb() -> None:
 
 def test_breakpoints() -> None:
     said = answers(
-        FIG_4, "c", "goto 0", "b", "b arrest 2", "b enter slip element 3 if v < 0 hits 2",
-        "b tested break_away_forward all", "breaks", "clear 3", "c", "c", "clear all", "b",
-    )  # fmt: skip
+        FIG_4,
+        "c",
+        "goto 0",
+        "b",
+        "b arrest 2",
+        "b enter slip element 3 if v < 0 hits 2",
+        "b tested break_away_forward all",
+        "breaks",
+        "clear 3",
+        "c",
+        "c",
+        "clear all",
+        "b",
+    )
     assert said[0].startswith("no breakpoint is set\nrow 349")
     assert said[2] == "no breakpoint is set"
     assert said[3] == "breakpoint 1: fires arrest, element 2"
@@ -237,9 +272,17 @@ def test_breakpoints() -> None:
 
 def test_poke_by_expression_and_branches(tmp_path: Path) -> None:
     said = answers(
-        FIG_4, "goto 25", "poke z1 = -0.9*s1 state4=slip", "p z1 / s1", "why 1", "next", "branch 0",
-        "branches", "run", "compare 0 1",
-    )  # fmt: skip
+        FIG_4,
+        "goto 25",
+        "poke z1 = -0.9*s1 state4=slip",
+        "p z1 / s1",
+        "why 1",
+        "next",
+        "branch 0",
+        "branches",
+        "run",
+        "compare 0 1",
+    )
     assert said[1].startswith("branch 1, from branch 0: z1 = -1.35, state 4 = slip\nrow 77")
     assert said[2] == "-0.9"
     assert "arrest fires next: every clause is true." in said[3]
@@ -260,9 +303,20 @@ def test_a_velocity_can_be_poked_where_there_is_a_mass() -> None:
 def test_save_and_load(tmp_path: Path) -> None:
     path = tmp_path / "a session.json"
     said = answers(
-        FIG_4, "goto 25", "watch z1", "b arrest", "poke z1=0", "run", f"save {path}", "goto 0",
-        "branch 0", "clear all", f'load "{path}"', "branches", "breaks",
-    )  # fmt: skip
+        FIG_4,
+        "goto 25",
+        "watch z1",
+        "b arrest",
+        "poke z1=0",
+        "run",
+        f"save {path}",
+        "goto 0",
+        "branch 0",
+        "clear all",
+        f'load "{path}"',
+        "branches",
+        "breaks",
+    )
     assert said[5].startswith("written to")
     assert "2 branches" in said[9]
     assert "row 77, t = 24.9999735 s" in said[9]
@@ -387,9 +441,14 @@ def test_a_guard_that_cannot_be_computed_is_said() -> None:
     from gms_fsm import Chart, ChartModel, State, Stribeck, Transition
 
     chart = Chart(
-        "bad", ("v",), ("z",), ("k",), (State("on", {"z": "v"}), State("off", {"z": "0"})),
-        (Transition("go", "on", "off", guard="0 / (z - z) > 0"),), {"F": "k * z"},
-    )  # fmt: skip
+        "bad",
+        ("v",),
+        ("z",),
+        ("k",),
+        (State("on", {"z": "v"}), State("off", {"z": "0"})),
+        (Transition("go", "on", "off", guard="0 / (z - z) > 0"),),
+        {"F": "k * z"},
+    )
     model = ChartModel(chart, {"k": 1.0}, n=1, stribeck=Stribeck(1.0, 1.5, 0.1))
     made = Debugger(Session(model, Prescribed("1"), 1.0), "", None, io.StringIO())
     assert "cannot be computed here" in made.reply("why")

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import GMS, Chart, ChartModel, GMSParameters, Prescribed, State, Stribeck, Transition
-from gms_fsm.debugger import COMMANDS, Debugger, run_debugger
-from gms_fsm.scenario import load_scenario
-from gms_fsm.session import Session
+from gms_fsm.app.debugger import COMMANDS, Debugger, run_debugger
+from gms_fsm.app.scenario import load_scenario
+from gms_fsm.inspection.session import Session
 from tests.test_debugger_transcripts import FIG_4, PULLED, SCENARIOS, talk
 
 ROOT = Path(__file__).parents[1]
@@ -61,10 +61,16 @@ def _wordy() -> Session:
     """Long names, long guards, many edges."""
     states = tuple(State(f"a_state_with_a_long_name_{i}", {"z": "v"}) for i in range(3))
     edges = tuple(
-        Transition(f"an_edge_with_a_name_that_does_not_end_{i}_{j}", states[i].name, states[j].name,
-                   guard=" and ".join(f"z * {10 + i + j + m} > s + k * v**2" for m in range(6)))
-        for i in range(3) for j in range(3) if i != j
-    )  # fmt: skip
+        Transition(
+            f"an_edge_with_a_name_that_does_not_end_{i}_{j}",
+            states[i].name,
+            states[j].name,
+            guard=" and ".join(f"z * {10 + i + j + m} > s + k * v**2" for m in range(6)),
+        )
+        for i in range(3)
+        for j in range(3)
+        if i != j
+    )
     name = "a chart with a name of many words " * 3
     chart = Chart(name, ("v", "s"), ("z",), ("k",), states, edges, {"F": "k * z"})
     model = ChartModel(chart, {"k": 1.0}, n=12, stribeck=Stribeck(1.0, 1.5, 1e-3))
@@ -136,14 +142,18 @@ def test_no_colour_where_it_is_not_wanted(
 
 def _piped(script: str, **environment: str) -> subprocess.CompletedProcess[bytes]:
     code = (
-        "import sys; from gms_fsm.debugger import run_debugger; "
-        "from gms_fsm.scenario import load_scenario; "
+        "import sys; from gms_fsm.app.debugger import run_debugger; "
+        "from gms_fsm.app.scenario import load_scenario; "
         f"sys.exit(run_debugger(load_scenario('scenarios/{FIG_4}.toml')))"
     )
     return subprocess.run(
-        [sys.executable, "-c", code], input=script.encode(), capture_output=True, check=False,
-        cwd=ROOT, env={**os.environ, **environment},
-    )  # fmt: skip
+        [sys.executable, "-c", code],
+        input=script.encode(),
+        capture_output=True,
+        check=False,
+        cwd=ROOT,
+        env={**os.environ, **environment},
+    )
 
 
 @pytest.mark.parametrize("environment", [{}, {"PYTHONIOENCODING": "ascii"}, {"NO_COLOR": "1"}])

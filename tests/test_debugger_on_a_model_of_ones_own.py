@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, State, Stribeck, Transition
-from gms_fsm.debugger import COMMANDS, Debugger, scenario_to_debug
+from gms_fsm.app.debugger import COMMANDS, Debugger, scenario_to_debug
 from gms_fsm.errors import ScenarioError
-from gms_fsm.session import Session
+from gms_fsm.inspection.session import Session
 from tests.helpers import stick_slip
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -19,7 +19,10 @@ SCENARIOS = Path(__file__).parents[1] / "scenarios"
 def contact(n: int = 1) -> ChartModel:
     """Three states, two variables; w wears off while the contact moves."""
     chart = Chart(
-        "warming contact", ("v", "s"), ("z", "w"), ("k", "tau"),
+        "warming contact",
+        ("v", "s"),
+        ("z", "w"),
+        ("k", "tau"),
         (
             State("static", {"z": "v", "w": "0"}),
             State("rising", {"z": "v", "w": "(1 - w) / tau"}),
@@ -31,7 +34,7 @@ def contact(n: int = 1) -> ChartModel:
             Transition("arrest", "kinetic", "static", guard="abs(v) <= 0.01", actions={"z": "0"}),
         ),
         {"F": "k * z"},
-    )  # fmt: skip
+    )
     values = {"k": 1.0, "tau": 1.0}
     return ChartModel(chart, values, n=n, stribeck=Stribeck(0.1, 0.2, 0.1), weights=[1.0] * n)
 
@@ -147,8 +150,19 @@ def test_where_has_a_column_a_variable() -> None:
     made = own(2)
     made.reply("poke w2=0.125")
     said = made.reply("where").splitlines()
-    assert said[2].split() == ["el", "state", "z", "[m]", "w", "s", "[m]", "|z|/s", "F_i", "[N]",
-                               "edges"]  # fmt: skip
+    assert said[2].split() == [
+        "el",
+        "state",
+        "z",
+        "[m]",
+        "w",
+        "s",
+        "[m]",
+        "|z|/s",
+        "F_i",
+        "[N]",
+        "edges",
+    ]
     assert said[4].split() == ["2", "static", "0", "0.125", "0.2", "0.000", "0", "1:n"]
     assert [line.index("1:n") for line in said[3:5]] == [said[2].index("edges")] * 2
 
@@ -157,8 +171,15 @@ def test_where_puts_edges_that_have_no_room_on_a_line_of_their_own() -> None:
     names = ("a", "b", "c", "d")
     flows = dict.fromkeys(names, "v")
     edges = tuple(Transition(f"e{i}", "on", "off", guard=f"a > {i} and b > 9") for i in range(1, 5))
-    chart = Chart("wide", ("v",), names, ("k",), (State("on", flows), State("off", flows)), edges,
-                  {"F": "k * a"})  # fmt: skip
+    chart = Chart(
+        "wide",
+        ("v",),
+        names,
+        ("k",),
+        (State("on", flows), State("off", flows)),
+        edges,
+        {"F": "k * a"},
+    )
     model = ChartModel(chart, {"k": 1.0}, n=2, stribeck=Stribeck(1.0, 1.0, 1.0))
     session = Session(model, Prescribed("0.1"), 2.0)
     said = Debugger(session, "", io.StringIO(), io.StringIO()).reply("where").splitlines()
@@ -211,8 +232,10 @@ def test_where_the_run_ends_with_a_firing_no_step_is_promised() -> None:
         ("break LEAVE Rising", "error"),  # a kind is no name
         ("break leave RISING element 1", "breakpoint 1: leave rising, element 1"),
         ("break Break_Away", "breakpoint 1: fires break_away, all elements"),
-        ("b arrest if state(1) == Kinetic",
-         "breakpoint 1: fires arrest, all elements, if state(1) == kinetic"),
+        (
+            "b arrest if state(1) == Kinetic",
+            "breakpoint 1: fires arrest, all elements, if state(1) == kinetic",
+        ),
         ("print state(1) == STATIC", "true"),
         ("print not state( 1 ) != Static and v < 1", "true"),
         ("until state(1)==Rising", "row 10"),
@@ -221,7 +244,7 @@ def test_where_the_run_ends_with_a_firing_no_step_is_promised() -> None:
         ("break Risen", "error: no edge or state 'Risen'; edges: break_away"),
         ("print state(1) == Risen", "error: column 13: unknown state"),
     ],
-)  # fmt: skip
+)
 def test_capitals_do_not_matter(command: str, said: str) -> None:
     assert own().reply(command).startswith(said)
 
@@ -229,10 +252,14 @@ def test_capitals_do_not_matter(command: str, said: str) -> None:
 def test_capitals_matter_where_only_they_differ() -> None:
     flow = {"z": "v"}
     chart = Chart(
-        "two cases", ("v",), ("z",), ("k",), (State("on", flow), State("ON", flow)),
+        "two cases",
+        ("v",),
+        ("z",),
+        ("k",),
+        (State("on", flow), State("ON", flow)),
         (Transition("go", "on", "ON", guard="z > 1"), Transition("Go", "ON", "on", guard="z < 0")),
         {"F": "k * z"},
-    )  # fmt: skip
+    )
     model = ChartModel(chart, {"k": 1.0}, n=1, stribeck=Stribeck(1.0, 1.0, 1.0))
     session = Session(model, Prescribed("0.1"), 2.0)
     made = Debugger(session, "", io.StringIO(), io.StringIO())
@@ -245,14 +272,23 @@ def test_capitals_matter_where_only_they_differ() -> None:
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("mine.py", "mine.py is Python; debug takes a scenario (.toml); for a model of your own: "
-                    "Debugger(Session(model, rig, t_end)).run(), see docs/howto/debugging.md"),
-        ("t.npz", "t.npz is a trace; `gms-fsm replay t.npz` steps through it; debug takes a "
-                  "scenario (.toml)"),
-        ("t.CSV", "t.CSV is a trace; `gms-fsm replay t.CSV` steps through it; debug takes a "
-                  "scenario (.toml)"),
+        (
+            "mine.py",
+            "mine.py is Python; debug takes a scenario (.toml); for a model of your own: "
+            "Debugger(Session(model, rig, t_end)).run(), see docs/howto/debugging.md",
+        ),
+        (
+            "t.npz",
+            "t.npz is a trace; `gms-fsm replay t.npz` steps through it; debug takes a "
+            "scenario (.toml)",
+        ),
+        (
+            "t.CSV",
+            "t.CSV is a trace; `gms-fsm replay t.CSV` steps through it; debug takes a "
+            "scenario (.toml)",
+        ),
     ],
-)  # fmt: skip
+)
 def test_another_file_is_sent_to_where_it_belongs(name: str, said: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         scenario_to_debug(name)

@@ -6,8 +6,8 @@ import io
 import re
 from pathlib import Path
 
-from gms_fsm.debugger import run_debugger
-from gms_fsm.scenario import load_scenario
+from gms_fsm.app.debugger import run_debugger
+from gms_fsm.app.scenario import load_scenario
 
 ROOT = Path(__file__).parents[1]
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import simulate
-from gms_fsm.debugger import run_debugger
-from gms_fsm.scenario import load_scenario
+from gms_fsm.app.debugger import run_debugger
+from gms_fsm.app.scenario import load_scenario
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 FIG_4 = "paper_fig4_stick_slip"
@@ -33,9 +33,18 @@ def answers(scenario: str, *commands: str) -> list[str]:
 
 def test_fig_4_story() -> None:
     said = talk(
-        FIG_4, "break fires break_away_backward element 2", "continue", "why 2", "back 10",
-        "poke z2=-0.3", "run", "branch 0", "run", "compare 0 1", "quit",
-    )  # fmt: skip
+        FIG_4,
+        "break fires break_away_backward element 2",
+        "continue",
+        "why 2",
+        "back 10",
+        "poke z2=-0.3",
+        "run",
+        "branch 0",
+        "run",
+        "compare 0 1",
+        "quit",
+    )
     expected = """\
 Stick-slip (paper, Fig. 4)
 GMS, 4 elements, published law; prescribed velocity, to t = 100 s
@@ -70,10 +79,22 @@ step, then why 2: the edges that leave slip
 
 def test_pulled_mass_story() -> None:
     said = answers(
-        PULLED, "break fires break_away_backward element 2", "continue", "why 2", "goto 3",
-        "poke v=-0.5", "continue", "why 2", "back 10", "poke z2=-0.001", "run", "branch 1", "run",
-        "compare 1 2", "branches",
-    )  # fmt: skip
+        PULLED,
+        "break fires break_away_backward element 2",
+        "continue",
+        "why 2",
+        "goto 3",
+        "poke v=-0.5",
+        "continue",
+        "why 2",
+        "back 10",
+        "poke z2=-0.001",
+        "run",
+        "branch 1",
+        "run",
+        "compare 1 2",
+        "branches",
+    )
     # It is pulled forward: of itself it never breaks away backward.
     assert said[1].startswith("no breakpoint hit\nrow 2043, t = 60 s")
     assert "arrest does not fire: |v| <= v_c is false by" in said[2]

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from gms_fsm.scenario import Scenario
+from gms_fsm.app.scenario import Scenario
 from tests.page_blocks import ROOT, Page, agrees, blocks_of
 
 for module in ("matplotlib", "numba", "pandas", "pygraphviz", "pyarrow", "uplot", "xarray", "z3"):
@@ -96,11 +96,16 @@ def test_there_are_pages_and_they_have_blocks() -> None:
 @pytest.mark.parametrize(
     ("shown", "said", "right"),
     [
-        ("a\nb\n", "a\nb\n", True), ("a\n", "a\nb\n", False), ("a\n...\nd\n", "a\nb\nc\nd\n", True),
-        ("...\nd\n", "a\nd\n", True), ("a\n...\n", "a\nb\n", True), ("a\n...\n", "b\n", False),
-        ("a  \n", "a\n", True), ("a.c\n", "abc\n", False),
+        ("a\nb\n", "a\nb\n", True),
+        ("a\n", "a\nb\n", False),
+        ("a\n...\nd\n", "a\nb\nc\nd\n", True),
+        ("...\nd\n", "a\nd\n", True),
+        ("a\n...\n", "a\nb\n", True),
+        ("a\n...\n", "b\n", False),
+        ("a  \n", "a\n", True),
+        ("a.c\n", "abc\n", False),
     ],
-)  # fmt: skip
+)
 def test_what_agrees(shown: str, said: str, right: bool) -> None:
     assert agrees(shown, said) == right
 

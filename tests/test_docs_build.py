@@ -27,10 +27,19 @@ pytest.importorskip("ipywidgets", reason="building the site needs the extra 'doc
 
 ROOT = Path(__file__).parents[1]
 LOADS = {  # what a browser fetches by itself
-    ("script", "src"), ("img", "src"), ("img", "srcset"), ("iframe", "src"), ("source", "src"),
-    ("video", "src"), ("audio", "src"), ("embed", "src"), ("object", "data"), ("link", "href"),
-    ("image", "href"), ("use", "href"),
-}  # fmt: skip
+    ("script", "src"),
+    ("img", "src"),
+    ("img", "srcset"),
+    ("iframe", "src"),
+    ("source", "src"),
+    ("video", "src"),
+    ("audio", "src"),
+    ("embed", "src"),
+    ("object", "data"),
+    ("link", "href"),
+    ("image", "href"),
+    ("use", "href"),
+}
 
 
 class Links(HTMLParser):
@@ -61,11 +70,24 @@ def outside(address: str) -> bool:
 def test_built_strictly_and_asks_nobody(tmp_path: Path) -> None:
     site = tmp_path / "site"
     done = subprocess.run(
-        [sys.executable, "-m", "sphinx", "--quiet", "--fail-on-warning", "--keep-going", "-d",
-         str(tmp_path / "doctrees"), "docs", str(site)],
-        cwd=ROOT, capture_output=True, text=True, check=False,
+        [
+            sys.executable,
+            "-m",
+            "sphinx",
+            "--quiet",
+            "--fail-on-warning",
+            "--keep-going",
+            "-d",
+            str(tmp_path / "doctrees"),
+            "docs",
+            str(site),
+        ],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
         env={**os.environ, "PYTHONWARNINGS": "default"},
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "WARNING" not in done.stderr
     pages = {path: Links(path.read_text(encoding="utf-8")) for path in site.rglob("*.html")}

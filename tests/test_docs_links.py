@@ -88,7 +88,7 @@ def test_every_page_is_in_the_contents() -> None:
 
 
 def test_the_citation_names_this_version() -> None:
-    version = re.search(r'__version__ = "(.+)"', (ROOT / "gms_fsm/__init__.py").read_text())
+    version = re.search(r'__version__ = "(.+)"', (ROOT / "gms_fsm/_version.py").read_text())
     assert version
     assert f"\nversion: {version[1]}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert f"(version {version[1]})" in (ROOT / "docs/cite.md").read_text(encoding="utf-8")

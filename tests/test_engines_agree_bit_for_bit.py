@@ -5,16 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gms_fsm import (
-    GMS,
-    GMSParameters,
-    LuGre,
-    Prescribed,
-    PulledSlider,
-    Slider,
-    Stribeck,
-    simulate,
-)  # fmt: skip
+from gms_fsm import GMS, GMSParameters, LuGre, Prescribed, PulledSlider, Slider, Stribeck, simulate
 from tests.helpers import (
     FIG3_FORCE,
     FIG4_SINE,
@@ -42,10 +33,17 @@ FIXED = {"method": "rk4", "step": 5.003e-3}
 @pytest.mark.parametrize("law", ["signed", "published"])
 @pytest.mark.parametrize(
     "options",
-    [{}, {"rtol": 1e-10, "atol": 1e-13}, {"method": "bs23"}, FIXED, FIXED | {"events": "step"},
-     {"events": "step", "max_step": 1e-2}, {"t_eval": np.linspace(0, 61, 501)}],
+    [
+        {},
+        {"rtol": 1e-10, "atol": 1e-13},
+        {"method": "bs23"},
+        FIXED,
+        FIXED | {"events": "step"},
+        {"events": "step", "max_step": 1e-2},
+        {"t_eval": np.linspace(0, 61, 501)},
+    ],
     ids=["dp45", "tight", "bs23", "rk4", "rk4 step", "dp45 step", "t_eval"],
-)  # fmt: skip
+)
 def test_open_loop(law, options):
     """Table I, stick-slip, 61 s."""
     trace = both(stick_slip(law), open_loop(), 61.0, **options)

@@ -15,7 +15,9 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import errors
-from gms_fsm.errors import GMSError, SimulationError
+from gms_fsm.errors import GMSError
+from gms_fsm.traces import failures
+from gms_fsm.traces.failures import SimulationError
 from tests.page_blocks import Page, agrees, blocks_of
 
 PAGE = (Path(__file__).parents[1] / "docs" / "errors.md").read_text(encoding="utf-8")
@@ -26,7 +28,8 @@ def _all(kind: type[GMSError]) -> list[type[GMSError]]:
     return [found for each in kind.__subclasses__() for found in (each, *_all(each))]
 
 
-KINDS = [kind for kind in _all(GMSError) if kind.__module__ == errors.__name__]
+HOMES = (errors.__name__, failures.__name__)
+KINDS = [kind for kind in _all(GMSError) if kind.__module__ in HOMES]
 
 
 @pytest.fixture(scope="module")
@@ -60,14 +63,16 @@ def _section(line: int) -> str:
 
 def test_every_error_has_one_root() -> None:
     """Whatever class stands in the module, and whatever exception elsewhere in the package."""
-    own = [kind for _, kind in inspect.getmembers(errors, inspect.isclass)]
-    own = [kind for kind in own if kind.__module__ == errors.__name__]
+    own = [
+        kind for home in (errors, failures) for _, kind in inspect.getmembers(home, inspect.isclass)
+    ]
+    own = [kind for kind in own if kind.__module__ in HOMES]
     assert len(own) > 10
     assert all(issubclass(kind, GMSError) for kind in own)
     root = Path(errors.__file__).parent
     for path in sorted(root.rglob("*.py")):
         named = re.findall(r"^class (\w+(?:Error|Exception))\(", path.read_text(), re.MULTILINE)
-        assert path.name == "errors.py" or named == [], path
+        assert path.name in ("errors.py", "failures.py") or named == [], path
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)

@@ -20,7 +20,8 @@ from gms_fsm import (
     Transition,
     simulate,
 )
-from gms_fsm.errors import LivelockError, ParameterError, StepLimitError
+from gms_fsm.errors import ParameterError
+from gms_fsm.traces.failures import LivelockError, StepLimitError
 from tests.helpers import banging, pulled_mass
 
 ENGINES = ["machines", "ifelse", "compiled"]
@@ -28,8 +29,9 @@ ENGINES = ["machines", "ifelse", "compiled"]
 
 def stiff(C: float) -> GMS:
     """One element whose deflection relaxes at the rate C / s."""
-    p = GMSParameters([4e6], [0], [C], sigma_2=250, stribeck=Stribeck(8, 9.5, 5e-4), v_c=7.3e-7,
-                      weights=[1 / 4e6])  # fmt: skip
+    p = GMSParameters(
+        [4e6], [0], [C], sigma_2=250, stribeck=Stribeck(8, 9.5, 5e-4), v_c=7.3e-7, weights=[1 / 4e6]
+    )
     return GMS(p, law="signed")
 
 
@@ -59,15 +61,21 @@ def test_fast_switching_that_goes_somewhere_is_none(engine):
 def test_switching_by_the_clock_is_none(engine):
     """Guards of t alone, while nothing moves at all."""
     chart = Chart(
-        "blinker", inputs=("t",), variables=("z",), parameters=("w",),
+        "blinker",
+        inputs=("t",),
+        variables=("z",),
+        parameters=("w",),
         states=(State("on", flow={"z": "0"}), State("off", flow={"z": "0"})),
-        transitions=(Transition("a", "on", "off", guard="sin(w * t) < 0"),
-                     Transition("b", "off", "on", guard="sin(w * t) > 0")),
+        transitions=(
+            Transition("a", "on", "off", guard="sin(w * t) < 0"),
+            Transition("b", "off", "on", guard="sin(w * t) > 0"),
+        ),
         outputs={"F": "z"},
-    )  # fmt: skip
+    )
     w = 2.0 * np.pi * 1000.0
-    trace = simulate(ChartModel(chart, {"w": w}), Prescribed("0"), 2.0, engine=needs(engine),
-                     max_step=1e-4)  # fmt: skip
+    trace = simulate(
+        ChartModel(chart, {"w": w}), Prescribed("0"), 2.0, engine=needs(engine), max_step=1e-4
+    )
     assert len(trace.transitions) == pytest.approx(4000, abs=2)
 
 
@@ -131,7 +139,7 @@ def test_a_session_ends_with_the_same_words():
 def test_a_scenario_takes_the_limit():
     from pathlib import Path
 
-    from gms_fsm.scenario import load_scenario
+    from gms_fsm.app.scenario import load_scenario
 
     path = Path(__file__).parents[1] / "scenarios" / "pulled_mass.toml"
     assert load_scenario(path, ["run.max_steps=777"]).arguments["max_steps"] == 777

@@ -19,9 +19,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from gms_fsm.chart import Chart, State, Transition
+from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ExpressionError, GMSError
-from gms_fsm.expression import (
+from gms_fsm.language.expression import (
     FUNCTIONS,
     evaluate,
     names_in,
@@ -30,7 +30,7 @@ from gms_fsm.expression import (
     rough_points,
     spell,
 )
-from gms_fsm.signals import Formula
+from gms_fsm.systems.signals import Formula
 
 NAMES = ("z", "s", "v", "v_c")
 NUMBER_WANTED = "a comparison stands where a number is needed"

@@ -26,15 +26,8 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.charts import gms_element
-from gms_fsm.errors import (
-    ChartError,
-    GMSError,
-    LivelockError,
-    NotFiniteError,
-    ParameterError,
-    SimulationError,
-    StepSizeError,
-)
+from gms_fsm.errors import ChartError, GMSError, ParameterError
+from gms_fsm.traces.failures import LivelockError, NotFiniteError, SimulationError, StepSizeError
 from tests.helpers import FunctionBelt, open_loop, pulled_mass, stick_slip
 
 CURVE = Stribeck(1.0, 1.5, 1e-3)
@@ -136,9 +129,13 @@ def test_steps_under_the_resolution_of_the_clock_are_refused(argument: str) -> N
     # Ten ticks of the clock, so that counting through them ends.
     with pytest.raises(GMSError, match=rf"{argument}|resolution of the clock"):
         simulate(
-            stick_slip("signed"), Prescribed("0.2"), 1.0 + 1e-14, t_start=1.0, progress=watch,
+            stick_slip("signed"),
+            Prescribed("0.2"),
+            1.0 + 1e-14,
+            t_start=1.0,
+            progress=watch,
             **{argument: 1e-20},
-        )  # fmt: skip
+        )
 
 
 # --------------------------------------------------------------------------- during the run
@@ -153,9 +150,14 @@ def _failed(error: type[SimulationError], *args: Any, **options: Any) -> Simulat
 def _broken(*edges: Transition, law: str = "signed") -> ChartModel:
     sound = gms_element(law)  # type: ignore[arg-type]
     chart = Chart(
-        "broken", sound.inputs, sound.variables, sound.parameters, sound.states, edges,
+        "broken",
+        sound.inputs,
+        sound.variables,
+        sound.parameters,
+        sound.states,
+        edges,
         sound.outputs,
-    )  # fmt: skip
+    )
     return ChartModel(
         chart, {"k": 1, "sigma": 0.1, "C": 0.1, "v_c": 0.2}, n=2, stribeck=CURVE, weights=[2, 1]
     )
@@ -242,9 +244,14 @@ def test_a_flow_that_escapes_to_infinity_is_a_step_size_error(
 ) -> None:
     # z' = z^2, z(0) = 1: z = 1/(1 - t) leaves the numbers at t = 1.
     error = _failed(
-        SimulationError, _singular("z * z"), Prescribed("0"), 2.0, t_eval=rows,
-        initial={"z": [0.1, 1.0]}, **options,
-    )  # fmt: skip
+        SimulationError,
+        _singular("z * z"),
+        Prescribed("0"),
+        2.0,
+        t_eval=rows,
+        initial={"z": [0.1, 1.0]},
+        **options,
+    )
     assert isinstance(error, StepSizeError | NotFiniteError)
     trace = error.trace
     if isinstance(error, StepSizeError):
@@ -273,9 +280,15 @@ def test_a_singular_flow_stops_before_it_is_singular(flow: str, t_break: float) 
 @pytest.mark.parametrize("events", ["located", "step"])
 def test_with_fixed_steps_infinity_is_not_finite(step: float, events: str) -> None:
     error = _failed(
-        NotFiniteError, _singular("z * z"), Prescribed("0"), 20.0, initial={"z": [1.0, 1.0]},
-        method="rk4", step=step, events=events,
-    )  # fmt: skip
+        NotFiniteError,
+        _singular("z * z"),
+        Prescribed("0"),
+        20.0,
+        initial={"z": [1.0, 1.0]},
+        method="rk4",
+        step=step,
+        events=events,
+    )
     assert "not finite" in str(error)
     assert 0.9 < error.trace.t[-1] < 10.0
     assert np.isfinite(error.trace.rows.y).all()
@@ -371,9 +384,11 @@ def test_a_heavy_run_near_the_edge_of_the_parameters_fails_in_words_or_ends() ->
 def test_initial_states_and_positions_are_the_first_row() -> None:
     model, rig = pulled_mass()
     trace = simulate(
-        model, rig, 0.1,
+        model,
+        rig,
+        0.1,
         initial={"x": 0.5, "v": 0.01, "z": [0, 0.001, 0.002, 0.003], "states": ["slip"] * 4},
-    )  # fmt: skip
+    )
     assert (trace.x[0], trace.v[0]) == (0.5, 0.01)
     assert trace.z[0].tolist() == [0, 0.001, 0.002, 0.003]
     assert trace.states[0].tolist() == ["slip"] * 4
@@ -391,18 +406,21 @@ def test_a_trial_step_too_far_does_not_end_the_run_early(velocity: str) -> None:
 
 
 def test_a_flow_that_is_not_finite_is_named_with_its_element() -> None:
-    error = _failed(NotFiniteError, _singular("v / (z - 1)"), Prescribed("1"), 2.0,
-                    initial={"z": [0.0, 1.0]})  # fmt: skip
+    error = _failed(
+        NotFiniteError, _singular("v / (z - 1)"), Prescribed("1"), 2.0, initial={"z": [0.0, 1.0]}
+    )
     assert "the flow of z in state on, [v / (z - 1)], is not finite in element 2" in str(error)
 
 
 @pytest.mark.parametrize(
     ("model", "rig", "words"),
-    [("GMS", Prescribed("0"), ["model is 'GMS'", "GMS(parameters, law='signed')"]),
-     (BOTH_WAYS, "0.1*t", ["rig is '0.1*t'", "Prescribed('0.1*sin(t)')"]),
-     (Prescribed("0"), BOTH_WAYS, ["model is Prescribed("])],
+    [
+        ("GMS", Prescribed("0"), ["model is 'GMS'", "GMS(parameters, law='signed')"]),
+        (BOTH_WAYS, "0.1*t", ["rig is '0.1*t'", "Prescribed('0.1*sin(t)')"]),
+        (Prescribed("0"), BOTH_WAYS, ["model is Prescribed("]),
+    ],
     ids=["text for a model", "text for a rig", "the wrong way round"],
-)  # fmt: skip
+)
 def test_what_is_no_model_or_no_rig_is_refused(model: Any, rig: Any, words: list[str]) -> None:
     with pytest.raises(ParameterError) as caught:
         simulate(model, rig, 1.0)

@@ -154,9 +154,12 @@ print("matplotlib.pyplot" in sys.modules)
 
     with tempfile.TemporaryDirectory() as folder:
         done = subprocess.run(
-            [sys.executable, "-c", code, folder], capture_output=True, text=True, check=True,
+            [sys.executable, "-c", code, folder],
+            capture_output=True,
+            text=True,
+            check=True,
             cwd=Path(__file__).parents[1],
-        )  # fmt: skip
+        )
     assert done.stdout.strip() == "False"
 
 

@@ -18,6 +18,10 @@ import numpy as np
 import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, State, Stribeck, Trace, Transition, simulate
+from gms_fsm.app.records import Column, motion_of, read_record
+from gms_fsm.app.scenario import load_scenario
+from gms_fsm.app.units import convert_numbers
+from gms_fsm.charts.parameters import GMSParameters
 from gms_fsm.errors import (
     ExpressionError,
     ParameterError,
@@ -26,13 +30,9 @@ from gms_fsm.errors import (
     SignalError,
     TraceFileError,
 )
-from gms_fsm.expression import evaluate, names_in, parse_condition, parse_value, spell
-from gms_fsm.parameters import GMSParameters
-from gms_fsm.records import Column, motion_of, read_record
-from gms_fsm.scenario import load_scenario
-from gms_fsm.signals import as_signal
-from gms_fsm.trace import dwell_times
-from gms_fsm.units import convert_numbers
+from gms_fsm.language.expression import evaluate, names_in, parse_condition, parse_value, spell
+from gms_fsm.systems.signals import as_signal
+from gms_fsm.traces.trace import dwell_times
 from tests.helpers import stick_slip
 from tests.scenario_files import MEASURED, OPEN_LOOP, changed, sine_table, table
 
@@ -204,10 +204,15 @@ def load(tmp_path: Path, text: str, *overrides: str) -> Any:
 
 @pytest.mark.parametrize(
     "line",
-    ["a." * 300_000 + "a = 1", '"a".' * 200_000 + "a = 1", "'a' . " * 100_000 + "a = 1",
-     "[" + "a." * 300_000 + "a]", "k = { " + "a." * 300_000 + "a = 1 }"],
+    [
+        "a." * 300_000 + "a = 1",
+        '"a".' * 200_000 + "a = 1",
+        "'a' . " * 100_000 + "a = 1",
+        "[" + "a." * 300_000 + "a]",
+        "k = { " + "a." * 300_000 + "a = 1 }",
+    ],
     ids=["bare", "quoted", "spaced", "head", "inline"],
-)  # fmt: skip
+)
 def test_a_key_without_end_is_refused(line: str, tmp_path: Path) -> None:
     """tomllib's work grows with the square of a key's parts: 5,000 took 2 s and 150 MB."""
     with pytest.raises(ScenarioError, match=r"line 2: a key of more than 20 parts"):
@@ -228,10 +233,13 @@ def test_dots_in_texts_and_numbers_are_not_keys(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("old", "new"),
-    [('kind = "GMS"', f'kind = "{LONG}"'), ('law = "signed"', f'law = "{LONG}"'),
-     ('title = "open loop"', f'"{LONG}" = 1')],
+    [
+        ('kind = "GMS"', f'kind = "{LONG}"'),
+        ('law = "signed"', f'law = "{LONG}"'),
+        ('title = "open loop"', f'"{LONG}" = 1'),
+    ],
     ids=["kind", "law", "key"],
-)  # fmt: skip
+)
 def test_long_values_in_a_file_do_not_make_long_messages(
     old: str, new: str, tmp_path: Path
 ) -> None:
@@ -289,9 +297,15 @@ def test_a_trace_without_rows_is_refused(saved: bytes, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("column", "value"),
-    [("edge", "nowhere"), ("source", "slip"), ("target", "x"), ("t", np.nan), ("t", 9e9),
-     ("t", -1.0)],
-)  # fmt: skip
+    [
+        ("edge", "nowhere"),
+        ("source", "slip"),
+        ("target", "x"),
+        ("t", np.nan),
+        ("t", 9e9),
+        ("t", -1.0),
+    ],
+)
 def test_a_log_that_the_chart_cannot_have_written_is_refused(
     column: str, value: Any, saved: bytes, tmp_path: Path
 ) -> None:
@@ -387,10 +401,13 @@ def test_any_name_of_a_chart_can_be_run(name: str) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["z >= s" + " >= v" * 1500, " or ".join(["z >= s"] * 600),
-     " and ".join(["(" + " or ".join(["z < s"] * 20) + ")"] * 20)],
+    [
+        "z >= s" + " >= v" * 1500,
+        " or ".join(["z >= s"] * 600),
+        " and ".join(["(" + " or ".join(["z < s"] * 20) + ")"] * 20),
+    ],
     ids=["chain", "row", "groups"],
-)  # fmt: skip
+)
 def test_hundreds_of_comparisons_are_refused(text: str) -> None:
     """The program that watches each of them on its own was too deep for Python to compile."""
     with pytest.raises(ExpressionError, match="too many comparisons"):

@@ -21,12 +21,12 @@ import numpy as np
 import pytest
 
 from gms_fsm import GMS, ChartModel, GMSParameters, LuGre, Prescribed, Slider, Stribeck
-from gms_fsm.chart import Chart, State, Transition
 from gms_fsm.charts import LAWS, gms_element
-from gms_fsm.expression import spell
-from gms_fsm.models import Model
-from gms_fsm.program import Program, lower
-from gms_fsm.rigs import Rig
+from gms_fsm.charts.chart import Chart, State, Transition
+from gms_fsm.language.expression import spell
+from gms_fsm.lowering.program import Program, lower
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.rigs import Rig
 from tests.helpers import open_loop, pulled_mass, stick_slip
 
 LUGRE = LuGre(sigma_0=1234.5, sigma_1=31.625, sigma_2=4.125, stribeck=Stribeck(1, 1.5, 1e-3))
@@ -94,9 +94,22 @@ def test_no_number_of_the_users_is_in_the_text() -> None:
     model, rig = odd_numbers(4, seed=3), Slider(0.7351, [(0.123, 0.456), (0.789, 0.987)])
     p = model.parameters
     theirs = {
-        *p.k, *p.sigma, *p.C, *p.weights, p.sigma_2, p.v_c, 0.7351, 0.123, 0.456, 0.789, 0.987,
-        p.stribeck.F_c, p.stribeck.F_s, p.stribeck.v_s, p.stribeck.dip,
-    }  # fmt: skip
+        *p.k,
+        *p.sigma,
+        *p.C,
+        *p.weights,
+        p.sigma_2,
+        p.v_c,
+        0.7351,
+        0.123,
+        0.456,
+        0.789,
+        0.987,
+        p.stribeck.F_c,
+        p.stribeck.F_s,
+        p.stribeck.v_s,
+        p.stribeck.dip,
+    }
     found = _numbers(lower(model, rig).source)
     assert found & {float(number) for number in theirs} == set()
     assert all(number == int(number) and number < 20 for number in found)
@@ -183,10 +196,14 @@ def test_names_that_would_end_a_comment_or_a_string_stay_inside() -> None:
 
 def test_powers_are_products_and_fractions_are_no_integers() -> None:
     chart = Chart(
-        "cubic", ("v",), ("z",), ("k",),
+        "cubic",
+        ("v",),
+        ("z",),
+        ("k",),
         (State("a", {"z": "v**3 * (1/2)"}), State("b", {"z": "0"})),
-        (Transition("e", "a", "b", "z**2 > 1/4"),), {"F": "k * z**3"},
-    )  # fmt: skip
+        (Transition("e", "a", "b", "z**2 > 1/4"),),
+        {"F": "k * z**3"},
+    )
     source = lower(
         ChartModel(chart, {"k": 1.0}, n=1, stribeck=Stribeck(1, 1.5, 1e-3)), Prescribed("t**2")
     ).source

@@ -11,11 +11,11 @@ import math
 import pytest
 
 from gms_fsm import GMS, ElementMachines, GMSParameters, Prescribed, Stribeck
-from gms_fsm.chart import SUPPLIED
 from gms_fsm.charts import GMS_ELEMENT, LAWS, SLIP_LAWS, gms_element
+from gms_fsm.charts.chart import SUPPLIED
 from gms_fsm.errors import ParameterError
-from gms_fsm.expression import evaluate, names_in
-from gms_fsm.program import lower
+from gms_fsm.language.expression import evaluate, names_in
+from gms_fsm.lowering.program import lower
 
 V_C = 1e-6
 S = (0.4, 1.0, 1.5)
@@ -92,9 +92,14 @@ def test_the_truth_table(law: str, state: str) -> None:
 def test_machines_and_generated_text_have_the_same_truth_table(law: str, weight: float) -> None:
     # The dip is so narrow that s is `weight` at every v of the grid but v = 0 and its neighbours.
     parameters = GMSParameters(
-        [1.0], [0.0], [1.0], sigma_2=0.0, v_c=V_C, stribeck=Stribeck(1.0, 1.5, 1e-300),
+        [1.0],
+        [0.0],
+        [1.0],
+        sigma_2=0.0,
+        v_c=V_C,
+        stribeck=Stribeck(1.0, 1.5, 1e-300),
         weights=[weight],
-    )  # fmt: skip
+    )
     model = GMS(parameters, law=law)  # type: ignore[arg-type]
     machines = ElementMachines(model)
     element = machines.elements[0]

@@ -33,8 +33,9 @@ from gms_fsm import (
     Transition,
     simulate,
 )
-from gms_fsm.errors import GMSError, SimulationError
-from gms_fsm.explain import Explanation, explain, explain_state, values_at
+from gms_fsm.errors import GMSError
+from gms_fsm.inspection.explain import Explanation, explain, explain_state, values_at
+from gms_fsm.traces.failures import SimulationError
 from tests.helpers import same_bits
 
 EXAMPLES = int(os.environ.get("GMS_FSM_EXAMPLES", "0"))
@@ -60,15 +61,34 @@ def rounded(low: float, high: float) -> st.SearchStrategy[float]:
 
 # --------------------------------------------------------------------------- what is run
 FLOWS = [
-    "v", "0", "-z", "0.5 * (sgn(v) - z / s)", "0.2 * v * cos(z)", "tanh(v) - z",
-    "v - abs(v) * z / s", "min(v, 0.2) - 0.5 * z", "max(-0.3, v) * exp(-abs(z))",
+    "v",
+    "0",
+    "-z",
+    "0.5 * (sgn(v) - z / s)",
+    "0.2 * v * cos(z)",
+    "tanh(v) - z",
+    "v - abs(v) * z / s",
+    "min(v, 0.2) - 0.5 * z",
+    "max(-0.3, v) * exp(-abs(z))",
     "0.1 * sin(3 * t) - 0.2 * z",
-]  # fmt: skip
+]
 CLAUSES = [
-    "z >= {a}", "z <= -{a}", "abs(z) < {a}", "abs(z) >= s", "z >= s", "z <= -s", "abs(v) <= {b}",
-    "v > {b}", "v < -{b}", "v >= {b}", "z * v > 0", "t > {a}", "sin(4 * t) > {b}", "z + v < {a}",
+    "z >= {a}",
+    "z <= -{a}",
+    "abs(z) < {a}",
+    "abs(z) >= s",
+    "z >= s",
+    "z <= -s",
+    "abs(v) <= {b}",
+    "v > {b}",
+    "v < -{b}",
+    "v >= {b}",
+    "z * v > 0",
+    "t > {a}",
+    "sin(4 * t) > {b}",
+    "z + v < {a}",
     "not (z < {a})",
-]  # fmt: skip
+]
 ACTIONS = [{}, {}, {}, {"z": "0.5 * z"}, {"z": "0"}, {"z": "z + 0.01"}]
 
 
@@ -106,11 +126,13 @@ def chart_models(draw: st.DrawFn) -> ChartModel:
     n = draw(st.integers(1, 3))
     F_c = draw(rounded(0.2, 0.8))
     return ChartModel(
-        draw(charts()), {"k": np.array(draw(st.lists(rounded(0.1, 9), min_size=n, max_size=n)))},
-        n=n, stribeck=Stribeck(F_c, F_c * draw(rounded(1, 2)), draw(rounded(0.01, 0.3))),
+        draw(charts()),
+        {"k": np.array(draw(st.lists(rounded(0.1, 9), min_size=n, max_size=n)))},
+        n=n,
+        stribeck=Stribeck(F_c, F_c * draw(rounded(1, 2)), draw(rounded(0.01, 0.3))),
         sigma_2=draw(rounded(0, 1)),
         weights=np.array(draw(st.lists(rounded(0.05, 0.5), min_size=n, max_size=n))),
-    )  # fmt: skip
+    )
 
 
 @st.composite
@@ -123,11 +145,14 @@ def banks(draw: st.DrawFn, law: str | None = None) -> GMS:
 
     F_c = draw(rounded(0.1, 1))
     parameters = GMSParameters(
-        numbers(0.5, 50), numbers(0, 1), numbers(0.01, 1),
+        numbers(0.5, 50),
+        numbers(0, 1),
+        numbers(0.01, 1),
         sigma_2=draw(rounded(0, 1)),
         stribeck=Stribeck(F_c, F_c * draw(rounded(1.01, 3)), draw(rounded(1e-3, 0.1))),
-        v_c=draw(st.sampled_from([1e-6, 1e-4, 1e-3])), weights=numbers(0.03, 0.4),
-    )  # fmt: skip
+        v_c=draw(st.sampled_from([1e-6, 1e-4, 1e-3])),
+        weights=numbers(0.03, 0.4),
+    )
     law = law or draw(st.sampled_from(["signed", "published"]))
     return GMS(parameters, law=law)  # type: ignore[arg-type]
 
@@ -150,11 +175,18 @@ def signals(draw: st.DrawFn) -> Any:
     kind = draw(st.sampled_from([0, 0, 0, 1, 1, 2, 3]))
     if kind == 0:
         a, w, p = draw(rounded(0.1, 0.6)), draw(rounded(0.5, 5)), draw(rounded(0, 6))
-        text = draw(st.sampled_from([
-            "{a}*sin({w}*t + {p})", "{a}*sgn(sin({w}*t))*min(1, 9*abs(sin({w}*t)))",
-            "{a}*cos({w}*t)*exp(-t/{w})", "{a}*tanh({w}*(t - 1))", "{a}*(t - 1)**3",
-            "max(0, {a}*sin({w}*t + {p}))",
-        ]))  # fmt: skip
+        text = draw(
+            st.sampled_from(
+                [
+                    "{a}*sin({w}*t + {p})",
+                    "{a}*sgn(sin({w}*t))*min(1, 9*abs(sin({w}*t)))",
+                    "{a}*cos({w}*t)*exp(-t/{w})",
+                    "{a}*tanh({w}*(t - 1))",
+                    "{a}*(t - 1)**3",
+                    "max(0, {a}*sin({w}*t + {p}))",
+                ]
+            )
+        )
         return text.format(a=a, w=w, p=p)
     if kind == 1:
         return draw(ramps(jumps=True))
@@ -484,9 +516,13 @@ def test_pieces_of_constant_velocity_are_closed_forms(data: st.DataObject, law: 
         (t, v) for (a, b), v in zip(itertools.pairwise(times), speeds, strict=True) for t in (a, b)
     ]
     trace = simulate(
-        model, Prescribed(corners), times[-1], rtol=1e-12, atol=1e-14,
+        model,
+        Prescribed(corners),
+        times[-1],
+        rtol=1e-12,
+        atol=1e-14,
         initial={"z": z, "states": states},
-    )  # fmt: skip
+    )
     for (start, end), v in zip(itertools.pairwise(times), speeds, strict=True):
         for element in exact:
             element.go(start, end, v)
@@ -507,25 +543,46 @@ def test_pieces_of_constant_velocity_are_closed_forms(data: st.DataObject, law: 
 # --------------------------------------------------------------------------- refused
 @hard(80)
 @given(
-    chart_models() | banks(), rigs(),
+    chart_models() | banks(),
+    rigs(),
     st.dictionaries(
-        st.sampled_from(["method", "step", "rtol", "atol", "max_step", "events", "engine", "t_eval",
-                         "initial", "output", "t_start"]),
-        st.none() | st.floats() | st.integers(-3, 10**400) | st.text(max_size=4)
+        st.sampled_from(
+            [
+                "method",
+                "step",
+                "rtol",
+                "atol",
+                "max_step",
+                "events",
+                "engine",
+                "t_eval",
+                "initial",
+                "output",
+                "t_start",
+            ]
+        ),
+        st.none()
+        | st.floats()
+        | st.integers(-3, 10**400)
+        | st.text(max_size=4)
         | st.lists(st.floats(), max_size=4)
         | st.dictionaries(st.sampled_from(["z", "v", "x", "states", "u"]), st.floats(), max_size=2),
-        min_size=1, max_size=2,
+        min_size=1,
+        max_size=2,
     ),
     st.floats() | st.just(0.3),
-)  # fmt: skip
+)
 def test_arguments_that_make_no_sense_are_refused_in_words(
     model: Any, rig: Any, nonsense: dict[str, Any], t_end: float
 ) -> None:
     """Whatever stands there: it runs, or a `GMSError` says what is wrong."""
     steps = [u for u in (nonsense.get("step"), nonsense.get("max_step")) if isinstance(u, float)]
     assume(not any(0 < u < 1e-3 for u in steps))  # a fine grid is no mistake, only slow
-    assume(not any(isinstance(nonsense.get(u), float) and 0 < nonsense[u] < 1e-10
-                   for u in ("rtol", "atol")))  # fmt: skip
+    assume(
+        not any(
+            isinstance(nonsense.get(u), float) and 0 < nonsense[u] < 1e-10 for u in ("rtol", "atol")
+        )
+    )
     t_end = t_end if not 1 < t_end < 1e9 else 1.0
     try:
         simulate(model, rig, t_end, **nonsense)

@@ -18,9 +18,9 @@ import numpy as np
 import pytest
 
 from gms_fsm import Prescribed, Trace, simulate
-from gms_fsm.recording import Recorder, _Columns
-from gms_fsm.report import run_scenario
-from gms_fsm.scenario import load_scenario
+from gms_fsm.app.report import run_scenario
+from gms_fsm.app.scenario import load_scenario
+from gms_fsm.run._recording import Recorder, _Columns
 from tests.helpers import pulled_mass, stick_slip
 from tests.scenario_files import OPEN_LOOP
 
@@ -52,7 +52,7 @@ def begins(whole: Trace, part: Trace) -> None:
 def test_what_was_computed_is_in_trace(
     engine: str, options: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gms_fsm.compiled_run.STEPS_AT_ONCE", 60)
+    monkeypatch.setattr("gms_fsm.run._compiled_run.STEPS_AT_ONCE", 60)
 
     def stop(moment: Any) -> None:
         if moment.t > 9.0:
@@ -134,13 +134,23 @@ def test_the_command_line_keeps_it_and_says_so_in_a_line(engine: str, tmp_path: 
         load = load_scenario(_file(tmp_path, OPEN_LOOP), ["run.engine=compiled"])
         run_scenario(load, tmp_path / "warm")  # the machine code is there
     scenario = _file(tmp_path, LONG)
-    command = [sys.executable, "-c", "from gms_fsm.cli import main; main()", "run", str(scenario)]
+    command = [
+        sys.executable,
+        "-c",
+        "from gms_fsm.app.cli import main; main()",
+        "run",
+        str(scenario),
+    ]
     command += ["-o", "out", "--checkpoint", "--set", f"run.engine={engine}"]
     child = subprocess.Popen(
-        command, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        command,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # ours may ignore it
-    )  # fmt: skip
+    )
     while not (tmp_path / "out" / "run.checkpoint").exists():
         time.sleep(0.01)
     time.sleep(2.0)
@@ -171,7 +181,7 @@ def test_before_the_first_row_nothing_is_written(
             error.trace = ()  # type: ignore[attr-defined]
         raise error
 
-    monkeypatch.setattr("gms_fsm.report.simulate", at_once)
+    monkeypatch.setattr("gms_fsm.app.report.simulate", at_once)
     with pytest.raises(KeyboardInterrupt, match="before the first row"):
         run_scenario(load_scenario(_file(tmp_path, LONG)), tmp_path / "out")
     assert list((tmp_path / "out").iterdir()) == []
@@ -183,7 +193,7 @@ def test_ctrl_c_while_figures_are_drawn_does_not_lose_the_run(
     def struck(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("gms_fsm.report.summary_text", struck)
+    monkeypatch.setattr("gms_fsm.app.report.summary_text", struck)
     with pytest.raises(KeyboardInterrupt, match=r"interrupted; the run is in .*trace\.npz"):
         run_scenario(load_scenario(_file(tmp_path, OPEN_LOOP)), tmp_path / "out")
     assert len(Trace.load(tmp_path / "out" / "trace.npz")) > 1

@@ -28,10 +28,10 @@ import numpy as np
 import pytest
 
 from gms_fsm import Prescribed, Sweep, Trace, simulate, sweep
-from gms_fsm.cli import main
+from gms_fsm._files import LIST, leftovers, written_together, written_whole
+from gms_fsm.app.cli import main
 from gms_fsm.errors import OutputError
-from gms_fsm.files import LIST, leftovers, written_together, written_whole
-from gms_fsm.session import Session
+from gms_fsm.inspection.session import Session
 from tests.helpers import pulled_mass, same_bits, stick_slip
 from tests.scenario_files import OPEN_LOOP
 
@@ -215,8 +215,11 @@ def nursery() -> None:
 def _nursery() -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, "-c", f"from {__name__} import nursery; nursery()"],
-        cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
+        cwd=ROOT,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
 
 
 def end_nursery() -> None:
@@ -329,8 +332,14 @@ def test_line_ends_do_not_part_rows_and_log(tmp_path: Path) -> None:
 
 def test_leftovers_are_those_of_the_file_alone(tmp_path: Path) -> None:
     mark = f"{7:016x}"
-    names = [f".a.csv.{mark}.gms-fsm-rest", f".a.csv.{mark}.gms-fsm-part", ".a.csv.7.gms-fsm-rest",
-             f".b.csv.{mark}.gms-fsm-rest", f"a.csv.{mark}.gms-fsm-rest", ".a.csv"]  # fmt: skip
+    names = [
+        f".a.csv.{mark}.gms-fsm-rest",
+        f".a.csv.{mark}.gms-fsm-part",
+        ".a.csv.7.gms-fsm-rest",
+        f".b.csv.{mark}.gms-fsm-rest",
+        f"a.csv.{mark}.gms-fsm-rest",
+        ".a.csv",
+    ]
     for name in names:
         (tmp_path / name).touch()
     assert [path.name for path in leftovers(tmp_path / "a.csv")] == names[:1]

@@ -11,7 +11,7 @@ import math
 import numpy as np
 import pytest
 
-from gms_fsm.lessons import l1_hysteresis as lesson
+from gms_fsm.app.lessons import l1_hysteresis as lesson
 from tests.lesson_checks import check_figure, check_lines
 
 PATH = [0.0, *lesson.TURNS]

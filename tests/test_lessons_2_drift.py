@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from gms_fsm.lessons import l2_drift as lesson
+from gms_fsm.app.lessons import l2_drift as lesson
 from tests.lesson_checks import check_figure, check_lines
 
 

@@ -10,7 +10,7 @@ import math
 import numpy as np
 import pytest
 
-from gms_fsm.lessons import l3_missed_window as lesson
+from gms_fsm.app.lessons import l3_missed_window as lesson
 from tests.lesson_checks import check_figure, check_lines
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import Trace
-from gms_fsm.lessons import l4_sign_of_s as lesson
+from gms_fsm.app.lessons import l4_sign_of_s as lesson
 from tests.lesson_checks import check_figure, check_lines
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from gms_fsm.lessons import l5_how_many as lesson
+from gms_fsm.app.lessons import l5_how_many as lesson
 from tests.lesson_checks import check_figure, check_lines
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import PulledSlider, simulate
-from gms_fsm.lessons import l6_stick_slip as lesson
+from gms_fsm.app.lessons import l6_stick_slip as lesson
 from tests.lesson_checks import check_figure, check_lines
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from gms_fsm.lessons import l7_frictional_lag as lesson
+from gms_fsm.app.lessons import l7_frictional_lag as lesson
 from tests.lesson_checks import check_figure, check_lines
 
 
@@ -33,9 +33,15 @@ def test_the_bank_is_one_lag_of_first_order(result: lesson.Result, w: float) -> 
 
     # From any start: after a second it is forgotten, exp(-50 / 1.5) of it is left.
     run = solve_ivp(
-        flow, (loop.t[0] - 1.0, loop.t[-1]), [1.2], t_eval=loop.t, rtol=1e-10, atol=1e-12,
-        method="DOP853", max_step=0.1 / w,
-    )  # fmt: skip
+        flow,
+        (loop.t[0] - 1.0, loop.t[-1]),
+        [1.2],
+        t_eval=loop.t,
+        rtol=1e-10,
+        atol=1e-12,
+        method="DOP853",
+        max_step=0.1 / w,
+    )
     np.testing.assert_allclose(loop.F - 0.4 * loop.v, run.y[0], rtol=0, atol=2e-5)
 
 

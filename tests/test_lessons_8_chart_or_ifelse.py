@@ -10,7 +10,7 @@ import math
 import numpy as np
 import pytest
 
-from gms_fsm.lessons import l8_chart_or_ifelse as lesson
+from gms_fsm.app.lessons import l8_chart_or_ifelse as lesson
 from tests.helpers import same_bits
 from tests.lesson_checks import check_figure, check_lines
 

@@ -10,25 +10,28 @@ from pathlib import Path
 
 import pytest
 
-from gms_fsm import lessons
+from gms_fsm._files import LIST
+from gms_fsm.app import lessons
 from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
-from gms_fsm.files import LIST
 
 
 def command(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     root = str(Path(__file__).parents[1])
     return subprocess.run(
-        [sys.executable, "-c", "from gms_fsm.cli import main; main()", "lesson", *arguments],
-        capture_output=True, text=True, cwd=cwd, check=False,
+        [sys.executable, "-c", "from gms_fsm.app.cli import main; main()", "lesson", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        check=False,
         env={**os.environ, "COLUMNS": "200", "PYTHONPATH": root},
-    )  # fmt: skip
+    )
 
 
 def test_there_are_eight_each_a_plain_module() -> None:
     assert list(lessons.LESSONS) == [1, 2, 3, 4, 5, 6, 7, 8]
     for number, lesson in lessons.LESSONS.items():
         assert isinstance(lesson, types.ModuleType)
-        assert lesson.__name__.startswith(f"gms_fsm.lessons.l{number}_")
+        assert lesson.__name__.startswith(f"gms_fsm.app.lessons.l{number}_")
         assert (lesson.__doc__ or "").startswith(f"Lesson {number}: ")
     assert len({lesson.QUESTION for lesson in lessons.LESSONS.values()}) == 8
 
@@ -64,9 +67,13 @@ def test_one_is_run_and_written(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
-    [(["9"], "no lesson '9'"), (["0"], "no lesson '0'"), (["one"], "no lesson 'one'"),
-     (["7", "-o", "file/out"], "choose another folder")],
-)  # fmt: skip
+    [
+        (["9"], "no lesson '9'"),
+        (["0"], "no lesson '0'"),
+        (["one"], "no lesson 'one'"),
+        (["7", "-o", "file/out"], "choose another folder"),
+    ],
+)
 def test_a_mistake_is_one_message(arguments: list[str], said: str, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     done = command(*arguments, cwd=tmp_path)

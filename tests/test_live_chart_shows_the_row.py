@@ -17,8 +17,8 @@ import pytest
 import plots.live_chart
 from gms_fsm import LuGre, Prescribed, Stribeck, Trace, simulate
 from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
-from gms_fsm.explain import explain, explain_state, values_at
-from gms_fsm.models import ChartModel
+from gms_fsm.inspection.explain import explain, explain_state, values_at
+from gms_fsm.systems.models import ChartModel
 from plots.live_chart import LiveChart, live_statechart
 from plots.style import CHART_THEMES
 from tests.helpers import one_element, open_loop, stick_slip
@@ -300,14 +300,17 @@ def test_program_and_package_give_the_same_look(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_a_guard_that_cannot_be_computed_is_marked_so() -> None:
-    from gms_fsm.chart import Chart, State, Transition
+    from gms_fsm.charts.chart import Chart, State, Transition
 
     chart = Chart(
-        "division", inputs=("v",), variables=("z",), parameters=(),
+        "division",
+        inputs=("v",),
+        variables=("z",),
+        parameters=(),
         states=(State("a", flow={"z": "1"}), State("b", flow={"z": "0"})),
         transitions=(Transition("ab", "a", "b", guard="z > 9 and 1 / v > 2"),),
         outputs={"F": "z"},
-    )  # fmt: skip
+    )
     trace = simulate(ChartModel(chart, {}, n=1, stribeck=CURVE), Prescribed("1"), 1.0)
     shown = LiveChart(trace)
     assert shown.look(0)[0].marks == {"ab": (False, False)}

@@ -10,8 +10,8 @@ import pytest
 from rich.console import Console
 
 from gms_fsm import simulate
-from gms_fsm.live import BETWEEN_FRAMES, LiveView
-from gms_fsm.simulate import Moment
+from gms_fsm.app.live import BETWEEN_FRAMES, LiveView
+from gms_fsm.run.simulate import Moment
 from tests.helpers import open_loop, pulled_mass, stick_slip
 
 
@@ -56,7 +56,7 @@ def test_frames_are_bounded_by_the_elapsed_time(
     tick: float, detail: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     clock = Clock(tick)
-    monkeypatch.setattr("gms_fsm.live.time.monotonic", clock)
+    monkeypatch.setattr("gms_fsm.app.live.time.monotonic", clock)
     view = Counted(screen(), 0.0, 20.0, detail=detail)
     begin = clock.now
     run_with(view)
@@ -68,7 +68,7 @@ def test_frames_are_bounded_by_the_elapsed_time(
 
 def test_a_standing_clock_gives_one_frame(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = Clock(0.0)
-    monkeypatch.setattr("gms_fsm.live.time.monotonic", clock)
+    monkeypatch.setattr("gms_fsm.app.live.time.monotonic", clock)
     view = Counted(screen(), 0.0, 20.0, detail=True)
     run_with(view)
     assert view.asked > 40
@@ -80,7 +80,7 @@ def test_a_frame_that_takes_long_does_not_call_for_the_next(
 ) -> None:
     """The pause is counted from the end of a frame, else a slow terminal eats the whole run."""
     clock = Clock(0.02)
-    monkeypatch.setattr("gms_fsm.live.time.monotonic", clock)
+    monkeypatch.setattr("gms_fsm.app.live.time.monotonic", clock)
 
     class Slow(Counted):
         def show(self, moment: Moment) -> None:
@@ -98,7 +98,7 @@ def test_between_frames_nothing_of_the_moment_is_computed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     clock = Clock(0.0)
-    monkeypatch.setattr("gms_fsm.live.time.monotonic", clock)
+    monkeypatch.setattr("gms_fsm.app.live.time.monotonic", clock)
     view = LiveView(screen(), 0.0, 20.0, detail=True)
     computed = 0
     original: Any = Moment.values.fget  # type: ignore[attr-defined]

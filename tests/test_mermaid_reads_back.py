@@ -17,10 +17,10 @@ from typing import Any
 
 import pytest
 
-import gms_fsm.chart
-from gms_fsm.chart import Chart, State, Transition
+import gms_fsm.charts.chart
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
-from gms_fsm.expression import MATLAB_LIKE, spell
+from gms_fsm.charts.chart import Chart, State, Transition
+from gms_fsm.language.expression import MATLAB_LIKE, spell
 from plots.mermaid import mermaid
 from tests.test_statechart_options import HOSTILE
 from tests.test_statechart_shows_the_whole_chart import FIVE_STATES, THREE_STATES
@@ -84,9 +84,14 @@ def parsed(texts: list[str]) -> list[dict[str, Any]]:
     reader = Path(folder, "reader.mjs")
     reader.write_text(READER, encoding="utf-8")
     done = subprocess.run(
-        [node, str(reader)], input=json.dumps(texts), capture_output=True, text=True, check=False,
-        timeout=60, encoding="utf-8",
-    )  # fmt: skip
+        [node, str(reader)],
+        input=json.dumps(texts),
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+        encoding="utf-8",
+    )
     assert done.returncode == 0, done.stderr
     found: list[dict[str, Any]] = json.loads(done.stdout)
     return found
@@ -128,13 +133,17 @@ def expected(chart: Chart) -> tuple[list[list[str]], list[tuple[int, int, str]]]
 @pytest.fixture
 def hostile(monkeypatch: pytest.MonkeyPatch) -> Chart:
     """A chart with names that no chart would take."""
-    monkeypatch.setattr(gms_fsm.chart, "_check_name", lambda *_: None)
+    monkeypatch.setattr(gms_fsm.charts.chart, "_check_name", lambda *_: None)
     bad = 'a"\n[*] --> evil: <b>&#x41;; %%{init}%% \u2028 --'
     return Chart(
-        name=bad, inputs=("v",), variables=("v" + bad,), parameters=(),
+        name=bad,
+        inputs=("v",),
+        variables=("v" + bad,),
+        parameters=(),
         states=(State(bad, flow={"v" + bad: "v"}),),
-        transitions=(Transition("e" + bad, bad, bad, guard="v > 0"),), outputs={"F": "v"},
-    )  # fmt: skip
+        transitions=(Transition("e" + bad, bad, bad, guard="v > 0"),),
+        outputs={"F": "v"},
+    )
 
 
 def test_mermaid_itself_reads_the_same_chart(hostile: Chart) -> None:

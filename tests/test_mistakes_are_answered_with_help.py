@@ -16,12 +16,12 @@ import pytest
 from rich.console import Console
 
 from gms_fsm import Prescribed, Session, Trace, simulate
+from gms_fsm.app.lessons import LESSONS
+from gms_fsm.app.live import LiveView
+from gms_fsm.app.scenario import load_scenario
 from gms_fsm.charts import LUGRE, gms_element
 from gms_fsm.errors import OutputError, ParameterError, ScenarioError, shown
-from gms_fsm.lessons import LESSONS
-from gms_fsm.live import LiveView
-from gms_fsm.scenario import load_scenario
-from gms_fsm.simulate import Moment
+from gms_fsm.run.simulate import Moment
 from plots import block_diagram, mermaid, render, statechart
 from plots.render import FORMATS
 from tests.helpers import pulled_mass, stick_slip

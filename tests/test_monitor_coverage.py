@@ -20,8 +20,8 @@ from gms_fsm import (
     Transition,
     simulate,
 )
-from gms_fsm.explain import explain
-from gms_fsm.verdicts import CoverageVerdict
+from gms_fsm.inspection.explain import explain
+from gms_fsm.traces.verdicts import CoverageVerdict
 from tests.helpers import FIG4_SINE, one_element, pulled_mass, stick_slip
 
 
@@ -47,8 +47,13 @@ def test_a_motion_both_ways_covers_the_gms_chart() -> None:
             int(((log.element == i) & (log.edge == edge)).sum()) for i in range(4)
         ]
     assert [clause.text for clause in found.clauses] == [
-        "z >= s", "v > v_c", "z <= -s", "v < -v_c", "|v| <= v_c", "|z| < s",
-    ]  # fmt: skip
+        "z >= s",
+        "v > v_c",
+        "z <= -s",
+        "v < -v_c",
+        "|v| <= v_c",
+        "|z| < s",
+    ]
     assert found.text == ("states 2 of 2, edges 3 of 3, clauses true 6 of 6, clauses false 6 of 6")
 
 
@@ -56,10 +61,14 @@ def test_a_motion_one_way_does_not() -> None:
     found = coverage(run(stick_slip("signed"), Prescribed(0.2), 3.0))
     assert not found.ok
     assert found.never == (
-        "edge break_away_backward", "edge arrest", "v > v_c of break_away_forward false",
-        "z <= -s of break_away_backward true", "v < -v_c of break_away_backward true",
-        "|v| <= v_c of arrest true", "|z| < s of arrest true",
-    )  # fmt: skip
+        "edge break_away_backward",
+        "edge arrest",
+        "v > v_c of break_away_forward false",
+        "z <= -s of break_away_backward true",
+        "v < -v_c of break_away_backward true",
+        "|v| <= v_c of arrest true",
+        "|z| < s of arrest true",
+    )
     assert "never: edge break_away_backward, edge arrest, " in found.text
     assert "a longer run, a motion both ways" in found.text
 
@@ -80,9 +89,7 @@ def test_elements_are_counted_one_by_one() -> None:
     assert found.edges["break_away_forward"] == (14, 8, 8, 8)
     assert found.edges["break_away_backward"] == (0, 0, 0, 0)
     assert found.edges["arrest"] == (13, 7, 7, 7)
-    assert found.never == (
-        "edge break_away_backward", "z <= -s of break_away_backward true",
-    )  # fmt: skip
+    assert found.never == ("edge break_away_backward", "z <= -s of break_away_backward true")
 
 
 @pytest.mark.parametrize("t_eval", [None, [0.0, 20.0, 50.0]])
@@ -119,11 +126,14 @@ def test_lugre_has_one_state_and_no_edges() -> None:
 def test_a_clause_that_cannot_be_computed_is_false() -> None:
     """As the guards themselves: 1/z at z = 0 does not hold."""
     chart = Chart(
-        "reciprocal", inputs=("v",), variables=("z",), parameters=("k",),
+        "reciprocal",
+        inputs=("v",),
+        variables=("z",),
+        parameters=("k",),
         states=(State("a", flow={"z": "v"}), State("b", flow={"z": "v"})),
         transitions=(Transition("go", "a", "b", guard="1 / z < 2 and z > 0"),),
         outputs={"F": "k * z"},
-    )  # fmt: skip
+    )
     model = ChartModel(chart, {"k": 1.0}, n=1, stribeck=Stribeck(1.0, 1.0, 1.0))
     found = coverage(run(model, Prescribed(0.0), 1.0))
     assert found.clauses[0].true == (False,)

@@ -29,9 +29,9 @@ from gms_fsm import (
     Trace,
     simulate,
 )
-from gms_fsm.errors import SimulationError
-from gms_fsm.monitors import Passivity, examine
-from gms_fsm.verdicts import PassivityVerdict
+from gms_fsm.traces.failures import SimulationError
+from gms_fsm.traces.monitors import Passivity, examine
+from gms_fsm.traces.verdicts import PassivityVerdict
 from tests.helpers import FIG4_SINE, non_drifting, one_element, pulled_mass, stick_slip
 
 FINE = {"rtol": 1e-9, "atol": 1e-12, "max_step": 0.05}
@@ -102,16 +102,22 @@ def motion(parts: list[tuple[float, float, float]]) -> Prescribed:
 
 MOTIONS = st.lists(
     st.tuples(st.floats(0.05, 0.5), st.floats(0.3, 3.0), st.floats(0.0, 6.0)),
-    min_size=1, max_size=3,
-)  # fmt: skip
+    min_size=1,
+    max_size=3,
+)
 
 
 def bank(F_s: float, v_s: float, C: float) -> GMS:
     """Two elements with sigma C <= k w F_c: the damper never overrules the spring."""
     parameters = GMSParameters(
-        [2.0, 5.0], [0.2, 0.4], [C, 0.5 * C], sigma_2=0.0, v_c=1e-6, weights=[0.3, 0.1],
+        [2.0, 5.0],
+        [0.2, 0.4],
+        [C, 0.5 * C],
+        sigma_2=0.0,
+        v_c=1e-6,
+        weights=[0.3, 0.1],
         stribeck=Stribeck(1.0, F_s, v_s),
-    )  # fmt: skip
+    )
     return GMS(parameters, law="signed")
 
 
@@ -144,9 +150,12 @@ def test_a_phase_of_slip_makes_at_most_what_the_stribeck_rise_stores(
 
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(
-    stroke=st.floats(3.0, 30.0), w=st.floats(0.2, 2.0), C=st.floats(0.02, 1.0),
-    F_s=st.floats(1.0, 2.0), v_s=st.floats(1e-3, 0.1),
-)  # fmt: skip
+    stroke=st.floats(3.0, 30.0),
+    w=st.floats(0.2, 2.0),
+    C=st.floats(0.02, 1.0),
+    F_s=st.floats(1.0, 2.0),
+    v_s=st.floats(1e-3, 0.1),
+)
 def test_strokes_longer_than_the_pre_sliding_are_passive(
     stroke: float, w: float, C: float, F_s: float, v_s: float
 ) -> None:
@@ -176,8 +185,9 @@ def test_the_signed_law_can_make_that_much() -> None:
 def test_a_start_in_slip_can_make_it_too() -> None:
     """From z = 0 at v < C: the closed form's lowest heat."""
     model = one_element("signed", k=2.0, sigma=0.3, F_c=1.0, F_s=1.5, v_s=1e-3, C=0.1)
-    trace = simulate(model, Prescribed(0.02), 30.0, initial={"states": ["slip"]},
-                     monitors="passivity", **FINE)  # type: ignore[arg-type]  # fmt: skip
+    trace = simulate(
+        model, Prescribed(0.02), 30.0, initial={"states": ["slip"]}, monitors="passivity", **FINE
+    )  # type: ignore[arg-type]
     taken, stored = np.array([slip("signed", 0.02, 0.0, t) for t in trace.t.tolist()]).T
     found = passivity(trace)
     assert not found.ok
@@ -201,8 +211,9 @@ def test_the_published_law_makes_energy_in_fig_4() -> None:
     assert not found.ok
     for part in (
         "element 1 (element 2 too) had made 2.15852 J out of nothing by t = 75 s",
-        "mostly in slip, where dz = sgn(v) * C * (1 - z / s)", "try law='signed'",
-    ):  # fmt: skip
+        "mostly in slip, where dz = sgn(v) * C * (1 - z / s)",
+        "try law='signed'",
+    ):
         assert part in found.text
 
 
@@ -242,14 +253,28 @@ def test_lugre_is_a_spring_and_a_damper_too() -> None:
     assert found.taken[0] == pytest.approx(0.5e-4 * (power[1:] + power[:-1]).sum(), rel=1e-3)
 
 
-@pytest.mark.parametrize(("force", "applicable"), [
-    ("k * z", True), ("k * z + c * dz", True), ("k * z**3", False), ("k * z + c * v", False),
-    ("c * dz + k * z", False), ("z", False), ("k * z + c * dz + v", False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("force", "applicable"),
+    [
+        ("k * z", True),
+        ("k * z + c * dz", True),
+        ("k * z**3", False),
+        ("k * z + c * v", False),
+        ("c * dz + k * z", False),
+        ("z", False),
+        ("k * z + c * dz + v", False),
+    ],
+)
 def test_other_forces_are_not_judged(force: str, applicable: bool) -> None:
-    chart = Chart("own", inputs=("v",), variables=("z",), parameters=("k", "c"),
-                  states=(State("only", flow={"z": "v"}),), transitions=(),
-                  outputs={"F": force})  # fmt: skip
+    chart = Chart(
+        "own",
+        inputs=("v",),
+        variables=("z",),
+        parameters=("k", "c"),
+        states=(State("only", flow={"z": "v"}),),
+        transitions=(),
+        outputs={"F": force},
+    )
     model = ChartModel(chart, {"k": 1.0, "c": 0.5}, n=2, stribeck=Stribeck(1.0, 1.0, 1.0))
     found = passivity(simulate(model, Prescribed("sin(t)"), 3.0, monitors="passivity"))
     assert found.ok
@@ -260,10 +285,18 @@ def test_other_forces_are_not_judged(force: str, applicable: bool) -> None:
 
 # --------------------------------------------------------------------------- how sure it is
 @pytest.mark.parametrize("law", ["signed", "published"])
-@pytest.mark.parametrize("options", [
-    {}, {"rtol": 1e-4}, {"method": "bs23"}, {"method": "rk4", "step": 0.01},
-    {"method": "heun", "step": 1e-3}, {"t_eval": np.linspace(0.0, 60.0, 301)},
-], ids=str)  # fmt: skip
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"rtol": 1e-4},
+        {"method": "bs23"},
+        {"method": "rk4", "step": 0.01},
+        {"method": "heun", "step": 1e-3},
+        {"t_eval": np.linspace(0.0, 60.0, 301)},
+    ],
+    ids=str,
+)
 def test_the_tolerance_covers_the_error_of_the_sums(law: str, options: dict[str, object]) -> None:
     """The same energies from coarse steps, or few rows, as from fine ones, within what is said."""
     model, rig = stick_slip(law), Prescribed(FIG4_SINE)

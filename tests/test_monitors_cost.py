@@ -10,14 +10,23 @@ from typing import Any
 
 import pytest
 
-from gms_fsm import Prescribed, monitors, simulate, trace
-from gms_fsm.errors import LivelockError
-from gms_fsm.program import lower
+from gms_fsm import Prescribed, simulate
+from gms_fsm.lowering.program import lower
+from gms_fsm.traces import monitors, trace
+from gms_fsm.traces.failures import LivelockError
 from tests.helpers import FIG4_SINE, open_loop, pulled_mass, stick_slip
 from tests.test_monitors_see_what_happens import SLOWING, memoryless
 
-FUNCTIONS = ("checked", "examine", "watched", "_chattering", "_invariant", "_passivity",
-             "_coverage", "_columns")  # fmt: skip
+FUNCTIONS = (
+    "checked",
+    "examine",
+    "watched",
+    "_chattering",
+    "_invariant",
+    "_passivity",
+    "_coverage",
+    "_columns",
+)
 
 
 @pytest.fixture
@@ -35,7 +44,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     for name in FUNCTIONS:
         monkeypatch.setattr(monitors, name, noting(name, getattr(monitors, name)))
     for name in ("checked", "watched"):
-        monkeypatch.setattr(sys.modules["gms_fsm.simulate"], name, getattr(monitors, name))
+        monkeypatch.setattr(sys.modules["gms_fsm.run.simulate"], name, getattr(monitors, name))
     monkeypatch.setattr(trace, "_observe_rows", noting("observe", trace._observe_rows))
     return noted
 
@@ -71,8 +80,12 @@ def test_the_run_itself_is_the_same(calls: list[str]) -> None:
 
 
 def test_rows_are_observed_once_for_all_monitors_and_for_the_reader(calls: list[str]) -> None:
-    run = simulate(stick_slip("signed"), Prescribed(FIG4_SINE), 50.0,
-                   monitors=["all", "abs(z) <= 2*s", "F < 99"])  # fmt: skip
+    run = simulate(
+        stick_slip("signed"),
+        Prescribed(FIG4_SINE),
+        50.0,
+        monitors=["all", "abs(z) <= 2*s", "F < 99"],
+    )
     assert calls.count("observe") == 1
     assert run.F.size == run.v.size == len(run)
     assert calls.count("observe") == 1

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import Trace
-from gms_fsm.debugger import run_debugger
-from gms_fsm.errors import LivelockError
-from gms_fsm.monitors import Invariant
-from gms_fsm.report import monitor_lines, run_scenario
-from gms_fsm.scenario import load_scenario
+from gms_fsm.app.debugger import run_debugger
+from gms_fsm.app.report import monitor_lines, run_scenario
+from gms_fsm.app.scenario import load_scenario
+from gms_fsm.traces.failures import LivelockError
+from gms_fsm.traces.monitors import Invariant
 from tests.scenario_files import (
     OPEN_LOOP,
     CommandLine,
@@ -93,8 +93,7 @@ def test_a_wrong_one_is_one_message(
 
 
 def test_a_run_that_fails_tells_them_too(gms_fsm: CommandLine, path: Path, tmp_path: Path) -> None:
-    done = gms_fsm("run", path, "-o", tmp_path / "out",
-                   "--set", "rig.velocity=0.1*sqrt(0.5 - t)")  # fmt: skip
+    done = gms_fsm("run", path, "-o", tmp_path / "out", "--set", "rig.velocity=0.1*sqrt(0.5 - t)")
     one_message(done, "not finite", "partial.npz", "monitor passivity (ok)", "monitor coverage")
     assert list(Trace.load(tmp_path / "out" / "partial.npz").monitors) == MONITORS
 

@@ -27,12 +27,13 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.charts.broken import BROKEN
-from gms_fsm.errors import ExpressionError, LivelockError, ParameterError, SimulationError
-from gms_fsm.explain import holds, values_at
-from gms_fsm.expression import parse_condition
-from gms_fsm.monitors import Chattering, Coverage, Invariant, Passivity, checked, examine
-from gms_fsm.session import Session
-from gms_fsm.verdicts import ChatteringVerdict, InvariantVerdict
+from gms_fsm.errors import ExpressionError, ParameterError
+from gms_fsm.inspection.explain import holds, values_at
+from gms_fsm.inspection.session import Session
+from gms_fsm.language.expression import parse_condition
+from gms_fsm.traces.failures import LivelockError, SimulationError
+from gms_fsm.traces.monitors import Chattering, Coverage, Invariant, Passivity, checked, examine
+from gms_fsm.traces.verdicts import ChatteringVerdict, InvariantVerdict
 from tests.helpers import (
     FIG4_SINE,
     FunctionBelt,
@@ -49,16 +50,22 @@ SLOWING = Prescribed("0.2*cos(2*pi*t/20)")
 def memoryless(weights: list[float]) -> ChartModel:
     """Guards that are each other's negation: on z = s both flows push into the other's state."""
     return ChartModel(
-        BROKEN["memoryless"].chart, {"k": 1.0, "sigma": 0.1, "C": 0.1, "v_c": 1e-6},
-        n=len(weights), stribeck=Stribeck(1.0, 1.5, 0.05), weights=np.array(weights),
-    )  # fmt: skip
+        BROKEN["memoryless"].chart,
+        {"k": 1.0, "sigma": 0.1, "C": 0.1, "v_c": 1e-6},
+        n=len(weights),
+        stribeck=Stribeck(1.0, 1.5, 0.05),
+        weights=np.array(weights),
+    )
 
 
 def blinker(period: float) -> ChartModel:
     """An element that goes on and off once a period, at known times."""
     return ChartModel(
         Chart(
-            "blinker", inputs=("t",), variables=("z",), parameters=("T", "k"),
+            "blinker",
+            inputs=("t",),
+            variables=("z",),
+            parameters=("T", "k"),
             states=(State("off", flow={"z": "0"}), State("on", flow={"z": "0"})),
             transitions=(
                 Transition("rise", "off", "on", guard="sin(2*pi*t/T) > 0"),
@@ -66,8 +73,10 @@ def blinker(period: float) -> ChartModel:
             ),
             outputs={"F": "k * z"},
         ),
-        {"T": period, "k": 1.0}, n=1, stribeck=Stribeck(1.0, 1.0, 1.0),
-    )  # fmt: skip
+        {"T": period, "k": 1.0},
+        n=1,
+        stribeck=Stribeck(1.0, 1.0, 1.0),
+    )
 
 
 def chattering(trace: Trace) -> ChatteringVerdict:
@@ -98,9 +107,14 @@ def test_memoryless_guards_chatter() -> None:
     assert (episode.t_first, episode.t_last) == (taken.t[0], taken.t[-1])
     assert episode.values == {"z": taken.z[0], "v": taken.v[0]}
     for part in (
-        "element 1 took fall, and back rise,", f"{episode.count} times in ", "from t = 1 s",
-        "z = 1", "[z >= 1]", "[z <= 1 - gap]", "leave a gap between them",
-    ):  # fmt: skip
+        "element 1 took fall, and back rise,",
+        f"{episode.count} times in ",
+        "from t = 1 s",
+        "z = 1",
+        "[z >= 1]",
+        "[z <= 1 - gap]",
+        "leave a gap between them",
+    ):
         assert part in found.text
 
 
@@ -134,15 +148,21 @@ def test_the_longest_stretch_counts() -> None:
     slow = blinker(0.1).chart
     model = ChartModel(
         Chart(
-            slow.name, slow.inputs, slow.variables, slow.parameters, slow.states,
+            slow.name,
+            slow.inputs,
+            slow.variables,
+            slow.parameters,
+            slow.states,
             tuple(
                 Transition(e.name, e.source, e.target, e.guard.replace("*t/T", f"*({times})/T"))
                 for e in slow.transitions
             ),
             slow.outputs,
         ),
-        {"T": 0.1, "k": 1.0}, n=1, stribeck=Stribeck(1.0, 1.0, 1.0),
-    )  # fmt: skip
+        {"T": 0.1, "k": 1.0},
+        n=1,
+        stribeck=Stribeck(1.0, 1.0, 1.0),
+    )
     trace = simulate(model, Prescribed("0"), 8.0, monitors=[Chattering(4, 0.35)], max_step=0.01)
     (episode,) = chattering(trace).episodes
     assert episode.t_first == pytest.approx(5.0, abs=0.11)
@@ -192,8 +212,9 @@ def test_an_invariant_that_holds() -> None:
 @pytest.mark.parametrize("times", [None, [0.0, 1.0, 2.0]])
 def test_the_first_break_in_stick_is_located(times: list[float] | None) -> None:
     """z = v t crosses 0.1 m at 0.5 s, between two rows."""
-    trace = simulate(stick_slip("signed"), Prescribed(0.2), 2.0, monitors=["z <= 0.1"],
-                     t_eval=times)  # fmt: skip
+    trace = simulate(
+        stick_slip("signed"), Prescribed(0.2), 2.0, monitors=["z <= 0.1"], t_eval=times
+    )
     found = invariant(trace, "z <= 0.1")
     assert not found.ok
     assert found.t == pytest.approx(0.5, abs=1e-12)
@@ -211,8 +232,15 @@ def test_the_first_break_in_stick_is_located(times: list[float] | None) -> None:
 def test_the_first_break_in_slip_is_located(law: str) -> None:
     """z = s (1 - exp(-C t / s)) crosses s / 2 at t = s/C ln 2."""
     model = one_element(law, F_c=1.0, F_s=1.5, v_s=1e-3, C=0.1, sigma=0.0)
-    trace = simulate(model, Prescribed(0.2), 20.0, monitors=["z <= 0.5*s"], rtol=1e-9,
-                     atol=1e-12, initial={"states": ["slip"]})  # fmt: skip
+    trace = simulate(
+        model,
+        Prescribed(0.2),
+        20.0,
+        monitors=["z <= 0.5*s"],
+        rtol=1e-9,
+        atol=1e-12,
+        initial={"states": ["slip"]},
+    )
     found = invariant(trace, "z <= 0.5*s")
     assert found.t == pytest.approx(10.0 * math.log(2.0), abs=1e-6)
     assert found.values["s"] == 1.0
@@ -280,11 +308,23 @@ def test_an_invariant_that_cannot_be_read_is_refused_before_the_run(text: str) -
 
 
 CONDITIONS = (
-    "z <= 0.999*s or state == slip", "exp(-z) < 0.9 and v > 0", "1 / (v - 0.15) > z / s",
-    "sqrt(z) <= 0.7", "(z / s)**2 < 1", "z**0.5 < 0.6", "z**-1 > k", "max(z, v) > min(s, 0.1)",
-    "not sin(t) * cos(x) > tanh(z)", "exp(1000 * t) > 1", "sgn(z - s) < sigma", "abs(F) < 1",
-    "z1 < z2 or F3 > s4", "v <= v_c or -1 < F < C * 10", "z**9 < s", "1 / z**2 > s",
-)  # fmt: skip
+    "z <= 0.999*s or state == slip",
+    "exp(-z) < 0.9 and v > 0",
+    "1 / (v - 0.15) > z / s",
+    "sqrt(z) <= 0.7",
+    "(z / s)**2 < 1",
+    "z**0.5 < 0.6",
+    "z**-1 > k",
+    "max(z, v) > min(s, 0.1)",
+    "not sin(t) * cos(x) > tanh(z)",
+    "exp(1000 * t) > 1",
+    "sgn(z - s) < sigma",
+    "abs(F) < 1",
+    "z1 < z2 or F3 > s4",
+    "v <= v_c or -1 < F < C * 10",
+    "z**9 < s",
+    "1 / z**2 > s",
+)
 
 
 @pytest.mark.parametrize("text", CONDITIONS)
@@ -299,8 +339,11 @@ def test_the_verdict_at_a_row_is_that_of_the_row_alone(text: str) -> None:
     for row in range(len(trace)):
         values: dict[str, Any] = {"F": trace.F[row]}
         for i in range(n):
-            values |= {f"z{i + 1}": trace.z[row, i], f"s{i + 1}": trace.s[row, i],
-                       f"F{i + 1}": trace.F_elements[row, i]}  # fmt: skip
+            values |= {
+                f"z{i + 1}": trace.z[row, i],
+                f"s{i + 1}": trace.s[row, i],
+                f"F{i + 1}": trace.F_elements[row, i],
+            }
         broken.append(
             not all(
                 holds(tree, values_at(trace, row, i) | values | {"state(0)": trace.states[row, i]})
@@ -330,8 +373,9 @@ def test_all_means_these_three() -> None:
     model = stick_slip("signed")
     assert list(checked("all", model)) == ["chattering", "passivity", "coverage"]
     assert checked(["z <= s", Coverage()], model) == {
-        "z <= s": Invariant("z <= s"), "coverage": Coverage(),
-    }  # fmt: skip
+        "z <= s": Invariant("z <= s"),
+        "coverage": Coverage(),
+    }
     assert checked("passivity", model) == {"passivity": Passivity()}
     assert checked(Chattering(3, 0.5), model) == {"chattering": Chattering(3, 0.5)}
 
@@ -352,10 +396,16 @@ def test_what_is_no_monitor_is_refused(monitors: Any, said: str) -> None:
     assert said in str(caught.value)
 
 
-@pytest.mark.parametrize("make", [
-    lambda: Chattering(times=1), lambda: Chattering(times=2.5), lambda: Chattering(within=0.0),
-    lambda: Chattering(within=math.nan), lambda: Passivity(tolerance=-1.0),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Chattering(times=1),
+        lambda: Chattering(times=2.5),
+        lambda: Chattering(within=0.0),
+        lambda: Chattering(within=math.nan),
+        lambda: Passivity(tolerance=-1.0),
+    ],
+)
 def test_numbers_of_a_monitor_have_rules(make: Any) -> None:
     with pytest.raises(ParameterError):
         make()
@@ -413,8 +463,9 @@ def test_files_keep_what_they_said(ending: str, tmp_path: Path) -> None:
 
 
 def test_values_that_are_not_finite_survive_a_file(tmp_path: Path) -> None:
-    found = InvariantVerdict(False, "broken", "z < 1", 2, 1, 0.5, 0, "slip",
-                             {"z": math.inf, "s": -math.inf}, 1.0)  # fmt: skip
+    found = InvariantVerdict(
+        False, "broken", "z < 1", 2, 1, 0.5, 0, "slip", {"z": math.inf, "s": -math.inf}, 1.0
+    )
     trace = simulate(stick_slip("signed"), Prescribed(0.2), 1.0).with_monitors({"z < 1": found})
     for ending in ("npz", "csv"):
         read = Trace.load(trace.save(tmp_path / f"run.{ending}"))

@@ -16,9 +16,9 @@ from typing import Any
 import pytest
 
 from gms_fsm import ChartModel, Prescribed, Stribeck, simulate
-from gms_fsm.chart import Chart, State, Transition
+from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ChartError, ExpressionError
-from gms_fsm.expression import (
+from gms_fsm.language.expression import (
     MATLAB_LIKE,
     Binary,
     InState,
@@ -36,7 +36,7 @@ from gms_fsm.expression import (
     split,
     substitute,
 )
-from gms_fsm.machines import Element, ElementMachines, Guard
+from gms_fsm.run.machines import Element, ElementMachines, Guard
 from integrators import advance as kernel
 from integrators.crossings import NO_CHANGE, first_change, nothing_near, watched
 from integrators.hybrid import Buffers, Options, System, buffers
@@ -139,11 +139,21 @@ def test_min_takes_fifty_arguments_folded_from_the_left_as_deep_as_any_tree_may_
 @pytest.mark.parametrize(
     ("text", "column"),
     [
-        ("w", 1), ("  w", 3), ("v + w", 5), ("\u03bc + w", 5), ("  \u03bc*\u03bc + w", 9),
-        ("v +", 4), ("  v + ", 7), ("  v )", 5), ("v # w", 3), ("", 1), ("   ", 1), ("v\n+ w", 5),
+        ("w", 1),
+        ("  w", 3),
+        ("v + w", 5),
+        ("\u03bc + w", 5),
+        ("  \u03bc*\u03bc + w", 9),
+        ("v +", 4),
+        ("  v + ", 7),
+        ("  v )", 5),
+        ("v # w", 3),
+        ("", 1),
+        ("   ", 1),
+        ("v\n+ w", 5),
         ("v + \ud800", 5),
     ],
-)  # fmt: skip
+)
 def test_the_column_is_counted_in_characters_of_the_text_as_written(text: str, column: int) -> None:
     assert _refused(text, "v", "\u03bc").column == column
 
@@ -208,11 +218,14 @@ def test_small_powers_are_products_until_the_text_grows_too_long() -> None:
         ("a**0.5 * b", "pow(a, 0.5) * b", "a^0.5 * b"),
         ("a**b**c", "pow(a, pow(b, c))", "a^(b^c)"),
         ("abs(a - b)", "abs(a - b)", "|a - b|"),
-        ("0.1 + 1e-7 + 0.30000000000000004", "0.1 + 1e-07 + 0.30000000000000004",
-         "0.1 + 1e-07 + 0.30000000000000004"),
+        (
+            "0.1 + 1e-7 + 0.30000000000000004",
+            "0.1 + 1e-07 + 0.30000000000000004",
+            "0.1 + 1e-07 + 0.30000000000000004",
+        ),
         ("1234567", "1234567.0", "1234567.0"),
     ],
-)  # fmt: skip
+)
 def test_a_value_has_no_more_and_no_fewer_brackets_than_its_order_needs(
     text: str, python: str, matlab: str
 ) -> None:
@@ -229,14 +242,13 @@ def test_a_value_has_no_more_and_no_fewer_brackets_than_its_order_needs(
         ("not not a > b", "not not a > b", "!(!(a > b))"),
         ("(a > b or b > c) and c > a", "(a > b or b > c) and c > a", "(a > b || b > c) && c > a"),
         ("a > b or b > c and c > a", "a > b or b > c and c > a", "a > b || b > c && c > a"),
-        ("a > b and (b > c and c > a)", "a > b and (b > c and c > a)",
-         "a > b && (b > c && c > a)"),
+        ("a > b and (b > c and c > a)", "a > b and (b > c and c > a)", "a > b && (b > c && c > a)"),
         ("a > b or (b > c or c > a)", "a > b or (b > c or c > a)", "a > b || (b > c || c > a)"),
         ("a + b <= -c", "a + b <= -c", "a + b <= -c"),
         ("state(2) == slip", "state(2) == slip", "state(2) == slip"),
         ("state != slip", "not state == slip", "!(state == slip)"),
     ],
-)  # fmt: skip
+)
 def test_a_condition_has_no_more_and_no_fewer_brackets_than_its_order_needs(
     text: str, python: str, matlab: str
 ) -> None:
@@ -295,8 +307,10 @@ def test_rough_calls_become_names_in_the_order_they_are_computed_and_smooth_ones
     smooth, calls = substitute(flow, names)
     assert spell(smooth) == "C * sgn_a - max_c"
     assert [(name, spell(call)) for name, call in calls.items()] == [
-        ("sgn_a", "sgn(v)"), ("abs_b", "abs(z)"), ("max_c", "max(v, -exp(abs_b))"),
-    ]  # fmt: skip
+        ("sgn_a", "sgn(v)"),
+        ("abs_b", "abs(z)"),
+        ("max_c", "max(v, -exp(abs_b))"),
+    ]
 
 
 # --------------------------------------------------------------------------- machines
@@ -380,10 +394,14 @@ def test_an_element_shows_the_values_of_the_moment_it_is_asked_at() -> None:
 
 def test_an_element_shows_every_variable_of_its_own() -> None:
     chart = Chart(
-        "two", ("v",), ("z", "w"), ("k",),
+        "two",
+        ("v",),
+        ("z", "w"),
+        ("k",),
         (State("rest", {"z": "v", "w": "2*v"}), State("gone", {"z": "v", "w": "0"})),
-        (Transition("leave", "rest", "gone", "z >= 0.25*k"),), {"F": "z"},
-    )  # fmt: skip
+        (Transition("leave", "rest", "gone", "z >= 0.25*k"),),
+        {"F": "z"},
+    )
     model = ChartModel(chart, {"k": [1.0, 2.0]}, n=2)
     seen = []
 
@@ -558,9 +576,18 @@ class _Run:
 
         nothing = Surfaces([], [], [])
         system = System(
-            flow, flow, lambda *_: None, margins, lambda *_: None, None, 0, [False], ["g"],
-            nothing, list(knots),
-        )  # fmt: skip
+            flow,
+            flow,
+            lambda *_: None,
+            margins,
+            lambda *_: None,
+            None,
+            0,
+            [False],
+            ["g"],
+            nothing,
+            list(knots),
+        )
         method = RK4 if step else DP45
         options = Options(method, step, tolerance, [tolerance], max_step, 0.0, 10**6, True, times)
         self.b: Buffers = buffers(system, origin, [1.0], [], 100.0, options, capacity)
@@ -578,9 +605,25 @@ class _Run:
     ) -> tuple[int, float, float, float]:
         b, s = self.b, self.system
         found = kernel.advance(
-            s.flow, s.margins, b.method, b.control, self.t, self.y, self.f, h, before, t_stop,
-            s.knots, [], [], None, b.relations, b.out, b.work, steps,
-        )  # fmt: skip
+            s.flow,
+            s.margins,
+            b.method,
+            b.control,
+            self.t,
+            self.y,
+            self.f,
+            h,
+            before,
+            t_stop,
+            s.knots,
+            [],
+            [],
+            None,
+            b.relations,
+            b.out,
+            b.work,
+            steps,
+        )
         self.t = found[1]
         return found
 

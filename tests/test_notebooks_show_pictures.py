@@ -33,7 +33,7 @@ def test_charts_and_models_are_svg() -> None:
         (one_element("signed"), 0),
         (LuGre(sigma_0=1e3, sigma_1=30.0, sigma_2=0.4, stribeck=CURVE), 0),
         (ChartModel(GMS_ELEMENT["signed"], values, n=9, stribeck=CURVE), 0),  # too many to show
-    ]  # fmt: skip
+    ]
     for shown, count in regions:
         root = ElementTree.fromstring(shown._repr_svg_())  # type: ignore[attr-defined]
         found = [g for g in root.iter() if "region" in g.get("class", "").split()]

@@ -6,17 +6,18 @@ import numpy as np
 import pytest
 
 from gms_fsm import GMS, GMSParameters, Prescribed, Stribeck, simulate
-from gms_fsm.notes import notes_on
-from gms_fsm.report import run_scenario
-from gms_fsm.scenario import load_scenario
+from gms_fsm.app.report import run_scenario
+from gms_fsm.app.scenario import load_scenario
+from gms_fsm.inspection.notes import notes_on
 from tests.helpers import open_loop, pulled_mass, stick_slip
 from tests.scenario_files import command_line
 
 
 def bank(k: float = 1.0, v_c: float = 1e-6) -> GMS:
     """Return two elements with thresholds of some micrometres at k = 1."""
-    p = GMSParameters.from_shares([0.5, 0.5], [k * 4e5, k * 2e5], C=20.0, v_c=v_c,
-                                  stribeck=Stribeck(2.0, 2.4, 1e-3))  # fmt: skip
+    p = GMSParameters.from_shares(
+        [0.5, 0.5], [k * 4e5, k * 2e5], C=20.0, v_c=v_c, stribeck=Stribeck(2.0, 2.4, 1e-3)
+    )
     return GMS(p, law="signed")
 
 
@@ -73,9 +74,17 @@ def test_a_run_that_sees_them_has_no_such_note():
 def test_the_command_line_says_them(tmp_path, monkeypatch, capsys):
     path = Path(__file__).parents[1] / "scenarios" / "pulled_mass.toml"
     done = command_line(monkeypatch, capsys)(
-        "run", path, "-o", tmp_path / "out", "--set", "model.v_c=10.0", "--set", "run.t_end=2.0",
-        "--set", "output.figures=[]",
-    )  # fmt: skip
+        "run",
+        path,
+        "-o",
+        tmp_path / "out",
+        "--set",
+        "model.v_c=10.0",
+        "--set",
+        "run.t_end=2.0",
+        "--set",
+        "output.figures=[]",
+    )
     assert done.code == 0
     assert "note: no transition: the speed stays below v_c" in done.out
 

@@ -21,9 +21,9 @@ import numpy as np
 import pytest
 
 from gms_fsm import Prescribed, Trace, simulate
-from gms_fsm.cli import main
+from gms_fsm._files import LIST, output_folder, remove_leftovers, written_whole
+from gms_fsm.app.cli import main
 from gms_fsm.errors import GMSError, OutputError
-from gms_fsm.files import LIST, output_folder, remove_leftovers, written_whole
 from tests.helpers import same_bits, stick_slip
 from tests.scenario_files import MEASURED, OPEN_LOOP
 
@@ -112,9 +112,17 @@ def test_the_record_of_a_run_is_no_output(refused: Callable[..., str], tmp_path:
 
 # --------------------------------------------------------------------------- a file of the user's
 @pytest.mark.parametrize(
-    "name", ["summary.md", "trace.npz", "transitions.csv", "trace.csv", "trace.transitions.csv",
-             "partial.npz", "overview.svg"],
-)  # fmt: skip
+    "name",
+    [
+        "summary.md",
+        "trace.npz",
+        "transitions.csv",
+        "trace.csv",
+        "trace.transitions.csv",
+        "partial.npz",
+        "overview.svg",
+    ],
+)
 def test_a_run_does_not_write_over_a_file_of_ones_own(
     name: str, refused: Callable[..., str], scenario: str
 ) -> None:
@@ -295,7 +303,7 @@ def test_of_a_living_process_nothing_is_removed(tmp_path: Path) -> None:
     code = """
 import sys, time
 from pathlib import Path
-from gms_fsm.files import written_whole
+from gms_fsm._files import written_whole
 def write(file):
     file.write(b"whole")
     print("begun", flush=True)
@@ -303,9 +311,12 @@ def write(file):
 written_whole(Path(sys.argv[1]), write)
 """
     child = subprocess.Popen(
-        [sys.executable, "-c", code, str(tmp_path / "a")], cwd=Path(__file__).parents[1], text=True,
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-    )  # fmt: skip
+        [sys.executable, "-c", code, str(tmp_path / "a")],
+        cwd=Path(__file__).parents[1],
+        text=True,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
     assert child.stdout is not None
     assert child.stdout.readline() == "begun\n"
     remove_leftovers(tmp_path)

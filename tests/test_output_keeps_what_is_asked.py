@@ -12,8 +12,8 @@ import pytest
 
 from gms_fsm import LuGre, Prescribed, Stribeck, Trace, simulate
 from gms_fsm.errors import ParameterError
-from gms_fsm.models import Model
-from gms_fsm.rigs import Rig
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.rigs import Rig
 from tests.helpers import non_drifting, open_loop, pulled_mass, stick_slip
 
 JUMPS = [(0, 0.1), (1, 0.2), (1, -0.3), (6, -0.3), (6, 0.4), (9, 0.4)]
@@ -168,9 +168,10 @@ def test_progress_is_told_of_a_run_that_keeps_its_end_only() -> None:
     """The last it is told of lies before the end, in time order, with finite values."""
     seen: list[tuple[float, float]] = []
     simulate(
-        *CASES["pulled mass"], output="end",
+        *CASES["pulled mass"],
+        output="end",
         progress=lambda moment: seen.append((moment.t, moment.values["F"])),
-    )  # fmt: skip
+    )
     assert len(seen) > 3
     assert [t for t, _ in seen] == sorted(t for t, _ in seen)
     assert np.isfinite(seen).all()
@@ -191,8 +192,15 @@ def test_a_long_compiled_run_comes_up_for_air(events: str, options: dict[str, An
     pytest.importorskip("numba", reason="needs the extra fast")
     seen: list[float] = []
     simulate(
-        stick_slip("signed"), Prescribed("0.2"), 45.0, engine="compiled", method="euler",
-        step=1e-3, events=events, progress=lambda moment: seen.append(moment.t), **options,
-    )  # fmt: skip
+        stick_slip("signed"),
+        Prescribed("0.2"),
+        45.0,
+        engine="compiled",
+        method="euler",
+        step=1e-3,
+        events=events,
+        progress=lambda moment: seen.append(moment.t),
+        **options,
+    )
     assert seen, "45,000 steps without a look at the keyboard"
     assert seen == sorted(seen)

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from gms_fsm import Prescribed
+from gms_fsm.app.scenario import Scenario, load_scenario
 from gms_fsm.errors import ScenarioError
-from gms_fsm.scenario import Scenario, load_scenario
-from gms_fsm.signals import Corners, Formula
+from gms_fsm.systems.signals import Corners, Formula
 from tests.scenario_files import (
     MEASURED,
     OPEN_LOOP,
@@ -95,9 +95,17 @@ def test_an_override_can_mend_a_file(path: Path) -> None:
 
 def test_the_run_obeys(gms_fsm: CommandLine, path: Path, tmp_path: Path) -> None:
     done = gms_fsm(
-        "run", path, "-o", tmp_path / "out",
-        "--set", "model.law=published", "--set", "run.t_end=0.25", "--set", "title=Mine",
-    )  # fmt: skip
+        "run",
+        path,
+        "-o",
+        tmp_path / "out",
+        "--set",
+        "model.law=published",
+        "--set",
+        "run.t_end=0.25",
+        "--set",
+        "title=Mine",
+    )
     assert done.code == 0, done.err
     summary = (tmp_path / "out" / "summary.md").read_text()
     assert summary.startswith("# Mine\n")
@@ -160,13 +168,56 @@ def test_the_schema_names_every_key_and_no_other(schema: dict[str, Any]) -> None
     tables = schema["$defs"]
     named = {key for table in tables.values() for key in table["properties"]}
     for key in (
-        "kind", "law", "preset", "k", "sigma", "C", "sigma_2", "v_c", "stribeck", "weights",
-        "shares", "F_c", "F_s", "v_s", "sigma_0", "sigma_1", "velocity", "force", "mass",
-        "stiffness", "speed", "file", "time", "position", "normal", "where", "smoothing",
-        "delimiter", "column", "unit", "sign", "value", "t_end", "t_start", "method", "step",
-        "rtol", "atol", "max_step", "events", "engine", "z", "states", "v", "x", "every",
-        "figures", "csv", "monitors",
-    ):  # fmt: skip
+        "kind",
+        "law",
+        "preset",
+        "k",
+        "sigma",
+        "C",
+        "sigma_2",
+        "v_c",
+        "stribeck",
+        "weights",
+        "shares",
+        "F_c",
+        "F_s",
+        "v_s",
+        "sigma_0",
+        "sigma_1",
+        "velocity",
+        "force",
+        "mass",
+        "stiffness",
+        "speed",
+        "file",
+        "time",
+        "position",
+        "normal",
+        "where",
+        "smoothing",
+        "delimiter",
+        "column",
+        "unit",
+        "sign",
+        "value",
+        "t_end",
+        "t_start",
+        "method",
+        "step",
+        "rtol",
+        "atol",
+        "max_step",
+        "events",
+        "engine",
+        "z",
+        "states",
+        "v",
+        "x",
+        "every",
+        "figures",
+        "csv",
+        "monitors",
+    ):
         assert key in named, key
     for name, table in tables.items():
         assert table["additionalProperties"] is False, name

@@ -24,7 +24,7 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.errors import ChartError
-from gms_fsm.rigs import Rig
+from gms_fsm.systems.rigs import Rig
 from tests.helpers import CURVE, same_bits, wear
 
 
@@ -45,9 +45,14 @@ def element(
     """One state, one flow."""
     parameters = parameters or {}
     chart = Chart(
-        "one", ("v", "t", "x"), ("z",), tuple(parameters), (State("on", {"z": flow}),), (),
+        "one",
+        ("v", "t", "x"),
+        ("z",),
+        tuple(parameters),
+        (State("on", {"z": flow}),),
+        (),
         {"F": force},
-    )  # fmt: skip
+    )
     return ChartModel(chart, parameters, n=n, stribeck=CURVE)
 
 
@@ -109,9 +114,14 @@ def test_an_arrest_resets_in_stateflows_order() -> None:
 def test_a_bouncing_reset_meets_its_closed_form() -> None:
     # z' = 1; at z = 1 back to 0: a sawtooth, through a self-loop.
     chart = Chart(
-        "sawtooth", (), ("z",), ("top",), (State("rise", {"z": "1"}),),
-        (Transition("drop", "rise", "rise", "z >= top", actions={"z": "0"}),), {"F": "z"},
-    )  # fmt: skip
+        "sawtooth",
+        (),
+        ("z",),
+        ("top",),
+        (State("rise", {"z": "1"}),),
+        (Transition("drop", "rise", "rise", "z >= top", actions={"z": "0"}),),
+        {"F": "z"},
+    )
     model = ChartModel(chart, {"top": [1.0, 0.75]}, n=2, stribeck=CURVE)  # type: ignore[dict-item]
     trace = both(model, Prescribed("0"), 5.5)
     for i, top in enumerate((1.0, 0.75)):
@@ -135,9 +145,14 @@ def test_or_and_not_fire_where_they_become_true() -> None:
     }
     for guard, wanted in guards.items():
         chart = Chart(
-            "logic", ("v", "t", "x"), ("z",), (), (State("a", {"z": "v"}), State("b", {"z": "v"})),
-            (Transition("e", "a", "b", guard),), {"F": "z"},
-        )  # fmt: skip
+            "logic",
+            ("v", "t", "x"),
+            ("z",),
+            (),
+            (State("a", {"z": "v"}), State("b", {"z": "v"})),
+            (Transition("e", "a", "b", guard),),
+            {"F": "z"},
+        )
         trace = both(ChartModel(chart, {}, n=1, stribeck=CURVE), Prescribed("0.5"), 4.0)
         assert trace.transitions.t.tolist() == [pytest.approx(wanted, abs=1e-9)], guard
 
@@ -190,9 +205,14 @@ def test_corners_in_an_elements_own_variable() -> None:
     rates = np.array([0.5, 0.25])
     times = np.linspace(0.0, 8.0, 33)
     trace = both(
-        element("1 - c * abs(z)", n=2, parameters={"c": rates}), Prescribed("0"), 8.0,
-        t_eval=times, initial={"z": [-1.0, -1.0]}, rtol=1e-9, atol=1e-12,
-    )  # fmt: skip
+        element("1 - c * abs(z)", n=2, parameters={"c": rates}),
+        Prescribed("0"),
+        8.0,
+        t_eval=times,
+        initial={"z": [-1.0, -1.0]},
+        rtol=1e-9,
+        atol=1e-12,
+    )
     for i, c in enumerate(rates):
         t0 = -math.log(1 - c) / c
         before = -1 / c + (1 / c - 1) * np.exp(c * times)
@@ -316,12 +336,17 @@ def test_states_and_edges_may_differ_by_case_only(
 
 def test_a_chart_without_the_input_s_needs_no_curve_and_one_element_is_enough() -> None:
     chart = Chart(
-        "end stop", ("v",), ("z",), ("k", "w"),
+        "end stop",
+        ("v",),
+        ("z",),
+        ("k", "w"),
         (State("free", {"z": "v"}), State("blocked", {"z": "0"})),
-        (Transition("stop", "free", "blocked", guard="z >= w and v > 0"),
-         Transition("leave", "blocked", "free", guard="v < 0")),
+        (
+            Transition("stop", "free", "blocked", guard="z >= w and v > 0"),
+            Transition("leave", "blocked", "free", guard="v < 0"),
+        ),
         {"F": "k * z"},
-    )  # fmt: skip
+    )
     trace = simulate(ChartModel(chart, {"k": 2.0, "w": 0.5}), Prescribed("sin(t)"), 6.0)
     assert trace.n == 1
     assert trace.transitions.edge.tolist() == ["stop", "leave"]

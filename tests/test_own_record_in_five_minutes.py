@@ -94,9 +94,16 @@ def test_the_readmes_overrides_work(
     (tmp_path / "rig.toml").write_text(SCENARIO)
     monkeypatch.chdir(tmp_path)
     done = gms_fsm(
-        "run", "rig.toml", "--live", "--set", "model.law=published", "--set",
-        "record.smoothing=0.05", "--set", "output.figures=[]",
-    )  # fmt: skip
+        "run",
+        "rig.toml",
+        "--live",
+        "--set",
+        "model.law=published",
+        "--set",
+        "record.smoothing=0.05",
+        "--set",
+        "output.figures=[]",
+    )
     assert done.code == 0, done.err
     assert "|z|/s" in done.err
     summary = (tmp_path / "out" / "rig" / "summary.md").read_text(encoding="utf-8")

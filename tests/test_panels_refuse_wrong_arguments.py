@@ -31,10 +31,20 @@ WINDOWS += [(np.nan, 2.0)]
 @pytest.mark.parametrize("window", WINDOWS, ids=str)
 @pytest.mark.parametrize(
     "panel",
-    [panels.velocity, panels.force, panels.deflections, panels.ratio, panels.ribbons,
-     panels.margins, panels.cascade, panels.portrait, panels.hysteresis, panels.stribeck],
+    [
+        panels.velocity,
+        panels.force,
+        panels.deflections,
+        panels.ratio,
+        panels.ribbons,
+        panels.margins,
+        panels.cascade,
+        panels.portrait,
+        panels.hysteresis,
+        panels.stribeck,
+    ],
     ids=lambda panel: panel.__name__,
-)  # fmt: skip
+)
 def test_windows(run: Trace, panel: Callable[..., object], window: object) -> None:
     with pytest.raises(ParameterError, match=r"window is .* t0 < t1 inside the run, 0 to 10 s"):
         panel(Figure().subplots(), run, window=window)
@@ -43,10 +53,18 @@ def test_windows(run: Trace, panel: Callable[..., object], window: object) -> No
 @pytest.mark.parametrize("elements", [[], [4], [-1], [0, 0], [1.0], [True], "01", 2], ids=str)
 @pytest.mark.parametrize(
     "panel",
-    [panels.force, panels.deflections, panels.ratio, panels.ribbons, panels.margins,
-     panels.cascade, panels.portrait, panels.hysteresis],
+    [
+        panels.force,
+        panels.deflections,
+        panels.ratio,
+        panels.ribbons,
+        panels.margins,
+        panels.cascade,
+        panels.portrait,
+        panels.hysteresis,
+    ],
     ids=lambda panel: panel.__name__,
-)  # fmt: skip
+)
 def test_elements(run: Trace, panel: Callable[..., object], elements: object) -> None:
     with pytest.raises(ParameterError, match=r"elements is .* from 0 to 3"):
         panel(Figure().subplots(), run, elements=elements)

@@ -82,9 +82,14 @@ def test_lugre_has_no_threshold(lugre: Trace, ax: Axes) -> None:
 
 def test_a_chart_that_does_not_know_s_is_not_held_against_it(ax: Axes) -> None:
     stop = Chart(
-        "stop", ("v",), ("d",), ("k",), (State("free", {"d": "v"}), State("blocked", {"d": "0"})),
-        (Transition("stop", "free", "blocked", guard="d >= 0.5"),), {"F": "k * d"},
-    )  # fmt: skip
+        "stop",
+        ("v",),
+        ("d",),
+        ("k",),
+        (State("free", {"d": "v"}), State("blocked", {"d": "0"})),
+        (Transition("stop", "free", "blocked", guard="d >= 0.5"),),
+        {"F": "k * d"},
+    )
     trace = simulate(ChartModel(stop, {"k": 2.0}), Prescribed("0.4"), 2.0)
     (line,) = panels.ratio(ax, trace)
     assert drawn(line)[1].max() == pytest.approx(0.5)
@@ -147,8 +152,10 @@ def test_portrait_counts_slipping_elements(run: Trace, ax: Axes) -> None:
     assert set(pieces.get_array()) == {0, 1}
     # At a row each piece starts with, the count is that of the row.
     part = panels.shown(run)
-    starts = {tuple(path.vertices[0]): n for path, n in zip(
-        pieces.get_paths(), pieces.get_array(), strict=True)}  # fmt: skip
+    starts = {
+        tuple(path.vertices[0]): n
+        for path, n in zip(pieces.get_paths(), pieces.get_array(), strict=True)
+    }
     slips = part.states[:, 3] == "slip"
     rows = {(v, F): int(s) for v, F, s in zip(part.v, part.F, slips, strict=True)}
     assert all(rows[point] == n for point, n in starts.items() if point in rows)

@@ -10,8 +10,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from gms_fsm import Trace, paper
-from gms_fsm.errors import OutputError, SimulationError
+from gms_fsm import Trace
+from gms_fsm.app import paper
+from gms_fsm.errors import OutputError
+from gms_fsm.traces.failures import SimulationError
 
 
 @pytest.fixture(scope="module")
@@ -81,16 +83,28 @@ def test_claims_say_what_we_chose_and_how_far_the_engines_agree(folder: Path) ->
     assert paper.VELOCITY in text
     assert re.search(r"\*\*0 of \d{5} numbers differ\*\*", text)
     assert "eigenvalue +C/s" in text
-    claims, holds, condition, differ = map(int, re.findall(
-        r"(\d+) claims: (\d+) hold, (\d+) hold under a condition, (\d+) differ", text)[0]
-    )  # fmt: skip
+    claims, holds, condition, differ = map(
+        int,
+        re.findall(r"(\d+) claims: (\d+) hold, (\d+) hold under a condition, (\d+) differ", text)[
+            0
+        ],
+    )
     assert claims == holds + condition + differ == text.count("| **")
     assert (holds, condition) == (text.count("| **holds** |"), text.count("| **holds only"))
 
 
 def test_figures_are_whole_and_small(folder: Path) -> None:
-    names = ["fig3", "fig3_slipping", "fig4", "fig4_laws", "residual", "chart_element",
-             "chart_bank", "block_diagram", "chart_lugre"]  # fmt: skip
+    names = [
+        "fig3",
+        "fig3_slipping",
+        "fig4",
+        "fig4_laws",
+        "residual",
+        "chart_element",
+        "chart_bank",
+        "block_diagram",
+        "chart_lugre",
+    ]
     for name in names:
         png = (folder / f"{name}.png").read_bytes()
         assert png.startswith(b"\x89PNG")

@@ -25,14 +25,14 @@ from gms_fsm import (
     State,
     Stribeck,
     Transition,
-    paper,
     simulate,
 )
+from gms_fsm.app import paper
 from gms_fsm.errors import ParameterError
-from gms_fsm.generated import standalone
-from gms_fsm.models import Model
-from gms_fsm.program import Program, lower
-from gms_fsm.rigs import Rig
+from gms_fsm.lowering._generated import standalone
+from gms_fsm.lowering.program import Program, lower
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.rigs import Rig
 from tests.helpers import stick_slip
 from tests.test_command_line import run
 
@@ -91,8 +91,10 @@ def _compare(model: Model, rig: Rig, text: str, t_end: float) -> None:
     given = f"STATES, P, SEEN, LIVE = {states!r}, {program.p!r}, {seen}, {program.live!r}\n"
     done = subprocess.run(
         [sys.executable, "-I", "-S", "-c", text + "\n\n" + given + ASK],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     numbers, modules = done.stdout.splitlines()
     assert modules == "[]", "it stands alone"
@@ -110,7 +112,10 @@ def test_what_the_command_line_prints(law: Any, rig: str) -> None:
 
 def _rough() -> ChartModel:
     chart = Chart(
-        "everything", ("t", "x", "v", "s"), ("z", "w"), ("k", "C"),
+        "everything",
+        ("t", "x", "v", "s"),
+        ("z", "w"),
+        ("k", "C"),
         (
             State("one", {"z": "min(v, 0.5) + sqrt(abs(x))", "w": "max(-w, cos(t))"}),
             State("two", {"z": "C * (sgn(v) - z / s)", "w": "tanh(z)**1.5 - w"}, {"w": "0"}),
@@ -120,7 +125,7 @@ def _rough() -> ChartModel:
             Transition("back", "two", "one", "abs(v) <= 0.01"),
         ),
         {"F": "k * z + exp(-w) * dz"},
-    )  # fmt: skip
+    )
     return ChartModel(chart, {"k": [1.0, 2.0], "C": 0.1}, n=2, stribeck=Stribeck(1.0, 1.5, 0.1))
 
 
@@ -130,11 +135,14 @@ def _rough() -> ChartModel:
         (stick_slip("signed"), Prescribed([(0, 0), (1, 0.3), (3, -0.3)]), 4.0),
         (stick_slip("signed"), Slider(1.0, ([0.0, 1.0, 5.0], [0.0, 3.0, -3.0])), 4.0),
         (_rough(), Prescribed("0.5*abs(sin(t))"), 3.0),
-        (LuGre(sigma_0=1e3, sigma_1=30.0, sigma_2=0.4, stribeck=Stribeck(1, 1.5, 0.01)),
-         Slider(1.0, "sgn(sin(t))"), 3.0),
+        (
+            LuGre(sigma_0=1e3, sigma_1=30.0, sigma_2=0.4, stribeck=Stribeck(1, 1.5, 0.01)),
+            Slider(1.0, "sgn(sin(t))"),
+            3.0,
+        ),
     ],
     ids=["ramps", "record", "every function", "LuGre"],
-)  # fmt: skip
+)
 def test_texts_of_other_models(model: Model, rig: Rig, t_end: float) -> None:
     _compare(model, rig, standalone(lower(model, rig).source), t_end)
 

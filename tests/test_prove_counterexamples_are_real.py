@@ -20,21 +20,26 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gms_fsm import Chart, Finding, Report, State, Transition, prove
-from gms_fsm.expression import Value, evaluate, parse_value
+from gms_fsm.language.expression import Value, evaluate, parse_value
 
 STEP = 2.0**-20  # s
 PASSES = 20
 NAMES = ("z", "v", "s", "v_c")
 SIGNED = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
 POSITIVE = (0.5, 1.0, 2.0)  # s and v_c: the domain
-GRID = [dict(zip(NAMES, point, strict=True))
-        for point in product(SIGNED, SIGNED, POSITIVE, POSITIVE)]  # fmt: skip
+GRID = [
+    dict(zip(NAMES, point, strict=True)) for point in product(SIGNED, SIGNED, POSITIVE, POSITIVE)
+]
 DICE = random.Random(3)
 GRID += [
-    {"z": DICE.randint(-64, 64) / 16, "v": DICE.randint(-64, 64) / 16,
-     "s": DICE.randint(1, 64) / 16, "v_c": DICE.randint(1, 64) / 16}
+    {
+        "z": DICE.randint(-64, 64) / 16,
+        "v": DICE.randint(-64, 64) / 16,
+        "s": DICE.randint(1, 64) / 16,
+        "v_c": DICE.randint(1, 64) / 16,
+    }
     for _ in range(500)
-]  # fmt: skip
+]
 
 # --------------------------------------------------------------------------- random charts
 left_sides = st.sampled_from(

@@ -19,8 +19,8 @@ from gms_fsm import Chart, Finding, LuGre, Report, State, Stribeck, Transition, 
 from gms_fsm.charts import LAWS, LUGRE, gms_element
 from gms_fsm.charts.broken import BROKEN
 from gms_fsm.errors import ExpressionError, ParameterError
-from gms_fsm.expression import evaluate
-from gms_fsm.prove import CHECKS, Check, default_domain
+from gms_fsm.inspection.prove import CHECKS, Check, default_domain
+from gms_fsm.language.expression import evaluate
 
 STEP = 2.0**-20  # s; exact in floats
 
@@ -61,8 +61,10 @@ def test_the_papers_guards_pass(law: str) -> None:
     assert found.domain == ("s > 0", "C > 0", "v_c > 0")
     passes(found, "determinism", "livelock", "reachability", "chattering")
     assert found.of("determinism")[0].where == (
-        "stick", "break_away_forward", "break_away_backward"
-    )  # fmt: skip
+        "stick",
+        "break_away_forward",
+        "break_away_backward",
+    )
     assert [f.where for f in found.of("livelock")] == [
         ("stick", "break_away_forward", "slip", "arrest"),
         ("stick", "break_away_backward", "slip", "arrest"),
@@ -85,8 +87,9 @@ def test_the_published_law_is_unstable_for_v_below_0_and_the_signed_law_is_not()
 
 
 def test_the_equilibria_are_named() -> None:
-    said = {f.case: f.text for f in prove(gms_element("signed")).of("stability")
-            if f.where == ("slip",)}  # fmt: skip
+    said = {
+        f.case: f.text for f in prove(gms_element("signed")).of("stability") if f.where == ("slip",)
+    }
     assert said == {
         "z for v > 0": "stable: z = s attracts",
         "z for v < 0": "stable: z = -s attracts",
@@ -169,11 +172,14 @@ def test_each_broken_reading_says_what_is_wrong() -> None:
 def chart(go: str = "z >= s", back: str = "z < 0.5 * s", **changes: Any) -> Chart:
     """Two states, two edges."""
     sound: dict[str, Any] = {
-        "name": "two", "inputs": ("v", "s", "t", "x"), "variables": ("z",), "parameters": ("C",),
+        "name": "two",
+        "inputs": ("v", "s", "t", "x"),
+        "variables": ("z",),
+        "parameters": ("C",),
         "states": (State("one", {"z": "v"}), State("two", {"z": "C * (sgn(v) - z / s)"})),
         "transitions": (Transition("go", "one", "two", go), Transition("back", "two", "one", back)),
         "outputs": {"F": "z"},
-    }  # fmt: skip
+    }
     return Chart(**{**sound, **changes})
 
 
@@ -197,9 +203,12 @@ def test_a_guard_that_is_not_encoded_leaves_open_what_rests_on_it() -> None:
     found = prove(chart(go="exp(z) > s"))
     open_ = {(f.check, f.where) for f in found.findings if f.status == "undecided"}
     assert open_ == {
-        ("livelock", ("one", "go", "two", "back")), ("chattering", ("one", "go", "two", "back")),
-        ("reachability", ("go",)), ("reachability", ("one",)), ("reachability", ("two",)),
-    }  # fmt: skip
+        ("livelock", ("one", "go", "two", "back")),
+        ("chattering", ("one", "go", "two", "back")),
+        ("reachability", ("go",)),
+        ("reachability", ("one",)),
+        ("reachability", ("two",)),
+    }
 
 
 def test_a_quotient_counts_only_where_its_denominator_is_not_0() -> None:

@@ -8,16 +8,22 @@ import numpy as np
 import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, Slider, State, simulate
-from gms_fsm.expression import parse_value
-from gms_fsm.pulses import waking_times
+from gms_fsm.language.expression import parse_value
+from gms_fsm.lowering._pulses import waking_times
 from tests.helpers import pulled_mass
 
 SPRING = ChartModel(
-    Chart("spring and damper", inputs=("v", "x"), variables=("z",), parameters=("k",),
-          states=(State("on", flow={"z": "v"}),), transitions=(),
-          outputs={"F": "k * z + 0.5 * v"}),
+    Chart(
+        "spring and damper",
+        inputs=("v", "x"),
+        variables=("z",),
+        parameters=("k",),
+        states=(State("on", flow={"z": "v"}),),
+        transitions=(),
+        outputs={"F": "k * z + 0.5 * v"},
+    ),
     {"k": 1.0},
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize("engine", ["ifelse", "compiled"])

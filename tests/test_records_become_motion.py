@@ -8,15 +8,18 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 
+from gms_fsm.app.records import Column, Motion, Record, motion_of, read_record
+from gms_fsm.app.units import FACTORS, convert_numbers, factor
 from gms_fsm.errors import RecordError, UnitError
-from gms_fsm.records import Column, Motion, Record, motion_of, read_record
-from gms_fsm.units import FACTORS, convert_numbers, factor
 from tests.scenario_files import MEASURED, CommandLine, changed, command_line, table
 
 SI = {
-    "time": Column("t", "s"), "position": Column("x", "m"), "velocity": Column("v", "m/s"),
-    "force": Column("F", "N"), "normal": Column("N", "N"),
-}  # fmt: skip
+    "time": Column("t", "s"),
+    "position": Column("x", "m"),
+    "velocity": Column("v", "m/s"),
+    "force": Column("F", "N"),
+    "normal": Column("N", "N"),
+}
 
 
 @pytest.fixture
@@ -38,17 +41,34 @@ def read(tmp_path: Path, text: str, where: str = "", **columns: Column) -> Recor
 EXPECTED = {
     "time": {"s": 1, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "min": 60, "h": 3600},
     "position": {
-        "m": 1, "cm": 0.01, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9,
+        "m": 1,
+        "cm": 0.01,
+        "mm": 1e-3,
+        "um": 1e-6,
+        "µm": 1e-6,
+        "μm": 1e-6,
+        "nm": 1e-9,
         "in": 0.0254,
     },
     "velocity": {
-        "m/s": 1, "cm/s": 0.01, "mm/s": 1e-3, "um/s": 1e-6, "µm/s": 1e-6, "μm/s": 1e-6,
+        "m/s": 1,
+        "cm/s": 0.01,
+        "mm/s": 1e-3,
+        "um/s": 1e-6,
+        "µm/s": 1e-6,
+        "μm/s": 1e-6,
         "nm/s": 1e-9,
     },
     "force": {
-        "N": 1, "kN": 1e3, "mN": 1e-3, "uN": 1e-6, "µN": 1e-6, "μN": 1e-6, "lbf": 4.4482216152605,
+        "N": 1,
+        "kN": 1e3,
+        "mN": 1e-3,
+        "uN": 1e-6,
+        "µN": 1e-6,
+        "μN": 1e-6,
+        "lbf": 4.4482216152605,
     },
-}  # fmt: skip
+}
 EXPECTED["normal"] = EXPECTED["force"]
 UNITS = [(quantity, unit) for quantity, units in EXPECTED.items() for unit in units]
 
@@ -354,8 +374,11 @@ def test_a_fitting_v_c_is_three_times_the_noise_rounded_up(
 
 def _noisy_scenario(tmp_path: Path, v_c: str) -> Path:
     motion = dwelling(5e-6)
-    text = changed(MEASURED, 'position = { column = "x", unit = "mm" }',
-                   'velocity = { column = "v", unit = "mm/s" }')  # fmt: skip
+    text = changed(
+        MEASURED,
+        'position = { column = "x", unit = "mm" }',
+        'velocity = { column = "v", unit = "mm/s" }',
+    )
     text = changed(text, "v_c = 1e-4", f"v_c = {v_c}")
     (tmp_path / "noisy.toml").write_text(text)
     force = np.tanh(motion.velocity / 1e-4)

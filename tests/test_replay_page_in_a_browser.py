@@ -20,13 +20,13 @@ import numpy as np
 import pytest
 
 from gms_fsm import Prescribed, Trace, simulate
-from gms_fsm.chart import Chart, State
+from gms_fsm.charts.chart import Chart, State
+from gms_fsm.charts.parameters import Stribeck
 from gms_fsm.errors import ExpressionError
-from gms_fsm.explain import explain
-from gms_fsm.expression import evaluate, parse_condition
-from gms_fsm.models import ChartModel
-from gms_fsm.parameters import Stribeck
-from gms_fsm.session import Session
+from gms_fsm.inspection.explain import explain
+from gms_fsm.inspection.session import Session
+from gms_fsm.language.expression import evaluate, parse_condition
+from gms_fsm.systems.models import ChartModel
 from plots.replay import replay, write_replay
 from tests.helpers import FIG4_SINE, stick_slip
 
@@ -50,9 +50,14 @@ from axe_playwright_python.sync_playwright import Axe  # noqa: E402  # after the
 from playwright.sync_api import Browser, Page, expect, sync_playwright  # noqa: E402
 
 ARGUMENTS = [
-    "--no-sandbox", "--headless", "--disable-gpu", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--no-first-run",
-]  # fmt: skip
+    "--no-sandbox",
+    "--headless",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+]
 SIZES = {"desk": (1400, 900), "tablet": (800, 1000), "phone": (400, 850)}
 
 Open = Callable[..., Page]
@@ -135,10 +140,15 @@ def said(page: Page) -> str:
 def test_the_buttons_walk(open_page: Open) -> None:
     page = open_page()
     for button, expected in (
-        ("step", 1), ("step", 2), ("back", 1), ("transition", events(page)[0]),
-        ("transition", events(page)[1]), ("back-transition", events(page)[0]), ("start", 0),
+        ("step", 1),
+        ("step", 2),
+        ("back", 1),
+        ("transition", events(page)[0]),
+        ("transition", events(page)[1]),
+        ("back-transition", events(page)[0]),
+        ("start", 0),
         ("back", 0),
-    ):  # fmt: skip
+    ):
         page.click(f"#{button}")
         assert frame(page) == expected, button
 
@@ -147,11 +157,17 @@ def test_the_keys_walk(open_page: Open) -> None:
     page = open_page()
     last = int(page.locator("#scrubber").get_attribute("max") or 0)
     for key, expected in (
-        ("ArrowRight", 1), ("ArrowRight", 2), ("ArrowLeft", 1),
-        ("Shift+ArrowRight", events(page)[0]), ("Shift+ArrowRight", events(page)[1]),
-        ("Shift+ArrowLeft", events(page)[0]), ("End", last), ("Shift+ArrowRight", last),
-        ("Home", 0), ("Shift+ArrowLeft", 0),
-    ):  # fmt: skip
+        ("ArrowRight", 1),
+        ("ArrowRight", 2),
+        ("ArrowLeft", 1),
+        ("Shift+ArrowRight", events(page)[0]),
+        ("Shift+ArrowRight", events(page)[1]),
+        ("Shift+ArrowLeft", events(page)[0]),
+        ("End", last),
+        ("Shift+ArrowRight", last),
+        ("Home", 0),
+        ("Shift+ArrowLeft", 0),
+    ):
         page.keyboard.press(key)
         assert frame(page) == expected, key
 
@@ -244,8 +260,12 @@ def test_the_table_explains_the_chosen_element(open_page: Open) -> None:
     trace = fig4("published")
     margin = explain(trace, int(np.flatnonzero(trace.microstep)[0]), 0)[0].clauses[0].margin
     assert lines.nth(0).locator("td").all_inner_texts() == [
-        "z >= s", "0.40000", "0.40000", f"{margin:.3e}".replace("-", "−"), "✓ true",
-    ]  # fmt: skip
+        "z >= s",
+        "0.40000",
+        "0.40000",
+        f"{margin:.3e}".replace("-", "−"),
+        "✓ true",
+    ]
     assert lines.nth(2).locator("td").first.inner_text() == "z <= -s"
     assert lines.nth(2).locator("td").last.inner_text() == "✗ false"
     assert lines.nth(0).locator("em").inner_text() == "FIRED"
@@ -371,17 +391,59 @@ def test_until_reads_what_the_expression_language_reads(open_page: Open) -> None
     page, trace = open_page(), fig4("published")
     session = Session(trace.model, trace.rig, 1.0)
     texts = [
-        "F > 1", "-1 < F < 1", "not F > 1 or v < 0 and z1 > 0.2", "(F > 1 or v > 0) and x > 0.1",
-        "abs(z1) >= s1", "2 * F1 + 3 > F2 ** 2 / 4 - 1", "-x ** 2 < -0.01", "2 ** -1 < x",
-        "min(z1, z2, z3) < max(v, 0.1)", "sgn(v) <= 0", "sqrt(s) > 1.1", "sin(pi * t) > .5",
-        "state(3) == slip", "state(3) != slip and t > 20", "((F)) > ((1))", "cos(t) * tanh(v) < 0",
-        "exp(-t) < 1e-3", "t >= 3.5e1 or t < 2.", "+F > - -1", "not not v > 0", "1 / v > 20",
-        "F >", "", "F = 1", "F > 1 and", "v", "not 3", "(v > 0) > 1", "abs v > 1", "abs(1, 2) > 1",
-        "z9 > 1", "F > 1 &&  v > 0", "'a' > 1", "F[0] > 1", "F.x > 1", "state(0) == slip",
-        "state(1) > 1", "v > 0 if 1 else 0", "1 < v == 2", "()", "min(1, 2) > 1, 2", "3x > 1",
-        "lambda: 1", "a := 1", "not(v > 0)", "v > (0", "v > 0)",
-        "__proto__ > 0", "toString > 1", "v <> 1", "1 > 2 > not v > 0", "**v > 1",
-    ]  # fmt: skip
+        "F > 1",
+        "-1 < F < 1",
+        "not F > 1 or v < 0 and z1 > 0.2",
+        "(F > 1 or v > 0) and x > 0.1",
+        "abs(z1) >= s1",
+        "2 * F1 + 3 > F2 ** 2 / 4 - 1",
+        "-x ** 2 < -0.01",
+        "2 ** -1 < x",
+        "min(z1, z2, z3) < max(v, 0.1)",
+        "sgn(v) <= 0",
+        "sqrt(s) > 1.1",
+        "sin(pi * t) > .5",
+        "state(3) == slip",
+        "state(3) != slip and t > 20",
+        "((F)) > ((1))",
+        "cos(t) * tanh(v) < 0",
+        "exp(-t) < 1e-3",
+        "t >= 3.5e1 or t < 2.",
+        "+F > - -1",
+        "not not v > 0",
+        "1 / v > 20",
+        "F >",
+        "",
+        "F = 1",
+        "F > 1 and",
+        "v",
+        "not 3",
+        "(v > 0) > 1",
+        "abs v > 1",
+        "abs(1, 2) > 1",
+        "z9 > 1",
+        "F > 1 &&  v > 0",
+        "'a' > 1",
+        "F[0] > 1",
+        "F.x > 1",
+        "state(0) == slip",
+        "state(1) > 1",
+        "v > 0 if 1 else 0",
+        "1 < v == 2",
+        "()",
+        "min(1, 2) > 1, 2",
+        "3x > 1",
+        "lambda: 1",
+        "a := 1",
+        "not(v > 0)",
+        "v > (0",
+        "v > 0)",
+        "__proto__ > 0",
+        "toString > 1",
+        "v <> 1",
+        "1 > 2 > not v > 0",
+        "**v > 1",
+    ]
     rows = page.evaluate(
         """() => data.frames.t.map((_, row) => Object.fromEntries([
             ...Object.entries(runs[0].columns).map(([name, f]) => [name, f(row)]),
@@ -557,8 +619,10 @@ def test_numbers_that_are_none_are_said_in_words(open_page: Open, tmp_path: Path
             assert cells[4] == "✗ false"
         page.keyboard.press("ArrowRight")
     assert [text.split(" N ")[0] for text in texts] == [
-        "F = not a number", "F = infinite", "F = −infinite",
-    ]  # fmt: skip
+        "F = not a number",
+        "F = infinite",
+        "F = −infinite",
+    ]
     page.fill("#until", "F < 0")
     page.press("#until", "Enter")
     assert frame(page) > 2
@@ -627,10 +691,25 @@ def test_every_control_is_reached_by_tab_and_shows_its_focus(open_page: Open) ->
         if name != "BODY":
             assert line == "solid" or ground == "3px", name
     controls = {
-        "start", "back-transition", "back", "play", "step", "transition", "continue", "until",
-        "speed", "zoom-out", "zoom-in", "zoom-all", "scrubber", "element", "SUMMARY",
-        "element4-guard-arrest", "ribbons", "why",
-    }  # fmt: skip
+        "start",
+        "back-transition",
+        "back",
+        "play",
+        "step",
+        "transition",
+        "continue",
+        "until",
+        "speed",
+        "zoom-out",
+        "zoom-in",
+        "zoom-all",
+        "scrubber",
+        "element",
+        "SUMMARY",
+        "element4-guard-arrest",
+        "ribbons",
+        "why",
+    }
     assert controls <= seen
 
 

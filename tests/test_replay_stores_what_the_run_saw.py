@@ -18,18 +18,13 @@ import numpy as np
 import pytest
 
 from gms_fsm import Prescribed, Trace, simulate
-from gms_fsm.chart import Chart, State
 from gms_fsm.charts import GMS_ELEMENT
-from gms_fsm.errors import (
-    MissingExtraError,
-    OutputError,
-    ParameterError,
-    SimulationError,
-    TraceFileError,
-)
-from gms_fsm.explain import explain
-from gms_fsm.models import ChartModel, LuGre
-from gms_fsm.parameters import Stribeck
+from gms_fsm.charts.chart import Chart, State
+from gms_fsm.charts.parameters import Stribeck
+from gms_fsm.errors import MissingExtraError, OutputError, ParameterError, TraceFileError
+from gms_fsm.inspection.explain import explain
+from gms_fsm.systems.models import ChartModel, LuGre
+from gms_fsm.traces.failures import SimulationError
 from plots.replay import replay, replay_html, write_replay
 from tests.helpers import FIG4_SINE, pulled_mass, stick_slip
 

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from gms_fsm import GMS, GMSParameters, LuGre, Prescribed, Stribeck, Trace, simulate
-from gms_fsm.models import Model
-from gms_fsm.records import Motion, Record, motion_of
-from gms_fsm.report import (
+from gms_fsm.app.records import Motion, Record, motion_of
+from gms_fsm.app.report import (
     compare,
     dwell_times,
     measured_force,
@@ -20,9 +19,10 @@ from gms_fsm.report import (
     velocity_note,
     what_it_cannot_tell,
 )
-from gms_fsm.rigs import Rig
-from gms_fsm.scenario import Loaded, load_scenario
-from gms_fsm.signals import Corners
+from gms_fsm.app.scenario import Loaded, load_scenario
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.rigs import Rig
+from gms_fsm.systems.signals import Corners
 from tests.helpers import non_drifting, open_loop, pulled_mass, stick_slip
 from tests.scenario_files import MEASURED, OPEN_LOOP, changed, table
 

@@ -9,18 +9,16 @@ import numpy as np
 import pytest
 
 from gms_fsm import Trace
-from gms_fsm.files import LIST
-from gms_fsm.report import compare, measured_force, plain, run_scenario
-from gms_fsm.scenario import Loaded, load_scenario
+from gms_fsm._files import LIST
+from gms_fsm.app.report import compare, measured_force, plain, run_scenario
+from gms_fsm.app.scenario import Loaded, load_scenario
 from tests.helpers import same_bits
 
 ROOT = Path(__file__).parents[1]
 RECORD = "reciprocating_friction.tsv"
 SHIPPED = sorted((ROOT / "scenarios").glob("*.toml"))
 OPEN = [path for path in SHIPPED if path.stem != "tribometer"]
-TRANSITIONS = {
-    "paper_fig3_non_drifting": 0, "pulled_mass": 72, "stribeck_sweep": 4,
-}  # fmt: skip
+TRANSITIONS = {"paper_fig3_non_drifting": 0, "pulled_mass": 72, "stribeck_sweep": 4}
 
 
 def data_folder() -> Path:

@@ -72,8 +72,13 @@ def test_sticking_contacts_are_full_and_slipping_ones_open(run: Trace) -> None:
 def test_numbers_have_units(run: Trace) -> None:
     drawn = schematic.schematic(Figure().subplots(), run, 900)
     shown = texts(drawn)
-    for symbol, unit in (("$k_{1}$", "N/m"), (r"$\sigma_{4}$", "Ns/m"), ("$z_{2}$", "m"),
-                         ("$v$", "m/s"), ("$F$", "N")):  # fmt: skip
+    for symbol, unit in (
+        ("$k_{1}$", "N/m"),
+        (r"$\sigma_{4}$", "Ns/m"),
+        ("$z_{2}$", "m"),
+        ("$v$", "m/s"),
+        ("$F$", "N"),
+    ):
         (text,) = [t for t in shown if t.startswith(symbol + " = ")]
         assert text.endswith(unit)
     (force,) = [t for t in shown if t.startswith("$F$")]

@@ -9,8 +9,8 @@ import pytest
 
 from gms_fsm import Prescribed, Trace, simulate
 from gms_fsm.errors import ExpressionError, SessionError
-from gms_fsm.explain import explain
-from gms_fsm.session import Session
+from gms_fsm.inspection.explain import explain
+from gms_fsm.inspection.session import Session
 from tests.helpers import FIG4_SINE, stick_slip
 
 EDGES = ("break_away_forward", "break_away_backward", "arrest")
@@ -100,9 +100,10 @@ def test_a_condition_narrows_and_hits_counts() -> None:
     session, trace = _session(), _trace()
     point = session.break_on("fires", "arrest", condition="z1 < 0 and state(2) == stick", hits=3)
     rows = [
-        row for row, r in _fired()
+        row
+        for row, r in _fired()
         if r.edge == "arrest" and trace.z[row, 0] < 0 and trace.states[row, 1] == "stick"
-    ]  # fmt: skip
+    ]
     assert len(rows) > 3
     assert _stops(session) == rows[2:]
     assert point.seen == len(rows)
@@ -116,9 +117,10 @@ def test_several_breakpoints_stop_at_whichever_comes_first() -> None:
     while (stop := session.proceed())[1] is not None:
         found.append((stop[0].row, stop[1]))
     assert [row for row, _ in found] == [
-        row for row, r in _fired()
+        row
+        for row, r in _fired()
         if (r.edge, r.element) == ("arrest", 2) or (r.source, r.element) == ("stick", 0)
-    ]  # fmt: skip
+    ]
     assert {id(point) for _, point in found} == {id(first), id(second)}
 
 

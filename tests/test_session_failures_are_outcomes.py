@@ -9,8 +9,9 @@ import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, State, Stribeck, Transition, simulate
 from gms_fsm.charts import gms_element
-from gms_fsm.errors import LivelockError, ParameterError, SessionError, SimulationError
-from gms_fsm.session import Session
+from gms_fsm.errors import ParameterError, SessionError
+from gms_fsm.inspection.session import Session
+from gms_fsm.traces.failures import LivelockError, SimulationError
 from tests.helpers import stick_slip
 
 
@@ -21,8 +22,9 @@ def both_ways() -> ChartModel:
         Transition("go", "stick", "slip", guard="z >= s and v > v_c"),
         Transition("stay", "slip", "stick", guard="z >= s"),
     )
-    chart = Chart("broken", law.inputs, law.variables, law.parameters, law.states, edges,
-                  law.outputs)  # fmt: skip
+    chart = Chart(
+        "broken", law.inputs, law.variables, law.parameters, law.states, edges, law.outputs
+    )
     values = {"k": 1.0, "sigma": 0.1, "C": 0.1, "v_c": 1e-6}
     return ChartModel(chart, values, n=2, weights=[2.0, 1.0], stribeck=Stribeck(1.0, 1.5, 1e-3))
 
@@ -66,9 +68,14 @@ def test_a_record_that_ends_too_early() -> None:
 @pytest.mark.parametrize("guard", ["0 / (z - z) > 0", "sqrt(-1 - z) > 0"])
 def test_a_run_that_cannot_even_start_has_its_first_row(guard: str) -> None:
     chart = Chart(
-        "bad", ("v",), ("z",), ("k",), (State("on", {"z": "v"}), State("off", {"z": "0"})),
-        (Transition("go", "on", "off", guard=guard),), {"F": "k * z"},
-    )  # fmt: skip
+        "bad",
+        ("v",),
+        ("z",),
+        ("k",),
+        (State("on", {"z": "v"}), State("off", {"z": "0"})),
+        (Transition("go", "on", "off", guard=guard),),
+        {"F": "k * z"},
+    )
     session = Session(
         ChartModel(chart, {"k": 1.0}, n=1, stribeck=Stribeck(1.0, 1.5, 0.1)), Prescribed("1"), 1.0
     )
@@ -78,8 +85,9 @@ def test_a_run_that_cannot_even_start_has_its_first_row(guard: str) -> None:
 
 
 def test_a_flow_that_leaves_the_numbers() -> None:
-    chart = Chart("singular", ("v",), ("z",), ("k",), (State("on", {"z": "z * z"}),), (),
-                  {"F": "k * z"})  # fmt: skip
+    chart = Chart(
+        "singular", ("v",), ("z",), ("k",), (State("on", {"z": "z * z"}),), (), {"F": "k * z"}
+    )
     model = ChartModel(chart, {"k": 1.0}, n=1, stribeck=Stribeck(1.0, 1.5, 0.1))
     session = Session(model, Prescribed("0"), 2.0, initial={"z": [1.0]})
     here = session.goto(2.0)

@@ -11,7 +11,7 @@ import scipy.integrate
 
 from gms_fsm import Prescribed
 from gms_fsm.errors import OutputError, SessionError, TraceFileError
-from gms_fsm.session import Session
+from gms_fsm.inspection.session import Session
 from tests.helpers import FIG4_SINE, pulled_mass, stick_slip
 
 
@@ -56,9 +56,18 @@ def test_saved_twice_is_the_same_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["", "{", "[]", "null", "{}", '{"format": "other"}', '{"format": "gms-fsm session 1"}', "\x00",
-     "title = 'a scenario'"],
-)  # fmt: skip
+    [
+        "",
+        "{",
+        "[]",
+        "null",
+        "{}",
+        '{"format": "other"}',
+        '{"format": "gms-fsm session 1"}',
+        "\x00",
+        "title = 'a scenario'",
+    ],
+)
 def test_something_else_is_refused(text: str, tmp_path: Path) -> None:
     path = tmp_path / "odd.json"
     path.write_text(text)

@@ -12,7 +12,7 @@ LONG = """
 import resource, sys
 from pathlib import Path
 from gms_fsm import GMS, GMSParameters, Prescribed
-from gms_fsm.session import Session
+from gms_fsm.inspection.session import Session
 session = Session(GMS(GMSParameters.paper("stick-slip"), law="signed"),
                   Prescribed("0.15*sin(2*pi*t/25)"), 100.0, method="rk4", step=1e-3)
 session.goto(100.0)
@@ -31,7 +31,10 @@ else:
 def test_a_long_session_is_small() -> None:
     pytest.importorskip("resource")
     done = subprocess.run(
-        [sys.executable, "-c", LONG], capture_output=True, text=True, check=True,
+        [sys.executable, "-c", LONG],
+        capture_output=True,
+        text=True,
+        check=True,
         cwd=Path(__file__).parents[1],
-    )  # fmt: skip
+    )
     assert float(done.stdout) < 200.0

@@ -8,7 +8,7 @@ import pytest
 
 from gms_fsm import Prescribed, simulate
 from gms_fsm.errors import ChartError, ParameterError, SessionError
-from gms_fsm.session import Session
+from gms_fsm.inspection.session import Session
 from tests.helpers import FIG4_SINE, open_loop, pulled_mass, stick_slip
 
 
@@ -184,10 +184,12 @@ def test_no_such_branch(branch: int) -> None:
 
 @pytest.mark.parametrize(
     ("poked", "words"),
-    [({"variables": "z"}, "variables is 'z'; give a mapping"),
-     ({"state": "slip"}, "state is 'slip'; give a mapping"),
-     ({"variables": {"F_s": {0: 2.0}}}, "F_s is a parameter; for another value make another")],
-)  # fmt: skip
+    [
+        ({"variables": "z"}, "variables is 'z'; give a mapping"),
+        ({"state": "slip"}, "state is 'slip'; give a mapping"),
+        ({"variables": {"F_s": {0: 2.0}}}, "F_s is a parameter; for another value make another"),
+    ],
+)
 def test_what_cannot_be_poked_is_said(poked: dict[str, Any], words: str) -> None:
     session = Session(stick_slip("signed"), open_loop(), 5.0)
     with pytest.raises(SessionError) as caught:

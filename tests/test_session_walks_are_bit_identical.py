@@ -13,9 +13,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from gms_fsm import GMS, GMSParameters, Prescribed, PulledSlider, Slider, Stribeck, Trace, simulate
-from gms_fsm.errors import SimulationError
-from gms_fsm.rigs import Rig
-from gms_fsm.session import Branch, Here, Session
+from gms_fsm.inspection.session import Branch, Here, Session
+from gms_fsm.systems.rigs import Rig
+from gms_fsm.traces.failures import SimulationError
 from tests.helpers import pulled_mass, same_bits
 
 T_END = 6.0
@@ -39,10 +39,14 @@ def models(draw: st.DrawFn) -> GMS:
     n = draw(st.integers(1, 3))
     several = st.lists(st.floats(0.5, 3.0), min_size=n, max_size=n)
     parameters = GMSParameters(
-        draw(several), [0.1] * n, draw(several), sigma_2=0.1,
-        stribeck=Stribeck(draw(st.floats(0.1, 0.39)), draw(st.floats(0.4, 0.6)), 0.1), v_c=1e-4,
+        draw(several),
+        [0.1] * n,
+        draw(several),
+        sigma_2=0.1,
+        stribeck=Stribeck(draw(st.floats(0.1, 0.39)), draw(st.floats(0.4, 0.6)), 0.1),
+        v_c=1e-4,
         weights=[1.0 / (n * k) for k in draw(several)],
-    )  # fmt: skip
+    )
     return GMS(parameters, law=draw(st.sampled_from(["signed", "published"])))
 
 
@@ -82,9 +86,11 @@ def _poked(session: Session, z: float, state: str | None) -> dict[str, Any]:
 
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
-    models(), st.sampled_from(RIGS), st.sampled_from(OPTIONS),
+    models(),
+    st.sampled_from(RIGS),
+    st.sampled_from(OPTIONS),
     st.lists(MOVES, min_size=1, max_size=25),
-)  # fmt: skip
+)
 def test_random_walks(
     model: GMS, rig: Rig, options: dict[str, Any], moves: list[tuple[str, Any]]
 ) -> None:

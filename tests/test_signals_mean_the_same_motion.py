@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 
 from gms_fsm import Prescribed, SimulationError, Slider, Trace, simulate
-from gms_fsm.errors import ExpressionError, NotFiniteError, SignalEndError, SignalError
-from gms_fsm.signals import Corners, Formula, Function, as_signal, piecewise_linear
+from gms_fsm.errors import ExpressionError, SignalError
+from gms_fsm.systems.signals import Corners, Formula, Function, as_signal, piecewise_linear
+from gms_fsm.traces.failures import NotFiniteError, SignalEndError
 from tests.helpers import pulled_mass, stick_slip
 
 CORNERS = [(0.0, 0.0), (1.0, 0.2), (8.0, 0.2), (10.0, -0.2), (17.0, -0.2), (19.0, 0.1)]
@@ -251,8 +252,13 @@ def test_a_record_that_ends_early_keeps_the_run_up_to_its_end(rows: Any, method:
     error = _fails(SignalEndError, record, 5.0, t_eval=rows, **method)
     for word in ("ends at t = 3.0 s", "t_end = 5.0 s", "t_end <= 3.0"):
         assert word in str(error)
-    whole = simulate(stick_slip("signed"), Prescribed(record), 3.0,
-                     t_eval=None if rows is None else rows[:4], **method)  # fmt: skip
+    whole = simulate(
+        stick_slip("signed"),
+        Prescribed(record),
+        3.0,
+        t_eval=None if rows is None else rows[:4],
+        **method,
+    )
     assert error.trace.t[-1] == 3.0
     np.testing.assert_array_equal(error.trace.t, whole.t)
     np.testing.assert_array_equal(error.trace.z, whole.z)
@@ -297,9 +303,10 @@ WORDS = {
 
 @pytest.mark.parametrize("how", BREAKS)
 @pytest.mark.parametrize(
-    "options", [{}, {"method": "rk4", "step": 0.01}, {"events": "step", "step": 0.01}],
+    "options",
+    [{}, {"method": "rk4", "step": 0.01}, {"events": "step", "step": 0.01}],
     ids=["dp45", "rk4", "step"],
-)  # fmt: skip
+)
 def test_a_function_that_breaks_keeps_the_run_up_to_there(
     how: str, options: dict[str, Any]
 ) -> None:

@@ -22,26 +22,36 @@ from gms_fsm import (
     Transition,
     simulate,
 )
-from gms_fsm.explain import explain
+from gms_fsm.inspection.explain import explain
 from tests.helpers import same_bits
 
 ENGINES = ["machines", "ifelse", "compiled"]
 BANK = GMS(
     GMSParameters(
-        [82e3, 146e3, 110e3], [29, 2.6, 114], [2.8e-3, 2.16e-3, 1.53e-3], sigma_2=1.3,
-        stribeck=Stribeck(2.88, 3.155, 8.8e-3), v_c=3.3e-6, weights=[3.9e-6, 3e-6, 2.15e-6],
+        [82e3, 146e3, 110e3],
+        [29, 2.6, 114],
+        [2.8e-3, 2.16e-3, 1.53e-3],
+        sigma_2=1.3,
+        stribeck=Stribeck(2.88, 3.155, 8.8e-3),
+        v_c=3.3e-6,
+        weights=[3.9e-6, 3e-6, 2.15e-6],
     ),
     law="signed",
-)  # fmt: skip
+)
 PUSHED = Slider(1.4, "2.9*sin(4.7*t)")
 
 
 def coulomb(outputs: str = "F_c * sgn(v)") -> ChartModel:
     """Return Coulomb friction without stiction."""
     chart = Chart(
-        "Coulomb friction", inputs=("v", "x"), variables=("z",), parameters=("F_c",),
-        states=(State("on", flow={"z": "0"}),), transitions=(), outputs={"F": outputs},
-    )  # fmt: skip
+        "Coulomb friction",
+        inputs=("v", "x"),
+        variables=("z",),
+        parameters=("F_c",),
+        states=(State("on", flow={"z": "0"}),),
+        transitions=(),
+        outputs={"F": outputs},
+    )
     return ChartModel(chart, {"F_c": 1.0})
 
 
@@ -143,7 +153,7 @@ class Belt:
     acceleration = "(stiffness * (0 - x) - F - F_b * sgn(v - w)) / mass"
 
     def __init__(self, w: str) -> None:
-        from gms_fsm.signals import as_signal
+        from gms_fsm.systems.signals import as_signal
 
         self.signals = {"w": as_signal(w)}
         self.numbers = {"mass": 1.0, "stiffness": 4.0, "F_b": 1.0}
@@ -169,12 +179,18 @@ def test_a_mass_rides_on_a_belt_along_a_surface_that_moves(engine, w, place):
 def test_elements_come_to_rest_on_surfaces_of_their_own(engine):
     """dz = -C sgn(z) reaches 0 in a finite time, each element by itself, two of them together."""
     chart = Chart(
-        "runs down", inputs=("v",), variables=("z",), parameters=("C",),
-        states=(State("on", flow={"z": "v - C * sgn(z)"}),), transitions=(), outputs={"F": "z"},
-    )  # fmt: skip
+        "runs down",
+        inputs=("v",),
+        variables=("z",),
+        parameters=("C",),
+        states=(State("on", flow={"z": "v - C * sgn(z)"}),),
+        transitions=(),
+        outputs={"F": "z"},
+    )
     model = ChartModel(chart, {"C": [1.0, 2.0, 2.0, 0.1]}, n=4)
-    trace = simulate(model, Slider(1e9, "0"), 2.0, engine=needs(engine),
-                     initial={"z": [1.0, 1.0, -1.0, 1.0]})  # fmt: skip
+    trace = simulate(
+        model, Slider(1e9, "0"), 2.0, engine=needs(engine), initial={"z": [1.0, 1.0, -1.0, 1.0]}
+    )
     names = {str(r.surface): float(r.t_start) for r in trace.sliding}
     assert names == pytest.approx(
         {"z of element 1": 1.0, "z of element 2": 0.5, "z of element 3": 0.5}, abs=1e-6
@@ -188,10 +204,14 @@ def test_elements_come_to_rest_on_surfaces_of_their_own(engine):
 def test_guards_that_compare_with_the_surface_are_asked_on_it(guard, v0, engine):
     """A rounding beside it another comparison keeps them false, and they were not looked at."""
     chart = Chart(
-        "waits", inputs=("v",), variables=("z",), parameters=("F_c",),
+        "waits",
+        inputs=("v",),
+        variables=("z",),
+        parameters=("F_c",),
         states=(State("a", flow={"z": "1"}), State("b", flow={"z": "1"})),
-        transitions=(Transition("go", "a", "b", guard=guard),), outputs={"F": "F_c * sgn(v)"},
-    )  # fmt: skip
+        transitions=(Transition("go", "a", "b", guard=guard),),
+        outputs={"F": "F_c * sgn(v)"},
+    )
     model = ChartModel(chart, {"F_c": 1.0})
     trace = simulate(model, Slider(1.0, "0"), 8.0, engine=needs(engine), initial={"v": v0})
     assert trace.transitions.t.tolist() == [pytest.approx(4.0, abs=1e-9)]
@@ -222,9 +242,14 @@ def test_sigma_at_the_end_is_that_before_a_firing_or_a_jump():
 
 def test_twenty_elements_slide_at_once():
     chart = Chart(
-        "runs down", inputs=("v",), variables=("z",), parameters=("C",),
-        states=(State("on", flow={"z": "v - C * sgn(z)"}),), transitions=(), outputs={"F": "z"},
-    )  # fmt: skip
+        "runs down",
+        inputs=("v",),
+        variables=("z",),
+        parameters=("C",),
+        states=(State("on", flow={"z": "v - C * sgn(z)"}),),
+        transitions=(),
+        outputs={"F": "z"},
+    )
     model = ChartModel(chart, {"C": np.linspace(1.0, 2.0, 20)}, n=20)
     trace = simulate(model, Slider(1e9, "0"), 2.0, initial={"z": [1.0] * 20})
     assert len(trace.sliding) == 20
@@ -287,9 +312,9 @@ def test_a_session_walks_over_it():
 
 
 def test_a_checkpoint_within_it_goes_on_bit_for_bit(tmp_path):
-    from gms_fsm.checkpoint import Keeper
-    from gms_fsm.simulate import Run
-    from gms_fsm.start import Start
+    from gms_fsm.run._checkpoint import Keeper
+    from gms_fsm.run.simulate import Run
+    from gms_fsm.run.start import Start
 
     start = Start.of(BANK, PUSHED, 0.4, rows_at_once=1)
     run = Run(start)

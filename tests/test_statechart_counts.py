@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from gms_fsm import Prescribed, Trace, simulate
+from gms_fsm.app.report import dwell_times
 from gms_fsm.charts import LUGRE
 from gms_fsm.errors import ParameterError
-from gms_fsm.models import ChartModel
-from gms_fsm.report import dwell_times
+from gms_fsm.systems.models import ChartModel
 from plots.render import render
 from plots.statechart import Tally, statechart
 from tests.helpers import one_element, open_loop, stick_slip

@@ -13,11 +13,11 @@ from xml.etree import ElementTree
 
 import pytest
 
-import gms_fsm.chart
-from gms_fsm.chart import Chart, State, Transition
+import gms_fsm.charts.chart
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
+from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ParameterError
-from gms_fsm.expression import parse_condition, parse_value
+from gms_fsm.language.expression import parse_condition, parse_value
 from plots.render import render
 from plots.statechart import Writer, chosen, statechart
 from plots.style import CHART_THEMES
@@ -67,10 +67,14 @@ def drawn(graph: object, folder: Path) -> dict[str, Drawn]:
 )
 def test_math(text: str, formula: str) -> None:
     chart = Chart(
-        name="names", inputs=("v", "s"), variables=("z",),
-        parameters=("v_c", "sigma_0", "omega"), states=(State("a", flow={"z": "0"}),),
-        transitions=(), outputs={"F": "z"},
-    )  # fmt: skip
+        name="names",
+        inputs=("v", "s"),
+        variables=("z",),
+        parameters=("v_c", "sigma_0", "omega"),
+        states=(State("a", flow={"z": "0"}),),
+        transitions=(),
+        outputs={"F": "z"},
+    )
     names = chart.inputs + chart.variables + chart.parameters
     assert Writer(chart, "math").text(parse_condition(text, names)) == formula
 
@@ -112,14 +116,17 @@ def test_every_look_shows_the_whole_hostile_chart(
 def test_names_that_no_chart_would_take(
     notation: str, direction: str, theme: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(gms_fsm.chart, "_check_name", lambda *_: None)  # let them through
+    monkeypatch.setattr(gms_fsm.charts.chart, "_check_name", lambda *_: None)  # let them through
     bad = 'slip</B></TD></TR></TABLE>>]; "evil:n" [label=<<B>\\N" & \x01[x] \\'
     chart = Chart(
-        name='<x>"]; evil [label=<<B>x</B>>]; "\\\n\0>', inputs=("v",), variables=("z<I>\\G</I>",),
-        parameters=(), states=(State(bad, flow={"z<I>\\G</I>": "v"}),),
+        name='<x>"]; evil [label=<<B>x</B>>]; "\\\n\0>',
+        inputs=("v",),
+        variables=("z<I>\\G</I>",),
+        parameters=(),
+        states=(State(bad, flow={"z<I>\\G</I>": "v"}),),
         transitions=(Transition('a"]; evil -> evil [x="', bad, bad, guard="v > 0"),),
         outputs={"F": "v"},
-    )  # fmt: skip
+    )
     graph = statechart(chart, notation=notation, direction=direction, theme=theme)
     shown = drawn(graph, tmp_path)
     assert sum("node" in group.classes for group in shown.values()) == 3

@@ -16,11 +16,11 @@ from xml.etree import ElementTree
 
 import pytest
 
-import gms_fsm.chart
-from gms_fsm.chart import Chart, State, Transition
+import gms_fsm.charts.chart
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
+from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ParameterError
-from gms_fsm.expression import MATLAB_LIKE, clauses, spell
+from gms_fsm.language.expression import MATLAB_LIKE, clauses, spell
 from plots.render import render
 from plots.statechart import statechart
 
@@ -293,7 +293,7 @@ def test_one_element_has_no_region_and_lugre_no_edges(draw: Draw) -> None:
 def test_hostile_names_are_shown_and_not_obeyed(
     draw: Draw, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(gms_fsm.chart, "_check_name", lambda *_: None)  # let them through
+    monkeypatch.setattr(gms_fsm.charts.chart, "_check_name", lambda *_: None)  # let them through
     bad_state = 'slip</B></TD></TR></TABLE>>]; "evil:n" [label=<<B>\\N" & \x01[x] \\'
     bad_edge = 'a"]; evil -> evil [x="'
     bad_variable = "z<I>\\G</I>"

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from gms_fsm.store import Store
+from gms_fsm.lowering._store import Store
 
 CONTENT = random.Random(1).randbytes(300)
 

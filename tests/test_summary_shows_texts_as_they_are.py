@@ -12,19 +12,49 @@ from pathlib import Path
 
 import pytest
 
-from gms_fsm.report import plain, run_scenario
-from gms_fsm.scenario import load_scenario
+from gms_fsm.app.report import plain, run_scenario
+from gms_fsm.app.scenario import load_scenario
 from tests.scenario_files import OPEN_LOOP
 
 NASTY = [
-    "<script>alert(1)</script>", "<img src=x onerror=alert(1)>", "![track](http://a.example/x.png)",
-    "[click](javascript:alert(1))", "<http://a.example>", "*em* **strong** _em_ __strong__ ~~no~~",
-    "`code` ``more``", "# heading", "## two ##", "- item", "+ item", "* item", "1. one", "2) two",
-    "> quote", "===", "---", "***", "```", "~~~", "    code", "| a | b |\n|---|---|\n| 1 | 2 |",
-    "line\n===", "line\n---", "&lt;b&gt; &amp; &#60;", r"\*not escaped\*", "[a]: http://a.example",
-    "$x^2$ $$y$$", "F_c, v_s and z_1 stay", "__init__ _", "a <!-- comment --> b", "<details>",
-    "Stick-slip (paper, Fig. 4)", "-0.5 m, +3 %, 0.25 s", "a\tb  \nc", "C#", "trailing \\",
-]  # fmt: skip
+    "<script>alert(1)</script>",
+    "<img src=x onerror=alert(1)>",
+    "![track](http://a.example/x.png)",
+    "[click](javascript:alert(1))",
+    "<http://a.example>",
+    "*em* **strong** _em_ __strong__ ~~no~~",
+    "`code` ``more``",
+    "# heading",
+    "## two ##",
+    "- item",
+    "+ item",
+    "* item",
+    "1. one",
+    "2) two",
+    "> quote",
+    "===",
+    "---",
+    "***",
+    "```",
+    "~~~",
+    "    code",
+    "| a | b |\n|---|---|\n| 1 | 2 |",
+    "line\n===",
+    "line\n---",
+    "&lt;b&gt; &amp; &#60;",
+    r"\*not escaped\*",
+    "[a]: http://a.example",
+    "$x^2$ $$y$$",
+    "F_c, v_s and z_1 stay",
+    "__init__ _",
+    "a <!-- comment --> b",
+    "<details>",
+    "Stick-slip (paper, Fig. 4)",
+    "-0.5 m, +3 %, 0.25 s",
+    "a\tb  \nc",
+    "C#",
+    "trailing \\",
+]
 
 
 def _shown(markdown: str) -> tuple[str, set[str]]:

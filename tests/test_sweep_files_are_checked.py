@@ -42,8 +42,25 @@ def test_the_whole_file_is_read(arrays: dict[str, Any], tmp_path: Path) -> None:
     assert arrays["program"] == gms_fsm.__version__
 
 
-NAMES = ["t", "x", "v", "F", "z", "outcome", "message", "states", "times", "rows_x", "rows_v",
-         "rows_F", "rows_z", "parameter_F_c", "parameter_k", "transitions", "edges"]  # fmt: skip
+NAMES = [
+    "t",
+    "x",
+    "v",
+    "F",
+    "z",
+    "outcome",
+    "message",
+    "states",
+    "times",
+    "rows_x",
+    "rows_v",
+    "rows_F",
+    "rows_z",
+    "parameter_F_c",
+    "parameter_k",
+    "transitions",
+    "edges",
+]
 
 
 @pytest.mark.parametrize("name", NAMES)

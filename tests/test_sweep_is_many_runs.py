@@ -35,15 +35,10 @@ from gms_fsm import (
     sweep,
 )
 from gms_fsm.charts import gms_element
-from gms_fsm.errors import (
-    OutputError,
-    ParameterError,
-    SignalError,
-    SimulationError,
-    TraceFileError,
-)
-from gms_fsm.models import Model, parameter_names, with_values
-from gms_fsm.rigs import Rig, with_numbers
+from gms_fsm.errors import OutputError, ParameterError, SignalError, TraceFileError
+from gms_fsm.systems.models import Model, parameter_names, with_values
+from gms_fsm.systems.rigs import Rig, with_numbers
+from gms_fsm.traces.failures import SimulationError
 from tests.helpers import non_drifting, open_loop, pulled_mass, stick_slip
 
 ENGINES = ("compiled", "machines", "ifelse")
@@ -81,30 +76,48 @@ RESETS = Chart(
     outputs={"F": "k * z + 0.1 * dz"},
 )
 OWN = ChartModel(
-    RESETS, {"k": np.linspace(1, 2, 3), "C": 0.3, "v_c": 1e-6}, n=3,
-    stribeck=Stribeck(F_c=1.0, F_s=1.5, v_s=0.02), weights=np.linspace(0.5, 1, 3),
-)  # fmt: skip
+    RESETS,
+    {"k": np.linspace(1, 2, 3), "C": 0.3, "v_c": 1e-6},
+    n=3,
+    stribeck=Stribeck(F_c=1.0, F_s=1.5, v_s=0.02),
+    weights=np.linspace(0.5, 1, 3),
+)
 BRISTLE = LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4.0, stribeck=Stribeck(1.0, 1.5, 1e-3))
 CASES: dict[str, tuple[Model, Rig, float, Mapping[str, Any]]] = {
     "a bank on a pulled mass": (*pulled_mass(), 12.0, _sets(7)),
     "numbers of model and rig": (
-        *pulled_mass(), 12.0,
-        {"F_s": [1.2, 1.5, 1.8], "v_s": [0.05, 0.02, 0.1], "sigma_2": [0.4, 0.2, 0.8],
-         "mass": [1.0, 2.0, 0.5], "stiffness": [2.0, 1.0, 3.0], "speed": [0.1, 0.2, 0.05],
-         "v_c": [1e-6, 1e-5, 1e-7], "C": [0.02, 0.05, 0.1]},
+        *pulled_mass(),
+        12.0,
+        {
+            "F_s": [1.2, 1.5, 1.8],
+            "v_s": [0.05, 0.02, 0.1],
+            "sigma_2": [0.4, 0.2, 0.8],
+            "mass": [1.0, 2.0, 0.5],
+            "stiffness": [2.0, 1.0, 3.0],
+            "speed": [0.1, 0.2, 0.05],
+            "v_c": [1e-6, 1e-5, 1e-7],
+            "C": [0.02, 0.05, 0.1],
+        },
     ),
     "open loop": (
-        stick_slip("published"), open_loop(), 25.0,
+        stick_slip("published"),
+        open_loop(),
+        25.0,
         {"F_c": [0.3, 0.35, 0.2], "sigma": RNG.uniform(0.1, 0.5, (3, 4))},
     ),
     "a slider": (
-        *non_drifting("signed", slipping=True), 8.0, {"mass": [0.5, 1.0, 2.0], "C": [0.1, 0.2, 0.3]}
+        *non_drifting("signed", slipping=True),
+        8.0,
+        {"mass": [0.5, 1.0, 2.0], "C": [0.1, 0.2, 0.3]},
     ),
     "a chart of one's own": (
-        OWN, Prescribed("0.3*sin(2*pi*t/17)"), 30.0, {"C": [0.1, 0.3, 0.5], "k": [1.0, 2.0, 3.0]}
+        OWN,
+        Prescribed("0.3*sin(2*pi*t/17)"),
+        30.0,
+        {"C": [0.1, 0.3, 0.5], "k": [1.0, 2.0, 3.0]},
     ),
     "LuGre": (BRISTLE, Prescribed("1e-3*sin(3*t)"), 4.0, {"sigma_0": [1e3, 2e3], "F_s": [1.5, 2]}),
-}  # fmt: skip
+}
 
 
 def _one(case: str, run: int) -> tuple[Model, Rig]:
@@ -114,9 +127,10 @@ def _one(case: str, run: int) -> tuple[Model, Rig]:
 
 
 @pytest.mark.parametrize(
-    "options", [{}, {"rtol": 1e-9, "atol": 1e-12}, {"method": "rk4", "step": 9.03e-3}],
+    "options",
+    [{}, {"rtol": 1e-9, "atol": 1e-12}, {"method": "rk4", "step": 9.03e-3}],
     ids=["dp45", "tight", "rk4"],
-)  # fmt: skip
+)
 @pytest.mark.parametrize("case", CASES)
 def test_each_row_is_a_run(case: str, options: dict[str, Any], engine: str) -> None:
     model, rig, t_end, parameters = CASES[case]
@@ -176,9 +190,14 @@ def test_more_runs_than_a_task_holds_and_more_firings_than_a_column() -> None:
 # --------------------------------------------------------------------------- what is varied
 def test_a_charts_own_parameter_goes_before_a_shared_one_of_its_name() -> None:
     chart = Chart(
-        "own Coulomb", ("v",), ("z",), ("F_c", "weights"),
-        (State("slip", flow={"z": "v"}),), (), {"F": "F_c * weights * sgn(v)"},
-    )  # fmt: skip
+        "own Coulomb",
+        ("v",),
+        ("z",),
+        ("F_c", "weights"),
+        (State("slip", flow={"z": "v"}),),
+        (),
+        {"F": "F_c * weights * sgn(v)"},
+    )
     model = ChartModel(chart, {"F_c": 2.0, "weights": 3.0}, n=2, stribeck=Stribeck(1.0, 1.5, 0.1))
     assert parameter_names(model) == ("F_c", "weights", "sigma_2", "F_s", "v_s")
     other = with_values(model, {"F_c": 5.0, "weights": 7.0, "F_s": 1.25})
@@ -288,14 +307,17 @@ def _fragile() -> ChartModel:
     """Livelocks where v_c is above the speed; its flow is infinite where k is 1."""
     sound = gms_element("signed")
     chart = Chart(
-        "fragile", sound.inputs, sound.variables, sound.parameters,
+        "fragile",
+        sound.inputs,
+        sound.variables,
+        sound.parameters,
         (State("stick", {"z": "v + 0 / (k - 1)"}), State("slip", {"z": "0 * v"})),
         (
             Transition("break_away", "stick", "slip", guard="abs(z) >= s and abs(v) <= v_c"),
             Transition("arrest", "slip", "stick", guard="abs(v) <= v_c and abs(z) < 10 * s"),
         ),
         sound.outputs,
-    )  # fmt: skip
+    )
     values = {"k": 2.0, "sigma": 0.1, "C": 0.1, "v_c": 0.01}
     return ChartModel(chart, values, n=2, stribeck=Stribeck(1.0, 1.5, 1e-3), weights=[2, 1])
 
@@ -303,20 +325,42 @@ def _fragile() -> ChartModel:
 def test_a_run_that_fails_is_a_row_and_ends_no_other(engine: str) -> None:
     good = {"F_c": 1.0, "v_c": 0.01, "k": 2.0}
     wrong: list[dict[str, float]] = [
-        {}, {"F_c": -1.0}, {}, {"v_c": 0.2}, {}, {"k": 1.0}, {}, {"F_c": 9.0}, {"k": np.nan}, {},
+        {},
+        {"F_c": -1.0},
+        {},
+        {"v_c": 0.2},
+        {},
+        {"k": 1.0},
+        {},
+        {"F_c": 9.0},
+        {"k": np.nan},
+        {},
         {"k": np.inf},
-    ]  # fmt: skip
+    ]
     parameters = {name: [(good | u)[name] for u in wrong] for name in good}
     model, rig, times = _fragile(), Prescribed("0.15"), [0.0, 5.0, 8.0, 12.0]
-    result = sweep(
-        model, rig, 12.0, parameters, engine=engine, output="t_eval", t_eval=times
-    )  # fmt: skip
+    result = sweep(model, rig, 12.0, parameters, engine=engine, output="t_eval", t_eval=times)
     assert result.outcome.tolist() == [
-        "ok", "ParameterError", "ok", "LivelockError", "ok", "NotFiniteError", "ok",
-        "ParameterError", "ParameterError", "ok", "ParameterError",
-    ]  # fmt: skip
-    words = {1: "F_c is -1.0", 3: "element 2 switched 100 times at t = 6.66", 5: "not finite",
-             7: "F_s is 1.5, F_c is 9.0", 8: "k is nan", 10: "k is inf"}  # fmt: skip
+        "ok",
+        "ParameterError",
+        "ok",
+        "LivelockError",
+        "ok",
+        "NotFiniteError",
+        "ok",
+        "ParameterError",
+        "ParameterError",
+        "ok",
+        "ParameterError",
+    ]
+    words = {
+        1: "F_c is -1.0",
+        3: "element 2 switched 100 times at t = 6.66",
+        5: "not finite",
+        7: "F_s is 1.5, F_c is 9.0",
+        8: "k is nan",
+        10: "k is inf",
+    }
     for run, text in enumerate(result.message):
         assert words.get(run, "") in text
         assert (text == "") == (run not in words)
@@ -356,8 +400,14 @@ def test_a_record_that_ends_ends_every_run() -> None:
     assert result.outcome.tolist() == ["SignalEndError"] * 2
     assert result.t.tolist() == [5.0, 5.0]
     with pytest.raises(SignalError, match="starts at 7"):
-        sweep(stick_slip("signed"), Prescribed(record), 9.0, {"C": [0.1]}, t_start=7.0,
-              engine="ifelse")  # fmt: skip
+        sweep(
+            stick_slip("signed"),
+            Prescribed(record),
+            9.0,
+            {"C": [0.1]},
+            t_start=7.0,
+            engine="ifelse",
+        )
 
 
 # --------------------------------------------------------------------------- executors
@@ -443,9 +493,13 @@ def test_processes_and_one_that_is_killed() -> None:
 def test_what_cannot_be_sent_to_a_process_is_a_row_that_says_so() -> None:
     with _pool(1) as pool:
         result = sweep(
-            stick_slip("signed"), Prescribed(lambda t: 0.1), 1.0, {"C": [0.1, 0.2]},
-            executor=pool, engine="machines",
-        )  # fmt: skip
+            stick_slip("signed"),
+            Prescribed(lambda t: 0.1),
+            1.0,
+            {"C": [0.1, 0.2]},
+            executor=pool,
+            engine="machines",
+        )
     assert len(set(result.outcome)) == 1
     for text in result.message:
         assert "the worker failed" in text
@@ -507,9 +561,13 @@ def test_progress_is_shown_where_it_is_wanted(capsys: pytest.CaptureFixture[str]
 def mixed() -> Sweep:
     """Two runs that end, one that cannot start; rows, wide and narrow parameters."""
     return sweep(
-        *pulled_mass(), 8.0, _sets(3) | {"F_c": [1.0, 0.9, -1.0]}, engine="ifelse",
-        output="t_eval", t_eval=[0.0, 3.0, 8.0],
-    )  # fmt: skip
+        *pulled_mass(),
+        8.0,
+        _sets(3) | {"F_c": [1.0, 0.9, -1.0]},
+        engine="ifelse",
+        output="t_eval",
+        t_eval=[0.0, 3.0, 8.0],
+    )
 
 
 def test_a_dataframe_has_one_row_a_run(mixed: Sweep) -> None:
@@ -557,9 +615,14 @@ def test_a_dataset_has_dimensions_and_units(mixed: Sweep) -> None:
 def test_parameters_that_are_called_like_results_are_kept_apart() -> None:
     names = ("transitions", "outcome", "time", "run", "element", "z1", "state1", "x_end")
     chart = Chart(
-        "names", ("v",), ("z",), names,
-        (State("on", {"z": "v * (" + " + ".join(names) + ")"}),), (), {"F": "z"},
-    )  # fmt: skip
+        "names",
+        ("v",),
+        ("z",),
+        names,
+        (State("on", {"z": "v * (" + " + ".join(names) + ")"}),),
+        (),
+        {"F": "z"},
+    )
     model = ChartModel(chart, dict.fromkeys(names, 1.0), n=1, stribeck=Stribeck(1, 2, 0.1))
     values = {name: [float(i), 7.0] for i, name in enumerate(names)}
     result = sweep(

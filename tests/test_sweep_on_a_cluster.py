@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import Prescribed, sweep
-from gms_fsm.sweep import _Collected
+from gms_fsm.run.sweep import _Collected
 from tests.helpers import pulled_mass, stick_slip
 
 distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
@@ -35,16 +35,20 @@ def cluster() -> Iterator[Any]:
     """Two worker processes of one thread each."""
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0",
+        n_workers=2,
+        threads_per_worker=1,
+        processes=True,
+        dashboard_address=":0",
         silence_logs=logging.CRITICAL,
-    ) as made:  # fmt: skip
+    ) as made:
         yield made
 
 
 quiet = pytest.mark.filterwarnings(
-    "ignore::DeprecationWarning", "ignore::ResourceWarning",
+    "ignore::DeprecationWarning",
+    "ignore::ResourceWarning",
     "ignore::pytest.PytestUnraisableExceptionWarning",
-)  # fmt: skip
+)
 
 
 @quiet
@@ -101,11 +105,14 @@ def test_what_kills_every_worker_is_a_row_that_says_so() -> None:
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 1}),
         distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0",
+            n_workers=2,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=":0",
             silence_logs=logging.CRITICAL,
         ) as made,
         distributed.Client(made) as client,
-    ):  # fmt: skip
+    ):
         executor = client.get_executor()
         far = sweep(model, rig, 12.0, sets(8), executor=Deadly(executor))
         again = sweep(model, rig, 12.0, sets(8), executor=executor)
@@ -139,6 +146,7 @@ def test_a_signal_that_cannot_be_sent_is_a_row_that_says_so(cluster: Any) -> Non
     assert np.isnan(lost.F).all()
     for text in set(lost.message):
         assert text.startswith("the run could not be sent to a worker (TypeError: ")
-        assert text.endswith("give signals as expressions of t or as arrays, or use threads "
-                             "(executor=None)")  # fmt: skip
+        assert text.endswith(
+            "give signals as expressions of t or as arrays, or use threads (executor=None)"
+        )
     assert set(found.outcome) == {"ok"}, "the cluster is none the worse for it"

@@ -24,9 +24,13 @@ def test_rows_are_the_wanted_times(case, options):
     full = simulate(model, rig, T, **options)
     rng = np.random.default_rng(7)
     for times in (
-        [T], [0.0], [0.0, T], [0.3 * T, 0.3 * T + 1e-9, 0.7 * T],
-        np.linspace(0, T, 2501), np.sort(rng.uniform(0, T, 300)),
-    ):  # fmt: skip
+        [T],
+        [0.0],
+        [0.0, T],
+        [0.3 * T, 0.3 * T + 1e-9, 0.7 * T],
+        np.linspace(0, T, 2501),
+        np.sort(rng.uniform(0, T, 300)),
+    ):
         trace = simulate(model, rig, T, t_eval=times, **options)
         np.testing.assert_array_equal(trace.t, times)
         assert (trace.microstep == 0).all()
@@ -81,10 +85,14 @@ def test_rows_between_steps_are_as_good_as_the_steps(case):
 def test_a_transition_at_the_end_is_in_the_last_row():
     """t_end on a transition: the row at t_end comes after the firing."""
     chart = Chart(
-        "by the clock", ("t",), ("z",), ("k",),
+        "by the clock",
+        ("t",),
+        ("z",),
+        ("k",),
         (State("early", {"z": "1"}), State("late", {"z": "0"})),
-        (Transition("go", "early", "late", guard="t >= 2"),), {"F": "k * z"},
-    )  # fmt: skip
+        (Transition("go", "early", "late", guard="t >= 2"),),
+        {"F": "k * z"},
+    )
     model, rig = ChartModel(chart, {"k": 1.0}, n=2), Prescribed("0.1")
     full = simulate(model, rig, 2.0)
     trace = simulate(model, rig, 2.0, t_eval=[0.0, 2.0])

@@ -7,10 +7,10 @@ compiler makes the same of it is the claim of test_compiled_is_bit_identical.py.
 import numpy as np
 import pytest
 
-import gms_fsm.compiled
+import gms_fsm.lowering._compiled
 import integrators.compiled
 from gms_fsm import Slider, simulate
-from gms_fsm.errors import LivelockError
+from gms_fsm.traces.failures import LivelockError
 from integrators import loop
 from tests.helpers import one_element, open_loop, pulled_mass, stick_slip
 from tests.test_monitors_see_what_happens import SLOWING, memoryless
@@ -21,7 +21,7 @@ TIMES = np.linspace(0.0, 20.0, 41)
 @pytest.fixture
 def read(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let engine="compiled" run the text."""
-    module = gms_fsm.compiled
+    module = gms_fsm.lowering._compiled
     monkeypatch.setattr(module, "machine_code", lambda program, name: program.ieee[name])
     monkeypatch.setattr(module, "store", lambda: None)
     kernel = integrators.compiled
@@ -32,11 +32,15 @@ def read(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     "options",
     [
-        {}, {"output": "end"}, {"t_eval": TIMES}, {"method": "rk4", "step": 9.03e-3},
-        {"events": "step", "method": "heun", "step": 0.01}, {"max_step": 0.01},
+        {},
+        {"output": "end"},
+        {"t_eval": TIMES},
+        {"method": "rk4", "step": 9.03e-3},
+        {"events": "step", "method": "heun", "step": 0.01},
+        {"max_step": 0.01},
     ],
     ids=["all", "end", "t_eval", "rk4", "step", "many rows"],
-)  # fmt: skip
+)
 @pytest.mark.parametrize("case", ["open loop", "pulled mass"])
 def test_the_same_rows_and_the_same_log(case, options, read):
     model, rig = (stick_slip("signed"), open_loop()) if case == "open loop" else pulled_mass()

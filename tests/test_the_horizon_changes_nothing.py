@@ -20,7 +20,7 @@ def test_a_longer_horizon_gives_the_same_bits_up_to_the_shorter(longer, engine):
         short = simulate(model, rig, 15.0, engine=engine)
         far = simulate(model, rig, min(longer, 60.0), engine=engine)
         if longer > 60.0:  # far away in time, but not run to there
-            from gms_fsm.errors import StepLimitError
+            from gms_fsm.traces.failures import StepLimitError
 
             with pytest.raises(StepLimitError) as caught:
                 simulate(model, rig, longer, engine=engine, max_steps=len(short) + 200)

@@ -20,24 +20,43 @@ HAS_NUMBA = bool(importlib.util.find_spec("numba"))
 ENGINE = "compiled" if HAS_NUMBA else "ifelse"
 
 CARRIAGE = Trial(
-    "a carriage", 0, 0,
+    "a carriage",
+    0,
+    0,
     GMS(
-        GMSParameters([4e6], [3e3], [1e-5], sigma_2=250, stribeck=Stribeck(8, 9.5, 5e-4),
-                      v_c=7.3e-7, weights=[1 / 4e6]),
+        GMSParameters(
+            [4e6],
+            [3e3],
+            [1e-5],
+            sigma_2=250,
+            stribeck=Stribeck(8, 9.5, 5e-4),
+            v_c=7.3e-7,
+            weights=[1 / 4e6],
+        ),
         law="signed",
     ),
-    PulledSlider(40, 1600, 1.8e-3), 8.0,
-)  # fmt: skip
+    PulledSlider(40, 1600, 1.8e-3),
+    8.0,
+)
 HELD = Trial(
-    "held on v = 0", 0, 0,
+    "held on v = 0",
+    0,
+    0,
     GMS(
-        GMSParameters([82e3, 146e3, 110e3], [29, 2.6, 114], [2.8e-3, 2.16e-3, 1.53e-3], sigma_2=1.3,
-                      stribeck=Stribeck(2.88, 3.155, 8.8e-3), v_c=3.3e-6,
-                      weights=[3.9e-6, 3e-6, 2.15e-6]),
+        GMSParameters(
+            [82e3, 146e3, 110e3],
+            [29, 2.6, 114],
+            [2.8e-3, 2.16e-3, 1.53e-3],
+            sigma_2=1.3,
+            stribeck=Stribeck(2.88, 3.155, 8.8e-3),
+            v_c=3.3e-6,
+            weights=[3.9e-6, 3e-6, 2.15e-6],
+        ),
         law="signed",
     ),
-    Slider(1.4, "2.9*sin(4.7*t)"), 4.0,
-)  # fmt: skip
+    Slider(1.4, "2.9*sin(4.7*t)"),
+    4.0,
+)
 
 
 def agrees(one: Trial) -> None:

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gms_fsm.archives import member
-from gms_fsm.expression import parse_value
+from gms_fsm.language.expression import parse_value
+from gms_fsm.traces._archives import member
 
 
 def test_four_threads_read_files_and_formulas(tmp_path: Path) -> None:

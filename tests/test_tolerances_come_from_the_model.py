@@ -23,16 +23,21 @@ from gms_fsm import (
 )
 from gms_fsm.charts import gms_element
 from gms_fsm.errors import ParameterError
-from gms_fsm.scales import scales_of
+from gms_fsm.lowering.scales import scales_of
 from tests.helpers import pulled_mass
 
 CARRIAGE = GMS(
     GMSParameters(
-        [4e6], [3e3], [1e-5], sigma_2=250, stribeck=Stribeck(8, 9.5, 5e-4), v_c=7.3e-7,
+        [4e6],
+        [3e3],
+        [1e-5],
+        sigma_2=250,
+        stribeck=Stribeck(8, 9.5, 5e-4),
+        v_c=7.3e-7,
         weights=[1 / 4e6],
     ),
     law="signed",
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize("engine", ["machines", "ifelse", "compiled"])
@@ -48,8 +53,15 @@ def test_a_carriage_on_micrometres_creeps_and_does_not_break_away(engine):
 
 
 def test_the_scales_of_a_bank_are_its_thresholds_its_stiffness_and_its_velocities():
-    p = GMSParameters([40.0, 10.0], [0.0, 0.0], [0.02, 0.01], sigma_2=0.4,
-                      stribeck=Stribeck(2.0, 3.0, 0.05), v_c=1e-7, weights=[0.01, 0.5])  # fmt: skip
+    p = GMSParameters(
+        [40.0, 10.0],
+        [0.0, 0.0],
+        [0.02, 0.01],
+        sigma_2=0.4,
+        stribeck=Stribeck(2.0, 3.0, 0.05),
+        v_c=1e-7,
+        weights=[0.01, 0.5],
+    )
     scales = scales_of(GMS(p, law="signed"))
     assert scales.variables["z"] == pytest.approx((0.02, 0.2))  # w F_c; F_c / k
     assert scales.x == pytest.approx(0.02)
@@ -77,10 +89,14 @@ def test_without_guards_the_scale_is_the_deflection_that_carries_the_friction():
 def test_charts_of_ones_own_have_the_scales_of_their_guards(guard, scale):
     """How far from 0 a comparison turns, by its slope; one that turns at 0 has none."""
     chart = Chart(
-        "own", inputs=("t", "v"), variables=("z",), parameters=("k",),
+        "own",
+        inputs=("t", "v"),
+        variables=("z",),
+        parameters=("k",),
         states=(State("a", flow={"z": "2 * v"}), State("b", flow={"z": "0"})),
-        transitions=(Transition("go", "a", "b", guard=guard),), outputs={"F": "k * z"},
-    )  # fmt: skip
+        transitions=(Transition("go", "a", "b", guard=guard),),
+        outputs={"F": "k * z"},
+    )
     scales = scales_of(ChartModel(chart, {"k": 100.0}))
     assert scales.variables["z"] == pytest.approx((scale,))
     assert scales.x == pytest.approx(scale / 2.0)  # x follows z at half its pace
@@ -89,9 +105,15 @@ def test_charts_of_ones_own_have_the_scales_of_their_guards(guard, scale):
 @pytest.mark.parametrize("length", [1.0, 1e-6, 1e6])
 def test_a_component_without_a_scale_is_measured_by_its_own_size(length):
     """A spring and a mass: v and x by their largest values, whatever the unit."""
-    spring = Chart("spring", inputs=("x",), variables=("z",), parameters=("k",),
-                   states=(State("on", flow={"z": "0"}),), transitions=(),
-                   outputs={"F": "k * x"})  # fmt: skip
+    spring = Chart(
+        "spring",
+        inputs=("x",),
+        variables=("z",),
+        parameters=("k",),
+        states=(State("on", flow={"z": "0"}),),
+        transitions=(),
+        outputs={"F": "k * x"},
+    )
     model = ChartModel(spring, {"k": 4.0})
     trace = simulate(model, Slider(1.0, "0"), 10.0, initial={"x": length})
     assert trace.settings["atol"] == {"x": 0.0, "v": 0.0, "z": [0.0]}
@@ -135,9 +157,15 @@ def test_a_foreign_solver_asks_for_a_tolerance_where_there_is_no_scale():
     """SciPy's own error norm divides by it."""
     from scipy.integrate import RK45
 
-    chart = Chart("idle", inputs=("v",), variables=("z",), parameters=(),
-                  states=(State("on", flow={"z": "0"}),), transitions=(),
-                  outputs={"F": "v"})  # fmt: skip
+    chart = Chart(
+        "idle",
+        inputs=("v",),
+        variables=("z",),
+        parameters=(),
+        states=(State("on", flow={"z": "0"}),),
+        transitions=(),
+        outputs={"F": "v"},
+    )
     with pytest.raises(ParameterError, match="needs an absolute tolerance"):
         simulate(ChartModel(chart, {}), Slider(1.0, "1"), 1.0, method=RK45)
     trace = simulate(ChartModel(chart, {}), Slider(1.0, "1"), 1.0, method=RK45, atol=1e-9)
@@ -151,14 +179,26 @@ def test_each_run_of_a_sweep_has_the_tolerances_of_its_own_model(engine):
     p = pulled_mass()[0].parameters
     weights = np.array([1e-6 * p.weights, p.weights])
     C = np.array([1e-6 * p.C, p.C])
-    many = sweep(pulled_mass()[0], Prescribed("1e-3*sin(t)"), 6.0, {"weights": weights, "C": C},
-                 engine=engine)  # fmt: skip
+    many = sweep(
+        pulled_mass()[0],
+        Prescribed("1e-3*sin(t)"),
+        6.0,
+        {"weights": weights, "C": C},
+        engine=engine,
+    )
     for row in range(2):
         model = GMS(
-            GMSParameters(p.k, p.sigma, C[row], sigma_2=p.sigma_2, stribeck=p.stribeck, v_c=p.v_c,
-                          weights=weights[row]),
+            GMSParameters(
+                p.k,
+                p.sigma,
+                C[row],
+                sigma_2=p.sigma_2,
+                stribeck=p.stribeck,
+                v_c=p.v_c,
+                weights=weights[row],
+            ),
             law="signed",
-        )  # fmt: skip
+        )
         alone = simulate(model, Prescribed("1e-3*sin(t)"), 6.0, engine="ifelse")
         assert many.x[row] == alone.x[-1]
         assert many.z[row].tolist() == alone.z[-1].tolist()
@@ -167,7 +207,7 @@ def test_each_run_of_a_sweep_has_the_tolerances_of_its_own_model(engine):
 def test_a_scenario_takes_both_forms(tmp_path):
     from pathlib import Path
 
-    from gms_fsm.scenario import load_scenario
+    from gms_fsm.app.scenario import load_scenario
 
     path = Path(__file__).parents[1] / "scenarios" / "pulled_mass.toml"
     assert load_scenario(path).arguments["atol"] is None
@@ -178,8 +218,16 @@ def test_a_scenario_takes_both_forms(tmp_path):
 
 def test_the_element_chart_alone_has_the_same_scales():
     values = {"k": 40.0, "sigma": 0.4, "C": 0.02, "v_c": 1e-6}
-    own = ChartModel(gms_element("signed"), values, stribeck=Stribeck(1, 1.5, 0.05),
-                     weights=[0.00625])  # fmt: skip
-    p = GMSParameters([40.0], [0.4], [0.02], sigma_2=0.0, stribeck=Stribeck(1, 1.5, 0.05),
-                      v_c=1e-6, weights=[0.00625])  # fmt: skip
+    own = ChartModel(
+        gms_element("signed"), values, stribeck=Stribeck(1, 1.5, 0.05), weights=[0.00625]
+    )
+    p = GMSParameters(
+        [40.0],
+        [0.4],
+        [0.02],
+        sigma_2=0.0,
+        stribeck=Stribeck(1, 1.5, 0.05),
+        v_c=1e-6,
+        weights=[0.00625],
+    )
     assert scales_of(own) == scales_of(GMS(p, law="signed"))

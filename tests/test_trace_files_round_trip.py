@@ -36,7 +36,7 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.errors import GMSError, OutputError, SignalError, TraceFileError
-from gms_fsm.trace import written_whole
+from gms_fsm.traces.trace import written_whole
 from tests.helpers import non_drifting, pulled_mass, stick_slip
 
 ENDINGS = pytest.mark.parametrize("ending", [".npz", ".csv"])
@@ -46,17 +46,33 @@ TIMES = np.linspace(0, 30, 31)
 
 def _own_chart() -> Trace:
     chart = Chart(
-        'own "\u00e9", with\ncommas', ("v", "s", "t"), ("z", "w"), ("k", "c"),
-        (State("rest", {"z": "v", "w": "0"}),
-         State("l\u00e4uft", {"z": "0", "w": "abs(v)"}, entry={"z": "z / 3"}, exit={"w": "w + 1"})),
-        (Transition("go", "rest", "l\u00e4uft", "abs(z) >= s or t > 100", actions={"w": "c * w"}),
-         Transition("back", "l\u00e4uft", "rest", "not abs(v) > 0.05")),
+        'own "\u00e9", with\ncommas',
+        ("v", "s", "t"),
+        ("z", "w"),
+        ("k", "c"),
+        (
+            State("rest", {"z": "v", "w": "0"}),
+            State(
+                "l\u00e4uft", {"z": "0", "w": "abs(v)"}, entry={"z": "z / 3"}, exit={"w": "w + 1"}
+            ),
+        ),
+        (
+            Transition(
+                "go", "rest", "l\u00e4uft", "abs(z) >= s or t > 100", actions={"w": "c * w"}
+            ),
+            Transition("back", "l\u00e4uft", "rest", "not abs(v) > 0.05"),
+        ),
         {"F": "k * z + 1e-3 * dw"},
-    )  # fmt: skip
+    )
     model = ChartModel(
-        chart, {"k": np.array([1 / 3, 2.0]), "c": 0.1}, n=2, weights=[0.1, 0.3],  # type: ignore[arg-type]
-        stribeck=Stribeck(1, 1.5, 0.02), sigma_2=0.1, title='mine; "quoted"\n\u00e9',
-    )  # fmt: skip
+        chart,
+        {"k": np.array([1 / 3, 2.0]), "c": 0.1},
+        n=2,
+        weights=[0.1, 0.3],  # type: ignore[arg-type]
+        stribeck=Stribeck(1, 1.5, 0.02),
+        sigma_2=0.1,
+        title='mine; "quoted"\n\u00e9',
+    )
     return simulate(model, Prescribed("0.3*sin(t)"), 20.0)
 
 
@@ -77,10 +93,11 @@ CASES: dict[str, Callable[[], Trace]] = {
     "one row": lambda: simulate(stick_slip("signed"), Prescribed("0"), 1.0, t_eval=[0.5]),
     "lugre": lambda: simulate(
         LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4, stribeck=Stribeck(1, 1.5, 1e-3)),
-        Slider(1.0, [(0, 0), (2, 0.5)]), 3.0,
+        Slider(1.0, [(0, 0), (2, 0.5)]),
+        3.0,
     ),
     "own chart": _own_chart,
-}  # fmt: skip
+}
 _made: dict[str, Trace] = {}
 
 
@@ -146,9 +163,12 @@ def test_a_loaded_trace_can_be_sampled_and_run_again(
     equal(loaded.sample(times), trace.sample(times))
     settings_ = dict(trace.settings)
     again = simulate(
-        loaded.model, loaded.rig, settings_["t_end"],  # type: ignore[arg-type]
-        rtol=settings_["rtol"], engine=settings_["engine"],  # type: ignore[arg-type]
-    )  # fmt: skip
+        loaded.model,
+        loaded.rig,
+        settings_["t_end"],  # type: ignore[arg-type]
+        rtol=settings_["rtol"],
+        engine=settings_["engine"],  # type: ignore[arg-type]
+    )
     equal(again, trace)
 
 
@@ -221,9 +241,24 @@ def test_to_pandas_has_one_column_a_quantity_and_element() -> None:
     trace = made("own chart")
     frame = trace.to_pandas()
     assert list(frame.columns) == [
-        "t", "microstep", "x", "v", "F", "z1", "z2", "w1", "w2", "state1", "state2", "s1", "s2",
-        "F1", "F2", "dz1", "dz2",
-    ]  # fmt: skip
+        "t",
+        "microstep",
+        "x",
+        "v",
+        "F",
+        "z1",
+        "z2",
+        "w1",
+        "w2",
+        "state1",
+        "state2",
+        "s1",
+        "s2",
+        "F1",
+        "F2",
+        "dz1",
+        "dz2",
+    ]
     assert len(frame) == len(trace)
     assert frame["w2"].tolist() == trace.variable("w")[:, 1].tolist()
     assert frame["state2"].tolist() == trace.states[:, 1].tolist()
@@ -451,9 +486,7 @@ HOSTILE = {
     "the log has two axes": _set("transitions", value=lambda a: a[:, None]),
     "the log's times are text": _set(
         "transitions",
-        value=lambda a: a.astype(
-            [(n, "U9" if n == "t" else a.dtype[n]) for n in a.dtype.names]
-        ),
+        value=lambda a: a.astype([(n, "U9" if n == "t" else a.dtype[n]) for n in a.dtype.names]),
     ),
     "the log has an element too many": _set(
         "transitions", value=lambda a: np.array([(0.0, 99, *list(r)[2:]) for r in a], a.dtype)
@@ -479,30 +512,48 @@ HOSTILE = {
     "an unknown rig": _set("header", "rig", "title", value="a cart"),
     "a rig without its mass": _set("header", "rig", "title", value="slider pushed by a force"),
     "a rig without its numbers": _set(
-        "header", "rig", "title", value="slider pulled through a spring"),
-    "a rig with other numbers": _set("header", "rig", value={
-        "title": "slider pulled through a spring", "acceleration": "1",
-        "numbers": {"mass": 1, "gravity": 9.81}, "signals": {}}),
+        "header", "rig", "title", value="slider pulled through a spring"
+    ),
+    "a rig with other numbers": _set(
+        "header",
+        "rig",
+        value={
+            "title": "slider pulled through a spring",
+            "acceleration": "1",
+            "numbers": {"mass": 1, "gravity": 9.81},
+            "signals": {},
+        },
+    ),
     "a signal that is missing": _set("header", "rig", "signals", value={}),
     "a signal of no kind": _set("header", "rig", "signals", "v", value={"kind": "magic"}),
     "a signal that cannot be read": _set(
-        "header", "rig", "signals", "v", value={"kind": "formula", "text": "t +"}),
+        "header", "rig", "signals", "v", value={"kind": "formula", "text": "t +"}
+    ),
     "a signal that runs backward": _set(
-        "header", "rig", "signals", "v",
-        value={"kind": "corners", "times": [1, 0], "values": [0, 0], "held": True}),
+        "header",
+        "rig",
+        "signals",
+        "v",
+        value={"kind": "corners", "times": [1, 0], "values": [0, 0], "held": True},
+    ),
     "a flow that runs code": _set(
-        "header", "model", "chart", "states", 0, "flow", "z", value="__import__('os').getpid()"),
+        "header", "model", "chart", "states", 0, "flow", "z", value="__import__('os').getpid()"
+    ),
     "a guard that runs code": _set(
-        "header", "model", "chart", "transitions", 0, "guard", value="exec('1') > 0"),
+        "header", "model", "chart", "transitions", 0, "guard", value="exec('1') > 0"
+    ),
     "a state name that runs code": _set(
-        "header", "model", "chart", "states", 0, "name", value="x = 1\nimport os"),
+        "header", "model", "chart", "states", 0, "name", value="x = 1\nimport os"
+    ),
     "a parameter that is no name": _set(
-        "header", "model", "chart", "parameters", value=["k", "sigma", "C", "v_c = 1; import os"]),
+        "header", "model", "chart", "parameters", value=["k", "sigma", "C", "v_c = 1; import os"]
+    ),
     "states that are none": _set("header", "model", "chart", "states", value=[]),
     "an edge to nowhere": _set(
-        "header", "model", "chart", "transitions", 0, "target", value="nowhere"),
+        "header", "model", "chart", "transitions", 0, "target", value="nowhere"
+    ),
     "an input no model supplies": _set("header", "model", "chart", "inputs", value=["v", "s", "u"]),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", HOSTILE)
@@ -605,7 +656,7 @@ HOSTILE_CSV: dict[str, Callable[[], dict[str, bytes]]] = {
     "no text": lambda: {**_bytes_of(".csv"), "run.csv": b"# {\xff\xfe\x00}"},
     "a log that is no text": lambda: {**_bytes_of(".csv"), LOG: b"\xff\xfe\x00"},
     "a hostile flow": lambda: _replace(0, '"z": "v"', '"z": "__import__(\'os\').getpid()"'),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", HOSTILE_CSV)

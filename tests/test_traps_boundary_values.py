@@ -55,11 +55,24 @@ def test_plain_maxwell_slip_is_the_play_operator():
     """F_s = F_c, signed, many elements: z_i is the clipped play of x, as in Maxwell's model."""
     weights = np.array([0.3, 0.1, 0.55, 0.2])
     parameters = GMSParameters(
-        [1.0] * 4, [0.0] * 4, [50.0] * 4, sigma_2=0.0, stribeck=Stribeck(1.0, 1.0, 1e-3), v_c=V_C,
+        [1.0] * 4,
+        [0.0] * 4,
+        [50.0] * 4,
+        sigma_2=0.0,
+        stribeck=Stribeck(1.0, 1.0, 1e-3),
+        v_c=V_C,
         weights=weights,
-    )  # fmt: skip
-    ramps = [(0, 0.4), (2, 0.4), (2.001, -0.4), (3.5, -0.4), (3.501, 0.4), (4, 0.4), (4.001, -0.4),
-             (7, -0.4)]  # fmt: skip
+    )
+    ramps = [
+        (0, 0.4),
+        (2, 0.4),
+        (2.001, -0.4),
+        (3.5, -0.4),
+        (3.501, 0.4),
+        (4, 0.4),
+        (4.001, -0.4),
+        (7, -0.4),
+    ]
     times = np.linspace(0, 7, 14001)
     trace = simulate(
         GMS(parameters, law="signed"), Prescribed(ramps), 7.0, t_eval=times, rtol=1e-8, atol=1e-11
@@ -76,8 +89,10 @@ def test_a_dwell_at_zero_ends_an_arrested_element():
     ramps = [(0, 0.5), (3, 0.5), (4, 0), (6, 0), (7, 0.5), (9, 0.5)]
     trace = simulate(one_element("signed"), Prescribed(ramps), 9.0, rtol=1e-9, atol=1e-12)
     assert [e for _, e in event_sequence(trace)] == [
-        "break_away_forward", "arrest", "break_away_forward"
-    ]  # fmt: skip
+        "break_away_forward",
+        "arrest",
+        "break_away_forward",
+    ]
     assert trace.transitions.t[1] == pytest.approx(4 - 2 * V_C, abs=1e-9)
     dwell = (trace.t >= 4) & (trace.t <= 6)
     assert np.ptp(trace.z[dwell, 0]) == 0.0
@@ -91,9 +106,13 @@ def test_a_dwell_while_an_element_slips_signed():
     """z > s at v = 0: sgn(0) = 0 lets z sink by exp(-C t / s) until |z| < s, then it arrests."""
     C, z0 = 0.5, 2.5
     trace = simulate(
-        one_element("signed", C=C), Prescribed(DWELL), 6.0, rtol=1e-10, atol=1e-13,
+        one_element("signed", C=C),
+        Prescribed(DWELL),
+        6.0,
+        rtol=1e-10,
+        atol=1e-13,
         initial={"z": [z0], "states": ["slip"]},
-    )  # fmt: skip
+    )
     assert event_sequence(trace) == [(0, "arrest")]
     record = trace.transitions[0]
     i = int(np.flatnonzero(trace.t >= 1.0)[0])
@@ -108,9 +127,11 @@ def test_a_dwell_while_an_element_slips_signed():
 def test_a_dwell_while_an_element_slips_published():
     """Published: with sgn(0) = 0 the deflection stands still at v = 0 and cannot arrest."""
     trace = simulate(
-        one_element("published", C=0.5), Prescribed(DWELL), 6.0,
+        one_element("published", C=0.5),
+        Prescribed(DWELL),
+        6.0,
         initial={"z": [2.5], "states": ["slip"]},
-    )  # fmt: skip
+    )
     assert len(trace.transitions) == 0
     dwell = trace.t >= 1.0
     assert dwell.sum() > 1

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, State, Stribeck, simulate
-from gms_fsm.program import lower
+from gms_fsm.lowering.program import lower
 from tests.helpers import open_loop, pulled_mass, stick_slip
 
 CUBE = Chart(

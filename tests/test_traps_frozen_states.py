@@ -10,8 +10,8 @@ import pytest
 
 import integrators
 from gms_fsm import Prescribed, simulate
-from gms_fsm.machines import IfElse
-from gms_fsm.program import lower
+from gms_fsm.lowering.program import lower
+from gms_fsm.run.machines import IfElse
 from tests.helpers import one_element, open_loop, pulled_mass, stick_slip
 
 C, v = 1.0, -0.5  # published law: after the break-away z = s + (z0 - s) exp(C t / s), s = 1
@@ -39,9 +39,12 @@ def test_stages_that_switch_cost_the_order():
     for steps in (7, 11, 17):
         h = 3.0 / steps
         ours = simulate(
-            one_element("published", F_s=1.0 + 1e-15, C=C, v_s=1e-3), Prescribed(v), 3.0,
-            method="rk4", step=h,
-        ).z[-1, 0]  # fmt: skip
+            one_element("published", F_s=1.0 + 1e-15, C=C, v_s=1e-3),
+            Prescribed(v),
+            3.0,
+            method="rk4",
+            step=h,
+        ).z[-1, 0]
         assert abs(ours - EXACT) < 0.04 * h**4
         assert abs(naive_rk4(h, 3.0) - EXACT) > 3 * abs(ours - EXACT)
         assert abs(naive_rk4(h, 3.0) - EXACT) > 1e-3
@@ -60,16 +63,29 @@ def test_the_flow_sees_one_mode_a_step(case, method):
         program.ieee["flow"](t, y, mode, held, p, dy)
 
     system = integrators.System(
-        flow=flow, flow_live=program.ieee["flow_live"], arm=program.ieee["arm"],
-        margins=program.ieee["margins"], normal=program.ieee["normal"], p=program.p,
-        held=program.held, strict=program.strict, relations=program.relations,
+        flow=flow,
+        flow_live=program.ieee["flow_live"],
+        arm=program.ieee["arm"],
+        margins=program.ieee["margins"],
+        normal=program.ieee["normal"],
+        p=program.p,
+        held=program.held,
+        strict=program.strict,
+        relations=program.relations,
         surfaces=program.surfaces,
-    )  # fmt: skip
+    )
     switch = IfElse(program)
     options = integrators.Options(
-        integrators.METHODS[method], 0.0501 if method == "rk4" else None, 1e-6,
-        [1e-9] * program.size, math.inf, 1.0, 100_000, True, None,
-    )  # fmt: skip
+        integrators.METHODS[method],
+        0.0501 if method == "rk4" else None,
+        1e-6,
+        [1e-9] * program.size,
+        math.inf,
+        1.0,
+        100_000,
+        True,
+        None,
+    )
     arcs = firings = 0
     y = [0.0] * program.size
     for happening in integrators.run(system, switch, 0.0, y, [0] * 4, 21.0, options):

@@ -40,9 +40,11 @@ def test_every_half_wave_has_its_arrest(law, T, method):
     """n half waves: an arrest at each reversal, a break-away in each half wave."""
     A = 4.0 / T  # the same stroke of 4/pi m in every wave
     trace = simulate(
-        one_element(law, F_c=F_c, F_s=F_s, v_s=v_s, C=1e-3 / T), Prescribed(f"{A}*sin(2*pi*t/{T})"),
-        (WAVES + 0.45) * T, method=method,
-    )  # fmt: skip
+        one_element(law, F_c=F_c, F_s=F_s, v_s=v_s, C=1e-3 / T),
+        Prescribed(f"{A}*sin(2*pi*t/{T})"),
+        (WAVES + 0.45) * T,
+        method=method,
+    )
     log = trace.transitions
     arrests = log.t[log.edge == "arrest"]
     np.testing.assert_allclose(arrests, T / 2 * np.arange(1, 2 * WAVES + 1), rtol=0, atol=1e-4 * T)

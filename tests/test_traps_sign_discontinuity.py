@@ -34,9 +34,12 @@ def naive_rk4(h):
 
 def ours(**options):
     trace = simulate(
-        one_element("signed", F_c=1.0, F_s=1.0, C=C, v_s=1e-3), Prescribed("0.4*cos(pi*t/2)"), T,
-        initial={"z": [z0], "states": ["slip"]}, **options,
-    )  # fmt: skip
+        one_element("signed", F_c=1.0, F_s=1.0, C=C, v_s=1e-3),
+        Prescribed("0.4*cos(pi*t/2)"),
+        T,
+        initial={"z": [z0], "states": ["slip"]},
+        **options,
+    )
     assert len(trace.transitions) == 0
     return trace
 

@@ -15,9 +15,12 @@ from tests.helpers import one_element
 def test_settling_on_the_threshold_makes_no_stop(law, start):
     """Constant v, C T / s = 200: z reaches s to the last bit; no stop, and few steps."""
     trace = simulate(
-        one_element(law, C=1.0), Prescribed(0.4), 200.0, t_eval=[200.0],
+        one_element(law, C=1.0),
+        Prescribed(0.4),
+        200.0,
+        t_eval=[200.0],
         initial={"z": [start], "states": ["slip"]},
-    )  # fmt: skip
+    )
     assert trace.z[-1, 0] == pytest.approx(1.0, abs=1e-6)
     assert len(trace.stops) == 2  # the start and the end
     rows = simulate(

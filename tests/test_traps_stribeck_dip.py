@@ -105,8 +105,9 @@ def test_the_old_step_jumps_it():
         return [C * (1 - z[0] / (F_c + (F_s - F_c) * math.exp(-((v / v_s) ** 2))))]
 
     exact = z_at_arrest(*case)
-    old = solve_ivp(slip, (t_dip, T / 2 + 1), [F_c], first_step=1.0, rtol=1e-6, atol=1e-9,
-                    dense_output=True)  # fmt: skip
+    old = solve_ivp(
+        slip, (t_dip, T / 2 + 1), [F_c], first_step=1.0, rtol=1e-6, atol=1e-9, dense_output=True
+    )
     small = solve_ivp(slip, (t_dip, T / 2), [F_c], first_step=1e-3, rtol=1e-6, atol=1e-9)
     assert abs(old.sol(T / 2)[0] - exact) > 1e-3
     assert abs(small.y[0, -1] - exact) < 2e-5
@@ -117,9 +118,14 @@ def test_the_error_norm_is_a_maximum():
     F_c, F_s, v_s, C, A, T = CASES["Table I, element 1"]
     n = 50
     parameters = GMSParameters(
-        np.ones(n), np.zeros(n), np.full(n, C), sigma_2=0.0, stribeck=Stribeck(F_c, F_s, v_s),
-        v_c=1e-6, weights=np.append(np.full(n - 1, 100.0), 1.0),
-    )  # fmt: skip
+        np.ones(n),
+        np.zeros(n),
+        np.full(n, C),
+        sigma_2=0.0,
+        stribeck=Stribeck(F_c, F_s, v_s),
+        v_c=1e-6,
+        weights=np.append(np.full(n - 1, 100.0), 1.0),
+    )
     trace = simulate(GMS(parameters, law="signed"), Prescribed(f"{A}*sin(2*pi*t/{T})"), 11.0)
     assert event_sequence(trace) == [(n - 1, "break_away_forward"), (n - 1, "arrest")]
     assert abs(trace.transitions.z[1] - z_at_arrest(F_c, F_s, v_s, C, A, T)) < 2e-5

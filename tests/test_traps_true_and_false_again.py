@@ -104,9 +104,7 @@ def test_a_window_between_two_steep_relations():
 
 
 @settings(max_examples=200, deadline=None, derandomize=True)
-@given(
-    st.floats(0.02, 0.9), st.floats(0.01, 0.5), st.floats(0.05, 1.0), st.floats(0.1, 10.0)
-)  # fmt: skip
+@given(st.floats(0.02, 0.9), st.floats(0.01, 0.5), st.floats(0.05, 1.0), st.floats(0.1, 10.0))
 def test_random_windows_and_lines(a, width, late, steepness):
     """Any parabola and any line: the earlier of the two, exactly."""
     b = a + width

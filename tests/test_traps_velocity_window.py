@@ -74,9 +74,12 @@ def test_a_composed_margin_has_no_sign_to_see():
         run = solve_ivp(slip, (5.0, 13.0), [0.4], events=arrest, rtol=rtol, atol=1e-12)
         assert len(run.t_events[0]) == 0
     ours = simulate(
-        first_element(), Prescribed(SINE), 13.0, t_start=5.0,
+        first_element(),
+        Prescribed(SINE),
+        13.0,
+        t_start=5.0,
         initial={"z": [0.4], "states": ["slip"]},
-    )  # fmt: skip
+    )
     assert event_sequence(ours) == [(0, "arrest")]
 
 
@@ -108,13 +111,18 @@ def test_a_root_is_not_yet_true():
     for period in range(3, 43):
         root = brentq(
             lambda t, T=period: 0.2 * math.sin(2 * math.pi * t / T) - v_c,
-            0.3 * period, 0.6 * period, xtol=1e-15,
-        )  # fmt: skip
+            0.3 * period,
+            0.6 * period,
+            xtol=1e-15,
+        )
         false += not abs(0.2 * math.sin(2 * math.pi * root / period)) <= v_c
         ours = simulate(
-            first_element(), Prescribed(f"0.2*sin(2*pi*t/{period})"), 0.6 * period,
-            t_start=0.3 * period, initial={"z": [0.4], "states": ["slip"]},
-        )  # fmt: skip
+            first_element(),
+            Prescribed(f"0.2*sin(2*pi*t/{period})"),
+            0.6 * period,
+            t_start=0.3 * period,
+            initial={"z": [0.4], "states": ["slip"]},
+        )
         assert event_sequence(ours) == [(0, "arrest")]
         assert guard_holds(ours.transitions[0], v_c)
     assert false > 5

@@ -10,14 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gms_fsm.app.records import Column, Record, read_record
+from gms_fsm.app.scenario import load_scenario
 from gms_fsm.errors import RecordError
-from gms_fsm.records import Column, Record, read_record
-from gms_fsm.scenario import load_scenario
 from tests.scenario_files import OPEN_LOOP
 
-COLUMNS = {
-    "time": Column("t", "s"), "position": Column("x", "mm"), "force": Column("F", "N"),
-}  # fmt: skip
+COLUMNS = {"time": Column("t", "s"), "position": Column("x", "mm"), "force": Column("F", "N")}
 ROWS = [f"{0.01 * i:.2f},{0.5 * i:.1f},{i % 7}" for i in range(20)]  # rows 2 to 21 of the file
 
 

@@ -24,7 +24,7 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.errors import ChartError, ExpressionError, GMSError, ParameterError, SessionError
-from gms_fsm.sweep import sweep
+from gms_fsm.run.sweep import sweep
 from plots import block_diagram
 from tests.helpers import stick_slip
 
@@ -35,9 +35,14 @@ STICK = State("stick", flow={"z": "v"})
 
 def _chart(**other: Any) -> Chart:
     parts: dict[str, Any] = {
-        "name": "mine", "inputs": ("v",), "variables": ("z",), "parameters": ("k",),
-        "states": (STICK,), "transitions": (), "outputs": {"F": "k * z"},
-    }  # fmt: skip
+        "name": "mine",
+        "inputs": ("v",),
+        "variables": ("z",),
+        "parameters": ("k",),
+        "states": (STICK,),
+        "transitions": (),
+        "outputs": {"F": "k * z"},
+    }
     return Chart(**{**parts, **other})
 
 

@@ -56,7 +56,8 @@ from gms_fsm import (
     Trace,
     simulate,
 )
-from gms_fsm.errors import GMSError, SimulationError
+from gms_fsm.errors import GMSError
+from gms_fsm.traces.failures import SimulationError
 
 JUDGED = ("pulled", "forced", "sines", "literature")
 FAMILIES = (*JUDGED, "undamped")
@@ -156,8 +157,9 @@ def trial(family: str, seed: int, index: int) -> Trial:
     return Trial(family, seed, index, model, rig, t_end)
 
 
-def _bank(k: Any, sigma: Any, C: Any, sigma_2: float, curve: Stribeck, v_c: float, weights: Any
-          ) -> GMSParameters:  # fmt: skip
+def _bank(
+    k: Any, sigma: Any, C: Any, sigma_2: float, curve: Stribeck, v_c: float, weights: Any
+) -> GMSParameters:
     return GMSParameters(k, sigma, C, sigma_2=sigma_2, stribeck=curve, v_c=v_c, weights=weights)
 
 
@@ -218,9 +220,17 @@ def pulled(draw: Draw, law: Any) -> tuple[GMS, PulledSlider, float]:
     sigma = 2 * np.sqrt(k * mass) * draw.decades(-2, -0.3, k.size)
     C = weights * F_c * omega * draw.decades(-0.7, 1.5, k.size)
     model = GMS(
-        _bank(k, sigma, C, mass * omega * draw.decades(-2, 0), curve,
-              speed * draw.decades(-6, -3), weights), law=law,
-    )  # fmt: skip
+        _bank(
+            k,
+            sigma,
+            C,
+            mass * omega * draw.decades(-2, 0),
+            curve,
+            speed * draw.decades(-6, -3),
+            weights,
+        ),
+        law=law,
+    )
     return model, *_pulled(PulledSlider(mass, stiffness, speed), model)
 
 
@@ -246,9 +256,17 @@ def forced(draw: Draw, law: Any) -> tuple[GMS, Slider, float]:
     sigma = 2 * np.sqrt(k * mass) * draw.decades(-2, -0.3, k.size)
     C = weights * F_c * omega * draw.decades(-0.5, 2, k.size)
     model = GMS(
-        _bank(k, sigma, C, mass * omega * draw.decades(-2, 0), curve,
-              speed * draw.decades(-7, -3.5), weights), law=law,
-    )  # fmt: skip
+        _bank(
+            k,
+            sigma,
+            C,
+            mass * omega * draw.decades(-2, 0),
+            curve,
+            speed * draw.decades(-7, -3.5),
+            weights,
+        ),
+        law=law,
+    )
     return model, Slider(mass, force), min(end, WORK / _fastest(model, mass))
 
 
@@ -261,9 +279,17 @@ def sines(draw: Draw, law: Any) -> tuple[GMS, Prescribed, float]:
     sigma = draw.decades(-2, 0, k.size) * k / omega
     C = weights * F_c * omega * draw.decades(-0.5, 2, k.size)
     model = GMS(
-        _bank(k, sigma, C, F_c / speed * draw.decades(-2, 0), curve,
-              speed * draw.decades(-7, -3.5), weights), law=law,
-    )  # fmt: skip
+        _bank(
+            k,
+            sigma,
+            C,
+            F_c / speed * draw.decades(-2, 0),
+            curve,
+            speed * draw.decades(-7, -3.5),
+            weights,
+        ),
+        law=law,
+    )
     return model, Prescribed(velocity), end
 
 
@@ -281,9 +307,10 @@ def literature(draw: Draw, law: Any) -> tuple[GMS, PulledSlider | Slider, float]
     curve = _curve(draw, F_c, draw.decades(-4, -2), most=-0.3)
     # Slow attraction as published (m/s), or a rate of the threshold.
     C = (
-        draw.decades(-5.3, -2.5, k.size) if draw.chance(0.5)
+        draw.decades(-5.3, -2.5, k.size)
+        if draw.chance(0.5)
         else weights * F_c * draw.decades(0.5, 3, k.size)
-    )  # fmt: skip
+    )
     model = GMS(
         _bank(k, sigma, C, draw.decades(0, 2.5), curve, draw.decades(-7, -5), weights), law=law
     )
@@ -323,9 +350,14 @@ def run(trial: Trial, engine: str = "compiled", **options: float) -> Outcome:
     trace: Trace | None = None
     try:
         trace = simulate(
-            trial.model, trial.rig, trial.t_end, engine=engine, output="end", progress=patience,
+            trial.model,
+            trial.rig,
+            trial.t_end,
+            engine=engine,
+            output="end",
+            progress=patience,
             **options,
-        )  # fmt: skip
+        )
     except SimulationError as error:
         trace, failed = error.trace, type(error).__name__
     except (GMSError, TooLong) as error:
@@ -521,8 +553,9 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--index", type=int, help="this one run, in full")
     parser.add_argument("--engine", default="compiled")
-    parser.add_argument("--witness", action="store_true",
-                        help="check the reference instead, by tests.witness")  # fmt: skip
+    parser.add_argument(
+        "--witness", action="store_true", help="check the reference instead, by tests.witness"
+    )
     given = parser.parse_args()
     families = given.family or FAMILIES
     if given.index is not None:

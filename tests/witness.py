@@ -19,7 +19,7 @@ from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
 from gms_fsm import GMS, Prescribed, PulledSlider, Slider
-from gms_fsm.signals import Corners, Formula
+from gms_fsm.systems.signals import Corners, Formula
 
 RTOL = 1e-12
 LOOKS = 6  # at the bits, inside a step
@@ -96,11 +96,15 @@ def witness(model: GMS, rig: Prescribed | Slider | PulledSlider, t_end: float) -
         over, under = bits[5 : 5 + n] >= 0, bits[5 + n :] <= 0
         fast, back = bits[0] > 0, bits[1] < 0
         edges = [
-            ("arrest" if not (fast or back or over[i] or under[i]) else "") if slip[i]
-            else "break_away_forward" if over[i] and fast
-            else "break_away_backward" if under[i] and back else ""
+            ("arrest" if not (fast or back or over[i] or under[i]) else "")
+            if slip[i]
+            else "break_away_forward"
+            if over[i] and fast
+            else "break_away_backward"
+            if under[i] and back
+            else ""
             for i in range(n)
-        ]  # fmt: skip
+        ]
         for i in np.flatnonzero(edges):
             said.transitions.append((t, int(i), edges[i]))
             slip[i] = not slip[i]
@@ -121,8 +125,13 @@ def witness(model: GMS, rig: Prescribed | Slider | PulledSlider, t_end: float) -
         sign, turned = float(bits[2]), NOTHING
         solver = DOP853(
             lambda t, y, sign=sign, held=slides: slope(t, y, holding(t, y) if held else sign),
-            t, y, stop, rtol=RTOL, atol=1e-11 * size, max_step=min(t_end / 200, stop - t),
-        )  # fmt: skip
+            t,
+            y,
+            stop,
+            rtol=RTOL,
+            atol=1e-11 * size,
+            max_step=min(t_end / 200, stop - t),
+        )
         while solver.status == "running" and turned == NOTHING:
             assert solver.step() is None, f"DOP853 gives up at t = {solver.t}"
             path, before = solver.dense_output(), solver.t_old

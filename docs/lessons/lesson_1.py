@@ -11,7 +11,7 @@ from ipywidgets import FloatSlider, interact
 from matplotlib.figure import Figure
 
 from gms_fsm import GMS, Prescribed, simulate
-from gms_fsm.lessons.l1_hysteresis import FINE, PARAMETERS, strokes
+from gms_fsm.app.lessons.l1_hysteresis import FINE, PARAMETERS, strokes
 
 
 def inner_loop(b):

@@ -11,8 +11,8 @@ from ipywidgets import FloatSlider, interact
 from matplotlib.figure import Figure
 
 from gms_fsm import GMS, Slider, simulate
-from gms_fsm.lessons.l2_drift import END, TABLE_I, cycle_means
-from gms_fsm.paper import lugre_like
+from gms_fsm.app.lessons.l2_drift import END, TABLE_I, cycle_means
+from gms_fsm.app.paper import lugre_like
 
 
 def shaken(amplitude):

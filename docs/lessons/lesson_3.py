@@ -10,7 +10,7 @@
 from ipywidgets import FloatSlider, interact
 from matplotlib.figure import Figure
 
-from gms_fsm.lessons.l3_missed_window import REVERSALS, ROWS, once_a_step, samples_in_window
+from gms_fsm.app.lessons.l3_missed_window import REVERSALS, ROWS, once_a_step, samples_in_window
 
 
 def with_step(ms):
@@ -29,9 +29,14 @@ def with_step(ms):
 
 
 ms = FloatSlider(
-    1.003, min=0.5, max=2, step=0.001, readout_format=".3f", description="step [ms]",
+    1.003,
+    min=0.5,
+    max=2,
+    step=0.001,
+    readout_format=".3f",
+    description="step [ms]",
     continuous_update=False,
-)  # fmt: skip
+)
 _ = interact(with_step, ms=ms)
 
 # %% [markdown]

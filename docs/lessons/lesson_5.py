@@ -10,7 +10,7 @@ from ipywidgets import IntSlider, interact
 from matplotlib.figure import Figure
 
 from gms_fsm import Prescribed, simulate
-from gms_fsm.lessons.l5_how_many import ATOL, RTOL, SPEED, STROKE, bank, parabola
+from gms_fsm.app.lessons.l5_how_many import ATOL, RTOL, SPEED, STROKE, bank, parabola
 
 
 def chain(n):

@@ -10,7 +10,7 @@ from ipywidgets import FloatSlider, interact
 from matplotlib.figure import Figure
 
 from gms_fsm import PulledSlider, simulate
-from gms_fsm.lessons.l6_stick_slip import MASS, STIFFNESS, bank
+from gms_fsm.app.lessons.l6_stick_slip import MASS, STIFFNESS, bank
 
 
 def pulled(V):

@@ -12,7 +12,7 @@ from ipywidgets import FloatLogSlider, interact
 from matplotlib.figure import Figure
 
 from gms_fsm import Prescribed, simulate
-from gms_fsm.lessons.l7_frictional_lag import (
+from gms_fsm.app.lessons.l7_frictional_lag import (
     ATOL,
     MEAN,
     MODEL,

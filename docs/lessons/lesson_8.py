@@ -6,7 +6,7 @@
 # This is what was compared: the program made from the chart, as the if-else engine runs it.
 
 # %%
-from gms_fsm.program import lower
+from gms_fsm.lowering.program import lower
 
 source = lower(result.ifelse.model, result.ifelse.rig).source
 print(source[source.index("def switch") :].split("\n\n\n")[0])

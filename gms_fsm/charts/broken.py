@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from gms_fsm.chart import Chart, Transition
+from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.charts.gms import gms_element
 
 __all__ = ["BROKEN", "Broken"]

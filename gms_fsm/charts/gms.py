@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
-from gms_fsm.chart import Chart, State, Transition
+from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ParameterError
 
 __all__ = ["GMS_ELEMENT", "LAWS", "SLIP_LAWS", "Law", "gms_element"]

@@ -8,7 +8,7 @@ Friction", IEEE Trans. Automatic Control 40 (1995).
 
 from __future__ import annotations
 
-from gms_fsm.chart import Chart, State
+from gms_fsm.charts.chart import Chart, State
 
 __all__ = ["LUGRE"]
 

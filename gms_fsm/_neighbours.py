@@ -1,0 +1,34 @@
+"""`integrators` and `plots` stand beside `gms_fsm`; a user's file may have one of these names."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+
+__all__ = ["check_neighbours"]
+
+
+def check_neighbours() -> None:
+    """Refuse to start where another file or folder stands before one of our packages.
+
+    Raises
+    ------
+    ImportError
+        In one sentence: which file hides which package, and what to do.
+    """
+    home = Path(__file__).resolve().parents[1]
+    for name in ("integrators", "plots"):
+        spec = find_spec(name)
+        if spec is None:
+            continue
+        # A folder without __init__.py has no origin.
+        place = next(filter(None, [spec.origin, *(spec.submodule_search_locations or [])]), "")
+        resolved = Path(place).resolve()
+        if place and home / name not in (resolved, *resolved.parents):
+            raise ImportError(
+                f"{place} hides the package {name!r} that gms-fsm brings; rename that file or "
+                "folder, or run Python from another folder"
+            )
+
+
+check_neighbours()

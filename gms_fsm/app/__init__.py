@@ -1,0 +1,1 @@
+"""The outer skin: command line, scenario files, records, reports, the debugger, lessons."""

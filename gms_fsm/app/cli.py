@@ -1,0 +1,522 @@
+"""The command line: one verb an experiment. A user's mistake is one message and exit code 2."""
+
+from __future__ import annotations
+
+import contextlib
+import enum
+import json
+import sys
+import textwrap
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from typer.core import TyperGroup
+
+import gms_fsm
+from gms_fsm._files import no_input, output_folder, written_whole
+from gms_fsm.app import paper
+from gms_fsm.app.live import LiveView
+from gms_fsm.app.report import monitor_lines, run_scenario, velocity_note
+from gms_fsm.app.scenario import Scenario, load_scenario
+from gms_fsm.charts import LUGRE, gms_element
+from gms_fsm.charts.broken import BROKEN
+from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.parameters import GMSParameters
+from gms_fsm.errors import GMSError, ParameterError
+from gms_fsm.inspection.notes import notes_on
+from gms_fsm.inspection.prove import Report, prove
+from gms_fsm.lowering._generated import standalone
+from gms_fsm.lowering.program import lower
+from gms_fsm.systems.models import GMS, Model
+from gms_fsm.systems.rigs import Prescribed, PulledSlider, Rig, Slider
+from gms_fsm.traces.trace import Trace, files_of
+
+__all__ = ["app", "main"]
+
+INTERRUPTED = 130  # the exit code of what Ctrl-C has ended, by custom
+
+
+@dataclass
+class Wishes:
+    """What the options before the verb ask for."""
+
+    debug: bool = False
+
+
+class _Verbs(TyperGroup):
+    """The verbs; ``--debug`` may stand before or behind one."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        options = args[: args.index("--")] if "--" in args else args
+        if "--debug" in options:
+            args = ["--debug", *(a for a in options if a != "--debug"), *args[len(options) :]]
+        return super().parse_args(ctx, args)
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:  # pydantic's words, as newer versions of typer pass on
+            error.message = error.message.removeprefix("Value error, ")
+            raise
+
+
+app = typer.Typer(
+    name="gms-fsm",
+    cls=_Verbs,
+    help="Friction as an explicit state machine: the Generalized Maxwell Slip model.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+)
+
+
+class LawName(enum.StrEnum):
+    """Slip laws."""
+
+    published = "published"
+    signed = "signed"
+
+
+class RigName(enum.StrEnum):
+    """What the friction is mounted on."""
+
+    prescribed = "prescribed"
+    slider = "slider"
+    pulled = "pulled"
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"gms-fsm {gms_fsm.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def root(
+    context: typer.Context,
+    _asked: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+    debug: Annotated[
+        bool, typer.Option("--debug", help="Answer a mistake with the traceback and its causes.")
+    ] = False,
+) -> None:
+    """Friction as an explicit state machine: the Generalized Maxwell Slip model."""
+    context.ensure_object(Wishes).debug = debug
+
+
+@contextlib.contextmanager
+def _progress(*columns: Any, console: Console) -> Iterator[Progress]:
+    """Give progress bars that whoever has something to show starts: none before an error."""
+    bars = Progress(*columns or Progress.get_default_columns(), console=console)
+    try:
+        yield bars
+    finally:
+        if bars.live.is_started:
+            bars.stop()
+
+
+@app.command("paper")
+def paper_command(
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Folder for everything that is written.")
+    ] = Path("paper"),
+    force: Annotated[
+        str, typer.Option(help="Applied force of Fig. 3 (N), an expression of t (s).")
+    ] = paper.FORCE,
+    velocity: Annotated[
+        str, typer.Option(help="Velocity of Fig. 4 (m/s), an expression of t (s).")
+    ] = paper.VELOCITY,
+) -> None:
+    """Run the paper's two experiments; write figures, traces, logs and claims.md."""
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description:<22}"), BarColumn(), TimeElapsedColumn())
+    with _progress(*columns, console=console) as bars:
+        tasks: dict[str, TaskID] = {}
+
+        def show(name: str, done: float) -> None:
+            if name not in tasks:
+                bars.start()
+                tasks[name] = bars.add_task(name, total=1.0)
+            bars.update(tasks[name], completed=done)
+
+        files = paper.write(output, force, velocity, show)
+    typer.echo(f"{len(files)} files in {output}; start with {files[0]}")
+
+
+@app.command("run")
+def run_command(
+    scenario: Annotated[
+        Path,
+        typer.Argument(
+            help="A scenario file, such as scenarios/pulled_mass.toml.", show_default=False
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Folder for what is written; out/<name> if left out."),
+    ] = None,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Change a key, for example --set model.law=published."),
+    ] = None,
+    live: Annotated[
+        bool, typer.Option("--live", help="Show every element's state while it runs.")
+    ] = False,
+    checkpoint: Annotated[
+        bool,
+        typer.Option(
+            "--checkpoint",
+            help="Keep the state in the folder once a minute; the same command goes on from it.",
+        ),
+    ] = False,
+) -> None:
+    """Run a scenario; write trace, transition log, overview figure and summary."""
+    loaded = load_scenario(scenario, overrides or [])
+    folder = Path("out") / scenario.stem if output is None else output
+    start, end = loaded.arguments["t_start"], loaded.arguments["t_end"]
+    try:
+        with LiveView(Console(stderr=True), start, end, detail=live) as view:
+            trace, files = run_scenario(loaded, folder, view, checkpoint=checkpoint)
+    except KeyboardInterrupt as error:
+        _plain_warning(str(error) or "interrupted")
+        raise typer.Exit(INTERRUPTED) from None
+    if loaded.motion is not None and (note := velocity_note(trace, loaded.motion)):
+        _plain_warning(note)
+    typer.echo(f"{len(trace.transitions)} transitions; {len(files)} files in {folder}")
+    for line in monitor_lines(trace):
+        typer.echo(line)
+    for note in notes_on(trace):
+        typer.echo(f"note: {note}")
+    typer.echo(f"start with {files[0]}")
+
+
+@app.command("schema")
+def schema_command() -> None:
+    """Print the JSON schema of scenario files, for editors."""
+    typer.echo(json.dumps(Scenario.model_json_schema(), indent=2))
+
+
+class ChartName(enum.StrEnum):
+    """Charts that ship."""
+
+    gms = "gms"
+    lugre = "lugre"
+
+
+class Notation(enum.StrEnum):
+    """How guards are written."""
+
+    stateflow = "stateflow"
+    math = "math"
+
+
+class Direction(enum.StrEnum):
+    """Where a chart grows."""
+
+    TB = "TB"
+    LR = "LR"
+
+
+class Theme(enum.StrEnum):
+    """Colours of a chart."""
+
+    light = "light"
+    dark = "dark"
+
+
+@app.command("chart")
+def chart_command(
+    name: Annotated[ChartName, typer.Argument(help="Which chart.", show_default=False)],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "--output", "-o", help="Ends in .svg, .png, .pdf, .dot, .gv or .mmd (Mermaid)."
+        ),
+    ] = Path("chart.svg"),
+    law: Annotated[LawName | None, typer.Option(help="Slip law of the GMS chart.")] = None,
+    elements: Annotated[int, typer.Option(help="How many elements, as parallel states.")] = 1,
+    notation: Annotated[Notation, typer.Option(help="Spelling.")] = Notation.stateflow,
+    direction: Annotated[Direction, typer.Option(help="Layout.")] = Direction.TB,
+    theme: Annotated[Theme, typer.Option(help="Colours.")] = Theme.light,
+    names: Annotated[bool, typer.Option("--names", help="Write the edges' names too.")] = False,
+) -> None:
+    """Draw a state chart."""
+    import plots
+
+    if name == ChartName.gms and law is None:
+        raise ParameterError("chart gms needs --law signed or --law published; they differ")
+    chart = LUGRE if law is None else gms_element(law.value)
+    graph = plots.statechart(
+        chart,
+        elements,
+        notation=notation.value,
+        direction=direction.value,
+        theme=theme.value,
+        names=names,
+    )
+    typer.echo(str(plots.render(graph, output)))
+
+
+@app.command("check")
+def check_command(
+    name: Annotated[
+        str, typer.Argument(help="gms, lugre, or a broken reading; see --list.", show_default=False)
+    ] = "",
+    law: Annotated[LawName | None, typer.Option(help="Slip law of the GMS chart.")] = None,
+    domain: Annotated[
+        list[str] | None,
+        typer.Option(help="Assume this instead, for example 's >= 0'; may be given again."),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Folder for the report and the charts, marked."),
+    ] = None,
+    names: Annotated[bool, typer.Option("--list", help="Say what can be checked.")] = False,
+) -> None:
+    """Prove a chart free of contradictions, or refute it by an example; then exit with 1.
+
+    What the order of the edges settles is said, and is no refutation.
+    """
+    if names:
+        typer.echo("gms --law signed, gms --law published, lugre, and as demonstrations:")
+        for broken, what in BROKEN.items():
+            typer.echo(textwrap.fill(f"broken:{broken}  {what.wrong}", 78, subsequent_indent="  "))
+        return
+    chart, usual = _to_check(name, law)
+    folder = None if output is None else output_folder(output)
+    report = prove(chart, domain or usual)
+    typer.echo(str(report))
+    for path in [] if folder is None else _write_report(report, folder):
+        typer.echo(str(path))
+    if report.refuted:
+        raise typer.Exit(1)
+
+
+def _to_check(name: str, law: LawName | None) -> tuple[Chart, tuple[str, ...] | None]:
+    """Return a chart and its domain, None for the usual one."""
+    charts = {"lugre": LUGRE, **{f"broken:{key}": found.chart for key, found in BROKEN.items()}}
+    if name == "gms":
+        if law is None:
+            raise ParameterError("check gms needs --law signed or --law published; they differ")
+        return gms_element(law.value), None
+    if name not in charts:
+        said = f"name is {name!r}; it" if name else "a name is missing; it"
+        raise ParameterError(
+            f"{said} must be one of gms, {', '.join(charts)} (a chart of your own is checked in "
+            "Python: prove(chart))"
+        )
+    if law is not None:
+        raise ParameterError(f"check {name} takes no --law; only gms does")
+    found = BROKEN.get(name.removeprefix("broken:"))
+    return charts[name], None if found is None else found.domain
+
+
+def _write_report(report: Report, folder: Path) -> list[Path]:
+    """Write a report, and a chart with the place marked for what is refuted or settled by order."""
+    import plots
+
+    text = f"{report}\n".encode()
+    found = [*report.refuted, *report.settled]
+    stems = [f"{number}-{finding.check}" for number, finding in enumerate(found, start=1)]
+    endings = ("svg", "png", "dot")
+    output_folder(
+        folder, ["report.txt", *(f"{stem}.{ending}" for stem in stems for ending in endings)]
+    )
+    written = [written_whole(folder / "report.txt", lambda file: file.write(text))]
+    edges = report.chart.guards
+    for stem, finding in zip(stems, found, strict=True):
+        marked = [part for part in finding.where if part in edges] or finding.where
+        settled = finding.status if finding in report.settled else ""
+        what = ", ".join(part for part in (finding.check, finding.case, settled) if part)
+        note = textwrap.wrap(f"{what}: {finding.text}", 50)
+        note += textwrap.wrap(finding.example, 50)
+        graph = plots.statechart(report.chart, marked=marked, note="\n".join(note))
+        for ending in ("svg", "png"):
+            written.append(plots.render(graph, folder / f"{stem}.{ending}"))
+    return list(dict.fromkeys(written))
+
+
+@app.command("blocks")
+def blocks_command(
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Ends in .svg, .png, .pdf, .dot or .gv.")
+    ] = Path("blocks.svg"),
+    elements: Annotated[int, typer.Option(help="How many elements.")] = 4,
+) -> None:
+    """Draw the block diagram of the whole model (the paper's Fig. 2a)."""
+    import plots
+
+    typer.echo(str(plots.render(plots.block_diagram(elements), output)))
+
+
+@app.command("plot")
+def plot_command(
+    trace: Annotated[Path, typer.Argument(help="A trace, .npz or .csv.", show_default=False)],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder.")] = Path("figures"),
+    start: Annotated[float | None, typer.Option(help="From t (s).")] = None,
+    end: Annotated[float | None, typer.Option(help="To t (s).")] = None,
+) -> None:
+    """Draw a run: overview, and the story of its break-aways."""
+    from plots import figures
+
+    run = Trace.load(trace)
+    names, endings = ("overview", "ribbons"), ("png", "svg")
+    folder = output_folder(output, [f"{name}.{ending}" for name in names for ending in endings])
+    window = None
+    if start is not None or end is not None:
+        window = (
+            float(run.t[0]) if start is None else start,
+            float(run.t[-1]) if end is None else end,
+        )
+    pictures = (figures.overview(run, window=window), figures.ribbons_figure(run, window=window))
+    for name, figure in zip(names, pictures, strict=True):
+        for ending in endings:
+            typer.echo(str(figures.save(figure, folder / f"{name}.{ending}")))
+
+
+@app.command("animate")
+def animate_command(
+    trace: Annotated[Path, typer.Argument(help="A trace, .npz or .csv.", show_default=False)],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Ends in .gif.")] = Path(
+        "film.gif"
+    ),
+    frames: Annotated[int, typer.Option(help="How many pictures.")] = 200,
+    start: Annotated[float | None, typer.Option(help="From t (s).")] = None,
+    end: Annotated[float | None, typer.Option(help="To t (s).")] = None,
+) -> None:
+    """Make a film of the chart at work, beside the force."""
+    from plots.animation import animate
+
+    no_input(output, *files_of(trace))
+    run = Trace.load(trace)
+    with _progress(console=Console(stderr=True)) as bar:
+        task = bar.add_task("frames", total=frames)
+
+        def show(done: int, _: int) -> None:
+            bar.start()
+            bar.update(task, completed=done)
+
+        film = animate(run, output, frames=frames, t_start=start, t_end=end, progress=show)
+    typer.echo(str(film))
+
+
+@app.command("replay")
+def replay_command(
+    trace: Annotated[Path, typer.Argument(help="A trace, .npz or .csv.", show_default=False)],
+    other: Annotated[Path | None, typer.Argument(help="A second one, shown beside it.")] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="The page, .html.")] = Path(
+        "replay.html"
+    ),
+    title: Annotated[str, typer.Option(help="Of the page.")] = "",
+) -> None:
+    """Write a run as one web page that is stepped, scrubbed and explained."""
+    from plots.replay import write_replay
+
+    no_input(output, *files_of(trace), *([] if other is None else files_of(other)))
+    second = None if other is None else Trace.load(other)
+    names = [] if other is None else [trace.stem, other.stem]
+    page = write_replay(output, Trace.load(trace), second, title=title, names=names)
+    typer.echo(str(page))
+
+
+@app.command("debug")
+def debug_command(
+    scenario: Annotated[
+        Path,
+        typer.Argument(
+            help="A scenario file, such as scenarios/pulled_mass.toml.", show_default=False
+        ),
+    ],
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Change a key, for example --set model.law=published."),
+    ] = None,
+) -> None:
+    """Step through a scenario at the terminal: break, why, back, poke, compare."""
+    from gms_fsm.app.debugger import run_debugger, scenario_to_debug
+
+    raise typer.Exit(run_debugger(scenario_to_debug(scenario, overrides or [])))
+
+
+@app.command("lesson")
+def lesson_command(
+    number: Annotated[
+        str, typer.Argument(help="Which one; left out, all are listed.", show_default=False)
+    ] = "",
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder.")] = Path("lessons"),
+) -> None:
+    """Run a lesson: a picture, a replay page, and five lines with the measured figures."""
+    from gms_fsm.app.lessons import listed, numbered, teach
+
+    if not number:
+        typer.echo(listed())
+        return
+    chosen = numbered(number)
+    with Console(stderr=True).status(f"running lesson {chosen}"):
+        taught = teach(chosen, output)
+    for line in taught.lines:
+        typer.echo(line)
+    typer.echo()
+    for path in taught.files:
+        typer.echo(str(path))
+
+
+@app.command("code")
+def code_command(
+    law: Annotated[LawName, typer.Option(help="Slip law; there is no default, they differ.")],
+    rig: Annotated[RigName, typer.Option(help="What the friction is mounted on.")] = (
+        RigName.prescribed
+    ),
+) -> None:
+    """Print the if-else program made from the GMS chart (the paper's Fig. 2c); it runs alone."""
+    rigs: dict[RigName, Rig] = {
+        RigName.prescribed: Prescribed(paper.VELOCITY),
+        RigName.slider: Slider(1.0, paper.FORCE),
+        RigName.pulled: PulledSlider(1.0, 2.0, 0.1),
+    }
+    model: Model = GMS(GMSParameters.paper("stick-slip"), law=law.value)
+    typer.echo(standalone(lower(model, rigs[rig]).source), nl=False)
+
+
+def main() -> None:
+    """Run the command line; print a user's mistake as one message and exit with code 2."""
+    warnings.showwarning = _plain_warning
+    wishes = Wishes()
+    try:
+        app(obj=wishes)
+    except GMSError as error:
+        if wishes.debug:
+            _with_causes(error)
+            raise
+        Console(stderr=True, soft_wrap=True).print(
+            f"[bold red]error:[/] {_escaped(str(error))}", highlight=False, emoji=False
+        )
+        sys.exit(2)
+
+
+def _with_causes(error: BaseException | None) -> None:
+    """Have a traceback show what an error was made from; to a user that says nothing."""
+    while error is not None:
+        error.__suppress_context__ = False
+        error = error.__context__
+
+
+def _escaped(text: str) -> str:
+    """Return a text as it is, neither markup nor a terminal's control codes."""
+    from rich.markup import escape
+
+    printable = (c if c.isprintable() or c in "\n\t" else ascii(c)[1:-1] for c in text)
+    return escape("".join(printable))
+
+
+def _plain_warning(message: Warning | str, *_: object, **__: object) -> None:
+    Console(stderr=True, soft_wrap=True).print(
+        f"[bold yellow]note:[/] {_escaped(str(message))}", highlight=False, emoji=False
+    )

@@ -1,0 +1,216 @@
+"""Eight lessons: what the GMS model does, and what goes wrong when it is simulated carelessly.
+
+Each lesson is a plain module with one question: ``run()`` makes the runs, measures, and returns a
+result; ``figure(result)`` draws one picture of it; ``result.lines()`` says it in five lines, every
+figure in them measured by this very run.
+
+>>> for number, lesson in LESSONS.items():
+...     print(number, lesson.QUESTION)
+1 What is pre-sliding hysteresis?
+2 Why does LuGre drift, and GMS not?
+3 What happens when a stepper misses v_c?
+4 What hangs on the sign of s(v) for v < 0?
+5 How many elements are enough?
+6 Why does a pulled mass stick and slip?
+7 Why does friction lag behind the speed?
+8 Does it matter whether a chart decides or an if-else text?
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from gms_fsm._files import output_folder, written_whole
+from gms_fsm.app.lessons import (
+    l1_hysteresis,
+    l2_drift,
+    l3_missed_window,
+    l4_sign_of_s,
+    l5_how_many,
+    l6_stick_slip,
+    l7_frictional_lag,
+    l8_chart_or_ifelse,
+)
+from gms_fsm.errors import MissingExtraError, ParameterError, shown
+from gms_fsm.traces.trace import Trace
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["LESSONS", "Lesson", "Result", "Taught", "lesson", "listed", "numbered", "teach"]
+
+
+class Result(Protocol):
+    """What a lesson's ``run()`` returns."""
+
+    @property
+    def replayed(self) -> dict[str, Trace]:
+        """One or two runs by their names, for the replay page."""
+
+    def lines(self) -> tuple[str, ...]:
+        """Question, what was run, two lines of measured figures, what follows."""
+
+
+class Lesson(Protocol):
+    """What a module must have to be a lesson."""
+
+    TITLE: str
+    QUESTION: str
+
+    def run(self) -> Result:
+        """Make the runs and measure."""
+
+    def figure(self, result: Any) -> Figure:
+        """Draw one picture of the result."""
+
+
+LESSONS: Mapping[int, Lesson] = {
+    1: l1_hysteresis,
+    2: l2_drift,
+    3: l3_missed_window,
+    4: l4_sign_of_s,
+    5: l5_how_many,
+    6: l6_stick_slip,
+    7: l7_frictional_lag,
+    8: l8_chart_or_ifelse,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Taught:
+    """A lesson that was run.
+
+    Parameters
+    ----------
+    lines : tuple of str
+        Its five lines.
+    files : tuple of Path
+        What was written, the text first.
+    """
+
+    lines: tuple[str, ...]
+    files: tuple[Path, ...]
+
+
+def lesson(number: int) -> Lesson:
+    """Return a lesson.
+
+    Parameters
+    ----------
+    number : int
+        1 to 8.
+
+    Returns
+    -------
+    Lesson
+        Its module.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such lesson.
+
+    Examples
+    --------
+    >>> lesson(7).TITLE
+    'Frictional lag'
+    """
+    return LESSONS[numbered(str(number))]
+
+
+def numbered(text: str) -> int:
+    """Return the number of a lesson that was asked for by a text.
+
+    Parameters
+    ----------
+    text : str
+        For example ``"7"``.
+
+    Returns
+    -------
+    int
+        A key of `LESSONS`.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such lesson; all are listed.
+    """
+    for number in LESSONS:
+        if text == str(number):
+            return number
+    raise ParameterError(f"there is no lesson {shown(text)}; these are there:\n{listed()}")
+
+
+def listed() -> str:
+    """Return the lessons, a line each.
+
+    Returns
+    -------
+    str
+        Number, title and question.
+    """
+    return "\n".join(f"{key}  {each.TITLE}: {each.QUESTION}" for key, each in LESSONS.items())
+
+
+def teach(number: int, folder: str | Path) -> Taught:
+    """Run a lesson and write its text, its picture and its replay page.
+
+    Parameters
+    ----------
+    number : int
+        1 to 8.
+    folder : str or Path
+        Made where missing, before anything is run. ``lesson_N.txt``, ``.png``, ``.svg`` and
+        ``.html`` go there.
+
+    Returns
+    -------
+    Taught
+        The lines and the files.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such lesson.
+    OutputError
+        If the folder cannot be written.
+
+    Warns
+    -----
+    UserWarning
+        If a picture or the page is left out because an extra is not installed.
+    """
+    chosen = lesson(number)
+    folder = output_folder(
+        folder, [f"lesson_{number}.{ending}" for ending in ("txt", "png", "svg", "html")]
+    )
+    result = chosen.run()
+    text = ("\n".join(result.lines()) + "\n").encode()
+    files = [written_whole(folder / f"lesson_{number}.txt", lambda file: file.write(text))]
+    for what, write in (("picture", _draw), ("replay page", _replay)):
+        try:
+            files += write(number, result, folder)
+        except MissingExtraError as error:
+            warnings.warn(f"no {what} was written: {error}", stacklevel=2)
+    return Taught(result.lines(), tuple(files))
+
+
+def _draw(number: int, result: Result, folder: Path) -> list[Path]:
+    from plots import figures
+
+    figure = LESSONS[number].figure(result)
+    return [figures.save(figure, folder / f"lesson_{number}.{ending}") for ending in ("png", "svg")]
+
+
+def _replay(number: int, result: Result, folder: Path) -> list[Path]:
+    from plots.replay import write_replay
+
+    runs = result.replayed
+    title = f"Lesson {number}: {LESSONS[number].QUESTION}"
+    page = folder / f"lesson_{number}.html"
+    return [write_replay(page, *runs.values(), title=title, names=list(runs))]

@@ -1,0 +1,274 @@
+"""Lesson 4: what hangs on the sign of s(v) for v < 0.
+
+Eq. (1) of the paper, ``dz = sgn(v) C (1 - z/s)``, and the signed law of Al-Bender, Lampaert and
+Swevers, ``dz = C (sgn(v) - z/s)``, are one law for v > 0. For v < 0 the signed law pulls z to -s;
+the published one pushes it away from +s, at which its eigenvalue is +C/s. An element that slips
+backward then stretches its spring further than the slider moves: the spring is charged with energy
+that nobody put in.
+
+An energy balance shows it without any taste in laws. Of the work of the motion, a part is stored
+in the springs; the rest is heat, and heat can only grow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm import GMS, GMSParameters, Prescribed, Trace, simulate
+from gms_fsm.app.paper import FIG4_END, VELOCITY
+from gms_fsm.charts.gms import Law
+from gms_fsm.charts.parameters import FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["QUESTION", "TITLE", "Energy", "Result", "energy", "figure", "run"]
+
+TITLE = "The sign of s(v)"
+QUESTION = "What hangs on the sign of s(v) for v < 0?"
+
+PARAMETERS = GMSParameters.paper("stick-slip")
+POINTS = 20_000  # of the integrals over time
+
+
+@dataclass(frozen=True, eq=False)
+class Energy:
+    """Where the work of the motion goes.
+
+    Parameters
+    ----------
+    t : ndarray, shape (m,), s
+        When.
+    v : ndarray, shape (m,), m/s
+        How fast it moves then.
+    work, stored : ndarray, shape (m,), J
+        The integral of F v; the sum of k z**2 / 2.
+    """
+
+    t: FloatArray
+    v: FloatArray
+    work: FloatArray
+    stored: FloatArray
+
+    @property
+    def heat(self) -> FloatArray:
+        """Work less stored, shape (m,), J."""
+        return self.work - self.stored
+
+    @property
+    def lost_heat(self) -> FloatArray:
+        """How much heat vanishes from each time to the next, shape (m - 1,), J, >= 0."""
+        return np.maximum(-np.diff(self.heat), 0.0)
+
+    @property
+    def outside_dip(self) -> NDArray[np.bool_]:
+        """Whether s(v) is flat between each time and the next, shape (m - 1,)."""
+        outside = np.abs(self.v) > PARAMETERS.stribeck.dip
+        return outside[1:] & outside[:-1]
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What was run and measured.
+
+    Parameters
+    ----------
+    published, signed : Trace
+        Fig. 4 under both laws.
+    published_energy, signed_energy : Energy
+        Their balances.
+    vanished : ndarray, shape (2,), J
+        All the heat that vanishes, published and signed.
+    outside_dip : ndarray, shape (2,), J
+        How much of it vanishes where s(v) is flat.
+    """
+
+    published: Trace
+    signed: Trace
+    published_energy: Energy
+    signed_energy: Energy
+    vanished: FloatArray
+    outside_dip: FloatArray
+
+    @property
+    def replayed(self) -> dict[str, Trace]:
+        """The runs of the replay page, by their names."""
+        return {"published law": self.published, "signed law": self.signed}
+
+    def lines(self) -> tuple[str, ...]:
+        """Return the lesson in five lines.
+
+        Returns
+        -------
+        tuple of str
+            Question, what was run, two lines of measured figures, what follows.
+        """
+        lowest = ", ".join(f"{z:.2f}" for z in self.published.z.min(axis=0))
+        t, z = self.published.t, self.published.z[:, 0]
+        cycles = ", ".join(f"{z[(t >= a) & (t <= a + 25)].min():.2f}" for a in (0, 25, 50, 75))
+        published, signed = self.published_energy, self.signed_energy
+        return (
+            f"Question: {QUESTION}",
+            f"Run: GMS, Table I (stick-slip), v = {VELOCITY} m/s (chosen by us), {FIG4_END:g} s, "
+            "under the published law (eq. (1) as printed) and under the signed law.",
+            f"Measured: published, the z_i go down to {lowest} m (z_1 to {cycles} m in the four "
+            f"cycles); signed, |z_i| is {np.abs(self.signed.z).max():.4f} m at most, both ways "
+            f"(s is {PARAMETERS.stribeck.F_c:g} m when it slides, weights 1 m/N).",
+            f"Measured: of {published.work[-1]:.2f} J of work the published springs hold "
+            f"{published.stored[-1]:.2f} J at the end; on the way {self.vanished[0]:.1f} J of heat "
+            f"turn back into spring energy. Signed: {signed.stored[-1]:.2f} J of "
+            f"{signed.work[-1]:.2f} J, and {1e3 * self.vanished[1]:.1f} mJ of heat vanish, "
+            f"{1e3 * self.outside_dip[1]:.1g} mJ of them outside the Stribeck dip.",
+            "So: with s(v) unsigned for v < 0 the model makes energy out of nothing. Use "
+            'law="signed"; it makes a little too, where s(v) rises at a reversal and z follows '
+            "while the slider hardly moves.",
+        )
+
+
+def run() -> Result:
+    """Run Fig. 4 under both laws and draw up their energy balances.
+
+    Returns
+    -------
+    Result
+        Traces and measured figures.
+
+    Examples
+    --------
+    >>> result = run()
+    >>> bool(result.vanished[0] > 1.0), bool(result.vanished[1] < 0.02)
+    (True, True)
+    """
+
+    def under(law: Law) -> Trace:
+        return simulate(GMS(PARAMETERS, law=law), Prescribed(VELOCITY), FIG4_END)
+
+    published, signed = under("published"), under("signed")
+    balances = (energy(published), energy(signed))
+    return Result(
+        published=published,
+        signed=signed,
+        published_energy=balances[0],
+        signed_energy=balances[1],
+        vanished=np.array([each.lost_heat.sum() for each in balances]),
+        outside_dip=np.array([each.lost_heat[each.outside_dip].sum() for each in balances]),
+    )
+
+
+def energy(trace: Trace) -> Energy:
+    """Draw up the energy balance of a run.
+
+    Parameters
+    ----------
+    trace : Trace
+        Of a GMS model.
+
+    Returns
+    -------
+    Energy
+        Over the run.
+    """
+    fine = trace.refined(POINTS)  # both sides of every jump of F are rows
+    power = fine.F * fine.v
+    steps = 0.5 * (power[1:] + power[:-1]) * np.diff(fine.t)
+    work = np.concatenate([[0.0], np.cumsum(steps)])
+    stored = (0.5 * PARAMETERS.k * fine.z**2).sum(axis=1)
+    return Energy(fine.t, fine.v, work, stored)
+
+
+def figure(result: Result) -> Figure:
+    """Draw deflections, energies and states under both laws.
+
+    Parameters
+    ----------
+    result : Result
+        From `run`.
+
+    Returns
+    -------
+    Figure
+        Two columns of three panels.
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    from plots import panels
+    from plots.style import LINE_GREY, RC, TEXT_GREY
+
+    columns = (
+        ("published law, eq. (1) as printed", result.published, result.published_energy),
+        ("signed law (Al-Bender et al. 2005)", result.signed, result.signed_energy),
+    )
+    with rc_context(RC):
+        sheet = Figure(figsize=(8.2, 7.6), layout="constrained")
+        axes = sheet.subplots(3, 2, sharex=True, sharey="row", height_ratios=(1.3, 1.5, 0.9))
+        for column, (_, trace, balance) in zip(axes.T, columns, strict=True):
+            panels.deflections(column[0], trace)
+            for sign in (1, -1):
+                column[0].axhline(
+                    sign * PARAMETERS.stribeck.F_c, color=LINE_GREY, linewidth=0.7, zorder=0
+                )
+            _balance(column[1], balance)
+            panels.ribbons(column[2], trace)
+            for ax in column[:2]:
+                ax.set_xlabel("")
+        for ax in axes[:, 1]:
+            ax.set_ylabel("")
+        axes[0, 0].set_title("a) " + columns[0][0])
+        axes[0, 1].set_title("b) " + columns[1][0])
+        axes[1, 0].set_title("c) energy (hatched: heat turns back)")
+        axes[1, 1].set_title(
+            f"d) energy ({1e3 * result.vanished[1]:.1f} mJ turn back: too little to see)"
+        )
+        axes[0, 1].annotate(
+            "all four $z_i$ together\ngrey: ± s(v) away from reversals",
+            (0.97, 0.04),
+            xycoords="axes fraction",
+            ha="right",
+            color=TEXT_GREY,
+        )
+        handles, labels = axes[0, 0].get_legend_handles_labels()
+        axes[0, 0].legend(
+            handles,
+            labels,
+            loc="lower left",
+            ncols=4,
+            handlelength=1.8,
+            columnspacing=1.0,
+            borderaxespad=0.0,
+        )
+        axes[1, 1].legend(loc="upper left")
+        sheet.suptitle(f"Lesson 4: {QUESTION}", x=0.01, ha="left", fontsize=12)
+    return sheet
+
+
+def _balance(ax: Axes, balance: Energy) -> None:
+    from plots.style import BLUE, INK, VERMILION, VERMILION_TINT
+
+    for values, colour, dash, name in (
+        (balance.work, INK, "-", "work of the motion"),
+        (balance.stored, BLUE, "--", "stored in the springs"),
+        (balance.heat, VERMILION, "-", "heat: work less stored"),
+    ):
+        ax.plot(balance.t, values, color=colour, linestyle=dash, linewidth=1.5, label=name)
+    # Where more than 0.05 W turn back.
+    falls = np.append(balance.lost_heat > 0.05 * np.diff(balance.t), False)
+    ax.fill_between(
+        balance.t,
+        0,
+        1,
+        where=falls,
+        transform=ax.get_xaxis_transform(),
+        facecolor=VERMILION_TINT,
+        edgecolor=VERMILION,
+        linewidth=0.0,
+        hatch="////",
+        alpha=0.6,
+        zorder=0,
+    )
+    ax.set_ylabel("energy [J]")

@@ -1,0 +1,297 @@
+"""Lesson 6: why a pulled mass sticks and slips.
+
+A mass is pulled through a soft spring whose end moves at V. It waits until the spring pulls with
+F_s; as it begins to slide, friction falls along the Stribeck curve, from F_s to F_c, and the
+surplus throws it forward until the spring is slack enough for it to stop. Then it waits again.
+
+So a cycle has two parts of different kinds. The wait is the time in which the spring is stretched
+once more by the same amount: a length divided by V. The slip is the swing of a mass on a spring
+and hardly asks for V. At a high speed the mass no longer comes to rest, and slides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gms_fsm import GMS, GMSParameters, PulledSlider, Stribeck, Trace, simulate
+from gms_fsm.charts.parameters import FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["QUESTION", "TITLE", "Cycle", "Result", "bank", "figure", "last_cycle", "run"]
+
+TITLE = "Stick-slip"
+QUESTION = "Why does a pulled mass stick and slip?"
+
+MASS, STIFFNESS = 1.0, 2.0  # kg, N/m
+SPEED, END = 0.1, 60.0  # m/s, s: of the portrait
+SPEEDS = (0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2)  # m/s
+TOO_FAST = 0.25  # m/s
+F_c, F_s, V_S = 1.0, 1.5, 0.05  # N, N, m/s
+SIGMA_2 = 0.4  # Ns/m
+K = np.array([40.0, 30.0, 20.0, 10.0])  # N/m
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """The last whole cycle of a run.
+
+    Parameters
+    ----------
+    slip, wait : float
+        From the moment all elements slip to the first arrest, and from there to the next slip, s.
+    pull_at_slip, pull_at_stop : float
+        Force of the spring at both ends of the wait, N.
+    """
+
+    slip: float
+    wait: float
+    pull_at_slip: float
+    pull_at_stop: float
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What was run and measured.
+
+    Parameters
+    ----------
+    portrait : Trace
+        The run at `SPEED`.
+    cycles : tuple of Cycle
+        At each of `SPEEDS`.
+    rests : dict of str to int
+        How often an element arrests in runs in which the mass does not stick and slip.
+    """
+
+    portrait: Trace
+    cycles: tuple[Cycle, ...]
+    rests: dict[str, int]
+
+    @property
+    def replayed(self) -> dict[str, Trace]:
+        """The runs of the replay page, by their names."""
+        return {f"pulled at {SPEED:g} m/s": self.portrait}
+
+    @property
+    def waits(self) -> FloatArray:
+        """Waits at each of `SPEEDS`, s."""
+        return np.array([cycle.wait for cycle in self.cycles])
+
+    @property
+    def slips(self) -> FloatArray:
+        """Slips at each of `SPEEDS`, s."""
+        return np.array([cycle.slip for cycle in self.cycles])
+
+    def lines(self) -> tuple[str, ...]:
+        """Return the lesson in five lines.
+
+        Returns
+        -------
+        tuple of str
+            Question, what was run, two lines of measured figures, what follows.
+        """
+        log, v = self.portrait.transitions, self.portrait.v
+        here = self.cycles[SPEEDS.index(SPEED)]
+        slow, fast = self.waits[0] + self.slips[0], self.waits[-1] + self.slips[-1]
+        lengths = 1e3 * self.waits * np.array(SPEEDS)
+        never = ", ".join(f"{name} {count}" for name, count in self.rests.items())
+        return (
+            f"Question: {QUESTION}",
+            f"Run: {self.portrait.model.title}, {MASS:g} kg pulled from rest through {STIFFNESS:g} "
+            f"N/m at {SPEED:g} m/s, and at {SPEEDS[0]:g} to {TOO_FAST:g} m/s (F_s = {F_s:g}, F_c = "
+            f"{F_c:g} N, v_s = {V_S:g} m/s, all chosen by us).",
+            f"Measured at {SPEED:g} m/s: {len(log)} transitions in {END:g} s, "
+            f"{int((log.edge == 'arrest').sum())} of them arrests, v from {v.min():.3f} to "
+            f"{v.max():.2f} m/s; the spring pulls with {here.pull_at_slip:.2f} N when all slip and "
+            f"with {here.pull_at_stop:.2f} N when the first one stops; period "
+            f"{here.wait + here.slip:.2f} s.",
+            f"Measured: the period falls from {slow:.1f} s at {SPEEDS[0]:g} m/s to {fast:.1f} s at "
+            f"{SPEEDS[-1]:g} m/s: a wait of {lengths.min():.0f} to {lengths.max():.0f} mm / V and "
+            f"a slip of {self.slips.min():.1f} to {self.slips.max():.1f} s. Arrests elsewhere: "
+            f"{never}.",
+            "So: it takes a friction that falls with speed and a slow pull; the wait is a length "
+            f"divided by V. At {SPEEDS[-1]:g} m/s both are possible: from rest it sticks and "
+            "slips, set going it slides on.",
+        )
+
+
+def run() -> Result:
+    """Pull the mass at several speeds.
+
+    Returns
+    -------
+    Result
+        Traces and measured figures.
+    """
+    portrait = simulate(bank(), PulledSlider(MASS, STIFFNESS, SPEED), END)
+    cycles = tuple(
+        # Long enough for the first pull and three cycles.
+        last_cycle(simulate(bank(), PulledSlider(MASS, STIFFNESS, V), 2.0 / V + 20.0))
+        for V in SPEEDS
+    )
+    fastest = SPEEDS[-1]
+    s = float(bank().stribeck(fastest))
+    sliding = {
+        "x": -(s + SIGMA_2 * fastest) / STIFFNESS,
+        "v": fastest,
+        "z": s * bank().weights,
+        "states": ["slip"] * K.size,
+    }
+    others = {
+        f"at {TOO_FAST:g} m/s": simulate(bank(), PulledSlider(MASS, STIFFNESS, TOO_FAST), END),
+        f"at {SPEED:g} m/s with F_s = F_c": simulate(
+            bank(F_s=F_c), PulledSlider(MASS, STIFFNESS, SPEED), END
+        ),
+        f"at {fastest:g} m/s, set going": simulate(
+            bank(), PulledSlider(MASS, STIFFNESS, fastest), END, initial=sliding
+        ),
+    }
+    rests = {
+        name: int((trace.transitions.edge == "arrest").sum()) for name, trace in others.items()
+    }
+    return Result(portrait, cycles, rests)
+
+
+def bank(F_s: float = F_s) -> GMS:
+    """Return the friction: four elements, each with a quarter of it.
+
+    Parameters
+    ----------
+    F_s : float
+        Stiction, N.
+
+    Returns
+    -------
+    GMS
+        Under the signed law.
+
+    Examples
+    --------
+    >>> bank().title
+    'GMS, 4 elements, signed law'
+    """
+    parameters = GMSParameters(
+        K,
+        [0.4, 0.3, 0.2, 0.1],
+        [0.02] * 4,
+        sigma_2=SIGMA_2,
+        stribeck=Stribeck(F_c=F_c, F_s=F_s, v_s=V_S),
+        v_c=1e-6,
+        weights=1 / (4 * K),
+    )
+    return GMS(parameters, law="signed")
+
+
+def last_cycle(trace: Trace) -> Cycle:
+    """Measure the last whole cycle of a run that sticks and slips.
+
+    Parameters
+    ----------
+    trace : Trace
+        With at least two gross slips.
+
+    Returns
+    -------
+    Cycle
+        Its parts.
+    """
+    log = trace.transitions
+    slipping = np.cumsum(np.where(log.target == "slip", 1, -1))
+    starts = log.t[(slipping == trace.n) & (log.target == "slip")][-2:]
+    arrests = log.t[log.edge == "arrest"]
+    stop = arrests[np.searchsorted(arrests, starts[0])]
+    pulled = trace.sample([stop, starts[1]])
+    assert isinstance(trace.rig, PulledSlider)
+    pull = trace.rig.stiffness * (trace.rig.speed * pulled.t - pulled.x)
+    return Cycle(
+        slip=float(stop - starts[0]),
+        wait=float(starts[1] - stop),
+        pull_at_slip=float(pull[1]),
+        pull_at_stop=float(pull[0]),
+    )
+
+
+def figure(result: Result) -> Figure:
+    """Draw v and states over time, the portrait, and the parts of the period against speed.
+
+    Parameters
+    ----------
+    result : Result
+        From `run`.
+
+    Returns
+    -------
+    Figure
+        Panels a to d.
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    from plots import panels
+    from plots.style import BLUE, INK, LINE_GREY, RC, TEXT_GREY, TEXT_ORANGE, VERMILION
+
+    trace = result.portrait
+    window = (30.0, 60.0)
+    with rc_context(RC):
+        sheet = Figure(figsize=(8.2, 7.8), layout="constrained")
+        axes = sheet.subplot_mosaic([["a", "a"], ["b", "b"], ["c", "d"]], height_ratios=(1, 0.9, 2))
+        panels.velocity(axes["a"], trace, window=window)
+        axes["a"].set_title(f"a) velocity, pulled at {SPEED:g} m/s; {trace.model.title}")
+        axes["a"].set_xlabel("")
+        axes["a"].tick_params(labelbottom=False)
+        panels.ribbons(axes["b"], trace, window=window)
+        axes["b"].set_title("b) states")
+        loop = axes["c"]
+        panels.portrait(loop, trace, window=window)
+        v = np.linspace(0.0, 0.38, 400)
+        curve = trace.model.stribeck
+        assert curve is not None  # of a GMS bank
+        steady = curve(v) + SIGMA_2 * v
+        loop.plot(v, steady, color=LINE_GREY, linestyle="--", linewidth=1.2, zorder=1)
+        loop.set_title("c) friction against velocity")
+        loop.set_ylim(0.6, 1.55)
+        for text, place in (
+            ("thrown forward →", (0.13, 1.31)),
+            ("← slows down", (0.2, 1.03)),
+            ("waits, swinging\non its bristles", (0.045, 0.77)),
+            (r"dashed: steady, s(v) + $\sigma_2$ v", (0.12, 0.63)),
+        ):
+            loop.annotate(text, place, color=TEXT_GREY, fontsize=8)
+
+        V, parts = np.array(SPEEDS), axes["d"]
+        guide = np.geomspace(V[0], V[-1], 20)
+        length = float(np.median(result.waits * V))
+        parts.loglog(guide, length / guide, ":", color=LINE_GREY)
+        parts.annotate(
+            f"{length:.2f} m / V",
+            (0.03, length / 0.03),
+            (-4, -4),
+            textcoords="offset points",
+            ha="right",
+            va="top",
+            color=TEXT_GREY,
+            fontsize=8,
+        )
+        curves = (
+            ("period", result.waits + result.slips, "D-", INK, INK),
+            ("wait", result.waits, "o-", BLUE, BLUE),
+            ("slip", result.slips, "s--", VERMILION, TEXT_ORANGE),
+        )
+        for name, times, look, colour, ink in curves:
+            parts.loglog(V, times, look, color=colour, markersize=5)
+            parts.annotate(
+                name, (V[-1], times[-1]), (7, 0), textcoords="offset points", va="center", color=ink
+            )
+        ticks = {"x": (0.01, 0.02, 0.05, 0.1, 0.2), "y": (1, 2, 5, 10, 20, 50)}
+        parts.set_xticks(ticks["x"], [f"{tick:g}" for tick in ticks["x"]])
+        parts.set_yticks(ticks["y"], [f"{tick:g}" for tick in ticks["y"]])
+        parts.minorticks_off()
+        parts.set(xlabel="pulling speed V [m/s]", ylabel="time [s]", xlim=(0.009, 0.33))
+        parts.set_title("d) a cycle and its parts")
+        sheet.suptitle(f"Lesson 6: {QUESTION}", x=0.01, ha="left", fontsize=12)
+    return sheet

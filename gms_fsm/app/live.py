@@ -1,0 +1,120 @@
+"""Shows a running simulation in the terminal: the active state of every element."""
+
+from __future__ import annotations
+
+import math
+import time
+from types import TracebackType
+
+from rich.console import Console, Group
+from rich.live import Live
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+from rich.text import Text
+
+from gms_fsm.run.simulate import Moment
+
+__all__ = ["LiveView"]
+
+BETWEEN_FRAMES = 0.1  # s; drawing more often would cost more than the simulation
+BAR = 20  # characters of |z|/s = 1
+COLOURS = ("blue", "dark_orange3", "green", "magenta", "yellow")
+
+
+class LiveView:
+    """Shows states, |z|/s as bars, v and F while a simulation runs.
+
+    Use it as a context manager and hand it to ``simulate(progress=...)``.
+
+    Parameters
+    ----------
+    console : Console
+        Where to draw.
+    t_start, t_end : float
+        s, for the progress bar.
+    detail : bool
+        With False only the progress bar is shown.
+    """
+
+    def __init__(self, console: Console, t_start: float, t_end: float, detail: bool) -> None:
+        self.detail = detail
+        self.names: list[str] = []
+        self.next_frame = 0.0
+        self.latest: Moment | None = None
+        self.bar = Progress(
+            TextColumn("t = {task.fields[t]:.2f} s"),
+            BarColumn(),
+            TimeElapsedColumn(),
+            console=console,
+        )
+        self.t_start = t_start
+        self.task = self.bar.add_task("", total=t_end - t_start, t=t_start)
+        self.console = console
+        self.live = Live(self.bar, console=console, auto_refresh=False)
+
+    def __enter__(self) -> LiveView:
+        return self  # drawing begins with the first moment: no empty bar before an error
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self.console.is_terminal:
+            if self.latest is not None:
+                self.show(self.latest)  # the end is always drawn
+            self.live.stop()
+        elif self.detail and self.latest is not None:
+            self.console.print(self.table(self.latest))  # a log gets the end only
+
+    def __call__(self, moment: Moment) -> None:
+        """Draw, if it is time to."""
+        self.latest = moment
+        if not self.console.is_terminal:
+            return
+        now = time.monotonic()
+        if now < self.next_frame:
+            return
+        self.show(moment)
+        self.next_frame = time.monotonic() + BETWEEN_FRAMES
+
+    def show(self, moment: Moment) -> None:
+        """Draw now."""
+        self.bar.update(self.task, completed=moment.t - self.t_start, t=moment.t)
+        shown = Group(self.table(moment), self.bar) if self.detail else self.bar
+        self.live.start()
+        self.live.update(shown, refresh=True)
+
+    def table(self, moment: Moment) -> Table:
+        """Return one line an element.
+
+        Parameters
+        ----------
+        moment : Moment
+            The latest row.
+
+        Returns
+        -------
+        rich.table.Table
+            State, |z|/s and z of each element; v and F in the title.
+        """
+        values, states = moment.values, moment.states
+        title = f"t = {moment.t:10.4f} s   v = {values['v']:+.6f} m/s   F = {values['F']:+.5f} N"
+        table = Table("element", "state", "|z|/s", "", "z [m]", title=title, title_justify="left")
+        for i, (state, z, s) in enumerate(zip(states, values["z"], values["s"], strict=True)):
+            if state not in self.names:
+                self.names.append(state)
+            colour = COLOURS[self.names.index(state) % len(COLOURS)]
+            ratio = abs(z) / s
+            bare = math.isnan(ratio)  # without a curve there is no threshold
+            filled = 0 if bare else min(BAR, round(BAR * ratio))
+            # The state is a word as well as a colour, the bar a length as well as a number.
+            table.add_row(
+                f"E{i + 1}",
+                Text(state.upper() if self.names.index(state) else state, style=colour),
+                "" if bare else f"{ratio:.3f}",
+                Text("█" * filled + "░" * (BAR - filled), style=colour),
+                f"{z:+.4e}",
+            )
+        return table

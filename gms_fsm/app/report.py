@@ -1,0 +1,424 @@
+"""Runs a scenario and writes what a person wants to know of it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gms_fsm._files import no_input, output_folder, written_whole
+from gms_fsm.app.records import Motion, Record
+from gms_fsm.app.scenario import Loaded
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.errors import GMSError, MissingExtraError, ScenarioError
+from gms_fsm.inspection.notes import notes_on
+from gms_fsm.lowering.scales import Setting
+from gms_fsm.run.simulate import Moment, simulate
+from gms_fsm.systems.models import GMS
+from gms_fsm.traces.failures import SimulationError
+from gms_fsm.traces.trace import Trace, dwell_times
+
+__all__ = [
+    "Comparison",
+    "compare",
+    "dwell_times",
+    "monitor_lines",
+    "plain",
+    "run_scenario",
+    "summary_text",
+]
+
+
+ONE_SPEED = 2.0  # a plateau has its speeds within this factor; a sine spreads over 2.7
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A model's friction against the measured one.
+
+    Parameters
+    ----------
+    rows : int
+        How many rows count.
+    rmse : float
+        Root mean square of the difference, N.
+    r2 : float
+        Coefficient of determination: 1 - sum of squared differences / that about the mean; NaN
+        for a constant measurement.
+    """
+
+    rows: int
+    rmse: float
+    r2: float
+
+
+def compare(trace: Trace, record: Record) -> Comparison | None:
+    """Compare a run with its record on the rows that count.
+
+    Parameters
+    ----------
+    trace : Trace
+        A run over the record's motion.
+    record : Record
+        With a column ``force``.
+
+    Returns
+    -------
+    Comparison or None
+        None if the record has no force.
+    """
+    times, measured = measured_force(record)
+    if not times.size:
+        return None
+    inside = (times >= trace.t[0]) & (times <= trace.t[-1])
+    times, measured = times[inside], measured[inside]
+    same = times.size == len(trace) and bool((times == trace.t).all())
+    difference = measured - (trace.F if same else trace.sample(times).F)
+    spread = measured - measured.mean()
+    total = float(spread @ spread)
+    r2 = 1.0 - float(difference @ difference) / total if total > 0.0 else math.nan
+    return Comparison(times.size, float(np.sqrt(np.mean(difference**2))), r2)
+
+
+def measured_force(record: Record) -> tuple[FloatArray, FloatArray]:
+    """Return times [s] and forces [N] of the rows that count; empty without a force column."""
+    if "force" not in record.columns:
+        return np.empty(0), np.empty(0)
+    return record.columns["time"][record.chosen], record.columns["force"][record.chosen]
+
+
+def run_scenario(
+    loaded: Loaded,
+    folder: str | Path,
+    progress: Callable[[Moment], object] | None = None,
+    *,
+    checkpoint: bool = False,
+) -> tuple[Trace, list[Path]]:
+    """Run a scenario and write trace, log, figure and summary.
+
+    Parameters
+    ----------
+    loaded : Loaded
+        From `gms_fsm.app.scenario.load_scenario`.
+    folder : str or Path
+        Made where missing, before anything is run.
+    progress : callable, optional
+        Handed to `simulate`.
+    checkpoint : bool
+        Keep the state of the run in ``run.checkpoint``; a run interrupted there goes on from it.
+
+    Returns
+    -------
+    (Trace, list of Path)
+        The run, and the files, ``summary.md`` first.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be written, or one of the files is there and not ours, or is read
+        here.
+    SimulationError
+        If the run cannot go on; its part so far is written to ``partial.npz``.
+    KeyboardInterrupt
+        On Ctrl-C; the part so far is written to ``partial.npz``, and the text says so.
+    ScenarioError
+        If `simulate` refuses an argument.
+    """
+    output = loaded.scenario.output
+    names = ["summary.md", "trace.npz", "transitions.csv", "partial.npz"]
+    names += [f"overview.{ending}" for ending in output.figures]
+    names += ["trace.csv", "trace.transitions.csv"] if output.csv else []
+    folder = output_folder(folder, names)
+    for name in names:
+        no_input(folder / name, loaded.path, *([loaded.record.path] if loaded.record else []))
+    try:
+        trace = simulate(
+            loaded.model,
+            loaded.rig,
+            progress=progress,
+            checkpoint=folder / "run.checkpoint" if checkpoint else None,
+            **loaded.arguments,
+        )
+    except SimulationError as error:
+        kept = error.trace.save(folder / "partial.npz")
+        told = str(error).replace(" is kept in .trace", " is kept")
+        watched = [
+            line
+            for line, verdict in zip(
+                monitor_lines(error.trace), error.trace.monitors.values(), strict=True
+            )
+            if not getattr(verdict, "livelock", False)  # it is what has just been told
+        ]
+        error.args = ("\n".join([f"{loaded.path}: {told}; written to {kept}", *watched]),)
+        raise
+    except GMSError as error:
+        raise ScenarioError(f"{loaded.path}: {error}") from None
+    except KeyboardInterrupt as error:
+        part: Any = getattr(error, "trace", ())  # none before the run has begun
+        error.args = ("interrupted before the first row; nothing is written",)
+        if len(part):
+            kept = part.save(folder / "partial.npz")
+            error.args = (f"interrupted at t = {part.t[-1]:.6g} s; the run so far is in {kept}",)
+        raise
+    saved = trace.save(folder / "trace.npz")  # first of all: nothing after it can lose the run
+    try:
+        return trace, _reported(loaded, trace, folder, saved)
+    except KeyboardInterrupt as error:
+        error.args = (f"interrupted; the run is in {saved}",)
+        raise
+
+
+def _reported(loaded: Loaded, trace: Trace, folder: Path, saved: Path) -> list[Path]:
+    """Write what a person wants to know of a run; return all files."""
+    log = trace.transitions_csv().encode()
+    text = summary_text(loaded, trace).encode()
+    files = [
+        written_whole(folder / "summary.md", lambda file: file.write(text)),
+        saved,
+        written_whole(folder / "transitions.csv", lambda file: file.write(log)),
+    ]
+    if loaded.scenario.output.csv:
+        files.append(trace.save(folder / "trace.csv"))
+    try:
+        files += _draw(loaded, trace, folder)
+    except MissingExtraError as error:
+        warnings.warn(f"no figure was drawn: {error}", stacklevel=3)
+    return files
+
+
+def _draw(loaded: Loaded, trace: Trace, folder: Path) -> list[Path]:
+    if not loaded.scenario.output.figures:
+        return []
+    from plots import figures
+
+    measured = None
+    if loaded.record is not None and loaded.motion is not None and "force" in loaded.record.columns:
+        times, force = measured_force(loaded.record)
+        position = loaded.motion.position[loaded.record.chosen]
+        measured = figures.Measured(times, position, force)
+    figure = figures.overview(trace, measured, title=loaded.title)
+    return [
+        figures.save(figure, folder / f"overview.{ending}")
+        for ending in loaded.scenario.output.figures
+    ]
+
+
+# --------------------------------------------------------------------------- the summary
+def summary_text(loaded: Loaded, trace: Trace) -> str:
+    """Write the summary of a run.
+
+    Parameters
+    ----------
+    loaded : Loaded
+        The scenario.
+    trace : Trace
+        Its run.
+
+    Returns
+    -------
+    str
+        Markdown: what ran, what each element did, how it compares with the measurement, and what
+        the measurement cannot tell.
+    """
+    settings = ", ".join(
+        f"{name} = {_setting(value)}" for name, value in trace.settings.items() if value is not None
+    )
+    lines = [
+        f"# {plain(' '.join(loaded.title.split()))}",
+        "",
+        *([plain(loaded.scenario.notes.strip()), ""] if loaded.scenario.notes.strip() else []),
+        f"- model: {plain(trace.model.title)}",
+        f"- rig: {plain(trace.rig.title)}",
+        f"- parameters: {_parameters(trace)}",
+        f"- run: {settings}",
+        f"- result: {len(trace)} rows, {len(trace.transitions)} transitions, F from "
+        f"{trace.F.min():.4g} to {trace.F.max():.4g} N",
+        *_held(trace),
+        *(f"- note: {note}" for note in notes_on(trace)),
+        "",
+        *_element_table(trace),
+    ]
+    if trace.monitors:
+        lines += ["", "## Monitors", "", *(f"- {line}" for line in monitor_lines(trace))]
+    if loaded.record is not None and loaded.motion is not None:
+        lines += ["", *_measurement(loaded.record, loaded.motion, trace)]
+    return "\n".join(lines) + "\n"
+
+
+def _setting(value: Setting) -> str:
+    """Show a setting; the tolerance of each component by its name."""
+    if not isinstance(value, Mapping):
+        return str(value)
+    return "(" + ", ".join(f"{name} {_number(np.array(u))}" for name, u in value.items()) + ")"
+
+
+def _held(trace: Trace) -> list[str]:
+    """Say where a sign was held between -1 and 1."""
+    stretches = trace.sliding
+    if not len(stretches):
+        return []
+    seconds = float((stretches.t_end - stretches.t_start).sum())
+    names = " and ".join(f"{name} = 0" for name in dict.fromkeys(stretches.surface.tolist()))
+    return [
+        f"- held on {names}: {len(stretches)} times, {seconds:.4g} s in all, first at t = "
+        f"{float(stretches.t_start[0]):.6g} s (a sliding mode: the sign is a number from -1 to 1)"
+    ]
+
+
+def plain(text: str) -> str:
+    r"""Return a text as Markdown that shows this very text, whoever wrote it.
+
+    Parameters
+    ----------
+    text : str
+        Of one line or several; each stays a line.
+
+    Returns
+    -------
+    str
+        Without HTML, links, pictures or anything else that Markdown makes of a text.
+
+    Examples
+    --------
+    >>> print(plain("F_c < 2 N, *new* ![x](y)"))
+    F_c &lt; 2 N, \*new\* !\[x\](y)
+    """
+    lines = []
+    for line in text.splitlines():
+        shown = "".join(c if c.isprintable() else " " for c in line).strip()
+        shown = re.sub(r"[\\`*\[\]|~$#]", r"\\\g<0>", shown)
+        shown = re.sub(r"(?<![^\W_])_|_(?![^\W_])", r"\\_", shown)  # not in F_c, which is plain
+        shown = shown.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+        lines.append(re.sub(r"^(\d*)([-+=.)])", r"\1\\\2", shown))  # a list, a rule, a heading
+    return "\n".join(lines)
+
+
+def monitor_lines(trace: Trace) -> list[str]:
+    """Return what the monitors of a run say, a line each.
+
+    Parameters
+    ----------
+    trace : Trace
+        A run.
+
+    Returns
+    -------
+    list of str
+        For people; `Trace.monitors` has the numbers.
+    """
+    return [
+        f"monitor {name} ({'ok' if verdict.ok else 'not ok'}): {verdict.text}"
+        for name, verdict in trace.monitors.items()
+    ]
+
+
+def _parameters(trace: Trace) -> str:
+    model = trace.model
+    curve = {} if model.stribeck is None else dataclasses.asdict(model.stribeck)
+    numbers = {**model.values, **curve, "sigma_2": model.sigma_2}
+    shown = [f"{name} = {_number(value)}" for name, value in numbers.items()]
+    weights = [] if model.stribeck is None else [f"weights = {_number(model.weights)} m/N"]
+    return ", ".join([*shown, *weights])
+
+
+def _number(value: float | FloatArray) -> str:
+    if np.ndim(value) == 0:
+        return f"{float(value):.6g}"
+    return "[" + ", ".join(f"{float(v):.6g}" for v in np.asarray(value)) + "]"
+
+
+def _element_table(trace: Trace) -> list[str]:
+    chart = trace.model.chart
+    edges = [edge.name for edge in chart.transitions]
+    dwell, log = dwell_times(trace), trace.transitions
+    head = ["element", *(f"{s.name} [s]" for s in chart.states), *edges]
+    rows = [
+        [
+            str(i + 1),
+            *(f"{seconds:.4g}" for seconds in dwell[i]),
+            *(str(int(((log.element == i) & (log.edge == edge)).sum())) for edge in edges),
+        ]
+        for i in range(trace.n)
+    ]
+    return ["| " + " | ".join(row) + " |" for row in [head, ["---"] * len(head), *rows]]
+
+
+def _measurement(record: Record, motion: Motion, trace: Trace) -> list[str]:
+    lines = [f"## Against the measurement ({plain(record.path.name)})", ""]
+    comparison = compare(trace, record)
+    if comparison is None:
+        lines.append("- the record has no force: nothing to compare with")
+    else:
+        lines.append(
+            f"- **R² = {comparison.r2:.4f}, RMSE = {comparison.rmse:.4g} N** on {comparison.rows} "
+            "rows (parameters as given; nothing was fitted)"
+        )
+    lines += [f"- {plain(note)}" for note in (*record.notes, *motion.notes)]
+    doubts = what_it_cannot_tell(trace, motion)
+    if doubts:
+        lines += ["", "### What this record cannot tell", "", *(f"- {doubt}" for doubt in doubts)]
+    return lines
+
+
+def velocity_note(trace: Trace, motion: Motion) -> str:
+    """Return a warning if v_c is lost in the velocity noise of a record, else an empty text."""
+    v_c = trace.model.values.get("v_c")
+    if v_c is None or motion.standstill == 0.0 or float(np.min(v_c)) >= motion.standstill:
+        return ""
+    return (
+        f"v_c = {float(np.min(v_c)):.3g} m/s is below the velocity noise at standstill, "
+        f"{motion.standstill:.2g} m/s (standard deviation): arrests happen by chance; "
+        f"v_c = {motion.fitting_v_c():.2g} m/s would fit this record"
+    )
+
+
+def what_it_cannot_tell(trace: Trace, motion: Motion) -> list[str]:
+    """Return what a record says nothing about, each with the reason.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run over it.
+    motion : Motion
+        Its motion.
+
+    Returns
+    -------
+    list of str
+        Sentences; empty if nothing stands out.
+    """
+    doubts = []
+    speed = np.abs(motion.velocity)
+    moving = speed[speed > 0.1 * np.quantile(speed, 0.99)]
+    if not moving.size:
+        return ["anything: it never moves"]
+    slow, fast = (float(q) for q in np.quantile(moving, [0.2, 0.95]))
+    if fast < ONE_SPEED * slow:
+        doubts.append(
+            f"the Stribeck curve: there is one speed only ({1e3 * slow:.2g} to {1e3 * fast:.2g} "
+            "mm/s while it moves), so F_s, v_s and sigma_2 cannot be told from F_c"
+        )
+        if isinstance(trace.model, GMS):
+            doubts.append(
+                "C: at constant speed an element in slip rests at z = w s(v) whatever C is; only "
+                "changes of speed during slip would show it"
+            )
+    note = velocity_note(trace, motion)
+    if note:
+        doubts.append(note)
+    sigma = trace.model.values.get("sigma")
+    if sigma is not None:
+        viscous = float(np.sum(sigma)) * fast
+        if viscous < 0.01 * float(np.abs(trace.F).max()):
+            doubts.append(
+                f"sigma_i: at this speed all bristle damping makes {1e3 * viscous:.2g} mN, under "
+                f"1 % of the friction"
+            )
+    return doubts

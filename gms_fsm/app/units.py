@@ -1,0 +1,101 @@
+"""Units that measured records come in: a small explicit table, everything inside is SI."""
+
+from __future__ import annotations
+
+import re
+
+from gms_fsm.errors import UnitError, shown
+
+__all__ = ["FACTORS", "convert_numbers", "factor"]
+
+# quantity -> unit -> factor to SI
+FACTORS: dict[str, dict[str, float]] = {
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
+    "position": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254},
+    "velocity": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "um/s": 1e-6, "nm/s": 1e-9},
+    "force": {"N": 1.0, "kN": 1e3, "mN": 1e-3, "uN": 1e-6, "lbf": 4.4482216152605},
+}
+FACTORS["normal"] = FACTORS["force"]
+
+
+def factor(quantity: str, unit: str) -> float:
+    """Return the factor from a unit to SI.
+
+    Parameters
+    ----------
+    quantity : {"time", "position", "velocity", "force", "normal"}
+        What is measured.
+    unit : str
+        For example ``"mm"``; ``µ`` and ``μ`` are read as ``u``.
+
+    Returns
+    -------
+    float
+        Value in SI = factor * value in the unit.
+
+    Raises
+    ------
+    UnitError
+        If the unit is unknown or belongs to another quantity.
+
+    Examples
+    --------
+    >>> factor("position", "µm")
+    1e-06
+    """
+    plain = unit.strip().replace("µ", "u").replace("μ", "u")
+    known = FACTORS[quantity]
+    if plain in known:
+        return known[plain]
+    for other, units in FACTORS.items():
+        if plain in units:
+            raise UnitError(
+                f"unit {shown(unit)} measures {other}, not {quantity}; use one of "
+                f"{', '.join(known)}"
+            )
+    raise UnitError(f"unknown unit {shown(unit)}; for {quantity} use one of {', '.join(known)}")
+
+
+def convert_numbers(text: str) -> str:
+    """Replace each ``number unit`` in a condition by the number in SI.
+
+    Parameters
+    ----------
+    text : str
+        For example ``"normal > 4.5 N"``.
+
+    Returns
+    -------
+    str
+        For example ``"normal > 4.5"``.
+
+    Raises
+    ------
+    UnitError
+        If a word behind a number is not a unit.
+
+    Examples
+    --------
+    >>> convert_numbers("normal > 4500 mN and time < 3 min")
+    'normal > 4.5     and time < 180.0'
+    """
+    # Never given back once read (++): 2e3 is no 2 with the unit e3, and long digits take no time.
+    number = r"(?:\d++(?:\.\d*+)?+|\.\d++)(?:[eE][-+]?\d++)?+"
+    number_unit = rf"(?<![\w.])({number})\s*+([^\W\d]\w*+(?:/s)?)"
+
+    def converted(clause: str) -> str:
+        # A unit has to fit the quantity it is compared with.
+        quantities = [q for q in FACTORS if re.search(rf"\b{q}\b", clause)]
+
+        def in_si(found: re.Match[str]) -> str:
+            value, unit = float(found.group(1)), found.group(2)
+            fitting = (
+                quantities or [q for q, units in FACTORS.items() if unit in units] or ["force"]
+            )
+            # As long as what it replaces, where it can be: columns in messages stay true.
+            return repr(value * factor(fitting[0], unit)).ljust(len(found.group(0)))
+
+        return re.sub(number_unit, in_si, clause)
+
+    parts = re.split(r"(\band\b|\bor\b|\bnot\b)", text)
+    return "".join(p if p in ("and", "or", "not") else converted(p) for p in parts)

@@ -1,0 +1,1 @@
+"""Looking into charts and runs: explanations, notes, proofs, step-by-step sessions."""

@@ -1,0 +1,360 @@
+"""Why an edge fired or did not: its guard, clause by clause, on a stored row.
+
+Computed on demand from the row with the chart's own trees, so it is what the run itself saw.
+Printed, an explanation is the text that the debugger says; there elements count from 1.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from gms_fsm.charts.chart import Chart, Transition
+from gms_fsm.language.expression import MATLAB_LIKE, Condition, Relation, clauses, evaluate, spell
+from gms_fsm.traces.trace import Trace
+
+__all__ = ["Clause", "Explanation", "Why", "explain", "explain_state", "holds", "values_at"]
+
+ROUNDING = 1e-8  # a margin this small beside both sides is the clock's and the floats', not physics
+UNITS = {"t": "s", "x": "m", "v": "m/s", "v_c": "m/s", "z": "m", "s": "m"}
+
+
+@dataclass(frozen=True)
+class Clause:
+    """One part of a guard that has to hold.
+
+    Parameters
+    ----------
+    text : str
+        As the chart shows it.
+    holds : bool
+        Whether it is true.
+    left, right : float
+        Both sides of a comparison; NaN for a compound clause, or one that cannot be computed.
+    margin : float
+        How far it is on the true side (negative: on the false side); NaN for a compound clause.
+    computable : bool
+        False where it has no value (1/0); it then counts as false.
+    """
+
+    text: str
+    holds: bool
+    left: float
+    right: float
+    margin: float
+    computable: bool = True
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """One edge that could be taken from the state an element is in (or has just left).
+
+    Parameters
+    ----------
+    edge : Transition
+        The edge.
+    priority : int
+        1 is asked first.
+    clauses : tuple of Clause
+        The guard's parts.
+    holds : bool
+        Whether the whole guard is true.
+    taken : str
+        The edge that is taken from this state: the one that led to this row, else the first whose
+        guard is true; empty for none.
+    past : bool
+        Whether it led to this row; the values are then those before.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts import gms_element
+    >>> values = {"z": 0.5, "s": 1.0, "v": 0.2, "v_c": 1e-6, "k": 1.0, "sigma": 0.0, "C": 1.0}
+    >>> forward, _ = explain_state(gms_element("signed"), "stick", values)
+    >>> print(forward)
+    break_away_forward does not fire: z >= s is false by 0.5 m.
+      1 break_away_forward: stick -> slip
+        false  z >= s   left 0.5         right 1           margin -0.5 m
+        true   v > v_c  left 0.2         right 1e-06       margin +0.2 m/s
+    """
+
+    edge: Transition
+    priority: int
+    clauses: tuple[Clause, ...]
+    holds: bool
+    taken: str = ""
+    past: bool = False
+
+    @property
+    def fired(self) -> bool:
+        """Whether it is the edge that was taken to reach this row."""
+        return self.past and self.taken == self.edge.name
+
+    def __str__(self) -> str:
+        return f"{_verdict(self)}\n{_detail(self)}"
+
+
+@dataclass(frozen=True)
+class Why:
+    """Why an element switches or does not: a sequence of `Explanation`, highest priority first.
+
+    Parameters
+    ----------
+    element : int
+        Counted from 0.
+    t : float
+        s.
+    state : str
+        The one it is in.
+    left : str
+        The one it has just left, if that is the one whose edges these are; else empty.
+    edges : tuple of Explanation
+        Empty if no edge leaves the state.
+    sigma : mapping of str to float
+        The signs held between -1 and 1, by what is zero there.
+    """
+
+    element: int
+    t: float
+    state: str
+    left: str
+    edges: tuple[Explanation, ...]
+    sigma: Mapping[str, float] = field(default_factory=dict)
+
+    def __iter__(self) -> Iterator[Explanation]:
+        return iter(self.edges)
+
+    def __len__(self) -> int:
+        return len(self.edges)
+
+    def __getitem__(self, index: int) -> Explanation:
+        return self.edges[index]
+
+    def __str__(self) -> str:
+        lines = [f"element {self.element + 1} is in {self.state} at t = {self.t:.9g} s"]
+        if self.left:
+            lines.append(f"it has just left {self.left}; values are those before that")
+        lines += [f"held on {name} = 0, σ = {u:.2g}" for name, u in self.sigma.items()]
+        if not self.edges:
+            lines.append("no edge leaves this state")
+        return "\n".join([*lines, *map(_verdict, self.edges), *map(_detail, self.edges)])
+
+
+def values_at(trace: Trace, row: int, element: int) -> dict[str, float]:
+    """Return every value a guard of an element can name, at a row.
+
+    Parameters
+    ----------
+    trace : Trace
+        A run.
+    row : int
+        Row index.
+    element : int
+        Counted from 0.
+
+    Returns
+    -------
+    dict of str to float
+        t, x, v, s, the variables and the parameters.
+    """
+    values = {
+        "t": float(trace.t[row]),
+        "x": float(trace.x[row]),
+        "v": float(trace.v[row]),
+        "s": float(trace.s[row, element]),
+    }
+    for name in trace.model.chart.variables:
+        values[name] = float(trace.variable(name)[row, element])
+    for name, value in trace.model.values.items():
+        values[name] = float(value if isinstance(value, float | int) else value[element])
+    return values
+
+
+def explain(trace: Trace, row: int, element: int) -> Why:
+    """Explain the edges of an element at a row, highest priority first.
+
+    On a row that a firing of this element made, the edges are those of the state it left, with the
+    values before the firing, and the edge taken is marked.
+
+    Parameters
+    ----------
+    trace : Trace
+        A run.
+    row : int
+        Row index; negative counts from the end.
+    element : int
+        Counted from 0.
+
+    Returns
+    -------
+    Why
+        An `Explanation` an edge; printed, the debugger's text.
+
+    Raises
+    ------
+    IndexError
+        If there is no such row or element.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    >>> trace = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"),
+    ...                  Prescribed("0.2"), 1.0)
+    >>> forward = explain(trace, -1, 0)[0]
+    >>> forward.edge.name, [(c.text, c.holds, round(c.margin, 3)) for c in forward.clauses]
+    ('break_away_forward', [('z >= s', False, -0.2), ('v > v_c', True, 0.2)])
+    """
+    if not -len(trace) <= row < len(trace) or not 0 <= element < trace.n:
+        raise IndexError(
+            f"row {row}, element {element}: the trace has {len(trace)} rows, {trace.n} elements"
+        )
+    row %= len(trace)
+    chart, modes = trace.model.chart, trace.rows.mode[:, element]
+    fired = _edge_taken(trace, row, element)
+    before = row - 1 if fired else row
+    now, asked = (chart.states[int(modes[r])].name for r in (row, before))
+    edges = explain_state(chart, asked, values_at(trace, before, element), fired)
+    left = asked if fired else ""
+    return Why(element, float(trace.t[row]), now, left, tuple(edges), trace.sigma(row))
+
+
+def explain_state(
+    chart: Chart, state: str, values: Mapping[str, float], fired: str = ""
+) -> list[Explanation]:
+    """Explain the edges that leave a state.
+
+    Parameters
+    ----------
+    chart : Chart
+        The chart.
+    state : str
+        A state's name.
+    values : mapping of str to float
+        A number for every name its guards use.
+    fired : str
+        The edge that was taken, if any.
+
+    Returns
+    -------
+    list of Explanation
+        Highest priority first.
+    """
+    leaving = [edge for _, edge in chart.leaving(state)]
+    true = {edge.name: holds(chart.guards[edge.name], values) for edge in leaving}
+    taken = fired or next((name for name, truth in true.items() if truth), "")
+    return [
+        Explanation(
+            edge,
+            priority,
+            tuple(_clause(part, values) for part in clauses(chart.guards[edge.name])),
+            true[edge.name],
+            taken,
+            bool(fired),
+        )
+        for priority, edge in enumerate(leaving, start=1)
+    ]
+
+
+def _edge_taken(trace: Trace, row: int, element: int) -> str:
+    """Return the edge whose firing made this row, or an empty text."""
+    microstep = int(trace.microstep[row])
+    if microstep == 0 or _only_slides(trace, row):
+        return ""
+    log = trace.transitions[trace.transitions.t == trace.t[row]]
+    taken = log[microstep - 1]
+    return str(taken.edge) if taken.element == element else ""
+
+
+def _only_slides(trace: Trace, row: int) -> bool:
+    """Tell whether a row differs from the one before by the surfaces slid on alone."""
+    same = row > 0 and trace.t[row - 1] == trace.t[row]
+    return same and bool(trace.microstep[row - 1] == trace.microstep[row])
+
+
+def _clause(part: Condition, values: Mapping[str, float]) -> Clause:
+    text = spell(part, MATLAB_LIKE)
+    try:
+        truth = bool(evaluate(part, values))
+        if not isinstance(part, Relation):
+            return Clause(text, truth, math.nan, math.nan, math.nan)
+        left, right = evaluate(part.left, values), evaluate(part.right, values)
+    except (ArithmeticError, ValueError):
+        return Clause(text, False, math.nan, math.nan, math.nan, computable=False)
+    margin = left - right if part.op in (">", ">=") else right - left
+    return Clause(text, truth, left, right, margin)
+
+
+def holds(condition: Condition, values: Mapping[str, float]) -> bool:
+    """Return a condition's truth; what cannot be computed (1/0) is not true.
+
+    Parameters
+    ----------
+    condition : Condition
+        A guard or a part of one.
+    values : mapping of str to float
+        A number for every name.
+
+    Returns
+    -------
+    bool
+        Its truth.
+    """
+    try:
+        return bool(evaluate(condition, values))
+    except (ArithmeticError, ValueError):
+        return False
+
+
+# --------------------------------------------------------------------------- in words
+def _verdict(each: Explanation) -> str:
+    """Say in one sentence why an edge fires or does not."""
+    name = each.edge.name
+    if each.fired:
+        return f"{name} fired here: every clause was true."
+    if each.holds:
+        if each.taken != name:
+            return f"{name} does not fire: its guard is true, but {each.taken} goes first."
+        return f"{name} fires next: every clause is true."
+    parts = []
+    for clause in each.clauses:
+        if not clause.holds:
+            by = "" if math.isnan(clause.margin) else f" by {_amount(clause, signed=False)}"
+            parts.append(f"{clause.text} is false{by}")
+    return f"{name} {'did' if each.past else 'does'} not fire: {' and '.join(parts)}."
+
+
+def _detail(each: Explanation) -> str:
+    """Show an edge's guard, a line a clause."""
+    wide = max(len(clause.text) for clause in each.clauses)
+    lines = [f"  {each.priority} {each.edge.name}: {each.edge.source} -> {each.edge.target}"]
+    for clause in each.clauses:
+        truth = "true " if clause.holds else "false"
+        lines.append(f"    {truth}  {clause.text:<{wide}}{_sides(clause)}".rstrip())
+    return "\n".join(lines)
+
+
+def _sides(clause: Clause) -> str:
+    if not clause.computable:
+        return "  cannot be computed here"
+    if math.isnan(clause.margin):  # compound: no two sides
+        return ""
+    return (
+        f"  left {clause.left:<11.5g} right {clause.right:<11.5g} margin "
+        f"{_amount(clause, signed=True)}"
+    )
+
+
+def _amount(clause: Clause, *, signed: bool) -> str:
+    if abs(clause.margin) <= ROUNDING * max(abs(clause.left), abs(clause.right)):
+        return "0 (rounding)"
+    return f"{clause.margin if signed else abs(clause.margin):{'+' if signed else ''}.3g}" + _unit(
+        clause
+    )
+
+
+def _unit(clause: Clause) -> str:
+    """Return the unit of a clause's margin where its names leave no doubt."""
+    units = {UNITS.get(name, "?") for name in re.findall(r"[A-Za-z_]\w*", clause.text)}
+    plain = not set(clause.text) & set("*/^()")
+    return f" {units.pop()}" if plain and len(units) == 1 and "?" not in units else ""

@@ -1,0 +1,253 @@
+"""Loads generated code so that debuggers and tracebacks find its lines.
+
+The only place where text becomes code, and it is always our own text, printed from a checked tree.
+"""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import functools
+import hashlib
+import inspect
+import linecache
+import math
+from collections.abc import Callable, Mapping
+from types import CodeType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from gms_fsm.errors import GMSError, ParameterError
+from gms_fsm.language._parser import PARSER
+from gms_fsm.language.expression import NAMESPACE
+from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
+
+__all__ = ["ieee", "load", "load_careful", "standalone"]
+
+
+def load(title: str, source: str, names: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    r"""Run generated text and return what it defines.
+
+    Parameters
+    ----------
+    title : str
+        Shown in place of a file name.
+    source : str
+        Python text.
+    names : mapping, optional
+        Objects it may use besides the functions of the expression language.
+
+    Returns
+    -------
+    dict
+        Its namespace.
+
+    Examples
+    --------
+    >>> load("example", "def twice(v):\n    return 2.0 * v\n")["twice"](3.0)
+    6.0
+    """
+    namespace: dict[str, Any] = {**NAMESPACE, **(names or {})}
+    exec(_compiled(title, source), namespace)
+    return namespace
+
+
+def load_careful(title: str, source: str, names: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Run generated text with functions and numbers that never raise, for `ieee`.
+
+    Parameters
+    ----------
+    title, source, names
+        As in `load`.
+
+    Returns
+    -------
+    dict
+        Its namespace.
+    """
+    namespace: dict[str, Any] = {**NAMESPACE, **(names or {}), **_IEEE, "_wide": _wide}
+    exec(_compiled(title, source, careful=True), namespace)
+    return namespace
+
+
+def standalone(source: str) -> str:
+    r"""Return generated text as a program of its own, with the imports and functions that it uses.
+
+    Parameters
+    ----------
+    source : str
+        From `gms_fsm.lowering.program.lower`.
+
+    Returns
+    -------
+    str
+        Python text that needs nothing but Python.
+
+    Raises
+    ------
+    ParameterError
+        If a signal in it is a Python function of the user's, which no text can hold.
+
+    Examples
+    --------
+    >>> print(standalone("# twice\ndef twice(u):\n    return 2.0 * sqrt(u)\n"))
+    # twice
+    <BLANKLINE>
+    from math import sqrt
+    <BLANKLINE>
+    <BLANKLINE>
+    def twice(u):
+        return 2.0 * sqrt(u)
+    <BLANKLINE>
+    """
+    used, own = set[str](), set[str]()
+    for node in ast.walk(_tree(source)):
+        match node:
+            case ast.Name(id=name, ctx=ast.Load()):
+                used.add(name)
+            case ast.Name(id=name) | ast.arg(arg=name) | ast.FunctionDef(name=name):
+                own.add(name)
+    known: dict[str, Any] = {
+        **NAMESPACE,
+        "piecewise_linear": piecewise_linear,
+        "piecewise_slope": piecewise_slope,
+        "nan": math.nan,
+    }
+    missing = sorted(used - own - set(dir(builtins)))
+    if foreign := [name for name in missing if name not in known]:
+        raise ParameterError(
+            f"{', '.join(foreign)}: a Python function, which no text can hold; give the signal as "
+            "a formula or as corners"
+        )
+    borrowed = [name for name in missing if known[name] is getattr(math, name, None)]
+    parts = [f"from math import {', '.join(borrowed)}\n"] if borrowed else []
+    parts += ["\n" + _bare(known[name]) for name in missing if name not in borrowed]
+    head, body = _split_head(source)
+    return "\n".join([head, *parts, "\n" + body.lstrip("\n")])
+
+
+def _tree(source: str) -> ast.Module:
+    """Parse a text, alone."""
+    with PARSER:
+        return ast.parse(source)
+
+
+def _split_head(source: str) -> tuple[str, str]:
+    """Split the comments that a text begins with from the rest."""
+    lines = source.splitlines(keepends=True)
+    end = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
+    return "".join(lines[:end]), "".join(lines[end:])
+
+
+def _bare(function: Callable[..., Any]) -> str:
+    """Return a function's text without annotations, its docstring cut to the first line."""
+    tree = _tree(inspect.getsource(function))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.arg):
+            node.annotation = None
+        if isinstance(node, ast.FunctionDef):
+            node.returns = None
+            first = (ast.get_docstring(node) or "").partition("\n")[0]
+            node.body[0] = ast.Expr(ast.Constant(first))
+    return ast.unparse(ast.fix_missing_locations(tree)) + "\n"
+
+
+@functools.lru_cache(maxsize=256)
+def _compiled(title: str, source: str, careful: bool = False) -> CodeType:
+    digest = hashlib.sha256(source.encode()).hexdigest()[:8]
+    shown = "".join(c if c.isprintable() else "?" for c in title)  # a file name takes not all
+    filename = f"<{shown} {digest}>"
+    linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
+    if not careful:
+        return compile(source, filename, "exec")
+    tree = ast.fix_missing_locations(_WideNumbers().visit(_tree(source)))
+    return compile(tree, filename, "exec")
+
+
+class _WideNumbers(ast.NodeTransformer):
+    """Has every number written in a text made one that does not raise: 1.0 / 0.0 is inf."""
+
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:
+        if not isinstance(node.value, float):
+            return node
+        return ast.Call(ast.Name("_wide", ast.Load()), [node], [])
+
+
+# --------------------------------------------------------------------------- IEEE arithmetic
+# A trial step may land where exp overflows or a root is of a negative number. IEEE arithmetic says
+# inf or NaN there and the step size shrinks; Python raises. So the text runs as it is, fast, and
+# where it raises once more with numbers that do not: the same bits as the compiled text.
+def ieee(fast: Callable[..., Any], careful: Callable[..., Any]) -> Callable[..., Any]:
+    r"""Return a generated function that computes inf and NaN where Python would raise.
+
+    Parameters
+    ----------
+    fast : callable
+        The function over Python's floats.
+    careful : callable
+        The same, from `load_careful`.
+
+    Returns
+    -------
+    callable
+        Takes the arguments of both.
+
+    Examples
+    --------
+    >>> source = "def rate(y, dy):\n    dy[0] = 1.0 / y[0]\n"
+    >>> rate = ieee(load("example", source)["rate"], load_careful("example", source)["rate"])
+    >>> dy = [0.0]
+    >>> rate([0.0], dy)
+    >>> dy
+    [inf]
+    """
+
+    @functools.wraps(fast)
+    def function(*arguments: Any) -> Any:
+        try:
+            return fast(*arguments)
+        except (ArithmeticError, ValueError) as error:
+            if isinstance(error, GMSError):  # of a user's own signal
+                raise
+        wide = [_wide(argument) for argument in arguments]
+        with np.errstate(all="ignore"):
+            value = careful(*wide)
+        for argument, result in zip(arguments, wide, strict=True):
+            if isinstance(argument, list):
+                argument[:] = [float(u) if isinstance(u, float) else u for u in result]
+        return value
+
+    return function
+
+
+def _wide(argument: Any) -> Any:
+    """Return floats, wherever they are, as numbers of numpy, which do not raise."""
+    if isinstance(argument, float):
+        return np.float64(argument)
+    if isinstance(argument, list | tuple):
+        return type(argument)(_wide(part) for part in argument)
+    if hasattr(argument, "__dict__"):  # an element, whose values a guard reads
+        return SimpleNamespace(**{name: _wide(value) for name, value in vars(argument).items()})
+    return argument
+
+
+def _quiet(function: Callable[..., float], replacement: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function of `math` that falls back on numpy's where it would raise."""
+
+    def computed(*arguments: Any) -> Any:
+        try:
+            return np.float64(function(*arguments))
+        except (ArithmeticError, ValueError):
+            return replacement(*map(np.float64, arguments))
+
+    return computed
+
+
+_IEEE: Mapping[str, Callable[..., Any]] = {
+    "exp": _quiet(math.exp, np.exp),
+    "sqrt": _quiet(math.sqrt, np.sqrt),
+    "sin": _quiet(math.sin, np.sin),
+    "cos": _quiet(math.cos, np.cos),
+    "pow": _quiet(math.pow, np.power),
+}

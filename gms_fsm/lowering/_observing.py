@@ -1,0 +1,137 @@
+"""What is seen of a state: velocity, force, thresholds, rates; along a surface with its sigma.
+
+A row's modes are those of the elements, then for each surface of the program whether the motion
+slides on it (`integrators.sliding`). There a sign is a number from -1 to 1.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.lowering.program import Program
+from integrators import Held, Sliding, look, room_to_slide, slope_on
+
+__all__ = ["armed", "observe", "rate", "sigmas"]
+
+
+def observe(program: Program, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
+    """Return v, F, then for all elements s, F_i and the rates.
+
+    Parameters
+    ----------
+    program : Program
+        Of the run.
+    t : float
+        s.
+    y : list of float, shape (m,)
+        State.
+    mode : sequence of int, shape (n,) or (n + surfaces,)
+        Of a row.
+
+    Returns
+    -------
+    list of float
+        As ``observe`` of the program fills it.
+    """
+    out = [0.0] * program.seen
+    if not any(mode[program.n :]):
+        program.ieee["observe"](t, y, mode, program.live, program.p, out)
+    else:
+        on, sliding = _sliding(program, mode, [0.0] * program.held)
+        functions = program.ieee["observe"], program.ieee["arm"]
+        look(*functions, on, sliding, t, y, list(mode), out)
+    return out
+
+
+def sigmas(program: Program, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
+    """Return for each surface the sigma in place of its sign.
+
+    Parameters
+    ----------
+    program, t, y, mode
+        As in `observe`.
+
+    Returns
+    -------
+    list of float
+        From -1 to 1; NaN for a surface that is not slid on.
+    """
+    found = [math.nan] * program.slides
+    if any(mode[program.n :]):
+        on, _ = _sliding(program, mode, armed(program, t, y, mode))
+        slope_on(on, t, y, list(mode), [0.0] * program.size)
+        for c in range(on.which[-1]):
+            found[on.which[c]] = min(max(on.sigma[c], -1.0), 1.0)
+    return found
+
+
+def armed(program: Program, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
+    """Return the signs that an arc from a state would hold.
+
+    Parameters
+    ----------
+    program, t, y, mode
+        As in `observe`.
+
+    Returns
+    -------
+    list of float
+        -1, 0 or 1; of the surfaces slid on not yet their sigmas.
+    """
+    held = [0.0] * program.held
+    program.ieee["arm"](t, y, mode, program.p, held, [0] * len(program.strict))
+    return held
+
+
+def rate(
+    program: Program, t: float, y: list[float], mode: Sequence[int], held: list[float]
+) -> FloatArray:
+    """Return dy/dt with the signs held.
+
+    Parameters
+    ----------
+    program, t, y, mode
+        As in `observe`.
+    held : list of float
+        The signs; those of surfaces that are slid on are found here.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        The slope.
+    """
+    dy = [0.0] * program.size
+    if not any(mode[program.n :]):
+        program.ieee["flow"](t, y, mode, held, program.p, dy)
+    else:
+        slope_on(_sliding(program, mode, held)[0], t, y, list(mode), dy)
+    return np.array(dy)
+
+
+def _sliding(program: Program, mode: Sequence[int], held: list[float]) -> tuple[Held, Sliding]:
+    """Return the program on the surfaces that a row is on."""
+    s = room_to_slide(
+        program.surfaces,
+        program.size,
+        program.held,
+        len(program.strict),
+        program.seen,
+        mode[program.n :],
+    )
+    functions = program.ieee
+    on = Held(
+        functions["flow"],
+        functions["margins"],
+        functions["normal"],
+        program.p,
+        held,
+        program.surfaces.sign,
+        s.which,
+        s.sigma,
+        s.table,
+    )
+    return on, s

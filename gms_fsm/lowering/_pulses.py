@@ -1,0 +1,76 @@
+"""Where a formula wakes up: a step over a flat stretch must not jump a pulse in it.
+
+A step is accepted by what its few stages see, and a pulse between them is not seen. So a formula is
+sampled before the run. Where it rests for a while and then changes, steps have to end at the
+beginning of the change, at its end and at some places inside; the error control does the rest.
+Formulas that never rest, such as a sine, get no such places.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm.charts.parameters import as_floats
+from gms_fsm.language._vectors import values_of
+from gms_fsm.language.expression import Value
+
+__all__ = ["SAMPLES", "waking_times"]
+
+SAMPLES = 4096  # a pulse that lies between two of them is not seen
+REST = 1e-5  # of the whole range: a change between two samples that is none
+LONG = SAMPLES // 100  # samples of rest that count as one
+INSIDE = 8  # parts of a change
+
+
+@functools.lru_cache(maxsize=256)
+def waking_times(tree: Value, t_start: float, t_end: float) -> tuple[float, ...]:
+    """Return the times that steps may not jump over.
+
+    Parameters
+    ----------
+    tree : Value
+        A formula of t.
+    t_start, t_end : float
+        s.
+
+    Returns
+    -------
+    tuple of float
+        s, increasing; empty if the formula never rests, never changes, or cannot be computed.
+
+    Examples
+    --------
+    >>> from gms_fsm.language.expression import parse_value
+    >>> times = waking_times(parse_value("exp(-((t - 3) / 0.01)**2)", ["t"]), 0.0, 8.0)
+    >>> len(times), round(times[0], 2), round(times[-1], 2)
+    (9, 2.96, 3.04)
+    >>> waking_times(parse_value("sin(t)", ["t"]), 0.0, 8.0)
+    ()
+    """
+    t = t_start + (t_end - t_start) / SAMPLES * np.arange(SAMPLES + 1)
+    values = values_of(tree, {"t": t})
+    if not np.isfinite(values).all():
+        return ()
+    moves = np.abs(np.diff(values)) > REST * np.ptp(values)
+    awake = ~_rests(moves)
+    if awake.all() or not awake.any():
+        return ()
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], awake, [False]]).astype(np.int8)))
+    found = [
+        np.linspace(t[first], t[last], INSIDE + 1)
+        for first, last in zip(edges[::2], edges[1::2], strict=True)
+    ]
+    return tuple(as_floats(np.unique(np.concatenate(found))))
+
+
+def _rests(moves: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Tell which intervals belong to a long rest."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], moves, [True]]).astype(np.int8)))
+    rests = np.zeros(moves.size, dtype=np.bool_)
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        if last - first >= LONG:
+            rests[first:last] = True
+    return rests

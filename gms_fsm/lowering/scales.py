@@ -1,0 +1,243 @@
+"""The sizes that a model itself distinguishes: what its default tolerances are measured by.
+
+A component's scale is the smallest size at which something in the model changes: the deflection at
+which a guard turns true (w F_c for a GMS element), the deflection that carries the Coulomb friction
+alone (F_c / k), the velocities v_c and v_s. Scales come from the model only, never from rig, signal
+or the length of a run, so that a run in other units, or on another rig, is as accurate.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Generic, TypeAlias, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.parameters import as_floats
+from gms_fsm.language.expression import (
+    Binary,
+    Number,
+    Value,
+    comparisons,
+    derivative,
+    names_in,
+    renamed,
+    spell,
+    split,
+)
+from gms_fsm.lowering._generated import load
+from gms_fsm.systems.models import Model
+
+__all__ = ["Scales", "Setting", "Tolerance", "scales_of"]
+
+T = TypeVar("T")
+Tolerance: TypeAlias = float | Mapping[str, ArrayLike] | None  # absolute, as it is given
+Setting: TypeAlias = str | float | Mapping[str, float | list[float]] | None  # of a run, as kept
+
+# The default absolute tolerance is rtol times the scale times this: near zero a component is known
+# to the accuracy that it has at a tenth of its scale.
+SHARE = 0.1
+# A velocity in a guard is a window to pass through, not a size to move by: it counts so many times.
+# With rtol = 1e-6 the velocity is then known to 1e-5 v_c; coarser, a creep just under v_c is off.
+WINDOW = 1e2
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Scales of a model's components; 0 where it has none.
+
+    Parameters
+    ----------
+    x, v : float
+        m and m/s.
+    variables : mapping of str to tuple of float
+        For each variable of the chart one per element.
+    speed : float
+        m/s: the smallest speed in a guard, v_c for a GMS element.
+    time : float
+        s: what the fastest flow takes to relax, s / C for a slipping GMS element.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters
+    >>> scales_of(GMS(GMSParameters.paper("stick-slip"), law="signed")).variables["z"]
+    (0.4, 0.4, 0.4, 0.4)
+    """
+
+    x: float
+    v: float
+    variables: Mapping[str, tuple[float, ...]]
+    speed: float
+    time: float
+
+    def tolerances(self, rtol: float) -> dict[str, list[float]]:
+        """Return the default absolute tolerances by name, one per element for variables.
+
+        Parameters
+        ----------
+        rtol : float
+            Relative tolerance.
+
+        Returns
+        -------
+        dict of str to list of float
+            0 for a component without a scale.
+        """
+        scales = {"x": (self.x,), "v": (self.v,), **self.variables}
+        return {name: [SHARE * rtol * u for u in row] for name, row in scales.items()}
+
+
+def scales_of(model: Model) -> Scales:
+    """Return the scales of a model.
+
+    Parameters
+    ----------
+    model : Model
+        Any.
+
+    Returns
+    -------
+    Scales
+        From its guards, its force and its curve.
+    """
+    return _scales_of(_Same(model))
+
+
+@functools.lru_cache(maxsize=64)
+def _scales_of(key: _Same[Model]) -> Scales:
+    model = key.it
+    chart = model.chart
+    sizes = _sizes(_Same(chart))
+    curve = model.stribeck if "s" in chart.inputs else None
+    numbers = [as_floats(np.broadcast_to(value, model.n)) for value in model.values.values()]
+    thresholds = [0.0] * model.n if curve is None else as_floats(model.weights * curve.F_c)
+    found: dict[str, list[float]] = {name: [] for name in ("x", "v", *chart.variables)}
+    lengths: list[float] = []
+    for values in zip(thresholds, *numbers, strict=True):
+        for name, row in found.items():
+            reaches = [_quotient(height, slope, values) for height, slope in sizes.reach[name]]
+            if curve is not None and name in sizes.stiffness:
+                reaches.append(_divided(curve.F_c, _number(sizes.stiffness[name], values)))
+            row.append(min((u for u in reaches if u > 0.0), default=0.0))
+        for name, follows in sizes.follows.items():
+            most = max(abs(_number(rate, values)) for rate in follows)
+            lengths.append(_divided(found[name][-1], most))
+    windows = [WINDOW * u for u in found["v"]]
+    v = [*windows, curve.v_s] if curve is not None else windows
+    least_x = min((u for u in [*found["x"], *lengths] if u > 0.0), default=0.0)
+    least_v = min((u for u in v if u > 0.0), default=0.0)
+    speed = least_v if curve is None else curve.v_s
+    rates = [
+        abs(_number(rate, (speed, *values)))
+        for values in zip(thresholds, *numbers, strict=True)
+        for rate in sizes.paces
+    ]
+    time = _divided(1.0, max(rates, default=0.0)) or _divided(least_x, speed)
+    variables = {name: tuple(found[name]) for name in chart.variables}
+    slowest = min((u for u in found["v"] if u > 0.0), default=0.0)
+    return Scales(least_x, least_v, variables, slowest, time)
+
+
+# --------------------------------------------------------------------------- what a chart says
+Numbers = Callable[..., float]  # of the threshold s and the parameters
+
+
+@dataclass(frozen=True, eq=False)
+class _Sizes:
+    """Functions of a chart's numbers, all at rest in the origin."""
+
+    reach: Mapping[str, Sequence[tuple[Numbers, Numbers]]]  # margins of guards, and their slopes
+    stiffness: Mapping[str, Numbers]  # slopes of the force
+    follows: Mapping[str, Sequence[Numbers]]  # by how much a variable changes with x, by state
+    paces: Sequence[Numbers]  # how fast variables relax, of v too
+
+
+class _Same(Generic[T]):
+    """A chart or a model by identity: as data it cannot be hashed."""
+
+    def __init__(self, it: T) -> None:
+        self.it = it
+
+    def __hash__(self) -> int:
+        return id(self.it)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and other.it is self.it
+
+
+@functools.lru_cache(maxsize=64)
+def _sizes(key: _Same[Chart]) -> _Sizes:
+    chart = key.it
+    states = ("x", "v", *chart.variables)
+    rates = [f"d{name}" for name in chart.variables]
+    rest: dict[str, Value] = dict.fromkeys(("t", *states, *rates), Number(0.0))
+    arguments = ", ".join(("s", *chart.parameters))
+
+    def function(tree: Value, *, moving: bool = False) -> Numbers:
+        still = {name: zero for name, zero in rest.items() if not (moving and name == "v")}
+        names = f"v, {arguments}" if moving else arguments
+        text = f"def number({names}):\n    return {spell(renamed(tree, still))}\n"
+        made: Numbers = load(f"scale in {chart.name}", text, {"sgn": _to_the_right})["number"]
+        return made
+
+    guards = chart.guards.values()
+    margins = [
+        Binary("-", each.left, each.right)
+        for each in dict.fromkeys(c for guard in guards for c in comparisons(split(guard)))
+    ]
+    reach = {
+        name: [
+            (function(margin), function(slope))
+            for margin in margins
+            if name in names_in(margin) and (slope := derivative(margin, name)) is not None
+        ]
+        for name in states
+    }
+    stiffness = {
+        name: function(slope)
+        for name in chart.variables
+        if (slope := derivative(chart.forces["F"], name)) is not None
+    }
+    follows = {
+        name: [
+            function(rate)
+            for state in chart.states
+            if (rate := derivative(chart.flows[state.name, name], "v")) is not None
+        ]
+        for name in chart.variables
+    }
+    paces = [
+        function(rate, moving=True)
+        for (_, name), flow in chart.flows.items()
+        if (rate := derivative(flow, name)) is not None
+    ]
+    return _Sizes(reach, stiffness, {name: row for name, row in follows.items() if row}, paces)
+
+
+def _to_the_right(u: float) -> float:
+    """Return the sign of u as seen from above: the slope of abs(z) at 0 is 1."""
+    return 1.0 if u >= 0.0 else -1.0
+
+
+def _number(function: Numbers, values: Sequence[float]) -> float:
+    """Compute a value at rest; 0 where it has none."""
+    try:
+        number = function(*values)
+    except (ArithmeticError, ValueError):
+        return 0.0
+    return number if math.isfinite(number) else 0.0
+
+
+def _quotient(height: Numbers, slope: Numbers, values: Sequence[float]) -> float:
+    return _divided(_number(height, values), _number(slope, values))
+
+
+def _divided(a: float, b: float) -> float:
+    """Return |a / b|, 0 where it means nothing."""
+    quotient = abs(a / b) if b else 0.0
+    return quotient if math.isfinite(quotient) else 0.0

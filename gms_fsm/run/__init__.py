@@ -1,0 +1,1 @@
+"""From a program to a trace: machines, the run and its files, sweeps."""

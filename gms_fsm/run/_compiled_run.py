@@ -1,0 +1,364 @@
+"""A run by the compiled engine: the outer loop itself is machine code and fills columns."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from gms_fsm.lowering import _compiled as compiled
+from gms_fsm.lowering._observing import observe
+from gms_fsm.lowering.program import system
+from gms_fsm.run._recording import PATIENCE, Recording, check_end, check_pace, explained, meddled
+from gms_fsm.run.machines import ElementMachines, MachineEngine, Meddling
+from gms_fsm.run.start import Start
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.rigs import Rig
+from gms_fsm.traces.failures import SimulationError
+from gms_fsm.traces.trace import Rows, Trace, log_from
+from integrators import hybrid, loop
+from integrators.advance import ROW, STEPS
+
+__all__ = ["CompiledRun"]
+
+STEPS_AT_ONCE = 20_000  # between two looks at the keyboard and two calls of progress
+
+
+class CompiledRun:
+    """A simulation under way, chunk by chunk; the same interface as `gms_fsm.run.simulate.Run`.
+
+    Parameters
+    ----------
+    start : Start
+        What to run.
+    machines : ElementMachines, optional
+        Machines of the user's own: each firing is replayed through them.
+    """
+
+    def __init__(self, start: Start, machines: ElementMachines | None = None) -> None:
+        self.start = start
+        program = start.program
+        flow = "flow" if start.options.located else "flow_live"
+        names = (flow, "arm", "margins", "normal", "switch", "act", "observe")
+        self.functions = [compiled.machine_code(program, name) for name in names]
+        self.columns = Columns(start)
+        self.recorder: Recording = self.columns
+        self.engine: MachineEngine | None = None
+        if machines is not None:
+            self.engine = MachineEngine(machines, program, start.mode)
+
+    @property
+    def buffers(self) -> hybrid.Buffers:
+        """Where the loop keeps its state."""
+        return self.columns.buffers
+
+    def kept(self) -> dict[str, Any]:
+        """Return what the columns hold, for a checkpoint."""
+        return self.columns.state()
+
+    def go_on_from(self, kept: dict[str, Any]) -> None:
+        """Take over what `kept` returned; the buffers are filled already."""
+        self.columns.put_back(kept)
+        counts: Any = self.buffers.memory.counts
+        t, y, mode = self.columns.latest
+        if self.engine is not None:
+            self.engine.go_on_from(t, y, mode[: self.start.model.n], self.start.program.p)
+            if counts[loop.PHASE] == loop.FIRE:  # its callbacks have run, the loop is yet to follow
+                edge = self.start.model.chart.transitions[counts[loop.EDGE]]
+                self.engine.set_state(int(counts[loop.MACHINE]), edge.target)
+
+    def begin_again(self, model: Model, rig: Rig) -> None:
+        """Start over with other numbers; signals and initial values stay.
+
+        Parameters
+        ----------
+        model, rig
+            Of the same kind as those before.
+        """
+        self.columns.begin_again(model, rig)
+
+    def advance(self) -> bool:
+        """Let the run go on for a while.
+
+        Returns
+        -------
+        bool
+            False when the run has reached its end.
+
+        Raises
+        ------
+        SimulationError
+            If it cannot go on.
+        """
+        from integrators.compiled import record
+
+        columns = self.columns
+        columns.make_room()
+        b, start, before = columns.buffers, columns.start, columns.latest
+        try:
+            happening = record(
+                (
+                    *self.functions,
+                    b.method,
+                    b.control,
+                    b.plan,
+                    b.memory,
+                    b.y,
+                    b.mode,
+                    b.held,
+                    columns.p,
+                    b.relations,
+                    b.surfaces,
+                    b.sliding,
+                    b.out,
+                    b.work,
+                    columns.log,
+                    start.program.first,
+                    STEPS_AT_ONCE,
+                    self.engine is not None,
+                ),
+                compiled.store(),
+            )
+        except Exception as error:
+            if not start.program.callables:
+                raise
+            columns.interrupted(before)
+            names = " or ".join(map(repr, start.program.callables))
+            raise SimulationError(
+                f"signal {names}: the function raised {type(error).__name__}: {error}; the run up "
+                "to there is kept",
+                columns.trace(),
+            ) from error
+        if happening == loop.DONE:
+            check_end(columns)
+            return False
+        if happening == loop.ROWS:
+            if b.out.cursor[STEPS] >= PATIENCE:
+                check_pace(columns, columns.as_lists())
+        elif happening == loop.FIRING:
+            self._replay(self.engine)
+        else:
+            failed = hybrid.failure(happening, columns.as_lists(), start.program.relations)
+            raise explained(failed, columns) from None
+        return True
+
+    def _replay(self, engine: MachineEngine | None) -> None:
+        """Fire the user's machine as the compiled one is about to."""
+        assert engine is not None
+        memory, (t, y, mode) = self.columns.buffers.memory, self.columns.latest
+        start = self.columns.start
+        if memory.counts[loop.FIRED_ONE] == 0:  # the elements saw these values when asked
+            engine.show(t, y, list(mode[: start.model.n]), start.program.p)
+        try:
+            engine.trigger(int(memory.counts[loop.EDGE]), int(memory.counts[loop.MACHINE]), t)
+        except Meddling as error:
+            raise meddled(error, self.columns) from error.__cause__
+
+
+class Columns:
+    """The arrays a compiled run fills; they grow as needed.
+
+    Parameters
+    ----------
+    start : Start
+        What runs.
+    p : tuple of ndarray, optional
+        Parameters in place of the program's own.
+    """
+
+    def __init__(self, start: Start, p: compiled.Packed | None = None) -> None:
+        from integrators.compiled import arrays
+
+        self.start = start
+        self.p = compiled.packed(start.program.p) if p is None else p
+        size, n = start.program.size, start.program.modes
+        b = hybrid.buffers(
+            system(start.program),
+            start.t_start,
+            start.y,
+            start.mode,
+            start.last,
+            start.options,
+            capacity=0,
+            seen=start.program.seen,
+        )
+        few = max(16, min(1024, 4_000_000 // size))  # rows to begin with
+        rows = {"all": few, "t_eval": len(start.options.times or ()), "end": 0}[start.output]
+        stops = few if start.output == "t_eval" else 0
+        array: Any = np.array  # the buffers' fields say list; compiled code takes arrays
+        floats: Any = np.empty
+        ints: Any = functools.partial(np.zeros, dtype=np.int64)
+        self.buffers = dataclasses.replace(
+            b,
+            method=arrays(b.method),
+            control=arrays(b.control),
+            plan=arrays(b.plan),
+            memory=arrays(b.memory),
+            relations=arrays(b.relations),
+            surfaces=arrays(b.surfaces),
+            sliding=arrays(b.sliding),
+            work=arrays(b.work),
+            out=arrays(b.out)._replace(rows_t=floats(rows), rows_y=floats((rows, size))),
+            y=array(b.y),
+            mode=array(b.mode, dtype=np.int64),
+            held=array(b.held),
+        )
+        self.log = loop.Log(
+            counts=ints(2),
+            t=floats(256),
+            machine=ints(256),
+            edge=ints(256),
+            numbers=floats((256, 5)),
+            seen=floats(start.program.seen),
+            rows_microstep=ints(rows),
+            rows_mode=ints((rows, n)),
+            stops_t=floats(stops),
+            stops_microstep=ints(stops),
+            stops_y=floats((stops, size)),
+            stops_mode=ints((stops, n)),
+        )
+        if stops:
+            modes = start.mode + [0] * start.program.slides
+            self.log.stops_t[0], self.log.stops_y[0] = start.t_start, self.buffers.y
+            self.log.stops_mode[0] = modes
+            self.log.counts[STOPS] = 1
+
+    def begin_again(self, model: Model, rig: Rig) -> None:
+        """Empty the columns and go back to the start, with the numbers of a model and a rig."""
+        self.start = self.start.with_numbers(model, rig)
+        self.p = compiled.packed(self.start.program.p)
+        self.empty()
+
+    def empty(self) -> None:
+        """Empty the columns and go back to the start."""
+        start, log = self.start, self.log
+        b: Any = self.buffers  # arrays
+        memory, sliding = b.memory, b.sliding
+        memory.now[:] = hybrid.beginning(start.t_start, start.last)
+        for counts in (
+            memory.counts,
+            memory.switches,
+            memory.changes,
+            b.relations.watch,
+            b.out.cursor,
+            sliding.which,
+            sliding.flags,
+            sliding.arrived,
+        ):
+            counts[:] = 0
+        b.y[:], b.mode[:], memory.anchor[:] = start.y, start.mode, start.y
+        sliding.live[:] = start.program.live
+        b.control.atol[:] = b.work.floor[:] = start.options.atol
+        control = b.control._replace(time_scale=start.options.time_scale)
+        self.buffers = dataclasses.replace(self.buffers, control=control)
+        log.counts[:] = [0, min(1, len(log.stops_t))]
+
+    def state(self) -> dict[str, Any]:
+        """Return what was kept, as arrays, for a checkpoint."""
+        out = self.buffers.out
+        return {**self.log._asdict(), "rows_t": out.rows_t, "rows_y": out.rows_y}
+
+    def put_back(self, state: Mapping[str, Any]) -> None:
+        """Take over what `state` returned."""
+        self.log = loop.Log(**{name: state[name] for name in self.log._fields})
+        out = self.buffers.out._replace(rows_t=state["rows_t"], rows_y=state["rows_y"])
+        self.buffers = dataclasses.replace(self.buffers, out=out)
+
+    def make_room(self) -> None:
+        """Double the columns that are full."""
+        out, log = self.buffers.out, self.log
+        if out.every_step and out.cursor[ROW] + 1 >= len(out.rows_t):
+            self.buffers = dataclasses.replace(
+                self.buffers, out=out._replace(rows_t=_twice(out.rows_t), rows_y=_twice(out.rows_y))
+            )
+            log = log._replace(
+                rows_microstep=_twice(log.rows_microstep), rows_mode=_twice(log.rows_mode)
+            )
+        if log.counts[FIRINGS] >= len(log.t):
+            log = log._replace(
+                **{name: _twice(getattr(log, name)) for name in ("t", "machine", "edge", "numbers")}
+            )
+        if 0 < len(log.stops_t) <= log.counts[STOPS]:
+            names = ("stops_t", "stops_microstep", "stops_y", "stops_mode")
+            log = log._replace(**{name: _twice(getattr(log, name)) for name in names})
+        self.log = log
+
+    def interrupted(self, before: tuple[float, list[float], tuple[int, ...]]) -> None:
+        """Make sense of what machine code leaves behind where a function of the user's raised.
+
+        The rows are whole but for their modes; of time and state only those before are certain.
+        """
+        b: Any = self.buffers
+        log: Any = self.log
+        fresh = slice(int(b.memory.counts[loop.TAKEN]), int(b.out.cursor[ROW]))
+        t, y, mode = before
+        modes = [*b.mode.tolist(), *b.sliding.flags.tolist()]
+        log.rows_microstep[fresh], log.rows_mode[fresh] = 0, modes
+        b.memory.now[loop.T], b.y[:], b.mode[:] = t, y, mode[: len(b.mode)]
+
+    @property
+    def latest(self) -> tuple[float, list[float], tuple[int, ...]]:
+        """Time, state and modes reached."""
+        b: Any = self.buffers
+        modes = (*b.mode.tolist(), *b.sliding.flags.tolist())
+        return float(b.memory.now[loop.T]), b.y.tolist(), modes
+
+    def as_lists(self) -> hybrid.Buffers:
+        """Return the buffers with time, state and modes as Python's own numbers, for messages."""
+        b: Any = self.buffers
+        memory = b.memory._replace(now=b.memory.now.tolist(), counts=b.memory.counts.tolist())
+        sliding = b.sliding._replace(flags=b.sliding.flags.tolist())
+        return dataclasses.replace(
+            self.buffers, memory=memory, sliding=sliding, y=b.y.tolist(), mode=b.mode.tolist()
+        )
+
+    def observe(self, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
+        """Return v, F, s, F_i, dz of a state."""
+        return observe(self.start.program, t, y, mode)
+
+    def transitions(self) -> Any:
+        """Return the transition log."""
+        chart, log, count = self.start.model.chart, self.log, int(self.log.counts[FIRINGS])
+        edges = log.edge[:count]
+        texts = [
+            np.array([getattr(edge, name) for edge in chart.transitions], dtype=np.str_)[edges]
+            for name in ("name", "source", "target")
+            if chart.transitions
+        ] or [np.empty(0, dtype=np.str_)] * 3
+        columns: Any = log.numbers
+        return log_from([log.t[:count], log.machine[:count], *texts, *columns[:count].T])
+
+    def trace(self) -> Trace:
+        """Return all that was kept."""
+        start, log, out = self.start, self.log, self.buffers.out
+        count = int(out.cursor[ROW])
+        if start.output == "end":
+            t, y, mode = self.latest
+            rows = Rows(np.array([t]), np.zeros(1, dtype=np.int64), np.array([y]), np.array([mode]))
+        else:
+            rows = _rows(count, out.rows_t, log.rows_microstep, out.rows_y, log.rows_mode)
+        stops = rows
+        if start.output == "t_eval":
+            stops = _rows(
+                int(log.counts[STOPS]),
+                log.stops_t,
+                log.stops_microstep,
+                log.stops_y,
+                log.stops_mode,
+            )
+        return Trace(rows, stops, self.transitions(), start.model, start.rig, start.settings)
+
+
+FIRINGS, STOPS = 0, 1  # places in Log.counts
+
+
+def _twice(column: Any) -> Any:
+    return np.concatenate([column, np.zeros_like(column)])
+
+
+def _rows(count: int, *columns: Any) -> Rows:
+    """Return the filled part of four columns."""
+    return Rows(*(column[:count].copy() for column in columns))

@@ -1,0 +1,447 @@
+"""What a run keeps, and how it words an error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+import integrators
+from gms_fsm.charts.chart import Chart
+from gms_fsm.language.expression import rough_points
+from gms_fsm.lowering._observing import armed, observe, rate
+from gms_fsm.run.machines import Meddling
+from gms_fsm.run.start import Start
+from gms_fsm.traces.failures import (
+    CallbackError,
+    LivelockError,
+    NotFiniteError,
+    SignalEndError,
+    SimulationError,
+    StepLimitError,
+    StepSizeError,
+)
+from gms_fsm.traces.trace import Rows, Trace, log_of
+from integrators import (
+    Arc,
+    Firing,
+    HybridError,
+    Livelock,
+    NotFinite,
+    Slide,
+    StepTooSmall,
+    TooManySteps,
+    hybrid,
+)
+from integrators.advance import STEPS
+from integrators.loop import H
+
+__all__ = [
+    "PATIENCE",
+    "Moment",
+    "Recorder",
+    "Recording",
+    "check_end",
+    "check_pace",
+    "explained",
+    "meddled",
+]
+
+POWERS = 12  # turns of the power iteration
+STABLE = 1.5  # step times fastest rate; explicit methods go to 2 or 3.3, and hover below
+PATIENCE = 5_000  # steps between two looks at the pace
+
+
+class Recording(Protocol):
+    """What listeners may ask of a run under way."""
+
+    @property
+    def start(self) -> Start:
+        """What runs."""
+
+    @property
+    def latest(self) -> tuple[float, list[float], tuple[int, ...]]:
+        """Time, state and modes reached."""
+
+    def observe(self, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
+        """Return v, F, s, F_i, dz of a state."""
+
+    def trace(self) -> Trace:
+        """Return all that was kept."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Columns:
+    """Growing lists behind one `Rows`."""
+
+    t: list[float]
+    microstep: list[int]
+    y: list[list[float]]
+    mode: list[tuple[int, ...]]
+
+    def add(self, t: float, microstep: int, y: list[float], mode: tuple[int, ...]) -> None:
+        self.t.append(t)
+        self.microstep.append(microstep)
+        self.y.append(y)
+        self.mode.append(mode)
+
+    def rows(self, size: int, n: int) -> Rows:
+        count = min(map(len, vars(self).values()))  # Ctrl-C may come between two columns
+        return Rows(
+            np.array(self.t[:count], dtype=np.float64),
+            np.array(self.microstep[:count], dtype=np.int64),
+            np.array(self.y[:count], dtype=np.float64).reshape(count, size),
+            np.array(self.mode[:count], dtype=np.int64).reshape(count, n),
+        )
+
+
+class Recorder:
+    """Keeps what the loop yields.
+
+    Parameters
+    ----------
+    start : Start
+        What runs.
+    """
+
+    def __init__(self, start: Start) -> None:
+        self.start = start
+        self.rows = _Columns([], [], [], [])
+        self.stops = _Columns([], [], [], [])
+        self.log: list[tuple[Any, ...]] = []
+        self.latest = start.t_start, start.y, (*start.mode, *[0] * start.program.slides)
+        if start.output == "t_eval":
+            self.stops.add(start.t_start, 0, list(start.y), self.latest[2])
+
+    def take(self, happening: Arc | Firing | Slide | integrators.Stop) -> None:
+        """Keep one happening."""
+        output = self.start.output
+        match happening:
+            case Arc(t=times, y=states, mode=mode):
+                self.rows.t.extend(times)
+                self.rows.microstep.extend([0] * len(times))
+                self.rows.y.extend(states)
+                self.rows.mode.extend([mode] * len(times))
+                self.latest = (times[-1], states[-1], mode)
+            case Firing() | Slide():
+                # First the log: no row may show a firing that it has not.
+                if isinstance(happening, Firing):
+                    self.log.append(self._record(happening))
+                if output != "end":
+                    side = self.stops if output == "t_eval" else self.rows
+                    side.add(happening.t, happening.microstep, happening.y, happening.mode)
+                self.latest = (happening.t, happening.y, happening.mode)
+            case integrators.Stop(t=t, y=y, mode=mode):
+                if output == "t_eval":
+                    self.stops.add(t, 0, y, mode)
+                self.latest = (t, y, mode)
+
+    def state(self) -> dict[str, Any]:
+        """Return what was kept, as arrays, for a checkpoint."""
+        size, n = self.start.program.size, self.start.program.modes
+        tables = {"rows": self.rows, "stops": self.stops}
+        kept = {
+            f"{name}_{column}": values
+            for name, table in tables.items()
+            for column, values in vars(table.rows(size, n)).items()
+        }
+        return kept | {"log": np.asarray(log_of(self.log))}
+
+    def put_back(
+        self, state: Mapping[str, Any], latest: tuple[float, list[float], tuple[int, ...]]
+    ) -> None:
+        """Take over what `state` returned, and the state reached."""
+        for name in ("rows", "stops"):
+            t, microstep, y, mode = (
+                state[f"{name}_{column}"].tolist() for column in ("t", "microstep", "y", "mode")
+            )
+            setattr(self, name, _Columns(t, microstep, y, [tuple(row) for row in mode]))
+        self.log = state["log"].tolist()
+        self.latest = latest
+
+    def _record(self, firing: Firing) -> tuple[Any, ...]:
+        chart, i = self.start.model.chart, firing.machine
+        edge = chart.transitions[firing.edge]
+        before, after = (
+            self.observe(firing.t, y, mode)
+            for y, mode in ((firing.y_before, firing.mode_before), (firing.y, firing.mode))
+        )
+        z = firing.y_before[self.start.program.first + i]
+        return (
+            firing.t,
+            i,
+            edge.name,
+            edge.source,
+            edge.target,
+            z,
+            before[0],
+            before[2 + i],
+            before[1],
+            after[1],
+        )
+
+    def observe(self, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
+        """Return v, F, s, F_i, dz of a state."""
+        return observe(self.start.program, t, y, mode)
+
+    def trace(self) -> Trace:
+        """Return all that was kept."""
+        start = self.start
+        size, n = start.program.size, start.program.modes
+        if start.output == "end":
+            self.rows = _Columns([], [], [], [])
+            t, y, mode = self.latest
+            self.rows.add(t, 0, y, mode)
+        rows = self.rows.rows(size, n)
+        stops = self.stops.rows(size, n) if start.output == "t_eval" else rows
+        return Trace(rows, stops, log_of(self.log), start.model, start.rig, start.settings)
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """The latest row of a running simulation; computed only when asked."""
+
+    _recording: Recording
+
+    @property
+    def t(self) -> float:
+        """Time, s."""
+        return self._recording.latest[0]
+
+    @property
+    def states(self) -> list[str]:
+        """Active state of each element."""
+        states = self._recording.start.model.chart.states
+        return [states[mode].name for mode in self._recording.latest[2][: self._n]]
+
+    @property
+    def _n(self) -> int:
+        return self._recording.start.model.n
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """``x`` [m], ``v`` [m/s] and ``F`` [N]; ``z`` and ``s`` [m], one an element."""
+        recording, start = self._recording, self._recording.start
+        t, y, mode = recording.latest
+        seen = recording.observe(t, y, mode)
+        first, n = start.program.first, self._n
+        elements = {"z": y[first : first + n], "s": seen[2 : 2 + n]}
+        return {"x": y[0], "v": seen[0], "F": seen[1], **elements}
+
+
+# --------------------------------------------------------------------------- explaining
+def explained(error: HybridError, recorder: Recording) -> SimulationError:
+    """Put an error of the loop into the words of the model.
+
+    Parameters
+    ----------
+    error : HybridError
+        From `integrators`.
+    recorder : Recording
+        What was kept.
+
+    Returns
+    -------
+    SimulationError
+        With the trace.
+    """
+    trace = recorder.trace()
+    chart, kept = recorder.start.model.chart, "the run up to there is kept in .trace"
+    scene = f"t = {error.t!r} s"
+    if isinstance(error, NotFinite):
+        return NotFiniteError(
+            f"{_not_finite(error, recorder)} at or just after {scene} "
+            f"(x, v, z ... = {[float(f'{u:.6g}') for u in error.y]}): {error}; look at the signals "
+            f"and parameters there; {kept}",
+            trace,
+        )
+    if isinstance(error, StepTooSmall):
+        return StepSizeError(
+            f"the step size fell under the resolution of the clock at {scene}: the flow changes "
+            "too fast there for this method; try a stiff method (method=scipy.integrate.Radau), a "
+            f"larger rtol/atol, or look for a singular parameter; {kept}",
+            trace,
+        )
+    if isinstance(error, TooManySteps):
+        return StepLimitError(
+            f"the run has taken max_steps = {recorder.start.options.max_steps} steps and is at "
+            f"{scene}, short of t_end = {recorder.start.t_end!r} s: {_slow(recorder)}; {kept}",
+            trace,
+        )
+    if not isinstance(error, Livelock):
+        return SimulationError(f"{error} at {scene}; {kept}", trace)
+    seen = recorder.observe(error.t, error.y, error.mode)
+
+    def values(i: int) -> str:
+        z = error.y[recorder.start.program.first + i]
+        s = f", s = {seen[2 + i]:.6g}" if "s" in chart.inputs else ""
+        return f"{chart.variables[0]} = {z:.6g}{s}, v = {seen[0]:.6g}"
+
+    if error.machine is not None:
+        log = trace.transitions
+        taken = log[log.element == error.machine][-error.times :]
+        last = taken[-1]
+        guard = next(edge.guard for edge in chart.transitions if edge.name == last.edge)
+        time = float(last.t - taken[0].t)
+        cause = (
+            f"the flows on both sides of guard [{guard}] push back over it (chattering); leave a "
+            "gap between the guards there and back"
+            if time > 0.0
+            else f"guard [{guard}] {_way_back(chart, taken)} hold together; make the guards "
+            "exclude each other"
+        )
+        return LivelockError(
+            f"element {error.machine + 1} switched {len(taken)} times "
+            f"{f'in {time:.3g} s ' if time else ''}at {scene}, "
+            f"last by {str(last.edge)!r} from {last.source} to {last.target} "
+            f"({values(error.machine)}): {cause}; {kept}",
+            trace,
+        )
+    rough = [
+        i
+        for i, state in enumerate(error.mode[: recorder.start.model.n])
+        if any(rough_points(chart.flows[chart.states[state].name, u]) for u in chart.variables)
+    ]
+    i = rough[0] if rough else 0
+    state = chart.states[error.mode[i]]
+    edges = ", ".join(f"{edge.name} [{edge.guard}]" for _, edge in chart.leaving(state.name))
+    return LivelockError(
+        f"{' and '.join(error.relations)} changed {error.times} times at {scene}: "
+        f"element {i + 1} is in {state.name} ({values(i)}), its flow pushes back on both sides, "
+        f"no edge leaves ({edges or 'it has none'}), and no value of the sign between -1 and 1 "
+        f"holds it there; look at the parameters and at the flow of {state.name}; {kept}",
+        trace,
+    )
+
+
+def _slow(recorder: Recording) -> str:
+    """Say why a run takes many steps."""
+    log = recorder.trace().transitions
+    most = recorder.start.options.max_steps
+    if 10 * len(log) > most:
+        element, count = np.unique(log.element, return_counts=True)
+        worst = int(element[count.argmax()])
+        return (
+            f"element {worst + 1} has switched {int(count.max())} times (chattering); leave a gap "
+            "between its guards there and back, or give a larger max_steps"
+        )
+    return "give a larger max_steps, a larger rtol, or for a stiff run method=scipy.integrate.Radau"
+
+
+def check_pace(recording: Recording, buffers: hybrid.Buffers) -> None:
+    """Stop a stiff run that cannot reach its end with the steps that are left.
+
+    Stiff is where stability, not accuracy, keeps the steps small: where the step times the fastest
+    rate of the flow is of the order of one. That rate is found by a power iteration.
+
+    Parameters
+    ----------
+    recording : Recording
+        Of a run under way.
+    buffers : integrators.hybrid.Buffers
+        Where it is.
+
+    Raises
+    ------
+    StepLimitError
+        With the advice to use an implicit method.
+    """
+    start = recording.start
+    t, y, mode = recording.latest
+    options = start.options
+    step, left = buffers.memory.now[H], options.max_steps - buffers.out.cursor[STEPS]
+    if options.step or not isinstance(options.method, integrators.Tableau):
+        return
+    if start.last - t <= step * left:
+        return
+    program = start.program
+    held = armed(program, t, y, mode)
+    slope = rate(program, t, y, mode, held)
+    size = np.maximum(np.abs(y), np.array(buffers.work.floor) / options.rtol)
+    direction, fastest = np.ones(len(y)), 0.0
+    for _ in range(POWERS):
+        moved = (np.array(y) + 1e-6 * size * direction).tolist()
+        change = (rate(program, t, moved, mode, held) - slope) / (1e-6 * size)
+        fastest = float(np.abs(change).max())
+        if not 0.0 < fastest < math.inf:
+            return
+        direction = change / fastest
+    if step * fastest < STABLE:
+        return
+    raise StepLimitError(
+        f"stiff: the flow has a rate of {fastest:.3g} /s at t = {t!r} s, which holds the steps of "
+        f"this method at {step:.3g} s; to t_end = {start.t_end!r} s it would take "
+        f"{(start.t_end - t) / step:.3g} of them, max_steps is {start.options.max_steps}; use an "
+        'implicit method (method=scipy.integrate.Radau; [run] method = "Radau"), or check C and '
+        "the thresholds; the run up to there is kept in .trace",
+        recording.trace(),
+    )
+
+
+def meddled(error: Meddling, recorder: Recording) -> CallbackError:
+    """Put what a callback did into an error with the trace.
+
+    Parameters
+    ----------
+    error : Meddling
+        From the machines.
+    recorder : Recording
+        What was kept.
+
+    Returns
+    -------
+    CallbackError
+        With the trace.
+    """
+    return CallbackError(f"{error}; the run up to there is kept in .trace", recorder.trace())
+
+
+def _way_back(chart: Chart, taken: Any) -> str:
+    """Name the other edge of an endless to and fro."""
+    other = next((edge for edge in chart.transitions if edge.name == taken[-2].edge), None)
+    if len(set(taken.edge.tolist())) != 2 or other is None:
+        return "and a way back"
+    return f"and that of {other.name}, [{other.guard}],"
+
+
+def _not_finite(error: NotFinite, recorder: Recording) -> str:
+    """Name what is not finite where a run ended, as far as it shows there."""
+    model = recorder.start.model
+    seen = recorder.observe(error.t, error.y, error.mode)
+    if not math.isfinite(seen[0]):
+        return "the velocity v is not finite"
+    rates = seen[2 + 2 * model.n :]
+    for j, variable in enumerate(model.chart.variables):
+        for i, mode in enumerate(error.mode[: model.n]):
+            if not math.isfinite(rates[j * model.n + i]):
+                state = model.chart.states[mode]
+                return (
+                    f"the flow of {variable} in state {state.name}, [{state.flow[variable]}], is "
+                    f"not finite in element {i + 1}"
+                )
+    return "a signal or a flow is not finite"
+
+
+def check_end(recorder: Recording) -> None:
+    """Raise if a sampled signal ended before the run should.
+
+    Parameters
+    ----------
+    recorder : Recording
+        Of a run that has reached its last time.
+
+    Raises
+    ------
+    SignalEndError
+        With the trace.
+    """
+    last, t_end = recorder.start.last, recorder.start.t_end
+    if last < t_end:
+        raise SignalEndError(
+            f"a sampled signal ends at t = {last!r} s, before t_end = {t_end!r} s; give a longer "
+            f"record or t_end <= {last!r}; the run up to there is kept",
+            recorder.trace(),
+        )

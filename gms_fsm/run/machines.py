@@ -1,0 +1,316 @@
+"""The elements as `transitions` machines, and the generated if-else in their place.
+
+One `transitions.Machine` serves n element objects. The driver asks a table read from that machine
+(its transitions and the guards that are their conditions) and fires through it, so that callbacks
+registered by a user (``on_enter_slip``, ``after`` ...) run, once a firing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+from transitions import Machine, MachineError
+
+from gms_fsm.charts.chart import Chart
+from gms_fsm.errors import ChartError, ParameterError, shown
+from gms_fsm.language.expression import PYTHON, Condition, names_in, spell
+from gms_fsm.lowering._generated import ieee, load, load_careful
+from gms_fsm.lowering.program import Arguments, Program
+from gms_fsm.systems.models import Model
+
+__all__ = ["Element", "ElementMachines", "Engine", "IfElse", "Meddling"]
+
+
+class Element:
+    """One Maxwell element: the model object of its machine.
+
+    Callbacks find here what they need: ``t`` [s], ``x`` [m], ``v`` [m/s], the threshold ``s``, each
+    variable (``z`` [m]) and each parameter (``k``, ``sigma``, ``C``, ``v_c``) of the chart, the
+    current ``state`` and the element's ``index`` counted from 0. Parameters are read-only: the run
+    is integrated with those of the model. Derive from it to give elements methods that
+    `transitions` calls by name, such as ``on_enter_slip(self, event)``.
+    """
+
+    # No __slots__ and no generated __eq__: transitions fails on the first and registers equal
+    # models only once.
+    state: str
+    index: int
+    t: float
+    x: float
+    v: float
+    s: float
+    _fixed: frozenset[str] = frozenset()
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in self._fixed:
+            raise ParameterError(
+                f"element {self.index + 1}: {name} is set to {shown(value)}, but parameters of an "
+                "element are read-only: the flow would not follow. Change them between runs "
+                "(with_values(model, ...)), or make the number a variable of the chart with the "
+                "flow '0' and assign it in an action"
+            )
+        object.__setattr__(self, name, value)
+
+
+class Guard:
+    """A guard as a condition of `transitions`: callable on its event, or asked directly."""
+
+    def __init__(self, edge: str, condition: Condition) -> None:
+        names = {name: f"element.{name}" for name in names_in(condition)}
+        self.text = spell(condition, PYTHON)
+        source = f"def holds(element):\n    return {spell(condition, PYTHON, names)}\n"
+        self.holds: Callable[[Element], bool] = ieee(
+            load(f"guard {edge}", source)["holds"], load_careful(f"guard {edge}", source)["holds"]
+        )
+
+    def __call__(self, event: Any) -> bool:
+        return self.holds(event.model)
+
+    def __repr__(self) -> str:
+        return f"<guard {self.text}>"
+
+
+class ElementMachines:
+    """n elements of a model, each in a state of one shared `transitions.Machine`.
+
+    Parameters
+    ----------
+    model : Model
+        What the elements are.
+    element : type, optional
+        Class of the element objects, `Element` or derived from it.
+
+    Attributes
+    ----------
+    machine : transitions.Machine
+        Add callbacks here: ``machines.machine.on_enter_slip(callback)``. With
+        ``send_event=True`` a callback gets the event; ``event.model`` is the `Element`.
+    elements : list of Element
+        The model objects, one an element.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> machines = ElementMachines(model)
+    >>> slips = []
+    >>> machines.machine.on_enter_slip(lambda event: slips.append(event.model.index))
+    >>> trace = simulate(model, Prescribed("0.2"), 3.0, engine=machines)
+    >>> slips, machines.elements[0].state
+    ([0, 1, 2, 3], 'slip')
+    """
+
+    def __init__(self, model: Model, element: type[Element] = Element) -> None:
+        if not hasattr(model, "chart"):
+            raise ParameterError(
+                f"model is {shown(model)}; it must be a model, for example GMS(parameters, "
+                "law='signed')"
+            )
+        chart = model.chart
+        self.model = model
+        self.guards = {edge: Guard(edge, guard) for edge, guard in chart.guards.items()}
+        self.elements = [_new_element(element, model, i) for i in range(model.n)]
+        self.machine = Machine(
+            model=self.elements,
+            states=[state.name for state in chart.states],
+            transitions=[
+                {
+                    "trigger": edge.name,
+                    "source": edge.source,
+                    "dest": edge.target,
+                    "conditions": [self.guards[edge.name]],
+                }
+                for edge in chart.transitions
+            ],
+            initial=chart.default_state.name,
+            auto_transitions=False,
+            send_event=True,
+        )
+
+    def table(self, chart: Chart) -> list[list[tuple[int, Guard]]]:
+        """Read the machine: for each state its edges and guards, highest priority first.
+
+        Parameters
+        ----------
+        chart : Chart
+            The chart the machine was made from.
+
+        Returns
+        -------
+        list of list of (int, Guard)
+            Edge index and guard, by state index.
+
+        Raises
+        ------
+        ChartError
+            If the machine has edges or conditions that are not in the chart.
+        """
+        table: list[list[tuple[int, Guard]]] = []
+        for state in chart.states:
+            rows = []
+            for index, edge in enumerate(chart.transitions):
+                for transition in self.machine.get_transitions(edge.name, source=state.name):
+                    conditions = [c.func for c in transition.conditions]
+                    if conditions != [self.guards[edge.name]] or transition.dest != edge.target:
+                        raise ChartError(
+                            f"edge {edge.name!r}: the machine was given conditions {conditions} "
+                            f"or the target {transition.dest!r}, which chart {chart.name!r} does "
+                            "not know; write them in the chart's guard, it is the only truth"
+                        )
+                    rows.append((index, self.guards[edge.name]))
+            found = [index for index, _ in rows]
+            for index, edge in chart.leaving(state.name):
+                if found.count(index) != 1:
+                    raise ChartError(
+                        f"the machine has the edge {edge.name!r} {found.count(index)} times, chart "
+                        f"{chart.name!r} has it once; change the chart, it is the only truth"
+                    )
+            table.append(rows)
+        known = {edge.name for edge in chart.transitions}
+        for trigger in self.machine.get_triggers(*self.machine.states):
+            if trigger not in known:
+                raise ChartError(
+                    f"the machine has a trigger {trigger!r} that chart {chart.name!r} does not "
+                    "know; add a Transition to the chart"
+                )
+        return table
+
+
+def _new_element(kind: type[Element], model: Model, index: int) -> Element:
+    if not (isinstance(kind, type) and issubclass(kind, Element)):
+        raise ParameterError(f"element is {kind!r}; it must be a class derived from Element")
+    if kind.__eq__ is not object.__eq__:
+        raise ParameterError(
+            f"{kind.__name__} compares by value, so that transitions would take all elements for "
+            "one; use @dataclass(eq=False)"
+        )
+    element = kind()
+    values = vars(element)  # past __setattr__, as an __init__ may have set these names
+    values["index"] = index
+    for name, value in model.values.items():
+        values[name] = float(value if isinstance(value, float | int) else value[index])
+    values["_fixed"] = frozenset(model.values) | {"index"}
+    return element
+
+
+# --------------------------------------------------------------------------- engines
+class Engine(Protocol):
+    """Who decides; satisfies `integrators.Switch`."""
+
+    def ask(
+        self, t: float, y: list[float], mode: list[int], p: Arguments, edges: list[int]
+    ) -> None:
+        """Fill the first enabled edge of each element, or -1."""
+
+    def act(
+        self, edge: int, machine: int, t: float, y: list[float], mode: list[int], p: Arguments
+    ) -> None:
+        """Take an edge."""
+
+
+class Meddling(Exception):
+    """A callback changed what it may only look at; whoever holds the run says it to the user."""
+
+
+class MachineEngine:
+    """Asks and fires the `transitions` machines."""
+
+    def __init__(self, machines: ElementMachines, program: Program, mode: list[int]) -> None:
+        self.machines, self.program = machines, program
+        self.chart = machines.model.chart
+        self.table = machines.table(self.chart)
+        n = len(mode)
+        self.seen, self.live = [0.0] * program.seen, program.live
+        self.places = [
+            (variable, program.first + j * n) for j, variable in enumerate(self.chart.variables)
+        ]
+        self.seen_by = [vars(element) for element in machines.elements]
+        self.states = [""] * n
+        self.set_states(mode)
+
+    def go_on_from(self, t: float, y: list[float], mode: Sequence[int], p: Arguments) -> None:
+        """Put every element where it was when a run was interrupted."""
+        self.set_states(mode)
+        self.show(t, y, list(mode), p)  # perhaps between two firings of a set
+
+    def set_states(self, mode: Sequence[int]) -> None:
+        """Put every element into a state, without callbacks."""
+        for i, state in enumerate(mode):
+            self.set_state(i, self.chart.states[state].name)
+
+    def set_state(self, machine: int, state: str) -> None:
+        """Put one element into a state, without callbacks."""
+        self.machines.machine.set_state(state, self.machines.elements[machine])
+        self.states[machine] = state
+
+    def show(self, t: float, y: list[float], mode: list[int], p: Arguments) -> None:
+        """Put the present values at hand of every element."""
+        seen = self.seen
+        self.program.ieee["observe"](t, y, mode, self.live, p, seen)
+        x, v = y[0], seen[0]
+        for i, values in enumerate(self.seen_by):  # past __setattr__, which would cost time
+            values["t"], values["x"], values["v"], values["s"] = t, x, v, seen[2 + i]
+            for variable, base in self.places:
+                values[variable] = y[base + i]
+
+    def ask(
+        self, t: float, y: list[float], mode: list[int], p: Arguments, edges: list[int]
+    ) -> None:
+        """Fill the first enabled edge of each element, or -1."""
+        self.show(t, y, mode, p)
+        for i, element in enumerate(self.machines.elements):
+            edges[i] = -1
+            for edge, guard in self.table[mode[i]]:
+                if guard.holds(element):
+                    edges[i] = edge
+                    break
+
+    def act(
+        self, edge: int, machine: int, t: float, y: list[float], mode: list[int], p: Arguments
+    ) -> None:
+        """Take an edge through `transitions`, so that callbacks run."""
+        self.trigger(edge, machine, t)
+        self.program.ieee["act"](edge, machine, t, y, mode, p)
+
+    def trigger(self, edge: int, machine: int, t: float) -> None:
+        """Fire the machine's edge on the values it was asked with.
+
+        Raises
+        ------
+        Meddling
+            If a callback changed these values, or a state.
+        """
+        row, elements = self.chart.transitions[edge], self.machines.elements
+        here = f"element {machine + 1}, edge {row.name!r} at t = {t!r} s"
+        # The trigger evaluates the guard once more; assignments come after, as in Stateflow, where
+        # the whole set was chosen before any of them.
+        try:
+            fired = getattr(elements[machine], row.name)()
+        except MachineError as error:
+            raise Meddling(
+                f"{here}: a callback moved a state ({error.value}); {ONLY_LOOK}"
+            ) from error
+        if not fired:
+            raise Meddling(
+                f"{here}: the edge was enabled, but a callback changed the element's values before "
+                f"it fired; {ONLY_LOOK}"
+            )
+        self.states[machine] = row.target
+        for i, (element, state) in enumerate(zip(elements, self.states, strict=True)):
+            if element.state != state:
+                raise Meddling(
+                    f"{here}: a callback put element {i + 1} into state {shown(element.state)}, "
+                    f"but the chart has it in {state!r}; {ONLY_LOOK}"
+                )
+
+
+ONLY_LOOK = "callbacks may only look; write the switch into the chart, as an edge with a guard"
+
+
+class IfElse:
+    """Asks the generated if-else text, the paper's Fig. 2c."""
+
+    def __init__(self, program: Program) -> None:
+        self.ask = program.ieee["switch"]
+        self.act = program.ieee["act"]

@@ -1,0 +1,287 @@
+"""simulate(): a model on a rig, run by its state machines."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+import integrators
+from gms_fsm.errors import ParameterError, SignalError
+from gms_fsm.lowering.program import system
+from gms_fsm.lowering.scales import Tolerance
+from gms_fsm.run._checkpoint import Keeper
+from gms_fsm.run._compiled_run import CompiledRun
+from gms_fsm.run._recording import (
+    PATIENCE,
+    Moment,
+    Recorder,
+    check_end,
+    check_pace,
+    explained,
+    meddled,
+)
+from gms_fsm.run.machines import ElementMachines, IfElse, MachineEngine, Meddling
+from gms_fsm.run.start import MOST_STEPS, Start
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.rigs import Rig
+from gms_fsm.traces.failures import SimulationError
+from gms_fsm.traces.monitors import Monitor, checked, watched
+from gms_fsm.traces.trace import Trace
+from integrators import Arc, Firing, HybridError, Slide, hybrid
+from integrators.advance import ROW, STEPS
+from integrators.loop import T
+
+__all__ = ["Moment", "Run", "simulate"]
+
+
+def simulate(
+    model: Model,
+    rig: Rig,
+    t_end: float,
+    *,
+    t_start: float = 0.0,
+    method: str | type[Any] = "dp45",
+    step: float | None = None,
+    rtol: float = 1e-6,
+    atol: Tolerance = None,
+    max_step: float = math.inf,
+    max_steps: int = MOST_STEPS,
+    events: str = "located",
+    engine: str | ElementMachines = "machines",
+    machines: ElementMachines | None = None,
+    output: str | None = None,
+    t_eval: ArrayLike | None = None,
+    initial: Mapping[str, Any] | None = None,
+    progress: Callable[[Moment], object] | None = None,
+    checkpoint: str | Path | None = None,
+    checkpoint_every: float = 60.0,
+    monitors: str | Iterable[str | Monitor] = (),
+) -> Trace:
+    """Run a friction model on a rig.
+
+    The driver asks the machines, freezes their states, integrates until a watched comparison
+    changes its truth, and asks again.
+
+    Parameters
+    ----------
+    model : GMS, LuGre or ChartModel
+        What rubs.
+    rig : Prescribed, Slider or PulledSlider
+        What it is mounted on.
+    t_end, t_start : float
+        s.
+    method : {"dp45", "bs23", "rk4", "heun", "euler"} or OdeSolver class
+        dp45 and bs23 choose their steps, the others need `step`. Any `scipy.integrate.OdeSolver`
+        class (Radau, BDF, LSODA ...) for stiff cases.
+    step : float, optional
+        Fixed steps of this length [s], the last one cut to t_end; at a located crossing a step is
+        cut and the grid is met again after it. A SciPy class is led from grid point to grid point.
+    rtol : float
+        Relative tolerance of adaptive steps; the error is the largest component's.
+    atol : float or mapping, optional
+        Absolute tolerance of all components, or by name: ``x`` [m], ``v`` [m/s], the chart's
+        variables, a number or one per element. What is left out comes from the model's own scales
+        (`gms_fsm.lowering.scales`): a tenth of rtol times the smallest deflection at which a
+        guard changes, or times v_c. A component for which the chart has no scale is measured
+        by the largest value it has had. What was used stands in ``Trace.settings``.
+    max_step : float
+        Longest adaptive step, s. Accuracy does not need it.
+    max_steps : int
+        How many steps may be tried; a run that needs more ends in a `StepLimitError`.
+    events : {"located", "step"}
+        ``"located"`` finds the place of each switch. ``"step"`` looks at the guards once at the end
+        of a step, at most one edge per element, like an if-else in a block diagram: it loses
+        switches and is here to show that. It needs `step` or a finite `max_step`.
+    engine : {"machines", "ifelse", "compiled"} or ElementMachines
+        Who decides: the `transitions` machines, the generated if-else text, or that text as machine
+        code (extra ``fast``). The results are the same to the last bit. Machines of your own, with
+        callbacks, may stand here instead of ``"machines"``.
+    machines : ElementMachines, optional
+        Machines of your own; with the compiled engine each firing is replayed through them, so that
+        callbacks run and their states are right at the end.
+    output : {"all", "t_eval", "end"}, optional
+        Rows to keep: every accepted step, the times of `t_eval`, or only the state at the end. The
+        transition log is always complete. By default ``"t_eval"`` if it is given, else ``"all"``.
+    t_eval : array_like, shape (m,), optional
+        Wanted times [s], increasing; the trace has exactly these rows. All accepted steps and
+        micro-steps otherwise.
+    initial : mapping, optional
+        Any of the chart's variables by name, such as ``z`` (n,) [m], ``states`` (n,) names, ``v``
+        [m/s] (not with a prescribed velocity) and ``x`` [m].
+    progress : callable, optional
+        Called now and then with the `Moment` reached.
+    checkpoint : str or Path, optional
+        A file for the state of a long run, written now and then. If it is there when the run
+        starts, the run goes on from it, bit for bit as if it had not been interrupted; at the end
+        the file is removed. A signal may be a Python function over plain values: another function
+        is refused.
+    checkpoint_every : float
+        s of the computer's time between two checkpoints.
+    monitors : str or iterable of str or Monitor
+        What to watch the run for: ``"chattering"``, ``"passivity"``, ``"coverage"``, ``"all"``
+        of these, invariants such as ``"abs(z) <= 2*s"``, or objects of `gms_fsm.traces.monitors`.
+        What they say is in ``Trace.monitors``. They look at the rows and the log when the run has
+        ended, or has failed.
+
+    Returns
+    -------
+    Trace
+        Rows, transition log and what they were made from.
+
+    Raises
+    ------
+    ParameterError, SignalError
+        If an argument breaks its rule.
+    CheckpointError
+        If the checkpoint belongs to another run or another program, or is damaged.
+    OutputError
+        If there is to be a checkpoint and the rig is of a class of your own.
+    SimulationError
+        If the run cannot go on (`LivelockError`, `StepSizeError`, `StepLimitError`,
+        `NotFiniteError`, `SignalEndError`, `CallbackError`); its ``trace`` holds the part before.
+    KeyboardInterrupt
+        On Ctrl-C; its ``trace`` holds the part before, perhaps without a row.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed
+    >>> trace = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"),
+    ...                  Prescribed("0.2*sin(2*pi*t/20)"), 61.0)
+    >>> len(trace.transitions)
+    48
+    """
+    if isinstance(engine, ElementMachines):
+        if machines is not None:
+            raise ParameterError("engine and machines are both machines of yours; give one of them")
+        machines, engine = engine, "machines"
+    if machines is not None:
+        if machines.model is not model:
+            raise ParameterError("machines: these ElementMachines were made for another model")
+        if engine == "ifelse":
+            raise ParameterError("engine 'ifelse' asks no machines; leave machines=... out")
+    start = Start.of(
+        model,
+        rig,
+        t_end,
+        t_start=t_start,
+        method=method,
+        step=step,
+        rtol=rtol,
+        atol=atol,
+        max_step=max_step,
+        max_steps=max_steps,
+        events=events,
+        engine=engine,
+        output=output,
+        t_eval=t_eval,
+        initial=initial,
+    )
+    watching = checked(monitors, model, start.output).values() if monitors else ()
+    run = CompiledRun(start, machines) if engine == "compiled" else Run(start, machines)
+    keeper = None if checkpoint is None else Keeper(run, Path(checkpoint), checkpoint_every)
+    try:
+        while run.advance():
+            if keeper is not None:
+                keeper.look()
+            if progress is not None:
+                progress(Moment(run.recorder))
+    except SimulationError as error:
+        if watching:
+            error.trace = watched(error.trace, watching, error)
+        raise
+    except KeyboardInterrupt as error:
+        error.trace = run.recorder.trace()  # type: ignore[attr-defined]
+        raise
+    if keeper is not None:
+        keeper.finish()
+    trace = run.recorder.trace()
+    return watched(trace, watching) if watching else trace
+
+
+class Run:
+    """A simulation under way: what `simulate` drives to its end and a session step by step.
+
+    Parameters
+    ----------
+    start : Start
+        What to run; for the engine ``"compiled"`` the machines run it, with the same result.
+    machines : ElementMachines, optional
+        Machines of the user's own.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> run = Run(Start.of(model, Prescribed("0.2"), 3.0, rows_at_once=1))
+    >>> run.advance(), len(run.recorder.trace())
+    (True, 1)
+    """
+
+    def __init__(self, start: Start, machines: ElementMachines | None = None) -> None:
+        self.start = start
+        switch: MachineEngine | IfElse = IfElse(start.program)
+        self.engine: MachineEngine | None = None
+        if start.settings["engine"] != "ifelse":
+            machines = ElementMachines(start.model) if machines is None else machines
+            switch = self.engine = MachineEngine(machines, start.program, start.mode)
+        self.recorder, self.next_look = Recorder(start), PATIENCE
+        self.happening: Arc | Firing | Slide | integrators.Stop | None = None  # the latest
+        made = system(start.program)
+        self.buffers = hybrid.buffers(
+            made, start.t_start, start.y, start.mode, start.last, start.options
+        )
+        self.happenings = hybrid.happenings(made, switch, self.buffers, start.options)
+
+    def kept(self) -> dict[str, Any]:
+        """Return what the recorder holds, for a checkpoint."""
+        return self.recorder.state()
+
+    def go_on_from(self, kept: dict[str, Any]) -> None:
+        """Take over what `kept` returned; the buffers are filled already."""
+        b = self.buffers
+        self.recorder.put_back(kept, (b.memory.now[T], list(b.y), hybrid.modes_of(b)))
+        if self.engine is not None:
+            self.engine.go_on_from(b.memory.now[T], list(b.y), b.mode, self.start.program.p)
+
+    def advance(self) -> bool:
+        """Let the next thing happen.
+
+        Returns
+        -------
+        bool
+            False when the run has reached its end.
+
+        Raises
+        ------
+        SimulationError
+            If it cannot go on.
+        """
+        recorder = self.recorder
+        try:
+            happening = next(self.happenings, None)
+        except HybridError as error:
+            recorder.latest = error.t, error.y, error.mode
+            raise explained(error, recorder) from None
+        except SignalError as error:
+            raise SimulationError(
+                f"{error}; the run up to there is kept", recorder.trace()
+            ) from None
+        except KeyboardInterrupt:  # within a step; the rows before may have taken an hour
+            if self.buffers.out.cursor[ROW]:
+                recorder.take(hybrid.take_rows(self.buffers))
+            raise
+        except Meddling as error:
+            raise meddled(error, recorder) from error.__cause__
+        if happening is None:
+            check_end(recorder)
+            return False
+        self.happening = happening
+        recorder.take(happening)
+        if isinstance(happening, Arc) and self.buffers.out.cursor[STEPS] >= self.next_look:
+            self.next_look = self.buffers.out.cursor[STEPS] + PATIENCE
+            check_pace(recorder, self.buffers)
+        return True

@@ -1,0 +1,368 @@
+"""Friction models: a chart, the numbers it needs, and what the elements share.
+
+A model says nothing of how it is run or what it is mounted on.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gms_fsm.charts.chart import SUPPLIED, Chart
+from gms_fsm.charts.gms import GMS_ELEMENT, Law, gms_element
+from gms_fsm.charts.lugre import LUGRE
+from gms_fsm.charts.parameters import (
+    FloatArray,
+    GMSParameters,
+    Stribeck,
+    checked_array,
+    checked_scalar,
+)
+from gms_fsm.errors import ParameterError, shown
+
+__all__ = ["GMS", "ChartModel", "LuGre", "Model", "parameter_names", "with_values"]
+
+
+class Model(Protocol):
+    """What a simulation needs to know of a friction model."""
+
+    @property
+    def title(self) -> str:
+        """Name and law, for figures and summaries."""
+
+    @property
+    def chart(self) -> Chart:
+        """The chart every element runs."""
+
+    @property
+    def n(self) -> int:
+        """Number of elements."""
+
+    @property
+    def values(self) -> Mapping[str, float | FloatArray]:
+        """For each parameter of the chart one number, or one an element, shape (n,)."""
+
+    @property
+    def weights(self) -> FloatArray:
+        """Threshold weights, shape (n,), m/N; ``s_i = weights[i] * s(v)``."""
+
+    @property
+    def stribeck(self) -> Stribeck | None:
+        """The common Stribeck curve; None where the chart has no input ``s``."""
+
+    @property
+    def sigma_2(self) -> float:
+        """Viscous friction, Ns/m."""
+
+
+@dataclass(frozen=True, eq=False)
+class GMS:
+    """A bank of Generalized Maxwell Slip elements in parallel.
+
+    ``F = sum(k_i z_i + sigma_i dz_i/dt) + sigma_2 v``, eq. (3) and (4).
+
+    Parameters
+    ----------
+    parameters : GMSParameters
+        The numbers.
+    law : {"published", "signed"}
+        The slip law; see `gms_fsm.charts.gms`. There is no default: the two differ for v < 0.
+
+    Raises
+    ------
+    ParameterError
+        If the law is neither.
+
+    Warns
+    -----
+    UserWarning
+        If the published law is used with F_s = F_c: such an element never arrests.
+
+    Examples
+    --------
+    >>> GMS(GMSParameters.paper("stick-slip"), law="published").title
+    'GMS, 4 elements, published law'
+    """
+
+    parameters: GMSParameters
+    law: Law = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.parameters, GMSParameters):
+            raise ParameterError(
+                f"parameters is {self.parameters!r}; it must be a GMSParameters, for example "
+                "GMSParameters.paper('stick-slip')"
+            )
+        gms_element(self.law)
+        if self.law == "published" and self.stribeck.F_s == self.stribeck.F_c:
+            warnings.warn(
+                f"published law with F_s = F_c = {self.stribeck.F_c!r} N: a slipping element stays "
+                "exactly on |z| = s, where the law is at rest, and never arrests; use law='signed' "
+                "or F_s > F_c",
+                stacklevel=3,
+            )
+
+    @property
+    def title(self) -> str:
+        """Name and law."""
+        plural = "element" if self.n == 1 else "elements"
+        return f"GMS, {self.n} {plural}, {self.law} law"
+
+    @property
+    def chart(self) -> Chart:
+        """The chart of one element."""
+        return GMS_ELEMENT[self.law]
+
+    @property
+    def n(self) -> int:
+        """Number of elements."""
+        return self.parameters.n
+
+    @property
+    def values(self) -> Mapping[str, float | FloatArray]:
+        """The chart's parameters."""
+        p = self.parameters
+        return {"k": p.k, "sigma": p.sigma, "C": p.C, "v_c": p.v_c}
+
+    @property
+    def weights(self) -> FloatArray:
+        """Threshold weights, shape (n,), m/N."""
+        return self.parameters.weights
+
+    @property
+    def stribeck(self) -> Stribeck:
+        """The Stribeck curve."""
+        return self.parameters.stribeck
+
+    @property
+    def sigma_2(self) -> float:
+        """Viscous friction, Ns/m."""
+        return self.parameters.sigma_2
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LuGre:
+    """The LuGre model: one bristle, one state, no edges.
+
+    ``dz = v - sigma_0 |v| z / s(v)``, ``F = sigma_0 z + sigma_1 dz + sigma_2 v``.
+
+    Parameters
+    ----------
+    sigma_0 : float
+        Bristle stiffness, N/m, > 0.
+    sigma_1 : float
+        Bristle damping, Ns/m, >= 0.
+    sigma_2 : float
+        Viscous friction, Ns/m, >= 0.
+    stribeck : Stribeck
+        The curve.
+
+    Examples
+    --------
+    >>> LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4, stribeck=Stribeck(1, 1.5, 1e-3)).n
+    1
+    """
+
+    sigma_0: float
+    sigma_1: float
+    sigma_2: float
+    stribeck: Stribeck
+
+    def __post_init__(self) -> None:
+        for name, rule in (("sigma_0", "> 0"), ("sigma_1", ">= 0"), ("sigma_2", ">= 0")):
+            object.__setattr__(self, name, checked_scalar(name, getattr(self, name), rule))
+        if not isinstance(self.stribeck, Stribeck):
+            raise ParameterError(f"stribeck is {self.stribeck!r}; it must be a Stribeck")
+
+    title = "LuGre"
+    chart = LUGRE
+    n = 1
+
+    @property
+    def values(self) -> Mapping[str, float | FloatArray]:
+        """The chart's parameters."""
+        return {"sigma_0": self.sigma_0, "sigma_1": self.sigma_1}
+
+    @property
+    def weights(self) -> FloatArray:
+        """One weight of 1; LuGre uses s(v) itself."""
+        return np.ones(1)
+
+
+@dataclass(frozen=True, eq=False)
+class ChartModel:
+    """Any chart run as a bank of n elements: your own reading of the guards, your own states.
+
+    Parameters
+    ----------
+    chart : Chart
+        The element's chart.
+    values : mapping
+        For each parameter of the chart a number, or an array of shape (n,).
+    n : int, optional
+        Number of elements; 1 when left out.
+    stribeck : Stribeck, optional
+        The curve behind the input ``s``; None for charts without this input.
+    sigma_2 : float
+        Viscous friction, Ns/m, >= 0.
+    weights : array_like, shape (n,), optional
+        Threshold weights, m/N; 1 when left out.
+    title : str, optional
+        For figures; the chart's name when left out.
+
+    Raises
+    ------
+    ParameterError
+        If a value is missing, unknown, not finite or of the wrong length, or the chart wants an
+        input that no model supplies, or ``s`` without a curve.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts import gms_element
+    >>> ChartModel(gms_element("signed"), {"k": 1, "sigma": 0, "C": 1, "v_c": 1e-6}, n=2,
+    ...            stribeck=Stribeck(1, 1.5, 1e-3)).title
+    'GMS element, signed law'
+    """
+
+    chart: Chart
+    values: Mapping[str, float | FloatArray]
+    n: int = field(default=1, kw_only=True)
+    stribeck: Stribeck | None = field(default=None, kw_only=True)
+    sigma_2: float = field(default=0.0, kw_only=True)
+    weights: FloatArray = field(default=None, kw_only=True)  # type: ignore[arg-type]
+    title: str = field(default="", kw_only=True)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.chart, Chart):
+            raise ParameterError(
+                f"chart is {shown(self.chart)}; it must be a gms_fsm.Chart (the transitions "
+                "machine is made from it: ElementMachines(model).machine)"
+            )
+        if isinstance(self.n, bool) or not isinstance(self.n, int) or self.n < 1:
+            raise ParameterError(
+                f"n is {shown(self.n)}; a bank has a whole number of elements, at least one"
+            )
+        curve: Any = self.stribeck
+        if not isinstance(curve, Stribeck) and (curve is not None or "s" in self.chart.inputs):
+            raise ParameterError(
+                f"chart {self.chart.name!r}: stribeck is {shown(curve)}; for the input s give its "
+                "curve, stribeck=Stribeck(F_c, F_s, v_s), and leave it out for a chart without s"
+            )
+        for name in self.chart.inputs:
+            if name not in SUPPLIED:
+                raise ParameterError(
+                    f"chart {self.chart.name!r} wants the input {name!r}; "
+                    f"a model supplies {', '.join(SUPPLIED)}"
+                )
+        if not isinstance(self.values, Mapping):
+            raise ParameterError(
+                f"values is {shown(self.values)}; it must give a number for each parameter of the "
+                "chart, for example {'k': 1.0}"
+            )
+        wanted, given = set(self.chart.parameters), set(self.values)
+        if wanted != given:
+            raise ParameterError(
+                f"chart {self.chart.name!r} has the parameters {sorted(wanted)}; missing values: "
+                f"{sorted(wanted - given) or 'none'}, unknown: {sorted(given - wanted) or 'none'}"
+            )
+        checked = {name: _number_or_array(name, v, self.n) for name, v in self.values.items()}
+        object.__setattr__(self, "values", checked)
+        object.__setattr__(self, "sigma_2", checked_scalar("sigma_2", self.sigma_2, ">= 0"))
+        weights: ArrayLike = np.ones(self.n) if self.weights is None else self.weights
+        object.__setattr__(self, "weights", checked_array("weights", weights, self.n, "> 0"))
+        object.__setattr__(self, "title", self.title or self.chart.name)
+
+
+def _number_or_array(name: str, value: float | FloatArray, n: int) -> float | FloatArray:
+    if np.ndim(value) == 0:
+        return checked_scalar(name, value, "finite")
+    return checked_array(name, value, n, "finite")
+
+
+# --------------------------------------------------------------------------- varying
+def parameter_names(model: Model) -> tuple[str, ...]:
+    """Return the names `with_values` takes for a model.
+
+    Parameters
+    ----------
+    model : Model
+        Any.
+
+    Returns
+    -------
+    tuple of str
+        The chart's parameters and what all models share: ``sigma_2``, and where there is a Stribeck
+        curve its numbers and the weights.
+
+    Examples
+    --------
+    >>> parameter_names(GMS(GMSParameters.paper("stick-slip"), law="signed"))
+    ('k', 'sigma', 'C', 'v_c', 'weights', 'sigma_2', 'F_c', 'F_s', 'v_s')
+    """
+    if model.stribeck is None:
+        return tuple(dict.fromkeys([*model.values, "sigma_2"]))
+    weights = () if isinstance(model, LuGre) else ("weights",)
+    return tuple(dict.fromkeys([*model.values, *weights, "sigma_2", "F_c", "F_s", "v_s"]))
+
+
+def with_values(model: Model, values: Mapping[str, ArrayLike]) -> Model:
+    """Return a model with some of its numbers replaced.
+
+    Parameters
+    ----------
+    model : GMS, LuGre or ChartModel
+        Where the others come from.
+    values : mapping
+        By a name of `parameter_names`; a single number goes to all elements. Other names are
+        ignored. A chart's own parameter goes before a shared one of its name.
+
+    Returns
+    -------
+    Model
+        A new one, checked.
+
+    Raises
+    ------
+    ParameterError
+        If a value breaks its rule.
+
+    Examples
+    --------
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> with_values(model, {"k": 2.0, "F_s": 1.0}).values["k"].tolist()
+    [2.0, 2.0, 2.0, 2.0]
+    """
+
+    def number(name: str, old: float) -> float:
+        return checked_scalar(name, values.get(name, old), "finite")
+
+    def array(name: str, old: float | FloatArray) -> FloatArray:
+        return np.full(model.n, values.get(name, old), dtype=np.float64)
+
+    def common(name: str, old: float) -> float:
+        return old if name in model.values else number(name, old)
+
+    stribeck = old = model.stribeck
+    if old is not None:
+        stribeck = Stribeck(common("F_c", old.F_c), common("F_s", old.F_s), common("v_s", old.v_s))
+    shared: Any = {"stribeck": stribeck, "sigma_2": common("sigma_2", model.sigma_2)}
+    if isinstance(model, LuGre):
+        own: Any = {name: number(name, float(value)) for name, value in model.values.items()}
+        return LuGre(**own, **shared)
+    fixed = old is None or "weights" in model.values
+    weights = model.weights if fixed else array("weights", model.weights)
+    if isinstance(model, GMS):
+        p = model.parameters
+        arrays = [array(name, getattr(p, name)) for name in ("k", "sigma", "C")]
+        v_c = number("v_c", p.v_c)
+        return GMS(GMSParameters(*arrays, v_c=v_c, weights=weights, **shared), law=model.law)
+    new = {
+        name: number(name, value) if isinstance(value, float) else array(name, value)
+        for name, value in model.values.items()
+    }
+    return ChartModel(model.chart, new, n=model.n, weights=weights, title=model.title, **shared)

@@ -1,0 +1,174 @@
+"""Rigs: what the friction is mounted on. A rig owns x, v and dv/dt.
+
+Each rig states its equation of motion as text, like a chart states its flows.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from numpy.typing import ArrayLike
+
+from gms_fsm.charts.parameters import checked_scalar
+from gms_fsm.systems.signals import Signal, SignalLike, as_signal
+
+__all__ = ["Prescribed", "PulledSlider", "Rig", "Slider", "with_numbers"]
+
+
+class Rig(Protocol):
+    """What a simulation needs to know of a rig."""
+
+    @property
+    def title(self) -> str:
+        """For figures and summaries."""
+
+    @property
+    def signals(self) -> Mapping[str, Signal]:
+        """Input signals by name; one named ``v`` prescribes the velocity."""
+
+    @property
+    def numbers(self) -> Mapping[str, float]:
+        """Constants of the equation of motion."""
+
+    @property
+    def acceleration(self) -> str | None:
+        """Text of dv/dt over t, x, v, F, the signals and the numbers; None if v is prescribed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prescribed:
+    """Open loop: the velocity is given.
+
+    Parameters
+    ----------
+    velocity : signal
+        v(t), m/s: an expression of t, ramps, a record or a callable.
+
+    Examples
+    --------
+    >>> Prescribed("0.2*sin(2*pi*t/20)").title
+    'prescribed velocity'
+    """
+
+    velocity: SignalLike
+    signals: Mapping[str, Signal] = field(init=False, repr=False)
+
+    title = "prescribed velocity"
+    acceleration = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "signals", {"v": as_signal(self.velocity)})
+
+    @property
+    def numbers(self) -> Mapping[str, float]:
+        """None."""
+        return {}
+
+
+@dataclass(frozen=True, eq=False)
+class Slider:
+    """Closed loop: a mass pushed by a force, ``m dv/dt = F_a(t) - F``.
+
+    Parameters
+    ----------
+    mass : float
+        kg, > 0.
+    force : signal
+        F_a(t), N.
+
+    Examples
+    --------
+    >>> Slider(1.0, [(0, 0), (2, 0.5)]).mass
+    1.0
+    """
+
+    mass: float
+    force: SignalLike
+    signals: Mapping[str, Signal] = field(init=False, repr=False)
+
+    title = "slider pushed by a force"
+    acceleration = "(F_a - F) / mass"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mass", checked_scalar("mass", self.mass, "> 0"))
+        object.__setattr__(self, "signals", {"F_a": as_signal(self.force)})
+
+    @property
+    def numbers(self) -> Mapping[str, float]:
+        """The mass."""
+        return {"mass": self.mass}
+
+
+@dataclass(frozen=True, eq=False)
+class PulledSlider:
+    """Closed loop: a mass pulled through a spring whose end moves at constant speed.
+
+    ``m dv/dt = stiffness * (speed * t - x) - F``.
+
+    Parameters
+    ----------
+    mass : float
+        kg, > 0.
+    stiffness : float
+        Of the pulling spring, N/m, > 0.
+    speed : float
+        Of the spring's far end, m/s.
+
+    Examples
+    --------
+    >>> PulledSlider(1.0, 2.0, 0.1).numbers
+    {'mass': 1.0, 'stiffness': 2.0, 'speed': 0.1}
+    """
+
+    mass: float
+    stiffness: float
+    speed: float
+
+    title = "slider pulled through a spring"
+    acceleration = "(stiffness * (speed * t - x) - F) / mass"
+
+    def __post_init__(self) -> None:
+        for name, rule in (("mass", "> 0"), ("stiffness", "> 0"), ("speed", "finite")):
+            object.__setattr__(self, name, checked_scalar(name, getattr(self, name), rule))
+
+    @property
+    def signals(self) -> Mapping[str, Signal]:
+        """None."""
+        return {}
+
+    @property
+    def numbers(self) -> Mapping[str, float]:
+        """Mass, stiffness, speed."""
+        return {"mass": self.mass, "stiffness": self.stiffness, "speed": self.speed}
+
+
+def with_numbers(rig: Rig, values: Mapping[str, ArrayLike]) -> Rig:
+    """Return a rig with some of its numbers replaced.
+
+    Parameters
+    ----------
+    rig : Rig
+        A frozen dataclass that has its numbers as fields.
+    values : mapping
+        By a name of ``rig.numbers``; other names are ignored.
+
+    Returns
+    -------
+    Rig
+        A new one, checked.
+
+    Raises
+    ------
+    ParameterError
+        If a value breaks its rule.
+
+    Examples
+    --------
+    >>> with_numbers(PulledSlider(1.0, 2.0, 0.1), {"speed": 0.2}).speed
+    0.2
+    """
+    new: Any = {name: values[name] for name in rig.numbers if name in values}
+    return dataclasses.replace(rig, **new) if new else rig  # type: ignore[type-var]

@@ -1,0 +1,275 @@
+"""Input signals: functions of time that drive a rig.
+
+A signal is given as an expression of t (``"0.2*sin(2*pi*t/20)"``), as ramps (a list of
+``(t, value)`` corners, held after the last), as sampled arrays ``(times, values)`` (straight lines
+between samples, no value outside), or as any Python callable of t.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from numbers import Real
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.errors import ExpressionError, SignalError, shown
+from gms_fsm.language.expression import Value, parse_value
+
+__all__ = ["Corners", "Formula", "Function", "Signal", "SignalLike", "as_signal", "piecewise_slope"]
+
+
+@dataclass(frozen=True)
+class Formula:
+    """An expression of t [s].
+
+    Parameters
+    ----------
+    text : str
+        In the expression language; the only name is ``t``.
+
+    Examples
+    --------
+    >>> Formula("0.15*sin(2*pi*t/25)").text
+    '0.15*sin(2*pi*t/25)'
+    """
+
+    text: str
+    tree: Value = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        try:
+            object.__setattr__(self, "tree", parse_value(self.text, ["t"]))
+        except ExpressionError as error:
+            raise error.at("signal") from None
+
+
+@dataclass(frozen=True, eq=False)
+class Corners:
+    """Straight lines between corners; two corners at one time are a jump.
+
+    Parameters
+    ----------
+    times : array_like, shape (m,)
+        s, not decreasing.
+    values : array_like, shape (m,)
+        In the signal's unit.
+    held : bool
+        Whether the first and the last value go on for ever (ramps); a record does not.
+
+    Raises
+    ------
+    SignalError
+        If lengths differ, a number is not finite, or time goes backward; rows count from 0.
+
+    Examples
+    --------
+    >>> Corners([0, 1], [0, 5], held=True).times.tolist()
+    [0.0, 1.0]
+    """
+
+    times: FloatArray
+    values: FloatArray
+    held: bool
+
+    def __post_init__(self) -> None:
+        for name in ("times", "values"):
+            try:
+                array = np.array(getattr(self, name), dtype=np.float64)
+            except (TypeError, ValueError, OverflowError):
+                raise SignalError(
+                    f"signal: the {name} {shown(getattr(self, name))} are not numbers; give "
+                    "numbers that a float can hold"
+                ) from None
+            if array.ndim != 1:
+                raise SignalError(f"signal: the {name} have shape {array.shape}; give a flat list")
+            for i in np.flatnonzero(~np.isfinite(array))[:1]:
+                raise SignalError(f"signal: {name}[{i}] is {array[i]}; it must be finite")
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+        if self.times.size != self.values.size:
+            raise SignalError(
+                f"signal: {self.times.size} times but {self.values.size} values; give one each"
+            )
+        if self.times.size < 2:
+            raise SignalError(f"signal: {self.times.size} point(s); give at least 2")
+        back = np.flatnonzero(np.diff(self.times) < 0)
+        if back.size:
+            i = int(back[0])
+            raise SignalError(
+                f"signal: time goes backward from times[{i}] = {self.times[i]} to "
+                f"times[{i + 1}] = {self.times[i + 1]}; sort the rows"
+            )
+
+    @property
+    def jumps(self) -> FloatArray:
+        """Times [s] at which the value jumps."""
+        found: FloatArray = self.times[1:][np.diff(self.times) == 0]
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Function:
+    """A Python callable of t [s] that returns a number.
+
+    Parameters
+    ----------
+    call : callable
+        ``call(t) -> float``.
+
+    Examples
+    --------
+    >>> Function(lambda t: 0.1).call(3.0)
+    0.1
+    """
+
+    call: Callable[[float], float]
+
+
+Signal: TypeAlias = Formula | Corners | Function
+SignalLike: TypeAlias = (
+    Signal
+    | str
+    | float
+    | Sequence[tuple[float, float]]
+    | tuple[ArrayLike, ArrayLike]
+    | Callable[[float], float]
+)
+
+
+def as_signal(given: SignalLike) -> Signal:
+    """Return the signal a user means.
+
+    Parameters
+    ----------
+    given : str, number, list of (t, value), (times, values), callable or Signal
+        A pair of two arrays is a record; a list of pairs is ramps.
+
+    Returns
+    -------
+    Signal
+        Checked.
+
+    Raises
+    ------
+    SignalError
+        If it is none of these, or its numbers do not make a signal.
+    ExpressionError
+        If its text cannot be read.
+
+    Examples
+    --------
+    >>> as_signal([(0, 0), (2, 0.5)]).held
+    True
+    >>> as_signal(([0, 1, 2], [0.0, 0.1, 0.0])).held
+    False
+    """
+    form: Any = given
+    if isinstance(form, Formula | Corners | Function):
+        return form
+    if isinstance(form, str):
+        return Formula(form)
+    if isinstance(form, bool):
+        raise SignalError(f"signal: {form!r} is not a signal; give a number, say 1.0")
+    if isinstance(form, Real | np.generic):
+        try:
+            level = float(form)
+        except OverflowError:
+            raise SignalError(f"signal: {shown(form)} is too large; it must be finite") from None
+        return Corners(np.array([-1.0, 0.0]), np.array([level, level]), held=True)
+    if callable(form):
+        return Function(form)
+    pair = form if isinstance(form, tuple) and len(form) == 2 else ()
+    if pair and all(isinstance(part, tuple) and len(part) == 2 for part in pair):
+        raise SignalError(
+            f"signal: {shown(form)} can be read as two ramp corners and as a record of two "
+            "samples; give a list [(t, value), (t, value)] or arrays (times, values)"
+        )
+    if pair:
+        return Corners(pair[0], pair[1], held=False)
+    if isinstance(form, list | np.ndarray | tuple):
+        try:
+            corners = np.array(form, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
+            corners = np.empty(0)
+        if corners.ndim == 2 and corners.shape[1] == 2:
+            return Corners(corners[:, 0], corners[:, 1], held=True)
+    raise SignalError(
+        f"signal: {shown(form)} is not a signal; give an expression of t in quotes, a list of "
+        "(t, value) pairs, a pair (times, values), or a function of t"
+    )
+
+
+def piecewise_linear(t: float, times: Sequence[float], values: Sequence[float]) -> float:
+    """Return the value at t of straight lines through corners, held outside, right-continuous.
+
+    Plain loops, because the compiled engine runs this same function.
+
+    Parameters
+    ----------
+    t : float
+        s.
+    times, values : sequence of float, shape (m,)
+        The corners, times not decreasing.
+
+    Returns
+    -------
+    float
+        The value.
+
+    Examples
+    --------
+    >>> piecewise_linear(0.5, [0.0, 1.0, 1.0], [0.0, 2.0, 5.0])
+    1.0
+    >>> piecewise_linear(1.0, [0.0, 1.0, 1.0], [0.0, 2.0, 5.0])
+    5.0
+    """
+    low, high = 0, len(times)
+    while low < high:  # first corner after t
+        middle = (low + high) // 2
+        if times[middle] <= t:
+            low = middle + 1
+        else:
+            high = middle
+    if low == 0:
+        return values[0]
+    if low == len(times):
+        return values[low - 1]
+    t0 = times[low - 1]
+    share = (t - t0) / (times[low] - t0)
+    return values[low - 1] + share * (values[low] - values[low - 1])
+
+
+def piecewise_slope(t: float, times: Sequence[float], values: Sequence[float]) -> float:
+    """Return the slope at t of straight lines through corners; 0 outside, right-continuous.
+
+    Parameters
+    ----------
+    t : float
+        s.
+    times, values : sequence of float, shape (m,)
+        The corners, times not decreasing.
+
+    Returns
+    -------
+    float
+        The slope.
+
+    Examples
+    --------
+    >>> piecewise_slope(0.5, [0.0, 1.0, 1.0], [0.0, 2.0, 5.0])
+    2.0
+    """
+    low, high = 0, len(times)
+    while low < high:  # first corner after t
+        middle = (low + high) // 2
+        if times[middle] <= t:
+            low = middle + 1
+        else:
+            high = middle
+    if low == 0 or low == len(times):
+        return 0.0
+    return (values[low] - values[low - 1]) / (times[low] - times[low - 1])

@@ -1,0 +1,110 @@
+"""Claim: each public name is had from `gms_fsm` in a fresh process, in any order of imports."""
+
+from __future__ import annotations
+
+import ast
+import json
+import subprocess
+import sys
+import types
+from pathlib import Path
+
+import pytest
+
+import gms_fsm
+from gms_fsm import errors
+from gms_fsm.traces import failures
+
+ROOT = Path(gms_fsm.__file__).parents[1]
+
+
+def _python(code: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    """Run code in a fresh interpreter."""
+    return subprocess.run(
+        [sys.executable, "-c", code], cwd=cwd, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.mark.parametrize("name", gms_fsm.__all__)
+def test_a_fresh_process_has_the_name_before_and_after_its_module(name: str) -> None:
+    home = gms_fsm._HOME[name]
+    code = f"""
+import sys, types
+from gms_fsm import {name} as first
+import gms_fsm, gms_fsm.{home}
+from gms_fsm import {name} as again
+assert first is again is gms_fsm.{name} is gms_fsm.{home}.{name}
+assert not isinstance(first, types.ModuleType)
+"""
+    done = _python(code)
+    assert done.returncode == 0, done.stderr
+
+
+def test_no_room_has_the_name_of_a_public_function() -> None:
+    rooms = {path.stem for path in Path(gms_fsm.__file__).parent.iterdir()}
+    assert len(rooms) >= 8
+    assert rooms & set(gms_fsm.__all__) == set()
+
+
+def test_type_checkers_and_python_read_the_same_names() -> None:
+    tree = ast.parse(Path(gms_fsm.__file__).read_text(encoding="utf-8"))
+    branch = next(node for node in tree.body if isinstance(node, ast.If))
+    told = {
+        alias.asname: node.module
+        for node in branch.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+        if alias.name == alias.asname
+    }
+    assert told == {name: f"gms_fsm.{home}" for name, home in gms_fsm._HOME.items()}
+
+
+def test_all_errors_are_public() -> None:
+    ours = {
+        name
+        for module in (errors, failures)
+        for name, value in vars(module).items()
+        if isinstance(value, type) and issubclass(value, errors.GMSError)
+    }
+    assert len(ours) > 10
+    assert ours <= set(gms_fsm.__all__)
+    assert {"Rig", "Model", "Signal"} <= set(gms_fsm.__all__)
+
+
+def test_importing_the_package_imports_no_numbers() -> None:
+    done = _python(
+        "import json, sys, gms_fsm; dir(gms_fsm); print(json.dumps(sorted(sys.modules)))"
+    )
+    loaded = {name.partition(".")[0] for name in json.loads(done.stdout)}
+    assert loaded & {"numpy", "scipy", "transitions", "typer", "pydantic", "integrators"} == set()
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    assert not hasattr(gms_fsm, "simulatte")
+    assert not isinstance(gms_fsm.simulate, types.ModuleType)
+    with pytest.raises(ImportError, match="simulatte"):
+        exec("from gms_fsm import simulatte")
+
+
+@pytest.mark.parametrize(
+    "hiding", ["plots.py", "integrators.py", "plots/", "integrators/__init__.py"]
+)
+def test_a_file_that_hides_a_package_is_named(hiding: str, tmp_path: Path) -> None:
+    place = tmp_path / hiding
+    if hiding.endswith("/"):
+        place.mkdir()
+    else:
+        place.parent.mkdir(exist_ok=True)
+        place.write_text("")
+    name = hiding.partition("/")[0].partition(".")[0]
+    code = f"import sys; sys.path[:0] = [{str(tmp_path)!r}, {str(ROOT)!r}]; import gms_fsm"
+    done = _python(code, tmp_path)
+    if hiding == "plots/":  # Python prefers any package to a folder without __init__.py
+        assert done.returncode == 0, done.stderr
+        return
+    assert done.returncode == 1
+    last = done.stderr.strip().splitlines()[-1]
+    assert last == (
+        f"ImportError: {place} hides the package {name!r} that gms-fsm brings; rename that file or "
+        "folder, or run Python from another folder"
+    )
