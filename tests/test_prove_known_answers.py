@@ -20,7 +20,7 @@ from gms_fsm.charts import LAWS, LUGRE, gms_element
 from gms_fsm.charts.broken import BROKEN
 from gms_fsm.errors import ExpressionError, ParameterError
 from gms_fsm.inspection.prove import CHECKS, Check, default_domain
-from gms_fsm.language.expression import evaluate
+from gms_fsm.language import evaluate
 
 STEP = 2.0**-20  # s; exact in floats
 

@@ -25,7 +25,7 @@ from gms_fsm.charts.parameters import Stribeck
 from gms_fsm.errors import ExpressionError
 from gms_fsm.inspection.explain import explain
 from gms_fsm.inspection.session import Session
-from gms_fsm.language.expression import evaluate, parse_condition
+from gms_fsm.language import evaluate, parse_condition
 from gms_fsm.systems.models import ChartModel
 from plots.replay import replay, write_replay
 from tests.helpers import FIG4_SINE, stick_slip

@@ -24,7 +24,7 @@ from gms_fsm.app.scenario import Loaded, load_scenario
 from gms_fsm.errors import GMSError, ScenarioError, SessionError
 from gms_fsm.inspection.explain import UNITS, Explanation, holds
 from gms_fsm.inspection.session import KINDS, Branch, Breakpoint, Session
-from gms_fsm.language.expression import evaluate
+from gms_fsm.language import evaluate
 from gms_fsm.systems.models import parameter_names
 
 __all__ = ["Debugger", "run_debugger", "scenario_to_debug"]

@@ -22,7 +22,7 @@ from gms_fsm._files import output_folder, written_whole
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.parameters import FloatArray, GMSParameters
 from gms_fsm.errors import MissingExtraError
-from gms_fsm.language.expression import evaluate
+from gms_fsm.language import evaluate
 from gms_fsm.run.simulate import Moment, simulate
 from gms_fsm.systems.models import GMS, LuGre, Model
 from gms_fsm.systems.rigs import Prescribed, Rig, Slider

@@ -38,7 +38,7 @@ from typing import Any, Literal, TypeAlias, get_args
 
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.errors import ExpressionError, MissingExtraError, ParameterError, shown
-from gms_fsm.language.expression import (
+from gms_fsm.language import (
     MATLAB_LIKE,
     Binary,
     Both,
@@ -60,7 +60,7 @@ from gms_fsm.language.expression import (
     spell,
     split,
 )
-from gms_fsm.language.expression import Literal as Comparative
+from gms_fsm.language import Literal as Comparative
 
 __all__ = ["CHECKS", "Check", "Finding", "Report", "Status", "default_domain", "prove"]
 
