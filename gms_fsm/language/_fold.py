@@ -125,14 +125,12 @@ def fold(tree: Node, algebra: Any) -> Any:
     4
     """
     match tree:
-        case Name(name):
-            return algebra.name(name)
-        case Number(value):
-            return algebra.number(value)
-        case InState(element, state):
-            return algebra.in_state(element, state)
-        case Binary("**"):
-            operation = algebra.power
-        case _:
-            operation = getattr(algebra, _OPERATIONS[type(tree)])
+        case Name():
+            return algebra.name(tree.id)
+        case Number():
+            return algebra.number(tree.value)
+        case InState():
+            return algebra.in_state(tree.element, tree.state)
+    power = isinstance(tree, Binary) and tree.op == "**"
+    operation = getattr(algebra, "power" if power else _OPERATIONS[type(tree)])
     return operation(tree, (fold(part, algebra) for part in tree.parts))

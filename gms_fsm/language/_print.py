@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from gms_fsm.language._fold import fold
 from gms_fsm.language._powers import product_power
@@ -71,8 +72,7 @@ def spell(node: Node, spelling: Spelling = PYTHON, rename: Mapping[str, str] | N
     return fold(node, _Printer(spelling, rename or {})).text
 
 
-@dataclass(frozen=True)
-class _Printed:
+class _Printed(NamedTuple):
     """A text and how tightly it binds."""
 
     text: str
