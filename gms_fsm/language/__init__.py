@@ -16,7 +16,15 @@ Nothing here knows of friction.
 from gms_fsm.language._derivative import derivative
 from gms_fsm.language._evaluate import evaluate
 from gms_fsm.language._fold import Algebra, ValueAlgebra, fold
-from gms_fsm.language._functions import CONSTANTS, FUNCTIONS, NAMESPACE, SEVERAL, sgn
+from gms_fsm.language._functions import (
+    COMPARISONS,
+    CONSTANTS,
+    FUNCTIONS,
+    NAMESPACE,
+    OPERATIONS,
+    SEVERAL,
+    sgn,
+)
 from gms_fsm.language._normal import (
     Comparison,
     Literal,
@@ -29,7 +37,7 @@ from gms_fsm.language._normal import (
     substitute,
     turning_inside,
 )
-from gms_fsm.language._powers import product_power, whole_power
+from gms_fsm.language._powers import LARGEST_PRODUCT_POWER, product_power, whole_power
 from gms_fsm.language._print import LEVELS, MATLAB_LIKE, PYTHON, Spelling, spell
 from gms_fsm.language._read import parse_condition, parse_value
 from gms_fsm.language._tree import (
@@ -51,11 +59,14 @@ from gms_fsm.language._tree import (
 )
 
 __all__ = [
+    "COMPARISONS",
     "CONSTANTS",
     "FUNCTIONS",
+    "LARGEST_PRODUCT_POWER",
     "LEVELS",
     "MATLAB_LIKE",
     "NAMESPACE",
+    "OPERATIONS",
     "PYTHON",
     "SEVERAL",
     "Algebra",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gms_fsm.language._tree import Binary, Name, Negative, Number, Value
 
-__all__ = ["product_power", "whole_power"]
+__all__ = ["LARGEST_PRODUCT_POWER", "product_power", "whole_power"]
 
 LARGEST_PRODUCT_POWER = 8  # x**8 and below are printed as products ...
 LARGEST_PRODUCT = 64  # ... unless the text would grow beyond this many parts
