@@ -1,4 +1,4 @@
-"""A small change of expression, chart, machines, crossings or advance is noticed.
+"""A small change of language, chart, machines, crossings or advance is noticed.
 
 Each test pins down what a mutant of `tests/mutation.py` got away with. At the end stands what
 no test can notice, and why.
@@ -24,7 +24,9 @@ from gms_fsm.language import (
     InState,
     Literal,
     Name,
+    Negative,
     Not,
+    Number,
     evaluate,
     parse_condition,
     parse_value,
@@ -76,7 +78,7 @@ def test_a_chart_shows_and_compares_what_was_written_not_what_was_parsed() -> No
     assert chart == _chart()
 
 
-# --------------------------------------------------------------------------- expression
+# --------------------------------------------------------------------------- language
 def _refused(text: str, *names: str, **states: Any) -> ExpressionError:
     read = parse_condition if states else parse_value
     with pytest.raises(ExpressionError) as caught:
@@ -228,6 +230,7 @@ def test_small_powers_are_products_until_the_text_grows_too_long() -> None:
         ("a**0.5 * b", "pow(a, 0.5) * b", "a^0.5 * b"),
         ("a**b**c", "pow(a, pow(b, c))", "a^(b^c)"),
         ("abs(a - b)", "abs(a - b)", "|a - b|"),
+        ("exp(a) * max(a, b)", "exp(a) * max(a, b)", "exp(a) * max(a, b)"),
         (
             "0.1 + 1e-7 + 0.30000000000000004",
             "0.1 + 1e-07 + 0.30000000000000004",
@@ -241,6 +244,11 @@ def test_a_value_has_no_more_and_no_fewer_brackets_than_its_order_needs(
 ) -> None:
     tree = parse_value(text, "abc")
     assert (spell(tree), spell(tree, MATLAB_LIKE)) == (python, matlab)
+
+
+def test_a_number_below_zero_binds_like_a_sign() -> None:  # of derivatives: read are none
+    assert spell(Negative(Number(-0.5))) == "-(-0.5)"
+    assert spell(Binary("**", Name("a"), Number(-0.5)), MATLAB_LIKE) == "a^(-0.5)"
 
 
 @pytest.mark.parametrize(
@@ -308,6 +316,11 @@ def test_splitting_flattens_like_in_like_and_turns_words_under_negation() -> Non
     turned = ("either", "a <= b", "b <= c", ("both", "c <= a", "a <= c", "a >= -c"))
     assert _literals(text, holds=False) == turned
     assert _literals(f"not ({text})") == turned
+
+
+def test_a_corner_against_zero_turns_where_the_other_side_does() -> None:
+    for text, turning in (("max(a, 0)", "a"), ("min(a, 1)", "a - 1.0"), ("max(a, -1)", "a - -1.0")):
+        assert [spell(u) for u in rough_points(parse_value(text, "a"))] == [turning]
 
 
 def test_rough_calls_become_names_in_the_order_they_are_computed_and_smooth_ones_stay() -> None:
