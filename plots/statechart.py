@@ -261,7 +261,9 @@ class Writer:
         if not self.math:
             return spell(tree, MATLAB_LIKE)
         chart = self.chart
-        names = {name: _symbol(name) for name in chart.inputs + chart.variables + chart.parameters}
+        names = {
+            name: _symbol(name) for name in chart.inputs + chart.variables + chart.parameter_names
+        }
         if "s" in chart.inputs:
             names["s"] = "s(v)"  # the threshold that the model supplies depends on the velocity
         return _TOKEN.sub(_formula_token, spell(tree, MATH, names))

@@ -27,12 +27,12 @@ from gms_fsm.app.scenario import Scenario, load_scenario
 from gms_fsm.charts import LUGRE, gms_element
 from gms_fsm.charts.broken import BROKEN
 from gms_fsm.charts.chart import Chart
-from gms_fsm.charts.parameters import GMSParameters
 from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.inspection.notes import notes_on
 from gms_fsm.inspection.prove import Report, prove
 from gms_fsm.lowering._generated import standalone
 from gms_fsm.lowering.program import lower
+from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.models import GMS, Model
 from gms_fsm.systems.rigs import Prescribed, PulledSlider, Rig, Slider
 from gms_fsm.traces.trace import Trace, files_of

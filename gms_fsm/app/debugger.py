@@ -22,7 +22,7 @@ from typing import TextIO
 
 from gms_fsm.app.scenario import Loaded, load_scenario
 from gms_fsm.errors import GMSError, ScenarioError, SessionError
-from gms_fsm.inspection.explain import UNITS, Explanation, holds
+from gms_fsm.inspection.explain import Explanation, holds
 from gms_fsm.inspection.session import KINDS, Branch, Breakpoint, Session
 from gms_fsm.language.expression import evaluate
 from gms_fsm.systems.models import parameter_names
@@ -617,7 +617,8 @@ class Debugger(cmd.Cmd):
     def _heads(self) -> list[str]:
         """Return the headings of a line of `where`, as wide as `_cells`."""
         chart = self.session.model.chart
-        names = [f"{name} [{UNITS[name]}]" if name in UNITS else name for name in chart.variables]
+        units = {name: chart.unit(name) for name in chart.variables}
+        names = [f"{name} [{unit}]" if unit else name for name, unit in units.items()]
         heads = [f"{_short(name, 10):>10}" for name in names]
         if "s" in chart.inputs:
             heads += [f"{'s [m]':>9}", f"{_short(f'|{chart.variables[0]}|/s', 7):>7}"]

@@ -14,16 +14,19 @@ import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm._files import output_folder, written_whole
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
-from gms_fsm.charts.parameters import FloatArray, GMSParameters
+from gms_fsm.charts.lugre import BENCHMARK
+from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import MissingExtraError
 from gms_fsm.language.expression import evaluate
 from gms_fsm.run.simulate import Moment, simulate
+from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.models import GMS, LuGre, Model
 from gms_fsm.systems.rigs import Prescribed, Rig, Slider
 from gms_fsm.systems.signals import Formula
@@ -112,9 +115,8 @@ def experiments(force: str = FORCE, velocity: str = VELOCITY) -> tuple[Experimen
 
 def lugre_like(parameters: GMSParameters) -> LuGre:
     """Return the LuGre model a column is compared with."""
-    return LuGre(
-        sigma_0=1e3, sigma_1=31.6, sigma_2=parameters.sigma_2, stribeck=parameters.stribeck
-    )
+    own: Any = BENCHMARK.values
+    return LuGre(**own, sigma_2=parameters.sigma_2, stribeck=parameters.stribeck)
 
 
 def run(
@@ -667,6 +669,9 @@ def claims_text(traces: Mapping[str, Trace], force: str = FORCE, velocity: str =
             "Not judged: the claims are about the signals chosen for the reproduction, and these "
             "were changed. Run without --force and --velocity for the table."
         ]
+    lugre = ", ".join(
+        f"{each.name} = {BENCHMARK.values[each.name]:g} {each.unit}" for each in LUGRE.parameters
+    )
     runs = [
         f"| {name} | {trace.model.title} | {trace.settings['engine']}, {trace.settings['events']} "
         f"| {len(trace)} | {len(trace.transitions)} |"
@@ -701,8 +706,7 @@ def claims_text(traces: Mapping[str, Trace], force: str = FORCE, velocity: str =
             f"- the applied force of Fig. 3: `F_a = {force}` N, t in s",
             f"- the velocity of Fig. 4: `v = {velocity}` m/s",
             "- the text of the guards: our reading of Section II-D (`gms-fsm code` prints them)",
-            "- LuGre: sigma_0 = 1000 N/m, sigma_1 = 31.6 Ns/m, and the column's F_s, F_c, v_s, "
-            "sigma_2",
+            f"- LuGre: {lugre}, and the column's F_s, F_c, v_s, sigma_2",
             "- the absolute tolerances, from the models' own scales (`gms_fsm.lowering.scales`); "
             "where not said otherwise rtol is 1e-6 and switches are located",
             "- the run with weights w_i = 0.25/k_i, in which an element slips (`fig3_slipping`)",

@@ -30,7 +30,7 @@ from pydantic import (
 )
 
 from gms_fsm.app.records import Column, Motion, Record, motion_of, read_record
-from gms_fsm.charts.parameters import GMSParameters, Stribeck
+from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import (
     LONGEST_SHOWN,
     GMSError,
@@ -42,6 +42,7 @@ from gms_fsm.errors import (
     shown,
 )
 from gms_fsm.run.start import MOST_STEPS
+from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.models import GMS, LuGre, Model
 from gms_fsm.systems.rigs import Prescribed, PulledSlider, Rig, Slider
 from gms_fsm.systems.signals import Corners, SignalLike, as_signal

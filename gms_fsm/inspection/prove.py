@@ -74,17 +74,6 @@ MOST_WAYS = 64  # alternatives of a guard
 HIGHEST_DEGREE = 16  # of a text as a polynomial; beyond it z3 needs memory before it needs time
 LARGEST_POWER = 8
 
-# What the names of the shipped charts mean, as their parameters are checked; C > 0 and not >= 0,
-# because with C = 0 the slip flow is no law but a standstill.
-ASSUMED: Mapping[str, str] = {
-    "s": "s > 0",
-    "v_c": "v_c > 0",
-    "C": "C > 0",
-    "k": "k > 0",
-    "sigma": "sigma >= 0",
-    "sigma_0": "sigma_0 > 0",
-    "sigma_1": "sigma_1 >= 0",
-}
 # Numbers an example is made of where they fit: a reader should see through it.
 NICE = tuple(Fraction(number) for number in (1, -1, 2, -2, 0, 0.5, -0.5, 3, -3, 0.25, -0.25, 4, -4))
 
@@ -206,8 +195,8 @@ def default_domain(chart: Chart) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        For each name of the shipped charts that its guards, flows or assignments use, the rule its
-        value has to keep; nothing for other names.
+        For each input and parameter that its guards, flows or assignments use, the rule its value
+        has to keep (`gms_fsm.Parameter`); nothing where there is none.
 
     Examples
     --------
@@ -218,8 +207,13 @@ def default_domain(chart: Chart) -> tuple[str, ...]:
     trees: list[Value | Condition] = [*chart.guards.values(), *chart.flows.values()]
     trees += [tree for texts in chart.assignments.values() for tree in texts.values()]
     used = frozenset[str]().union(*map(names_in, trees))
-    symbols = chart.inputs + chart.parameters
-    return tuple(ASSUMED[name] for name in symbols if name in ASSUMED and name in used)
+    declared = chart.declared
+    return tuple(
+        condition
+        for name in chart.inputs + chart.parameter_names
+        if name in declared and name in used
+        for condition in declared[name].conditions
+    )
 
 
 def prove(chart: Chart, domain: Sequence[str] | None = None) -> Report:
@@ -439,7 +433,7 @@ class _Prover:
         self.chart, self.z3 = chart, _z3()
         real, zero = self.z3.Real, self.z3.RealVal(0)
         # In the order an example fixes them: constants, what comes from outside, the own state.
-        names = (*chart.parameters, *chart.inputs, *chart.variables)
+        names = (*chart.parameter_names, *chart.inputs, *chart.variables)
         self.symbols = {name: real(name) for name in names}
         self.rates = {f"d{name}/dt": real(f"d{name}/dt") for name in chart.inputs}
         self.still = {name: _Dual(symbol, zero) for name, symbol in self.symbols.items()}
@@ -908,7 +902,7 @@ def _equilibrium(prover: _Prover, flow: Value, variable: str, sign: str) -> _Ans
 def _place(prover: _Prover, flow: Value, variable: str, case: Sequence[Any]) -> str:
     """Name the equilibrium of a flow where a simple text does."""
     chart = prover.chart
-    names = sorted(names_in(flow) & {*chart.inputs, *chart.parameters} - {"v"})
+    names = sorted(names_in(flow) & {*chart.inputs, *chart.parameter_names} - {"v"})
     simple = ["0", *names, *(f"{a} / {b}" for a in names for b in names if a != b)]
     for text in (sign + text for text in simple for sign in ("", "-")):
         reading = _Reading()

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm._files import written_whole
-from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.charts.parameters import QUANTITIES, WEIGHTS, FloatArray
 from gms_fsm.errors import (
     GMSError,
     MissingExtraError,
@@ -183,7 +183,7 @@ class Sweep:
             Dimensions ``run``, ``element`` (from 1) and, with rows, ``time``; units as attributes.
         """
         xarray = _imported("xarray", "sweep")
-        units = {"t": "s", "x": "m", "v": "m/s", "F": "N", "z": "m"}
+        units = {name: QUANTITIES[name].unit for name in ("t", "x", "v", "F", "z")}
         data: dict[str, Any] = {}
         for name in ("outcome", "message", "t", "x", "v", "F"):
             data[f"{name}_end" if name in units else name] = ("run", getattr(self, name))
@@ -462,7 +462,7 @@ def _values(
             array = np.array(value, dtype=np.float64)
         except (TypeError, ValueError):
             raise ParameterError(f"parameters[{name!r}] is not an array of numbers") from None
-        wide = name == "weights" or np.ndim(model.values.get(name, 0.0)) > 0
+        wide = name == WEIGHTS.name or np.ndim(model.values.get(name, 0.0)) > 0
         if array.shape[1:] not in (((), (model.n,)) if wide else ((),)) or array.ndim == 0:
             wanted = f"(runs,) or (runs, {model.n})" if wide else "(runs,)"
             raise ParameterError(
