@@ -151,6 +151,11 @@ class Entry:
         """What its charts take."""
         return self._any.parameters
 
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Their names."""
+        return self._any.parameter_names
+
     def chart(self, law: str = "") -> Chart:
         """Return the chart under a law.
 
