@@ -54,16 +54,9 @@ class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
-def _told(parameter: Parameter) -> str:
-    """Describe a key."""
-    told = [parameter.described]
-    if parameter.per_element:
-        told.append("one number per element")
-    return "; ".join(filter(None, told))
-
-
 _TOLD: Mapping[str, str] = {
-    each.name: _told(each) for each in (*PARAMETERS, *LUGRE.parameters, SIGMA_2, WEIGHTS, *STRIBECK)
+    each.name: each.described
+    for each in (*PARAMETERS, *LUGRE.parameters, SIGMA_2, WEIGHTS, *STRIBECK)
 }
 
 
@@ -206,7 +199,8 @@ class ChartTable(Table):
         given: dict[str, Any] = vars(self)
         entry = registered()[self.chart]
         values = {name: given[_FIELD.format(name)] for name in entry.parameter_names}
-        curve, weights = given.get("stribeck"), given.get("weights")
+        curve: StribeckTable | None = given.get("stribeck")
+        weights: Any = given.get("weights")
         lists = [each for each in (weights, *values.values()) if isinstance(each, list)]
         return ChartModel(
             entry.chart(given.get("law", "")),
@@ -230,7 +224,7 @@ def _chart_table(entry: Entry) -> type[ChartTable]:
         fields["law"] = (law, Field(description="there is no default"))
     for each in entry.parameters:
         numbers: Any = Numbers if each.per_element else float
-        told = _told(each)
+        told = each.described
         fields[_FIELD.format(each.name)] = (numbers, Field(alias=each.name, description=told))
     if entry.curve:
         fields["stribeck"] = (StribeckTable, Field(description="the curve behind the input s"))

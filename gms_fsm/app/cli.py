@@ -24,21 +24,18 @@ from gms_fsm.app import paper
 from gms_fsm.app.live import LiveView
 from gms_fsm.app.report import monitor_lines, run_scenario, velocity_note
 from gms_fsm.app.scenario import Scenario, load_scenario
-from gms_fsm.charts import LUGRE, gms_element
-from gms_fsm.charts.broken import BROKEN
-from gms_fsm.charts.chart import Chart
-from gms_fsm.errors import GMSError, ParameterError
+from gms_fsm.errors import GMSError
 from gms_fsm.inspection.notes import notes_on
 from gms_fsm.inspection.prove import Report, prove
 from gms_fsm.lowering._generated import standalone
 from gms_fsm.lowering.program import lower
-from gms_fsm.systems.gms_parameters import GMSParameters
-from gms_fsm.systems.models import GMS, Model
+from gms_fsm.systems.models import demonstration
 from gms_fsm.systems.rigs import Prescribed, PulledSlider, Rig, Slider
 from gms_fsm.traces.trace import Trace, files_of
 
 __all__ = ["app", "main"]
 
+LAW = "Law of a chart that has several, such as gms; there is no default, they differ."
 INTERRUPTED = 130  # the exit code of what Ctrl-C has ended, by custom
 
 
@@ -74,13 +71,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     add_completion=False,
 )
-
-
-class LawName(enum.StrEnum):
-    """Slip laws."""
-
-    published = "published"
-    signed = "signed"
 
 
 class RigName(enum.StrEnum):
@@ -203,13 +193,6 @@ def schema_command() -> None:
     typer.echo(json.dumps(Scenario.model_json_schema(), indent=2))
 
 
-class ChartName(enum.StrEnum):
-    """Charts that ship."""
-
-    gms = "gms"
-    lugre = "lugre"
-
-
 class Notation(enum.StrEnum):
     """How guards are written."""
 
@@ -233,26 +216,34 @@ class Theme(enum.StrEnum):
 
 @app.command("chart")
 def chart_command(
-    name: Annotated[ChartName, typer.Argument(help="Which chart.", show_default=False)],
+    name: Annotated[
+        str, typer.Argument(help="Which chart; --list names all.", show_default=False)
+    ] = "",
     output: Annotated[
         Path,
         typer.Option(
             "--output", "-o", help="Ends in .svg, .png, .pdf, .dot, .gv or .mmd (Mermaid)."
         ),
     ] = Path("chart.svg"),
-    law: Annotated[LawName | None, typer.Option(help="Slip law of the GMS chart.")] = None,
+    law: Annotated[str, typer.Option(help=LAW, show_default=False)] = "",
     elements: Annotated[int, typer.Option(help="How many elements, as parallel states.")] = 1,
     notation: Annotated[Notation, typer.Option(help="Spelling.")] = Notation.stateflow,
     direction: Annotated[Direction, typer.Option(help="Layout.")] = Direction.TB,
     theme: Annotated[Theme, typer.Option(help="Colours.")] = Theme.light,
     names: Annotated[bool, typer.Option("--names", help="Write the edges' names too.")] = False,
+    listed: Annotated[
+        bool, typer.Option("--list", help="List the charts, with their parameters.")
+    ] = False,
 ) -> None:
-    """Draw a state chart."""
+    """Draw a state chart, or list those that ship."""
+    from gms_fsm.app._catalogue import catalogue, chosen
+
+    if listed:
+        typer.echo(catalogue())
+        return
     import plots
 
-    if name == ChartName.gms and law is None:
-        raise ParameterError("chart gms needs --law signed or --law published; they differ")
-    chart = LUGRE if law is None else gms_element(law.value)
+    _, chart = chosen("chart", name, law)
     graph = plots.statechart(
         chart,
         elements,
@@ -267,9 +258,9 @@ def chart_command(
 @app.command("check")
 def check_command(
     name: Annotated[
-        str, typer.Argument(help="gms, lugre, or a broken reading; see --list.", show_default=False)
+        str, typer.Argument(help="Which chart; --list names all.", show_default=False)
     ] = "",
-    law: Annotated[LawName | None, typer.Option(help="Slip law of the GMS chart.")] = None,
+    law: Annotated[str, typer.Option(help=LAW, show_default=False)] = "",
     domain: Annotated[
         list[str] | None,
         typer.Option(help="Assume this instead, for example 's >= 0'; may be given again."),
@@ -284,38 +275,19 @@ def check_command(
 
     What the order of the edges settles is said, and is no refutation.
     """
+    from gms_fsm.app._catalogue import checkable, chosen
+
     if names:
-        typer.echo("gms --law signed, gms --law published, lugre, and as demonstrations:")
-        for broken, what in BROKEN.items():
-            typer.echo(textwrap.fill(f"broken:{broken}  {what.wrong}", 78, subsequent_indent="  "))
+        typer.echo(checkable())
         return
-    chart, usual = _to_check(name, law)
+    found, chart = chosen("check", name, law)
     folder = None if output is None else output_folder(output)
-    report = prove(chart, domain or usual)
+    report = prove(chart, domain or found.domain)
     typer.echo(str(report))
     for path in [] if folder is None else _write_report(report, folder):
         typer.echo(str(path))
     if report.refuted:
         raise typer.Exit(1)
-
-
-def _to_check(name: str, law: LawName | None) -> tuple[Chart, tuple[str, ...] | None]:
-    """Return a chart and its domain, None for the usual one."""
-    charts = {"lugre": LUGRE, **{f"broken:{key}": found.chart for key, found in BROKEN.items()}}
-    if name == "gms":
-        if law is None:
-            raise ParameterError("check gms needs --law signed or --law published; they differ")
-        return gms_element(law.value), None
-    if name not in charts:
-        said = f"name is {name!r}; it" if name else "a name is missing; it"
-        raise ParameterError(
-            f"{said} must be one of gms, {', '.join(charts)} (a chart of your own is checked in "
-            "Python: prove(chart))"
-        )
-    if law is not None:
-        raise ParameterError(f"check {name} takes no --law; only gms does")
-    found = BROKEN.get(name.removeprefix("broken:"))
-    return charts[name], None if found is None else found.domain
 
 
 def _write_report(report: Report, folder: Path) -> list[Path]:
@@ -470,18 +442,22 @@ def lesson_command(
 
 @app.command("code")
 def code_command(
-    law: Annotated[LawName, typer.Option(help="Slip law; there is no default, they differ.")],
+    name: Annotated[str, typer.Argument(help="Which chart.")] = "gms",
+    law: Annotated[str, typer.Option(help=LAW, show_default=False)] = "",
     rig: Annotated[RigName, typer.Option(help="What the friction is mounted on.")] = (
         RigName.prescribed
     ),
 ) -> None:
-    """Print the if-else program made from the GMS chart (the paper's Fig. 2c); it runs alone."""
+    """Print the if-else program made from a chart (the paper's Fig. 2c); it runs alone."""
+    from gms_fsm.app._catalogue import chosen
+
+    found, _ = chosen("code", name, law)
     rigs: dict[RigName, Rig] = {
         RigName.prescribed: Prescribed(paper.VELOCITY),
         RigName.slider: Slider(1.0, paper.FORCE),
         RigName.pulled: PulledSlider(1.0, 2.0, 0.1),
     }
-    model: Model = GMS(GMSParameters.paper("stick-slip"), law=law.value)
+    model = demonstration(found, law)
     typer.echo(standalone(lower(model, rigs[rig]).source), nl=False)
 
 

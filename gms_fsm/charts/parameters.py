@@ -197,13 +197,14 @@ class Parameter:
 
     @property
     def described(self) -> str:
-        """Meaning, unit and rule in one line, as far as they are known.
+        """What is known of it, in one line.
 
         >>> Parameter("k", "N/m", "> 0", meaning="bristle stiffness").described
-        'bristle stiffness, N/m, > 0'
+        'bristle stiffness, N/m, > 0; one number per element'
         """
         rule = "" if self.rule == ANY else self.rule
-        return ", ".join(part for part in (self.meaning, self.unit, rule) if part)
+        known = ", ".join(part for part in (self.meaning, self.unit, rule) if part)
+        return "; ".join(filter(None, (known, "one number per element" * self.per_element)))
 
 
 # What has the same name in every chart and on every rig.

@@ -202,8 +202,8 @@ def registered() -> Mapping[str, Entry]:
 
     Examples
     --------
-    >>> list(registered())[:2]
-    ['gms', 'lugre']
+    >>> registered()["gms"].title
+    'Generalized Maxwell Slip element'
     """
     found: dict[str, tuple[Entry, str]] = {}
     for module in pkgutil.iter_modules(gms_fsm.charts.__path__):
