@@ -12,6 +12,7 @@ from gms_fsm.errors import ParameterError
 __all__ = ["catalogue", "checkable", "chosen"]
 
 WIDTH = 78
+OWN = "in Python, plots.statechart(chart), prove(chart); or as a file in gms_fsm/charts"
 
 
 def chosen(verb: str, name: str, law: str) -> tuple[Entry, Chart]:
@@ -36,7 +37,10 @@ def chosen(verb: str, name: str, law: str) -> tuple[Entry, Chart]:
     ParameterError
         If there is no such chart, or a law is missing, unknown or not wanted.
     """
-    found = entry(name)
+    try:
+        found = entry(name)
+    except ParameterError as error:
+        raise ParameterError(f"{error} (a chart of your own: {OWN})") from None
     options = " or ".join(f"--law {each}" for each in found.laws)
     if law and not options:
         others = [each.name for each in registered().values() if each.laws]

@@ -81,6 +81,14 @@ class RigName(enum.StrEnum):
     pulled = "pulled"
 
 
+class EngineName(enum.StrEnum):
+    """What runs the chart."""
+
+    compiled = "compiled"
+    machines = "machines"
+    ifelse = "ifelse"
+
+
 def _version(wanted: bool) -> None:
     if wanted:
         typer.echo(f"gms-fsm {gms_fsm.__version__}")
@@ -184,6 +192,59 @@ def run_command(
         typer.echo(line)
     for note in notes_on(trace):
         typer.echo(f"note: {note}")
+    typer.echo(f"start with {files[0]}")
+
+
+@app.command("sweep")
+def sweep_command(
+    scenario: Annotated[
+        Path,
+        typer.Argument(
+            help="A scenario file, such as scenarios/pulled_mass.toml.", show_default=False
+        ),
+    ],
+    over: Annotated[
+        list[str],
+        typer.Option(
+            help="What to vary: name=from:to:count, with ,log behind it for even steps of the "
+            "logarithm; given again, every combination is run.",
+            show_default=False,
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="Folder for what is written; out/<name>-sweep if left out."
+        ),
+    ] = None,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Change a key, for example --set model.law=published."),
+    ] = None,
+    engine: Annotated[
+        EngineName, typer.Option(help="All give the same numbers; compiled is the fast one.")
+    ] = EngineName.compiled,
+) -> None:
+    """Run a scenario over a grid of parameters; write all results and a summary table."""
+    from gms_fsm.app.sweeps import axis, failures, sweep_scenario
+
+    axes = [axis(text) for text in over]
+    loaded = load_scenario(scenario, overrides or [])
+    folder = Path("out") / f"{scenario.stem}-sweep" if output is None else output
+    if "monitors" in loaded.arguments:
+        _plain_warning("a sweep watches nothing: run.monitors is left out")
+    try:
+        result, files = sweep_scenario(loaded, axes, folder, engine=engine.value)
+    except KeyboardInterrupt:
+        _plain_warning("interrupted; nothing is written")
+        raise typer.Exit(INTERRUPTED) from None
+    bad = int((result.outcome != "ok").sum())
+    typer.echo(
+        f"{len(result)} runs, {bad} failed, {len(result.transitions)} transitions; "
+        f"{len(files)} files in {folder}"
+    )
+    for run, message in failures(result, most=1):
+        typer.echo(f"first failure: run {run}: {message}")
     typer.echo(f"start with {files[0]}")
 
 

@@ -147,16 +147,24 @@ class Sweep:
         log = self.transitions[self.transitions["run"] == run]
         return [(int(i), self.edges[edge]) for i, edge in zip(log.element, log.edge, strict=True)]
 
-    def to_dataframe(self) -> pandas.DataFrame:
-        """Return one row a run as a pandas DataFrame (extra ``pandas``).
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per run, by column.
 
         Returns
         -------
-        DataFrame
-            Parameters, outcome, end of the run; columns of elements are numbered from 1.
+        dict of str to ndarray, shape (runs,)
+            Parameters, outcome, end of the run; columns of elements are numbered from 1. A
+            parameter with the name of a result is called ``parameter_<name>``.
+
+        Examples
+        --------
+        >>> from gms_fsm import GMS, GMSParameters, Prescribed
+        >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+        >>> result = sweep(model, Prescribed("0.2"), 1.0, {"F_s": [1.5]}, engine="machines")
+        >>> list(result.columns())[:8]
+        ['F_s', 'outcome', 'message', 't', 'x', 'v', 'F', 'z1']
         """
-        pandas = _imported("pandas", "pandas")
-        results = {
+        results: dict[str, NDArray[Any]] = {
             "outcome": self.outcome,
             "message": self.message,
             "t": self.t,
@@ -166,13 +174,23 @@ class Sweep:
         }
         results |= _numbered("z", self.z) | _numbered("state", self.states)
         results |= {"transitions": self.transition_count}
-        columns = {
+        parameters = {
             _apart(column, results): numbers
             for name, values in self.parameters.items()
             for column, numbers in _numbered(name, values).items()
         }
-        index = pandas.RangeIndex(len(self), name="run")
-        return pandas.DataFrame(columns | results, index=index)
+        return parameters | results
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Return one row per run as a pandas DataFrame (extra ``pandas``).
+
+        Returns
+        -------
+        DataFrame
+            What `columns` gives.
+        """
+        pandas = _imported("pandas", "pandas")
+        return pandas.DataFrame(self.columns(), index=pandas.RangeIndex(len(self), name="run"))
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the results as an xarray Dataset (extra ``sweep``).
