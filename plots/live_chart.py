@@ -19,7 +19,7 @@ import numpy as np
 
 from gms_fsm.errors import MissingExtraError, OutputError, ParameterError, shown
 from gms_fsm.inspection.explain import values_at
-from gms_fsm.language.expression import Condition, clauses, evaluate
+from gms_fsm.language import Condition, clauses, evaluate
 from gms_fsm.traces.trace import Trace
 from plots.render import drawn
 from plots.statechart import (

@@ -24,7 +24,7 @@ import graphviz
 
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ParameterError, shown
-from gms_fsm.language.expression import (
+from gms_fsm.language import (
     MATLAB_LIKE,
     Both,
     Condition,

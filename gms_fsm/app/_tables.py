@@ -10,7 +10,7 @@ from pydantic import Discriminator, Field, PositiveFloat, Tag, model_validator
 
 from gms_fsm.app._model_tables import BY_CHART, BY_KIND, LIST, ONE, ModelTable, Table
 from gms_fsm.app.records import Column
-from gms_fsm.run.start import MOST_STEPS
+from gms_fsm.run.settings import MOST_STEPS
 from gms_fsm.systems.rigs import PulledSlider
 
 __all__ = [

@@ -24,7 +24,7 @@ from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.lugre import BENCHMARK
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import MissingExtraError
-from gms_fsm.language.expression import evaluate
+from gms_fsm.language import evaluate
 from gms_fsm.run.simulate import Moment, simulate
 from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.models import GMS, LuGre, Model

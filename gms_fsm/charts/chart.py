@@ -14,7 +14,7 @@ from typing import Any
 
 from gms_fsm.charts.parameters import QUANTITIES, Parameter
 from gms_fsm.errors import ChartError, ExpressionError, shown
-from gms_fsm.language.expression import (
+from gms_fsm.language import (
     CONSTANTS,
     FUNCTIONS,
     MATLAB_LIKE,

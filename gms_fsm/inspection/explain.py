@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from gms_fsm.charts.chart import Chart, Transition
-from gms_fsm.language.expression import (
+from gms_fsm.language import (
     MATLAB_LIKE,
     Condition,
     Relation,
