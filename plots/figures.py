@@ -15,21 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm._files import written_whole
-from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
+from gms_fsm.errors import OutputError, ParameterError
 from gms_fsm.traces.trace import Trace, check_trace
 from plots import panels
+from plots._matplotlib import Axes, Figure, LineCollection, rc_context
 from plots.panels import SMOOTH, Window, shown
 from plots.style import BLUE, INK, LINE_GREY, PALE_GREY, RC, TEXT_GREY, VERMILION
-
-try:
-    from matplotlib import rc_context
-    from matplotlib.axes import Axes
-    from matplotlib.collections import LineCollection
-    from matplotlib.figure import Figure
-except ImportError:
-    raise MissingExtraError(
-        'figures need matplotlib; install it with: pip install "gms-fsm[plots]"'
-    ) from None
 
 __all__ = [
     "FIG3_PHASES",

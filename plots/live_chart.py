@@ -17,7 +17,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from gms_fsm.errors import MissingExtraError, OutputError, ParameterError, shown
+from gms_fsm._extras import missing
+from gms_fsm.errors import OutputError, ParameterError, shown
 from gms_fsm.inspection.explain import values_at
 from gms_fsm.language.expression import Condition, clauses, evaluate
 from gms_fsm.traces.trace import Trace
@@ -141,10 +142,7 @@ class LiveChart:
         )
         picture = drawn(graph, "svg")
         if picture is None:
-            raise MissingExtraError(
-                "a live chart needs Graphviz: install the program dot, or "
-                'pip install "gms-fsm[render]"'
-            )
+            raise missing("Graphviz", "render")
         self.root = _plain_tree(picture)
         self.root.set("style", f"background:{self._sheet.colours.paper}")
         groups = {group.get("id", ""): group for group in self.root.iter("g")}

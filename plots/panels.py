@@ -16,9 +16,20 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gms_fsm.errors import MissingExtraError, ParameterError, SignalError
+from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.errors import shown as written
 from gms_fsm.traces.trace import Rows, Trace, check_trace
+from plots._matplotlib import (
+    Artist,
+    Axes,
+    BoundaryNorm,
+    LineCollection,
+    ListedColormap,
+    MaxNLocator,
+    RendererBase,
+    Text,
+    colormaps,
+)
 from plots.style import (
     BLUE,
     ELEMENT_COLOURS,
@@ -31,20 +42,6 @@ from plots.style import (
     TEXT_GREY,
     VERMILION,
 )
-
-try:
-    from matplotlib import colormaps
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.backend_bases import RendererBase
-    from matplotlib.collections import LineCollection
-    from matplotlib.colors import BoundaryNorm, ListedColormap
-    from matplotlib.text import Text
-    from matplotlib.ticker import MaxNLocator
-except ImportError:
-    raise MissingExtraError(
-        'figures need matplotlib; install it with: pip install "gms-fsm[plots]"'
-    ) from None
 
 __all__ = [
     "cascade",

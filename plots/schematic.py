@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm.errors import MissingExtraError, ParameterError, shown
+from gms_fsm.errors import ParameterError, shown
 from gms_fsm.traces.trace import Trace, check_trace
 from plots import panels
+from plots._matplotlib import Artist, Axes, FancyArrowPatch, Figure, Rectangle, rc_context
 from plots.style import (
     BLUE,
     ELEMENT_COLOURS,
@@ -26,17 +27,6 @@ from plots.style import (
     TEXT_ORANGE,
     VERMILION,
 )
-
-try:
-    from matplotlib import rc_context
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.patches import FancyArrowPatch, Rectangle
-except ImportError:
-    raise MissingExtraError(
-        'figures need matplotlib; install it with: pip install "gms-fsm[plots]"'
-    ) from None
 
 __all__ = ["schematic", "schematic_figure"]
 

@@ -36,8 +36,9 @@ from fractions import Fraction
 from itertools import combinations, islice, product
 from typing import Any, Literal, TypeAlias, get_args
 
+from gms_fsm._extras import require
 from gms_fsm.charts.chart import Chart, Transition
-from gms_fsm.errors import ExpressionError, MissingExtraError, ParameterError, shown
+from gms_fsm.errors import ExpressionError, ParameterError, shown
 from gms_fsm.language.expression import (
     MATLAB_LIKE,
     Binary,
@@ -265,16 +266,6 @@ def prove(chart: Chart, domain: Sequence[str] | None = None) -> Report:
     return Report(chart, domain, tuple(found for check in checks for found in check(prover)))
 
 
-def _z3() -> Any:
-    try:
-        import z3
-    except ImportError:
-        raise MissingExtraError(
-            'checking a chart needs z3; install it with: pip install "gms-fsm[check]"'
-        ) from None
-    return z3
-
-
 # --------------------------------------------------------------------------- texts over the reals
 class _Undecided(Exception):
     """A question stays open; the text is the reason."""
@@ -299,7 +290,7 @@ class _Reading:
     """Reads the texts of one question; keeps what has to be nonzero, and where a value jumps."""
 
     def __init__(self) -> None:
-        self.z3 = _z3()
+        self.z3 = require("z3", "check")
         self.denominators: list[tuple[Any, str]] = []
         self.breaks: list[Any] = []
 
@@ -436,7 +427,7 @@ class _Prover:
     """A chart's names as real symbols, within the domain."""
 
     def __init__(self, chart: Chart, domain: Sequence[str]) -> None:
-        self.chart, self.z3 = chart, _z3()
+        self.chart, self.z3 = chart, require("z3", "check")
         real, zero = self.z3.Real, self.z3.RealVal(0)
         # In the order an example fixes them: constants, what comes from outside, the own state.
         names = (*chart.parameters, *chart.inputs, *chart.variables)
