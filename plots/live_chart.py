@@ -22,18 +22,9 @@ from gms_fsm.errors import OutputError, ParameterError, shown
 from gms_fsm.inspection.explain import values_at
 from gms_fsm.language.expression import Condition, clauses, evaluate
 from gms_fsm.traces.trace import Trace
+from plots._labels import FALSE, TRUE, UNKNOWN, Piece, Row, element_id, part_id
 from plots.render import drawn
-from plots.statechart import (
-    FALSE,
-    TRUE,
-    UNKNOWN,
-    Piece,
-    Row,
-    Sheet,
-    chosen,
-    element_id,
-    part_id,
-)
+from plots.statechart import Sheet, chosen
 
 __all__ = ["ElementLook", "LiveChart", "live_statechart"]
 

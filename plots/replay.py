@@ -32,8 +32,9 @@ from gms_fsm.errors import MissingExtraError, ParameterError, SignalError, Trace
 from gms_fsm.inspection.explain import explain_state, values_at
 from gms_fsm.language.expression import MATLAB_LIKE, Relation, clauses, spell
 from gms_fsm.traces.trace import Rows, Trace, check_trace
+from plots._labels import Row, element_id, part_id
 from plots.render import drawn
-from plots.statechart import Row, Sheet, element_id, part_id
+from plots.statechart import Sheet
 from plots.style import (
     CHART_THEMES,
     ELEMENT_COLOURS,
