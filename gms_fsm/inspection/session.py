@@ -14,9 +14,9 @@ import threading
 from bisect import bisect_left
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, Unpack
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from gms_fsm._files import written_whole
 from gms_fsm.errors import ExpressionError, ParameterError, SessionError, TraceFileError, shown, why
 from gms_fsm.inspection.explain import Why, explain_state, holds
 from gms_fsm.language.expression import Condition, Value, evaluate, parse_condition, parse_value
+from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import Run
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model, parameter_names
@@ -302,8 +303,8 @@ class Session:
 
     Parameters
     ----------
-    model, rig, t_end, **options
-        As for `gms_fsm.simulate` (without ``t_eval`` and ``progress``).
+    model, rig, t_end, t_start, initial, settings, **options
+        As for `gms_fsm.simulate`; there is a row at every step, so no ``t_eval``.
 
     Attributes
     ----------
@@ -335,8 +336,18 @@ class Session:
       element 1: stick -> slip by break_away_forward
     """
 
-    def __init__(self, model: Model, rig: Rig, t_end: float, **options: Any) -> None:
-        for name in ("t_eval", "progress"):
+    def __init__(
+        self,
+        model: Model,
+        rig: Rig,
+        t_end: float,
+        *,
+        t_start: float = 0.0,
+        initial: Mapping[str, Any] | None = None,
+        settings: Settings | None = None,
+        **options: Unpack[SettingOptions],
+    ) -> None:
+        for name in ("progress", "checkpoint"):
             if name in options:
                 raise ParameterError(f"{name} does not go with a session: it stops at every row")
         if "monitors" in options:
@@ -349,11 +360,43 @@ class Session:
                 "engine: every branch of a session makes machines of its own; use 'machines' or "
                 "'ifelse'"
             )
-        self.model, self.rig, self.t_end, self.options = model, rig, t_end, dict(options)
-        self.branches = [Branch(Run(Start.of(model, rig, t_end, rows_at_once=1, **options)))]
+        self.settings = Settings.of(settings, "a session", **options)
+        if self.settings.output != "all":
+            raise ParameterError(
+                f"output={self.settings.output!r} does not go with a session: it stops at every row"
+            )
+        self.model, self.rig, self.t_end = model, rig, t_end
+        self.t_start, self.initial = t_start, initial
+        self.branches = [Branch(self._run(t_start, initial))]
         self.current = 0
         self.breakpoints: list[Breakpoint] = []
         self.watches: list[str] = []
+
+    def _run(self, t_start: float, initial: Mapping[str, Any] | None) -> Run:
+        """Return a run of this model from other values."""
+        return Run(
+            Start.of(
+                self.model,
+                self.rig,
+                self.t_end,
+                self.settings,
+                t_start=t_start,
+                initial=initial,
+                rows_at_once=1,
+            )
+        )
+
+    def _options(self) -> dict[str, Any]:
+        """Return the arguments that are not at their defaults."""
+        usual = Settings()
+        chosen = {
+            each.name: getattr(self.settings, each.name)
+            for each in fields(Settings)
+            if getattr(self.settings, each.name) != getattr(usual, each.name)
+        }
+        if self.t_start != 0.0:
+            chosen["t_start"] = self.t_start
+        return chosen if self.initial is None else chosen | {"initial": dict(self.initial)}
 
     def __repr__(self) -> str:
         branch = f", branch {self.current}" if self.current else ""
@@ -995,8 +1038,7 @@ class Session:
             initial["v"] = v
         elif self.rig.acceleration is not None:
             initial["v"] = here.v
-        options = {**self.options, "t_start": here.t, "initial": initial}
-        run = Run(Start.of(self.model, self.rig, self.t_end, rows_at_once=1, **options))
+        run = self._run(here.t, initial)
         edits = {
             "variables": {name: dict(values) for name, values in variables.items()},
             "v": v,
@@ -1123,14 +1165,15 @@ class Session:
         """
         if any(isinstance(signal, Function) for signal in self.rig.signals.values()):
             raise SessionError("a signal is a Python function, which a file cannot hold")
-        for name, value in self.options.items():
+        options = self._options()
+        for name, value in options.items():
             if not isinstance(value, str | int | float | dict | type(None)):
                 raise SessionError(f"the option {name} = {value!r} cannot be written to a file")
         data = {
             "format": "gms-fsm session 1",
             "header": json.loads(Header.of(self.model, self.rig, {}).model_dump_json()),
             "t_end": self.t_end,
-            "options": {k: _plain(v) for k, v in self.options.items()},
+            "options": {k: _plain(v) for k, v in options.items()},
             "branches": [
                 {
                     "parent": b.parent,
