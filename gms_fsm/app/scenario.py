@@ -19,6 +19,7 @@ from typing import Annotated, Any, Literal, get_args
 import numpy as np
 import scipy.integrate
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     Discriminator,
@@ -28,6 +29,7 @@ from pydantic import (
     ValidationError,
     model_validator,
 )
+from pydantic_core import PydanticKnownError
 
 from gms_fsm.app.records import Column, Motion, Record, motion_of, read_record
 from gms_fsm.charts.parameters import GMSParameters, Stribeck
@@ -328,13 +330,35 @@ class InitialTable(_Table):
     x: float | None = None
 
 
+def _figure_ending(value: str) -> str:
+    from plots import formats
+
+    known = [ending.removeprefix(".") for ending in formats.endings("figure")]
+    if value not in known:
+        listed = formats.either([repr(ending) for ending in known])
+        raise PydanticKnownError("literal_error", {"expected": listed})
+    return value
+
+
+def _with_figure_endings(schema: dict[str, Any]) -> None:
+    """Name the endings in a schema; they are not known before somebody asks."""
+    from plots import formats
+
+    endings = [ending.removeprefix(".") for ending in formats.endings("figure")]
+    schema["anyOf"][0]["items"]["enum"] = endings
+
+
 class OutputTable(_Table):
     """What is written."""
 
     every: float | None = Field(
         None, gt=0, description="rows this far apart [s]; every accepted step when left out"
     )
-    figures: list[Literal["png", "svg", "pdf"]] = ["png", "svg"]
+    figures: list[Annotated[str, AfterValidator(_figure_ending)]] | None = Field(
+        None,
+        description="endings of the overview figure; the usual ones when left out",
+        json_schema_extra=_with_figure_endings,
+    )
     csv: bool = Field(False, description="write the trace as CSV too")
 
 
