@@ -19,7 +19,7 @@ import numpy as np
 
 from gms_fsm.errors import OutputError, ParameterError, shown
 from gms_fsm.inspection.explain import values_at
-from gms_fsm.language.expression import Condition, clauses, evaluate
+from gms_fsm.language import Condition, clauses, evaluate
 from gms_fsm.traces.trace import Trace
 from plots._labels import FALSE, TRUE, UNKNOWN, Piece, Row, element_id, part_id
 from plots.render import picture

@@ -18,7 +18,7 @@ import graphviz
 
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ParameterError, shown
-from gms_fsm.language.expression import Both, Condition, Either, clauses
+from gms_fsm.language import Both, Condition, Either, clauses
 from gms_fsm.traces.trace import Trace
 from plots._labels import (
     DOT,

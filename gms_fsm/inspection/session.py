@@ -23,7 +23,7 @@ import numpy as np
 from gms_fsm._files import written_whole
 from gms_fsm.errors import ExpressionError, ParameterError, SessionError, TraceFileError, shown, why
 from gms_fsm.inspection.explain import Why, explain_state, holds
-from gms_fsm.language.expression import Condition, Value, evaluate, parse_condition, parse_value
+from gms_fsm.language import Condition, Value, evaluate, parse_condition, parse_value
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import Run
 from gms_fsm.run.start import Start

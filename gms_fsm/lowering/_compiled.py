@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gms_fsm._extras import missing
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import SignalError
-from gms_fsm.language.expression import sgn
+from gms_fsm.language import sgn
 from gms_fsm.lowering._generated import load
 from gms_fsm.lowering._store import Store
 from gms_fsm.lowering.program import Arguments, Program

@@ -11,7 +11,7 @@ import numpy as np
 
 import integrators
 from gms_fsm.charts.chart import Chart
-from gms_fsm.language.expression import rough_points
+from gms_fsm.language import rough_points
 from gms_fsm.lowering._observing import armed, observe, rate
 from gms_fsm.run.machines import Meddling
 from gms_fsm.run.start import Start

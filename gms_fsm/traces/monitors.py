@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from gms_fsm.charts import GMS_ELEMENT
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import ExpressionError, ParameterError, SignalError, shown
-from gms_fsm.language._vectors import truths
-from gms_fsm.language.expression import (
+from gms_fsm.language import (
     MATLAB_LIKE,
     Binary,
     Condition,
@@ -32,6 +31,7 @@ from gms_fsm.language.expression import (
     spell,
     states_in,
 )
+from gms_fsm.language._vectors import truths
 from gms_fsm.systems.models import Model
 from gms_fsm.traces.failures import LivelockError
 from gms_fsm.traces.trace import Rows, Trace, interpolated, slopes

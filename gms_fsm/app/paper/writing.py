@@ -15,7 +15,7 @@ from gms_fsm.app.paper.claims import Claim, differing_numbers, force_difference,
 from gms_fsm.app.paper.experiments import Progress, experiments, run_one
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.errors import MissingExtraError
-from gms_fsm.language.expression import evaluate
+from gms_fsm.language import evaluate
 from gms_fsm.systems.signals import Formula
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.trace import Trace
