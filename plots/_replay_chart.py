@@ -6,8 +6,9 @@ from collections.abc import Iterable
 from xml.etree import ElementTree
 
 from gms_fsm.charts.chart import Chart
+from plots._labels import Row, element_id, part_id
 from plots.render import drawn
-from plots.statechart import Row, Sheet, element_id, part_id
+from plots.statechart import Sheet
 
 __all__ = ["chart_svg"]
 

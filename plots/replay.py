@@ -21,8 +21,9 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
+from gms_fsm._extras import missing
 from gms_fsm._files import written_whole
-from gms_fsm.errors import MissingExtraError, ParameterError
+from gms_fsm.errors import ParameterError
 from gms_fsm.language import (
     COMPARISONS,
     CONSTANTS,
@@ -275,9 +276,7 @@ def _uplot() -> tuple[str, str]:
         styles = list(static.glob("uPlot.min.css"))
         if scripts and styles:
             return _text(scripts[0]), _text(styles[0])
-    raise MissingExtraError(
-        'a replay page needs uPlot; install it with: pip install "gms-fsm[replay]"'
-    )
+    raise missing("uPlot", "replay")
 
 
 def _text(path: Path | Traversable) -> str:

@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, TypeAlias
 
+from gms_fsm._extras import require
 from gms_fsm.charts.chart import Chart
-from gms_fsm.errors import ExpressionError, MissingExtraError, ParameterError
+from gms_fsm.errors import ExpressionError, ParameterError
 from gms_fsm.inspection._findings import Check, Finding, Status, listed
 from gms_fsm.language import (
     COMPARISONS,
@@ -58,13 +59,8 @@ NICE = tuple(Fraction(number) for number in (1, -1, 2, -2, 0, 0.5, -0.5, 3, -3, 
 
 
 def solver() -> Any:
-    try:
-        import z3
-    except ImportError:
-        raise MissingExtraError(
-            'checking a chart needs z3; install it with: pip install "gms-fsm[check]"'
-        ) from None
-    return z3
+    """Return the module z3, or say how to get it."""
+    return require("z3", "check")
 
 
 # --------------------------------------------------------------------------- texts over the reals
@@ -253,7 +249,7 @@ class Prover:
         self.chart, self.z3 = chart, solver()
         real, zero = self.z3.Real, self.z3.RealVal(0)
         # In the order an example fixes them: constants, what comes from outside, the own state.
-        names = (*chart.parameters, *chart.inputs, *chart.variables)
+        names = (*chart.parameter_names, *chart.inputs, *chart.variables)
         self.symbols = {name: real(name) for name in names}
         self.rates = {f"d{name}/dt": real(f"d{name}/dt") for name in chart.inputs}
         self.still = {name: Dual(symbol, zero) for name, symbol in self.symbols.items()}
