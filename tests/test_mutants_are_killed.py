@@ -810,9 +810,9 @@ def test_an_infinite_slope_and_a_step_of_nothing_are_told_apart() -> None:
 # - Cannot occur: a bend, a depth, a count of steps and `quiet` are never negative, a cursor
 #   never beyond its list, a time never behind its stop, no place beyond `NO_CHANGE`, a chain of
 #   comparisons never empty, no atom stands firmer than an atom, an estimate of the error is
-#   infinite where it is no number, Python knows of no column behind a text's end, a number read is
-#   never negative, what is no sum and no power is `*` or `/`. So `> 0` and `!= 0`, `>=` and `==`,
-#   `<` and `!=` are the same there.
+#   infinite where it is no number, Python knows of no column behind a text's end, a whole power of
+#   0 or 1 was answered before, `sgn` and `abs` have one argument. So `> 0` and `!= 0`, `>=` and
+#   `==`, `<` and `!=` are the same there.
 # - Equality of floats: where two computed numbers are exactly alike, `<` and `<=` differ by a
 #   halving, a look or a redone step, never by the place found.
 # - Read by nobody: scratch is filled before it is read, and may be longer; the place returned with
@@ -821,7 +821,9 @@ def test_an_infinite_slope_and_a_step_of_nothing_are_told_apart() -> None:
 # - A hint: the grid's index may be too low, a loop climbs from there; a guess in `_bracket` is
 #   clamped into the bracket. Both only take longer.
 # - Names: the numbers of statuses and of `NO_CHANGE`; of the levels of binding the order alone
-#   counts.
+#   counts, and only of those that can stand side by side.
+# - Words: no function sorts before `abs`, no word for not before `!`, and only `min` and `max` have
+#   two arguments. So `==` and `<=`, or `>=`, are the same there.
 # - Scale: a margin times 2 is on the same side of every comparison.
 # - The least tolerance of a bracket matters to a step longer than the times at both its ends.
 # - Follows from the rest: `compare=True` for the trees of a `Chart`, for equal texts give equal
