@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.errors import MissingExtraError, ParameterError, SignalError
 from gms_fsm.errors import shown as written
-from gms_fsm.traces.trace import Rows, Trace, check_trace
+from gms_fsm.traces.rows import Rows
+from gms_fsm.traces.trace import Trace, check_trace
 from plots.style import (
     BLUE,
     ELEMENT_COLOURS,

@@ -31,7 +31,8 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import MissingExtraError, ParameterError, SignalError, TraceFileError
 from gms_fsm.inspection.explain import explain_state, values_at
 from gms_fsm.language.expression import MATLAB_LIKE, Relation, clauses, spell
-from gms_fsm.traces.trace import Rows, Trace, check_trace
+from gms_fsm.traces.rows import Rows
+from gms_fsm.traces.trace import Trace, check_trace
 from plots.render import drawn
 from plots.statechart import Row, Sheet, element_id, part_id
 from plots.style import (

@@ -8,6 +8,7 @@ which is enough for `Chattering` only.
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import math
 from collections.abc import Iterable, Mapping
@@ -33,8 +34,12 @@ from gms_fsm.language.expression import (
     states_in,
 )
 from gms_fsm.systems.models import Model
+from gms_fsm.traces._between import first_true, interpolated, slopes
+from gms_fsm.traces._parts import OBSERVED
 from gms_fsm.traces.failures import LivelockError
-from gms_fsm.traces.trace import Rows, Trace, interpolated, slopes
+from gms_fsm.traces.rows import Rows
+from gms_fsm.traces.scope import Scope, invariant_names
+from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.verdicts import (
     ChatteringVerdict,
     ClauseSeen,
@@ -56,8 +61,6 @@ __all__ = [
     "watched",
 ]
 
-HALVINGS = 60  # of a stretch between two rows
-OBSERVED = ("v", "F", "s", "F_elements", "dz")  # what a trace computes from its rows
 Truths = NDArray[np.bool_]
 
 
@@ -296,34 +299,11 @@ def watched(trace: Trace, monitors: Iterable[Monitor], error: Exception | None =
 
 # --------------------------------------------------------------------------- names and values
 def _read(monitor: Invariant, model: Model) -> Condition:
-    chart, numbers = model.chart, range(1, model.n + 1)
-    threshold = () if model.stribeck is None else ("s",)
-    names = ["t", "x", "v", "F", *threshold, *chart.variables, *chart.parameters]
-    names += [f"{name}{i}" for name in (*chart.variables, *threshold, "F") for i in numbers]
-    states = [state.name for state in chart.states]
+    names, states = invariant_names(model), [state.name for state in model.chart.states]
     try:
         return parse_condition(monitor.text, names, states, model.n, own_state=True)
     except ExpressionError as error:
         raise error.at("invariant") from None
-
-
-def _columns(trace: Trace, states: bool = False) -> dict[str, NDArray[Any]]:
-    """Return all that conditions can name: shape (rows, n), or a 1 for what all elements share."""
-    model, n = trace.model, trace.n
-    own = {name: trace.variable(name) for name in model.chart.variables} | {"s": trace.s}
-    found: dict[str, NDArray[Any]] = {
-        f"{name}{i + 1}": block[:, i : i + 1]
-        for name, block in (own | {"F": trace.F_elements}).items()
-        for i in range(n)
-    }
-    # A chart's own name goes before a numbered one.
-    found |= own | {name: np.atleast_2d(value) for name, value in model.values.items()}
-    shared = {"t": trace.t, "x": trace.x, "v": trace.v, "F": trace.F}
-    found |= {name: column[:, np.newaxis] for name, column in shared.items()}
-    if states:
-        active = trace.states
-        found |= {f"state({i + 1})": active[:, i : i + 1] for i in range(n)} | {"state(0)": active}
-    return found
 
 
 def _shown(values: Mapping[str, float]) -> str:
@@ -348,13 +328,13 @@ class _Held:
         """Return the columns it names."""
         asked = states_in(self.tree)
         names = [*sorted(names_in(self.tree)), *(f"state({i})" for i in sorted(asked))]
-        columns = _columns(trace, bool(asked))
+        columns = Scope.over(trace).invariants(states=bool(asked))
         return {name: columns[name] for name in names}
 
     def at(self, trace: Trace) -> Truths:
-        """Return where it holds, shape (rows, n), or (rows, 1) if it is not of elements."""
+        """Return where it holds, shape (n, rows), or (1, rows) if it is not of elements."""
         width = trace.n if self.of_elements else 1
-        return truths(self.tree, self.columns(trace), (len(trace), width))
+        return truths(self.tree, self.columns(trace), (width, len(trace)))
 
 
 def _of_elements(tree: Condition, model: Model) -> bool:
@@ -366,16 +346,16 @@ def _of_elements(tree: Condition, model: Model) -> bool:
 def _invariant(monitor: Invariant, trace: Trace) -> InvariantVerdict:
     tree = _read(monitor, trace.model)
     invariant, rows = _Held(tree, _of_elements(tree, trace.model)), len(trace)
-    broken = np.flatnonzero(~invariant.at(trace).all(axis=1))
+    broken = np.flatnonzero(~invariant.at(trace).all(axis=0))
     if not broken.size:
         text = f"held at all {rows} rows"
         return InvariantVerdict(True, text, monitor.text, rows, 0, None, None, "", {}, None)
     place = _located(invariant, trace, int(broken[0]))
-    i = int(np.argmin(invariant.at(place)[0]))
+    i = int(np.argmin(invariant.at(place)[:, 0]))
     values = {
-        name: float(column[0, min(i, column.shape[1] - 1)])
+        name: float(np.broadcast_to(column, (trace.n, 1))[i, 0])
         for name, column in invariant.columns(place).items()
-        if column.dtype.kind == "f"
+        if np.asarray(column).dtype.kind == "f"
     }
     t, t_last = float(place.t[0]), float(trace.t[broken[-1]])
     who, state = "", ""
@@ -413,20 +393,19 @@ def _located(invariant: _Held, trace: Trace, row: int) -> Trace:
     place = at(float(rows.t[row]), rows.y[row], seen)
     low, high = float(rows.t[max(0, row - 1)]), float(rows.t[row])
     ends = low, rows.y[row - 1], high, rows.y[row]
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        if not low < middle < high:
-            break
-        try:
-            y = interpolated(trace.program, rows.mode[row].tolist(), *ends, middle)
-            there = at(middle, y, {})
-            holds = bool(invariant.at(there).all())
-        except SignalError:  # of a trace from a file, whose signal was a Python function
-            break
-        if holds:
-            low = middle
-        else:
-            high, place = middle, there
+
+    def breaks(t: float) -> bool:
+        nonlocal place
+        y = interpolated(trace.program, rows.mode[row].tolist(), *ends, t)
+        there = at(t, y, {})
+        if invariant.at(there).all():
+            return False
+        place = there
+        return True
+
+    # A trace from a file may not have its signal any more, if it was a Python function.
+    with contextlib.suppress(SignalError):
+        first_true(low, high, breaks)
     return place
 
 
@@ -589,11 +568,9 @@ def _lost(trace: Trace, k: FloatArray, sigma: FloatArray) -> tuple[FloatArray, F
             rates = np.array([_rates(trace, row) for row in left.tolist()])
         except SignalError:  # of a trace from a file, whose signal was a Python function
             return lost, doubt
-        first, right = trace.program.first, left + 1
-        (v0, v1), (dz0, dz1) = (
-            np.moveaxis(rates[:, :, columns], 1, 0)
-            for columns in (slice(0, 1), slice(first, first + trace.n))
-        )
+        right, places = left + 1, trace.program.layout.y
+        v0, v1 = np.moveaxis(rates[:, :, [places.index("x")]], 1, 0)
+        dz0, dz1 = np.moveaxis(rates[:, :, places.block(places.own[0])], 1, 0)
         lost[left], doubt[left] = _heat(
             k, sigma, h[left], x[left], x[right], z[left], z[right], v0, v1, dz0, dz1
         )
@@ -676,7 +653,7 @@ def _told(verdict: PassivityVerdict, trace: Trace, lost: FloatArray) -> list[str
 
 # --------------------------------------------------------------------------- coverage
 def _coverage(trace: Trace) -> CoverageVerdict:
-    chart, log, mode = trace.model.chart, trace.transitions, trace.modes
+    chart, log, mode = trace.model.chart, trace.transitions, trace.modes.T
     inside = {state.name: mode == m for m, state in enumerate(chart.states)}
     states = {name: _each(places) for name, places in inside.items()}
     edges = {
@@ -685,7 +662,7 @@ def _coverage(trace: Trace) -> CoverageVerdict:
         )
         for edge in chart.transitions
     }
-    columns = _columns(trace) if chart.transitions else {}
+    columns = Scope.over(trace).invariants() if chart.transitions else {}
     known: dict[Condition, Truths] = {}
     seen = []
     for edge in chart.transitions:
@@ -724,4 +701,4 @@ def _count(found: Iterable[Iterable[object]]) -> str:
 
 def _each(places: Truths) -> tuple[bool, ...]:
     """Return for each element whether it is so at any row."""
-    return tuple(bool(found) for found in np.any(places, axis=0))
+    return tuple(bool(found) for found in np.any(places, axis=1))
