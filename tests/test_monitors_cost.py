@@ -25,7 +25,6 @@ FUNCTIONS = (
     "_invariant",
     "_passivity",
     "_coverage",
-    "_columns",
 )
 
 
@@ -45,7 +44,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         monkeypatch.setattr(monitors, name, noting(name, getattr(monitors, name)))
     for name in ("checked", "watched"):
         monkeypatch.setattr(sys.modules["gms_fsm.run.simulate"], name, getattr(monitors, name))
-    monkeypatch.setattr(trace, "_observe_rows", noting("observe", trace._observe_rows))
+    monkeypatch.setattr(trace, "observed_rows", noting("observe", trace.observed_rows))
     return noted
 
 

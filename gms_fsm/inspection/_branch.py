@@ -9,7 +9,7 @@ from __future__ import annotations
 import signal
 import threading
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
@@ -133,13 +133,16 @@ class Branch:
         """Return the last computed row at or before a time; -1 if it is before all of them."""
         return bisect_right(range(len(self)), t, key=lambda row: self.raw(row).t) - 1
 
-    def between_rows(self, row: int, t: float) -> Row:
-        """Return the place at a time between a row and the next."""
+    def behind(self, row: int) -> Callable[[float], Row]:
+        """Return what gives the place at a time between a row and the next."""
         before, after = self.raw(row), self.raw(row + 1)
         program, mode = self.run.start.program, list(before.mode)
         ends = before.t, np.array(before.y), after.t, np.array(after.y)
-        y = interpolated(program, mode, *ends, t)
-        return Row(t, 0, [float(u) for u in y], before.mode)
+
+        def place(t: float) -> Row:
+            return Row(t, 0, interpolated(program, mode, *ends, t).tolist(), before.mode)
+
+        return place
 
     def scope(self, row: Row) -> Scope:
         """Return the values at a row or a place by name."""

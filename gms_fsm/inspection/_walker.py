@@ -63,7 +63,7 @@ def walk_to(branch: Branch, row: int, t: float | None) -> None:
     while row + (t is not None) >= len(branch) and branch.pull():
         pass
     branch.cursor = min(row, len(branch) - 1)
-    branch.between = None if t is None else branch.between_rows(branch.cursor, t)
+    branch.between = None if t is None else branch.behind(branch.cursor)(t)
 
 
 def reaches(branch: Branch, holds: Callable[[Row], bool]) -> bool:
@@ -112,15 +112,15 @@ def _first_true(
     start = before.t if begin is None else begin
     if after.microstep > 0 or after.t <= start:
         return None, truth
-    low = start
+    low, place = start, branch.behind(row)
     for look in range(1, LOOKS + 1):
         at_end = look == LOOKS
         t = after.t if at_end else start + (after.t - start) * look / LOOKS
-        now = holds(after if at_end else branch.between_rows(row, t))
+        now = holds(after if at_end else place(t))
         if now and not truth:
-            found = first_true(low, t, lambda t: holds(branch.between_rows(row, t)))
+            found = first_true(low, t, lambda t: holds(place(t)))
             if at_end and found == after.t:
                 break
-            return branch.between_rows(row, found), True
+            return place(found), True
         low, truth = t, now
     return None, truth

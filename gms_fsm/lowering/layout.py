@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from gms_fsm.systems.models import Model
@@ -53,7 +54,7 @@ class Places(Generic[Name]):
     own: tuple[Name, ...]
     n: int
 
-    @property
+    @cached_property
     def size(self) -> int:
         """How many places there are."""
         return len(self.shared) + len(self.own) * self.n
@@ -78,9 +79,16 @@ class Places(Generic[Name]):
         int
             The place.
         """
-        if name in self.shared:
-            return self.shared.index(name)
-        return len(self.shared) + self.own.index(name) * self.n + element
+        start = self._starts[name]
+        return start if start < len(self.shared) else start + element
+
+    @cached_property
+    def _starts(self) -> Mapping[Name, int]:
+        """The first place of each name."""
+        starts = {name: place for place, name in enumerate(self.shared)}
+        for row, name in enumerate(self.own):
+            starts[name] = len(self.shared) + row * self.n
+        return starts
 
     def block(self, name: Name) -> slice:
         """Return the places of an own name, one per element.
@@ -111,7 +119,13 @@ class Places(Generic[Name]):
         int or slice
             As `index` for a shared name, as `block` for an own one.
         """
-        return self.index(name) if name in self.shared else self.block(name)
+        return self._all[name]
+
+    @cached_property
+    def _all(self) -> Mapping[Name, int | slice]:
+        """What stands under each name."""
+        shared = {name: self._starts[name] for name in self.shared}
+        return shared | {name: self.block(name) for name in self.own}
 
     def all_of(self, name: Name) -> range:
         """Return the places of a name: one if it is shared, else one per element.
@@ -142,7 +156,7 @@ class Places(Generic[Name]):
         dict
             For a shared name its entry, for an own name its part of `values`, one per element.
         """
-        return {name: values[self.where(name)] for name in (*self.shared, *self.own)}
+        return {name: values[where] for name, where in self._all.items()}
 
     def joined(self, values: Mapping[Name, Any]) -> list[Any]:
         """Return entries in the order of the places; the inverse of `named`.
@@ -288,17 +302,17 @@ class Layout:
         return f"d{self.variable}"
 
     # ------------------------------------------------------------------ modes
-    @property
+    @cached_property
     def modes(self) -> int:
         """How many modes a row has."""
         return self.n + self.surfaces
 
-    @property
+    @cached_property
     def elements(self) -> slice:
         """Places of the elements' states among the modes."""
         return slice(0, self.n)
 
-    @property
+    @cached_property
     def slides(self) -> slice:
         """Places of the surfaces' flags among the modes."""
         return slice(self.n, None)

@@ -154,7 +154,7 @@ class CompiledRun:
         memory, (t, y, mode) = self.columns.buffers.memory, self.columns.latest
         start = self.columns.start
         if memory.counts[loop.FIRED_ONE] == 0:  # the elements saw these values when asked
-            engine.show(t, y, mode[start.program.layout.elements])
+            engine.show(t, y, list(mode[start.program.layout.elements]))
         try:
             engine.trigger(int(memory.counts[loop.EDGE]), int(memory.counts[loop.MACHINE]), t)
         except Meddling as error:

@@ -18,7 +18,7 @@ from gms_fsm.language.expression import PYTHON, Condition, names_in, spell
 from gms_fsm.lowering._generated import ieee, load, load_careful
 from gms_fsm.lowering.program import Arguments, Program
 from gms_fsm.systems.models import Model
-from gms_fsm.traces.scope import Scope
+from gms_fsm.traces.scope import GuardValues
 
 __all__ = ["Element", "ElementMachines", "Engine", "IfElse", "Meddling"]
 
@@ -221,6 +221,9 @@ class MachineEngine:
         self.machines, self.program = machines, program
         self.chart = machines.model.chart
         self.table = machines.table(self.chart)
+        self.seen, self.live = [0.0] * program.layout.observed.size, program.live
+        self.values = GuardValues(program.layout)
+        # Past __setattr__ of the elements, which would cost time.
         self.seen_by = [vars(element) for element in machines.elements]
         self.states = [""] * len(mode)
         self.set_states(mode)
@@ -228,7 +231,7 @@ class MachineEngine:
     def go_on_from(self, t: float, y: list[float], mode: Sequence[int]) -> None:
         """Put every element where it was when a run was interrupted."""
         self.set_states(mode)
-        self.show(t, y, mode)  # perhaps between two firings of a set
+        self.show(t, y, list(mode))  # perhaps between two firings of a set
 
     def set_states(self, mode: Sequence[int]) -> None:
         """Put every element into a state, without callbacks."""
@@ -240,11 +243,11 @@ class MachineEngine:
         self.machines.machine.set_state(state, self.machines.elements[machine])
         self.states[machine] = state
 
-    def show(self, t: float, y: list[float], mode: Sequence[int]) -> None:
+    def show(self, t: float, y: list[float], mode: list[int]) -> None:
         """Put the present values at hand of every element."""
-        scope = Scope.of(self.machines.model, self.program, t, y, mode)
-        for i, values in enumerate(self.seen_by):  # past __setattr__, which would cost time
-            scope.put(i, values)
+        program = self.program
+        program.ieee["observe"](t, y, mode, self.live, program.p, self.seen)
+        self.values.put(t, y, self.seen, self.seen_by)
 
     def ask(
         self, t: float, y: list[float], mode: list[int], p: Arguments, edges: list[int]

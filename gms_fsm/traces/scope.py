@@ -11,9 +11,9 @@ invariants   as watches, but ``s``, variables and parameters without a number ar
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from gms_fsm.lowering.program import Program
 from gms_fsm.systems.models import Model
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["Scope", "invariant_names", "watch_names"]
+__all__ = ["GuardValues", "Scope", "invariant_names", "watch_names"]
 
 FORCE = "F_elements"  # what F1, F2 ... are called among what is observed
 
@@ -74,13 +74,16 @@ def _curve(model: Model) -> tuple[str, ...]:
     return () if model.stribeck is None else ("s",)
 
 
-def _numbered(model: Model) -> dict[str, tuple[str, int]]:
+def _numbered(model: Model) -> Mapping[str, tuple[str, int]]:
     """Return the names of single elements' quantities, each with quantity and element."""
-    quantities = {name: name for name in (*model.chart.variables, *_curve(model))} | {"F": FORCE}
+    return _all_numbered((*model.chart.variables, *_curve(model)), model.n)
+
+
+@functools.lru_cache(maxsize=64)  # `until` asks at every place it looks
+def _all_numbered(names: tuple[str, ...], n: int) -> Mapping[str, tuple[str, int]]:
+    quantities = {name: name for name in names} | {"F": FORCE}
     return {
-        f"{name}{i + 1}": (quantity, i)
-        for name, quantity in quantities.items()
-        for i in range(model.n)
+        f"{name}{i + 1}": (quantity, i) for name, quantity in quantities.items() for i in range(n)
     }
 
 
@@ -112,7 +115,7 @@ class Scope:
     >>> round(here.guards(0)["z"], 9), round(here.watches()["z1"], 9), here.states
     (0.2, 0.2, ['stick', 'stick', 'stick', 'stick'])
     >>> run.watches()["z1"].shape, run.invariants()["z"].shape
-    ((12,), (4, 12))
+    ((7,), (4, 7))
     """
 
     model: Model
@@ -225,7 +228,7 @@ class Scope:
         """The Stribeck curve at v, N; NaN where the model has none."""
         return self.s[0] / float(self.model.weights[0])
 
-    @cached_property
+    @functools.cached_property
     def states(self) -> Any:
         """Names of the active states, one per element."""
         names = [state.name for state in self.model.chart.states]
@@ -265,22 +268,12 @@ class Scope:
         dict of str to float, or to ndarray, shape (rows,)
             By name.
         """
-        values = self._own(element)
+        values = {"t": self.t, "x": self.x, "v": self.v, "s": self.s[element]}
+        for name in self.layout.y.own:
+            values[name] = self.each(name)[element]
         for name, value in self.model.values.items():
             values[name] = float(value if isinstance(value, float | int) else value[element])
         return values
-
-    def put(self, element: int, values: dict[str, Any]) -> None:
-        """Put what changes with the row, of what the guards of an element can name, into values.
-
-        Parameters
-        ----------
-        element : int
-            Counted from 0.
-        values : dict
-            Changed in place.
-        """
-        values.update(self._own(element))
 
     def watches(self) -> dict[str, Any]:
         """Return what watches can name, and the states.
@@ -325,14 +318,49 @@ class Scope:
 
     def _single(self) -> dict[str, Any]:
         """Return the quantities of single elements under their numbered names."""
+        quantities = {name: self.each(name) for name in (*self.layout.y.own, "s", FORCE)}
         names = _numbered(self.model).items()
-        return {name: self.each(quantity)[i] for name, (quantity, i) in names}
+        return {name: quantities[quantity][i] for name, (quantity, i) in names}
 
     def _numbered_states(self) -> dict[str, Any]:
         return {f"state({i + 1})": state for i, state in enumerate(self.states)}
 
-    def _own(self, element: int) -> dict[str, Any]:
-        values = {"t": self.t, "x": self.x, "v": self.v, "s": self.s[element]}
-        for name in self.layout.y.own:
-            values[name] = self.y[self.layout.y.index(name, element)]
-        return values
+
+class GuardValues:
+    """Puts what guards can name at hand of all elements; for asking thousands of times a second.
+
+    The same as `Scope.guards` but for the parameters, which do not change.
+
+    Parameters
+    ----------
+    layout : Layout
+        Where the values stand.
+    """
+
+    def __init__(self, layout: Layout) -> None:
+        y, seen = layout.y, layout.observed
+        self._x, self._v = y.index("x"), seen.index("v")
+        self._own = [
+            (seen.index("s", i), [(name, y.index(name, i)) for name in y.own])
+            for i in range(layout.n)
+        ]
+
+    def put(
+        self, t: float, y: Sequence[float], seen: Sequence[float], into: Sequence[dict[str, Any]]
+    ) -> None:
+        """Put values into one mapping per element.
+
+        Parameters
+        ----------
+        t : float
+            s.
+        y, seen : sequence of float
+            State vector, and what is observed of it, by place.
+        into : sequence of dict, length n
+            Changed in place.
+        """
+        x, v = y[self._x], seen[self._v]
+        for values, (threshold, variables) in zip(into, self._own, strict=True):
+            values["t"], values["x"], values["v"], values["s"] = t, x, v, seen[threshold]
+            for name, place in variables:
+                values[name] = y[place]
