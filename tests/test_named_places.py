@@ -142,7 +142,7 @@ OLD = {
     "next to a place": "y[i + 1]",
     "printed block": 'f"{base} + {row} * n + i"',
     "printed element": 'f"y[{base} + i]"',
-    "printed velocity": '"v = y[1]"',
+    "printed velocity": 'line = "v = y[1]"',
 }
 FINE = (
     "y[places.index('z', i)]",
