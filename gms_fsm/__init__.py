@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from gms_fsm.inspection.session import Session as Session
     from gms_fsm.run.machines import Element as Element
     from gms_fsm.run.machines import ElementMachines as ElementMachines
+    from gms_fsm.run.settings import Settings as Settings
     from gms_fsm.run.simulate import simulate as simulate
     from gms_fsm.run.sweep import Sweep as Sweep
     from gms_fsm.run.sweep import sweep as sweep
@@ -73,6 +74,7 @@ _HOMES = {
     "inspection.prove": "Finding Report prove",
     "inspection.session": "Session",
     "run.machines": "Element ElementMachines",
+    "run.settings": "Settings",
     "run.simulate": "simulate",
     "run.sweep": "Sweep sweep",
     "systems.models": "ChartModel GMS LuGre Model",

@@ -41,7 +41,7 @@ from gms_fsm.errors import (
     cut,
     shown,
 )
-from gms_fsm.run.start import MOST_STEPS
+from gms_fsm.run.settings import MOST_STEPS
 from gms_fsm.systems.models import GMS, LuGre, Model
 from gms_fsm.systems.rigs import Prescribed, PulledSlider, Rig, Slider
 from gms_fsm.systems.signals import Corners, SignalLike, as_signal

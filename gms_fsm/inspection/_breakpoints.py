@@ -9,9 +9,11 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import SessionError
 from gms_fsm.inspection._branch import Branch
 from gms_fsm.inspection._checks import source_of
+from gms_fsm.inspection._conditions import holds_at, read
 from gms_fsm.inspection.explain import holds
+from gms_fsm.systems.models import Model
 
-__all__ = ["KINDS", "Breakpoint", "happens", "new_breakpoint"]
+__all__ = ["KINDS", "Breakpoint", "hits", "new_breakpoint"]
 
 Kind = Literal["tested", "valid", "fires", "enter", "leave"]
 KINDS: tuple[Kind, ...] = ("tested", "valid", "fires", "enter", "leave")
@@ -60,27 +62,33 @@ def new_breakpoint(
     return Breakpoint(kind, name, element, condition, hits)
 
 
-def happens(point: Breakpoint, chart: Chart, branch: Branch, row: int, element: int) -> bool:
-    """Tell whether what a breakpoint waits for happens at a row.
+def hits(point: Breakpoint, model: Model, branch: Branch, row: int) -> bool:
+    """Tell whether a breakpoint hits at a row.
 
     Parameters
     ----------
     point : Breakpoint
-        Its condition is left to the caller.
-    chart : Chart
-        Of the model.
+        What is waited for.
+    model : Model
+        What runs.
     branch : Branch
         What is walked.
     row : int
         Not the first.
-    element : int
-        Counted from 0.
 
     Returns
     -------
     bool
-        Whether it does.
+        Whether it happens, and the condition holds.
     """
+    elements = range(model.n) if point.element is None else (point.element,)
+    if not any(_happens(point, model.chart, branch, row, i) for i in elements):
+        return False
+    return not point.condition or holds_at(read(model, point.condition), branch, branch.raw(row))
+
+
+def _happens(point: Breakpoint, chart: Chart, branch: Branch, row: int, element: int) -> bool:
+    """Tell whether what a breakpoint waits for happens to an element at a row."""
     if point.kind in ("fires", "enter", "leave"):
         fired = branch.fired(row)
         if fired is None or fired.element != element:

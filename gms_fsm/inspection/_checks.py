@@ -1,14 +1,38 @@
-"""What callers of a session may ask for: counts, elements, edges, branches that exist."""
+"""What callers of a session may ask for: settings, counts, elements, edges, branches."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from gms_fsm.charts.chart import Chart
-from gms_fsm.errors import SessionError, shown
+from gms_fsm.errors import ParameterError, SessionError, shown
+from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.systems.models import Model
 
-__all__ = ["check_branch", "check_count", "check_element", "source_of"]
+__all__ = ["check_branch", "check_count", "check_element", "checked_settings", "source_of"]
+
+
+def checked_settings(settings: Settings | None, options: SettingOptions) -> Settings:
+    """Return the settings of a session; raise a `ParameterError` for what does not go with one."""
+    for name in ("progress", "checkpoint"):
+        if name in options:
+            raise ParameterError(f"{name} does not go with a session: it stops at every row")
+    if "monitors" in options:
+        raise ParameterError(
+            "monitors look at a finished run: "
+            "gms_fsm.traces.monitors.examine(session.branch.trace(), ...)"
+        )
+    if not isinstance(options.get("engine", ""), str):
+        raise ParameterError(
+            "engine: every branch of a session makes machines of its own; use 'machines' or "
+            "'ifelse'"
+        )
+    chosen = Settings.of(settings, "a session", **options)
+    if chosen.output != "all":
+        raise ParameterError(
+            f"output={chosen.output!r} does not go with a session: it stops at every row"
+        )
+    return chosen
 
 
 def check_count(count: int) -> None:

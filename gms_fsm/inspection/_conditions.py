@@ -7,11 +7,13 @@ from contextlib import contextmanager
 from typing import Any
 
 from gms_fsm.errors import ExpressionError, SessionError
+from gms_fsm.inspection._branch import Branch, Row
+from gms_fsm.inspection.explain import holds
 from gms_fsm.language.expression import Condition, evaluate, parse_condition, parse_value
 from gms_fsm.systems.models import Model
 from gms_fsm.traces.scope import watch_names
 
-__all__ = ["read", "value_of"]
+__all__ = ["holds_at", "read", "value_of"]
 
 
 def read(model: Model, text: str) -> Condition:
@@ -19,6 +21,11 @@ def read(model: Model, text: str) -> Condition:
     states = [state.name for state in model.chart.states]
     with _numbered(model):
         return parse_condition(text, watch_names(model), states, model.n, own_state=model.n == 1)
+
+
+def holds_at(condition: Condition, branch: Branch, row: Row) -> bool:
+    """Tell whether a condition holds at a row of a branch, or a place between two."""
+    return holds(condition, branch.scope(row).watches())
 
 
 def value_of(model: Model, text: str, values: Mapping[str, Any]) -> float:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gms_fsm.errors import SessionError, shown
+from gms_fsm.inspection._checks import check_element
 from gms_fsm.systems.models import Model, parameter_names
 from gms_fsm.traces.scope import Scope
 
@@ -63,6 +64,8 @@ class Edits:
         edits = cls(own, v, dict(state or {}))
         if not (any(edits.variables.values()) or edits.state or v is not None):
             raise SessionError("nothing to poke; give variables, v or state")
+        for element in (*(i for values in own.values() for i in values), *edits.state):
+            check_element(element, model)
         return edits
 
     def __str__(self) -> str:
@@ -76,11 +79,6 @@ class Edits:
             parts.append(f"v = {self.v:.6g}")
         parts += [f"state {i + 1} = {name}" for i, name in self.state.items()]
         return ", ".join(parts)
-
-    @property
-    def elements(self) -> list[int]:
-        """All elements that are named."""
-        return [*(i for values in self.variables.values() for i in values), *self.state]
 
 
 def initial_with(edits: Edits, here: Scope, *, prescribed: bool) -> dict[str, Any]:

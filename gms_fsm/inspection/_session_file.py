@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +15,13 @@ from gms_fsm.errors import SessionError
 from gms_fsm.inspection._branch import Branch
 from gms_fsm.inspection._breakpoints import Breakpoint
 from gms_fsm.inspection._poking import Edits
+from gms_fsm.run.settings import Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Function
 from gms_fsm.traces._header import Header
 
-__all__ = ["BranchRecord", "SessionRecord", "read", "write"]
+__all__ = ["BranchRecord", "SessionRecord", "options_of", "read", "write"]
 
 FORMAT = "gms-fsm session 1"
 
@@ -83,6 +84,21 @@ class SessionRecord:
     current: int
     breakpoints: Sequence[Breakpoint]
     watches: Sequence[str]
+
+
+def options_of(
+    settings: Settings, t_start: float, initial: Mapping[str, Any] | None
+) -> dict[str, Any]:
+    """Return the arguments of a session that are not at their defaults."""
+    usual = Settings()
+    chosen = {
+        each.name: getattr(settings, each.name)
+        for each in fields(Settings)
+        if getattr(settings, each.name) != getattr(usual, each.name)
+    }
+    if t_start != 0.0:
+        chosen["t_start"] = t_start
+    return chosen if initial is None else chosen | {"initial": dict(initial)}
 
 
 def write(path: Path, record: SessionRecord) -> Path:

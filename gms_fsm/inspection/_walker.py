@@ -2,30 +2,47 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator
 
 from gms_fsm.errors import SessionError, shown
 from gms_fsm.inspection._branch import Branch, Row
+from gms_fsm.inspection._checks import check_count
 from gms_fsm.traces._between import first_true
 
-__all__ = ["back", "forward", "goto", "next_firing", "previous_firing", "reaches", "walk_to"]
+__all__ = [
+    "back",
+    "forward",
+    "goto",
+    "next_firing",
+    "previous_firing",
+    "reaches",
+    "step",
+    "walk_to",
+]
 
 LOOKS = 16  # places between two rows at which a condition is tried
 
 
-def forward(branch: Branch, count: int | None = None) -> Iterator[int]:
-    """Walk forward by rows, some or all; yield the number of each new row."""
+def forward(branch: Branch) -> Iterator[int]:
+    """Walk forward by rows to the end; yield the number of each new row."""
     branch.between = None
-    while count is None or count > 0:
-        if branch.cursor + 1 >= len(branch) and not branch.pull():
-            return
+    while branch.cursor + 1 < len(branch) or branch.pull():
         branch.cursor += 1
         yield branch.cursor
-        count = None if count is None else count - 1
+
+
+def step(branch: Branch, count: int) -> None:
+    """Go forward by rows, or to the end."""
+    check_count(count)
+    branch.between = None
+    for _ in itertools.islice(forward(branch), count):
+        pass
 
 
 def back(branch: Branch, count: int) -> None:
     """Go back by rows; from a located place the first is the row before it."""
+    check_count(count)
     if branch.between is not None and count > 0:
         branch.between, count = None, count - 1
     branch.cursor = max(0, branch.cursor - count)

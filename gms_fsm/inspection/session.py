@@ -9,19 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
-from gms_fsm.errors import ParameterError, SessionError, TraceFileError, why
+from gms_fsm.errors import SessionError, TraceFileError, why
 from gms_fsm.inspection import _breakpoints, _conditions, _session_file, _walker
-from gms_fsm.inspection._branch import Branch, Row
+from gms_fsm.inspection._branch import Branch
 from gms_fsm.inspection._breakpoints import KINDS, Breakpoint
-from gms_fsm.inspection._checks import check_branch, check_count, check_element
+from gms_fsm.inspection._checks import check_branch, check_element, checked_settings
+from gms_fsm.inspection._conditions import holds_at
 from gms_fsm.inspection._here import here_at, why_at
 from gms_fsm.inspection._poking import Edits, initial_with
 from gms_fsm.inspection._session_file import BranchRecord, SessionRecord
 from gms_fsm.inspection._told import Comparison, Fired, Here, compared
-from gms_fsm.inspection.explain import Why, holds
+from gms_fsm.inspection.explain import Why
 from gms_fsm.language.expression import Condition
+from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import Run
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
@@ -36,8 +38,8 @@ class Session:
 
     Parameters
     ----------
-    model, rig, t_end, **options
-        As for `gms_fsm.simulate` (without ``t_eval`` and ``progress``).
+    model, rig, t_end, t_start, initial, settings, **options
+        As for `gms_fsm.simulate`; there is a row at every step, so no ``t_eval``.
 
     Attributes
     ----------
@@ -69,25 +71,38 @@ class Session:
       element 1: stick -> slip by break_away_forward
     """
 
-    def __init__(self, model: Model, rig: Rig, t_end: float, **options: Any) -> None:
-        for name in ("t_eval", "progress"):
-            if name in options:
-                raise ParameterError(f"{name} does not go with a session: it stops at every row")
-        if "monitors" in options:
-            raise ParameterError(
-                "monitors look at a finished run: "
-                "gms_fsm.traces.monitors.examine(session.branch.trace(), ...)"
-            )
-        if not isinstance(options.get("engine", ""), str):
-            raise ParameterError(
-                "engine: every branch of a session makes machines of its own; use 'machines' or "
-                "'ifelse'"
-            )
-        self.model, self.rig, self.t_end, self.options = model, rig, t_end, dict(options)
-        self.branches = [Branch(self._run())]
+    def __init__(
+        self,
+        model: Model,
+        rig: Rig,
+        t_end: float,
+        *,
+        t_start: float = 0.0,
+        initial: Mapping[str, Any] | None = None,
+        settings: Settings | None = None,
+        **options: Unpack[SettingOptions],
+    ) -> None:
+        self.settings = checked_settings(settings, options)
+        self.model, self.rig, self.t_end = model, rig, t_end
+        self.t_start, self.initial = t_start, initial
+        self.branches = [Branch(self._run(t_start, initial))]
         self.current = 0
         self.breakpoints: list[Breakpoint] = []
         self.watches: list[str] = []
+
+    def _run(self, t_start: float, initial: Mapping[str, Any] | None) -> Run:
+        """Return a run of this model from other values."""
+        return Run(
+            Start.of(
+                self.model,
+                self.rig,
+                self.t_end,
+                self.settings,
+                t_start=t_start,
+                initial=initial,
+                rows_at_once=1,
+            )
+        )
 
     def __repr__(self) -> str:
         branch = f", branch {self.current}" if self.current else ""
@@ -95,10 +110,6 @@ class Session:
             f"<Session: {self.model.title}; {self.rig.title}, to t = {self.t_end:g} s; "
             f"at t = {self.here.t:.9g} s{branch}>"
         )
-
-    def _run(self, **changed: Any) -> Run:
-        options = {**self.options, **changed}
-        return Run(Start.of(self.model, self.rig, self.t_end, rows_at_once=1, **options))
 
     # ------------------------------------------------------------------ where we are
     @property
@@ -140,9 +151,7 @@ class Session:
         Here
             Where it stopped: the last row if the run ended before.
         """
-        check_count(count)
-        for _ in _walker.forward(self.branch, count):
-            pass
+        _walker.step(self.branch, count)
         return self.here
 
     def back(self, count: int = 1) -> Here:
@@ -158,7 +167,6 @@ class Session:
         Here
             Where it stopped.
         """
-        check_count(count)
         _walker.back(self.branch, count)
         return self.here
 
@@ -289,10 +297,7 @@ class Session:
         (False, 20.0)
         """
         tree = self.parse(condition)
-        return _walker.reaches(self.branch, lambda row: self._holds(tree, row))
-
-    def _holds(self, tree: Condition, row: Row) -> bool:
-        return holds(tree, self.branch.scope(row).watches())
+        return _walker.reaches(self.branch, lambda row: holds_at(tree, self.branch, row))
 
     # ------------------------------------------------------------------ breakpoints
     def break_on(
@@ -344,18 +349,11 @@ class Session:
         """
         for row in _walker.forward(self.branch):
             for point in self.breakpoints:
-                if self._hits(point, row):
+                if _breakpoints.hits(point, self.model, self.branch, row):
                     point.seen += 1
                     if point.seen >= point.hits:
                         return self.here, point
         return self.here, None
-
-    def _hits(self, point: Breakpoint, row: int) -> bool:
-        branch, chart = self.branch, self.model.chart
-        elements = range(self.model.n) if point.element is None else (point.element,)
-        if not any(_breakpoints.happens(point, chart, branch, row, i) for i in elements):
-            return False
-        return not point.condition or self._holds(self.parse(point.condition), branch.raw(row))
 
     def why(self, element: int = 0, edge: str = "") -> Why:
         """Explain the edges of an element at the cursor, clause by clause.
@@ -441,14 +439,12 @@ class Session:
         ((-1.4, 0.0), 'slip')
         """
         edits = Edits.of(self.model, variables, v, state)
-        for element in edits.elements:
-            check_element(element, self.model)
         branch, here = self.branch, self.branch.here
         if not here.t < self.t_end:
             raise SessionError(f"t = {here.t!r} s is the end of the run; go back first")
         prescribed = self.rig.acceleration is None
         initial = initial_with(edits, branch.scope(here), prescribed=prescribed)
-        run = self._run(t_start=here.t, initial=initial)
+        run = self._run(here.t, initial)
         new = Branch(run, self.current, branch.cursor, branch, edits, branch.between)
         new.cursor = new.offset
         self.branches.append(new)
@@ -544,7 +540,7 @@ class Session:
             self.model,
             self.rig,
             self.t_end,
-            self.options,
+            _session_file.options_of(self.settings, self.t_start, self.initial),
             [BranchRecord.of(branch) for branch in self.branches],
             self.current,
             self.breakpoints,
@@ -594,9 +590,9 @@ class Session:
             _walker.walk_to(session.branch, branch.cursor, branch.between)
         session.switch(record.current)
         for point in record.breakpoints:
-            seen = point.seen
-            session.break_on(
+            found = session.break_on(
                 point.kind, point.name, point.element, point.condition, point.hits
-            ).seen = seen
+            )
+            found.seen = point.seen
         session.watches = list(record.watches)
         return session

@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,6 +34,7 @@ from gms_fsm.lowering._compiled import check_numba
 from gms_fsm.lowering.layout import LOG_NUMBERS
 from gms_fsm.run._compiled_run import CompiledRun
 from gms_fsm.run._recording import scope_of
+from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import Run
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model, parameter_names, with_values
@@ -48,18 +49,6 @@ if TYPE_CHECKING:
 __all__ = ["Sweep", "sweep"]
 
 AT_ONCE = 64  # runs a task, at most
-_OPTIONS = (
-    "t_start",
-    "method",
-    "step",
-    "rtol",
-    "atol",
-    "max_step",
-    "max_steps",
-    "events",
-    "t_eval",
-    "initial",
-)
 _LOG = np.dtype(
     [
         ("run", "i8"),
@@ -342,10 +331,11 @@ def sweep(
     parameters: Mapping[str, ArrayLike] | pandas.DataFrame,
     *,
     executor: Executor | None = None,
-    output: str = "end",
-    engine: str = "compiled",
+    t_start: float = 0.0,
+    initial: Mapping[str, Any] | None = None,
+    settings: Settings | None = None,
     progress: bool | None = None,
-    **options: Any,
+    **options: Unpack[SettingOptions],
 ) -> Sweep:
     """Run a model on a rig once for each set of parameters.
 
@@ -361,14 +351,16 @@ def sweep(
     executor : concurrent.futures.Executor, optional
         Where to run: a process pool, or the executor of a Dask ``Client`` (extra ``cluster``).
         Threads on this machine when left out; compiled runs do not hold the interpreter.
-    output : {"end", "t_eval"}
-        Keep the end of each run, or also rows at ``t_eval``.
-    engine : {"compiled", "machines", "ifelse"}
-        As in `simulate`; ``"compiled"`` needs the extra ``fast``.
+    t_start, initial
+        As in `simulate`.
+    settings : Settings, optional
+        How to integrate and what to keep: the end of each run (also where it says ``"all"``: runs
+        have different steps), or rows at ``t_eval``. When left out, ``engine="compiled"``, which
+        needs the extra ``fast``.
     progress : bool, optional
         Show a progress bar on standard error; by default where that is a terminal.
     **options
-        Further arguments of `simulate`: ``rtol``, ``method``, ``t_eval`` ...
+        Fields of `Settings` by name, in place of those of `settings`.
 
     Returns
     -------
@@ -389,22 +381,13 @@ def sweep(
     >>> result.outcome.tolist(), result.transition_count.tolist()
     (['ok', 'ok'], [4, 4])
     """
-    if output not in ("end", "t_eval"):
-        raise ParameterError(
-            f"output is {output!r}; a sweep keeps 'end' or 't_eval' (runs have different steps)"
-        )
-    if engine == "compiled":
+    begin = _Begin(t_end, t_start, initial, _chosen(settings, options))
+    if begin.settings.engine == "compiled":
         check_numba()
-    for name in options:
-        if name not in _OPTIONS:
-            raise ParameterError(
-                f"a sweep takes no {name!r}; of simulate's arguments it takes {', '.join(_OPTIONS)}"
-            )
-    options = {**options, "engine": engine, "output": output}
-    Start.of(model, rig, t_end, **options)  # what is wrong for all is said once, here
+    begin.start(model, rig)  # what is wrong for all is said once, here
     values = _values(model, rig, parameters)
     runs = len(next(iter(values.values())))
-    collected = _Collected(model, runs, options.get("t_eval"))
+    collected = _Collected(model, runs, begin.settings.t_eval)
     size = max(1, min(AT_ONCE, runs // AT_ONCE))
     chunks = [range(start, min(start + size, runs)) for start in range(0, runs, size)]
     # Dask takes tasks with equal arguments for one, and a failure of before for its result.
@@ -419,7 +402,7 @@ def sweep(
                 for chunk in chunks:
                     part = {key: array[chunk.start : chunk.stop] for key, array in values.items()}
                     try:
-                        task = executor.submit(_run_chunk, model, rig, t_end, part, options, name)
+                        task = executor.submit(_run_chunk, model, rig, begin, part, name)
                     except Exception as error:
                         if not isinstance(error, BrokenExecutor):  # by a task before this one
                             error = _NotSent(f"{type(error).__name__}: {error}")
@@ -505,12 +488,41 @@ class _Result:
     rows: Mapping[str, FloatArray] | None
 
 
+@dataclass(frozen=True)
+class _Begin:
+    """What all runs of a sweep share."""
+
+    t_end: float
+    t_start: float
+    initial: Mapping[str, Any] | None
+    settings: Settings
+
+    def start(self, model: Model, rig: Rig) -> Start:
+        return Start.of(
+            model, rig, self.t_end, self.settings, t_start=self.t_start, initial=self.initial
+        )
+
+
+def _chosen(settings: Settings | None, options: SettingOptions) -> Settings:
+    """Return the settings of each run: a sweep keeps ends, if not rows at wanted times."""
+    whole = settings is None or settings.output == "all"
+    if whole and options.get("t_eval") is None and options.get("output") is None:
+        options = {**options, "output": "end"}
+    if settings is None:
+        options = {"engine": "compiled", **options}
+    chosen = Settings.of(settings, "a sweep", **options)
+    if chosen.output == "all":
+        raise ParameterError(
+            "output is 'all'; a sweep keeps 'end' or 't_eval' (runs have different steps)"
+        )
+    return chosen
+
+
 def _run_chunk(
     model: Model,
     rig: Rig,
-    t_end: float,
+    begin: _Begin,
     part: Mapping[str, FloatArray],
-    options: Mapping[str, Any],
     _sweep: str,
 ) -> list[_Result]:
     """Run some sets of parameters, one after the other, for one sweep."""
@@ -525,10 +537,10 @@ def _run_chunk(
             if compiled is not None:  # the same buffers and machine code, other numbers
                 compiled.begin_again(its_model, its_rig)
                 run = compiled
-            elif options["engine"] == "compiled":
-                run = compiled = CompiledRun(Start.of(its_model, its_rig, t_end, **options))
+            elif begin.settings.engine == "compiled":
+                run = compiled = CompiledRun(begin.start(its_model, its_rig))
             else:
-                run = Run(Start.of(its_model, its_rig, t_end, **options))
+                run = Run(begin.start(its_model, its_rig))
             while run.advance():
                 pass
         except GMSError as error:
