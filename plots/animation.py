@@ -18,25 +18,22 @@ from xml.etree import ElementTree
 import numpy as np
 
 from gms_fsm._files import written_whole
-from gms_fsm.errors import MissingExtraError, ParameterError, shown
+from gms_fsm.errors import ParameterError, shown
 from gms_fsm.traces.trace import Trace, check_trace
+from plots._matplotlib import (
+    Artist,
+    Axes,
+    Curve,
+    Figure,
+    FigureCanvasAgg,
+    Image,
+    patches,
+    rc_context,
+    to_rgb,
+)
 from plots.live_chart import LiveChart
 from plots.statechart import Sheet
 from plots.style import CHART_THEMES, RC, ChartTheme
-
-try:
-    from matplotlib import patches, rc_context
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.colors import to_rgb
-    from matplotlib.figure import Figure
-    from matplotlib.path import Path as Curve
-    from PIL import Image
-except ImportError:
-    raise MissingExtraError(
-        'animations need matplotlib and Pillow; install them with: pip install "gms-fsm[plots]"'
-    ) from None
 
 __all__ = ["animate"]
 

@@ -1,7 +1,8 @@
 """A run as one web page: stepped, scrubbed and explained, without a network.
 
 Everything the page shows is computed here and stored in it: values, active states, clause truths
-and margins. The page restyles the chart and moves cursors; it evaluates no guard. The plot library
+and margins. The page restyles the chart and moves cursors; it evaluates no guard. It reads one kind
+of text itself, the condition that a user types into its `until` box. The plot library
 (uPlot) is read from the installed package and written into the page with its licence.
 """
 
@@ -13,20 +14,27 @@ import html
 import importlib.util
 import json
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from xml.etree import ElementTree
+from typing import Any
 
+from gms_fsm._extras import missing
 from gms_fsm._files import written_whole
-from gms_fsm.charts.chart import Chart
-from gms_fsm.errors import MissingExtraError, ParameterError
+from gms_fsm.errors import ParameterError
+from gms_fsm.language import (
+    COMPARISONS,
+    CONSTANTS,
+    FUNCTIONS,
+    LEVELS,
+    OPERATIONS,
+    SEVERAL,
+)
 from gms_fsm.traces.trace import Trace, check_trace
-from plots._replay_data import data_of, frame_of, frames_of, page_rows
-from plots.render import drawn
-from plots.statechart import Row, Sheet, element_id, part_id
+from plots._replay_chart import chart_svg
+from plots._replay_run import common_frames, frames_of_run, page_rows, stored_run
 from plots.style import (
     CHART_THEMES,
     ELEMENT_COLOURS,
@@ -39,10 +47,7 @@ from plots.style import (
 
 __all__ = ["Replay", "replay", "replay_html", "write_replay"]
 
-MOST_CHARTS = 6  # a larger bank is shown as one chart, that of the chosen element
 HATCH_ANGLES = (None, 45, 135, 0, 90)  # of the states' ribbons, degrees
-SVG = "http://www.w3.org/2000/svg"
-COLOURING = ("fill", "stroke", "stroke-dasharray", "stroke-width")
 # The licence of uPlot asks to go with every copy; the package's file names the licence only.
 MIT = """\
 Permission is hereby granted, free of charge, to any person obtaining a copy of this software and
@@ -206,15 +211,15 @@ def replay_html(
     plot_script, plot_style = _uplot()
     if len(names) not in (0, len(traces)):
         raise ParameterError(f"{len(traces)} run(s) but names = {list(names)!r}; give one each")
-    pictures = [_chart_svg(each.model.chart, each.n) for each in traces]
+    pictures = [chart_svg(each.model.chart, each.n) for each in traces]
     charts = list(dict.fromkeys(pictures))
     chosen = [page_rows(each) for each in traces]
-    frames = frames_of([run.t.tolist() for run, _ in chosen])
+    frames = common_frames([run.t.tolist() for run, _ in chosen])
     runs = [
         {
             "chart": charts.index(picture),
             "title": ": ".join([*names[i : i + 1], f"{run.model.title}; {run.rig.title}"]),
-            **data_of(run, between, frame_of(frames, i)),
+            **stored_run(run, between, frames_of_run(frames, i)),
         }
         for i, (picture, (run, between)) in enumerate(zip(pictures, chosen, strict=True))
     ]
@@ -222,6 +227,7 @@ def replay_html(
         "title": title or " and ".join(dict.fromkeys(t.model.title for t in traces)),
         "runs": runs,
         "frames": frames,
+        "language": _language(),
         "events": sorted({entry["frame"] for run in runs for entry in run["log"]}),
         # The ink of a page depends on its theme.
         "colours": ["--ink" if colour == INK else colour for colour in ELEMENT_COLOURS],
@@ -247,69 +253,16 @@ def replay_html(
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], _part("replay_template.html"))
 
 
-# --------------------------------------------------------------------------- the chart
-def _chart_svg(chart: Chart, n: int) -> str:
-    """Return the chart's SVG for restyling: its parts have roles and numbers instead of colours."""
-    sheet = Sheet(chart, live=True)
-    numbers = range(n if n <= MOST_CHARTS else 1)
-    picture = drawn(sheet.graph(numbers, bare=len(numbers) == 1), "svg")
-    if picture is None:
-        return "<p>The chart is left out: no Graphviz was found when this page was written.</p>"
-    root = ElementTree.fromstring(picture)
-    for node in root.iter():
-        node.tag = node.tag.removeprefix(f"{{{SVG}}}")
-        for title in node.findall(f"{{{SVG}}}title"):
-            node.remove(title)  # browsers show titles as tooltips, and these are ids
-        _give_role(node)
-    root.attrib = {"viewBox": root.attrib["viewBox"]}
-    groups = {group.get("id", ""): group for group in root.iter("g")}
-    groups["graph0"].remove(groups["graph0"][0])  # its ground; the page has one
-    for number in numbers:
-        element, edges = element_id(number), 0
-        groups.get(element, root).attrib |= {"data-slot": str(number)}
-        for k, state in enumerate(chart.states):
-            group = groups[part_id(element, "state", state.name)]
-            group.attrib |= {"data-slot": str(number), "data-state": str(k)}
-            _name_texts(group, sheet.state_rows(state, number))
-            for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
-                guard = groups[part_id(element, "guard", edge.name)]
-                path = part_id(element, "edge", edge.name)
-                for part in (guard, groups[f"{path}-1"], groups[f"{path}-2"]):
-                    part.attrib |= {"data-slot": str(number), "data-edge": str(edges)}
-                _name_texts(guard, sheet.guard_rows(edge, priority, number))
-                _make_button(guard)
-                edges += 1
-    return ElementTree.tostring(root, encoding="unicode")
-
-
-def _give_role(node: ElementTree.Element) -> None:
-    """Replace the colours of a shape by what they mean; the page's style sheet knows the themes."""
-    drawing = [node.attrib.pop(name, None) for name in COLOURING]
-    if node.tag not in ("path", "polygon", "polyline", "ellipse"):
-        return
-    fill, stroke, dashes, _ = drawing
-    if dashes:
-        role = "frame"
-    elif fill == "none":
-        role = "line"
-    else:
-        role = "ground" if stroke in ("none", "transparent") else "solid"
-    node.set("class", role)
-
-
-def _name_texts(group: ElementTree.Element, rows: Iterable[Row]) -> None:
-    pieces = [piece for row in rows for piece in row]
-    for piece, text in zip(pieces, group.findall("text"), strict=True):
-        text.set("class", piece.role)
-        if piece.clause >= 0:
-            text.set("data-clause", str(piece.clause))
-
-
-def _make_button(guard: ElementTree.Element) -> None:
-    guard.attrib |= {"role": "button", "tabindex": "0"}
-    corners = [point.split(",") for point in guard[0].attrib["points"].split()]
-    x, y = (min(corner, key=float) for corner in zip(*corners, strict=True))  # left, above
-    ElementTree.SubElement(guard, "circle", {"class": "stop", "cx": x, "cy": y, "r": "4.5"})
+def _language() -> dict[str, Any]:
+    """Return what the page has to know of the language to read a typed condition."""
+    binary = {op: LEVELS[op] for op in ("or", "and", *OPERATIONS, "**")}
+    return {
+        "levels": binary | dict.fromkeys(COMPARISONS, LEVELS["<"]),
+        "negation": LEVELS["not"],
+        "sign": LEVELS["neg"],
+        "functions": {name: "several" if name in SEVERAL else "one" for name in FUNCTIONS},
+        "constants": dict(CONSTANTS),
+    }
 
 
 # --------------------------------------------------------------------------- the page's parts
@@ -323,9 +276,7 @@ def _uplot() -> tuple[str, str]:
         styles = list(static.glob("uPlot.min.css"))
         if scripts and styles:
             return _text(scripts[0]), _text(styles[0])
-    raise MissingExtraError(
-        'a replay page needs uPlot; install it with: pip install "gms-fsm[replay]"'
-    )
+    raise missing("uPlot", "replay")
 
 
 def _text(path: Path | Traversable) -> str:

@@ -159,18 +159,3 @@ def test_a_failure_leaves_the_old_file(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
     with pytest.raises(OutputError, match="nowhere"):
         animate(one(), tmp_path / "nowhere" / "run.gif", frames=2)
-
-
-@pytest.mark.parametrize("missing", ["matplotlib", "PIL"])
-def test_without_its_extra_it_is_named(missing: str) -> None:
-    import subprocess
-    import sys
-
-    code = (
-        f"import sys; sys.modules[{missing!r}] = None\n"
-        "from gms_fsm.errors import MissingExtraError\n"
-        "try:\n    import plots.animation\n"
-        "except MissingExtraError as error:\n    print(error)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert 'pip install "gms-fsm[plots]"' in done.stdout

@@ -15,7 +15,7 @@ import pytest
 
 from gms_fsm.charts.chart import RESERVED, Chart, State, Transition
 from gms_fsm.errors import ChartError, ExpressionError
-from gms_fsm.language.expression import CONSTANTS, FUNCTIONS, spell
+from gms_fsm.language import CONSTANTS, FUNCTIONS, spell
 
 STICK = State("stick", flow={"z": "v"})
 SLIP = State("slip", flow={"z": "C * (sgn(v) - z / s)"})

@@ -30,7 +30,7 @@ from gms_fsm.errors import (
     SignalError,
     TraceFileError,
 )
-from gms_fsm.language.expression import evaluate, names_in, parse_condition, parse_value, spell
+from gms_fsm.language import evaluate, names_in, parse_condition, parse_value, spell
 from gms_fsm.systems.signals import as_signal
 from gms_fsm.traces.trace import dwell_times
 from tests.helpers import stick_slip

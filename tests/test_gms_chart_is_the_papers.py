@@ -14,7 +14,7 @@ from gms_fsm import GMS, ElementMachines, GMSParameters, Prescribed, Stribeck
 from gms_fsm.charts import GMS_ELEMENT, LAWS, SLIP_LAWS, gms_element
 from gms_fsm.charts.chart import SUPPLIED
 from gms_fsm.errors import ParameterError
-from gms_fsm.language.expression import evaluate, names_in
+from gms_fsm.language import evaluate, names_in
 from gms_fsm.lowering.program import lower
 
 V_C = 1e-6

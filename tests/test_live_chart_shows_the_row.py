@@ -272,7 +272,9 @@ def test_wrong_options_are_refused() -> None:
 
 def test_without_graphviz_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plots.live_chart, "drawn", lambda *_: None)
-    with pytest.raises(MissingExtraError, match=r"program dot, or pip install .*\[render\]"):
+    with pytest.raises(
+        MissingExtraError, match=r"Graphviz, .* pip install .*\[render\].* program dot"
+    ):
         LiveChart(run("one"))
 
 

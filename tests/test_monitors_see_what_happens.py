@@ -30,7 +30,7 @@ from gms_fsm.charts.broken import BROKEN
 from gms_fsm.errors import ExpressionError, ParameterError
 from gms_fsm.inspection.explain import holds, values_at
 from gms_fsm.inspection.session import Session
-from gms_fsm.language.expression import parse_condition
+from gms_fsm.language import parse_condition
 from gms_fsm.traces.failures import LivelockError, SimulationError
 from gms_fsm.traces.monitors import Chattering, Coverage, Invariant, Passivity, checked, examine
 from gms_fsm.traces.verdicts import ChatteringVerdict, InvariantVerdict

@@ -18,14 +18,13 @@ import pytest
 from gms_fsm import ChartModel, Prescribed, Stribeck, simulate
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ChartError, ExpressionError
-from gms_fsm.language.expression import (
+from gms_fsm.language import (
     MATLAB_LIKE,
     Binary,
     InState,
     Literal,
     Name,
     Not,
-    _walk,
     evaluate,
     parse_condition,
     parse_value,
@@ -36,6 +35,7 @@ from gms_fsm.language.expression import (
     split,
     substitute,
 )
+from gms_fsm.language._tree import walk
 from gms_fsm.run.machines import Element, ElementMachines, Guard
 from integrators import advance as kernel
 from integrators.crossings import NO_CHANGE, first_change, nothing_near, watched
@@ -88,7 +88,7 @@ def test_a_tree_and_its_spelling_cannot_be_changed() -> None:
     condition = parse_condition(
         "not -a > b * 2 and (state(1) == slip or max(a, b) > c)", "abc", ["slip"], 1
     )
-    parts = list(_walk(condition))
+    parts = list(walk(condition))
     assert len({type(part) for part in parts}) == 10
     comparison = split(parse_condition("a > b", "abc"))
     assert isinstance(comparison, Literal)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import doctest
 import inspect
-import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -19,8 +18,9 @@ from gms_fsm import Chart, Finding, LuGre, Report, State, Stribeck, Transition, 
 from gms_fsm.charts import LAWS, LUGRE, gms_element
 from gms_fsm.charts.broken import BROKEN
 from gms_fsm.errors import ExpressionError, ParameterError
+from gms_fsm.inspection import _prover
 from gms_fsm.inspection.prove import CHECKS, Check, default_domain
-from gms_fsm.language.expression import evaluate
+from gms_fsm.language import evaluate
 
 STEP = 2.0**-20  # s; exact in floats
 
@@ -400,7 +400,7 @@ def test_a_point_that_rounding_hides_is_no_refutation() -> None:
 
 
 def test_a_long_question_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules[Report.__module__], "PATIENCE", 0.1)
+    monkeypatch.setattr(_prover, "PATIENCE", 0.1)
     hard = " and ".join(
         f"({a}*{b}*{b} - {c}*{d}*{d} + {a}*{d}*{c} - 1)**2 <= 0"
         for a, b, c, d in ("efgh", "fghj", "ghjl", "hjle", "jlef")

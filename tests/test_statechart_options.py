@@ -17,9 +17,10 @@ import gms_fsm.charts.chart
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ParameterError
-from gms_fsm.language.expression import parse_condition, parse_value
+from gms_fsm.language import parse_condition, parse_value
+from plots._notation import Writer
 from plots.render import render
-from plots.statechart import Writer, chosen, statechart
+from plots.statechart import chosen, statechart
 from plots.style import CHART_THEMES
 from tests.test_statechart_shows_the_whole_chart import SVG, Drawn, squeezed
 

@@ -1,4 +1,7 @@
-"""The command line: one verb an experiment. A user's mistake is one message and exit code 2."""
+"""The command line: one verb an experiment. A user's mistake is one message and exit code 2.
+
+A verb imports what it needs when it runs, so that help, completion and mistakes answer at once.
+"""
 
 from __future__ import annotations
 
@@ -11,31 +14,21 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from typer.core import TyperGroup
 
 import gms_fsm
 from gms_fsm._files import no_input, output_folder, written_whole
-from gms_fsm.app import paper
-from gms_fsm.app.live import LiveView
-from gms_fsm.app.report import monitor_lines, run_scenario, velocity_note
-from gms_fsm.app.scenario import Scenario, load_scenario
-from gms_fsm.charts import LUGRE, gms_element
-from gms_fsm.charts.broken import BROKEN
-from gms_fsm.charts.chart import Chart
-from gms_fsm.charts.parameters import GMSParameters
+from gms_fsm.app.paper import FORCE, VELOCITY
 from gms_fsm.errors import GMSError, ParameterError
-from gms_fsm.inspection.notes import notes_on
-from gms_fsm.inspection.prove import Report, prove
-from gms_fsm.lowering._generated import standalone
-from gms_fsm.lowering.program import lower
-from gms_fsm.systems.models import GMS, Model
-from gms_fsm.systems.rigs import Prescribed, PulledSlider, Rig, Slider
-from gms_fsm.traces.trace import Trace, files_of
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress, TaskID
+
+    from gms_fsm import Chart, Model, Report, Rig
 
 __all__ = ["app", "main"]
 
@@ -111,10 +104,19 @@ def root(
     context.ensure_object(Wishes).debug = debug
 
 
+def _messages(**options: Any) -> Console:
+    """Return where messages and progress go, beside the results."""
+    from rich.console import Console
+
+    return Console(stderr=True, **options)
+
+
 @contextlib.contextmanager
-def _progress(*columns: Any, console: Console) -> Iterator[Progress]:
+def _progress(*columns: Any) -> Iterator[Progress]:
     """Give progress bars that whoever has something to show starts: none before an error."""
-    bars = Progress(*columns or Progress.get_default_columns(), console=console)
+    from rich.progress import Progress
+
+    bars = Progress(*columns or Progress.get_default_columns(), console=_messages())
     try:
         yield bars
     finally:
@@ -129,15 +131,18 @@ def paper_command(
     ] = Path("paper"),
     force: Annotated[
         str, typer.Option(help="Applied force of Fig. 3 (N), an expression of t (s).")
-    ] = paper.FORCE,
+    ] = FORCE,
     velocity: Annotated[
         str, typer.Option(help="Velocity of Fig. 4 (m/s), an expression of t (s).")
-    ] = paper.VELOCITY,
+    ] = VELOCITY,
 ) -> None:
     """Run the paper's two experiments; write figures, traces, logs and claims.md."""
-    console = Console(stderr=True)
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+
+    from gms_fsm.app.paper import writing
+
     columns = (TextColumn("{task.description:<22}"), BarColumn(), TimeElapsedColumn())
-    with _progress(*columns, console=console) as bars:
+    with _progress(*columns) as bars:
         tasks: dict[str, TaskID] = {}
 
         def show(name: str, done: float) -> None:
@@ -146,7 +151,7 @@ def paper_command(
                 tasks[name] = bars.add_task(name, total=1.0)
             bars.update(tasks[name], completed=done)
 
-        files = paper.write(output, force, velocity, show)
+        files = writing.write(output, force, velocity, show)
     typer.echo(f"{len(files)} files in {output}; start with {files[0]}")
 
 
@@ -178,11 +183,16 @@ def run_command(
     ] = False,
 ) -> None:
     """Run a scenario; write trace, transition log, overview figure and summary."""
+    from gms_fsm.app.live import LiveView
+    from gms_fsm.app.report import monitor_lines, run_scenario, velocity_note
+    from gms_fsm.app.scenario import load_scenario
+    from gms_fsm.inspection.notes import notes_on
+
     loaded = load_scenario(scenario, overrides or [])
     folder = Path("out") / scenario.stem if output is None else output
     start, end = loaded.arguments["t_start"], loaded.arguments["t_end"]
     try:
-        with LiveView(Console(stderr=True), start, end, detail=live) as view:
+        with LiveView(_messages(), start, end, detail=live) as view:
             trace, files = run_scenario(loaded, folder, view, checkpoint=checkpoint)
     except KeyboardInterrupt as error:
         _plain_warning(str(error) or "interrupted")
@@ -200,6 +210,8 @@ def run_command(
 @app.command("schema")
 def schema_command() -> None:
     """Print the JSON schema of scenario files, for editors."""
+    from gms_fsm.app.scenario import Scenario
+
     typer.echo(json.dumps(Scenario.model_json_schema(), indent=2))
 
 
@@ -249,6 +261,7 @@ def chart_command(
 ) -> None:
     """Draw a state chart."""
     import plots
+    from gms_fsm.charts import LUGRE, gms_element
 
     if name == ChartName.gms and law is None:
         raise ParameterError("chart gms needs --law signed or --law published; they differ")
@@ -284,6 +297,9 @@ def check_command(
 
     What the order of the edges settles is said, and is no refutation.
     """
+    from gms_fsm import prove
+    from gms_fsm.charts.broken import BROKEN
+
     if names:
         typer.echo("gms --law signed, gms --law published, lugre, and as demonstrations:")
         for broken, what in BROKEN.items():
@@ -301,6 +317,9 @@ def check_command(
 
 def _to_check(name: str, law: LawName | None) -> tuple[Chart, tuple[str, ...] | None]:
     """Return a chart and its domain, None for the usual one."""
+    from gms_fsm.charts import LUGRE, gms_element
+    from gms_fsm.charts.broken import BROKEN
+
     charts = {"lugre": LUGRE, **{f"broken:{key}": found.chart for key, found in BROKEN.items()}}
     if name == "gms":
         if law is None:
@@ -364,6 +383,7 @@ def plot_command(
     end: Annotated[float | None, typer.Option(help="To t (s).")] = None,
 ) -> None:
     """Draw a run: overview, and the story of its break-aways."""
+    from gms_fsm import Trace
     from plots import figures
 
     run = Trace.load(trace)
@@ -392,11 +412,12 @@ def animate_command(
     end: Annotated[float | None, typer.Option(help="To t (s).")] = None,
 ) -> None:
     """Make a film of the chart at work, beside the force."""
+    from gms_fsm.traces.trace import Trace, files_of
     from plots.animation import animate
 
     no_input(output, *files_of(trace))
     run = Trace.load(trace)
-    with _progress(console=Console(stderr=True)) as bar:
+    with _progress() as bar:
         task = bar.add_task("frames", total=frames)
 
         def show(done: int, _: int) -> None:
@@ -417,6 +438,7 @@ def replay_command(
     title: Annotated[str, typer.Option(help="Of the page.")] = "",
 ) -> None:
     """Write a run as one web page that is stepped, scrubbed and explained."""
+    from gms_fsm.traces.trace import Trace, files_of
     from plots.replay import write_replay
 
     no_input(output, *files_of(trace), *([] if other is None else files_of(other)))
@@ -459,7 +481,7 @@ def lesson_command(
         typer.echo(listed())
         return
     chosen = numbered(number)
-    with Console(stderr=True).status(f"running lesson {chosen}"):
+    with _messages().status(f"running lesson {chosen}"):
         taught = teach(chosen, output)
     for line in taught.lines:
         typer.echo(line)
@@ -476,9 +498,13 @@ def code_command(
     ),
 ) -> None:
     """Print the if-else program made from the GMS chart (the paper's Fig. 2c); it runs alone."""
+    from gms_fsm import GMS, GMSParameters, Prescribed, PulledSlider, Slider
+    from gms_fsm.lowering._generated import standalone
+    from gms_fsm.lowering.program import lower
+
     rigs: dict[RigName, Rig] = {
-        RigName.prescribed: Prescribed(paper.VELOCITY),
-        RigName.slider: Slider(1.0, paper.FORCE),
+        RigName.prescribed: Prescribed(VELOCITY),
+        RigName.slider: Slider(1.0, FORCE),
         RigName.pulled: PulledSlider(1.0, 2.0, 0.1),
     }
     model: Model = GMS(GMSParameters.paper("stick-slip"), law=law.value)
@@ -495,7 +521,7 @@ def main() -> None:
         if wishes.debug:
             _with_causes(error)
             raise
-        Console(stderr=True, soft_wrap=True).print(
+        _messages(soft_wrap=True).print(
             f"[bold red]error:[/] {_escaped(str(error))}", highlight=False, emoji=False
         )
         sys.exit(2)
@@ -517,6 +543,6 @@ def _escaped(text: str) -> str:
 
 
 def _plain_warning(message: Warning | str, *_: object, **__: object) -> None:
-    Console(stderr=True, soft_wrap=True).print(
+    _messages(soft_wrap=True).print(
         f"[bold yellow]note:[/] {_escaped(str(message))}", highlight=False, emoji=False
     )

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from gms_fsm.errors import ChartError, ExpressionError, shown
-from gms_fsm.language.expression import (
+from gms_fsm.language import (
     CONSTANTS,
     FUNCTIONS,
     MATLAB_LIKE,

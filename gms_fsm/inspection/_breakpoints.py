@@ -7,8 +7,8 @@ from typing import Literal
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import SessionError
+from gms_fsm.inspection._asked import source_of
 from gms_fsm.inspection._branch import Branch
-from gms_fsm.inspection._checks import source_of
 from gms_fsm.inspection._conditions import holds_at, read
 from gms_fsm.inspection.explain import holds
 from gms_fsm.systems.models import Model

@@ -9,7 +9,7 @@ from typing import Any
 from gms_fsm.errors import ExpressionError, SessionError
 from gms_fsm.inspection._branch import Branch, Row
 from gms_fsm.inspection.explain import holds
-from gms_fsm.language.expression import Condition, evaluate, parse_condition, parse_value
+from gms_fsm.language import Condition, evaluate, parse_condition, parse_value
 from gms_fsm.systems.models import Model
 from gms_fsm.traces.scope import watch_names
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from gms_fsm.errors import SessionError
+from gms_fsm.inspection._asked import source_of
 from gms_fsm.inspection._branch import Branch
-from gms_fsm.inspection._checks import source_of
 from gms_fsm.inspection._told import Here
 from gms_fsm.inspection.explain import Why, explain_state
 

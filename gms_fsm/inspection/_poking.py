@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gms_fsm.errors import SessionError, shown
-from gms_fsm.inspection._checks import check_element
+from gms_fsm.inspection._asked import check_element
 from gms_fsm.systems.models import Model, parameter_names
 from gms_fsm.traces.scope import Scope
 

@@ -6,8 +6,8 @@ import itertools
 from collections.abc import Callable, Iterator
 
 from gms_fsm.errors import SessionError, shown
+from gms_fsm.inspection._asked import check_count
 from gms_fsm.inspection._branch import Branch, Row
-from gms_fsm.inspection._checks import check_count
 from gms_fsm.traces._between import first_true
 
 __all__ = [

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from gms_fsm.charts.chart import Chart, Transition
-from gms_fsm.language.expression import MATLAB_LIKE, Condition, Relation, clauses, evaluate, spell
+from gms_fsm.language import MATLAB_LIKE, Condition, Relation, clauses, evaluate, spell
 from gms_fsm.traces.scope import Scope
 from gms_fsm.traces.trace import Trace
 

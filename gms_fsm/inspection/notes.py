@@ -12,7 +12,7 @@ import numpy as np
 
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.inspection.explain import holds, values_at
-from gms_fsm.language.expression import Call, Name, Relation, Value, clauses, evaluate
+from gms_fsm.language import Call, Name, Relation, Value, clauses, evaluate
 from gms_fsm.lowering.scales import scales_of
 from gms_fsm.traces.trace import Trace
 

@@ -13,16 +13,16 @@ from typing import Any, Unpack
 
 from gms_fsm.errors import SessionError, TraceFileError, why
 from gms_fsm.inspection import _breakpoints, _conditions, _session_file, _walker
+from gms_fsm.inspection._asked import check_branch, check_element, checked_settings
 from gms_fsm.inspection._branch import Branch
 from gms_fsm.inspection._breakpoints import KINDS, Breakpoint
-from gms_fsm.inspection._checks import check_branch, check_element, checked_settings
 from gms_fsm.inspection._conditions import holds_at
 from gms_fsm.inspection._here import here_at, why_at
 from gms_fsm.inspection._poking import Edits, initial_with
 from gms_fsm.inspection._session_file import BranchRecord, SessionRecord
 from gms_fsm.inspection._told import Comparison, Fired, Here, compared
 from gms_fsm.inspection.explain import Why
-from gms_fsm.language.expression import Condition
+from gms_fsm.language import Condition
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import Run
 from gms_fsm.run.start import Start

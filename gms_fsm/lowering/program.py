@@ -36,7 +36,7 @@ import integrators
 from gms_fsm.charts.chart import RESERVED
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.errors import SignalError
-from gms_fsm.language.expression import (
+from gms_fsm.language import (
     Binary,
     Call,
     Comparison,

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import as_floats
-from gms_fsm.language.expression import (
+from gms_fsm.language import (
     Binary,
     Number,
     Value,

@@ -11,7 +11,7 @@ import numpy as np
 
 import integrators
 from gms_fsm.charts.chart import Chart
-from gms_fsm.language.expression import rough_points
+from gms_fsm.language import rough_points
 from gms_fsm.lowering._observing import armed, rate
 from gms_fsm.lowering.layout import Layout, LogRecord
 from gms_fsm.run.machines import Meddling

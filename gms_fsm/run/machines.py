@@ -14,7 +14,7 @@ from transitions import Machine, MachineError
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ChartError, ParameterError, shown
-from gms_fsm.language.expression import PYTHON, Condition, names_in, spell
+from gms_fsm.language import PYTHON, Condition, names_in, spell
 from gms_fsm.lowering._generated import ieee, load, load_careful
 from gms_fsm.lowering.program import Arguments, Program
 from gms_fsm.systems.models import Model

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
 import math
 import os
 import signal
@@ -18,11 +17,11 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gms_fsm._extras import require
 from gms_fsm._files import written_whole
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import (
     GMSError,
-    MissingExtraError,
     OutputError,
     ParameterError,
     TraceFileError,
@@ -142,7 +141,7 @@ class Sweep:
         DataFrame
             Parameters, outcome, end of the run; columns of elements are numbered from 1.
         """
-        pandas = _imported("pandas", "pandas")
+        pandas = require("pandas", "pandas")
         results = {
             "outcome": self.outcome,
             "message": self.message,
@@ -169,7 +168,7 @@ class Sweep:
         Dataset
             Dimensions ``run``, ``element`` (from 1) and, with rows, ``time``; units as attributes.
         """
-        xarray = _imported("xarray", "sweep")
+        xarray = require("xarray", "sweep")
         units = {"t": "s", "x": "m", "v": "m/s", "F": "N", "z": "m"}
         data: dict[str, Any] = {}
         for name in ("outcome", "message", "t", "x", "v", "F"):
@@ -225,8 +224,8 @@ class Sweep:
             arrays["edges"] = np.array(self.edges, dtype=np.str_)
             return written_whole(path, lambda file: np.savez_compressed(file, **arrays))
         if path.suffix == ".parquet":
-            pandas = _imported("pandas", "sweep")
-            _imported("pyarrow", "sweep")
+            pandas = require("pandas", "sweep")
+            require("pyarrow", "sweep")
             log = pandas.DataFrame(
                 {name: self.transitions[name] for name in _LOG.names or ()}
                 | {"edge": np.array(self.edges, dtype=object)[self.transitions["edge"]]}
@@ -693,12 +692,3 @@ def _numbered(name: str, values: NDArray[Any]) -> dict[str, Any]:
 def _apart(name: str, taken: Collection[str]) -> str:
     """Return a parameter's column name that is not one of the results'."""
     return f"parameter_{name}" if name in taken else name
-
-
-def _imported(module: str, extra: str) -> Any:
-    try:
-        return importlib.import_module(module)
-    except ImportError:
-        raise MissingExtraError(
-            f"{module} is not installed: pip install 'gms-fsm[{extra}]'"
-        ) from None

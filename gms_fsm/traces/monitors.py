@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 from gms_fsm.charts import GMS_ELEMENT
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import ExpressionError, ParameterError, SignalError, shown
-from gms_fsm.language._vectors import truths
-from gms_fsm.language.expression import (
+from gms_fsm.language import (
     MATLAB_LIKE,
     Binary,
     Condition,
@@ -33,6 +32,7 @@ from gms_fsm.language.expression import (
     spell,
     states_in,
 )
+from gms_fsm.language._vectors import truths
 from gms_fsm.systems.models import Model
 from gms_fsm.traces._between import first_true, interpolated, slopes
 from gms_fsm.traces._parts import OBSERVED

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gms_fsm._extras import require
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import (
-    MissingExtraError,
     OutputError,
     ParameterError,
     TraceFileError,
@@ -500,13 +500,7 @@ class Trace:
         MissingExtraError
             If pandas is not installed.
         """
-        try:
-            import pandas
-        except ImportError:
-            raise MissingExtraError(
-                'to_pandas needs pandas; install it with: pip install "gms-fsm[pandas]"'
-            ) from None
-        return pandas.DataFrame(self.columns())
+        return require("pandas", "pandas").DataFrame(self.columns())
 
     def transitions_csv(self) -> str:
         """Return the transition log as CSV text; elements counted from 1, as texts do.

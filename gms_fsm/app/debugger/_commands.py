@@ -16,7 +16,7 @@ from gms_fsm.app.debugger._view import branches, chart_states, ribbons, view
 from gms_fsm.errors import GMSError, SessionError
 from gms_fsm.inspection.explain import holds
 from gms_fsm.inspection.session import KINDS, Breakpoint, Session
-from gms_fsm.language.expression import evaluate
+from gms_fsm.language import evaluate
 from gms_fsm.systems.models import parameter_names
 
 __all__ = ["Commands"]

@@ -1,4 +1,4 @@
-"""The data of a replay page: rows, values by name, clauses and firings of a run, as plain lists."""
+"""What a replay page stores of a run: rows, values, truths of every guard and clause, the log."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from numpy.typing import NDArray
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import SignalError, TraceFileError
 from gms_fsm.inspection.explain import explain_state
-from gms_fsm.language.expression import MATLAB_LIKE, Relation, clauses, spell
+from gms_fsm.language import MATLAB_LIKE, Relation, clauses, spell
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.scope import Scope, watch_names
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["data_of", "frame_of", "frames_of", "page_rows"]
+__all__ = ["common_frames", "frames_of_run", "page_rows", "stored_run"]
 
 MOST_ROWS, FEWEST_ROWS = 4000, 200  # rows without a transition, divided by elements + 1
 
 
-def data_of(trace: Trace, between: NDArray[np.bool_], frame_of: Sequence[int]) -> dict[str, Any]:
+def stored_run(trace: Trace, between: NDArray[np.bool_], frame_of: Sequence[int]) -> dict[str, Any]:
     """Return what the page stores of a run; `frame_of` its rows on the page's common time."""
     chart, n, pool = trace.model.chart, trace.n, _Pool()
     values = Scope.over(trace).watches()
@@ -151,7 +151,7 @@ def _log(trace: Trace, edges: Sequence[Mapping[str, Any]]) -> list[dict[str, Any
     return found
 
 
-def frames_of(runs: Sequence[Sequence[float]]) -> dict[str, list[Any]]:
+def common_frames(runs: Sequence[Sequence[float]]) -> dict[str, list[Any]]:
     """Put the rows of one or two runs on one time.
 
     Rows of one instant are told apart by their order, so that micro-steps stand beside micro-steps.
@@ -170,7 +170,7 @@ def frames_of(runs: Sequence[Sequence[float]]) -> dict[str, list[Any]]:
     }
 
 
-def frame_of(frames: Mapping[str, list[Any]], run: int) -> list[int]:
+def frames_of_run(frames: Mapping[str, list[Any]], run: int) -> list[int]:
     """Return the frame of each row of a run."""
     return [frame for frame, own in enumerate(frames["own"][run]) if own]
 
