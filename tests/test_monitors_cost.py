@@ -12,8 +12,9 @@ import pytest
 
 from gms_fsm import Prescribed, simulate
 from gms_fsm.lowering.program import lower
-from gms_fsm.traces import monitors, trace
+from gms_fsm.traces import trace
 from gms_fsm.traces.failures import LivelockError
+from gms_fsm.traces.monitors import _examining as monitors
 from tests.helpers import FIG4_SINE, open_loop, pulled_mass, stick_slip
 from tests.test_monitors_see_what_happens import SLOWING, memoryless
 
@@ -21,10 +22,10 @@ FUNCTIONS = (
     "checked",
     "examine",
     "watched",
-    "_chattering",
-    "_invariant",
-    "_passivity",
-    "_coverage",
+    "chattering",
+    "invariant_verdict",
+    "passivity",
+    "coverage",
 )
 
 

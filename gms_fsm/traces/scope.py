@@ -24,7 +24,7 @@ from gms_fsm.lowering.program import Program
 from gms_fsm.systems.models import Model
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["GuardValues", "Scope", "invariant_names", "watch_names"]
+__all__ = ["GuardValues", "Scope", "invariant_names", "parameters_of", "watch_names"]
 
 FORCE = "F_elements"  # what F1, F2 ... are called among what is observed
 
@@ -68,6 +68,27 @@ def invariant_names(model: Model) -> list[str]:
     chart = model.chart
     own = (*_curve(model), *chart.variables, *chart.parameters)
     return ["t", "x", "v", "F", *own, *_numbered(model)]
+
+
+def parameters_of(model: Model, element: int) -> dict[str, float]:
+    """Return the parameters of an element.
+
+    Parameters
+    ----------
+    model : Model
+        What runs.
+    element : int
+        Counted from 0.
+
+    Returns
+    -------
+    dict of str to float
+        Those of the chart, by name.
+    """
+    return {
+        name: float(value if isinstance(value, float | int) else value[element])
+        for name, value in model.values.items()
+    }
 
 
 def _curve(model: Model) -> tuple[str, ...]:
@@ -271,9 +292,7 @@ class Scope:
         values = {"t": self.t, "x": self.x, "v": self.v, "s": self.s[element]}
         for name in self.layout.y.own:
             values[name] = self.each(name)[element]
-        for name, value in self.model.values.items():
-            values[name] = float(value if isinstance(value, float | int) else value[element])
-        return values
+        return values | parameters_of(self.model, element)
 
     def watches(self) -> dict[str, Any]:
         """Return what watches can name, and the states.

@@ -223,7 +223,8 @@ def _ending(session: Session) -> str:
 
 
 def _element(session: Session, i: int) -> ElementView:
-    here, chart, values = session.here, session.model.chart, session.values()
+    here, chart, branch = session.here, session.model.chart, session.branch
+    scope = branch.scope(branch.here)
     edges = tuple(
         EdgeView(
             each.edge.name,
@@ -239,7 +240,7 @@ def _element(session: Session, i: int) -> ElementView:
     return ElementView(
         i + 1,
         here.states[i],
-        tuple(values[f"{name}{i + 1}"] for name in chart.variables),
+        tuple(scope.each(name)[i] for name in chart.variables),
         here.s[i] if has_s else None,
         abs(here.z[i]) / here.s[i] if has_s else None,
         here.F_elements[i],
