@@ -18,7 +18,7 @@ from gms_fsm.language import PYTHON, Condition, names_in, spell
 from gms_fsm.lowering._generated import ieee, load, load_careful
 from gms_fsm.lowering.program import Arguments, Program
 from gms_fsm.systems.models import Model
-from gms_fsm.traces.scope import GuardValues, parameters_of
+from gms_fsm.traces.scope import GuardValues, parameter_values
 
 __all__ = ["Element", "ElementMachines", "Engine", "IfElse", "Meddling"]
 
@@ -189,7 +189,7 @@ def _new_element(kind: type[Element], model: Model, index: int) -> Element:
     element = kind()
     values = vars(element)  # past __setattr__, as an __init__ may have set these names
     values["index"] = index
-    values |= parameters_of(model, index)
+    values |= parameter_values(model, index)
     values["_fixed"] = frozenset(model.values) | {"index"}
     return element
 

@@ -24,7 +24,7 @@ from gms_fsm.lowering.program import Program
 from gms_fsm.systems.models import Model
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["GuardValues", "Scope", "invariant_names", "parameters_of", "watch_names"]
+__all__ = ["GuardValues", "Scope", "invariant_names", "parameter_values", "watch_names"]
 
 FORCE = "F_elements"  # what F1, F2 ... are called among what is observed
 
@@ -66,11 +66,11 @@ def invariant_names(model: Model) -> list[str]:
         Without ``state`` and ``state(1)``.
     """
     chart = model.chart
-    own = (*_curve(model), *chart.variables, *chart.parameters)
+    own = (*_curve(model), *chart.variables, *chart.parameter_names)
     return ["t", "x", "v", "F", *own, *_numbered(model)]
 
 
-def parameters_of(model: Model, element: int) -> dict[str, float]:
+def parameter_values(model: Model, element: int) -> dict[str, float]:
     """Return the parameters of an element.
 
     Parameters
@@ -292,7 +292,7 @@ class Scope:
         values = {"t": self.t, "x": self.x, "v": self.v, "s": self.s[element]}
         for name in self.layout.y.own:
             values[name] = self.each(name)[element]
-        return values | parameters_of(self.model, element)
+        return values | parameter_values(self.model, element)
 
     def watches(self) -> dict[str, Any]:
         """Return what watches can name, and the states.

@@ -14,6 +14,7 @@ from gms_fsm.app.paper import FORCE, VELOCITY
 from gms_fsm.app.paper.claims import Claim, differing_numbers, force_difference, judge
 from gms_fsm.app.paper.experiments import Progress, experiments, run_one
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
+from gms_fsm.charts.lugre import BENCHMARK
 from gms_fsm.errors import MissingExtraError
 from gms_fsm.language import evaluate
 from gms_fsm.systems.signals import Formula
@@ -55,9 +56,11 @@ def write(
     SimulationError
         If a run cannot go on; its part so far is written to ``partial.npz``.
     """
+    from plots import formats
+
     chosen = experiments(force, velocity)
-    drawn = [f"{name}.{ending}" for name in CHARTS for ending in ("svg", "png", "dot")]
-    drawn += [f"{name}.{ending}" for name in FIGURES for ending in ("png", "svg")]
+    drawn = [file for name in CHARTS for file in formats.files(name, "graph")]
+    drawn += [file for name in FIGURES for file in formats.files(name, "figure")]
     folder = output_folder(folder, ["claims.md", "partial.npz", *drawn])
     output_folder(folder / "traces", [f"{experiment.name}.npz" for experiment in chosen])
     output_folder(folder / "transitions", [f"{experiment.name}.csv" for experiment in chosen])
@@ -94,6 +97,7 @@ def _keep(folder: Path, name: str, trace: Trace) -> list[Path]:
 
 def _draw_charts(folder: Path) -> list[Path]:
     import plots
+    from plots import formats
 
     pictures = {
         "chart_element": plots.statechart(GMS_ELEMENT["published"]),
@@ -104,13 +108,13 @@ def _draw_charts(folder: Path) -> list[Path]:
     files = [
         plots.render(graph, folder / f"{name}{ending}")
         for name, graph in pictures.items()
-        for ending in (".svg", ".png")
+        for ending in formats.endings("graph", usual=True)
     ]
     return list(dict.fromkeys(files))  # without Graphviz both endings give one DOT text
 
 
 def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list[Path]:
-    from plots import figures
+    from plots import figures, formats
 
     def applied(trace: Trace) -> NDArray[np.float64]:
         tree = Formula(force).tree
@@ -155,9 +159,9 @@ def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list
         ),
     }
     return [
-        figures.save(figure, folder / f"{name}{ending}")  # type: ignore[arg-type]
+        figures.save(figure, folder / file)  # type: ignore[arg-type]
         for name, figure in pictures.items()
-        for ending in (".png", ".svg")
+        for file in formats.files(name, "figure")
     ]
 
 
@@ -193,6 +197,9 @@ def claims_text(traces: Mapping[str, Trace], force: str = FORCE, velocity: str =
             "Not judged: the claims are about the signals chosen for the reproduction, and these "
             "were changed. Run without --force and --velocity for the table."
         ]
+    lugre = ", ".join(
+        f"{each.name} = {BENCHMARK.values[each.name]:g} {each.unit}" for each in LUGRE.parameters
+    )
     runs = [
         f"| {name} | {trace.model.title} | {trace.settings['engine']}, {trace.settings['events']} "
         f"| {len(trace)} | {len(trace.transitions)} |"
@@ -227,8 +234,7 @@ def claims_text(traces: Mapping[str, Trace], force: str = FORCE, velocity: str =
             f"- the applied force of Fig. 3: `F_a = {force}` N, t in s",
             f"- the velocity of Fig. 4: `v = {velocity}` m/s",
             "- the text of the guards: our reading of Section II-D (`gms-fsm code` prints them)",
-            "- LuGre: sigma_0 = 1000 N/m, sigma_1 = 31.6 Ns/m, and the column's F_s, F_c, v_s, "
-            "sigma_2",
+            f"- LuGre: {lugre}, and the column's F_s, F_c, v_s, sigma_2",
             "- the absolute tolerances, from the models' own scales (`gms_fsm.lowering.scales`); "
             "where not said otherwise rtol is 1e-6 and switches are located",
             "- the run with weights w_i = 0.25/k_i, in which an element slips (`fig3_slipping`)",
