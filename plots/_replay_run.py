@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import SignalError, TraceFileError
-from gms_fsm.inspection.explain import explain_state, values_at
+from gms_fsm.inspection.explain import explain_state
 from gms_fsm.language import MATLAB_LIKE, Relation, clauses, spell
-from gms_fsm.traces.trace import Rows, Trace
+from gms_fsm.traces.rows import Rows
+from gms_fsm.traces.scope import Scope, watch_names
+from gms_fsm.traces.trace import Trace
 
 __all__ = ["common_frames", "frames_of_run", "page_rows", "stored_run"]
 
@@ -25,13 +27,7 @@ MOST_ROWS, FEWEST_ROWS = 4000, 200  # rows without a transition, divided by elem
 def stored_run(trace: Trace, between: NDArray[np.bool_], frame_of: Sequence[int]) -> dict[str, Any]:
     """Return what the page stores of a run; `frame_of` its rows on the page's common time."""
     chart, n, pool = trace.model.chart, trace.n, _Pool()
-    columns = {"x": trace.x, "v": trace.v, "F": trace.F}
-    blocks = {name: trace.variable(name) for name in chart.variables}
-    if trace.model.stribeck is not None:
-        columns["s"] = trace.s[:, 0] / float(trace.model.weights[0])  # the curve itself
-        blocks["s"] = trace.s
-    for name, block in (blocks | {"F": trace.F_elements}).items():
-        columns |= {f"{name}{i + 1}": block[:, i] for i in range(n)}
+    values = Scope.over(trace).watches()
     edges = _edges(chart)
     first = chart.variables[0]
     inner, inner_title = trace.z, "z [m]" if first == "z" else first
@@ -48,8 +44,9 @@ def stored_run(trace: Trace, between: NDArray[np.bool_], frame_of: Sequence[int]
         "states": [state.name for state in chart.states],
         "edges": edges,
         "names": {
-            "t": pool.add(trace.t, digits=17),  # 17 digits tell all numbers apart
-            **{name: pool.add(column) for name, column in columns.items()},
+            # 17 digits tell all times apart
+            name: pool.add(values[name], digits=17 if name == "t" else 7)
+            for name in watch_names(trace.model)
         },
         "inner": {
             "title": inner_title,
@@ -234,7 +231,7 @@ def page_rows(trace: Trace) -> tuple[Trace, NDArray[np.bool_]]:
     if others.size > wanted:
         others = others[np.linspace(0, others.size - 1, wanted).astype(int)]
     kept[others] = True
-    rows = Rows(*(column[kept] for column in _columns(trace.rows)))
+    rows = trace.rows.at(kept)
     stored = {name: column[kept] for name, column in trace.stored.items()}
     return replace(trace, rows=rows, stops=rows, stored=stored), between[kept]
 
@@ -246,18 +243,10 @@ def _with_microsteps(trace: Trace) -> Trace:
         return trace
     rows = trace.rows
     new = ~np.isin(rows.t, stops.t)  # at a stop its own rows tell more
-    pairs = zip(_columns(stops), _columns(rows), strict=True)
-    table = _in_time(Rows(*(np.concatenate([a, b[new]]) for a, b in pairs)))
+    pairs = zip(vars(stops).values(), vars(rows.at(new)).values(), strict=True)
+    table = Rows(*(np.concatenate(pair) for pair in pairs))
+    table = table.at(np.argsort(table.t, kind="stable"))
     return Trace(table, table, trace.transitions, trace.model, trace.rig, trace.settings)
-
-
-def _columns(rows: Rows) -> tuple[NDArray[Any], ...]:
-    return rows.t, rows.microstep, rows.y, rows.mode
-
-
-def _in_time(rows: Rows) -> Rows:
-    order = np.argsort(rows.t, kind="stable")
-    return Rows(*(column[order] for column in _columns(rows)))
 
 
 def _explained(
@@ -267,10 +256,9 @@ def _explained(
     sides: list[Any] = [[] for _ in range(trace.n)]
     truth: list[Any] = [[] for _ in range(trace.n)]
     holds: list[Any] = [[] for _ in range(trace.n)]
+    scopes = [Scope.at(trace, row) for row in range(len(trace))]
     for i in range(trace.n):
-        told = [
-            _row_truths(trace.model.chart, values_at(trace, row, i)) for row in range(len(trace))
-        ]
+        told = [_row_truths(trace.model.chart, scope.guards(i)) for scope in scopes]
         for edge in edges:
             own = [line[edge["name"]] for line in told]
             parts = list(zip(*(of_clauses for _, of_clauses in own), strict=True))

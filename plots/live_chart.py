@@ -199,7 +199,7 @@ class LiveChart:
 
     def _look(self, row: int, element: int) -> ElementLook:
         trace, chart = self.trace, self.trace.model.chart
-        state = chart.states[int(trace.rows.mode[row, element])].name
+        state = chart.states[int(trace.modes[row, element])].name
         leaving = tuple(edge.name for _, edge in chart.leaving(state))
         values = values_at(trace, row, element)
         marks = {edge: _marks(chart.guards[edge], values) for edge in leaving}

@@ -20,6 +20,7 @@ from gms_fsm.language import (
     names_in,
     spell,
 )
+from gms_fsm.traces.scope import Scope
 from gms_fsm.traces.trace import Trace
 
 __all__ = ["Clause", "Explanation", "Why", "explain", "explain_state", "holds", "values_at"]
@@ -167,17 +168,7 @@ def values_at(trace: Trace, row: int, element: int) -> dict[str, float]:
     dict of str to float
         t, x, v, s, the variables and the parameters.
     """
-    values = {
-        "t": float(trace.t[row]),
-        "x": float(trace.x[row]),
-        "v": float(trace.v[row]),
-        "s": float(trace.s[row, element]),
-    }
-    for name in trace.model.chart.variables:
-        values[name] = float(trace.variable(name)[row, element])
-    for name, value in trace.model.values.items():
-        values[name] = float(value if isinstance(value, float | int) else value[element])
-    return values
+    return Scope.at(trace, row).guards(element)
 
 
 def explain(trace: Trace, row: int, element: int) -> Why:
@@ -219,7 +210,7 @@ def explain(trace: Trace, row: int, element: int) -> Why:
             f"row {row}, element {element}: the trace has {len(trace)} rows, {trace.n} elements"
         )
     row %= len(trace)
-    chart, modes = trace.model.chart, trace.rows.mode[:, element]
+    chart, modes = trace.model.chart, trace.modes[:, element]
     fired = _edge_taken(trace, row, element)
     before = row - 1 if fired else row
     now, asked = (chart.states[int(modes[r])].name for r in (row, before))

@@ -15,6 +15,7 @@ from gms_fsm.inspection.explain import holds, values_at
 from gms_fsm.language import Call, Name, Relation, Value, clauses, evaluate
 from gms_fsm.lowering.scales import scales_of
 from gms_fsm.systems.models import Model, parameters_of
+from gms_fsm.traces.scope import parameter_values
 from gms_fsm.traces.trace import Trace
 
 __all__ = ["notes_on"]
@@ -93,12 +94,8 @@ def _windows(trace: Trace) -> Iterator[str]:
     for edge, bound in _velocity_windows(chart):
         missed = []
         for i in range(whole.n):
-            values = {
-                name: float(np.broadcast_to(u, whole.n)[i])
-                for name, u in whole.model.values.items()
-            }
             try:
-                c = float(evaluate(bound, values))
+                c = float(evaluate(bound, parameter_values(whole.model, i)))
             except (KeyError, ArithmeticError, ValueError):
                 continue  # it depends on more than parameters
             inside = whole.modes[:, i] == chart.state_index(edge.source)

@@ -209,12 +209,12 @@ def observe_rows(
 
     Returns
     -------
-    ndarray, shape (rows, program.seen)
+    ndarray, shape (rows, observed)
         Bit for bit as the readable engine.
     """
     from integrators import compiled
 
-    table = np.empty((t.size, program.seen))
+    table = np.empty((t.size, program.layout.observed.size))
     compiled.for_each_row(
         machine_code(program, "observe"),
         np.ascontiguousarray(t),

@@ -30,14 +30,16 @@ from gms_fsm.errors import (
     why,
 )
 from gms_fsm.lowering._compiled import check_numba
+from gms_fsm.lowering.layout import LOG_NUMBERS
 from gms_fsm.run._compiled_run import CompiledRun
+from gms_fsm.run._recording import scope_of
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import Run
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model, parameter_names, with_values
 from gms_fsm.systems.rigs import Rig, with_numbers
 from gms_fsm.traces._archives import member
-from gms_fsm.traces.trace import column_name
+from gms_fsm.traces.rows import column_name
 
 if TYPE_CHECKING:
     import pandas
@@ -52,11 +54,7 @@ _LOG = np.dtype(
         ("t", "f8"),
         ("element", "i8"),
         ("edge", "i8"),
-        ("z", "f8"),
-        ("v", "f8"),
-        ("s", "f8"),
-        ("F_before", "f8"),
-        ("F_after", "f8"),
+        *((name, "f8") for name in LOG_NUMBERS),
     ]
 )
 
@@ -502,7 +500,7 @@ class _Result:
 
     outcome: str
     message: str
-    end: tuple[float, list[float], tuple[int, ...], list[float]] | None  # t, y, mode, observed
+    end: Mapping[str, Any] | None  # t, x, v, F, z, mode
     log: NDArray[Any]
     rows: Mapping[str, FloatArray] | None
 
@@ -572,7 +570,6 @@ def _result(run: Run | CompiledRun | None, outcome: str, message: str) -> _Resul
     if run is None:
         return _Result(outcome, message, None, np.empty(0, dtype=_LOG), None)
     recorder, trace = run.recorder, run.recorder.trace()
-    t, y, mode = recorder.latest
     edges = {edge.name: index for index, edge in enumerate(trace.model.chart.transitions)}
     log = np.empty(len(trace.transitions), dtype=_LOG)
     for name in (_LOG.names or ())[1:]:
@@ -584,7 +581,9 @@ def _result(run: Run | CompiledRun | None, outcome: str, message: str) -> _Resul
     rows = None
     if recorder.start.output == "t_eval":
         rows = {name: getattr(trace, name) for name in ("x", "v", "F", "z")}
-    end = t, y, mode[: recorder.start.model.n], recorder.observe(t, y, mode)
+    here = scope_of(recorder)
+    end = {name: getattr(here, name) for name in ("t", "x", "v", "F", "z")}
+    end["mode"] = here.mode[here.layout.elements]
     return _Result(outcome, message, end, log, rows)
 
 
@@ -631,17 +630,14 @@ class _Collected:
 
     def take(self, chunk: range, results: Sequence[_Result]) -> None:
         """Put results in their rows."""
-        n = self.model.n
-        first = -n * len(self.model.chart.variables)
         for run, result in zip(chunk, results, strict=True):
             self.outcome[run], self.message[run] = result.outcome, result.message
             result.log["run"] = run
             self.logs[run] = result.log
             if result.end is not None:
-                t, y, mode, seen = result.end
-                self.ends[run] = t, y[0], seen[0], seen[1]
-                z = y[first:][:n]
-                self.z[run], self.mode[run] = z, mode
+                end = result.end
+                self.ends[run] = end["t"], end["x"], end["v"], end["F"]
+                self.z[run], self.mode[run] = end["z"], end["mode"]
             for name, values in (result.rows or {}).items():
                 self.rows[name][run, : len(values)] = values
 

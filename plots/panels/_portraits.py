@@ -22,7 +22,7 @@ def _by_slipping(
 ) -> LineCollection:
     """Draw F against x in pieces, coloured by how many elements have left their default state."""
     default = trace.model.chart.state_index(trace.model.chart.default_state.name)
-    away = (trace.rows.mode[:, chosen] != default).sum(axis=1)
+    away = (trace.modes[:, chosen] != default).sum(axis=1)
     points = np.column_stack([x, trace.F])
     # A piece holds its colour from row to row; the next one begins where it ends.
     cuts = np.concatenate([[0], np.flatnonzero(np.diff(away)) + 1, [len(points)]])

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.errors import shown as written
-from gms_fsm.traces.trace import Rows, Trace, check_trace
+from gms_fsm.traces._parts import OBSERVED
+from gms_fsm.traces.trace import Trace, check_trace
 
 __all__ = ["has_threshold", "shown"]
 
@@ -98,8 +99,8 @@ def shown(trace: Trace, window: Window | None = None) -> Trace:
 
 def _picked(trace: Trace, keep: NDArray[np.intp], *, known: bool) -> Trace:
     """Return the trace with some of its rows; forces that are known are handed on."""
-    rows = Rows(*(column[keep] for column in vars(trace.rows).values()))
-    names = ("v", "F", "s", "F_elements", "dz") if known else ()
+    rows = trace.rows.at(keep)
+    names = OBSERVED if known else ()
     stored = {name: getattr(trace, name)[keep] for name in names}
     return replace(trace, rows=rows, stops=rows, stored=stored)
 

@@ -72,7 +72,7 @@ def spans(trace: Trace, i: int, window: Window) -> Iterator[tuple[str, float, fl
         States that lasted no time are left out.
     """
     log = trace.transitions[trace.transitions.element == i]
-    first = log.source[0] if log.size else trace.model.chart.states[trace.rows.mode[0, i]].name
+    first = log.source[0] if log.size else trace.model.chart.states[trace.modes[0, i]].name
     ends = np.clip(np.concatenate([[window[0]], log.t, [window[1]]]), *window)
     for name, begin, end in zip([first, *log.target], ends[:-1], ends[1:], strict=True):
         if end > begin:
