@@ -15,7 +15,7 @@ EXTRAS: Mapping[str, tuple[str, str]] = {
     "plots": ("figures and animations need", "runs, traces and charts need no extra"),
     "render": (
         "pictures of charts need",
-        "Graphviz's program dot draws them too, and charts can be written as .dot and .mmd texts",
+        "Graphviz's program dot draws them too, and charts can be written as texts",
     ),
     "pandas": ("data frames need", "Trace.columns() has the same numbers, and so has a CSV file"),
     "fast": ("engine 'compiled' needs", "engine='machines' gives the same result, slower"),

@@ -17,13 +17,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from gms_fsm._extras import missing
 from gms_fsm.errors import OutputError, ParameterError, shown
 from gms_fsm.inspection.explain import values_at
 from gms_fsm.language import Condition, clauses, evaluate
 from gms_fsm.traces.trace import Trace
 from plots._labels import FALSE, TRUE, UNKNOWN, Piece, Row, element_id, part_id
-from plots.render import drawn
+from plots.render import picture
 from plots.statechart import Sheet, chosen
 
 __all__ = ["ElementLook", "LiveChart", "live_statechart"]
@@ -131,10 +130,7 @@ class LiveChart:
             values=self._value_rows(None),
             foot=f"t = {WIDEST} s" if values else "",
         )
-        picture = drawn(graph, "svg")
-        if picture is None:
-            raise missing("Graphviz", "render")
-        self.root = _plain_tree(picture)
+        self.root = _plain_tree(picture(graph, "svg"))
         self.root.set("style", f"background:{self._sheet.colours.paper}")
         groups = {group.get("id", ""): group for group in self.root.iter("g")}
         self._parts = {i: _ElementParts(self._sheet, i, groups) for i in self.elements}

@@ -164,6 +164,12 @@ def test_a_text_has_a_hundred_comparisons_at_most() -> None:
         parse_condition(" and ".join(["v > 0"] * 101), "v")
 
 
+def test_pow_takes_two_arguments() -> None:
+    assert parse_value("pow(a, b)", "ab") == parse_value("a**b", "ab")
+    for arguments in ("", "a", "a, b, a"):
+        assert "two arguments" in str(_refused(f"pow({arguments})", "a", "b"))
+
+
 def test_what_counts_as_a_mark_that_cannot_be_read() -> None:
     assert "half a character" in str(_refused("v + \ud800", "v"))
     assert "half a character" in str(_refused("v + \udfff", "v"))
@@ -189,6 +195,10 @@ def test_small_powers_are_products_until_the_text_grows_too_long() -> None:
     assert power(f"({eight})**v", "8") is None  # 8 + 1
     assert power(f"({eight})**1", "8") == 8
     assert power(f"({eight} + v)**0", "8") == 8
+    seven = "a + b + c + d + e + f + g"
+    for one in ("h", "h**1", "(h * v)**0"):  # each is one part
+        assert power(f"{seven} + {one}", "8") == 8  # 64
+        assert power(f"{eight} + {one}", "8") is None  # 72
     assert power("(a * -b)**8", "4") == 4  # 16 * 4
     assert power("(a * -b)**8", "-5") is None
     assert power("(a + b)**0.5", "8") == 8  # by pow once: two parts, not eight

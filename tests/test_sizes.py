@@ -22,13 +22,11 @@ SAID = re.compile(r"# Long because \w")
 
 # Modules that are being split. A name leaves this list when its module is small enough.
 LONG_MODULES = {
-    "gms_fsm/app/debugger.py",
-    "gms_fsm/inspection/prove.py",
     "gms_fsm/inspection/session.py",
-    "gms_fsm/language/expression.py",
     "gms_fsm/lowering/program.py",
+    "gms_fsm/traces/monitors.py",
     "gms_fsm/traces/trace.py",
-    "plots/replay.py",
+    "integrators/loop.py",
 }
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef

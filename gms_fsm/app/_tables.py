@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import scipy.integrate
-from pydantic import Discriminator, Field, PositiveFloat, Tag, model_validator
+from pydantic import AfterValidator, Discriminator, Field, PositiveFloat, Tag, model_validator
+from pydantic_core import PydanticKnownError
 
 from gms_fsm.app._model_tables import BY_CHART, BY_KIND, LIST, ONE, ModelTable, Table
 from gms_fsm.app.records import Column
@@ -181,13 +182,35 @@ class InitialTable(Table):
     x: float | None = None
 
 
+def _figure_ending(value: str) -> str:
+    from plots import formats
+
+    known = [ending.removeprefix(".") for ending in formats.endings("figure")]
+    if value not in known:
+        listed = formats.either([repr(ending) for ending in known])
+        raise PydanticKnownError("literal_error", {"expected": listed})
+    return value
+
+
+def _with_figure_endings(schema: dict[str, Any]) -> None:
+    """Name the endings in a schema; they are not known before somebody asks."""
+    from plots import formats
+
+    endings = [ending.removeprefix(".") for ending in formats.endings("figure")]
+    schema["anyOf"][0]["items"]["enum"] = endings
+
+
 class OutputTable(Table):
     """What is written."""
 
     every: float | None = Field(
         None, gt=0, description="rows this far apart [s]; every accepted step when left out"
     )
-    figures: list[Literal["png", "svg", "pdf"]] = Field(["png", "svg"])
+    figures: list[Annotated[str, AfterValidator(_figure_ending)]] | None = Field(
+        None,
+        description="endings of the overview figure; the usual ones when left out",
+        json_schema_extra=_with_figure_endings,
+    )
     csv: bool = Field(False, description="write the trace as CSV too")
 
 

@@ -13,11 +13,12 @@ import textwrap
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup, TyperOption
 
 import gms_fsm
 from gms_fsm._files import no_input, output_folder, written_whole
@@ -58,6 +59,21 @@ class _Verbs(TyperGroup):
         except typer.BadParameter as error:  # pydantic's words, as newer versions of typer pass on
             error.message = error.message.removeprefix("Value error, ")
             raise
+
+
+class _Drawing(TyperCommand):
+    """A verb whose help names endings: ``{chart}`` stands for those of charts, and so on."""
+
+    def get_params(self, ctx: Any) -> Any:
+        from plots import formats
+
+        params = super().get_params(ctx)
+        listed: dict[str, str] = {each: formats.listed(each) for each in get_args(formats.Subject)}
+        listed["chart"] = formats.listed("graph", "chart")
+        for param in params:
+            if isinstance(param, TyperOption) and param.help:
+                param.help = param.help.format(**listed)
+        return params
 
 
 app = typer.Typer(
@@ -292,16 +308,14 @@ class Theme(enum.StrEnum):
     dark = "dark"
 
 
-@app.command("chart")
+@app.command("chart", cls=_Drawing)
 def chart_command(
     name: Annotated[
         str, typer.Argument(help="Which chart; --list names all.", show_default=False)
     ] = "",
     output: Annotated[
         Path,
-        typer.Option(
-            "--output", "-o", help="Ends in .svg, .png, .pdf, .dot, .gv or .mmd (Mermaid)."
-        ),
+        typer.Option("--output", "-o", help="Ends in {chart}."),
     ] = Path("chart.svg"),
     law: Annotated[str, typer.Option(help=LAW, show_default=False)] = "",
     elements: Annotated[int, typer.Option(help="How many elements, as parallel states.")] = 1,
@@ -372,14 +386,13 @@ def check_command(
 def _write_report(report: Report, folder: Path) -> list[Path]:
     """Write a report, and a chart with the place marked for what is refuted or settled by order."""
     import plots
+    from plots import formats
 
     text = f"{report}\n".encode()
     found = [*report.refuted, *report.settled]
     stems = [f"{number}-{finding.check}" for number, finding in enumerate(found, start=1)]
-    endings = ("svg", "png", "dot")
-    output_folder(
-        folder, ["report.txt", *(f"{stem}.{ending}" for stem in stems for ending in endings)]
-    )
+    pictures = [name for stem in stems for name in formats.files(stem, "graph")]
+    output_folder(folder, ["report.txt", *pictures])
     written = [written_whole(folder / "report.txt", lambda file: file.write(text))]
     edges = report.chart.guards
     for stem, finding in zip(stems, found, strict=True):
@@ -389,16 +402,16 @@ def _write_report(report: Report, folder: Path) -> list[Path]:
         note = textwrap.wrap(f"{what}: {finding.text}", 50)
         note += textwrap.wrap(finding.example, 50)
         graph = plots.statechart(report.chart, marked=marked, note="\n".join(note))
-        for ending in ("svg", "png"):
-            written.append(plots.render(graph, folder / f"{stem}.{ending}"))
+        for ending in formats.endings("graph", usual=True):
+            written.append(plots.render(graph, folder / f"{stem}{ending}"))
     return list(dict.fromkeys(written))
 
 
-@app.command("blocks")
+@app.command("blocks", cls=_Drawing)
 def blocks_command(
-    output: Annotated[
-        Path, typer.Option("--output", "-o", help="Ends in .svg, .png, .pdf, .dot or .gv.")
-    ] = Path("blocks.svg"),
+    output: Annotated[Path, typer.Option("--output", "-o", help="Ends in {graph}.")] = Path(
+        "blocks.svg"
+    ),
     elements: Annotated[int, typer.Option(help="How many elements.")] = 4,
 ) -> None:
     """Draw the block diagram of the whole model (the paper's Fig. 2a)."""
@@ -416,11 +429,11 @@ def plot_command(
 ) -> None:
     """Draw a run: overview, and the story of its break-aways."""
     from gms_fsm import Trace
-    from plots import figures
+    from plots import figures, formats
 
     run = Trace.load(trace)
-    names, endings = ("overview", "ribbons"), ("png", "svg")
-    folder = output_folder(output, [f"{name}.{ending}" for name in names for ending in endings])
+    files = [formats.files(name, "figure") for name in ("overview", "ribbons")]
+    folder = output_folder(output, chain(*files))
     window = None
     if start is not None or end is not None:
         window = (
@@ -428,15 +441,15 @@ def plot_command(
             float(run.t[-1]) if end is None else end,
         )
     pictures = (figures.overview(run, window=window), figures.ribbons_figure(run, window=window))
-    for name, figure in zip(names, pictures, strict=True):
-        for ending in endings:
-            typer.echo(str(figures.save(figure, folder / f"{name}.{ending}")))
+    for figure, names in zip(pictures, files, strict=True):
+        for name in names:
+            typer.echo(str(figures.save(figure, folder / name)))
 
 
-@app.command("animate")
+@app.command("animate", cls=_Drawing)
 def animate_command(
     trace: Annotated[Path, typer.Argument(help="A trace, .npz or .csv.", show_default=False)],
-    output: Annotated[Path, typer.Option("--output", "-o", help="Ends in .gif.")] = Path(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Ends in {animation}.")] = Path(
         "film.gif"
     ),
     frames: Annotated[int, typer.Option(help="How many pictures.")] = 200,
@@ -460,24 +473,26 @@ def animate_command(
     typer.echo(str(film))
 
 
-@app.command("replay")
+@app.command("replay", cls=_Drawing)
 def replay_command(
     trace: Annotated[Path, typer.Argument(help="A trace, .npz or .csv.", show_default=False)],
     other: Annotated[Path | None, typer.Argument(help="A second one, shown beside it.")] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="The page, .html.")] = Path(
+    output: Annotated[Path, typer.Option("--output", "-o", help="The page, {page}.")] = Path(
         "replay.html"
     ),
     title: Annotated[str, typer.Option(help="Of the page.")] = "",
 ) -> None:
     """Write a run as one web page that is stepped, scrubbed and explained."""
     from gms_fsm.traces.trace import Trace, files_of
-    from plots.replay import write_replay
+    from plots import formats
+    from plots.replay import replay
 
     no_input(output, *files_of(trace), *([] if other is None else files_of(other)))
     second = None if other is None else Trace.load(other)
     names = [] if other is None else [trace.stem, other.stem]
-    page = write_replay(output, Trace.load(trace), second, title=title, names=names)
-    typer.echo(str(page))
+    formats.chosen(output, "page")
+    page = replay(Trace.load(trace), second, title=title, names=names)
+    typer.echo(str(formats.save(page, output, "page")))
 
 
 @app.command("debug")

@@ -132,7 +132,7 @@ def run_scenario(
     """
     output = loaded.scenario.output
     names = ["summary.md", "trace.npz", "transitions.csv", "partial.npz"]
-    names += [f"overview.{ending}" for ending in output.figures]
+    names += _figure_files(loaded)
     names += ["trace.csv", "trace.transitions.csv"] if output.csv else []
     folder = output_folder(folder, names)
     for name in names:
@@ -192,8 +192,19 @@ def _reported(loaded: Loaded, trace: Trace, folder: Path, saved: Path) -> list[P
     return files
 
 
+def _figure_files(loaded: Loaded) -> list[str]:
+    """Return the names of the files that the overview is drawn to."""
+    wanted = loaded.scenario.output.figures
+    if wanted is not None:
+        return [f"overview.{ending}" for ending in wanted]
+    from plots import formats
+
+    return formats.files("overview", "figure")
+
+
 def _draw(loaded: Loaded, trace: Trace, folder: Path) -> list[Path]:
-    if not loaded.scenario.output.figures:
+    names = _figure_files(loaded)
+    if not names:
         return []
     from plots import figures
 
@@ -203,10 +214,7 @@ def _draw(loaded: Loaded, trace: Trace, folder: Path) -> list[Path]:
         position = loaded.motion.position[loaded.record.chosen]
         measured = figures.Measured(times, position, force)
     figure = figures.overview(trace, measured, title=loaded.title)
-    return [
-        figures.save(figure, folder / f"overview.{ending}")
-        for ending in loaded.scenario.output.figures
-    ]
+    return [figures.save(figure, folder / name) for name in names]
 
 
 # --------------------------------------------------------------------------- the summary

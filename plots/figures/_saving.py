@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
 
-from gms_fsm._files import written_whole
-from gms_fsm.errors import OutputError
+from plots import formats
 from plots._matplotlib import Figure, rc_context
 from plots.style import RC
 
-__all__ = ["save"]
-
-FORMATS = ("png", "svg", "pdf")
+__all__ = ["picture", "save"]
 
 
 def save(figure: Figure, path: str | Path) -> Path:
-    """Write a figure; the suffix chooses the format.
+    """Write a figure; the ending chooses the format.
 
     Parameters
     ----------
     figure : Figure
         What.
     path : str or Path
-        Ends in ``.png``, ``.svg`` or ``.pdf``.
+        Ends like one of the figures' formats in `plots.formats.FORMATS`.
 
     Returns
     -------
@@ -33,21 +31,35 @@ def save(figure: Figure, path: str | Path) -> Path:
 
     Raises
     ------
+    ParameterError
+        If the ending is another one.
     OutputError
-        If the ending is another, or the folder cannot be written.
+        If the folder cannot be written.
     """
-    path = Path(path)
-    ending = path.suffix[1:].lower()
-    if ending not in FORMATS:
-        raise OutputError(f"{path}: a figure is saved as .png, .svg or .pdf, not {path.suffix!r}")
+    return formats.save(figure, path, "figure")
+
+
+def picture(figure: Figure, form: str, metadata: Mapping[str, None]) -> bytes:
+    """Return a figure as bytes.
+
+    Parameters
+    ----------
+    figure : Figure
+        What.
+    form : str
+        A format of matplotlib, for example ``"png"``.
+    metadata : mapping of str to None
+        What matplotlib leaves out, such as the date.
+
+    Returns
+    -------
+    bytes
+        The same for the same trace, whenever it is drawn.
+    """
     buffer = BytesIO()
     with rc_context(RC):
-        stamp = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(ending, {})
-        figure.savefig(buffer, format=ending, metadata=stamp)
-    picture = buffer.getvalue()
-    if ending == "svg":
-        picture = _named_clips(picture)
-    return written_whole(path, lambda file: file.write(picture))
+        figure.savefig(buffer, format=form, metadata=metadata)
+    return _named_clips(buffer.getvalue()) if form == "svg" else buffer.getvalue()
 
 
 def _named_clips(svg: bytes) -> bytes:

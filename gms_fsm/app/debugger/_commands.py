@@ -447,10 +447,9 @@ class Commands:
     def do_plot(self, arg: str) -> Iterator[str]:
         """Draw branches."""
         path = self._path("plot", arg)
-        if path.suffix not in (".png", ".svg", ".pdf"):
-            raise SessionError(f"{arg!r} must end in .png, .svg or .pdf")
-        from plots import figures
+        from plots import figures, formats
 
+        formats.chosen(path, "figure")
         runs = {}
         for number, branch in enumerate(self.session.branches):
             branch.complete()

@@ -127,7 +127,7 @@ COMMANDS = {
     "plot": Command(
         "change",
         "plot FILE.png",
-        "Compute all branches to their ends and draw them (.png, .svg or .pdf; needs matplotlib).",
+        "Compute all branches to their ends and draw them (needs matplotlib).",
         ("plot branches.png",),
     ),
     "save": Command("file", "save FILE", "Write the session to a file.", ("save mine.json",)),

@@ -56,9 +56,11 @@ def write(
     SimulationError
         If a run cannot go on; its part so far is written to ``partial.npz``.
     """
+    from plots import formats
+
     chosen = experiments(force, velocity)
-    drawn = [f"{name}.{ending}" for name in CHARTS for ending in ("svg", "png", "dot")]
-    drawn += [f"{name}.{ending}" for name in FIGURES for ending in ("png", "svg")]
+    drawn = [file for name in CHARTS for file in formats.files(name, "graph")]
+    drawn += [file for name in FIGURES for file in formats.files(name, "figure")]
     folder = output_folder(folder, ["claims.md", "partial.npz", *drawn])
     output_folder(folder / "traces", [f"{experiment.name}.npz" for experiment in chosen])
     output_folder(folder / "transitions", [f"{experiment.name}.csv" for experiment in chosen])
@@ -95,6 +97,7 @@ def _keep(folder: Path, name: str, trace: Trace) -> list[Path]:
 
 def _draw_charts(folder: Path) -> list[Path]:
     import plots
+    from plots import formats
 
     pictures = {
         "chart_element": plots.statechart(GMS_ELEMENT["published"]),
@@ -105,13 +108,13 @@ def _draw_charts(folder: Path) -> list[Path]:
     files = [
         plots.render(graph, folder / f"{name}{ending}")
         for name, graph in pictures.items()
-        for ending in (".svg", ".png")
+        for ending in formats.endings("graph", usual=True)
     ]
     return list(dict.fromkeys(files))  # without Graphviz both endings give one DOT text
 
 
 def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list[Path]:
-    from plots import figures
+    from plots import figures, formats
 
     def applied(trace: Trace) -> NDArray[np.float64]:
         tree = Formula(force).tree
@@ -156,9 +159,9 @@ def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list
         ),
     }
     return [
-        figures.save(figure, folder / f"{name}{ending}")  # type: ignore[arg-type]
+        figures.save(figure, folder / file)  # type: ignore[arg-type]
         for name, figure in pictures.items()
-        for ending in (".png", ".svg")
+        for file in formats.files(name, "figure")
     ]
 
 
