@@ -22,11 +22,8 @@ SAID = re.compile(r"# Long because \w")
 
 # Modules that are being split. A name leaves this list when its module is small enough.
 LONG_MODULES = {
-    "gms_fsm/app/scenario.py",
-    "gms_fsm/inspection/session.py",
     "gms_fsm/lowering/program.py",
-    "gms_fsm/run/sweep.py",
-    "gms_fsm/traces/trace.py",
+    "integrators/loop.py",
 }
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
