@@ -70,7 +70,8 @@ class Writer:
         if not self.math:
             return spell(tree, MATLAB_LIKE)
         chart = self.chart
-        names = {name: _symbol(name) for name in chart.inputs + chart.variables + chart.parameters}
+        known = chart.inputs + chart.variables + chart.parameter_names
+        names = {name: _symbol(name) for name in known}
         if "s" in chart.inputs:
             names["s"] = "s(v)"  # the threshold that the model supplies depends on the velocity
         return _TOKEN.sub(_formula_token, spell(tree, MATH, names))

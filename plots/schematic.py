@@ -176,13 +176,14 @@ def _numbers(trace: Trace | None, i: int) -> tuple[str, str]:
         return STIFFNESS["k"].format(i + 1), DAMPING["sigma"].format(i + 1)
     values = trace.model.values
     texts = []
-    for symbols, unit in ((STIFFNESS, "N/m"), (DAMPING, "Ns/m")):
+    for symbols in (STIFFNESS, DAMPING):
         name = next((name for name in symbols if name in values), None)
         if name is None:
             texts.append("")
             continue
         value = np.broadcast_to(values[name], trace.n)[i]
-        texts.append(f"{symbols[name].format(i + 1)} = {value:.4g} {unit}")
+        unit = trace.model.chart.unit(name)
+        texts.append(f"{symbols[name].format(i + 1)} = {value:.4g} {unit}".rstrip())
     return texts[0], texts[1]
 
 

@@ -98,7 +98,10 @@ def test_a_state_asked_for_by_a_wrong_name_is_refused_with_the_right_ones() -> N
         ({"parameters": ("k", "C", "v_c", "")}, ["parameter name '' is not a name"]),
         ({"parameters": ("k", "C", "v_c", "k 2")}, ["'k 2' is not a name"]),
         ({"parameters": ("k", "C", "v_c", "if")}, ["'if' is not a name", "keyword"]),
-        ({"parameters": ("k", "C", "v_c", 3)}, ["parameter name 3 is not a name"]),
+        (
+            {"parameters": ("k", "C", "v_c", 3)},
+            ["parameters has 3", "Parameter('k', 'N/m',"],
+        ),
         ({"parameters": "k C"}, ["parameters is 'k C', not a tuple", "('k C',)"]),
         ({"variables": "z"}, ["variables is 'z', not a tuple", "('z',)"]),
         ({"states": STICK}, ["states is State(...), not a tuple", "(State(...),)"]),

@@ -332,7 +332,7 @@ def test_the_verdict_at_a_row_is_that_of_the_row_alone(text: str) -> None:
     trace = simulate(stick_slip("published"), Prescribed(FIG4_SINE), 30.0, monitors=[text])
     found = invariant(trace, text)
     model, n = trace.model, trace.n
-    names = ["t", "x", "v", "F", "s", "z", *model.chart.parameters]
+    names = ["t", "x", "v", "F", "s", "z", *model.chart.parameter_names]
     names += [f"{name}{i + 1}" for name in ("z", "s", "F") for i in range(n)]
     tree = parse_condition(text, names, ["stick", "slip"], n, own_state=True)
     broken = []

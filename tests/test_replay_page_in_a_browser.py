@@ -21,7 +21,7 @@ import pytest
 
 from gms_fsm import Prescribed, Trace, simulate
 from gms_fsm.charts.chart import Chart, State
-from gms_fsm.charts.parameters import Stribeck
+from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ExpressionError
 from gms_fsm.inspection.explain import explain
 from gms_fsm.inspection.session import Session

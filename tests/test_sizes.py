@@ -22,7 +22,6 @@ SAID = re.compile(r"# Long because \w")
 
 # What is being split. A name leaves these lists when it is small enough.
 LONG_MODULES = {
-    "gms_fsm/app/scenario.py",
     "gms_fsm/inspection/session.py",
     "gms_fsm/lowering/program.py",
     "gms_fsm/run/sweep.py",

@@ -76,7 +76,7 @@ def test_math(text: str, formula: str) -> None:
         transitions=(),
         outputs={"F": "z"},
     )
-    names = chart.inputs + chart.variables + chart.parameters
+    names = chart.inputs + chart.variables + chart.parameter_names
     assert Writer(chart, "math").text(parse_condition(text, names)) == formula
 
 

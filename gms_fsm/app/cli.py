@@ -23,16 +23,17 @@ from typer.core import TyperCommand, TyperGroup, TyperOption
 import gms_fsm
 from gms_fsm._files import no_input, output_folder, written_whole
 from gms_fsm.app.paper import FORCE, VELOCITY
-from gms_fsm.errors import GMSError, ParameterError
+from gms_fsm.errors import GMSError
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, TaskID
 
-    from gms_fsm import Chart, Model, Report, Rig
+    from gms_fsm import Report, Rig
 
 __all__ = ["app", "main"]
 
+LAW = "Law of a chart that has several, such as gms; there is no default, they differ."
 INTERRUPTED = 130  # the exit code of what Ctrl-C has ended, by custom
 
 
@@ -85,19 +86,20 @@ app = typer.Typer(
 )
 
 
-class LawName(enum.StrEnum):
-    """Slip laws."""
-
-    published = "published"
-    signed = "signed"
-
-
 class RigName(enum.StrEnum):
     """What the friction is mounted on."""
 
     prescribed = "prescribed"
     slider = "slider"
     pulled = "pulled"
+
+
+class EngineName(enum.StrEnum):
+    """What runs the chart."""
+
+    compiled = "compiled"
+    machines = "machines"
+    ifelse = "ifelse"
 
 
 def _version(wanted: bool) -> None:
@@ -223,19 +225,66 @@ def run_command(
     typer.echo(f"start with {files[0]}")
 
 
+@app.command("sweep")
+def sweep_command(
+    scenario: Annotated[
+        Path,
+        typer.Argument(
+            help="A scenario file, such as scenarios/pulled_mass.toml.", show_default=False
+        ),
+    ],
+    over: Annotated[
+        list[str],
+        typer.Option(
+            help="What to vary: name=from:to:count, with ,log behind it for even steps of the "
+            "logarithm; given again, every combination is run.",
+            show_default=False,
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="Folder for what is written; out/<name>-sweep if left out."
+        ),
+    ] = None,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Change a key, for example --set model.law=published."),
+    ] = None,
+    engine: Annotated[
+        EngineName, typer.Option(help="All give the same numbers; compiled is the fast one.")
+    ] = EngineName.compiled,
+) -> None:
+    """Run a scenario over a grid of parameters; write all results and a summary table."""
+    from gms_fsm.app.scenario import load_scenario
+    from gms_fsm.app.sweeps import axis, failures, sweep_scenario
+
+    axes = [axis(text) for text in over]
+    loaded = load_scenario(scenario, overrides or [])
+    folder = Path("out") / f"{scenario.stem}-sweep" if output is None else output
+    if "monitors" in loaded.arguments:
+        _plain_warning("a sweep watches nothing: run.monitors is left out")
+    try:
+        result, files = sweep_scenario(loaded, axes, folder, engine=engine.value)
+    except KeyboardInterrupt:
+        _plain_warning("interrupted; nothing is written")
+        raise typer.Exit(INTERRUPTED) from None
+    bad = int((result.outcome != "ok").sum())
+    typer.echo(
+        f"{len(result)} runs, {bad} failed, {len(result.transitions)} transitions; "
+        f"{len(files)} files in {folder}"
+    )
+    for run, message in failures(result, most=1):
+        typer.echo(f"first failure: run {run}: {message}")
+    typer.echo(f"start with {files[0]}")
+
+
 @app.command("schema")
 def schema_command() -> None:
     """Print the JSON schema of scenario files, for editors."""
     from gms_fsm.app.scenario import Scenario
 
     typer.echo(json.dumps(Scenario.model_json_schema(), indent=2))
-
-
-class ChartName(enum.StrEnum):
-    """Charts that ship."""
-
-    gms = "gms"
-    lugre = "lugre"
 
 
 class Notation(enum.StrEnum):
@@ -261,25 +310,32 @@ class Theme(enum.StrEnum):
 
 @app.command("chart", cls=_Drawing)
 def chart_command(
-    name: Annotated[ChartName, typer.Argument(help="Which chart.", show_default=False)],
+    name: Annotated[
+        str, typer.Argument(help="Which chart; --list names all.", show_default=False)
+    ] = "",
     output: Annotated[
         Path,
         typer.Option("--output", "-o", help="Ends in {chart}."),
     ] = Path("chart.svg"),
-    law: Annotated[LawName | None, typer.Option(help="Slip law of the GMS chart.")] = None,
+    law: Annotated[str, typer.Option(help=LAW, show_default=False)] = "",
     elements: Annotated[int, typer.Option(help="How many elements, as parallel states.")] = 1,
     notation: Annotated[Notation, typer.Option(help="Spelling.")] = Notation.stateflow,
     direction: Annotated[Direction, typer.Option(help="Layout.")] = Direction.TB,
     theme: Annotated[Theme, typer.Option(help="Colours.")] = Theme.light,
     names: Annotated[bool, typer.Option("--names", help="Write the edges' names too.")] = False,
+    listed: Annotated[
+        bool, typer.Option("--list", help="List the charts, with their parameters.")
+    ] = False,
 ) -> None:
-    """Draw a state chart."""
-    import plots
-    from gms_fsm.charts import LUGRE, gms_element
+    """Draw a state chart, or list those that ship."""
+    from gms_fsm.app._catalogue import catalogue, chosen
 
-    if name == ChartName.gms and law is None:
-        raise ParameterError("chart gms needs --law signed or --law published; they differ")
-    chart = LUGRE if law is None else gms_element(law.value)
+    if listed:
+        typer.echo(catalogue())
+        return
+    import plots
+
+    _, chart = chosen("chart", name, law)
     graph = plots.statechart(
         chart,
         elements,
@@ -294,9 +350,9 @@ def chart_command(
 @app.command("check")
 def check_command(
     name: Annotated[
-        str, typer.Argument(help="gms, lugre, or a broken reading; see --list.", show_default=False)
+        str, typer.Argument(help="Which chart; --list names all.", show_default=False)
     ] = "",
-    law: Annotated[LawName | None, typer.Option(help="Slip law of the GMS chart.")] = None,
+    law: Annotated[str, typer.Option(help=LAW, show_default=False)] = "",
     domain: Annotated[
         list[str] | None,
         typer.Option(help="Assume this instead, for example 's >= 0'; may be given again."),
@@ -312,43 +368,19 @@ def check_command(
     What the order of the edges settles is said, and is no refutation.
     """
     from gms_fsm import prove
-    from gms_fsm.charts.broken import BROKEN
+    from gms_fsm.app._catalogue import checkable, chosen
 
     if names:
-        typer.echo("gms --law signed, gms --law published, lugre, and as demonstrations:")
-        for broken, what in BROKEN.items():
-            typer.echo(textwrap.fill(f"broken:{broken}  {what.wrong}", 78, subsequent_indent="  "))
+        typer.echo(checkable())
         return
-    chart, usual = _to_check(name, law)
+    found, chart = chosen("check", name, law)
     folder = None if output is None else output_folder(output)
-    report = prove(chart, domain or usual)
+    report = prove(chart, domain or found.domain)
     typer.echo(str(report))
     for path in [] if folder is None else _write_report(report, folder):
         typer.echo(str(path))
     if report.refuted:
         raise typer.Exit(1)
-
-
-def _to_check(name: str, law: LawName | None) -> tuple[Chart, tuple[str, ...] | None]:
-    """Return a chart and its domain, None for the usual one."""
-    from gms_fsm.charts import LUGRE, gms_element
-    from gms_fsm.charts.broken import BROKEN
-
-    charts = {"lugre": LUGRE, **{f"broken:{key}": found.chart for key, found in BROKEN.items()}}
-    if name == "gms":
-        if law is None:
-            raise ParameterError("check gms needs --law signed or --law published; they differ")
-        return gms_element(law.value), None
-    if name not in charts:
-        said = f"name is {name!r}; it" if name else "a name is missing; it"
-        raise ParameterError(
-            f"{said} must be one of gms, {', '.join(charts)} (a chart of your own is checked in "
-            "Python: prove(chart))"
-        )
-    if law is not None:
-        raise ParameterError(f"check {name} takes no --law; only gms does")
-    found = BROKEN.get(name.removeprefix("broken:"))
-    return charts[name], None if found is None else found.domain
 
 
 def _write_report(report: Report, folder: Path) -> list[Path]:
@@ -505,22 +537,26 @@ def lesson_command(
 
 @app.command("code")
 def code_command(
-    law: Annotated[LawName, typer.Option(help="Slip law; there is no default, they differ.")],
+    name: Annotated[str, typer.Argument(help="Which chart.")] = "gms",
+    law: Annotated[str, typer.Option(help=LAW, show_default=False)] = "",
     rig: Annotated[RigName, typer.Option(help="What the friction is mounted on.")] = (
         RigName.prescribed
     ),
 ) -> None:
-    """Print the if-else program made from the GMS chart (the paper's Fig. 2c); it runs alone."""
-    from gms_fsm import GMS, GMSParameters, Prescribed, PulledSlider, Slider
+    """Print the if-else program made from a chart (the paper's Fig. 2c); it runs alone."""
+    from gms_fsm import Prescribed, PulledSlider, Slider
+    from gms_fsm.app._catalogue import chosen
     from gms_fsm.lowering._generated import standalone
     from gms_fsm.lowering.program import lower
+    from gms_fsm.systems.models import demonstration
 
+    found, _ = chosen("code", name, law)
     rigs: dict[RigName, Rig] = {
         RigName.prescribed: Prescribed(VELOCITY),
         RigName.slider: Slider(1.0, FORCE),
         RigName.pulled: PulledSlider(1.0, 2.0, 0.1),
     }
-    model: Model = GMS(GMSParameters.paper("stick-slip"), law=law.value)
+    model = demonstration(found, law)
     typer.echo(standalone(lower(model, rigs[rig]).source), nl=False)
 
 

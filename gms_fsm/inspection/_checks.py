@@ -367,7 +367,7 @@ def _equilibrium(prover: Prover, flow: Value, variable: str, sign: str) -> Answe
 def _place(prover: Prover, flow: Value, variable: str, case: Sequence[Any]) -> str:
     """Name the equilibrium of a flow where a simple text does."""
     chart = prover.chart
-    names = sorted(names_in(flow) & {*chart.inputs, *chart.parameters} - {"v"})
+    names = sorted(names_in(flow) & {*chart.inputs, *chart.parameter_names} - {"v"})
     simple = ["0", *names, *(f"{a} / {b}" for a in names for b in names if a != b)]
     for text in (sign + text for text in simple for sign in ("", "-")):
         reading = Reading()

@@ -249,7 +249,7 @@ class Prover:
         self.chart, self.z3 = chart, solver()
         real, zero = self.z3.Real, self.z3.RealVal(0)
         # In the order an example fixes them: constants, what comes from outside, the own state.
-        names = (*chart.parameters, *chart.inputs, *chart.variables)
+        names = (*chart.parameter_names, *chart.inputs, *chart.variables)
         self.symbols = {name: real(name) for name in names}
         self.rates = {f"d{name}/dt": real(f"d{name}/dt") for name in chart.inputs}
         self.still = {name: Dual(symbol, zero) for name, symbol in self.symbols.items()}

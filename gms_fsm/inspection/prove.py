@@ -28,7 +28,7 @@ equilibrium, for flows linear in the variable.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError, shown
@@ -38,18 +38,6 @@ from gms_fsm.inspection._prover import Prover
 from gms_fsm.language import Condition, Value, names_in
 
 __all__ = ["CHECKS", "Check", "Finding", "Report", "Status", "default_domain", "prove"]
-
-# What the names of the shipped charts mean, as their parameters are checked; C > 0 and not >= 0,
-# because with C = 0 the slip flow is no law but a standstill.
-ASSUMED: Mapping[str, str] = {
-    "s": "s > 0",
-    "v_c": "v_c > 0",
-    "C": "C > 0",
-    "k": "k > 0",
-    "sigma": "sigma >= 0",
-    "sigma_0": "sigma_0 > 0",
-    "sigma_1": "sigma_1 >= 0",
-}
 
 
 def default_domain(chart: Chart) -> tuple[str, ...]:
@@ -63,8 +51,8 @@ def default_domain(chart: Chart) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        For each name of the shipped charts that its guards, flows or assignments use, the rule its
-        value has to keep; nothing for other names.
+        For each input and parameter that its guards, flows or assignments use, the rule its value
+        has to keep (`gms_fsm.Parameter`); nothing where there is none.
 
     Examples
     --------
@@ -75,8 +63,13 @@ def default_domain(chart: Chart) -> tuple[str, ...]:
     trees: list[Value | Condition] = [*chart.guards.values(), *chart.flows.values()]
     trees += [tree for texts in chart.assignments.values() for tree in texts.values()]
     used = frozenset[str]().union(*map(names_in, trees))
-    symbols = chart.inputs + chart.parameters
-    return tuple(ASSUMED[name] for name in symbols if name in ASSUMED and name in used)
+    declared = chart.declared
+    return tuple(
+        condition
+        for name in chart.inputs + chart.parameter_names
+        if name in declared and name in used
+        for condition in declared[name].conditions
+    )
 
 
 def prove(chart: Chart, domain: Sequence[str] | None = None) -> Report:

@@ -176,7 +176,7 @@ def lower(model: Model, rig: Rig) -> Program:
         repr(model.chart),
         model.stribeck is None,
         model.n,
-        tuple(np.ndim(model.values[name]) for name in model.chart.parameters),
+        tuple(np.ndim(model.values[name]) for name in model.chart.parameter_names),
         rig.title,
         rig.acceleration,
         tuple(rig.numbers),
@@ -267,7 +267,7 @@ def arguments(model: Model, rig: Rig) -> Arguments:
     tuple of lists
         See `Program`.
     """
-    curve, values = model.stribeck, [model.values[name] for name in model.chart.parameters]
+    curve, values = model.stribeck, [model.values[name] for name in model.chart.parameter_names]
     shared = [] if curve is None else [curve.F_c, curve.F_s, curve.v_s, curve.dip]
     shared += [model.sigma_2, *rig.numbers.values()]
     shared += [float(value) for value in values if np.ndim(value) == 0]
@@ -368,7 +368,7 @@ class _Lowering:
         # A chart may call its own parameter F_c or mass: it gets a name of its own in the text.
         self.rename: dict[str, str] = {_DIP: "v_dip"}
         self.rename |= {apart.id: name for name, apart in self.rig_names.items()}
-        chart_names = (*self.chart.variables, *self.chart.parameters)
+        chart_names = (*self.chart.variables, *self.chart.parameter_names)
         for name in chart_names:
             local = name
             while local in taken or (local != name and local in chart_names):
@@ -376,7 +376,7 @@ class _Lowering:
             taken.add(local)
             self.rename[name] = local
         self.locals = taken
-        for name in self.chart.parameters:
+        for name in self.chart.parameter_names:
             if np.ndim(self.model.values[name]) == 0:
                 self.shared.append(self.rename[name])
             else:

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm._extras import require
 from gms_fsm._files import written_whole
-from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.charts.parameters import QUANTITIES, WEIGHTS, FloatArray
 from gms_fsm.errors import (
     GMSError,
     OutputError,
@@ -135,16 +135,24 @@ class Sweep:
         log = self.transitions[self.transitions["run"] == run]
         return [(int(i), self.edges[edge]) for i, edge in zip(log.element, log.edge, strict=True)]
 
-    def to_dataframe(self) -> pandas.DataFrame:
-        """Return one row a run as a pandas DataFrame (extra ``pandas``).
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per run, by column.
 
         Returns
         -------
-        DataFrame
-            Parameters, outcome, end of the run; columns of elements are numbered from 1.
+        dict of str to ndarray, shape (runs,)
+            Parameters, outcome, end of the run; columns of elements are numbered from 1. A
+            parameter with the name of a result is called ``parameter_<name>``.
+
+        Examples
+        --------
+        >>> from gms_fsm import GMS, GMSParameters, Prescribed
+        >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+        >>> result = sweep(model, Prescribed("0.2"), 1.0, {"F_s": [1.5]}, engine="machines")
+        >>> list(result.columns())[:8]
+        ['F_s', 'outcome', 'message', 't', 'x', 'v', 'F', 'z1']
         """
-        pandas = require("pandas", "pandas")
-        results = {
+        results: dict[str, NDArray[Any]] = {
             "outcome": self.outcome,
             "message": self.message,
             "t": self.t,
@@ -154,13 +162,23 @@ class Sweep:
         }
         results |= _numbered("z", self.z) | _numbered("state", self.states)
         results |= {"transitions": self.transition_count}
-        columns = {
+        parameters = {
             _apart(column, results): numbers
             for name, values in self.parameters.items()
             for column, numbers in _numbered(name, values).items()
         }
-        index = pandas.RangeIndex(len(self), name="run")
-        return pandas.DataFrame(columns | results, index=index)
+        return parameters | results
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Return one row per run as a pandas DataFrame (extra ``pandas``).
+
+        Returns
+        -------
+        DataFrame
+            What `columns` gives.
+        """
+        pandas = require("pandas", "pandas")
+        return pandas.DataFrame(self.columns(), index=pandas.RangeIndex(len(self), name="run"))
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the results as an xarray Dataset (extra ``sweep``).
@@ -171,7 +189,7 @@ class Sweep:
             Dimensions ``run``, ``element`` (from 1) and, with rows, ``time``; units as attributes.
         """
         xarray = require("xarray", "sweep")
-        units = {"t": "s", "x": "m", "v": "m/s", "F": "N", "z": "m"}
+        units = {name: QUANTITIES[name].unit for name in ("t", "x", "v", "F", "z")}
         data: dict[str, Any] = {}
         for name in ("outcome", "message", "t", "x", "v", "F"):
             data[f"{name}_end" if name in units else name] = ("run", getattr(self, name))
@@ -444,7 +462,7 @@ def _values(
             array = np.array(value, dtype=np.float64)
         except (TypeError, ValueError):
             raise ParameterError(f"parameters[{name!r}] is not an array of numbers") from None
-        wide = name == "weights" or np.ndim(model.values.get(name, 0.0)) > 0
+        wide = name == WEIGHTS.name or np.ndim(model.values.get(name, 0.0)) > 0
         if array.shape[1:] not in (((), (model.n,)) if wide else ((),)) or array.ndim == 0:
             wanted = f"(runs,) or (runs, {model.n})" if wide else "(runs,)"
             raise ParameterError(

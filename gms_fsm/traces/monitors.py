@@ -298,7 +298,7 @@ def watched(trace: Trace, monitors: Iterable[Monitor], error: Exception | None =
 def _read(monitor: Invariant, model: Model) -> Condition:
     chart, numbers = model.chart, range(1, model.n + 1)
     threshold = () if model.stribeck is None else ("s",)
-    names = ["t", "x", "v", "F", *threshold, *chart.variables, *chart.parameters]
+    names = ["t", "x", "v", "F", *threshold, *chart.variables, *chart.parameter_names]
     names += [f"{name}{i}" for name in (*chart.variables, *threshold, "F") for i in numbers]
     states = [state.name for state in chart.states]
     try:

@@ -18,15 +18,13 @@ VECTOR_ROWS = 6_000  # longer curves are pixels inside an SVG or PDF, which keep
 
 
 def first_variable(trace: Trace, values: NDArray[np.float64]) -> tuple[float, str]:
-    """Return factor and title of the chart's first variable: z is a deflection, m.
-
-    One's own by another name may be anything, a force say: no unit then.
-    """
+    """Return factor and title of the chart's first variable, with its unit where it is known."""
     name = trace.model.chart.variables[0]
-    if name != "z":
+    known = trace.model.chart.unit(name)
+    if not known:
         return 1.0, name
-    factor, unit = scaled(values, "m")
-    return factor, f"z [{unit}]"
+    factor, unit = scaled(values, known)
+    return factor, f"{name} [{unit}]"
 
 
 def element_look(i: int) -> dict[str, Any]:

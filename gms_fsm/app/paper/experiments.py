@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from gms_fsm.app.paper import FIG3_END, FIG4_END, FORCE, PAPER_RTOL, PAPER_STEP, VELOCITY
-from gms_fsm.charts.parameters import GMSParameters
+from gms_fsm.charts.lugre import BENCHMARK
 from gms_fsm.run.simulate import Moment, simulate
+from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.models import GMS, LuGre, Model
 from gms_fsm.systems.rigs import Prescribed, Rig, Slider
 from gms_fsm.traces.trace import Trace
@@ -86,9 +88,8 @@ def experiments(force: str = FORCE, velocity: str = VELOCITY) -> tuple[Experimen
 
 def lugre_like(parameters: GMSParameters) -> LuGre:
     """Return the LuGre model a column is compared with."""
-    return LuGre(
-        sigma_0=1e3, sigma_1=31.6, sigma_2=parameters.sigma_2, stribeck=parameters.stribeck
-    )
+    own: Any = BENCHMARK.values
+    return LuGre(**own, sigma_2=parameters.sigma_2, stribeck=parameters.stribeck)
 
 
 def run(

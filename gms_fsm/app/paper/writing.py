@@ -14,6 +14,7 @@ from gms_fsm.app.paper import FORCE, VELOCITY
 from gms_fsm.app.paper.claims import Claim, differing_numbers, force_difference, judge
 from gms_fsm.app.paper.experiments import Progress, experiments, run_one
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
+from gms_fsm.charts.lugre import BENCHMARK
 from gms_fsm.errors import MissingExtraError
 from gms_fsm.language import evaluate
 from gms_fsm.systems.signals import Formula
@@ -196,6 +197,9 @@ def claims_text(traces: Mapping[str, Trace], force: str = FORCE, velocity: str =
             "Not judged: the claims are about the signals chosen for the reproduction, and these "
             "were changed. Run without --force and --velocity for the table."
         ]
+    lugre = ", ".join(
+        f"{each.name} = {BENCHMARK.values[each.name]:g} {each.unit}" for each in LUGRE.parameters
+    )
     runs = [
         f"| {name} | {trace.model.title} | {trace.settings['engine']}, {trace.settings['events']} "
         f"| {len(trace)} | {len(trace.transitions)} |"
@@ -230,8 +234,7 @@ def claims_text(traces: Mapping[str, Trace], force: str = FORCE, velocity: str =
             f"- the applied force of Fig. 3: `F_a = {force}` N, t in s",
             f"- the velocity of Fig. 4: `v = {velocity}` m/s",
             "- the text of the guards: our reading of Section II-D (`gms-fsm code` prints them)",
-            "- LuGre: sigma_0 = 1000 N/m, sigma_1 = 31.6 Ns/m, and the column's F_s, F_c, v_s, "
-            "sigma_2",
+            f"- LuGre: {lugre}, and the column's F_s, F_c, v_s, sigma_2",
             "- the absolute tolerances, from the models' own scales (`gms_fsm.lowering.scales`); "
             "where not said otherwise rtol is 1e-6 and switches are located",
             "- the run with weights w_i = 0.25/k_i, in which an element slips (`fig3_slipping`)",
