@@ -22,7 +22,6 @@ SAID = re.compile(r"# Long because \w")
 
 # What is being split. A name leaves these lists when it is small enough.
 LONG_MODULES = {
-    "gms_fsm/lowering/program.py",
     "integrators/loop.py",
 }
 LONG_FUNCTIONS = {
