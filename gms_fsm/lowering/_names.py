@@ -9,11 +9,11 @@ from functools import cached_property
 import numpy as np
 
 from gms_fsm.charts.chart import RESERVED
-from gms_fsm.language import Name, Node, names_in
+from gms_fsm.language import Binary, Name, Node, names_in, product_power
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 
-__all__ = ["DIP", "Names", "names_of"]
+__all__ = ["DIP", "Names", "computed_names", "names_of"]
 
 DIP = "v dip"  # not an identifier, so no chart can have a name like it
 
@@ -61,7 +61,9 @@ class Names:
 
     def read_by(self, *nodes: Node) -> frozenset[str]:
         """Return what trees read, as it is called in the text."""
-        return frozenset(self.local.get(name, name) for node in nodes for name in names_in(node))
+        return frozenset(
+            self.local.get(name, name) for node in nodes for name in computed_names(node)
+        )
 
     def is_shared(self, node: Node) -> bool:
         """Tell whether a tree of the chart has one value for all elements."""
@@ -69,6 +71,33 @@ class Names:
             name in ("t", "x", "v") or name in self.plain or self.local.get(name) in self.shared
             for name in names_in(node)
         )
+
+
+def computed_names(node: Node) -> frozenset[str]:
+    """Return the names that a tree is computed from: ``u**0`` is 1 whatever u is.
+
+    Parameters
+    ----------
+    node : Node
+        A value or a condition.
+
+    Returns
+    -------
+    frozenset of str
+        As `names_in` otherwise.
+
+    Examples
+    --------
+    >>> from gms_fsm.language import parse_value
+    >>> computed_names(parse_value("k + v**0", ["k", "v"]))
+    frozenset({'k'})
+    """
+    match node:
+        case Name(name):
+            return frozenset({name})
+        case Binary("**", base, exponent) if product_power(base, exponent) == 0:
+            return frozenset()
+    return frozenset[str]().union(*(computed_names(part) for part in node.parts))
 
 
 def names_of(model: Model, rig: Rig) -> Names:

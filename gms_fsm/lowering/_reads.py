@@ -8,7 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal as OneOf
 
-from gms_fsm.language import comparisons, names_in, split
+from gms_fsm.language import comparisons, split
+from gms_fsm.lowering._names import computed_names
 from gms_fsm.lowering._plan import Flow, Gradient, Input, Plan, RoughCall, both_sides
 
 __all__ = ["Head", "Signs", "head_of", "of_act", "of_arm", "of_element", "of_flow", "of_gradient"]
@@ -69,7 +70,7 @@ def head_of(plan: Plan, reads: Reads, signs: Signs) -> Head:
     """
     curve = plan.curve is not None and "S" in reads
     if plan.curve is not None and curve:
-        reads |= names_in(plan.curve)
+        reads |= computed_names(plan.curve)
     inputs = tuple(each for each in plan.inputs if each.name in reads)
     reads = reads.union(*(_of_input(plan, each, signs) for each in inputs))
     shared = tuple((name, j) for j, name in enumerate(plan.names.shared) if name in reads)
@@ -151,11 +152,11 @@ def of_gradient(plan: Plan, gradient: Gradient) -> Reads:
     reads = plan.names.read_by(*trees)
     reads = reads.union(*(plan.layout.y.text_names(name) for name in gradient.by_state))
     if gradient.by_s is not None and plan.curve_slope is not None:
-        reads |= names_in(plan.curve_slope) | {"weight"}
+        reads |= computed_names(plan.curve_slope) | {"weight"}
     moving = {*gradient.by_signal, *({"v"} if gradient.by_speed and plan.prescribed else ())}
     for each in plan.inputs:
         if each.name in moving:
-            reads |= {"t", "tables"} if each.slope is None else names_in(each.slope)
+            reads |= {"t", "tables"} if each.slope is None else computed_names(each.slope)
     return reads
 
 
@@ -203,4 +204,4 @@ def _of_input(plan: Plan, signal: Input, signs: Signs) -> Reads:
     if signal.formula is None:
         return frozenset({"t", "tables"} if signal.tabled else {"t"})
     reads = (_of_call(plan, call, signs) for call in signal.calls)
-    return names_in(signal.formula).union(*reads)
+    return computed_names(signal.formula).union(*reads)
