@@ -22,7 +22,6 @@ from pathlib import Path
 from typing import Any
 
 from gms_fsm._extras import missing
-from gms_fsm._files import written_whole
 from gms_fsm.errors import ParameterError
 from gms_fsm.language import (
     COMPARISONS,
@@ -33,6 +32,7 @@ from gms_fsm.language import (
     SEVERAL,
 )
 from gms_fsm.traces.trace import Trace, check_trace
+from plots import formats
 from plots._replay_chart import chart_svg
 from plots._replay_run import common_frames, frames_of_run, page_rows, stored_run
 from plots.style import (
@@ -96,7 +96,7 @@ class Replay:
         Parameters
         ----------
         path : str or Path
-            Usually ends in ``.html``.
+            Ends like one of the pages' formats in `plots.formats.FORMATS`, as ``.html``.
 
         Returns
         -------
@@ -105,10 +105,12 @@ class Replay:
 
         Raises
         ------
+        ParameterError
+            If the ending is another one.
         OutputError
             If the folder cannot be written.
         """
-        return written_whole(Path(path), lambda file: file.write(self.html.encode()))
+        return formats.save(self, path, "page")
 
 
 def replay(
@@ -162,7 +164,7 @@ def write_replay(
     Parameters
     ----------
     path : str or Path
-        The file; its folder has to exist.
+        The file; its folder has to exist, and its ending chooses the format, as ``.html``.
     trace, other, title, names
         See `replay`.
 
@@ -174,12 +176,13 @@ def write_replay(
     Raises
     ------
     ParameterError
-        If there are names, but not one a run.
+        If there are names, but not one a run, or the ending is another one.
     MissingExtraError
         If uPlot is not installed.
     OutputError
         If the folder cannot be written.
     """
+    formats.chosen(path, "page")  # before any work
     return replay(trace, other, title=title, names=names).save(path)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gms_fsm.charts.chart import SUPPLIED, Chart
-from gms_fsm.charts.gms import GMS_ELEMENT, Law, gms_element
+from gms_fsm.charts.gms import GMS_ELEMENT, Law, check_law
 from gms_fsm.charts.lugre import LUGRE
 from gms_fsm.charts.parameters import (
     SIGMA_2,
@@ -113,7 +113,7 @@ class GMS:
                 f"parameters is {self.parameters!r}; it must be a GMSParameters, for example "
                 "GMSParameters.paper('stick-slip')"
             )
-        gms_element(self.law)
+        check_law(self.law)
         if self.law == "published" and self.stribeck.F_s == self.stribeck.F_c:
             warnings.warn(
                 f"published law with F_s = F_c = {self.stribeck.F_c!r} N: a slipping element stays "

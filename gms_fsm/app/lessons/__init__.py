@@ -217,5 +217,4 @@ def _replay(number: int, result: Result, folder: Path) -> list[Path]:
     runs = result.replayed
     title = f"Lesson {number}: {LESSONS[number].QUESTION}"
     page = replay(*runs.values(), title=title, names=list(runs))
-    names = formats.files(f"lesson_{number}", "page")
-    return [formats.save(page, folder / name, "page") for name in names]
+    return [page.save(folder / name) for name in formats.files(f"lesson_{number}", "page")]
