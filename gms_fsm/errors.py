@@ -6,6 +6,10 @@ do. The command line prints that text and exits with code 2; Python callers can 
 
 from __future__ import annotations
 
+import copy
+import enum
+from typing import Self
+
 LONGEST_SHOWN = 120  # characters of a value in a message
 
 
@@ -55,8 +59,69 @@ def why(error: BaseException) -> str:
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
+class _Nothing(enum.Enum):
+    """Stands for no value: None may be the value that is wrong."""
+
+    NOTHING = enum.auto()
+
+
+NOTHING = _Nothing.NOTHING
+
+
 class GMSError(Exception):
-    """Base of every error this package raises on purpose."""
+    """Base of every error this package raises on purpose; its text is made from its fields.
+
+    Parameters
+    ----------
+    reason : str
+        What is wrong: ``"it must be > 0"``, ``"there is no such file"``.
+    place : str, optional
+        Where: an argument, a file, a file's key or column, an edge of a chart.
+    value : object, optional
+        What stands there.
+    advice : str, optional
+        What to do about it.
+
+    Examples
+    --------
+    >>> print(GMSError("it must be > 0", place="step", value=-1.0, advice="leave it out"))
+    step is -1.0; it must be > 0; leave it out
+    >>> print(GMSError("no such file", place="run.toml"))
+    run.toml: no such file
+    >>> print(GMSError("it must be > 0", place="step", value=-1.0).inside("run.toml"))
+    run.toml: step is -1.0; it must be > 0
+    """
+
+    def __init__(
+        self, reason: str, *, place: str = "", value: object = NOTHING, advice: str = ""
+    ) -> None:
+        self.reason, self.place, self.value, self.advice = reason, place, value, advice
+        self.outer = ""
+        super().__init__(reason)
+
+    def __str__(self) -> str:
+        head = "" if self.value is NOTHING else f"{self.place or 'the value'} is {shown(self.value)}; "
+        if not head and self.place:
+            head = f"{self.place}: "
+        text = f"{head}{self.reason}" + (f"; {self.advice}" if self.advice else "")
+        return f"{self.outer}: {text}" if self.outer else text
+
+    def inside(self, place: str) -> Self:
+        """Return this error with a further place around it, such as a file.
+
+        Parameters
+        ----------
+        place : str
+            What holds the place that the error names.
+
+        Returns
+        -------
+        GMSError
+            Of the same class and fields.
+        """
+        again = copy.copy(self)
+        again.outer = f"{place}: {self.outer}" if self.outer else place
+        return again
 
 
 class ExpressionError(GMSError, ValueError):
