@@ -36,7 +36,7 @@ from gms_fsm.errors import (
     TraceFileError,
 )
 from gms_fsm.inspection.explain import explain
-from gms_fsm.language.expression import (
+from gms_fsm.language import (
     FUNCTIONS,
     MATLAB_LIKE,
     Node,

@@ -197,7 +197,7 @@ class Run:
         b = self.buffers
         self.recorder.put_back(kept, (b.memory.now[T], list(b.y), hybrid.modes_of(b)))
         if self.engine is not None:
-            self.engine.go_on_from(b.memory.now[T], list(b.y), b.mode, self.start.program.p)
+            self.engine.go_on_from(b.memory.now[T], list(b.y), b.mode)
 
     def advance(self) -> bool:
         """Let the next thing happen.

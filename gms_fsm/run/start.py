@@ -13,6 +13,7 @@ import integrators
 from gms_fsm.charts.parameters import as_floats, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError, SignalError, shown
 from gms_fsm.lowering._pulses import waking_times
+from gms_fsm.lowering.layout import Layout
 from gms_fsm.lowering.program import Program, arguments, lower
 from gms_fsm.lowering.scales import Setting, Tolerance, scales_of
 from gms_fsm.run.settings import Settings
@@ -217,25 +218,24 @@ def _tolerances(
     model: Model, rig: Rig, atol: Tolerance, default: Mapping[str, list[float]]
 ) -> tuple[list[float], float | dict[str, float | list[float]]]:
     """Return the absolute tolerance of each component, and what to say of them."""
-    moved = ("x",) if rig.acceleration is None else ("x", "v")
-    names = (*moved, *model.chart.variables)
+    places = Layout.state(model, rig)
     if atol is not None and not isinstance(atol, Mapping):
-        return [atol] * (len(moved) + model.n * len(model.chart.variables)), atol
-    rows = {name: default[name] for name in names}
+        return [atol] * places.size, atol
+    rows = {name: default[name] for name in (*places.shared, *places.own)}
     by_name: Mapping[str, Any] = {} if atol is None else atol
     for name, given in by_name.items():
         if name not in rows:
             raise ParameterError(
-                f"atol has the key {shown(name)}; known are {', '.join(map(repr, names))}"
+                f"atol has the key {shown(name)}; known are {', '.join(map(repr, rows))}"
             )
         if np.ndim(given) == 0:
             rows[name] = [checked_scalar(f"atol[{name!r}]", given, "> 0")] * len(rows[name])
         else:
             rows[name] = as_floats(checked_array(f"atol[{name!r}]", given, len(rows[name]), "> 0"))
     used: dict[str, float | list[float]] = {
-        name: row if name in model.chart.variables else row[0] for name, row in rows.items()
+        name: row if name in places.own else row[0] for name, row in rows.items()
     }
-    return [each for name in names for each in rows[name]], used
+    return places.joined(used), used
 
 
 def _watchful(program: Program, rig: Rig, t_start: float, t_end: float) -> Program:
@@ -277,10 +277,12 @@ def _initial(model: Model, rig: Rig, initial: Mapping[str, Any]) -> tuple[list[f
             raise ParameterError(
                 f"initial has the key {shown(name)}; known are {', '.join(map(repr, known))}"
             )
-    y = [checked_scalar("initial['x']", initial.get("x", 0.0), "finite")]
-    if rig.acceleration is not None:
-        y.append(checked_scalar("initial['v']", initial.get("v", 0.0), "finite"))
-    elif "v" in initial:
+    places = Layout.state(model, rig)
+    y: dict[str, Any] = {
+        name: checked_scalar(f"initial[{name!r}]", initial.get(name, 0.0), "finite")
+        for name in places.shared
+    }
+    if "v" in initial and "v" not in y:
         raise ParameterError(
             f"initial has 'v' = {shown(initial['v'])}, but the rig prescribes the velocity; leave "
             "it out"
@@ -291,8 +293,8 @@ def _initial(model: Model, rig: Rig, initial: Mapping[str, Any]) -> tuple[list[f
             raise ParameterError(
                 f"initial[{name!r}] has {values.size} entries; the model has {n} elements"
             )
-        y += as_floats(values)
+        y[name] = as_floats(values)
     names: Any = initial.get("states", [chart.default_state.name] * n)
     if isinstance(names, str) or np.ndim(names) != 1 or len(names) != n:
         raise ParameterError(f"initial['states'] is {shown(names)}; it must list {n} state names")
-    return y, [chart.state_index(str(name)) for name in names]
+    return places.joined(y), [chart.state_index(str(name)) for name in names]

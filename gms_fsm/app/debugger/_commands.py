@@ -12,11 +12,11 @@ from pathlib import Path
 
 from gms_fsm.app.debugger import _text as text_of
 from gms_fsm.app.debugger._help import ALIASES, COMMANDS, help_of, overview
-from gms_fsm.app.debugger._view import branches, chart_states, edits_of, ribbons, view
+from gms_fsm.app.debugger._view import branches, chart_states, ribbons, view
 from gms_fsm.errors import GMSError, SessionError
 from gms_fsm.inspection.explain import holds
 from gms_fsm.inspection.session import KINDS, Breakpoint, Session
-from gms_fsm.language.expression import evaluate
+from gms_fsm.language import evaluate
 from gms_fsm.systems.models import parameter_names
 
 __all__ = ["Commands"]
@@ -199,8 +199,7 @@ class Commands:
         try:
             self.session.goto(t)
         except KeyboardInterrupt:
-            branch = self.session.branch
-            self.session.goto(branch.raw(len(branch) - 1)[0])
+            self.session.goto(self.session.branch.last.t)
             raise
         yield from self.here()
 
@@ -291,7 +290,7 @@ class Commands:
         if not rows:
             yield "no transition up to here"
         for row in rows[-count:]:
-            yield f"  t = {branch.raw(row)[0]:<12.9g} s  row {row:<5} {branch.fired(row)}"
+            yield f"  t = {branch.raw(row).t:<12.9g} s  row {row:<5} {branch.fired(row)}"
         if len(rows) > count:
             yield f"  ({len(rows) - count} before these)"
 
@@ -411,7 +410,7 @@ class Commands:
                 variables.setdefault(what, {})[i] = self.session.watch(value)
         parent = self.session.current
         number = self.session.poke(variables, v, states)
-        yield f"branch {number}, from branch {parent}: {edits_of(self.session.branch)}"
+        yield f"branch {number}, from branch {parent}: {self.session.branch.edits}"
         yield from self.here()
 
     def _pokeable(self, name: str) -> tuple[str, int]:
@@ -447,17 +446,16 @@ class Commands:
     def do_plot(self, arg: str) -> Iterator[str]:
         """Draw branches."""
         path = self._path("plot", arg)
-        if path.suffix not in (".png", ".svg", ".pdf"):
-            raise SessionError(f"{arg!r} must end in .png, .svg or .pdf")
-        from plots import figures
+        from plots import figures, formats
 
+        formats.chosen(path, "figure")
         runs = {}
         for number, branch in enumerate(self.session.branches):
             branch.complete()
             trace = branch.trace()
             if not trace.t[-1] > trace.t[0]:
                 raise SessionError(f"branch {number} failed at once; there is nothing to draw")
-            edits = f": {edits_of(branch)}" if branch.edits else ""
+            edits = f": {branch.edits}" if branch.edits else ""
             runs[text_of.short(f"branch {number}{edits}", 50)] = trace
         yield f"written to {figures.save(figures.compare_laws(runs), path)}"
 

@@ -127,7 +127,7 @@ COMMANDS = {
     "plot": Command(
         "change",
         "plot FILE.png",
-        "Compute all branches to their ends and draw them (.png, .svg or .pdf; needs matplotlib).",
+        "Compute all branches to their ends and draw them (needs matplotlib).",
         ("plot branches.png",),
     ),
     "save": Command("file", "save FILE", "Write the session to a file.", ("save mine.json",)),
@@ -162,7 +162,7 @@ def names_for(session: Session) -> dict[str, str]:
         Name in braces to text.
     """
     chart = session.model.chart
-    start, n = session.branch.raw(0)[0], min(2, session.model.n)
+    start, n = session.branch.raw(0).t, min(2, session.model.n)
     names = {
         "t": f"{start + 0.25 * (session.t_end - start):.9g}",
         "n": str(n),

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 from gms_fsm.app.debugger._view import BranchView, Ribbons, StateView, View
 from gms_fsm.charts.chart import Chart
-from gms_fsm.inspection.explain import UNITS
 from gms_fsm.inspection.session import Breakpoint
 
 __all__ = [
@@ -101,7 +100,8 @@ def screen_lines(
 
 def _heads(chart: Chart) -> list[str]:
     """Return the headings of an element's numbers, as wide as these."""
-    names = [f"{name} [{UNITS[name]}]" if name in UNITS else name for name in chart.variables]
+    units = {name: chart.unit(name) for name in chart.variables}
+    names = [f"{name} [{unit}]" if unit else name for name, unit in units.items()]
     heads = [f"{short(name, 10):>10}" for name in names]
     if "s" in chart.inputs:
         heads += [f"{'s [m]':>9}", f"{short(f'|{chart.variables[0]}|/s', 7):>7}"]

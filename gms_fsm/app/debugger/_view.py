@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from dataclasses import dataclass
 
-from gms_fsm.inspection.session import Branch, Session
+from gms_fsm.inspection.session import Session
 
 __all__ = [
     "BranchView",
@@ -16,7 +15,6 @@ __all__ = [
     "View",
     "branches",
     "chart_states",
-    "edits_of",
     "ribbons",
     "view",
 ]
@@ -225,7 +223,8 @@ def _ending(session: Session) -> str:
 
 
 def _element(session: Session, i: int) -> ElementView:
-    here, chart, values = session.here, session.model.chart, session.values()
+    here, chart, branch = session.here, session.model.chart, session.branch
+    scope = branch.scope(branch.here)
     edges = tuple(
         EdgeView(
             each.edge.name,
@@ -241,7 +240,7 @@ def _element(session: Session, i: int) -> ElementView:
     return ElementView(
         i + 1,
         here.states[i],
-        tuple(values[f"{name}{i + 1}"] for name in chart.variables),
+        tuple(scope.each(name)[i] for name in chart.variables),
         here.s[i] if has_s else None,
         abs(here.z[i]) / here.s[i] if has_s else None,
         here.F_elements[i],
@@ -299,14 +298,14 @@ def ribbons(session: Session, parts: int) -> Ribbons:
     Ribbons
         The states in the middle of each part.
     """
-    branch, start, end = session.branch, session.branch.raw(0)[0], session.t_end
+    branch, start, end = session.branch, session.branch.raw(0).t, session.t_end
     modes: list[tuple[int, ...] | None] = []
     for part in range(parts):
         t = start + (end - start) * (part + 0.5) / parts
-        row = bisect_right(range(len(branch)), t, key=lambda r: branch.raw(r)[0]) - 1
+        row = branch.row_at(t)
         # The last row's states are known up to its time only.
         reached = row + 1 < len(branch) or branch.outcome == "end"
-        modes.append(branch.raw(row)[3] if row >= 0 and reached else None)
+        modes.append(branch.raw(row).mode if row >= 0 and reached else None)
     now = min(parts - 1, int(parts * (session.here.t - start) / (end - start)))
     return Ribbons(start, end, tuple(modes), now)
 
@@ -330,36 +329,11 @@ def branches(session: Session) -> tuple[BranchView, ...]:
             len(branch),
             len(branch.log()),
             number == session.current,
-            branch.raw(len(branch) - 1)[0],
+            branch.last.t,
             branch.outcome,
             branch.parent,
-            None if branch.parent is None else branch.raw(branch.fork + 1)[0],
-            edits_of(branch),
+            None if branch.parent is None else branch.raw(branch.fork + 1).t,
+            "" if branch.edits is None else str(branch.edits),
         )
         for number, branch in enumerate(session.branches)
     )
-
-
-def edits_of(branch: Branch) -> str:
-    """Return what was poked where a branch begins.
-
-    Parameters
-    ----------
-    branch : Branch
-        Any of a session's.
-
-    Returns
-    -------
-    str
-        ``"z1 = 0.2, state 2 = slip"``; empty for the first branch.
-    """
-    edits = branch.edits
-    parts = [
-        f"{name}{i + 1} = {value:.6g}"
-        for name, values in edits.get("variables", {}).items()
-        for i, value in values.items()
-    ]
-    if edits.get("v") is not None:
-        parts.append(f"v = {edits['v']:.6g}")
-    parts += [f"state {i + 1} = {name}" for i, name in edits.get("state", {}).items()]
-    return ", ".join(parts)
