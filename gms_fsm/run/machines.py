@@ -212,6 +212,11 @@ class Engine(Protocol):
 class Meddling(Exception):
     """A callback changed what it may only look at; whoever holds the run says it to the user."""
 
+    def __init__(self, reason: str, place: str, t: float) -> None:
+        super().__init__(reason)
+        self.reason, self.place, self.t = reason, place, t
+        self.advice = "write the switch into the chart, as an edge with a guard"
+
 
 class MachineEngine:
     """Asks and fires the `transitions` machines."""
@@ -277,30 +282,34 @@ class MachineEngine:
             If a callback changed these values, or a state.
         """
         row, elements = self.chart.transitions[edge], self.machines.elements
-        here = f"element {machine + 1}, edge {row.name!r} at t = {t!r} s"
+        place = f"element {machine + 1}, edge {row.name!r}"
         # The trigger evaluates the guard once more; assignments come after, as in Stateflow, where
         # the whole set was chosen before any of them.
         try:
             fired = getattr(elements[machine], row.name)()
         except MachineError as error:
             raise Meddling(
-                f"{here}: a callback moved a state ({error.value}); {ONLY_LOOK}"
+                f"a callback moved a state ({error.value}); {ONLY_LOOK}", place, t
             ) from error
         if not fired:
             raise Meddling(
-                f"{here}: the edge was enabled, but a callback changed the element's values before "
-                f"it fired; {ONLY_LOOK}"
+                "the edge was enabled, but a callback changed the element's values before "
+                f"it fired; {ONLY_LOOK}",
+                place,
+                t,
             )
         self.states[machine] = row.target
         for i, (element, state) in enumerate(zip(elements, self.states, strict=True)):
             if element.state != state:
                 raise Meddling(
-                    f"{here}: a callback put element {i + 1} into state {shown(element.state)}, "
-                    f"but the chart has it in {state!r}; {ONLY_LOOK}"
+                    f"a callback put element {i + 1} into state {shown(element.state)}, "
+                    f"but the chart has it in {state!r}; {ONLY_LOOK}",
+                    place,
+                    t,
                 )
 
 
-ONLY_LOOK = "callbacks may only look; write the switch into the chart, as an edge with a guard"
+ONLY_LOOK = "callbacks may only look"
 
 
 class IfElse:

@@ -220,7 +220,7 @@ class Run:
             raise explained(error, recorder) from None
         except SignalError as error:
             raise SimulationError(
-                f"{error}; the run up to there is kept", recorder.trace()
+                error.reason, recorder.trace(), place=error.place, advice=error.advice
             ) from None
         except KeyboardInterrupt:  # within a step; the rows before may have taken an hour
             if self.buffers.out.cursor[ROW]:

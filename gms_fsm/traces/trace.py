@@ -436,9 +436,7 @@ class Trace:
         try:
             parts = checked(reader(path))
         except TraceFileError as error:
-            if str(error).startswith((f"{path}:", f"{_csv.log_path(path)}:")):
-                raise
-            raise TraceFileError(f"{path}: {error}") from None
+            raise (error if error.outer else error.inside(path)) from None
         except FileNotFoundError as error:
             raise TraceFileError(
                 f"{error.filename}: no such file; check its name and the folder"

@@ -148,7 +148,7 @@ class Commands:
         """Refuse to go forward from the end."""
         branch = self.session.branch
         last = branch.between is None and branch.cursor + 1 == len(branch)
-        if last and not branch.pull() and branch.outcome == "end":
+        if last and not branch.pull() and branch.ended:
             raise SessionError("this is the end of the run; go back first")
 
     def here(self) -> Iterator[str]:
@@ -321,7 +321,7 @@ class Commands:
             try:
                 value = self._value(text)
             except GMSError as error:
-                value = str(error).partition("\n")[0]
+                value = error.reason
             yield f"  watch {number}: {text} = {value}"
         if not self.session.watches:
             yield "nothing is watched"
