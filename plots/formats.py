@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+from gms_fsm._arguments import checked_path
 from gms_fsm._extras import EXTRAS
 from gms_fsm._files import written_whole
 from gms_fsm.errors import ParameterError, shown
@@ -287,8 +288,9 @@ def chosen(path: str | Path, *subjects: Subject) -> Format:
     Traceback (most recent call last):
     gms_fsm.errors.ParameterError: path is 'a.bmp'; it must end in .png, .svg or .pdf
     """
+    path = checked_path("path", path)
     for each in of(*subjects):
-        if Path(path).suffix.lower() == each.ending:
+        if path.suffix.lower() == each.ending:
             return each
     raise ParameterError(f"path is {str(path)!r}; it must end in {listed(*subjects)}")
 

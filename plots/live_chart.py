@@ -17,10 +17,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from gms_fsm._arguments import checked_whole
+from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import OutputError, ParameterError, shown
 from gms_fsm.inspection.explain import values_at
 from gms_fsm.language import Condition, clauses, evaluate
-from gms_fsm.traces.trace import Trace
+from gms_fsm.traces.trace import Trace, check_trace
 from plots._labels import FALSE, TRUE, UNKNOWN, Piece, Row, element_id, part_id
 from plots.render import picture
 from plots.statechart import Sheet, chosen
@@ -114,6 +116,7 @@ class LiveChart:
         values: bool = False,
         direction: str = "TB",
     ) -> None:
+        check_trace(trace)
         self.trace = trace
         self.elements = chosen(trace.n if elements is None else elements, trace.n)
         self.values = values
@@ -160,7 +163,7 @@ class LiveChart:
         ParameterError
             If the time lies outside the run.
         """
-        times = self.trace.t
+        times, t = self.trace.t, checked_scalar("t", t, "finite")
         if not times.min() <= t <= times.max():
             raise ParameterError(
                 f"t is {shown(t)} s; it must lie within the run, {times.min():g} to "
@@ -193,6 +196,7 @@ class LiveChart:
 
     def _row(self, row: int) -> int:
         rows = len(self.trace)
+        row = checked_whole("row", row)
         if not -rows <= row < rows:
             raise IndexError(f"row {row}: the trace has {rows} rows")
         return row % rows

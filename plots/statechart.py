@@ -16,6 +16,7 @@ from math import ceil, sqrt
 
 import graphviz
 
+from gms_fsm._arguments import checked_kind, listed
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.language import Both, Condition, Either, clauses
@@ -110,12 +111,15 @@ def statechart(
     """
     if not hasattr(chart, "guards"):
         raise ParameterError(f"chart is {chart!r:.60}; give a Chart, of a model its .chart")
+    checked_kind("note", note, str, "a text")
+    if counts is not None:
+        checked_kind("counts", counts, Trace, "a Trace, a run of this chart")
     if counts is not None and counts.model.chart != chart:
         raise ParameterError(
             f"counts is a run of the chart {counts.model.chart.name!r}; it must be one of the "
             f"chart that is drawn, {chart.name!r}"
         )
-    pointed = tuple(marked)
+    pointed = tuple(listed("marked", marked, "names of states and edges"))
     parts = [*(state.name for state in chart.states), *(edge.name for edge in chart.transitions)]
     for name in pointed:
         one_of("marked", name, parts)

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+from gms_fsm._arguments import checked_kind
 from gms_fsm.charts.parameters import QUANTITIES, Parameter
 from gms_fsm.errors import ChartError, ExpressionError, shown
 from gms_fsm.language import (
@@ -344,7 +345,7 @@ class Chart:
         >>> LUGRE.unit("sigma_0"), LUGRE.unit("v"), LUGRE.unit("w")
         ('N/m', 'm/s', '')
         """
-        found = self.declared.get(name)
+        found = self.declared.get(checked_kind("name", name, str, "a text"))
         return "" if found is None else found.unit
 
     @property
@@ -405,6 +406,11 @@ class Chart:
         str
             For example ``"|v| <= v_c && |z| < s"``.
         """
+        if not isinstance(edge, str) or edge not in self.guards:
+            raise ChartError(
+                f"chart {self.name!r} has no edge {shown(edge)}",
+                advice=f"its edges are {', '.join(map(repr, self.guards)) or 'none'}",
+            )
         return spell(self.guards[edge], MATLAB_LIKE)
 
 

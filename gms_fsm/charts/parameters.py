@@ -28,6 +28,7 @@ __all__ = [
     "FloatArray",
     "Parameter",
     "as_floats",
+    "as_numbers",
     "checked_array",
     "checked_scalar",
     "checked_values",
@@ -319,12 +320,7 @@ def checked_array(name: str, values: ArrayLike, n: int | None, rule: str) -> Flo
     ParameterError
         Naming the parameter, the entry, its value and the rule.
     """
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ParameterError(f"{name} is {shown(values)}; it must be a list of numbers") from None
-    except OverflowError:
-        raise ParameterError(f"{name} has too large a number; it must be finite") from None
+    array = as_numbers(name, values)
     if array.ndim != 1 or array.size == 0:
         raise ParameterError(
             f"{name} has shape {array.shape}; it must be a flat list of numbers, not empty"
@@ -339,6 +335,29 @@ def checked_array(name: str, values: ArrayLike, n: int | None, rule: str) -> Flo
         checked_scalar(f"{name}[{i}] (element {i + 1})", float(array[i]), rule)
     array.setflags(write=False)
     return array
+
+
+def as_numbers(name: str, values: ArrayLike) -> FloatArray:
+    """Return a copy as an array of floats, of any shape; raise a `ParameterError` if it is none.
+
+    Parameters
+    ----------
+    name : str
+        For the message.
+    values : array_like
+        What was given.
+
+    Returns
+    -------
+    ndarray
+        A copy.
+    """
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ParameterError("it must be a list of numbers", place=name, value=values) from None
+    except OverflowError:
+        raise ParameterError("a number is too large; it must be finite", place=name) from None
 
 
 def checked_values(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gms_fsm._arguments import checked_whole
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError, SessionError, shown
 from gms_fsm.run.settings import SettingOptions, Settings
@@ -36,15 +37,20 @@ def checked_settings(settings: Settings | None, options: SettingOptions) -> Sett
 
 
 def check_count(count: int) -> None:
-    """Raise a `SessionError` for a count below 0."""
-    if count < 0:
-        raise SessionError(f"count is {count}; it must be at least 0")
+    """Raise a `SessionError` for what is no count."""
+    checked_whole("count", count, 0, SessionError)
 
 
 def check_branch(number: int, branches: int) -> None:
     """Raise a `SessionError` unless there is a branch of this number."""
-    if not 0 <= number < branches:
+    if not 0 <= checked_whole("branch", number, None, SessionError) < branches:
         raise SessionError(f"no branch {number}; there are 0 to {branches - 1}")
+
+
+def check_row(row: int, rows: int) -> None:
+    """Raise a `SessionError` unless a row of this number has been computed."""
+    if not 0 <= checked_whole("row", row, None, SessionError) < rows:
+        raise SessionError(f"no row {row}; 0 to {rows - 1} are computed")
 
 
 def check_element(element: int, model: Model) -> None:

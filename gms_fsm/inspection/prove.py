@@ -30,6 +30,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from gms_fsm._arguments import listed
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.inspection._checks import chattering, determinism, livelock, reachability, stability
@@ -109,7 +110,11 @@ def prove(chart: Chart, domain: Sequence[str] | None = None) -> Report:
         raise ParameterError(f"chart is {shown(chart)}; prove takes a Chart, of a model its .chart")
     if domain is None:
         domain = default_domain(chart)
-    domain = (domain,) if isinstance(domain, str) else tuple(domain)
+    domain = (
+        (domain,)
+        if isinstance(domain, str)
+        else tuple(listed("domain", domain, "a list of conditions"))
+    )
     prover = Prover(chart, domain)
     checks = (determinism, livelock, reachability, chattering, stability)
     return Report(chart, domain, tuple(found for check in checks for found in check(prover)))

@@ -11,9 +11,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Unpack
 
+from gms_fsm._arguments import checked_path
 from gms_fsm.errors import SessionError, TraceFileError, why
 from gms_fsm.inspection import _breakpoints, _conditions, _session_file, _walker
-from gms_fsm.inspection._asked import check_branch, check_element, checked_settings
+from gms_fsm.inspection._asked import check_branch, check_element, check_row, checked_settings
 from gms_fsm.inspection._branch import Branch
 from gms_fsm.inspection._breakpoints import KINDS, Breakpoint
 from gms_fsm.inspection._conditions import holds_at
@@ -135,6 +136,7 @@ class Session:
         Here
             The row.
         """
+        check_row(row, len(self.branch))
         return here_at(self.branch, row)
 
     # ------------------------------------------------------------------ walking
@@ -504,12 +506,14 @@ class Session:
           first different transition at t = 12.4999735 s
           largest difference: z 0.599 m, F 0.375 N
         """
+        for number in (a, b):
+            if number is not None:
+                check_branch(number, len(self.branches))
         b = self.current if b is None else b
-        a = self.branches[b].parent if a is None and 0 <= b < len(self.branches) else a
+        a = self.branches[b].parent if a is None else a
         if a is None:
             raise SessionError(f"branch {b} has no parent; name two branches")
         for number in (a, b):
-            check_branch(number, len(self.branches))
             self.branches[number].complete()
         return compared((a, b), self.branches[a].trace(), self.branches[b].trace())
 
@@ -546,7 +550,7 @@ class Session:
             self.breakpoints,
             self.watches,
         )
-        return _session_file.write(Path(path), record)
+        return _session_file.write(checked_path("path", path), record)
 
     @classmethod
     def load(cls, path: str | Path) -> Session:
@@ -567,7 +571,7 @@ class Session:
         TraceFileError
             If the file is missing, damaged or something else.
         """
-        path = Path(path)
+        path = checked_path("path", path)
         try:
             return cls._of(_session_file.read(path))
         except FileNotFoundError:

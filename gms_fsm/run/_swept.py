@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gms_fsm._arguments import checked_path
 from gms_fsm._extras import require
 from gms_fsm._files import written_whole
 from gms_fsm.charts.parameters import QUANTITIES, FloatArray
@@ -207,7 +208,7 @@ class Sweep:
         OutputError
             If the folder cannot be written or the ending is another.
         """
-        path = Path(path)
+        path = checked_path("path", path)
         if path.suffix == ".npz":
             from gms_fsm._version import __version__
 
@@ -250,9 +251,10 @@ class Sweep:
             If the file is missing, damaged, or not a sweep of this format; nothing in it is
             executed.
         """
+        path = checked_path("path", path)
         try:
             # Opened here: np.load leaves a damaged file open.
-            with Path(path).open("rb") as raw, np.load(raw, allow_pickle=False) as file:
+            with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
                 return _read(file)
         except FileNotFoundError:
             raise TraceFileError(

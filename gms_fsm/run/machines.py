@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 from transitions import Machine, MachineError
 
+from gms_fsm._arguments import checked_kind
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ChartError, ParameterError, shown
 from gms_fsm.language import PYTHON, Condition, names_in, spell
@@ -147,6 +148,7 @@ class ElementMachines:
         ChartError
             If the machine has edges or conditions that are not in the chart.
         """
+        checked_kind("chart", chart, Chart, "a Chart")
         table: list[list[tuple[int, Guard]]] = []
         for state in chart.states:
             rows = []

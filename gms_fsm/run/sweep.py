@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gms_fsm._arguments import checked_kind
 from gms_fsm.charts.parameters import WEIGHTS, FloatArray
 from gms_fsm.errors import GMSError, ParameterError, cut, shown
 from gms_fsm.lowering._compiled import check_numba
@@ -217,6 +218,8 @@ class _Begin:
 
 def _chosen(settings: Settings | None, options: SettingOptions) -> Settings:
     """Return the settings of each run: a sweep keeps ends, if not rows at wanted times."""
+    if settings is not None:
+        checked_kind("settings", settings, Settings, "a Settings, for example Settings(rtol=1e-8)")
     whole = settings is None or settings.output == "all"
     if whole and options.get("t_eval") is None and options.get("output") is None:
         options = {**options, "output": "end"}

@@ -149,7 +149,7 @@ class GMSParameters:
         >>> GMSParameters.paper("stick-slip").C.tolist()
         [0.1, 0.05, 0.025, 0.0001]
         """
-        if column not in TABLE_I:
+        if not isinstance(column, str) or column not in TABLE_I:
             raise ParameterError(
                 f"Table I has no column {column!r}; it has {' and '.join(map(repr, TABLE_I))}"
             )

@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gms_fsm._arguments import checked_path, checked_whole
 from gms_fsm._extras import require
-from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.charts.parameters import FloatArray, as_numbers
 from gms_fsm.errors import (
     OutputError,
     ParameterError,
@@ -254,6 +255,7 @@ class Trace:
         dict of str to float
             By what is zero there, such as ``v``; empty almost everywhere.
         """
+        row = checked_whole("row", row)
         on = np.flatnonzero(self.rows.mode[row, self.program.layout.slides])
         return {self.program.surface_names[k]: self._sigma(self.rows, row, int(k)) for k in on}
 
@@ -300,7 +302,7 @@ class Trace:
         SignalError
             If the trace comes from a file and its signal was a Python function.
         """
-        wanted = np.atleast_1d(np.asarray(times, dtype=np.float64))
+        wanted = np.atleast_1d(as_numbers("times", times))
         table = merged(self.rows, self.stops)
         if wanted.ndim != 1 or wanted.size == 0:
             raise ParameterError(f"times has shape {wanted.shape}; give a flat, non-empty list")
@@ -328,6 +330,7 @@ class Trace:
         Trace
             All rows of this trace, micro-steps included, and the samples.
         """
+        points = checked_whole("points", points, 1)
         even = self.sample(np.linspace(self.t[0], self.t[-1], points)).rows
         inner = ~np.isin(even.t, self.t)
         rows = merged(even.at(inner), self.rows)
@@ -400,7 +403,7 @@ class Trace:
             If the folder cannot be written, the ending is another, or the rig is of a class of
             your own.
         """
-        path = Path(path)
+        path = checked_path("path", path)
         if path.suffix not in (".npz", ".csv"):
             raise OutputError(f"{path}: a trace is saved as .npz or .csv, not {path.suffix!r}")
         header = Header.of(self.model, self.rig, self.settings, self.monitors)
@@ -429,7 +432,7 @@ class Trace:
         TraceFileError
             If the file is missing, damaged, or not a trace; nothing in it is executed.
         """
-        path = Path(path)
+        path = checked_path("path", path)
         reader = {".npz": _npz.read, ".csv": _csv.read}.get(path.suffix)
         if reader is None:
             raise TraceFileError(f"{path}: a trace ends in .npz or .csv, not {path.suffix!r}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+from gms_fsm._arguments import listed
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.systems.models import Model
 from gms_fsm.traces.monitors._chattering import chattering
@@ -59,7 +60,11 @@ def checked(
     >>> list(checked(["all", "z <= s"], GMS(GMSParameters.paper("stick-slip"), law="signed")))
     ['chattering', 'passivity', 'coverage', 'z <= s']
     """
-    given = [monitors] if isinstance(monitors, str | Monitor) else list(monitors)
+    given = (
+        [monitors]
+        if isinstance(monitors, str | Monitor)
+        else listed("monitors", monitors, "names of monitors, or monitors")
+    )
     found: dict[str, Monitor] = {}
     for each in given:
         for monitor in ALL if each == "all" else (_monitor(each),):
