@@ -73,7 +73,7 @@ class Format:
     def __post_init__(self) -> None:
         if not isinstance(self.ending, str) or not re.fullmatch(r"\.[a-z0-9]+", self.ending):
             raise ParameterError(
-                f"ending is {shown(self.ending)}; it must be a dot and small letters or digits"
+                "it must be a dot and small letters or digits", place="ending", value=self.ending
             )
         for name, known in (("subject", get_args(Subject)), ("extra", ("", *EXTRAS))):
             value = getattr(self, name)
@@ -292,7 +292,7 @@ def chosen(path: str | Path, *subjects: Subject) -> Format:
     for each in of(*subjects):
         if path.suffix.lower() == each.ending:
             return each
-    raise ParameterError(f"path is {str(path)!r}; it must end in {listed(*subjects)}")
+    raise ParameterError(f"it must end in {listed(*subjects)}", place="path", value=str(path))
 
 
 def save(made: Any, path: str | Path, *subjects: Subject) -> Path:

@@ -18,7 +18,6 @@ from xml.etree import ElementTree
 import numpy as np
 
 from gms_fsm._arguments import checked_whole
-from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import OutputError, ParameterError, shown
 from gms_fsm.inspection.explain import values_at
 from gms_fsm.language import Condition, clauses, evaluate
@@ -163,11 +162,11 @@ class LiveChart:
         ParameterError
             If the time lies outside the run.
         """
-        times, t = self.trace.t, checked_scalar("t", t, "finite")
-        if not times.min() <= t <= times.max():
+        times = self.trace.t
+        if not isinstance(t, float | int | np.number) or not times.min() <= t <= times.max():
             raise ParameterError(
-                f"t is {shown(t)} s; it must lie within the run, {times.min():g} to "
-                f"{times.max():g} s"
+                f"t is {shown(t)} s",
+                advice=f"it must lie within the run, {times.min():g} to {times.max():g} s",
             )
         # Not a bisection: the rows of Trace.sample come in the order they were asked for.
         before = np.flatnonzero(times <= t)
@@ -314,7 +313,9 @@ def live_statechart(
     '<svg'
     """
     if (row is None) == (t is None):
-        raise ParameterError(f"row is {shown(row)} and t is {shown(t)}; give exactly one of them")
+        raise ParameterError(
+            "give exactly one of them", place=f"row is {shown(row)} and t", value=t
+        )
     chart = LiveChart(
         trace, elements, notation=notation, theme=theme, values=values, direction=direction
     )
@@ -370,8 +371,8 @@ def _paired(rows: Sequence[Row], nodes: Sequence[ElementTree.Element]) -> Texts:
     pieces = [piece for row in rows for piece in row]
     if len(pieces) != len(nodes):
         raise OutputError(
-            f"Graphviz wrote {len(nodes)} texts for {len(pieces)}; this version of Graphviz cannot "
-            "be used for live charts, install another"
+            f"Graphviz wrote {len(nodes)} texts for {len(pieces)}",
+            advice="this version of Graphviz cannot be used for live charts, install another",
         )
     return list(zip(pieces, nodes, strict=True))
 

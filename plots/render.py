@@ -66,8 +66,8 @@ def render(graph: graphviz.Digraph, path: str | Path) -> Path:
     """
     if not hasattr(graph, "source"):
         raise ParameterError(
-            f"graph is {graph!r:.60}; give first the graph, for example from statechart, then the "
-            "path"
+            f"graph is {graph!r:.60}",
+            advice="give first the graph, for example from statechart, then the path",
         )
     path = checked_path("path", path)
     chart: tuple[formats.Subject, ...] = ("chart",) if isinstance(graph, ChartGraph) else ()

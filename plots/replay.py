@@ -216,7 +216,9 @@ def replay_html(
     names = [checked_kind("names", each, str, "texts") for each in listed("names", names, "texts")]
     plot_script, plot_style = _uplot()
     if len(names) not in (0, len(traces)):
-        raise ParameterError(f"{len(traces)} run(s) but names = {list(names)!r}; give one each")
+        raise ParameterError(
+            f"{len(traces)} run(s) but names = {list(names)!r}", advice="give one each"
+        )
     pictures = [chart_svg(each.model.chart, each.n) for each in traces]
     charts = list(dict.fromkeys(pictures))
     chosen = [page_rows(each) for each in traces]

@@ -46,9 +46,9 @@ def chosen(verb: str, name: str, law: str) -> tuple[Entry, Chart]:
         others = [each.name for each in registered().values() if each.laws]
         raise ParameterError(f"{verb} {name} takes no --law; only {', '.join(others)} does")
     if options and not law:
-        raise ParameterError(f"{verb} {name} needs {options}; they differ")
+        raise ParameterError(f"{verb} {name} needs {options}", advice="they differ")
     if law not in found.laws and options:
-        raise ParameterError(f"{verb} {name} has no law {law!r}; give {options}")
+        raise ParameterError(f"{verb} {name} has no law {law!r}", advice=f"give {options}")
     return found, found.chart(law)
 
 

@@ -25,8 +25,8 @@ def checked_settings(settings: Settings | None, options: SettingOptions) -> Sett
         )
     if not isinstance(options.get("engine", ""), str):
         raise ParameterError(
-            "engine: every branch of a session makes machines of its own; use 'machines' or "
-            "'ifelse'"
+            "engine: every branch of a session makes machines of its own",
+            advice="use 'machines' or 'ifelse'",
         )
     chosen = Settings.of(settings, "a session", **options)
     if chosen.output != "all":
@@ -44,13 +44,13 @@ def check_count(count: int) -> None:
 def check_branch(number: int, branches: int) -> None:
     """Raise a `SessionError` unless there is a branch of this number."""
     if not 0 <= checked_whole("branch", number, None, SessionError) < branches:
-        raise SessionError(f"no branch {number}; there are 0 to {branches - 1}")
+        raise SessionError(f"no branch {number}", advice=f"there are 0 to {branches - 1}")
 
 
 def check_row(row: int, rows: int) -> None:
     """Raise a `SessionError` unless a row of this number has been computed."""
     if not 0 <= checked_whole("row", row, None, SessionError) < rows:
-        raise SessionError(f"no row {row}; 0 to {rows - 1} are computed")
+        raise SessionError(f"no row {row}", advice=f"0 to {rows - 1} are computed")
 
 
 def check_element(element: int, model: Model) -> None:
@@ -61,8 +61,8 @@ def check_element(element: int, model: Model) -> None:
         if said in [repr(edge.name) for edge in model.chart.transitions]:
             said += f" (an edge is asked for by edge={said})"
         raise SessionError(
-            f"no element {said}; there are 0 to {model.n - 1} (counted from 0 in Python, from 1 in "
-            "text)"
+            f"no element {said}",
+            advice=f"there are 0 to {model.n - 1} (counted from 0 in Python, from 1 in text)",
         )
 
 

@@ -58,7 +58,7 @@ def new_breakpoint(
     if name not in known:
         raise SessionError(f"no {what} {name!r}; there are {', '.join(known) or 'none'}")
     if hits < 1:
-        raise SessionError(f"hits is {hits}; it must be at least 1")
+        raise SessionError(f"hits is {hits}", advice="it must be at least 1")
     return Breakpoint(kind, name, element, condition, hits)
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Unpack
 
 from gms_fsm._arguments import checked_path
-from gms_fsm.errors import SessionError, TraceFileError, why
+from gms_fsm.errors import SessionError
 from gms_fsm.inspection import _breakpoints, _conditions, _session_file, _walker
 from gms_fsm.inspection._asked import check_branch, check_element, check_row, checked_settings
 from gms_fsm.inspection._branch import Branch
@@ -443,7 +443,7 @@ class Session:
         edits = Edits.of(self.model, variables, v, state)
         branch, here = self.branch, self.branch.here
         if not here.t < self.t_end:
-            raise SessionError(f"t = {here.t!r} s is the end of the run; go back first")
+            raise SessionError(f"t = {here.t!r} s is the end of the run", advice="go back first")
         prescribed = self.rig.acceleration is None
         initial = initial_with(edits, branch.scope(here), prescribed=prescribed)
         run = self._run(here.t, initial)
@@ -512,7 +512,7 @@ class Session:
         b = self.current if b is None else b
         a = self.branches[b].parent if a is None else a
         if a is None:
-            raise SessionError(f"branch {b} has no parent; name two branches")
+            raise SessionError(f"branch {b} has no parent", advice="name two branches")
         for number in (a, b):
             self.branches[number].complete()
         return compared((a, b), self.branches[a].trace(), self.branches[b].trace())
@@ -572,12 +572,8 @@ class Session:
             If the file is missing, damaged or something else.
         """
         path = checked_path("path", path)
-        try:
+        with _session_file.blamed(path):
             return cls._of(_session_file.read(path))
-        except FileNotFoundError:
-            raise TraceFileError(f"{path}: no such file; check its name and the folder") from None
-        except Exception as error:  # whatever a damaged file provokes, it is the file's fault
-            raise TraceFileError(f"{path}: not a session file, or damaged ({why(error)})") from None
 
     @classmethod
     def _of(cls, record: SessionRecord) -> Session:

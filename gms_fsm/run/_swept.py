@@ -229,7 +229,9 @@ class Sweep:
             beside = path.with_name(f"{path.stem}.transitions.parquet")
             written_whole(beside, log.to_parquet)
             return written_whole(path, self.to_dataframe().to_parquet)
-        raise OutputError(f"{path}: a sweep is saved as .npz or .parquet, not {path.suffix!r}")
+        raise OutputError(
+            f"a sweep is saved as .npz or .parquet, not {path.suffix!r}", place=str(path)
+        )
 
     @classmethod
     def load(cls, path: str | Path) -> Sweep:
@@ -258,11 +260,11 @@ class Sweep:
                 return _read(file)
         except FileNotFoundError:
             raise TraceFileError(
-                f"{path}: there is no such file; check its name and the folder"
+                "there is no such file", place=str(path), advice="check its name and the folder"
             ) from None
         except Exception as error:  # numpy and zipfile raise many kinds over damaged files
             raise TraceFileError(
-                f"{path}: not a sweep, or damaged ({why(error)}); run it again"
+                f"not a sweep, or damaged ({why(error)})", place=str(path), advice="run it again"
             ) from None
 
 

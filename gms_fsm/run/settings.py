@@ -147,8 +147,8 @@ class Settings:
                 )
             if self.step is None and not integrators.METHODS[method].adaptive:
                 raise ParameterError(
-                    f"method {method!r} has no error estimate; give step=..., or use 'dp45' or "
-                    "'bs23'"
+                    f"method {method!r} has no error estimate",
+                    advice="give step=..., or use 'dp45' or 'bs23'",
                 )
         elif not (isinstance(method, type) and hasattr(method, "TOO_SMALL_STEP")):
             raise ParameterError(
@@ -210,15 +210,16 @@ class Settings:
         """
         if not (settings is None or isinstance(settings, Settings)):
             raise ParameterError(
-                f"settings is {shown(settings)}; it must be a Settings, for example "
-                "Settings(rtol=1e-8)"
+                "it must be a Settings, for example Settings(rtol=1e-8)",
+                place="settings",
+                value=settings,
             )
         fields = [each.name for each in dataclasses.fields(cls)]
         for name in options:
             if name not in fields:
                 near = difflib.get_close_matches(name, fields, 1)
                 hint = f"did you mean {near[0]!r}?" if near else f"it takes {', '.join(fields)}"
-                raise ParameterError(f"{whose} takes no argument {name!r}; {hint}")
+                raise ParameterError(f"{whose} takes no argument {name!r}", advice=hint)
         if settings is None:
             return cls(**options)
         if "t_eval" in options and "output" not in options:
@@ -242,7 +243,7 @@ def _check_choice(name: str, given: object, choices: tuple[str, ...]) -> None:
 def _check_count(max_steps: object) -> None:
     if isinstance(max_steps, bool) or not isinstance(max_steps, int) or max_steps < 1:
         raise ParameterError(
-            f"max_steps is {shown(max_steps)}; it must be an integer, at least 1 step"
+            "it must be an integer, at least 1 step", place="max_steps", value=max_steps
         )
 
 
@@ -251,6 +252,7 @@ def _increasing(t_eval: ArrayLike) -> tuple[float, ...]:
     for i, (one, after) in enumerate(itertools.pairwise(wanted)):
         if after <= one:
             raise ParameterError(
-                f"t_eval[{i}] = {one} is not before t_eval[{i + 1}] = {after}; times must increase"
+                f"t_eval[{i}] = {one} is not before t_eval[{i + 1}] = {after}",
+                advice="times must increase",
             )
     return tuple(wanted)

@@ -123,7 +123,9 @@ def simulate(
     """
     if isinstance(engine, ElementMachines):
         if machines is not None:
-            raise ParameterError("engine and machines are both machines of yours; give one of them")
+            raise ParameterError(
+                "engine and machines are both machines of yours", advice="give one of them"
+            )
         machines, engine = engine, "machines"
     given: SettingOptions = {**options} if engine is None else {**options, "engine": engine}  # type: ignore[typeddict-item]
     chosen = Settings.of(settings, "simulate", **given)
@@ -137,7 +139,9 @@ def simulate(
         if machines.model is not model:
             raise ParameterError("machines: these ElementMachines were made for another model")
         if chosen.engine == "ifelse":
-            raise ParameterError("engine 'ifelse' asks no machines; leave machines=... out")
+            raise ParameterError(
+                "engine 'ifelse' asks no machines", advice="leave machines=... out"
+            )
     start = Start.of(model, rig, t_end, chosen, t_start=t_start, initial=initial)
     watching = checked(monitors, model, start.output).values() if monitors else ()
     run = CompiledRun(start, machines) if chosen.engine == "compiled" else Run(start, machines)

@@ -209,8 +209,8 @@ def _signal(name: str, record: FormulaRecord | CornersRecord | FunctionRecord) -
 def _lost(name: str) -> Callable[[float], float]:
     def missing(_: float) -> float:
         raise SignalError(
-            f"{name!r} was a Python function, which a trace file cannot hold; sample before "
-            "saving, or run with t_eval"
+            f"{name!r} was a Python function, which a trace file cannot hold",
+            advice="sample before saving, or run with t_eval",
         )
 
     return missing

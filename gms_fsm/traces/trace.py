@@ -71,7 +71,7 @@ def check_trace(trace: object) -> None:
     """
     if not isinstance(trace, Trace):
         raise ParameterError(
-            f"trace is {shown(trace)}; it must be a Trace, from simulate(...) or Trace.load(path)"
+            "it must be a Trace, from simulate(...) or Trace.load(path)", place="trace", value=trace
         )
 
 
@@ -305,7 +305,9 @@ class Trace:
         wanted = np.atleast_1d(as_numbers("times", times))
         table = merged(self.rows, self.stops)
         if wanted.ndim != 1 or wanted.size == 0:
-            raise ParameterError(f"times has shape {wanted.shape}; give a flat, non-empty list")
+            raise ParameterError(
+                f"times has shape {wanted.shape}", advice="give a flat, non-empty list"
+            )
         outside = wanted[~((wanted >= table.t[0]) & (wanted <= table.t[-1]))]
         if outside.size:
             raise ParameterError(
@@ -405,7 +407,9 @@ class Trace:
         """
         path = checked_path("path", path)
         if path.suffix not in (".npz", ".csv"):
-            raise OutputError(f"{path}: a trace is saved as .npz or .csv, not {path.suffix!r}")
+            raise OutputError(
+                f"a trace is saved as .npz or .csv, not {path.suffix!r}", place=str(path)
+            )
         header = Header.of(self.model, self.rig, self.settings, self.monitors)
         if path.suffix == ".csv":
             return _csv.write(path, header, self.columns(), self.transitions)
@@ -435,20 +439,24 @@ class Trace:
         path = checked_path("path", path)
         reader = {".npz": _npz.read, ".csv": _csv.read}.get(path.suffix)
         if reader is None:
-            raise TraceFileError(f"{path}: a trace ends in .npz or .csv, not {path.suffix!r}")
+            raise TraceFileError(
+                f"a trace ends in .npz or .csv, not {path.suffix!r}", place=str(path)
+            )
         try:
             parts = checked(reader(path))
         except TraceFileError as error:
             raise (error if error.outer else error.inside(path)) from None
         except FileNotFoundError as error:
             raise TraceFileError(
-                f"{error.filename}: no such file; check its name and the folder"
+                "no such file", place=error.filename, advice="check its name and the folder"
             ) from None
         except Exception as error:
             # A damaged file can fail anywhere inside zipfile, zlib, numpy, csv or pydantic, and
             # each has errors of its own; whatever it is, it is the file's fault.
             raise TraceFileError(
-                f"{path}: damaged or incomplete trace file ({why(error)}); write it again"
+                f"damaged or incomplete trace file ({why(error)})",
+                place=str(path),
+                advice="write it again",
             ) from None
         return cls(
             parts.rows,

@@ -67,7 +67,7 @@ class Commands:
         if name not in COMMANDS:
             near = difflib.get_close_matches(name, COMMANDS, 1)
             hint = f"did you mean {near[0]}? " if near else ""
-            raise SessionError(f"no command {name!r}; {hint}help lists them")
+            raise SessionError(f"no command {name!r}", advice=f"{hint}help lists them")
         yield from getattr(self, f"do_{name}")(arg)
 
     def words(self, name: str, before: str) -> Sequence[str]:
@@ -126,7 +126,7 @@ class Commands:
 
     def _path(self, name: str, text: str) -> Path:
         if not text:
-            raise SessionError(f"a file name is missing; {self._usage(name)}")
+            raise SessionError("a file name is missing", advice=f"{self._usage(name)}")
         return Path(text.strip("\"'")).expanduser()
 
     # ------------------------------------------------------------------ help
@@ -137,7 +137,7 @@ class Commands:
             return
         name = ALIASES.get(arg, arg)
         if name not in COMMANDS:
-            raise SessionError(f"no command {arg!r}; help lists them")
+            raise SessionError(f"no command {arg!r}", advice="help lists them")
         each = help_of(name, self.session)
         alias = f"   (short: {each.alias})" if each.alias else ""
         yield f"{each.usage}{alias}\n{each.says}"
@@ -149,7 +149,7 @@ class Commands:
         branch = self.session.branch
         last = branch.between is None and branch.cursor + 1 == len(branch)
         if last and not branch.pull() and branch.ended:
-            raise SessionError("this is the end of the run; go back first")
+            raise SessionError("this is the end of the run", advice="go back first")
 
     def here(self) -> Iterator[str]:
         """Say where we are, after a move.
@@ -339,7 +339,9 @@ class Commands:
     def _element(self, command: str, text: str) -> int:
         number = _whole(text, help_of(command, self.session).usage)
         if not 1 <= number <= self.session.model.n:
-            raise SessionError(f"no element {number}; there are 1 to {self.session.model.n}")
+            raise SessionError(
+                f"no element {number}", advice=f"there are 1 to {self.session.model.n}"
+            )
         return number - 1
 
     # ------------------------------------------------------------------ breakpoints
@@ -400,7 +402,8 @@ class Commands:
             what, i = self._pokeable(name)
             if not what and name in parameter_names(self.session.model):
                 raise SessionError(
-                    f"{name} is a parameter; for another value start a session with another model"
+                    f"{name} is a parameter",
+                    advice="for another value start a session with another model",
                 )
             if not value or not what:
                 raise SessionError(f"{part!r} cannot be poked; {self._usage('poke')}")
@@ -422,7 +425,7 @@ class Commands:
         if form[2]:
             return form[1], self._element("poke", form[2])
         if self.session.model.n > 1:
-            raise SessionError(f"{name!r} cannot be poked; for element 1 write {name}1")
+            raise SessionError(f"{name!r} cannot be poked", advice=f"for element 1 write {name}1")
         return form[1], 0
 
     def do_branches(self, arg: str) -> Iterator[str]:
@@ -454,7 +457,9 @@ class Commands:
             branch.complete()
             trace = branch.trace()
             if not trace.t[-1] > trace.t[0]:
-                raise SessionError(f"branch {number} failed at once; there is nothing to draw")
+                raise SessionError(
+                    f"branch {number} failed at once", advice="there is nothing to draw"
+                )
             edits = f": {branch.edits}" if branch.edits else ""
             runs[text_of.short(f"branch {number}{edits}", 50)] = trace
         yield f"written to {figures.save(figures.compare_laws(runs), path)}"
@@ -479,14 +484,14 @@ class Commands:
 
 def _whole(text: str, usage: str) -> int:
     if not re.fullmatch(r"\d{1,9}", text):
-        raise SessionError(f"{text!r} is not an integer; usage: {usage}")
+        raise SessionError(f"{text!r} is not an integer", advice=f"usage: {usage}")
     return int(text)
 
 
 def _count(name: str, text: str, default: int = 1) -> int:
     count = _whole(text, COMMANDS[name].usage) if text else default
     if count < 1:
-        raise SessionError(f"{name} {count} goes nowhere; usage: {COMMANDS[name].usage}")
+        raise SessionError(f"{name} {count} goes nowhere", advice=f"usage: {COMMANDS[name].usage}")
     return count
 
 
@@ -501,7 +506,7 @@ def _remove(where: list[Breakpoint] | list[str], name: str, arg: str) -> None:
         return
     number = _whole(arg, COMMANDS[name].usage)
     if not 1 <= number <= len(where):
-        raise SessionError(f"there is no number {number}; there are {len(where)}")
+        raise SessionError(f"there is no number {number}", advice=f"there are {len(where)}")
     del where[number - 1]
 
 

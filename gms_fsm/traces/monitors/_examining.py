@@ -69,13 +69,16 @@ def checked(
     for each in given:
         for monitor in ALL if each == "all" else (_monitor(each),):
             if monitor.name in found:
-                raise ParameterError(f"monitors has {shown(monitor.name)} twice; give it once")
+                raise ParameterError(
+                    f"monitors has {shown(monitor.name)} twice", advice="give it once"
+                )
             if isinstance(monitor, Invariant):
                 read_invariant(monitor, model)
             if output == "end" and not isinstance(monitor, Chattering):
                 raise ParameterError(
-                    f"the monitor {shown(monitor.name)} looks at the rows of a run, but output is "
-                    "'end'; use output='all'"
+                    f"the monitor {shown(monitor.name)} looks at the rows of a run, but "
+                    "output is 'end'",
+                    advice="use output='all'",
                 )
             found[monitor.name] = monitor
     return found
