@@ -16,7 +16,7 @@ from typing import Any, Literal, get_args
 from gms_fsm._arguments import checked_path
 from gms_fsm._extras import EXTRAS
 from gms_fsm._files import written_whole
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.errors import ParameterError
 
 __all__ = [
     "FORMATS",
@@ -79,7 +79,7 @@ class Format:
             value = getattr(self, name)
             if value not in known:
                 raise ParameterError(
-                    f"{name} is {shown(value)}; it must be one of {', '.join(map(repr, known))}"
+                    f"it must be one of {', '.join(map(repr, known))}", place=name, value=value
                 )
 
 

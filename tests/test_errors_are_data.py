@@ -23,7 +23,7 @@ KINDS = [
     if isinstance(each, type) and issubclass(each, GMSError)
 ]
 PLAIN = [each for each in KINDS if not issubclass(each, ExpressionError | SimulationError)]
-HIDDEN = 40  # raise sites with "; " in the reason, by `_hiding`; this number may only shrink
+HIDDEN = 0  # raise sites with "; " in the reason, by `_hiding`; this number may only shrink
 ROOT = Path(__file__).parents[1]
 
 

@@ -44,7 +44,9 @@ def chosen(verb: str, name: str, law: str) -> tuple[Entry, Chart]:
     options = " or ".join(f"--law {each}" for each in found.laws)
     if law and not options:
         others = [each.name for each in registered().values() if each.laws]
-        raise ParameterError(f"{verb} {name} takes no --law; only {', '.join(others)} does")
+        raise ParameterError(
+            f"{verb} {name} takes no --law", advice=f"only {', '.join(others)} does"
+        )
     if options and not law:
         raise ParameterError(f"{verb} {name} needs {options}", advice="they differ")
     if law not in found.laws and options:

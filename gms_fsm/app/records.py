@@ -215,8 +215,9 @@ def _read_cells(
             if len(head) == 1:
                 advice = "if these are several columns, say what divides them: delimiter = ..."
             raise RecordError(
-                f"{path}: {what} {shown(column.name)} (for {quantity}); columns: "
-                f"{cut(', '.join(map(repr, head)), 1000)}; {advice}"
+                f"{what} {shown(column.name)} (for {quantity})",
+                place=str(path),
+                advice=f"columns: {cut(', '.join(map(repr, head)), 1000)}; {advice}",
             )
         places[quantity] = head.index(column.name)
     found: dict[str, list[float]] = {quantity: [] for quantity in columns}

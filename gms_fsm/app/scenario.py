@@ -111,9 +111,11 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
     except (RecordError, ScenarioError):
         raise
     except UnitError as error:
-        raise ScenarioError.of(error).inside("[record]").inside(path) from None
+        place = f"[record] {error.place}".rstrip()
+        raise ScenarioError.of(error).replaced(place=place).inside(path) from None
     except GMSError as error:
-        raise ScenarioError.of(error).inside("[rig]").inside(path) from None
+        place = f"[rig] {error.place}".rstrip()
+        raise ScenarioError.of(error).replaced(place=place).inside(path) from None
 
 
 def _loaded(path: Path, scenario: Scenario) -> Loaded:

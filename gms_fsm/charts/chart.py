@@ -67,8 +67,9 @@ class State:
         """Refuse what is no part of a state, in our words."""
         for name in sorted(given.keys() - {each.name for each in fields(cls)}):
             raise ChartError(
-                f"state {shown(given.get('name', '?'))}: a State takes name, flow, entry and exit, "
-                f"not {name!r}; states do not nest, so write one state for each combination"
+                f"a State takes name, flow, entry and exit, not {name!r}",
+                place=f"state {shown(given.get('name', '?'))}",
+                advice="states do not nest, so write one state for each combination",
             )
         return object.__new__(cls)
 
@@ -230,9 +231,11 @@ class Chart:
             )
         if hasattr(self.outputs["F"], "keys"):
             raise ChartError(
-                f"{here}: output 'F' is {shown(self.outputs['F'])}; it is one text for all states. "
-                "Where the law differs by state let a variable carry it, for example a variable f "
-                "with the flow 'k * v' in one state and an entry {'f': 'F_c * sgn(v)'} in another"
+                f"output 'F' is {shown(self.outputs['F'])}",
+                place=here,
+                advice="it is one text for all states. Where the law differs by state let a "
+                "variable carry it, for example a variable f with the flow 'k * v' in "
+                "one state and an entry {'f': 'F_c * sgn(v)'} in another",
             )
         forces = {
             name: _value(text, symbols + derivatives, f"{here}, output {name!r}")

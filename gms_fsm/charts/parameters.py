@@ -291,7 +291,7 @@ def checked_scalar(name: str, value: Any, rule: str) -> float:
     except (TypeError, ValueError):
         raise ParameterError("it must be a number", place=name, value=value) from None
     except OverflowError:  # a whole number that no float can hold
-        raise ParameterError("it is too large; it must be finite", place=name) from None
+        raise ParameterError("too large a number", place=name, advice="it must be finite") from None
     if not math.isfinite(number):
         raise ParameterError("it must be finite", place=name, value=number)
     for bound in bounds_of(rule):
@@ -361,7 +361,9 @@ def as_numbers(name: str, values: ArrayLike) -> FloatArray:
     except (TypeError, ValueError):
         raise ParameterError("it must be a list of numbers", place=name, value=values) from None
     except OverflowError:
-        raise ParameterError("a number is too large; it must be finite", place=name) from None
+        raise ParameterError(
+            "it has too large a number", place=name, advice="it must be finite"
+        ) from None
 
 
 def checked_values(

@@ -121,8 +121,9 @@ class Entry:
         wanted, names = {*self._any.parameter_names}, {*given.values}
         if wanted != names:
             raise ChartError(
-                f"{here}: missing values: {sorted(wanted - names) or 'none'}, unknown: "
-                f"{sorted(names - wanted) or 'none'}"
+                f"missing values: {sorted(wanted - names) or 'none'}, unknown: "
+                f"{sorted(names - wanted) or 'none'}",
+                place=here,
             )
         if self.curve != (given.stribeck is not None):
             raise ChartError(
@@ -186,8 +187,10 @@ class Entry:
             return self.charts
         if law not in self.charts:
             raise ParameterError(
-                f"law is {shown(law)}; {self.name} has {' and '.join(map(repr, self.laws))}, which "
-                "differ; choose one"
+                f"{self.name} has {' and '.join(map(repr, self.laws))}, which differ",
+                place="law",
+                value=law,
+                advice="choose one",
             )
         return self.charts[law]
 

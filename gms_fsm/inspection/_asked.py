@@ -70,5 +70,5 @@ def source_of(edge: str, chart: Chart) -> str:
     """Return the state that an edge leaves; raise a `SessionError` if there is no such edge."""
     sources = {each.name: each.source for each in chart.transitions}
     if edge not in sources:
-        raise SessionError(f"no edge {edge!r}; there are {', '.join(sources) or 'none'}")
+        raise SessionError(f"no edge {edge!r}", advice=f"there are {', '.join(sources) or 'none'}")
     return sources[edge]

@@ -259,7 +259,9 @@ class Prover:
         except GaveUp:
             empty = False
         if empty:
-            raise ParameterError(f"the domain {', '.join(domain)} holds nowhere; loosen it")
+            raise ParameterError(
+                f"the domain {', '.join(domain)} holds nowhere", advice="loosen it"
+            )
 
     def _assumed(self, text: str) -> Any:
         reading = Reading()

@@ -385,7 +385,7 @@ def check_pace(recording: Recording, buffers: hybrid.Buffers) -> None:
         return
     raise StepLimitError(
         f"stiff: the flow has a rate of {fastest:.3g} /s, which holds the steps of "
-        f"this method at {step:.3g} s; to t_end = {start.t_end!r} s it would take "
+        f"this method at {step:.3g} s: to t_end = {start.t_end!r} s it would take "
         f"{(start.t_end - t) / step:.3g} of them, max_steps is {start.options.max_steps}",
         recording.trace(),
         t=t,

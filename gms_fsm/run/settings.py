@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 import integrators
 from gms_fsm.charts.parameters import as_floats, checked_array, checked_scalar
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.errors import ParameterError
 from gms_fsm.lowering.scales import Tolerance
 
 __all__ = ["ENGINES", "EVENTS", "MOST_STEPS", "OUTPUTS", "RunOptions", "SettingOptions", "Settings"]
@@ -136,14 +136,17 @@ class Settings:
         method = self.method
         if not isinstance(self.engine, str) or self.engine not in ENGINES:
             raise ParameterError(
-                f"engine is {shown(self.engine)}; it must be {', '.join(map(repr, ENGINES))}, or "
-                "an ElementMachines"
+                f"it must be {', '.join(map(repr, ENGINES))}, or an ElementMachines",
+                place="engine",
+                value=self.engine,
             )
         if isinstance(method, str):
             if method not in integrators.METHODS:
                 raise ParameterError(
-                    f"method is {shown(method)}; it must be one of "
-                    f"{', '.join(integrators.METHODS)}, or a scipy.integrate.OdeSolver class"
+                    f"it must be one of {', '.join(integrators.METHODS)}, or a "
+                    "scipy.integrate.OdeSolver class",
+                    place="method",
+                    value=method,
                 )
             if self.step is None and not integrators.METHODS[method].adaptive:
                 raise ParameterError(
@@ -152,13 +155,16 @@ class Settings:
                 )
         elif not (isinstance(method, type) and hasattr(method, "TOO_SMALL_STEP")):
             raise ParameterError(
-                f"method is {shown(method)}; it must be a name ({', '.join(integrators.METHODS)}) "
-                "or a scipy.integrate.OdeSolver class"
+                f"it must be a name ({', '.join(integrators.METHODS)}) or a "
+                "scipy.integrate.OdeSolver class",
+                place="method",
+                value=method,
             )
         elif self.engine == "compiled":
             raise ParameterError(
-                f"engine 'compiled' runs our own methods ({', '.join(integrators.METHODS)}), not "
-                f"{method.__name__}; use engine='machines' for SciPy's solvers"
+                f"engine 'compiled' runs our own methods ({', '.join(integrators.METHODS)}), "
+                f"not {method.__name__}",
+                advice="use engine='machines' for SciPy's solvers",
             )
 
     def _output(self) -> str:
@@ -236,7 +242,7 @@ def _check_choice(name: str, given: object, choices: tuple[str, ...]) -> None:
     if not isinstance(given, str) or given not in choices:
         said = [repr(each) for each in choices]
         raise ParameterError(
-            f"{name} is {shown(given)}; it must be {', '.join(said[:-1])} or {said[-1]}"
+            f"it must be {', '.join(said[:-1])} or {said[-1]}", place=name, value=given
         )
 
 

@@ -228,7 +228,7 @@ def _tolerances(
     for name, given in by_name.items():
         if name not in rows:
             raise ParameterError(
-                f"atol has the key {shown(name)}; known are {', '.join(map(repr, rows))}"
+                f"atol has the key {shown(name)}", advice=f"known are {', '.join(map(repr, rows))}"
             )
         if np.ndim(given) == 0:
             rows[name] = [checked_scalar(f"atol[{name!r}]", given, "> 0")] * len(rows[name])
@@ -277,7 +277,8 @@ def _initial(model: Model, rig: Rig, initial: Mapping[str, Any]) -> tuple[list[f
     for name in initial:
         if name not in known:
             raise ParameterError(
-                f"initial has the key {shown(name)}; known are {', '.join(map(repr, known))}"
+                f"initial has the key {shown(name)}",
+                advice=f"known are {', '.join(map(repr, known))}",
             )
     places = Layout.state(model, rig)
     y: dict[str, Any] = {
@@ -286,8 +287,8 @@ def _initial(model: Model, rig: Rig, initial: Mapping[str, Any]) -> tuple[list[f
     }
     if "v" in initial and "v" not in y:
         raise ParameterError(
-            f"initial has 'v' = {shown(initial['v'])}, but the rig prescribes the velocity; leave "
-            "it out"
+            f"initial has 'v' = {shown(initial['v'])}, but the rig prescribes the velocity",
+            advice="leave it out",
         )
     for name in chart.variables:
         values = checked_array(f"initial[{name!r}]", initial.get(name, [0.0] * n), None, "finite")

@@ -153,7 +153,9 @@ def _values(
     arrays: dict[str, FloatArray] = {}
     for name, value in given.items():
         if name not in known:
-            raise ParameterError(f"parameters has {name!r}; known here are {', '.join(known)}")
+            raise ParameterError(
+                f"parameters has {name!r}", advice=f"known here are {', '.join(known)}"
+            )
         try:
             array = np.array(value, dtype=np.float64)
         except (TypeError, ValueError):

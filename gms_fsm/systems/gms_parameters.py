@@ -152,7 +152,8 @@ class GMSParameters:
         """
         if not isinstance(column, str) or column not in TABLE_I:
             raise ParameterError(
-                f"Table I has no column {column!r}; it has {' and '.join(map(repr, TABLE_I))}"
+                f"Table I has no column {column!r}",
+                advice=f"it has {' and '.join(map(repr, TABLE_I))}",
             )
         found = TABLE_I[column]
         numbers: Any = found.values

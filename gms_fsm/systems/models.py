@@ -277,8 +277,8 @@ class ChartModel:
         for name in self.chart.inputs:
             if name not in SUPPLIED:
                 raise ParameterError(
-                    f"chart {self.chart.name!r} wants the input {name!r}; "
-                    f"a model supplies {', '.join(SUPPLIED)}"
+                    f"chart {self.chart.name!r} wants the input {name!r}",
+                    advice=f"a model supplies {', '.join(SUPPLIED)}",
                 )
         if not isinstance(self.values, Mapping):
             raise ParameterError(
@@ -289,8 +289,9 @@ class ChartModel:
         wanted, given = set(self.chart.parameter_names), set(self.values)
         if wanted != given:
             raise ParameterError(
-                f"chart {self.chart.name!r} has the parameters {sorted(wanted)}; missing values: "
-                f"{sorted(wanted - given) or 'none'}, unknown: {sorted(given - wanted) or 'none'}"
+                f"chart {self.chart.name!r} has the parameters {sorted(wanted)}",
+                advice=f"missing values: {sorted(wanted - given) or 'none'}, unknown: "
+                f"{sorted(given - wanted) or 'none'}",
             )
         values = checked_values(self.chart.parameters, self.values, self.n)
         object.__setattr__(self, "values", values)

@@ -173,8 +173,9 @@ class Trace:
         """
         if name not in self.model.chart.variables:
             raise ParameterError(
-                f"name is {shown(name)}; the chart has the variables "
-                f"{', '.join(self.model.chart.variables)}"
+                f"the chart has the variables {', '.join(self.model.chart.variables)}",
+                place="name",
+                value=name,
             )
         return self._named(name)
 

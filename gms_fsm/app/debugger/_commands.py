@@ -195,7 +195,7 @@ class Commands:
         try:
             t = float(arg.removesuffix("s"))
         except ValueError:
-            raise SessionError(f"{arg!r} is no time; {self._usage('goto')}") from None
+            raise SessionError(f"{arg!r} is no time", advice=f"{self._usage('goto')}") from None
         try:
             self.session.goto(t)
         except KeyboardInterrupt:
@@ -206,7 +206,7 @@ class Commands:
     def do_until(self, arg: str) -> Iterator[str]:
         """Go to where a condition becomes true."""
         if not arg:
-            raise SessionError(f"a condition is missing; {self._usage('until')}")
+            raise SessionError("a condition is missing", advice=f"{self._usage('until')}")
         condition, session, branch = self._with_states(arg), self.session, self.session.branch
         already = holds(session.parse(condition), session.values())
         self._ahead()
@@ -266,8 +266,8 @@ class Commands:
             edge = _spelt(words.pop(0), self._edges)
             if edge not in self._edges or words:
                 raise SessionError(
-                    f"{' '.join([edge, *words])!r} is no edge; there are "
-                    f"{', '.join(self._edges) or 'none'}; {self._usage('why')}"
+                    f"{' '.join([edge, *words])!r} is no edge",
+                    advice=f"there are {', '.join(self._edges) or 'none'}; {self._usage('why')}",
                 )
         found, branch = self.session.why(i, edge), self.session.branch
         yield str(found)
@@ -297,7 +297,7 @@ class Commands:
     def do_print(self, arg: str) -> Iterator[str]:
         """Show a value."""
         if not arg:
-            raise SessionError(f"an expression is missing; {self._usage('print')}")
+            raise SessionError("an expression is missing", advice=f"{self._usage('print')}")
         yield self._value(arg)
 
     def _value(self, text: str) -> str:
@@ -356,15 +356,15 @@ class Commands:
             arg,
         )
         if form is None:
-            raise SessionError(f"{arg!r} is no breakpoint; {self._usage('break')}")
+            raise SessionError(f"{arg!r} is no breakpoint", advice=f"{self._usage('break')}")
         kind, name, element, condition, hits = form.groups()
         states, edges = self._states, self._edges
         asked = {None: states + edges, "enter": states, "leave": states}.get(kind, edges)
         name = _spelt(name, asked)
         if name not in states + edges:
             raise SessionError(
-                f"no edge or state {name!r}; edges: {', '.join(edges) or 'none'}; "
-                f"states: {', '.join(states)}"
+                f"no edge or state {name!r}",
+                advice=f"edges: {', '.join(edges) or 'none'}; states: {', '.join(states)}",
             )
         point = self.session.break_on(
             kind or ("enter" if name in states else "fires"),
@@ -406,7 +406,7 @@ class Commands:
                     advice="for another value start a session with another model",
                 )
             if not value or not what:
-                raise SessionError(f"{part!r} cannot be poked; {self._usage('poke')}")
+                raise SessionError(f"{part!r} cannot be poked", advice=f"{self._usage('poke')}")
             if what == "state":
                 states[i] = _spelt(value, self._states)
             else:
@@ -443,7 +443,7 @@ class Commands:
         """Compare branches."""
         numbers = [_whole(text, "compare A B") for text in arg.split()]
         if len(numbers) not in (0, 2):
-            raise SessionError(f"two branches are needed; {self._usage('compare')}")
+            raise SessionError("two branches are needed", advice=f"{self._usage('compare')}")
         yield str(self.session.compare(*numbers))
 
     def do_plot(self, arg: str) -> Iterator[str]:

@@ -89,15 +89,18 @@ def _monitor(given: str | Monitor) -> Monitor:
         return given
     if not isinstance(given, str):
         raise ParameterError(
-            f"monitors has {shown(given)}; a monitor is {', '.join(map(repr, KNOWN))}, an "
-            "invariant's text, or an object of gms_fsm.traces.monitors"
+            f"monitors has {shown(given)}",
+            advice=f"a monitor is {', '.join(map(repr, KNOWN))}, an invariant's text, or "
+            "an object of gms_fsm.traces.monitors",
         )
     word = given.strip()
     if word.isidentifier() and word not in KNOWN:
         near = difflib.get_close_matches(word[:40], KNOWN, n=1)
         raise ParameterError(
-            f"no monitor {shown(word)}; {f'did you mean {near[0]!r}? ' if near else ''}there are "
-            f"{', '.join(map(repr, KNOWN))}, 'all', and invariants such as 'abs(z) <= 2*s'"
+            f"no monitor {shown(word)}",
+            advice=f"{(f'did you mean {near[0]!r}? ' if near else '')}there are "
+            f"{', '.join(map(repr, KNOWN))}, 'all', and invariants such as 'abs(z) "
+            "<= 2*s'",
         )
     return KNOWN.get(word) or Invariant(given)
 
