@@ -21,6 +21,7 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
+from gms_fsm._arguments import checked_kind, listed
 from gms_fsm._extras import missing
 from gms_fsm.errors import ParameterError
 from gms_fsm.language import (
@@ -211,9 +212,13 @@ def replay_html(
     traces = [trace] if other is None else [trace, other]
     for each in traces:
         check_trace(each)
+    checked_kind("title", title, str, "a text")
+    names = [checked_kind("names", each, str, "texts") for each in listed("names", names, "texts")]
     plot_script, plot_style = _uplot()
     if len(names) not in (0, len(traces)):
-        raise ParameterError(f"{len(traces)} run(s) but names = {list(names)!r}; give one each")
+        raise ParameterError(
+            f"{len(traces)} run(s) but names = {list(names)!r}", advice="give one each"
+        )
     pictures = [chart_svg(each.model.chart, each.n) for each in traces]
     charts = list(dict.fromkeys(pictures))
     chosen = [page_rows(each) for each in traces]

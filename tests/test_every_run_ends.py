@@ -133,7 +133,7 @@ def test_a_mildly_stiff_run_that_can_end_ends():
 def test_a_session_ends_with_the_same_words():
     session = Session(stiff(200.0), Prescribed("1e-3*sin(t)"), 10.0, engine="ifelse")
     session.proceed()
-    assert session.branch.outcome.startswith("stiff: the flow has a rate")
+    assert session.branch.failure.reason.startswith("stiff: the flow has a rate")
 
 
 def test_a_scenario_takes_the_limit():

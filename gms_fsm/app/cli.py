@@ -570,8 +570,9 @@ def main() -> None:
         if wishes.debug:
             _with_causes(error)
             raise
+        told = "\n".join([str(error), *getattr(error, "__notes__", ())])
         _messages(soft_wrap=True).print(
-            f"[bold red]error:[/] {_escaped(str(error))}", highlight=False, emoji=False
+            f"[bold red]error:[/] {_escaped(told)}", highlight=False, emoji=False
         )
         sys.exit(2)
 

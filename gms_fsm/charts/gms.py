@@ -66,8 +66,10 @@ def check_law(law: object) -> None:
     """
     if law not in LAWS:
         raise ParameterError(
-            f"law is {law!r}; it must be 'published' (eq. (1) of the paper as printed) or "
-            "'signed' (Al-Bender et al. 2005)"
+            "it must be 'published' (eq. (1) of the paper as printed) or 'signed' "
+            "(Al-Bender et al. 2005)",
+            place="law",
+            value=law,
         )
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gms_fsm._arguments import checked_path
 from gms_fsm._extras import require
 from gms_fsm._files import written_whole
 from gms_fsm.charts.parameters import QUANTITIES, FloatArray
@@ -207,7 +208,7 @@ class Sweep:
         OutputError
             If the folder cannot be written or the ending is another.
         """
-        path = Path(path)
+        path = checked_path("path", path)
         if path.suffix == ".npz":
             from gms_fsm._version import __version__
 
@@ -228,7 +229,9 @@ class Sweep:
             beside = path.with_name(f"{path.stem}.transitions.parquet")
             written_whole(beside, log.to_parquet)
             return written_whole(path, self.to_dataframe().to_parquet)
-        raise OutputError(f"{path}: a sweep is saved as .npz or .parquet, not {path.suffix!r}")
+        raise OutputError(
+            f"a sweep is saved as .npz or .parquet, not {path.suffix!r}", place=str(path)
+        )
 
     @classmethod
     def load(cls, path: str | Path) -> Sweep:
@@ -250,17 +253,18 @@ class Sweep:
             If the file is missing, damaged, or not a sweep of this format; nothing in it is
             executed.
         """
+        path = checked_path("path", path)
         try:
             # Opened here: np.load leaves a damaged file open.
-            with Path(path).open("rb") as raw, np.load(raw, allow_pickle=False) as file:
+            with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
                 return _read(file)
         except FileNotFoundError:
             raise TraceFileError(
-                f"{path}: there is no such file; check its name and the folder"
+                "there is no such file", place=str(path), advice="check its name and the folder"
             ) from None
         except Exception as error:  # numpy and zipfile raise many kinds over damaged files
             raise TraceFileError(
-                f"{path}: not a sweep, or damaged ({why(error)}); run it again"
+                f"not a sweep, or damaged ({why(error)})", place=str(path), advice="run it again"
             ) from None
 
 

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gms_fsm._arguments import checked_kind
 from gms_fsm.charts.parameters import WEIGHTS, FloatArray
-from gms_fsm.errors import GMSError, ParameterError, cut, shown
+from gms_fsm.errors import GMSError, ParameterError, cut
 from gms_fsm.lowering._compiled import check_numba
 from gms_fsm.run._compiled_run import CompiledRun
 from gms_fsm.run._recording import scope_of
@@ -138,19 +139,23 @@ def _values(
     """Check names and shapes."""
     if not hasattr(parameters, "keys"):
         raise ParameterError(
-            f"parameters is {shown(parameters)}; it must give values by name, for example "
-            "{'k': [1.0, 2.0]}: sweep(model, rig, t_end, parameters)"
+            "it must give values by name, for example {'k': [1.0, 2.0]}: "
+            "sweep(model, rig, t_end, parameters)",
+            place="parameters",
+            value=parameters,
         )
     known = (*parameter_names(model), *rig.numbers)
     given = {str(name): parameters[name] for name in parameters}
     if not isinstance(parameters, Mapping):
         given = _elements_joined(given, known, model.n)
     if not given:
-        raise ParameterError("parameters is empty; give at least one name with its values")
+        raise ParameterError("parameters is empty", advice="give at least one name with its values")
     arrays: dict[str, FloatArray] = {}
     for name, value in given.items():
         if name not in known:
-            raise ParameterError(f"parameters has {name!r}; known here are {', '.join(known)}")
+            raise ParameterError(
+                f"parameters has {name!r}", advice=f"known here are {', '.join(known)}"
+            )
         try:
             array = np.array(value, dtype=np.float64)
         except (TypeError, ValueError):
@@ -159,7 +164,7 @@ def _values(
         if array.shape[1:] not in (((), (model.n,)) if wide else ((),)) or array.ndim == 0:
             wanted = f"(runs,) or (runs, {model.n})" if wide else "(runs,)"
             raise ParameterError(
-                f"parameters[{name!r}] has shape {array.shape}; it must be {wanted}"
+                f"parameters[{name!r}] has shape {array.shape}", advice=f"it must be {wanted}"
             )
         arrays[name] = array
     lengths = {name: len(array) for name, array in arrays.items()}
@@ -217,6 +222,8 @@ class _Begin:
 
 def _chosen(settings: Settings | None, options: SettingOptions) -> Settings:
     """Return the settings of each run: a sweep keeps ends, if not rows at wanted times."""
+    if settings is not None:
+        checked_kind("settings", settings, Settings, "a Settings, for example Settings(rtol=1e-8)")
     whole = settings is None or settings.output == "all"
     if whole and options.get("t_eval") is None and options.get("output") is None:
         options = {**options, "output": "end"}
@@ -225,7 +232,7 @@ def _chosen(settings: Settings | None, options: SettingOptions) -> Settings:
     chosen = Settings.of(settings, "a sweep", **options)
     if chosen.output == "all":
         raise ParameterError(
-            "output is 'all'; a sweep keeps 'end' or 't_eval' (runs have different steps)"
+            "output is 'all'", advice="a sweep keeps 'end' or 't_eval' (runs have different steps)"
         )
     return chosen
 

@@ -143,7 +143,9 @@ def numbered(text: str) -> int:
     for number in LESSONS:
         if text == str(number):
             return number
-    raise ParameterError(f"there is no lesson {shown(text)}; these are there:\n{listed()}")
+    raise ParameterError(
+        f"there is no lesson {shown(text)}", advice=f"these are there:\n{listed()}"
+    )
 
 
 def listed() -> str:
