@@ -319,10 +319,12 @@ def plan_of(model: Model, rig: Rig) -> Plan:
 
 def _labels(held: Places[Value], names: Names) -> dict[Value, str]:
     """Return for each held sign what the rough calls at it are called after."""
-    labels = {}
+    labels: dict[Value, str] = {}
     for number, u in enumerate([*held.shared, *held.own]):
         label = u.id if isinstance(u, Name) and u.id.isidentifier() else str(number)
-        while any(f"{function}_{label}" in names.taken for function in ROUGH):
+        while label in labels.values() or any(
+            f"{function}_{label}" in names.taken for function in ROUGH
+        ):
             label += "_"
         labels[u] = label
     return labels
@@ -333,17 +335,33 @@ class _Smoothing:
     """Takes the rough calls out of values."""
 
     def __init__(self, held: Places[Value], names: Names) -> None:
-        self.held, self.labels = held, _labels(held, names)
+        self.held, self.labels, self.taken = held, _labels(held, names), names.taken
         self.turning = {
             f"{function}_{label}": u for u, label in self.labels.items() for function in ROUGH
         }
+        self.named: dict[Call, str] = {}
 
     def __call__(self, value: Value) -> tuple[Value, tuple[RoughCall, ...]]:
         """Return a value with names in place of its rough calls, and these calls in order."""
-        smooth, calls = substitute(value, self.labels)
+        smooth, calls = substitute(value, self.name_of)
         return smooth, tuple(
             RoughCall(name, call, self.turning[name]) for name, call in calls.items()
         )
+
+    def name_of(self, turning: Value, call: Call) -> str | None:
+        """Return what a rough call is named, None where its sign is not held."""
+        if turning not in self.labels:
+            return None
+        if call not in self.named:
+            # max(v, 2) and max(v - 2, 0) turn at the same place, and are not the same.
+            first = name = f"{call.function}_{self.labels[turning]}"
+            number = 2
+            while name in self.named.values() or (
+                name != first and (name in self.taken or name in self.turning)
+            ):
+                name, number = f"{first}_{number}", number + 1
+            self.named[call], self.turning[name] = name, turning
+        return self.named[call]
 
 
 def _acceleration(rig: Rig, names: Names) -> Value | None:
