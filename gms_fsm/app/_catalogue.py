@@ -40,7 +40,8 @@ def chosen(verb: str, name: str, law: str) -> tuple[Entry, Chart]:
     try:
         found = entry(name)
     except ParameterError as error:
-        raise error.replaced(advice=f"{error.advice} (a chart of your own: {OWN})") from None
+        advice = "; ".join(filter(None, (error.advice, f"for a chart of your own: {OWN}")))
+        raise error.replaced(advice=advice) from None
     options = " or ".join(f"--law {each}" for each in found.laws)
     if law and not options:
         others = [each.name for each in registered().values() if each.laws]
