@@ -8,7 +8,7 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from hypothesis import Phase, assume, given, settings
+from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -122,7 +122,13 @@ def cases(draw):
 
 
 # No shrinking: the oracle is slow, and the example as drawn says as much.
-@settings(max_examples=50, deadline=None, derandomize=True, phases=[Phase.generate])
+@settings(
+    max_examples=50,
+    deadline=None,
+    derandomize=True,
+    phases=[Phase.generate],
+    suppress_health_check=[HealthCheck.too_slow],  # of the oracle, on a busy machine
+)
 @given(cases())
 def test_same_events_same_deflections(case):
     """The same sequence of (element, edge), times to 1e-6, z to 1e-6."""

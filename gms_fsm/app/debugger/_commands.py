@@ -449,9 +449,11 @@ class Commands:
     def do_plot(self, arg: str) -> Iterator[str]:
         """Draw branches."""
         path = self._path("plot", arg)
-        from plots import figures, formats
+        from plots import formats
 
-        formats.chosen(path, "figure")
+        formats.chosen(path, "figure")  # a mistake is said before matplotlib is asked for
+        from plots import figures
+
         runs = {}
         for number, branch in enumerate(self.session.branches):
             branch.complete()
