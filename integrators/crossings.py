@@ -35,6 +35,8 @@ __all__ = [
 
 Margins = Callable[..., Any]  # margins(t, y, mode, p, watch, out) -> None, fills watched entries
 NO_CHANGE = 2.0
+# A margin with a narrow hump (a Stribeck peak between two of the places) bends more than they show.
+WARY = 4.0
 DEEPEST = 8  # halvings of a step: windows down to 1/256 of it are searched for
 
 
@@ -323,6 +325,6 @@ def _is_quiet(w: Watched, left: Vector, middle: Vector, right: Vector) -> bool:
         first, second = m - a, b - m
         bend = abs(second - first)
         monotone = bend < min(abs(first), abs(second))  # of opposite signs they bend by more
-        if not monotone and max(a, m, b) + bend >= 0.0 and bend > 0.0:
+        if not monotone and max(a, m, b) + WARY * bend >= 0.0 and bend > 0.0:
             return False
     return True
