@@ -8,7 +8,8 @@ that starts at zero does not fire again.
 
 Before a place is believed to be the first, the step up to it is searched for a change that is
 undone again: an interval counts as quiet only where start, middle and end show each margin to be
-monotone, or farther from a change than its curvature could carry it; else it is halved.
+monotone, or farther from a change than `WARY` times the curvature they show could carry it; else
+it is halved.
 
 Roads not taken: a root finder on the margin stops at a place where the comparison is not yet true
 (margin -5e-17); a bracket by sign fails when the arc starts on the zero; one relation after another

@@ -264,7 +264,7 @@ def run(
     Yields
     ------
     Arc, Stop, Slide or Firing
-        Arcs hold the rows wanted; firings come one an edge, m of them at one time numbered 1..m.
+        Arcs hold the rows wanted; firings come one per edge, m of them at one time numbered 1..m.
 
     Raises
     ------
