@@ -36,7 +36,7 @@ __all__ = [
 
 Margins = Callable[..., Any]  # margins(t, y, mode, p, watch, out) -> None, fills watched entries
 NO_CHANGE = 2.0
-# A margin with a narrow hump (a Stribeck peak between two of the places) bends more than they show.
+# A margin with a narrow hump between two of the places bends more than they show.
 WARY = 4.0
 DEEPEST = 8  # halvings of a step: windows down to 1/256 of it are searched for
 
