@@ -67,20 +67,19 @@ _OF_A_STEP: tuple[Callable[..., Any], ...] = (
 )
 # The phases of the loop, and what is written of an event: called from one place each.
 _OF_AN_EVENT: tuple[Callable[..., Any], ...] = (
-    loop._ask,
     loop._begin_arc,
-    loop._choose_step,
+    loop._choose_stop,
     loop._end_arc,
     loop._finish,
-    loop._fire,
-    loop._flow,
+    loop._fired,
+    loop._flowed,
     loop._is_full,
     loop._jump,
     loop._pick,
     loop._put_firing,
     loop._put_stop,
-    loop._settle,
     loop._start,
+    loop._steps_ahead,
 )
 _OF_AN_ARC: tuple[Callable[..., Any], ...] = (
     advance.advance,
@@ -436,13 +435,13 @@ def _compile_record(
 ) -> Any:
     import numba
 
-    for helper in (*_INLINED, *_OF_AN_ARC, loop.record):
+    for helper in (*_INLINED, *_OF_AN_ARC):
         usable_inside(helper, inlined=helper in _INLINED)
     names = ("flow", "arm", "margins", "normal", "switch", "act", "observe")
     at_flow, at_arm, at_margins, at_normal, at_switch, at_act, at_observe = (
         _function_at(_signature(SIGNATURES[name])) for name in names
     )
-    run = loop.record
+    run = numba.njit(inline="always", **_OPTIONS)(loop.record)  # else it is compiled twice
 
     def record(
         at: Any, machines: Any, b: Any, log: Any, first: Any, most_steps: Any, pause: Any

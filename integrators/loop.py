@@ -167,31 +167,48 @@ def run_to_event(
         SLID (onto a surface or off it), ADVANCE (a foreign solver is to go on), DONE; or the error
         TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK, RELATION_LIVELOCK, TOO_MANY_STEPS.
     """
-    counts, cursor, p = b.memory.counts, b.out.cursor, functions.p
+    plan, now, memory = b.plan, b.now, b.memory
+    relations, sliding, scratch = b.relations, b.sliding, b.scratch
+    clock, counts, p = now.clock, memory.counts, functions.p
+    out, cursor = b.out, b.out.cursor
     while True:
         if cursor[ROW] > counts[TAKEN]:
             return ROWS
         phase, event = counts[PHASE], NOTHING
         if phase == ASK:
-            _ask(switch, p, b)
+            switch.ask(clock[T], now.y, now.mode, p, memory.edges)
+            counts[MACHINE] = -1
+            counts[FIRED_ONE] = 0
+            counts[PHASE] = PICK
         elif phase == PICK:
-            event = _pick(b)
+            event = _pick(plan, counts, memory.edges)
         elif phase == FIRE:
-            event = _fire(switch, p, b)
+            switch.act(counts[EDGE], counts[MACHINE], clock[T], now.y, now.mode, p)
+            event = _fired(plan, now, memory, scratch)
         elif phase == SETTLED:
-            event = _settle(functions, b)
+            _choose_stop(plan, clock, counts)
+            if plan.located and counts[PHASE] == BEGIN:
+                event = _rearm(functions, now, relations, sliding, counts)
         elif phase == BEGIN:
-            event = _begin_arc(motion, b)
+            event = _begin_arc(motion, plan, now, scratch, counts)
         elif phase == ARC:
-            event = _flow(motion, b, most_steps)
+            steps = _steps_ahead(plan, cursor, most_steps)
+            if steps > 0 and not plan.foreign:
+                w = listed(relations, counts[ACTIVE])
+                counts[STATUS] = advance(motion, plan, now, w, out, scratch, steps)
+            event = _flowed(plan, counts, steps)
         elif phase == AFTER:
-            event = _end_arc(motion, b)
+            often = False
+            if counts[STATUS] == CROSSED:
+                w = listed(relations, counts[ACTIVE])
+                often = _often_changed(motion, plan, now, w, sliding, memory, scratch)
+            event = _end_arc(plan, clock, counts, often)
         elif phase == JUMPING:
-            event = _jump(b)
+            event = _jump(plan, now, counts, out)
         elif phase == START:
-            _start(b)
+            _start(plan, now, counts, out)
         elif phase == FINISH:
-            _finish(b)
+            _finish(now, counts, out)
         else:
             return DONE
         if event != NOTHING:
@@ -199,27 +216,17 @@ def run_to_event(
 
 
 # --------------------------------------------------------------------------- one helper per phase
-def _start(b: Buffers) -> None:
-    counts, now = b.memory.counts, b.now
+# They are handed what they need, not all the buffers: a call hands on every array by itself.
+def _start(plan: Plan, now: Now, counts: list[int], out: Output) -> None:
     counts[PHASE] = ASK
     counts[FRESH] = 1
-    raise_floor(b.plan.control, now)
-    if b.out.every_step:
-        put_row(b.out, now.clock[T], now.y)
+    raise_floor(plan.control, now)
+    if out.every_step:
+        put_row(out, now.clock[T], now.y)
 
 
-def _ask(switch: Switch, p: Any, b: Buffers) -> None:
-    """Ask every machine for an enabled edge."""
-    counts, now = b.memory.counts, b.now
-    switch.ask(now.clock[T], now.y, now.mode, p, b.memory.edges)
-    counts[MACHINE] = -1
-    counts[FIRED_ONE] = 0
-    counts[PHASE] = PICK
-
-
-def _pick(b: Buffers) -> int:
+def _pick(plan: Plan, counts: list[int], edges: list[int]) -> int:
     """Find the next machine with an enabled edge."""
-    counts, edges = b.memory.counts, b.memory.edges
     i = counts[MACHINE] + 1
     while i < len(edges) and edges[i] < 0:
         i += 1
@@ -228,34 +235,31 @@ def _pick(b: Buffers) -> int:
         counts[EDGE] = edges[i]
         counts[PHASE] = FIRE
         return FIRING
-    counts[PHASE] = ASK if counts[FIRED_ONE] == 1 and b.plan.located else SETTLED
+    counts[PHASE] = ASK if counts[FIRED_ONE] == 1 and plan.located else SETTLED
     return NOTHING
 
 
-def _fire(switch: Switch, p: Any, b: Buffers) -> int:
-    """Take the edge picked."""
-    now, memory, counts = b.now, b.memory, b.memory.counts
-    i = counts[MACHINE]
+def _fired(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> int:
+    """Count the edge just taken."""
+    counts, i = memory.counts, memory.counts[MACHINE]
     counts[MICROSTEP] += 1
     counts[FIRED_ONE] = 1
     counts[FRESH] = 1
     counts[PHASE] = PICK
-    switch.act(counts[EDGE], i, now.clock[T], now.y, now.mode, p)
     _look_at_clock(now, memory)
     memory.switches[i] += 1
-    if memory.switches[i] >= MOST_SWITCHES and _no_progress(b):
+    if memory.switches[i] >= MOST_SWITCHES and _no_progress(plan, now, memory, scratch):
         counts[PHASE] = AFTER
         counts[STATUS] = MACHINE_LIVELOCK
     return FIRED
 
 
-def _settle(functions: Functions, b: Buffers) -> int:
-    """All machines are quiet: choose the next stop, what to watch and what to slide on."""
-    plan, clock, counts = b.plan, b.now.clock, b.memory.counts
+def _choose_stop(plan: Plan, clock: Vector, counts: list[int]) -> None:
+    """All machines are quiet: on to the next jump, or to the end."""
     t, jumps = clock[T], plan.jumps
     if t >= plan.t_end:
         counts[PHASE] = FINISH
-        return NOTHING
+        return
     # A step that ends on a jump would see the value behind it: stop one clock tick before.
     while counts[JUMP] < len(jumps) and jumps[counts[JUMP]] <= t:
         counts[JUMP] += 1
@@ -264,96 +268,19 @@ def _settle(functions: Functions, b: Buffers) -> int:
         clock[T_STOP] = min(clock[T_STOP], plan.before_jumps[counts[JUMP]])
     counts[STATUS] = FULL
     counts[PHASE] = BEGIN
-    if not plan.located:
-        return NOTHING
-    slid = _rearm(functions, b)
-    if _undefined(listed(b.relations, counts[ACTIVE])):
-        counts[PHASE] = AFTER
-        counts[STATUS] = NOT_FINITE
-    elif slid:  # y lies on the surface now: whoever compares with it has to be asked again
-        counts[PHASE] = ASK
-        return SLID
-    return NOTHING
 
 
-def _begin_arc(motion: Motion, b: Buffers) -> int:
-    """Start anew behind a switch or a jump."""
-    counts, plan = b.memory.counts, b.plan
-    if plan.located or counts[FRESH] == 1:
-        counts[NEW_ARC] = 1
-        if not plan.foreign:
-            _choose_step(motion, b)
-        counts[FRESH] = 0
-    counts[PHASE] = ARC
-    return ADVANCE if plan.foreign else NOTHING
-
-
-def _flow(motion: Motion, b: Buffers, most_steps: int) -> int:
-    """Flow on; a foreign solver has done so already."""
-    counts, plan, cursor = b.memory.counts, b.plan, b.out.cursor
-    counts[MICROSTEP] = 0
-    if cursor[STEPS] >= plan.max_steps:
-        return TOO_MANY_STEPS
-    if not plan.foreign:
-        steps = min(most_steps, plan.max_steps - cursor[STEPS]) if plan.located else 1
-        w = listed(b.relations, counts[ACTIVE])
-        counts[STATUS] = advance(motion, plan, b.now, w, b.out, b.scratch, steps)
-    if counts[STATUS] != FULL or not plan.located:
-        counts[PHASE] = AFTER
-        return NOTHING
-    return ADVANCE if plan.foreign else ROWS
-
-
-def _end_arc(motion: Motion, b: Buffers) -> int:
-    """Tell why the arc has ended."""
-    counts, plan = b.memory.counts, b.plan
-    status = counts[STATUS]
-    if status in (TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK):
-        return status
-    counts[PHASE] = ASK
-    if status == REACHED and b.now.clock[T] < plan.t_end:
-        counts[PHASE] = JUMPING
-        return STOPPED
-    if status == FULL and not plan.located:
-        return ROWS  # perhaps none, but a caller may want to breathe
-    if status == CROSSED:
-        return RELATION_LIVELOCK if _often_changed(motion, b) else STOPPED
-    return NOTHING
-
-
-def _jump(b: Buffers) -> int:
-    """Go over a jump of the flow."""
-    counts, now = b.memory.counts, b.now
-    now.clock[T] = b.plan.jumps[counts[JUMP]]
-    counts[PHASE] = ASK
-    if b.out.every_step:
-        put_row(b.out, now.clock[T], now.y)
-    return STOPPED
-
-
-def _finish(b: Buffers) -> None:
-    """Write the rows wanted at the end itself."""
-    b.memory.counts[PHASE] = END
-    out, cursor, now = b.out, b.out.cursor, b.now
-    while cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] <= now.clock[T]:
-        put_row(out, out.times[cursor[NEXT_TIME]], now.y)
-        cursor[NEXT_TIME] += 1
-
-
-# --------------------------------------------------------------------------- arcs
-def _rearm(functions: Functions, b: Buffers) -> bool:
-    """Hold signs, choose what to watch and to slide on, remember the truth of what is watched.
-
-    Returns whether other surfaces are slid on than before.
-    """
-    now, watch, p = b.now, b.relations.watch, functions.p
-    sliding, surfaces = b.sliding, b.sliding.surfaces
+def _rearm(
+    functions: Functions, now: Now, relations: Watched, sliding: Sliding, counts: list[int]
+) -> int:
+    """Hold signs, choose what to watch and to slide on, remember the truth of what is watched."""
+    surfaces, watch, p = sliding.surfaces, relations.watch, functions.p
     t, y = now.clock[T], now.y
     mode, held = now.mode, now.held
-    for a in range(b.memory.counts[ACTIVE]):
-        watch[b.relations.room[a]] = 0
+    for a in range(counts[ACTIVE]):
+        watch[relations.room[a]] = 0
     functions.arm(t, y, mode, p, held, watch)
-    w = _list(b)
+    w = _list(relations, counts)
     functions.margins(t, y, mode, p, watch, w.start)
     slid = False
     if len(surfaces.sign) > 0:
@@ -366,7 +293,7 @@ def _rearm(functions: Functions, b: Buffers) -> bool:
                 k = sliding.which[c]
                 watch[surfaces.above[k]] = watch[surfaces.at_least[k]] = 0
                 watch[first + 2 * c] = watch[first + 2 * c + 1] = 1
-            w = _list(b)
+            w = _list(relations, counts)
             margins_on(t, y, mode, on, watch, w.start)
     for r in w.active:
         g = w.start[r]
@@ -375,18 +302,24 @@ def _rearm(functions: Functions, b: Buffers) -> bool:
         sign = held[surfaces.sign[k]]
         if watch[surfaces.above[k]] and sign != 0.0:
             w.truth[surfaces.above[k]] = w.truth[surfaces.at_least[k]] = sign > 0.0
-    return slid
+    if _undefined(w):
+        counts[PHASE] = AFTER
+        counts[STATUS] = NOT_FINITE
+    elif slid:  # y lies on the surface now: whoever compares with it has to be asked again
+        counts[PHASE] = ASK
+        return SLID
+    return NOTHING
 
 
-def _list(b: Buffers) -> Watched:
+def _list(relations: Watched, counts: list[int]) -> Watched:
     """List the flagged relations."""
-    w, active = b.relations, 0
-    for r in range(len(w.watch)):
-        if w.watch[r]:
-            w.room[active] = r
+    active = 0
+    for r in range(len(relations.watch)):
+        if relations.watch[r]:
+            relations.room[active] = r
             active += 1
-    b.memory.counts[ACTIVE] = active
-    return listed(w, active)
+    counts[ACTIVE] = active
+    return listed(relations, active)
 
 
 def _undefined(w: Watched) -> bool:
@@ -397,17 +330,71 @@ def _undefined(w: Watched) -> bool:
     return undefined
 
 
-def _choose_step(motion: Motion, b: Buffers) -> None:
-    """Fill the slope and choose the first step of an arc."""
-    now, clock, control = b.now, b.now.clock, b.plan.control
-    motion.flow(clock[T], now.y, now.mode, now.held, motion.p, now.f)
-    # Without location the solver knows of no switch: it keeps its step.
-    if control.step <= 0.0 and (b.plan.located or clock[H] <= 0.0):
-        clock[ERROR_BEFORE] = 1.0
-        # Where the system has a scale, how far there is to go does not count: the kernel cuts.
-        scale = control.time_scale if control.time_scale > 0.0 else clock[T_STOP] - clock[T]
-        order = b.plan.method.error_order
-        clock[H] = starting_step(motion, now, control, order, scale, b.scratch)
+def _begin_arc(motion: Motion, plan: Plan, now: Now, scratch: Scratch, counts: list[int]) -> int:
+    """Behind a switch or a jump fill the slope and choose the first step."""
+    control, clock = plan.control, now.clock
+    counts[PHASE] = ARC
+    if plan.located or counts[FRESH] == 1:
+        counts[NEW_ARC] = 1
+        counts[FRESH] = 0
+        if not plan.foreign:
+            motion.flow(clock[T], now.y, now.mode, now.held, motion.p, now.f)
+            # Without location the solver knows of no switch: it keeps its step.
+            if control.step <= 0.0 and (plan.located or clock[H] <= 0.0):
+                clock[ERROR_BEFORE] = 1.0
+                clock[H] = starting_step(motion, plan.method.error_order, control, now, scratch)
+    return ADVANCE if plan.foreign else NOTHING
+
+
+def _steps_ahead(plan: Plan, cursor: list[int], most_steps: int) -> int:
+    """Return how many steps may be taken at once."""
+    left = plan.max_steps - cursor[STEPS]
+    return min(most_steps, left) if plan.located else min(1, left)
+
+
+def _flowed(plan: Plan, counts: list[int], steps: int) -> int:
+    """Tell whether the arc goes on; a foreign solver has taken its steps before."""
+    counts[MICROSTEP] = 0
+    if steps <= 0:
+        return TOO_MANY_STEPS
+    if counts[STATUS] != FULL or not plan.located:
+        counts[PHASE] = AFTER
+        return NOTHING
+    return ADVANCE if plan.foreign else ROWS
+
+
+def _end_arc(plan: Plan, clock: Vector, counts: list[int], often: bool) -> int:
+    """Tell why the arc has ended."""
+    status = counts[STATUS]
+    if status in (TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK):
+        return status
+    counts[PHASE] = ASK
+    if status == REACHED and clock[T] < plan.t_end:
+        counts[PHASE] = JUMPING
+        return STOPPED
+    if status == FULL and not plan.located:
+        return ROWS  # perhaps none, but a caller may want to breathe
+    if status == CROSSED:
+        return RELATION_LIVELOCK if often else STOPPED
+    return NOTHING
+
+
+def _jump(plan: Plan, now: Now, counts: list[int], out: Output) -> int:
+    """Go over a jump of the flow."""
+    now.clock[T] = plan.jumps[counts[JUMP]]
+    counts[PHASE] = ASK
+    if out.every_step:
+        put_row(out, now.clock[T], now.y)
+    return STOPPED
+
+
+def _finish(now: Now, counts: list[int], out: Output) -> None:
+    """Write the rows wanted at the end itself."""
+    counts[PHASE] = END
+    t, cursor = now.clock[T], out.cursor
+    while cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] <= t:
+        put_row(out, out.times[cursor[NEXT_TIME]], now.y)
+        cursor[NEXT_TIME] += 1
 
 
 # --------------------------------------------------------------------------- progress
@@ -429,28 +416,33 @@ def _count_anew(now: Now, memory: Memory) -> None:
         memory.changes[r] = 0
 
 
-def _no_progress(b: Buffers) -> bool:
+def _no_progress(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> bool:
     """Tell whether the switches counted led nowhere; if they led on, count anew from here."""
-    now, anchor, moved = b.now, b.memory.anchor, b.scratch.error
-    t, y = now.clock[T], now.y
-    elapsed = t - now.clock[ANCHOR]
+    y, anchor, moved = now.y, memory.anchor, scratch.error
+    t, elapsed = now.clock[T], now.clock[T] - now.clock[ANCHOR]
     stands = elapsed <= MOST_SWITCHES * CLOCK_STANDS * abs(t)
     if not stands and elapsed <= MOST_SWITCHES * CLOCK_CRAWLS * abs(t):
         for j in range(len(y)):
             moved[j] = y[j] - anchor[j]
-        distance = error_norm(moved, 1.0, y, anchor, b.plan.control.rtol, now.floor)
+        distance = error_norm(moved, 1.0, y, anchor, plan.control.rtol, now.floor)
         stands = distance <= MOST_SWITCHES * STATE_STANDS
     if not stands:
-        _count_anew(now, b.memory)
+        _count_anew(now, memory)
     return stands
 
 
-def _often_changed(motion: Motion, b: Buffers) -> bool:
+def _often_changed(
+    motion: Motion,
+    plan: Plan,
+    now: Now,
+    w: Watched,
+    sliding: Sliding,
+    memory: Memory,
+    scratch: Scratch,
+) -> bool:
     """Count the relations that have just changed; tell whether one has too often."""
-    now, changes, surfaces = b.now, b.memory.changes, b.sliding.surfaces
-    w = listed(b.relations, b.memory.counts[ACTIVE])
-    probe = w.search.probe
-    _look_at_clock(now, b.memory)
+    changes, probe, surfaces = memory.changes, w.search.probe, sliding.surfaces
+    _look_at_clock(now, memory)
     motion.margins(now.clock[T], now.y, now.mode, motion.p, w.watch, probe)
     often = False
     for r in w.active:
@@ -464,8 +456,8 @@ def _often_changed(motion: Motion, b: Buffers) -> bool:
     for k in range(len(surfaces.sign)):
         above, at_least = surfaces.above[k], surfaces.at_least[k]
         if w.watch[above] and (w.changed[above] or w.changed[at_least]):
-            b.sliding.arrived[k] = 1
-    return often and _no_progress(b)
+            sliding.arrived[k] = 1
+    return often and _no_progress(plan, now, memory, scratch)
 
 
 # --------------------------------------------------------------------------- into columns
@@ -518,14 +510,14 @@ def record(
         if event == ROWS:
             for row in range(counts[TAKEN], cursor[ROW]):
                 log.rows_microstep[row] = 0
-                _put_modes(now, b.sliding, log.rows_mode[row])
+                _put_modes(now.mode, b.sliding.flags, log.rows_mode[row])
             counts[TAKEN] = cursor[ROW]
             if counts[PHASE] == ARC:
                 return ROWS
         elif event == FIRING:
             if seen_at != t:
                 look(observe, on, t, now.y, now.mode, log.seen)
-            _put_firing(b, log, first)
+            _put_firing(now, counts, log, first)
             if pause:
                 return FIRING
         elif event == FIRED:
@@ -538,7 +530,8 @@ def record(
         elif event not in (STOPPED, DONE):
             return event
         if event not in (ROWS, FIRING):
-            _put_stop(b, log, event in (FIRED, SLID))
+            switched = event in (FIRED, SLID)
+            _put_stop(now, counts, b.out, b.sliding.flags, log, switched)
         if event == DONE:
             return DONE
 
@@ -552,28 +545,29 @@ def _is_full(out: Output, log: Log) -> bool:
     return 0 < len(log.stops_t) <= log.counts[STOPS]
 
 
-def _put_firing(b: Buffers, log: Log, first: int) -> None:
+def _put_firing(now: Now, counts: list[int], log: Log, first: int) -> None:
     """Write what is known before a firing."""
-    i, row = b.memory.counts[MACHINE], log.counts[FIRINGS]
+    i, row = counts[MACHINE], log.counts[FIRINGS]
     numbers = log.numbers[row]
-    log.t[row] = b.now.clock[T]
+    log.t[row] = now.clock[T]
     log.machine[row] = i
-    log.edge[row] = b.memory.counts[EDGE]
-    numbers[0] = b.now.y[first + i]
+    log.edge[row] = counts[EDGE]
+    numbers[0] = now.y[first + i]
     numbers[1] = log.seen[0]
     numbers[2] = log.seen[2 + i]
     numbers[3] = log.seen[1]
 
 
-def _put_stop(b: Buffers, log: Log, switched: bool) -> None:
+def _put_stop(
+    now: Now, counts: list[int], out: Output, flags: list[int], log: Log, switched: bool
+) -> None:
     """Write the state and the modes from here on."""
-    now, counts, out = b.now, b.memory.counts, b.out
     t = now.clock[T]
     if out.every_step and switched:
         row = out.cursor[ROW]
         put_row(out, t, now.y)
         log.rows_microstep[row] = counts[MICROSTEP]
-        _put_modes(now, b.sliding, log.rows_mode[row])
+        _put_modes(now.mode, flags, log.rows_mode[row])
         counts[TAKEN] = out.cursor[ROW]
     if len(log.stops_t) > 0:
         row = log.counts[STOPS]
@@ -581,13 +575,13 @@ def _put_stop(b: Buffers, log: Log, switched: bool) -> None:
         log.stops_microstep[row] = counts[MICROSTEP] if switched else 0
         for j in range(len(now.y)):
             log.stops_y[row][j] = now.y[j]
-        _put_modes(now, b.sliding, log.stops_mode[row])
+        _put_modes(now.mode, flags, log.stops_mode[row])
         log.counts[STOPS] += 1
 
 
-def _put_modes(now: Now, sliding: Sliding, place: list[int]) -> None:
-    n = len(now.mode)
+def _put_modes(mode: list[int], flags: list[int], place: list[int]) -> None:
+    n = len(mode)
     for i in range(n):
-        place[i] = now.mode[i]
-    for k in range(len(sliding.flags)):
-        place[n + k] = sliding.flags[k]
+        place[i] = mode[i]
+    for k in range(len(flags)):
+        place[n + k] = flags[k]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from integrators.steps import Motion, Now, Scratch, T, Vector
+from integrators.steps import T_STOP, Motion, Now, Scratch, T, Vector
 
 __all__ = ["Control", "error_norm", "next_factor", "retry_factor", "starting_step"]
 
@@ -126,7 +126,7 @@ def retry_factor(error: float, order: int) -> float:
 
 
 def starting_step(
-    motion: Motion, now: Now, control: Control, order: int, time_scale: float, scratch: Scratch
+    motion: Motion, order: int, control: Control, now: Now, scratch: Scratch
 ) -> float:
     """Return the usual starting step, from the size of y, y' and y''.
 
@@ -136,14 +136,12 @@ def starting_step(
     ----------
     motion : Motion
         What flows.
-    now : Now
-        Time, state and slope at the start.
-    control : Control
-        Tolerances, and the longest step.
     order : int
         Exponent of the step's error.
-    time_scale : float
-        Of the system, s, > 0.
+    control : Control
+        Tolerances, the longest step, and the system's time scale.
+    now : Now
+        Time, state and slope at the start, and the next stop.
     scratch : Scratch
         A state and a slope are tried there.
 
@@ -152,6 +150,9 @@ def starting_step(
     float
         A step, > 0.
     """
+    t = now.clock[T]
+    # Where the system has a scale, how far there is to go does not count: the kernel cuts.
+    time_scale = control.time_scale if control.time_scale > 0.0 else now.clock[T_STOP] - t
     y, f = now.y, now.f
     y_try, f_try = scratch.y_new, scratch.f_new
     rtol, atol, longest = control.rtol, now.floor, control.max_step
@@ -166,7 +167,7 @@ def starting_step(
         h = 1e-6 * h
     for j in range(len(y)):
         y_try[j] = y[j] + h * f[j]
-    motion.flow(now.clock[T] + h, y_try, now.mode, now.held, motion.p, f_try)
+    motion.flow(t + h, y_try, now.mode, now.held, motion.p, f_try)
     for j in range(len(y)):
         f_try[j] = (f_try[j] - f[j]) / h
     d2 = error_norm(f_try, 1.0, y, y, rtol, atol)
