@@ -11,6 +11,8 @@
 #                SOAK_MINUTES=10 for each fuzzer
 #   make gallery the pictures kept under docs/, shown in docs/gallery.md
 #   make docs    the documentation -> folder site/, to be opened from disk
+#   make wheel   a wheel -> folder dist/, installed and tried where the checkout cannot be seen
+#   make clean   takes away what the others made
 PYTHON ?= python3
 LOWEST_PYTHON ?= python3.11
 VENV ?= .venv
@@ -18,7 +20,7 @@ RUN := $(VENV)/bin
 SOAK_MINUTES ?= 10
 PIP := $(RUN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: help paper test coverage lint core lowest bench soak gallery docs clean
+.PHONY: help paper test coverage lint core lowest bench soak gallery docs wheel clean
 .DEFAULT_GOAL := test
 
 $(VENV)/bin/python:
@@ -42,7 +44,7 @@ $(VENV)/bench.stamp: pyproject.toml | $(VENV)/bin/python
 	@touch $@ $(VENV)/dev.stamp
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile
+	@sed -n '/^[^#]/q; s/^# \{0,1\}//p' Makefile
 
 .venv-core/stamp: pyproject.toml
 	$(PYTHON) -m venv .venv-core
@@ -99,5 +101,16 @@ gallery: $(VENV)/all.stamp
 docs: $(VENV)/docs.stamp
 	$(RUN)/sphinx-build --quiet --fail-on-warning --keep-going -d .docs-cache/doctrees docs site
 
+# setuptools would put into the wheel what an earlier build left in build/.
+wheel: | $(VENV)/bin/python
+	rm -rf build dist
+	$(PIP) wheel --no-deps --wheel-dir dist .
+	@set -ex; unset PYTHONPATH; wheel=$$(ls "$(CURDIR)"/dist/*.whl); away=$$(mktemp -d); \
+	trap 'rm -rf "$$away"' EXIT; $(PYTHON) -m venv "$$away/venv"; cd "$$away"; \
+	venv/bin/python -m pip --disable-pip-version-check --quiet install "$$wheel[plots,replay]"; \
+	venv/bin/gms-fsm --help; \
+	venv/bin/gms-fsm paper -o paper; \
+	venv/bin/gms-fsm replay paper/traces/fig4_chart.npz -o page.html
+
 clean:
-	rm -rf $(VENV) .venv-core .venv-lowest .docs-cache paper site build *.egg-info
+	rm -rf $(VENV) .venv-core .venv-lowest .docs-cache paper site build dist *.egg-info

@@ -44,6 +44,7 @@ from gms_fsm import (
 )
 from gms_fsm.errors import MissingExtraError, ParameterError
 from gms_fsm.run._compiled_run import CompiledRun
+from gms_fsm.run.settings import Settings
 from gms_fsm.run.start import Start
 
 ROWS = 6001
@@ -114,7 +115,7 @@ def ours(case: Case, **how: Any) -> Outcome:
 def kernel(case: Case) -> Callable[[], Outcome]:
     """Return a call of the compiled loop without all that `simulate` does before and after."""
     model, rig = model_and_rig(case)
-    start = Start.of(model, rig, case.t_end, engine="compiled", output="end")
+    start = Start.of(model, rig, case.t_end, Settings(engine="compiled", output="end"))
     made: list[CompiledRun] = []
 
     def run() -> Outcome:

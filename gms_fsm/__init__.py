@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from gms_fsm.charts.chart import Chart as Chart
     from gms_fsm.charts.chart import State as State
     from gms_fsm.charts.chart import Transition as Transition
-    from gms_fsm.charts.parameters import GMSParameters as GMSParameters
-    from gms_fsm.charts.parameters import Stribeck as Stribeck
+    from gms_fsm.charts.parameters import Parameter as Parameter
+    from gms_fsm.charts.stribeck import Stribeck as Stribeck
     from gms_fsm.errors import ChartError as ChartError
     from gms_fsm.errors import CheckpointError as CheckpointError
     from gms_fsm.errors import ExpressionError as ExpressionError
@@ -43,9 +43,11 @@ if TYPE_CHECKING:
     from gms_fsm.inspection.session import Session as Session
     from gms_fsm.run.machines import Element as Element
     from gms_fsm.run.machines import ElementMachines as ElementMachines
+    from gms_fsm.run.settings import Settings as Settings
     from gms_fsm.run.simulate import simulate as simulate
     from gms_fsm.run.sweep import Sweep as Sweep
     from gms_fsm.run.sweep import sweep as sweep
+    from gms_fsm.systems.gms_parameters import GMSParameters as GMSParameters
     from gms_fsm.systems.models import GMS as GMS
     from gms_fsm.systems.models import ChartModel as ChartModel
     from gms_fsm.systems.models import LuGre as LuGre
@@ -67,14 +69,17 @@ if TYPE_CHECKING:
 # The same names again, for Python; type checkers read those above. A test holds the two together.
 _HOMES = {
     "charts.chart": "Chart State Transition",
-    "charts.parameters": "GMSParameters Stribeck",
+    "charts.parameters": "Parameter",
+    "charts.stribeck": "Stribeck",
     "errors": "ChartError CheckpointError ExpressionError GMSError MissingExtraError OutputError "
     "ParameterError RecordError ScenarioError SessionError SignalError TraceFileError UnitError",
     "inspection.prove": "Finding Report prove",
     "inspection.session": "Session",
     "run.machines": "Element ElementMachines",
+    "run.settings": "Settings",
     "run.simulate": "simulate",
     "run.sweep": "Sweep sweep",
+    "systems.gms_parameters": "GMSParameters",
     "systems.models": "ChartModel GMS LuGre Model",
     "systems.rigs": "Prescribed PulledSlider Rig Slider",
     "systems.signals": "Signal",

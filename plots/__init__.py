@@ -40,14 +40,14 @@ register()
 
 
 def animate(trace: Trace, path: str | Path, **options: Any) -> Path:
-    """Make a GIF of the chart at work beside the force; see `plots.animation.animate`.
+    """Make an animation of the chart at work beside the force; see `plots.animation.animate`.
 
     Parameters
     ----------
     trace : Trace
         The run.
     path : str or Path
-        Ends in ``.gif``.
+        Its ending chooses the format, as ``.gif``.
     **options
         Of `plots.animation.animate`: elements, frames, t_start, t_end, fps, notation, theme.
 

@@ -1,4 +1,4 @@
-"""A run as a moving picture: the live chart beside the friction force, as a GIF.
+"""A run as a moving picture: the live chart beside the friction force.
 
 The chart is laid out once by Graphviz and painted by `plots.live_chart`; here matplotlib draws the
 painted SVG, whose few kinds of parts (paths, polygons, circles, texts) it has too. So there is one
@@ -11,32 +11,31 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any, cast
 from xml.etree import ElementTree
 
 import numpy as np
 
-from gms_fsm._files import written_whole
-from gms_fsm.errors import MissingExtraError, ParameterError, shown
+from gms_fsm.errors import ParameterError, shown
 from gms_fsm.traces.trace import Trace, check_trace
+from plots import formats
+from plots._matplotlib import (
+    Artist,
+    Axes,
+    Curve,
+    Figure,
+    FigureCanvasAgg,
+    Image,
+    patches,
+    rc_context,
+    to_rgb,
+)
 from plots.live_chart import LiveChart
 from plots.statechart import Sheet
 from plots.style import CHART_THEMES, RC, ChartTheme
-
-try:
-    from matplotlib import patches, rc_context
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.colors import to_rgb
-    from matplotlib.figure import Figure
-    from matplotlib.path import Path as Curve
-    from PIL import Image
-except ImportError:
-    raise MissingExtraError(
-        'animations need matplotlib and Pillow; install them with: pip install "gms-fsm[plots]"'
-    ) from None
 
 __all__ = ["animate"]
 
@@ -69,8 +68,8 @@ def animate(
     trace : Trace
         The run.
     path : str or Path
-        Ends in ``.gif``. The folder has to exist; a file of that name is replaced as a whole or not
-        at all.
+        Ends like one of the animations' formats in `plots.formats.FORMATS`, as ``.gif``. The folder
+        has to exist; a file of that name is replaced as a whole or not at all.
     elements : int or sequence of int, optional
         How many elements, or which ones, counted from 0; all if not given.
     frames : int
@@ -111,9 +110,7 @@ def animate(
     gms_fsm.errors.ParameterError: frames is 1; it must be a whole number of at least 2
     """
     check_trace(trace)
-    path = Path(path)
-    if path.suffix.lower() != ".gif":
-        raise ParameterError(f"path is {str(path)!r}; an animation must end in .gif")
+    formats.chosen(path, "animation")
     if isinstance(frames, bool) or not isinstance(frames, int) or frames < 2:
         raise ParameterError(f"frames is {shown(frames)}; it must be a whole number of at least 2")
     if not 0 < fps <= FASTEST:
@@ -131,31 +128,64 @@ def animate(
     chart = LiveChart(rows, elements, notation=notation, theme=theme)
     with rc_context(RC):
         film = _Film(chart, trace.sample(np.linspace(begin, end, SMOOTH)), CHART_THEMES[theme])
-        return written_whole(path, lambda file: _save(film, file, frames, fps, progress))
+        return formats.save(Movie(film, frames, fps, progress), path, "animation")
 
 
-def _save(
-    film: _Film, file: Any, frames: int, fps: float, progress: Callable[[int, int], object] | None
-) -> None:
-    palette = film.palette()
+@dataclass(frozen=True, eq=False)
+class Movie:
+    """An animation that is ready to be written in some format.
 
-    def pictures() -> Iterator[Image.Image]:
-        for row in range(frames):
-            picture = film.picture(row).quantize(palette=palette, dither=Image.Dither.NONE)
-            if progress is not None:
-                progress(row + 1, frames)
-            yield picture
+    Parameters
+    ----------
+    film : _Film
+        The picture that moves.
+    frames : int
+        How many.
+    fps : float
+        Frames a second.
+    progress : callable, optional
+        Called as ``progress(done, frames)``.
+    """
 
-    each = pictures()
+    film: _Film
+    frames: int
+    fps: float
+    progress: Callable[[int, int], object] | None = None
+
+    def pictures(self) -> Iterator[Image.Image]:
+        """Draw frame by frame."""
+        for row in range(self.frames):
+            yield self.film.picture(row)
+            if self.progress is not None:
+                self.progress(row + 1, self.frames)
+
+
+def gif(movie: Movie) -> bytes:
+    """Return an animation as GIF, which repeats for ever.
+
+    Parameters
+    ----------
+    movie : Movie
+        What.
+
+    Returns
+    -------
+    bytes
+        The file.
+    """
+    palette, none = movie.film.palette(), Image.Dither.NONE
+    each = (picture.quantize(palette=palette, dither=none) for picture in movie.pictures())
+    file = BytesIO()
     next(each).save(
         file,
         format="GIF",
         save_all=True,
         append_images=each,
-        duration=1000.0 / fps,
+        duration=1000.0 / movie.fps,
         loop=0,
         optimize=False,
     )
+    return file.getvalue()
 
 
 class _Film:

@@ -17,22 +17,13 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from gms_fsm.errors import MissingExtraError, OutputError, ParameterError, shown
+from gms_fsm.errors import OutputError, ParameterError, shown
 from gms_fsm.inspection.explain import values_at
-from gms_fsm.language.expression import Condition, clauses, evaluate
+from gms_fsm.language import Condition, clauses, evaluate
 from gms_fsm.traces.trace import Trace
-from plots.render import drawn
-from plots.statechart import (
-    FALSE,
-    TRUE,
-    UNKNOWN,
-    Piece,
-    Row,
-    Sheet,
-    chosen,
-    element_id,
-    part_id,
-)
+from plots._labels import FALSE, TRUE, UNKNOWN, Piece, Row, element_id, part_id
+from plots.render import picture
+from plots.statechart import Sheet, chosen
 
 __all__ = ["ElementLook", "LiveChart", "live_statechart"]
 
@@ -139,13 +130,7 @@ class LiveChart:
             values=self._value_rows(None),
             foot=f"t = {WIDEST} s" if values else "",
         )
-        picture = drawn(graph, "svg")
-        if picture is None:
-            raise MissingExtraError(
-                "a live chart needs Graphviz: install the program dot, or "
-                'pip install "gms-fsm[render]"'
-            )
-        self.root = _plain_tree(picture)
+        self.root = _plain_tree(picture(graph, "svg"))
         self.root.set("style", f"background:{self._sheet.colours.paper}")
         groups = {group.get("id", ""): group for group in self.root.iter("g")}
         self._parts = {i: _ElementParts(self._sheet, i, groups) for i in self.elements}
@@ -214,7 +199,7 @@ class LiveChart:
 
     def _look(self, row: int, element: int) -> ElementLook:
         trace, chart = self.trace, self.trace.model.chart
-        state = chart.states[int(trace.rows.mode[row, element])].name
+        state = chart.states[int(trace.modes[row, element])].name
         leaving = tuple(edge.name for _, edge in chart.leaving(state))
         values = values_at(trace, row, element)
         marks = {edge: _marks(chart.guards[edge], values) for edge in leaving}

@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterator
 
 from gms_fsm.charts.chart import Chart, State
-from gms_fsm.language.expression import MATLAB_LIKE, spell
+from gms_fsm.language import MATLAB_LIKE, spell
 
 __all__ = ["mermaid"]
 

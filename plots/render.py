@@ -11,41 +11,31 @@ import re
 import shutil
 import subprocess
 import warnings
-from collections.abc import Mapping
 from pathlib import Path
 
 import graphviz
 
+from gms_fsm._extras import missing
 from gms_fsm._files import written_whole
-from gms_fsm.errors import OutputError, ParameterError
-from plots.mermaid import mermaid
+from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
+from plots import formats
 from plots.statechart import ChartGraph
 
-__all__ = ["FORMATS", "drawn", "render"]
+__all__ = ["drawn", "picture", "render"]
 
-# What a file can be, by its suffix. Mermaid text is made of state charts only.
-FORMATS: Mapping[str, str] = {
-    ".svg": "a picture",
-    ".png": "a picture",
-    ".pdf": "a picture",
-    ".dot": "DOT text",
-    ".gv": "DOT text",
-    ".mmd": "Mermaid text",
-}
 PNG_DPI = "144"  # twice a screen point: crisp on dense displays
 
 
 def render(graph: graphviz.Digraph, path: str | Path) -> Path:
-    """Write a picture; the format is the path's suffix.
+    """Write a picture, or the text of a graph; the path's ending chooses the format.
 
     Parameters
     ----------
     graph : graphviz.Digraph
         For example from `plots.statechart.statechart`.
     path : str or Path
-        Ends with ``.svg``, ``.png`` or ``.pdf`` for a picture, ``.dot`` or ``.gv`` for the DOT
-        text; of a state chart also ``.mmd`` for Mermaid text. The folder has to exist. A file of
-        that name is replaced as a whole or not at all.
+        Ends like one of the graphs' formats in `plots.formats.FORMATS`; some are of state charts
+        only. The folder has to exist. A file of that name is replaced as a whole or not at all.
 
     Returns
     -------
@@ -55,7 +45,7 @@ def render(graph: graphviz.Digraph, path: str | Path) -> Path:
     Raises
     ------
     ParameterError
-        If the suffix is another one.
+        If the ending is another one.
     OutputError
         If the folder cannot be written, or if Graphviz cannot draw the graph.
 
@@ -79,33 +69,43 @@ def render(graph: graphviz.Digraph, path: str | Path) -> Path:
             "path"
         )
     path = Path(path)
-    suffix = path.suffix.lower()
-    texts = {"DOT text": graph.source}
-    if isinstance(graph, ChartGraph):
-        texts["Mermaid text"] = mermaid(graph.chart)
-    kinds = {s: kind for s, kind in FORMATS.items() if kind in ("a picture", *texts)}
-    if suffix not in kinds:
-        listed = [
-            f"{', '.join(s for s in kinds if kinds[s] == kind)} for {kind}"
-            for kind in dict.fromkeys(kinds.values())
-        ]
-        raise ParameterError(f"path is {str(path)!r}; it must end in {' or '.join(listed)}")
-    if kinds[suffix] in texts:
-        text = texts[kinds[suffix]].encode()
-        return written_whole(path, lambda file: file.write(text))
-    picture = drawn(graph, suffix[1:])
-    if picture is not None:
-        written_whole(path, lambda file: file.write(picture))
-    else:
-        path = path.with_suffix(".dot")
-        written_whole(path, lambda file: file.write(graph.source.encode()))
-        warnings.warn(
-            # The same words each time, so that Python says them once a run, not once a picture.
-            "No Graphviz was found, so charts are written as DOT text: install Graphviz (program "
-            'dot) or run `pip install "gms-fsm[render]"` to get pictures.',
-            stacklevel=2,
-        )
-    return path
+    chart: tuple[formats.Subject, ...] = ("chart",) if isinstance(graph, ChartGraph) else ()
+    try:
+        content = formats.chosen(path, "graph", *chart).write(graph)
+    except MissingExtraError as error:
+        path = path.with_suffix(formats.INSTEAD)
+        content = formats.chosen(path, "graph").write(graph)
+        # The same words each time, so that Python says them once a run, not once a picture.
+        warnings.warn(f"charts are written as DOT text: {error}", stacklevel=2)
+    return written_whole(path, lambda file: file.write(content))
+
+
+def picture(graph: graphviz.Digraph, form: str) -> bytes:
+    """Return a picture as bytes.
+
+    Parameters
+    ----------
+    graph : graphviz.Digraph
+        What to draw.
+    form : str
+        See `drawn`.
+
+    Returns
+    -------
+    bytes
+        The picture.
+
+    Raises
+    ------
+    MissingExtraError
+        If there is no Graphviz, neither program nor package.
+    OutputError
+        If Graphviz cannot draw the graph.
+    """
+    found = drawn(graph, form)
+    if found is None:
+        raise missing("Graphviz", "render")
+    return found
 
 
 def drawn(graph: graphviz.Digraph, form: str) -> bytes | None:

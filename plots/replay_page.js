@@ -304,7 +304,7 @@ function stopsAt(k) {
 function readUntil() {
   const box = $("#until"), errors = [];
   const conditions = box.value.trim() === "" ? [] : runs.map((run) => {
-    try { return parse(box.value, run.columns, run.states, run.mode); } catch (error) { errors.push(error.message); return () => false; }
+    try { return parse(box.value, data.language, run.columns, run.states, run.mode); } catch (error) { errors.push(error.message); return () => false; }
   });
   const wrong = runs.length === errors.length; // two runs may have different names
   box.setAttribute("aria-invalid", wrong);

@@ -1,16 +1,14 @@
 "use strict";
-// The `until` box: a condition over stored values, in the expression language of the product.
-// Closures are built from checked text; nothing is ever `eval`ed, and no guard comes here.
-const LEVELS = { or: 1, and: 2, "<": 4, "<=": 4, ">": 4, ">=": 4, "+": 5, "-": 5, "*": 6, "/": 6, "**": 8 };
-const NEGATION = 3, SIGN = 7;
+// The `until` box: a condition over stored values, in the expression language of the product. It is the only
+// text that Python has not seen. What binds how tightly, the functions and the constants are Python's, stored
+// in the page. Closures are built from checked text; nothing is ever `eval`ed, and no guard comes here.
 const OPERATIONS = {
   or: (a, b) => a || b, and: (a, b) => a && b, "<": (a, b) => a < b, "<=": (a, b) => a <= b,
   ">": (a, b) => a > b, ">=": (a, b) => a >= b, "+": (a, b) => a + b, "-": (a, b) => a - b,
   "*": (a, b) => a * b, "/": (a, b) => (b === 0 ? NaN : a / b), "**": (a, b) => a ** b,
 };
-const ONE = ["abs", "exp", "sqrt", "sgn", "sin", "cos", "tanh"], SEVERAL = ["min", "max"];
 
-function parse(text, names, states, modes) {
+function parse(text, { levels, negation, sign, functions, constants }, names, states, modes) {
   const pattern = /\s*(?:(?<digits>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?!\w)|(?<name>[A-Za-z_]\w*)|\*\*|[<>=!]=|[-+*/()<>,])/y;
   const fail = (at, reason) => { throw new Error(`until, column ${at + 1}: ${reason}`); };
   const end = text.trimEnd().length, tokens = [];
@@ -30,12 +28,12 @@ function parse(text, names, states, modes) {
   function expression(level) {
     let left = prefix();
     for (;;) {
-      const { word, at } = here(), own = LEVELS[word];
+      const { word, at } = here(), own = levels[word];
       if (word === "==" || word === "!=") fail(at, "only < <= > >= compare numbers; == is for state(1) == name");
       if (!(own >= level)) return left;
       next += 1;
-      const right = expression(word === "**" ? SIGN : own + 1), f = OPERATIONS[word], logic = own < NEGATION;
-      const compares = own === LEVELS["<"], before = compares && left.last && left.f; // a < b < c is a < b and b < c
+      const right = expression(word === "**" ? sign : own + 1), f = OPERATIONS[word], logic = own < negation;
+      const compares = own === levels["<"], before = compares && left.last && left.f; // a < b < c is a < b and b < c
       const a = before ? left.last : as(logic, left), b = as(logic, right);
       const now = (row) => f(a(row), b(row));
       left = { at: left.at, truth: logic || compares, f: before ? (row) => before(row) && now(row) : now, last: compares && b };
@@ -47,11 +45,11 @@ function parse(text, names, states, modes) {
     next += 1;
     if (digits) return { at, truth: false, f: () => Number(digits) };
     if (word === "-" || word === "+") {
-      const f = as(false, expression(SIGN));
+      const f = as(false, expression(sign));
       return { at, truth: false, f: word === "-" ? (row) => -f(row) : f };
     }
     if (word === "not") {
-      const f = as(true, expression(NEGATION));
+      const f = as(true, expression(negation));
       return { at, truth: true, f: (row) => !f(row) };
     }
     if (word === "(") {
@@ -60,8 +58,8 @@ function parse(text, names, states, modes) {
       return { at, truth, f };
     }
     if (word === "state") return inState(at);
-    if (word === "pi") return { at, truth: false, f: () => Math.PI };
-    if (ONE.includes(word) || SEVERAL.includes(word)) return call(word, at);
+    if (Object.hasOwn(constants, word)) return { at, truth: false, f: () => constants[word] };
+    if (Object.hasOwn(functions, word)) return call(word, at);
     if (name && Object.hasOwn(names, name)) return { at, truth: false, f: names[name] };
     return fail(at, word ? `unknown ${JSON.stringify(word)}; names are ${Object.keys(names).join(", ")}` : "the text ends too early");
   }
@@ -71,7 +69,7 @@ function parse(text, names, states, modes) {
     take(["("], `${name}(...)`);
     do parts.push(as(false, expression(1))); while (take([","]));
     take([")"], "a closing bracket");
-    if (ONE.includes(name) !== (parts.length === 1)) fail(at, `${name} got ${parts.length} arguments`);
+    if ((functions[name] === "one") !== (parts.length === 1)) fail(at, `${name} got ${parts.length} arguments`);
     return { at, truth: false, f: (row) => f(...parts.map((part) => part(row))) };
   }
 

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm.errors import MissingExtraError, ParameterError, shown
+from gms_fsm.errors import ParameterError, shown
 from gms_fsm.traces.trace import Trace, check_trace
-from plots import panels
+from plots._matplotlib import Artist, Axes, FancyArrowPatch, Figure, Rectangle, rc_context
+from plots.panels._shown import scaled
 from plots.style import (
     BLUE,
     ELEMENT_COLOURS,
@@ -26,17 +27,6 @@ from plots.style import (
     TEXT_ORANGE,
     VERMILION,
 )
-
-try:
-    from matplotlib import rc_context
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.patches import FancyArrowPatch, Rectangle
-except ImportError:
-    raise MissingExtraError(
-        'figures need matplotlib; install it with: pip install "gms-fsm[plots]"'
-    ) from None
 
 __all__ = ["schematic", "schematic_figure"]
 
@@ -186,13 +176,14 @@ def _numbers(trace: Trace | None, i: int) -> tuple[str, str]:
         return STIFFNESS["k"].format(i + 1), DAMPING["sigma"].format(i + 1)
     values = trace.model.values
     texts = []
-    for symbols, unit in ((STIFFNESS, "N/m"), (DAMPING, "Ns/m")):
+    for symbols in (STIFFNESS, DAMPING):
         name = next((name for name in symbols if name in values), None)
         if name is None:
             texts.append("")
             continue
         value = np.broadcast_to(values[name], trace.n)[i]
-        texts.append(f"{symbols[name].format(i + 1)} = {value:.4g} {unit}")
+        unit = trace.model.chart.unit(name)
+        texts.append(f"{symbols[name].format(i + 1)} = {value:.4g} {unit}".rstrip())
     return texts[0], texts[1]
 
 
@@ -257,7 +248,7 @@ def _deflection(
     ]
     label = f"$z_{{{i + 1}}}$"
     if trace is not None:
-        factor, unit = panels.scaled(trace.z[row], "m")
+        factor, unit = scaled(trace.z[row], "m")
         label += f" = {factor * trace.z[row, i]:.3g} {unit}"
     if abs(contact - rest) > 0.15:
         drawn.append(_arrow(ax, (contact, height), (rest, height), INK, size=7))
@@ -289,7 +280,7 @@ def _slider(ax: Axes, n: int, trace: Trace | None, row: int) -> list[Artist]:
     v, F = (0.0, 0.0) if trace is None else (float(trace.v[row]), float(trace.F[row]))
     speed, push = "$v$", "$F$"
     if trace is not None:
-        factor, unit = panels.scaled(np.array([v]), "m/s")
+        factor, unit = scaled(np.array([v]), "m/s")
         speed += f" = {factor * v:.3g} {unit}"
         push += f" = {F:.4g} N"
     edge = WALL + 0.9

@@ -9,14 +9,8 @@ as ``element1-state-slip``.
 
 from __future__ import annotations
 
-import html
-import math
 import operator
-import re
-import textwrap
-import unicodedata
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import ceil, sqrt
 
@@ -24,30 +18,32 @@ import graphviz
 
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ParameterError, shown
-from gms_fsm.language.expression import (
-    MATLAB_LIKE,
-    Both,
-    Condition,
-    Either,
-    Spelling,
-    Value,
-    clauses,
-    spell,
+from gms_fsm.language import Both, Condition, Either, clauses
+from gms_fsm.traces.trace import Trace
+from plots._labels import (
+    DOT,
+    LONGEST_LINE,
+    TRUE,
+    Piece,
+    Row,
+    Tally,
+    element_id,
+    escape,
+    part_id,
+    printable,
+    wrapped,
 )
-from gms_fsm.traces.trace import Trace, dwell_times
+from plots._notation import NOTATIONS, Writer
 from plots.style import CHART_THEMES, MONO, SANS, ChartTheme
 
 __all__ = ["ChartGraph", "statechart"]
 
-NOTATIONS = ("stateflow", "math")
 DIRECTIONS = {"TB": "top to bottom", "LR": "left to right"}
 
 # Points of a state's side for every edge that begins or ends there. On a shorter side the edges
 # would leave around the corners and run into each other.
 ROOM_PER_EDGE = {"TB": 45, "LR": 16}
-LONGEST_LINE = 52  # characters; longer texts are wrapped
 MARKED = "2.6"  # points, of lines that point something out
-DOT, TRUE, FALSE, UNKNOWN = "●", "✓", "✗", "?"
 
 
 class ChartGraph(graphviz.Digraph):  # type: ignore[misc]
@@ -213,167 +209,6 @@ def one_of(name: str, value: str, allowed: Iterable[str]) -> str:
     return value
 
 
-# --------------------------------------------------------------------------- notations
-MATH = Spelling(" ∧ ", " ∨ ", "!", bars=True, products=False)  # ! brackets what it negates
-# What differs between the tokens of the two notations; numbers are tokens of their own, so the
-# minus of 1e-06 is not taken for an operator.
-_TOKEN = re.compile(
-    r"(?P<power>\^\d+(?![\w.]))|(?P<number>\d[\d.]*(?:e[+-]?\d+)?)|(?P<name>\w+)|>=|<=|[*!-]"
-)
-_SIGNS = {">=": "≥", "<=": "≤", "*": "·", "-": "−", "!": "¬", "sqrt": "√"}
-_RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
-_LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
-_GREEK = {
-    unicodedata.name(c).removeprefix("GREEK SMALL LETTER ").lower(): c
-    for c in "αβγδεζηθκμνξρστφχψω"
-}
-
-
-@dataclass(frozen=True)
-class Writer:
-    """Writes the texts of a chart in one notation, always from the checked trees.
-
-    Parameters
-    ----------
-    chart : Chart
-        Whose names are written.
-    notation : {"stateflow", "math"}
-        How.
-
-    Examples
-    --------
-    >>> from gms_fsm.charts import GMS_ELEMENT
-    >>> chart = GMS_ELEMENT["signed"]
-    >>> Writer(chart, "math").text(chart.guards["arrest"])
-    '|v| ≤ v_c ∧ |z| < s(v)'
-    """
-
-    chart: Chart
-    notation: str
-
-    @property
-    def math(self) -> bool:
-        """Whether the notation is that of formulas."""
-        return self.notation == "math"
-
-    def text(self, tree: Value | Condition) -> str:
-        """Write a tree."""
-        if not self.math:
-            return spell(tree, MATLAB_LIKE)
-        chart = self.chart
-        names = {name: _symbol(name) for name in chart.inputs + chart.variables + chart.parameters}
-        if "s" in chart.inputs:
-            names["s"] = "s(v)"  # the threshold that the model supplies depends on the velocity
-        return _TOKEN.sub(_formula_token, spell(tree, MATH, names))
-
-    def rate(self, variable: str) -> str:
-        """Write the time derivative of a variable."""
-        if not self.math:
-            return f"d{variable}"
-        dotted = unicodedata.normalize("NFC", variable + "\u0307")
-        return dotted if len(dotted) == 1 else f"d{_symbol(variable)}/dt"
-
-    def flow(self, variable: str, tree: Value) -> str:
-        """Write a flow."""
-        return f"{self.rate(variable)} = {self.text(tree)}{'' if self.math else ';'}"
-
-    def assignment(self, variable: str, tree: Value) -> str:
-        """Write an assignment."""
-        if self.math:
-            return f"{_symbol(variable)} := {self.text(tree)}"
-        return f"{variable} = {self.text(tree)};"
-
-    @property
-    def words(self) -> Mapping[type, str]:
-        """Between the parts of a conjunction or an alternative."""
-        spelling = MATH if self.math else MATLAB_LIKE
-        return {Both: spelling.both.strip(), Either: spelling.either.strip()}
-
-    def actions(self, trees: Mapping[str, Value]) -> str:
-        """Write the assignments of an edge in one line; empty if there are none."""
-        if not trees:
-            return ""
-        texts = [self.assignment(name, tree) for name, tree in trees.items()]
-        return "/ " + ", ".join(texts) if self.math else "{" + " ".join(texts) + "}"
-
-
-def _symbol(name: str) -> str:
-    """Write a name as formulas do: sigma_0 as σ₀."""
-    head, _, index = name.partition("_")
-    head = _GREEK.get(head, head)
-    if not index:
-        return head if name == name.rstrip("_") else name
-    return head + index.translate(_LOWERED) if index.isdecimal() else f"{head}_{index}"
-
-
-def _formula_token(match: re.Match[str]) -> str:
-    token = match[0]
-    if match["power"]:
-        return token[1:].translate(_RAISED)
-    if match["number"]:
-        if float(token) == math.pi:
-            return "π"
-        digits, _, exponent = token.partition("e")
-        power = f"10{str(int(exponent)).translate(_RAISED)}" if exponent else ""
-        return (power if digits == "1" else f"{digits}·{power}") if power else digits
-    return _SIGNS.get(token, token)
-
-
-# --------------------------------------------------------------------------- counts
-class Tally:
-    """How long each element was in each state, and how often it took each edge.
-
-    Parameters
-    ----------
-    trace : Trace
-        The run; its log is complete whatever its rows are.
-    """
-
-    def __init__(self, trace: Trace) -> None:
-        log = trace.transitions
-        self.states = [state.name for state in trace.model.chart.states]
-        self.firings: Counter[tuple[int, str]] = Counter(
-            zip(log.element.tolist(), log.edge.tolist(), strict=True)
-        )
-        self.dwell = dwell_times(trace)
-
-    def of_state(self, element: int, state: str) -> str:
-        """Write how long a state was active."""
-        seconds, whole = self.dwell[element, self.states.index(state)], self.dwell[element].sum()
-        share = f" ({100 * seconds / whole:.0f} %)" if whole > 0 else ""
-        return f"active {seconds:.4g} s{share}"
-
-    def of_edge(self, element: int, edge: str) -> str:
-        """Write how often an edge was taken."""
-        times = self.firings[element, edge]
-        if not times:
-            return "never taken"
-        return "taken once" if times == 1 else f"taken {times} times"
-
-
-# --------------------------------------------------------------------------- the drawing
-@dataclass(frozen=True)
-class Piece:
-    """One text of a label: Graphviz writes each as one text of the SVG, in this order.
-
-    Parameters
-    ----------
-    text : str
-        What is written.
-    role : str
-        What it is: ``title``, ``dot``, ``word``, ``code``, ``priority``, ``clause``, ``mark``, ...
-    clause : int
-        For a clause and its mark, which clause of the guard; else -1.
-    """
-
-    text: str
-    role: str = "code"
-    clause: int = -1
-
-
-Row = list[Piece]
-
-
 @dataclass(frozen=True)
 class Sheet:
     """A chart and how it is drawn.
@@ -441,7 +276,7 @@ class Sheet:
         """
         ink = self.colours.ink
         graph = ChartGraph(
-            name=graphviz.escape(_printable(self.chart.name)),
+            name=graphviz.escape(printable(self.chart.name)),
             graph_attr={
                 "fontname": SANS,
                 "bgcolor": self.colours.paper,
@@ -584,7 +419,7 @@ class Sheet:
         ):
             head = f"{kind}: "
             for text in texts:
-                for line in _wrapped(text):
+                for line in wrapped(text):
                     rows.append([Piece(head, "word"), Piece(line)])
                     head = " " * len(head)
         if self.tally is not None:
@@ -627,7 +462,7 @@ class Sheet:
                 row.append(Piece("]", "bracket"))
             rows.append(row)
         action = self.write.actions(self.chart.assignments["action", edge.name])
-        rows += [[Piece(line, "action")] for line in _wrapped(action)]
+        rows += [[Piece(line, "action")] for line in wrapped(action)]
         if self.tally is not None:
             taken = bool(self.tally.firings[number, edge.name])
             text = self.tally.of_edge(number, edge.name)
@@ -642,7 +477,7 @@ class Sheet:
         if not isinstance(part, Either):
             text = self.write.text(part)
             # The brackets that the guard has as one text.
-            return _wrapped(f"({text})" if inside and isinstance(part, Both) else text)
+            return wrapped(f"({text})" if inside and isinstance(part, Both) else text)
         texts = [self.write.text(operand) for operand in part.operands]
         texts = [
             f"({text})" if isinstance(operand, Either) else text
@@ -653,7 +488,7 @@ class Sheet:
             texts[0], texts[-1] = f"({texts[0]}", f"{texts[-1]})"
             if sum(map(len, texts)) < LONGEST_LINE:
                 texts = [" ".join(texts)]
-        return [line for text in texts for line in _wrapped(text)]
+        return [line for text in texts for line in wrapped(text)]
 
     def _state_box(self, state: State, number: int) -> str:
         ends = sum((edge.source, edge.target).count(state.name) for edge in self.chart.transitions)
@@ -710,52 +545,6 @@ class Sheet:
         }.get(piece.role, (10, MONO, False))
         soft = piece.role in ("word", "note", "count")
         colour = self.colours.soft if soft else self.colours.ink
-        words = _escape(piece.text)
+        words = escape(piece.text)
         words = f"<B>{words}</B>" if bold else words
         return f'<FONT FACE="{face}" POINT-SIZE="{size}" COLOR="{colour}">{words}</FONT>'
-
-
-def _wrapped(text: str) -> list[str]:
-    if len(text) <= LONGEST_LINE:
-        return [text] if text else []
-    # An indent tells that the line goes on; a word longer than the line is not cut.
-    return textwrap.wrap(
-        text,
-        LONGEST_LINE,
-        subsequent_indent="  ",
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
-
-
-def _escape(text: str) -> str:
-    """Write a text for an HTML label: nothing in it is markup, and an indent stays."""
-    core = text.strip(" ")
-    words = html.escape(_printable(core))
-    # Graphviz 2.43 refuses a bare ] in a label; one backslash would begin an escape sequence.
-    words = words.replace("[", "&#91;").replace("]", "&#93;").replace("\\", "&#92;" * 2)
-    start = len(text) - len(text.lstrip(" ")) if core else len(text)
-    return "&#160;" * start + words + "&#160;" * (len(text) - start - len(core))
-
-
-def _printable(text: str) -> str:
-    return "".join(c if c.isprintable() else " " for c in text)
-
-
-def element_id(number: int) -> str:
-    """Return the id of an element counted from 0; ids count from 1, as pictures do.
-
-    >>> element_id(0)
-    'element1'
-    """
-    return f"element{number + 1}"
-
-
-def part_id(element: str, kind: str, name: str) -> str:
-    """Return the id of a state, guard or edge.
-
-    >>> part_id("element1", "state", "slip")
-    'element1-state-slip'
-    """
-    # Names of a chart are identifiers; whatever else came in here could be read as a port or DOT.
-    return f"{element}-{kind}-" + re.sub(r"\W", "_", name)

@@ -36,7 +36,7 @@ from gms_fsm.errors import (
     TraceFileError,
 )
 from gms_fsm.inspection.explain import explain
-from gms_fsm.language.expression import (
+from gms_fsm.language import (
     FUNCTIONS,
     MATLAB_LIKE,
     Node,
@@ -49,6 +49,7 @@ from gms_fsm.language.expression import (
     split,
 )
 from gms_fsm.lowering._generated import load
+from gms_fsm.run.settings import Settings
 from gms_fsm.run.simulate import Run
 from gms_fsm.run.start import Start
 from gms_fsm.traces.failures import SimulationError
@@ -730,12 +731,14 @@ def one_scenario(data: bytes) -> bool:
 
 def _start_and_run(loaded: Any) -> None:
     """Run a few steps, as `simulate` would begin."""
-    arguments = {name: value for name, value in loaded.arguments.items() if name != "monitors"}
-    if np.size(arguments.get("t_eval", ())) < 10_000:
-        Start.of(loaded.model, loaded.rig, **arguments)
+    options = {name: value for name, value in loaded.arguments.items() if name != "monitors"}
+    where = {name: options.pop(name) for name in ("t_end", "t_start", "initial") if name in options}
+    if np.size(options.get("t_eval", ())) < 10_000:
+        Start.of(loaded.model, loaded.rig, settings=Settings(**options), **where)
     # With wanted times an arc goes on to the last of them, and hostile numbers make stiff runs.
-    arguments.pop("t_eval", None)
-    run = Run(Start.of(loaded.model, loaded.rig, rows_at_once=20, **arguments))
+    options.pop("t_eval", None)
+    settings = Settings(**options)
+    run = Run(Start.of(loaded.model, loaded.rig, settings=settings, rows_at_once=20, **where))
     for _ in range(5):
         if not run.advance():
             break

@@ -49,12 +49,28 @@ NEAR = {  # module: its tests, the quickest to notice first
     ],
     "integrators/advance.py": ["mutants_are_killed", *PHYSICS, "convergence_orders"],
     "integrators/crossings.py": ["mutants_are_killed", *PHYSICS],
-    "gms_fsm/language/expression.py": [
+}
+LANGUAGE = [
+    "tree",
+    "functions",
+    "read",
+    "fold",
+    "powers",
+    "print",
+    "evaluate",
+    "normal",
+    "derivative",
+]
+NEAR |= {
+    f"gms_fsm/language/_{name}.py": [
         "mutants_are_killed",
+        "fold_reads_each_part_once_and_only_when_taken",
+        "derivatives_are_slopes",
         "expression_refuses_everything_else",
         "expression_evaluates_like_python",
         "gms_chart_is_the_papers",
-    ],
+    ]
+    for name in LANGUAGE
 }
 
 

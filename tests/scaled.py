@@ -24,7 +24,7 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.app.scenario import Loaded
-from gms_fsm.language.expression import Binary, Call, Name, Negative, Number, Value, spell
+from gms_fsm.language import Binary, Call, Name, Negative, Number, Value, spell
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Corners, Formula, Signal

@@ -139,7 +139,7 @@ def test_conditions_do_not_know_s(model: ChartModel, tmp_path: Path) -> None:
 
 
 def test_what_people_read_names_no_curve(trace: Trace) -> None:
-    assert _parameters(trace) == "k = [1, 2], F_c = 0.1, sigma_2 = 0"
+    assert _parameters(trace) == "k = [1, 2], F_c = 0.1, sigma_2 = 0 Ns/m"
     for text in (str(trace), *(verdict.text for verdict in trace.monitors.values())):
         assert "nan" not in text
 

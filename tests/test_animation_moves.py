@@ -99,13 +99,13 @@ def test_the_active_state_moves_with_the_run(tmp_path: Path) -> None:
 
 def test_one_layout_serves_all_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[Any] = []
-    real = plots.live_chart.drawn
+    real = plots.live_chart.picture
 
-    def counted(*arguments: Any) -> bytes | None:
+    def counted(*arguments: Any) -> bytes:
         calls.append(arguments)
         return real(*arguments)
 
-    monkeypatch.setattr(plots.live_chart, "drawn", counted)
+    monkeypatch.setattr(plots.live_chart, "picture", counted)
     told: list[tuple[int, int]] = []
     animate(
         bank(),
@@ -121,7 +121,7 @@ def test_one_layout_serves_all_frames(tmp_path: Path, monkeypatch: pytest.Monkey
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"path": "run.mp4"}, r"path is 'run\.mp4'; an animation must end in \.gif"),
+        ({"path": "run.mp4"}, r"path is 'run\.mp4'; it must end in \.gif"),
         ({"frames": 1}, "frames is 1; it must be a whole number of at least 2"),
         ({"frames": 2.5}, r"frames is 2\.5"),
         ({"frames": True}, "frames is True"),
@@ -159,18 +159,3 @@ def test_a_failure_leaves_the_old_file(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
     with pytest.raises(OutputError, match="nowhere"):
         animate(one(), tmp_path / "nowhere" / "run.gif", frames=2)
-
-
-@pytest.mark.parametrize("missing", ["matplotlib", "PIL"])
-def test_without_its_extra_it_is_named(missing: str) -> None:
-    import subprocess
-    import sys
-
-    code = (
-        f"import sys; sys.modules[{missing!r}] = None\n"
-        "from gms_fsm.errors import MissingExtraError\n"
-        "try:\n    import plots.animation\n"
-        "except MissingExtraError as error:\n    print(error)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert 'pip install "gms-fsm[plots]"' in done.stdout

@@ -67,7 +67,7 @@ PLACES = ("prepare_event", "before_state_change", "after_state_change", "finaliz
 def _watched(model: Model, kind: type[Element] = Element) -> tuple[ElementMachines, list[Call]]:
     """Machines with a note of every callback at every place, and the notes."""
     machines, calls = ElementMachines(model, kind), []
-    variables, parameters = model.chart.variables, model.chart.parameters
+    variables, parameters = model.chart.variables, model.chart.parameter_names
 
     def note(place: str) -> Any:
         def callback(event: Any) -> None:

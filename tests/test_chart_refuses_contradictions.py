@@ -15,7 +15,7 @@ import pytest
 
 from gms_fsm.charts.chart import RESERVED, Chart, State, Transition
 from gms_fsm.errors import ChartError, ExpressionError
-from gms_fsm.language.expression import CONSTANTS, FUNCTIONS, spell
+from gms_fsm.language import CONSTANTS, FUNCTIONS, spell
 
 STICK = State("stick", flow={"z": "v"})
 SLIP = State("slip", flow={"z": "C * (sgn(v) - z / s)"})
@@ -98,7 +98,10 @@ def test_a_state_asked_for_by_a_wrong_name_is_refused_with_the_right_ones() -> N
         ({"parameters": ("k", "C", "v_c", "")}, ["parameter name '' is not a name"]),
         ({"parameters": ("k", "C", "v_c", "k 2")}, ["'k 2' is not a name"]),
         ({"parameters": ("k", "C", "v_c", "if")}, ["'if' is not a name", "keyword"]),
-        ({"parameters": ("k", "C", "v_c", 3)}, ["parameter name 3 is not a name"]),
+        (
+            {"parameters": ("k", "C", "v_c", 3)},
+            ["parameters has 3", "Parameter('k', 'N/m',"],
+        ),
         ({"parameters": "k C"}, ["parameters is 'k C', not a tuple", "('k C',)"]),
         ({"variables": "z"}, ["variables is 'z', not a tuple", "('z',)"]),
         ({"states": STICK}, ["states is State(...), not a tuple", "(State(...),)"]),

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from gms_fsm.errors import ExpressionError
 from gms_fsm.inspection.explain import holds
+from gms_fsm.language import InState, Not, parse_condition, spell, states_in
 from gms_fsm.language._vectors import truths
-from gms_fsm.language.expression import InState, Not, parse_condition, spell, states_in
 
 NAMES = ("a", "b", "c")
 SPECIAL = (0.0, -0.0, 1.0, -1.0, 0.5, 3.0, 1e-300, 1e300, 800.0, math.inf, -math.inf, math.nan)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from gms_fsm import Prescribed
-from gms_fsm.app.debugger import ALIASES, COMMANDS, Debugger
+from gms_fsm.app.debugger import ALIASES, COMMANDS, Debugger, help_of
 from gms_fsm.inspection.session import Session
 from tests.helpers import FIG4_SINE, stick_slip
 from tests.test_debugger_transcripts import FIG_4, PULLED, answers, talk
@@ -30,7 +30,7 @@ def test_help_has_usage_and_an_example_that_works(
     made = _debugger()
     text = made.reply(f"help {name}")
     assert text.startswith(COMMANDS[name].usage.split()[0])
-    for example in made.help_of(name).examples:
+    for example in help_of(name, made.session).examples:
         assert f"example: {example}" in text
         for line in ("goto 20", "watch x", "b arrest", "poke z1=0.1", "run", "save mine.json"):
             assert "error" not in made.reply(line)
@@ -68,11 +68,11 @@ def test_letters_are_those_of_pdb(alias: str, name: str) -> None:
     [
         ("stpe", "did you mean step?"),
         ("xyzzy", "help lists them"),
-        ("step many", "'many' is no whole number; usage: step [N]"),
+        ("step many", "'many' is not an integer; usage: step [N]"),
         ("step 0", "usage: step [N]"),
-        ("step -3", "no whole number"),
-        ("back 1.5", "no whole number"),
-        ("step 99999999999999999999", "no whole number"),
+        ("step -3", "is not an integer"),
+        ("back 1.5", "is not an integer"),
+        ("step 99999999999999999999", "is not an integer"),
         ("next 3", "next takes no argument"),
         ("goto", "usage: goto T, for example: goto 25"),
         ("goto yesterday", "'yesterday' is no time"),
@@ -91,11 +91,11 @@ def test_letters_are_those_of_pdb(alias: str, name: str) -> None:
         ("why 1 arest", "'arest' is no edge"),
         ("why arrest 1", "'arrest 1' is no edge"),
         ("why 1.5", "'1.5' is no edge"),
-        ("why 99999999999", "no whole number; usage: why [ELEMENT] [EDGE]"),
+        ("why 99999999999", "is not an integer; usage: why [ELEMENT] [EDGE]"),
         ("why arrest", "arrest leaves slip; element 1 is in stick"),
         ("why 2 Arrest", "arrest leaves slip; element 2 is in stick"),
         ("element", "usage: element N"),
-        ("element arrest", "'arrest' is no whole number; usage: element N"),
+        ("element arrest", "'arrest' is not an integer; usage: element N"),
         ("print", "an expression is missing"),
         ("print 1 / x", "cannot be computed here"),
         ("print 1 / x > 2", "cannot be computed here"),
@@ -114,7 +114,7 @@ def test_letters_are_those_of_pdb(alias: str, name: str) -> None:
         ("break arrest if z9 > 1", "unknown name 'z9'"),
         ("break arrest hits 0", "at least 1"),
         ("break arrest if", "is no breakpoint"),
-        ("clear", "no whole number"),
+        ("clear", "is not an integer"),
         ("clear 3", "there is no number 3"),
         ("poke", "nothing to poke"),
         ("poke z1", "'z1' cannot be poked; usage: poke z1=VALUE"),
@@ -157,7 +157,7 @@ def test_a_mistake_is_one_message(command: str, said: str) -> None:
 
 def test_an_unexpected_failure_does_not_end_the_session(monkeypatch: pytest.MonkeyPatch) -> None:
     made = _debugger()
-    monkeypatch.setattr(made, "do_where", lambda arg: 1 / 0)
+    monkeypatch.setattr(made.commands, "do_where", lambda arg: 1 / 0)
     assert made.reply("where") == "error: ZeroDivisionError: division by zero"
     assert made.reply("print t") == "0"
 

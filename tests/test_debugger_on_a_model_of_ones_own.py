@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, State, Stribeck, Transition
-from gms_fsm.app.debugger import COMMANDS, Debugger, scenario_to_debug
+from gms_fsm.app.debugger import COMMANDS, Debugger, help_of, scenario_to_debug
 from gms_fsm.errors import ScenarioError
 from gms_fsm.inspection.session import Session
 from tests.helpers import stick_slip
@@ -71,7 +71,7 @@ def test_help_has_examples_of_this_session(
     text = made.reply(f"help {name}")
     assert "slip" not in text
     assert "{" not in text
-    examples = made.help_of(name).examples
+    examples = help_of(name, made.session).examples
     assert examples
     for example in examples:
         assert f"example: {example}" in text
@@ -88,12 +88,12 @@ def test_help_without_a_threshold_or_an_edge() -> None:
     assert made.reply("help").startswith(
         "To find out why an element switches or does not:  goto 1.25   then   why 1\n"
     )
-    assert made.help_of("print").examples == ("p state(2) == on",)
-    assert made.help_of("break").examples == ("b enter on if v < 0 hits 3",)
-    assert made.help_of("poke").examples == ("poke u1=0",)
-    assert made.help_of("poke").usage.startswith("poke u1=VALUE")
+    assert help_of("print", made.session).examples == ("p state(2) == on",)
+    assert help_of("break", made.session).examples == ("b enter on if v < 0 hits 3",)
+    assert help_of("poke", made.session).examples == ("poke u1=0",)
+    assert help_of("poke", made.session).usage.startswith("poke u1=VALUE")
     for name in COMMANDS:
-        assert made.help_of(name).examples
+        assert help_of(name, made.session).examples
         assert "error:" not in made.reply(f"help {name}")
     assert "no edge leaves this state" in made.reply("why")
     assert made.reply("why go").startswith("error: 'go' is no edge; there are none")

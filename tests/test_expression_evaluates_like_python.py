@@ -16,7 +16,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from gms_fsm.errors import ExpressionError
-from gms_fsm.language.expression import (
+from gms_fsm.language import (
     MATLAB_LIKE,
     NAMESPACE,
     PYTHON,

@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ExpressionError, GMSError
-from gms_fsm.language.expression import (
+from gms_fsm.language import (
     FUNCTIONS,
     evaluate,
     names_in,

@@ -72,7 +72,6 @@ ARGUMENTS = [
     _wrong("events", None, "events is None", "'located'", "'step'"),
     _wrong("events", "step", "events='step'", "step=", "max_step"),
     _wrong("engine", "turbo", "engine is 'turbo'", "'machines'", "'ifelse'"),
-    _wrong("engine", None, "engine is None", "'machines'"),
     _wrong("t_eval", [], "t_eval"),
     _wrong("t_eval", [0.0, 2.0], "t_eval", "2.0", "t_end = 1.0"),
     _wrong("t_eval", [-0.5, 0.5], "t_eval", "-0.5", "t_start = 0.0"),

@@ -21,7 +21,6 @@ from gms_fsm import Chart, ChartModel, Prescribed, State, Stribeck, Trace, Trans
 from gms_fsm.app.records import Column, motion_of, read_record
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.app.units import convert_numbers
-from gms_fsm.charts.parameters import GMSParameters
 from gms_fsm.errors import (
     ExpressionError,
     ParameterError,
@@ -30,7 +29,8 @@ from gms_fsm.errors import (
     SignalError,
     TraceFileError,
 )
-from gms_fsm.language.expression import evaluate, names_in, parse_condition, parse_value, spell
+from gms_fsm.language import evaluate, names_in, parse_condition, parse_value, spell
+from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.signals import as_signal
 from gms_fsm.traces.trace import dwell_times
 from tests.helpers import stick_slip

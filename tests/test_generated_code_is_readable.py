@@ -23,7 +23,7 @@ import pytest
 from gms_fsm import GMS, ChartModel, GMSParameters, LuGre, Prescribed, Slider, Stribeck
 from gms_fsm.charts import LAWS, gms_element
 from gms_fsm.charts.chart import Chart, State, Transition
-from gms_fsm.language.expression import spell
+from gms_fsm.language import spell
 from gms_fsm.lowering.program import Program, lower
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import shutil
+import sys
 from functools import cache
 from xml.etree import ElementTree
 
@@ -177,13 +178,13 @@ def test_a_frame_depends_on_its_row_only() -> None:
 
 def test_one_layout_serves_all_frames(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = []
-    real = plots.live_chart.drawn
+    real = plots.live_chart.picture
 
-    def counted(*arguments: object) -> bytes | None:
+    def counted(*arguments: object) -> bytes:
         calls.append(arguments)
         return real(*arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(plots.live_chart, "drawn", counted)
+    monkeypatch.setattr(plots.live_chart, "picture", counted)
     chart = LiveChart(run("bank"))
     for row in range(len(run("bank"))):
         chart.frame(row)
@@ -271,18 +272,20 @@ def test_wrong_options_are_refused() -> None:
 
 
 def test_without_graphviz_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(plots.live_chart, "drawn", lambda *_: None)
-    with pytest.raises(MissingExtraError, match=r"program dot, or pip install .*\[render\]"):
+    monkeypatch.setattr(sys.modules["plots.render"], "drawn", lambda *_: None)
+    with pytest.raises(
+        MissingExtraError, match=r"Graphviz, .* pip install .*\[render\].* program dot"
+    ):
         LiveChart(run("one"))
 
 
 def test_a_graphviz_that_writes_other_texts_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    real = plots.live_chart.drawn
+    real = plots.live_chart.picture
 
     def other(graph: object, form: str) -> bytes:
-        return real(graph, form).replace(b"<text", b"<tspan", 1).replace(b"</text", b"</tspan", 1)  # type: ignore[arg-type, union-attr]
+        return real(graph, form).replace(b"<text", b"<tspan", 1).replace(b"</text", b"</tspan", 1)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(plots.live_chart, "drawn", other)
+    monkeypatch.setattr(plots.live_chart, "picture", other)
     with pytest.raises(OutputError, match="cannot be used for live charts"):
         LiveChart(run("one"))
 

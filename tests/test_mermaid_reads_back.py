@@ -20,7 +20,7 @@ import pytest
 import gms_fsm.charts.chart
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.chart import Chart, State, Transition
-from gms_fsm.language.expression import MATLAB_LIKE, spell
+from gms_fsm.language import MATLAB_LIKE, spell
 from plots.mermaid import mermaid
 from tests.test_statechart_options import HOSTILE
 from tests.test_statechart_shows_the_whole_chart import FIVE_STATES, THREE_STATES

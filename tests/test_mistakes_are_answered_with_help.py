@@ -23,7 +23,7 @@ from gms_fsm.charts import LUGRE, gms_element
 from gms_fsm.errors import OutputError, ParameterError, ScenarioError, shown
 from gms_fsm.run.simulate import Moment
 from plots import block_diagram, mermaid, render, statechart
-from plots.render import FORMATS
+from plots.formats import of
 from tests.helpers import pulled_mass, stick_slip
 from tests.scenario_files import OPEN_LOOP, CommandLine, command_line
 from tests.test_command_line import run
@@ -45,9 +45,12 @@ def scenario(tmp_path: Path) -> Path:
 
 
 # --------------------------------------------------------------------------- formats
+FORMATS = {each.ending: each for each in of("graph", "chart")}
+
+
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_a_chart_takes_every_format(suffix: str, tmp_path: Path) -> None:
-    if FORMATS[suffix] == "a picture":
+    if FORMATS[suffix].extra == "render":
         pytest.importorskip("pygraphviz", reason="pictures need Graphviz, extra 'render'")
     assert render(statechart(LUGRE), tmp_path / f"chart{suffix}").suffix == suffix
     assert (tmp_path / f"chart{suffix}").stat().st_size > 100
@@ -62,9 +65,9 @@ def test_mermaid_text_is_the_charts(tmp_path: Path) -> None:
 def test_the_formats_are_named_from_one_table(tmp_path: Path, gms_fsm: CommandLine) -> None:
     with pytest.raises(ParameterError) as caught:
         render(statechart(LUGRE), tmp_path / "x.tex")
-    for suffix, kind in FORMATS.items():
+    for suffix, each in FORMATS.items():
         assert suffix in str(caught.value)
-        assert kind in str(caught.value)
+        assert each.kind in str(caught.value)
     done = gms_fsm("chart", "lugre", "-o", "x.tex")
     assert done.code == 2
     assert ".mmd for Mermaid text" in done.message

@@ -12,8 +12,9 @@ import pytest
 
 from gms_fsm import Prescribed, simulate
 from gms_fsm.lowering.program import lower
-from gms_fsm.traces import monitors, trace
+from gms_fsm.traces import trace
 from gms_fsm.traces.failures import LivelockError
+from gms_fsm.traces.monitors import _examining as monitors
 from tests.helpers import FIG4_SINE, open_loop, pulled_mass, stick_slip
 from tests.test_monitors_see_what_happens import SLOWING, memoryless
 
@@ -21,11 +22,10 @@ FUNCTIONS = (
     "checked",
     "examine",
     "watched",
-    "_chattering",
-    "_invariant",
-    "_passivity",
-    "_coverage",
-    "_columns",
+    "chattering",
+    "invariant_verdict",
+    "passivity",
+    "coverage",
 )
 
 
@@ -45,7 +45,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         monkeypatch.setattr(monitors, name, noting(name, getattr(monitors, name)))
     for name in ("checked", "watched"):
         monkeypatch.setattr(sys.modules["gms_fsm.run.simulate"], name, getattr(monitors, name))
-    monkeypatch.setattr(trace, "_observe_rows", noting("observe", trace._observe_rows))
+    monkeypatch.setattr(trace, "observed_rows", noting("observe", trace.observed_rows))
     return noted
 
 

@@ -30,7 +30,7 @@ from gms_fsm.charts.broken import BROKEN
 from gms_fsm.errors import ExpressionError, ParameterError
 from gms_fsm.inspection.explain import holds, values_at
 from gms_fsm.inspection.session import Session
-from gms_fsm.language.expression import parse_condition
+from gms_fsm.language import parse_condition
 from gms_fsm.traces.failures import LivelockError, SimulationError
 from gms_fsm.traces.monitors import Chattering, Coverage, Invariant, Passivity, checked, examine
 from gms_fsm.traces.verdicts import ChatteringVerdict, InvariantVerdict
@@ -332,7 +332,7 @@ def test_the_verdict_at_a_row_is_that_of_the_row_alone(text: str) -> None:
     trace = simulate(stick_slip("published"), Prescribed(FIG4_SINE), 30.0, monitors=[text])
     found = invariant(trace, text)
     model, n = trace.model, trace.n
-    names = ["t", "x", "v", "F", "s", "z", *model.chart.parameters]
+    names = ["t", "x", "v", "F", "s", "z", *model.chart.parameter_names]
     names += [f"{name}{i + 1}" for name in ("z", "s", "F") for i in range(n)]
     tree = parse_condition(text, names, ["stick", "slip"], n, own_state=True)
     broken = []

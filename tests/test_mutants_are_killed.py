@@ -1,4 +1,4 @@
-"""A small change of expression, chart, machines, crossings or advance is noticed.
+"""A small change of language, chart, machines, crossings or advance is noticed.
 
 Each test pins down what a mutant of `tests/mutation.py` got away with. At the end stands what
 no test can notice, and why.
@@ -18,14 +18,15 @@ import pytest
 from gms_fsm import ChartModel, Prescribed, Stribeck, simulate
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ChartError, ExpressionError
-from gms_fsm.language.expression import (
+from gms_fsm.language import (
     MATLAB_LIKE,
     Binary,
     InState,
     Literal,
     Name,
+    Negative,
     Not,
-    _walk,
+    Number,
     evaluate,
     parse_condition,
     parse_value,
@@ -36,6 +37,7 @@ from gms_fsm.language.expression import (
     split,
     substitute,
 )
+from gms_fsm.language._tree import walk
 from gms_fsm.run.machines import Element, ElementMachines, Guard
 from integrators import advance as kernel
 from integrators.crossings import NO_CHANGE, first_change, nothing_near, watched
@@ -76,7 +78,7 @@ def test_a_chart_shows_and_compares_what_was_written_not_what_was_parsed() -> No
     assert chart == _chart()
 
 
-# --------------------------------------------------------------------------- expression
+# --------------------------------------------------------------------------- language
 def _refused(text: str, *names: str, **states: Any) -> ExpressionError:
     read = parse_condition if states else parse_value
     with pytest.raises(ExpressionError) as caught:
@@ -88,7 +90,7 @@ def test_a_tree_and_its_spelling_cannot_be_changed() -> None:
     condition = parse_condition(
         "not -a > b * 2 and (state(1) == slip or max(a, b) > c)", "abc", ["slip"], 1
     )
-    parts = list(_walk(condition))
+    parts = list(walk(condition))
     assert len({type(part) for part in parts}) == 10
     comparison = split(parse_condition("a > b", "abc"))
     assert isinstance(comparison, Literal)
@@ -164,6 +166,12 @@ def test_a_text_has_a_hundred_comparisons_at_most() -> None:
         parse_condition(" and ".join(["v > 0"] * 101), "v")
 
 
+def test_pow_takes_two_arguments() -> None:
+    assert parse_value("pow(a, b)", "ab") == parse_value("a**b", "ab")
+    for arguments in ("", "a", "a, b, a"):
+        assert "two arguments" in str(_refused(f"pow({arguments})", "a", "b"))
+
+
 def test_what_counts_as_a_mark_that_cannot_be_read() -> None:
     assert "half a character" in str(_refused("v + \ud800", "v"))
     assert "half a character" in str(_refused("v + \udfff", "v"))
@@ -189,6 +197,10 @@ def test_small_powers_are_products_until_the_text_grows_too_long() -> None:
     assert power(f"({eight})**v", "8") is None  # 8 + 1
     assert power(f"({eight})**1", "8") == 8
     assert power(f"({eight} + v)**0", "8") == 8
+    seven = "a + b + c + d + e + f + g"
+    for one in ("h", "h**1", "(h * v)**0"):  # each is one part
+        assert power(f"{seven} + {one}", "8") == 8  # 64
+        assert power(f"{eight} + {one}", "8") is None  # 72
     assert power("(a * -b)**8", "4") == 4  # 16 * 4
     assert power("(a * -b)**8", "-5") is None
     assert power("(a + b)**0.5", "8") == 8  # by pow once: two parts, not eight
@@ -218,6 +230,7 @@ def test_small_powers_are_products_until_the_text_grows_too_long() -> None:
         ("a**0.5 * b", "pow(a, 0.5) * b", "a^0.5 * b"),
         ("a**b**c", "pow(a, pow(b, c))", "a^(b^c)"),
         ("abs(a - b)", "abs(a - b)", "|a - b|"),
+        ("exp(a) * max(a, b)", "exp(a) * max(a, b)", "exp(a) * max(a, b)"),
         (
             "0.1 + 1e-7 + 0.30000000000000004",
             "0.1 + 1e-07 + 0.30000000000000004",
@@ -231,6 +244,11 @@ def test_a_value_has_no_more_and_no_fewer_brackets_than_its_order_needs(
 ) -> None:
     tree = parse_value(text, "abc")
     assert (spell(tree), spell(tree, MATLAB_LIKE)) == (python, matlab)
+
+
+def test_a_number_below_zero_binds_like_a_sign() -> None:  # of derivatives: read are none
+    assert spell(Negative(Number(-0.5))) == "-(-0.5)"
+    assert spell(Binary("**", Name("a"), Number(-0.5)), MATLAB_LIKE) == "a^(-0.5)"
 
 
 @pytest.mark.parametrize(
@@ -298,6 +316,11 @@ def test_splitting_flattens_like_in_like_and_turns_words_under_negation() -> Non
     turned = ("either", "a <= b", "b <= c", ("both", "c <= a", "a <= c", "a >= -c"))
     assert _literals(text, holds=False) == turned
     assert _literals(f"not ({text})") == turned
+
+
+def test_a_corner_against_zero_turns_where_the_other_side_does() -> None:
+    for text, turning in (("max(a, 0)", "a"), ("min(a, 1)", "a - 1.0"), ("max(a, -1)", "a - -1.0")):
+        assert [spell(u) for u in rough_points(parse_value(text, "a"))] == [turning]
 
 
 def test_rough_calls_become_names_in_the_order_they_are_computed_and_smooth_ones_stay() -> None:
@@ -787,9 +810,9 @@ def test_an_infinite_slope_and_a_step_of_nothing_are_told_apart() -> None:
 # - Cannot occur: a bend, a depth, a count of steps and `quiet` are never negative, a cursor
 #   never beyond its list, a time never behind its stop, no place beyond `NO_CHANGE`, a chain of
 #   comparisons never empty, no atom stands firmer than an atom, an estimate of the error is
-#   infinite where it is no number, Python knows of no column behind a text's end, a number read is
-#   never negative, what is no sum and no power is `*` or `/`. So `> 0` and `!= 0`, `>=` and `==`,
-#   `<` and `!=` are the same there.
+#   infinite where it is no number, Python knows of no column behind a text's end, a whole power of
+#   0 or 1 was answered before, `sgn` and `abs` have one argument. So `> 0` and `!= 0`, `>=` and
+#   `==`, `<` and `!=` are the same there.
 # - Equality of floats: where two computed numbers are exactly alike, `<` and `<=` differ by a
 #   halving, a look or a redone step, never by the place found.
 # - Read by nobody: scratch is filled before it is read, and may be longer; the place returned with
@@ -798,7 +821,9 @@ def test_an_infinite_slope_and_a_step_of_nothing_are_told_apart() -> None:
 # - A hint: the grid's index may be too low, a loop climbs from there; a guess in `_bracket` is
 #   clamped into the bracket. Both only take longer.
 # - Names: the numbers of statuses and of `NO_CHANGE`; of the levels of binding the order alone
-#   counts.
+#   counts, and only of those that can stand side by side.
+# - Words: no function sorts before `abs`, no word for not before `!`, and only `min` and `max` have
+#   two arguments. So `==` and `<=`, or `>=`, are the same there.
 # - Scale: a margin times 2 is on the same side of every comparison.
 # - The least tolerance of a bracket matters to a step longer than the times at both its ends.
 # - Follows from the rest: `compare=True` for the trees of a `Chart`, for equal texts give equal

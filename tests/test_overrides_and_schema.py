@@ -11,6 +11,7 @@ import pytest
 
 from gms_fsm import Prescribed
 from gms_fsm.app.scenario import Scenario, load_scenario
+from gms_fsm.charts.registry import registered
 from gms_fsm.errors import ScenarioError
 from gms_fsm.systems.signals import Corners, Formula
 from tests.scenario_files import (
@@ -246,7 +247,27 @@ def test_the_schema_says_what_must_be_chosen(schema: dict[str, Any]) -> None:
     assert gms["properties"]["law"]["enum"] == ["signed", "published"]
     rigs = schema["properties"]["rig"]["discriminator"]["mapping"]
     assert set(rigs) == {"prescribed", "record", "slider", "pulled"}
-    assert set(schema["properties"]["model"]["discriminator"]["mapping"]) == {"GMS", "LuGre"}
+    by_kind, by_chart = schema["properties"]["model"]["oneOf"]
+    assert set(by_kind["discriminator"]["mapping"]) == {"GMS", "LuGre"}
+    assert set(by_chart["discriminator"]["mapping"]) == set(registered())
+
+
+def test_a_chart_s_keys_are_its_parameters_with_units_and_rules(schema: dict[str, Any]) -> None:
+    by_chart = schema["properties"]["model"]["oneOf"][1]["discriminator"]["mapping"]
+    for name, entry in registered().items():
+        table = schema["$defs"][by_chart[name].removeprefix("#/$defs/")]
+        keys = table["properties"]
+        own = {each.name for each in entry.parameters}
+        shared = {"chart", "n", "sigma_2"} | ({"stribeck", "weights"} if entry.curve else set())
+        assert set(keys) == own | shared | ({"law"} if entry.laws else set())
+        wanted = {"chart", *own, *(["law"] if entry.laws else [])}
+        assert set(table["required"]) == wanted | ({"stribeck"} if entry.curve else set())
+        for each in entry.parameters:
+            said = keys[each.name]["description"]
+            assert each.unit
+            assert f", {each.unit}" in said
+            assert (each.rule in said) == (each.rule != "finite")
+            assert ("array" in str(keys[each.name])) == each.per_element
 
 
 def test_every_shipped_scenario_uses_keys_of_the_schema(schema: dict[str, Any]) -> None:

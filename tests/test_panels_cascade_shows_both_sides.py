@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 
 from plots import panels
+from plots.panels._cascades import RESOLVED
 from tests.helpers import open_loop, pulled_mass, stick_slip
 
 
@@ -37,7 +38,7 @@ def test_the_first_cascade_that_can_be_told_apart_is_found(run: Trace) -> None:
     log = in_window(run, window)
     assert log.element.tolist() == [3, 2, 1, 0]
     assert window[0] == pytest.approx(15.83, abs=0.02)
-    assert np.ptp(log.t) > panels.RESOLVED
+    assert np.ptp(log.t) > RESOLVED
 
 
 def test_dots_are_the_one_sided_values(run: Trace) -> None:

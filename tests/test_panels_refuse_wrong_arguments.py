@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import Trace, simulate
-from gms_fsm.errors import OutputError, ParameterError
+from gms_fsm.errors import ParameterError
 
 pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
 
@@ -114,7 +114,7 @@ def test_figure_3_wants_a_force_a_row(run: Trace) -> None:
 
 
 def test_formats(run: Trace, tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match=r"\.png, \.svg or \.pdf, not '\.bmp'"):
+    with pytest.raises(ParameterError, match=r"a\.bmp'; it must end in \.png, \.svg or \.pdf"):
         figures.save(Figure(), tmp_path / "a.bmp")
 
 

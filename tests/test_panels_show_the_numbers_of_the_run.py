@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 
 from gms_fsm import Chart, ChartModel, LuGre, Prescribed, State, Stribeck, Transition
 from plots import figures, panels
+from plots.panels._shown import MOST_ROWS
 from tests.helpers import FIG4_SINE, non_drifting, open_loop, pulled_mass, stick_slip
 
 
@@ -202,7 +203,7 @@ def test_a_long_run_is_thinned_but_keeps_extremes_and_switches() -> None:
     times = np.linspace(0.0, 100.0, 60_000)
     run = simulate(stick_slip("published"), Prescribed(FIG4_SINE), 100.0, t_eval=times)
     part = panels.shown(run)
-    assert len(part) <= panels.MOST_ROWS
+    assert len(part) <= MOST_ROWS
     for name in ("v", "F", "x"):
         whole, kept = getattr(run, name), getattr(part, name)
         assert (kept.min(), kept.max()) == (whole.min(), whole.max())

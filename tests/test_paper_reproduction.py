@@ -12,6 +12,8 @@ import pytest
 
 from gms_fsm import Trace
 from gms_fsm.app import paper
+from gms_fsm.app.paper.experiments import experiments, run
+from gms_fsm.app.paper.writing import claims_text, write
 from gms_fsm.errors import OutputError
 from gms_fsm.traces.failures import SimulationError
 
@@ -23,7 +25,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pytest.importorskip("pygraphviz", reason="the charts need Graphviz, extra 'render'")
     place = tmp_path_factory.mktemp("paper")
     seen: dict[str, list[float]] = {}
-    files = paper.write(place, progress=lambda name, done: seen.setdefault(name, []).append(done))
+    files = write(place, progress=lambda name, done: seen.setdefault(name, []).append(done))
     assert files[0] == place / "claims.md"
     assert all(path.is_file() for path in files)
     for name, steps in seen.items():  # a bar that runs backward or never ends is no progress
@@ -123,7 +125,7 @@ def test_figure_4_has_the_panels_of_the_paper(folder: Path) -> None:
 
 
 def test_traces_and_logs_are_there_and_agree(folder: Path) -> None:
-    for experiment in paper.experiments():
+    for experiment in experiments():
         trace = Trace.load(folder / "traces" / f"{experiment.name}.npz")
         assert trace.t[-1] == experiment.t_end
         with (folder / "transitions" / f"{experiment.name}.csv").open() as file:
@@ -140,24 +142,24 @@ def test_a_folder_that_cannot_be_written_is_said_before_anything_runs(tmp_path: 
     (tmp_path / "file").write_text("in the way")
     begun: list[str] = []
     with pytest.raises(OutputError, match="choose another folder"):
-        paper.write(tmp_path / "file" / "out", progress=lambda name, _: begun.append(name))
+        write(tmp_path / "file" / "out", progress=lambda name, _: begun.append(name))
     assert not begun
 
 
 def test_a_run_that_fails_leaves_its_part(tmp_path: Path) -> None:
     with pytest.raises(SimulationError, match=r"written to .*partial\.npz"):
-        paper.write(tmp_path, force="0.1*sqrt(3 - t)")
+        write(tmp_path, force="0.1*sqrt(3 - t)")
     assert 2.999 < Trace.load(tmp_path / "partial.npz").t[-1] <= 3.0
 
 
 def test_a_run_that_fails_leaves_the_runs_before_it(tmp_path: Path) -> None:
     with pytest.raises(SimulationError, match="fig4_chart"):
-        paper.write(tmp_path, velocity="0.1*sqrt(3 - t)")
+        write(tmp_path, velocity="0.1*sqrt(3 - t)")
     assert Trace.load(tmp_path / "traces" / "fig3_chart.npz").t[-1] == paper.FIG3_END
 
 
 def test_own_signals_are_used_and_not_judged() -> None:
-    text = paper.claims_text(paper.run("0.1*t", "0.1*sin(t)"), "0.1*t", "0.1*sin(t)")
+    text = claims_text(run("0.1*t", "0.1*sin(t)"), "0.1*t", "0.1*sin(t)")
     assert "F_a = 0.1*t" in text
     assert "Not judged" in text
     assert "| claim |" not in text

@@ -20,6 +20,7 @@ from gms_fsm import (
     ChartModel,
     GMSParameters,
     LuGre,
+    Parameter,
     Prescribed,
     PulledSlider,
     Slider,
@@ -28,7 +29,7 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.charts import gms_element
-from gms_fsm.errors import GMSError, ParameterError
+from gms_fsm.errors import ChartError, GMSError, ParameterError
 
 CURVE = Stribeck(F_c=1.0, F_s=1.5, v_s=1e-3)
 NAN, INF = math.nan, math.inf
@@ -60,7 +61,25 @@ def own(values: Any = None, *, chart: Any = None, **changes: Any) -> ChartModel:
 
 
 WANTS_U = Chart("u", ("v", "u"), ("z",), (), (State("a", {"z": "u"}),), (), {"F": "z"})
+RULED = (
+    Parameter("a", "1", ">= 0 and < 2"),
+    Parameter("b", "1", "> a"),
+    Parameter("c", "m", "< a", meaning="height"),
+    Parameter("d", "m", "<=c"),
+)
+
+
+def ruled(**changes: Any) -> ChartModel:
+    made = Chart("r", ("v",), ("z",), RULED, (State("a_", {"z": "v"}),), (), {"F": "z"})
+    return ChartModel(made, {"a": 1, "b": 2, "c": 0.5, "d": 0.25, **changes}, n=2)
+
+
 ONLY_Q = Chart("q", ("v",), ("z",), ("q",), (State("a", {"z": "v"}),), (), {"F": "q * z"})
+
+
+def with_parameters(made: Callable[[], tuple[Parameter | str, ...]]) -> Chart:
+    return Chart("r", ("v",), ("z",), made(), (State("a", {"z": "v"}),), (), {"F": "z"})
+
 
 BROKEN: list[tuple[Callable[..., object], dict[str, Any], list[str]]] = [
     # the curve
@@ -123,11 +142,23 @@ BROKEN: list[tuple[Callable[..., object], dict[str, Any], list[str]]] = [
     (own, {"values": {"k": None}}, ["k is None", "a number"]),
     (own, {"values": {"k": [1, 2, 3]}}, ["k has 3 entries", "2"]),
     (own, {"values": {"k": [1, INF]}}, ["k[1] (element 2) is inf", "finite"]),
+    (own, {"values": {"k": 0.0}}, ["k is 0.0", "> 0"]),
+    (own, {"values": {"sigma": [0, -1]}}, ["sigma[1] (element 2) is -1.0", ">= 0"]),
+    (own, {"values": {"v_c": [1e-6, 1e-6]}}, ["v_c is [1e-06, 1e-06]", "one for all elements"]),
+    (own, {"values": {"k": [[1], [1, 2]]}}, ["k is [[1], [1, 2]]", "a list of numbers"]),
     (own, {"sigma_2": -1}, ["sigma_2 is -1.0", ">= 0"]),
     (own, {"weights": (1, -1)}, ["weights[1] (element 2) is -1.0", "> 0"]),
     (own, {"weights": (1,)}, ["weights has 1 entries", "2"]),
     (own, {"stribeck": None}, ["for the input s", "stribeck is None", "Stribeck(F_c, F_s, v_s)"]),
     (own, {"chart": WANTS_U}, ["'u'", "t, x, v, s"]),
+    # rules that name other parameters
+    (ruled, {"a": 3}, ["a is 3.0; it must be < 2"]),
+    (ruled, {"a": -1}, ["a is -1.0; it must be >= 0"]),
+    (ruled, {"b": 0.5}, ["b is 0.5, a is 1.0; b must be greater than a (b > a)"]),
+    (ruled, {"c": 1}, ["c is 1.0, a is 1.0; height must be less than a (c < a)"]),
+    (ruled, {"d": 2}, ["d is 2.0, c is 0.5; d must be at most the height (d <= c)"]),
+    (ruled, {"b": [2, 1]}, ["b[1] (element 2) is 1.0, a[1] (element 2) is 1.0", "(b > a)"]),
+    (ruled, {"a": [1, 1.5], "b": [2, 1]}, ["b[1] (element 2) is 1.0, a[1] (element 2) is 1.5"]),
     # the model and the rigs
     (GMS, {"parameters": {}, "law": "signed"}, ["parameters is {}", "GMSParameters"]),
     (Slider, {"mass": 0, "force": "t"}, ["mass is 0.0", "> 0"]),
@@ -165,6 +196,32 @@ def test_a_wrong_length_is_not_blamed_on_a_parameter_the_chart_has_not() -> None
     assert "k has" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        (("k", {"rule": "positive"}), "parameter 'k', rule 'positive': 'positive' is not a bound"),
+        (("k", {"rule": "> "}), "'>' is not a bound"),
+        (("k", {"rule": "> 0 and"}), "is not a bound"),
+        (("k", {"rule": "== 0"}), "'== 0' is not a bound"),
+        (("k", {"rule": "> 1e999"}), "is not a bound"),
+        (("k", {"rule": "> 0", "assumed": "0 <"}), "rule '0 <'"),
+        (("k", {"rule": 0}), "parameter 'k': rule is 0, no text"),
+        (("k", {"rule": "> q"}), "chart 'r', parameter 'k': its rule names 'q'.* there are 'h'"),
+        (("k", {"rule": "> k"}), "its rule names 'k', which is no other parameter"),
+    ],
+)
+def test_a_rule_that_is_none_is_refused(parameters: tuple[str, dict[str, Any]], words: str) -> None:
+    name, changes = parameters
+    with pytest.raises(ChartError, match=words):
+        with_parameters(lambda: (Parameter(name, **changes), "h"))
+
+
+def test_a_plain_name_is_short_for_a_parameter_that_may_be_any_number() -> None:
+    assert ONLY_Q.parameters == (Parameter("q"),)
+    assert ONLY_Q.unit("q") == ""
+    assert ChartModel(ONLY_Q, {"q": [-1e300, 0.0]}, n=2).n == 2
+
+
 def test_values_on_the_boundary_are_allowed() -> None:
     assert Stribeck(1, 1, 1e-3)(0.0) == 1.0
     assert bank(sigma=(0, 0), C=(0, 0), sigma_2=0).sigma.tolist() == [0, 0]
@@ -183,10 +240,19 @@ def test_published_law_without_a_dip_warns_and_the_signed_one_does_not() -> None
 
 
 def test_the_curve_is_eq_2() -> None:
+    with pytest.MonkeyPatch.context() as patch:  # what it computes is its text
+        patch.setattr(Stribeck, "text", "F_c + v_s * v")
+        assert float(CURVE(2.0)) == 1.002
     for v in (0.0, 1e-4, -1e-3, 2e-3, -0.5):
         assert float(CURVE(v)) == pytest.approx(1.0 + 0.5 * math.exp(-((v / 1e-3) ** 2)), rel=1e-15)
     assert CURVE(np.array([[0.0, 1.0]])).shape == (1, 2)
     assert CURVE(CURVE.dip) - CURVE.F_c < 1e-16
+
+
+def test_the_curve_is_to_the_bit_what_a_run_computes() -> None:
+    trace = simulate(GMS(bank(), law="signed"), Prescribed("2e-3*sin(t)"), 7.0)
+    assert len(np.unique(trace.s[:, 0])) > 10
+    assert (CURVE(trace.v) == trace.s[:, 0]).all()
 
 
 def test_table_one_is_exact() -> None:

@@ -20,7 +20,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gms_fsm import Chart, Finding, Report, State, Transition, prove
-from gms_fsm.language.expression import Value, evaluate, parse_value
+from gms_fsm.language import Value, evaluate, parse_value
 
 STEP = 2.0**-20  # s
 PASSES = 20

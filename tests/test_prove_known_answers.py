@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import doctest
 import inspect
-import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,12 +14,13 @@ import pytest
 
 pytest.importorskip("z3", reason="needs z3 (extra: check)")
 
-from gms_fsm import Chart, Finding, LuGre, Report, State, Stribeck, Transition, prove
+from gms_fsm import Chart, Finding, LuGre, Parameter, Report, State, Stribeck, Transition, prove
 from gms_fsm.charts import LAWS, LUGRE, gms_element
 from gms_fsm.charts.broken import BROKEN
 from gms_fsm.errors import ExpressionError, ParameterError
+from gms_fsm.inspection import _prover
 from gms_fsm.inspection.prove import CHECKS, Check, default_domain
-from gms_fsm.language.expression import evaluate
+from gms_fsm.language import evaluate
 
 STEP = 2.0**-20  # s; exact in floats
 
@@ -175,7 +175,7 @@ def chart(go: str = "z >= s", back: str = "z < 0.5 * s", **changes: Any) -> Char
         "name": "two",
         "inputs": ("v", "s", "t", "x"),
         "variables": ("z",),
-        "parameters": ("C",),
+        "parameters": (Parameter("C", "m/s", ">= 0", assumed="> 0"),),
         "states": (State("one", {"z": "v"}), State("two", {"z": "C * (sgn(v) - z / s)"})),
         "transitions": (Transition("go", "one", "two", go), Transition("back", "two", "one", back)),
         "outputs": {"F": "z"},
@@ -400,7 +400,7 @@ def test_a_point_that_rounding_hides_is_no_refutation() -> None:
 
 
 def test_a_long_question_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules[Report.__module__], "PATIENCE", 0.1)
+    monkeypatch.setattr(_prover, "PATIENCE", 0.1)
     hard = " and ".join(
         f"({a}*{b}*{b} - {c}*{d}*{d} + {a}*{d}*{c} - 1)**2 <= 0"
         for a, b, c, d in ("efgh", "fghj", "ghjl", "hjle", "jlef")
@@ -426,9 +426,12 @@ def test_the_report_says_what_was_asked_and_of_what() -> None:
     assert str(prove(gms_element("published"))) == text
 
 
-def test_only_names_of_the_shipped_charts_are_assumed_positive() -> None:
-    own = chart(parameters=("C", "share", "k"), go="z >= share * s")
-    assert default_domain(own) == ("s > 0", "C > 0")
+def test_what_is_declared_of_the_names_in_use_is_assumed() -> None:
+    C, unused = Parameter("C", "m/s", ">= 0 and < 1"), Parameter("k", "N/m", "> 0")
+    share = Parameter("share", "1", "<= C", assumed="> 0")
+    own = chart(parameters=(C, share, unused), go="z >= share * s")
+    assert default_domain(own) == ("s > 0", "C >= 0", "C < 1", "share > 0")
+    assert default_domain(chart(parameters=("C",))) == ("s > 0",)
     assert prove(own, "s > 0").domain == ("s > 0",)
     assert prove(own, []).domain == ()
 

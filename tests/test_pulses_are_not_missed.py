@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, Slider, State, simulate
-from gms_fsm.language.expression import parse_value
+from gms_fsm.language import parse_value
 from gms_fsm.lowering._pulses import waking_times
 from tests.helpers import pulled_mass
 

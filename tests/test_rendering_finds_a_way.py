@@ -88,7 +88,7 @@ def test_program_and_package_show_the_same(
 def test_neither_gives_the_text_and_a_warning(
     graph: graphviz.Digraph, tmp_path: Path, no_graphviz: None
 ) -> None:
-    with pytest.warns(UserWarning, match=r'install Graphviz .* or .*"gms-fsm\[render\]"') as caught:
+    with pytest.warns(UserWarning, match=r'DOT text: .* Graphviz, .*"gms-fsm\[render\]"') as caught:
         written = render(graph, tmp_path / "picture.svg")
     assert len(caught) == 1
     assert caught[0].filename == __file__

@@ -21,11 +21,11 @@ import pytest
 
 from gms_fsm import Prescribed, Trace, simulate
 from gms_fsm.charts.chart import Chart, State
-from gms_fsm.charts.parameters import Stribeck
+from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ExpressionError
 from gms_fsm.inspection.explain import explain
 from gms_fsm.inspection.session import Session
-from gms_fsm.language.expression import evaluate, parse_condition
+from gms_fsm.language import CONSTANTS, FUNCTIONS, SEVERAL, evaluate, parse_condition
 from gms_fsm.systems.models import ChartModel
 from plots.replay import replay, write_replay
 from tests.helpers import FIG4_SINE, stick_slip
@@ -443,6 +443,10 @@ def test_until_reads_what_the_expression_language_reads(open_page: Open) -> None
         "v <> 1",
         "1 > 2 > not v > 0",
         "**v > 1",
+        "F neg 1 > 0",
+        "F not > 1",
+        *(f"{name}({'v, z1' if name in SEVERAL else 'v'}) > 0.1" for name in FUNCTIONS),
+        *(f"{name} * v > 0.1" for name in CONSTANTS),
     ]
     rows = page.evaluate(
         """() => data.frames.t.map((_, row) => Object.fromEntries([
@@ -455,7 +459,8 @@ def test_until_reads_what_the_expression_language_reads(open_page: Open) -> None
         got = page.evaluate(
             """(text) => {
                 try {
-                    const f = parse(text, runs[0].columns, runs[0].states, runs[0].mode);
+                    const { columns, states, mode } = runs[0];
+                    const f = parse(text, data.language, columns, states, mode);
                     return data.frames.t.map((_, row) => Boolean(f(row)));
                 } catch (error) { return error.message; }
             }""",

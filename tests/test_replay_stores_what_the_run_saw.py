@@ -20,11 +20,12 @@ import pytest
 from gms_fsm import Prescribed, Trace, simulate
 from gms_fsm.charts import GMS_ELEMENT
 from gms_fsm.charts.chart import Chart, State
-from gms_fsm.charts.parameters import Stribeck
+from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import MissingExtraError, OutputError, ParameterError, TraceFileError
 from gms_fsm.inspection.explain import explain
 from gms_fsm.systems.models import ChartModel, LuGre
 from gms_fsm.traces.failures import SimulationError
+from plots import _replay_chart
 from plots.replay import replay, replay_html, write_replay
 from tests.helpers import FIG4_SINE, pulled_mass, stick_slip
 
@@ -263,8 +264,7 @@ def test_a_chart_without_edges_and_a_bank_of_many_elements_have_pages() -> None:
 
 @uplot
 def test_without_graphviz_the_page_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    module = importlib.import_module("plots.replay")  # the name in plots is the function
-    monkeypatch.setattr(module, "drawn", lambda graph, form: None)
+    monkeypatch.setattr(_replay_chart, "drawn", lambda graph, form: None)
     assert "The chart is left out" in replay_html(fig4("signed"))
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from gms_fsm import Prescribed, simulate
 from gms_fsm.errors import ChartError, ParameterError, SessionError
+from gms_fsm.inspection._poking import Edits
 from gms_fsm.inspection.session import Session
 from tests.helpers import FIG4_SINE, open_loop, pulled_mass, stick_slip
 
@@ -39,7 +40,7 @@ def test_velocity_and_state() -> None:
     here = session.here
     assert (here.v, here.x, here.z) == (-0.2, before.x, before.z)
     assert here.states == ("stick", "stick", "slip", "stick")
-    assert session.branch.edits == {"variables": {}, "v": -0.2, "state": {2: "slip"}}
+    assert session.branch.edits == Edits({}, -0.2, {2: "slip"})
 
 
 def test_the_branch_is_the_run_from_there() -> None:

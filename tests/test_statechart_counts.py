@@ -15,8 +15,9 @@ from gms_fsm.app.report import dwell_times
 from gms_fsm.charts import LUGRE
 from gms_fsm.errors import ParameterError
 from gms_fsm.systems.models import ChartModel
+from plots._labels import Tally
 from plots.render import render
-from plots.statechart import Tally, statechart
+from plots.statechart import statechart
 from tests.helpers import one_element, open_loop, stick_slip
 from tests.test_statechart_shows_the_whole_chart import SVG, THREE_STATES
 

@@ -17,9 +17,10 @@ import gms_fsm.charts.chart
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ParameterError
-from gms_fsm.language.expression import parse_condition, parse_value
+from gms_fsm.language import parse_condition, parse_value
+from plots._notation import Writer
 from plots.render import render
-from plots.statechart import Writer, chosen, statechart
+from plots.statechart import chosen, statechart
 from plots.style import CHART_THEMES
 from tests.test_statechart_shows_the_whole_chart import SVG, Drawn, squeezed
 
@@ -75,7 +76,7 @@ def test_math(text: str, formula: str) -> None:
         transitions=(),
         outputs={"F": "z"},
     )
-    names = chart.inputs + chart.variables + chart.parameters
+    names = chart.inputs + chart.variables + chart.parameter_names
     assert Writer(chart, "math").text(parse_condition(text, names)) == formula
 
 

@@ -20,7 +20,7 @@ import gms_fsm.charts.chart
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ParameterError
-from gms_fsm.language.expression import MATLAB_LIKE, clauses, spell
+from gms_fsm.language import MATLAB_LIKE, clauses, spell
 from plots.render import render
 from plots.statechart import statechart
 

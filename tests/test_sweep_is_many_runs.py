@@ -289,7 +289,8 @@ def test_lugre_has_no_weights() -> None:
     [
         ({"output": "all"}, "output is 'all'; a sweep keeps 'end' or 't_eval'"),
         ({"output": "t_eval"}, "needs t_eval="),
-        ({"t_eval": [0.5]}, "output is 'end', but t_eval"),
+        ({"t_eval": [0.5], "output": "end"}, "output is 'end', but t_eval"),
+        ({"t_evil": [0.5]}, "did you mean 't_eval'?"),
         ({"engine": "turbo"}, "engine is 'turbo'"),
         ({"rtol": -1}, "rtol is -1"),
         ({"method": "rk4"}, "give step="),

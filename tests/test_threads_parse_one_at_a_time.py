@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gms_fsm.language.expression import parse_value
+from gms_fsm.language import parse_value
 from gms_fsm.traces._archives import member
 
 

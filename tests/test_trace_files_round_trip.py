@@ -35,8 +35,8 @@ from gms_fsm import (
     Transition,
     simulate,
 )
+from gms_fsm._files import written_whole
 from gms_fsm.errors import GMSError, OutputError, SignalError, TraceFileError
-from gms_fsm.traces.trace import written_whole
 from tests.helpers import non_drifting, pulled_mass, stick_slip
 
 ENDINGS = pytest.mark.parametrize("ending", [".npz", ".csv"])

@@ -79,7 +79,7 @@ def test_the_flow_sees_one_mode_a_step(case, method):
         integrators.METHODS[method],
         0.0501 if method == "rk4" else None,
         1e-6,
-        [1e-9] * program.size,
+        [1e-9] * program.layout.y.size,
         math.inf,
         1.0,
         100_000,
@@ -87,7 +87,7 @@ def test_the_flow_sees_one_mode_a_step(case, method):
         None,
     )
     arcs = firings = 0
-    y = [0.0] * program.size
+    y = [0.0] * program.layout.y.size
     for happening in integrators.run(system, switch, 0.0, y, [0] * 4, 21.0, options):
         if isinstance(happening, integrators.Firing):
             firings += 1

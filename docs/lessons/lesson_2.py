@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from gms_fsm import GMS, Slider, simulate
 from gms_fsm.app.lessons.l2_drift import END, TABLE_I, cycle_means
-from gms_fsm.app.paper import lugre_like
+from gms_fsm.app.paper.experiments import lugre_like
 
 
 def shaken(amplitude):

@@ -1,4 +1,7 @@
-"""The command line: one verb an experiment. A user's mistake is one message and exit code 2."""
+"""The command line: one verb an experiment. A user's mistake is one message and exit code 2.
+
+A verb imports what it needs when it runs, so that help, completion and mistakes answer at once.
+"""
 
 from __future__ import annotations
 
@@ -10,35 +13,27 @@ import textwrap
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup, TyperOption
 
 import gms_fsm
 from gms_fsm._files import no_input, output_folder, written_whole
-from gms_fsm.app import paper
-from gms_fsm.app.live import LiveView
-from gms_fsm.app.report import monitor_lines, run_scenario, velocity_note
-from gms_fsm.app.scenario import Scenario, load_scenario
-from gms_fsm.charts import LUGRE, gms_element
-from gms_fsm.charts.broken import BROKEN
-from gms_fsm.charts.chart import Chart
-from gms_fsm.charts.parameters import GMSParameters
-from gms_fsm.errors import GMSError, ParameterError
-from gms_fsm.inspection.notes import notes_on
-from gms_fsm.inspection.prove import Report, prove
-from gms_fsm.lowering._generated import standalone
-from gms_fsm.lowering.program import lower
-from gms_fsm.systems.models import GMS, Model
-from gms_fsm.systems.rigs import Prescribed, PulledSlider, Rig, Slider
-from gms_fsm.traces.trace import Trace, files_of
+from gms_fsm.app.paper import FORCE, VELOCITY
+from gms_fsm.errors import GMSError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress, TaskID
+
+    from gms_fsm import Report, Rig
 
 __all__ = ["app", "main"]
 
+LAW = "Law of a chart that has several, such as gms; there is no default, they differ."
 INTERRUPTED = 130  # the exit code of what Ctrl-C has ended, by custom
 
 
@@ -66,6 +61,21 @@ class _Verbs(TyperGroup):
             raise
 
 
+class _Drawing(TyperCommand):
+    """A verb whose help names endings: ``{chart}`` stands for those of charts, and so on."""
+
+    def get_params(self, ctx: Any) -> Any:
+        from plots import formats
+
+        params = super().get_params(ctx)
+        listed: dict[str, str] = {each: formats.listed(each) for each in get_args(formats.Subject)}
+        listed["chart"] = formats.listed("graph", "chart")
+        for param in params:
+            if isinstance(param, TyperOption) and param.help:
+                param.help = param.help.format(**listed)
+        return params
+
+
 app = typer.Typer(
     name="gms-fsm",
     cls=_Verbs,
@@ -76,19 +86,20 @@ app = typer.Typer(
 )
 
 
-class LawName(enum.StrEnum):
-    """Slip laws."""
-
-    published = "published"
-    signed = "signed"
-
-
 class RigName(enum.StrEnum):
     """What the friction is mounted on."""
 
     prescribed = "prescribed"
     slider = "slider"
     pulled = "pulled"
+
+
+class EngineName(enum.StrEnum):
+    """What runs the chart."""
+
+    compiled = "compiled"
+    machines = "machines"
+    ifelse = "ifelse"
 
 
 def _version(wanted: bool) -> None:
@@ -111,10 +122,19 @@ def root(
     context.ensure_object(Wishes).debug = debug
 
 
+def _messages(**options: Any) -> Console:
+    """Return where messages and progress go, beside the results."""
+    from rich.console import Console
+
+    return Console(stderr=True, **options)
+
+
 @contextlib.contextmanager
-def _progress(*columns: Any, console: Console) -> Iterator[Progress]:
+def _progress(*columns: Any) -> Iterator[Progress]:
     """Give progress bars that whoever has something to show starts: none before an error."""
-    bars = Progress(*columns or Progress.get_default_columns(), console=console)
+    from rich.progress import Progress
+
+    bars = Progress(*columns or Progress.get_default_columns(), console=_messages())
     try:
         yield bars
     finally:
@@ -129,15 +149,18 @@ def paper_command(
     ] = Path("paper"),
     force: Annotated[
         str, typer.Option(help="Applied force of Fig. 3 (N), an expression of t (s).")
-    ] = paper.FORCE,
+    ] = FORCE,
     velocity: Annotated[
         str, typer.Option(help="Velocity of Fig. 4 (m/s), an expression of t (s).")
-    ] = paper.VELOCITY,
+    ] = VELOCITY,
 ) -> None:
     """Run the paper's two experiments; write figures, traces, logs and claims.md."""
-    console = Console(stderr=True)
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+
+    from gms_fsm.app.paper import writing
+
     columns = (TextColumn("{task.description:<22}"), BarColumn(), TimeElapsedColumn())
-    with _progress(*columns, console=console) as bars:
+    with _progress(*columns) as bars:
         tasks: dict[str, TaskID] = {}
 
         def show(name: str, done: float) -> None:
@@ -146,7 +169,7 @@ def paper_command(
                 tasks[name] = bars.add_task(name, total=1.0)
             bars.update(tasks[name], completed=done)
 
-        files = paper.write(output, force, velocity, show)
+        files = writing.write(output, force, velocity, show)
     typer.echo(f"{len(files)} files in {output}; start with {files[0]}")
 
 
@@ -178,11 +201,16 @@ def run_command(
     ] = False,
 ) -> None:
     """Run a scenario; write trace, transition log, overview figure and summary."""
+    from gms_fsm.app.live import LiveView
+    from gms_fsm.app.report import monitor_lines, run_scenario, velocity_note
+    from gms_fsm.app.scenario import load_scenario
+    from gms_fsm.inspection.notes import notes_on
+
     loaded = load_scenario(scenario, overrides or [])
     folder = Path("out") / scenario.stem if output is None else output
     start, end = loaded.arguments["t_start"], loaded.arguments["t_end"]
     try:
-        with LiveView(Console(stderr=True), start, end, detail=live) as view:
+        with LiveView(_messages(), start, end, detail=live) as view:
             trace, files = run_scenario(loaded, folder, view, checkpoint=checkpoint)
     except KeyboardInterrupt as error:
         _plain_warning(str(error) or "interrupted")
@@ -197,17 +225,66 @@ def run_command(
     typer.echo(f"start with {files[0]}")
 
 
+@app.command("sweep")
+def sweep_command(
+    scenario: Annotated[
+        Path,
+        typer.Argument(
+            help="A scenario file, such as scenarios/pulled_mass.toml.", show_default=False
+        ),
+    ],
+    over: Annotated[
+        list[str],
+        typer.Option(
+            help="What to vary: name=from:to:count, with ,log behind it for even steps of the "
+            "logarithm; given again, every combination is run.",
+            show_default=False,
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="Folder for what is written; out/<name>-sweep if left out."
+        ),
+    ] = None,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Change a key, for example --set model.law=published."),
+    ] = None,
+    engine: Annotated[
+        EngineName, typer.Option(help="All give the same numbers; compiled is the fast one.")
+    ] = EngineName.compiled,
+) -> None:
+    """Run a scenario over a grid of parameters; write all results and a summary table."""
+    from gms_fsm.app.scenario import load_scenario
+    from gms_fsm.app.sweeps import axis, failures, sweep_scenario
+
+    axes = [axis(text) for text in over]
+    loaded = load_scenario(scenario, overrides or [])
+    folder = Path("out") / f"{scenario.stem}-sweep" if output is None else output
+    if "monitors" in loaded.arguments:
+        _plain_warning("a sweep watches nothing: run.monitors is left out")
+    try:
+        result, files = sweep_scenario(loaded, axes, folder, engine=engine.value)
+    except KeyboardInterrupt:
+        _plain_warning("interrupted; nothing is written")
+        raise typer.Exit(INTERRUPTED) from None
+    bad = int((result.outcome != "ok").sum())
+    typer.echo(
+        f"{len(result)} runs, {bad} failed, {len(result.transitions)} transitions; "
+        f"{len(files)} files in {folder}"
+    )
+    for run, message in failures(result, most=1):
+        typer.echo(f"first failure: run {run}: {message}")
+    typer.echo(f"start with {files[0]}")
+
+
 @app.command("schema")
 def schema_command() -> None:
     """Print the JSON schema of scenario files, for editors."""
+    from gms_fsm.app.scenario import Scenario
+
     typer.echo(json.dumps(Scenario.model_json_schema(), indent=2))
-
-
-class ChartName(enum.StrEnum):
-    """Charts that ship."""
-
-    gms = "gms"
-    lugre = "lugre"
 
 
 class Notation(enum.StrEnum):
@@ -231,28 +308,34 @@ class Theme(enum.StrEnum):
     dark = "dark"
 
 
-@app.command("chart")
+@app.command("chart", cls=_Drawing)
 def chart_command(
-    name: Annotated[ChartName, typer.Argument(help="Which chart.", show_default=False)],
+    name: Annotated[
+        str, typer.Argument(help="Which chart; --list names all.", show_default=False)
+    ] = "",
     output: Annotated[
         Path,
-        typer.Option(
-            "--output", "-o", help="Ends in .svg, .png, .pdf, .dot, .gv or .mmd (Mermaid)."
-        ),
+        typer.Option("--output", "-o", help="Ends in {chart}."),
     ] = Path("chart.svg"),
-    law: Annotated[LawName | None, typer.Option(help="Slip law of the GMS chart.")] = None,
+    law: Annotated[str, typer.Option(help=LAW, show_default=False)] = "",
     elements: Annotated[int, typer.Option(help="How many elements, as parallel states.")] = 1,
     notation: Annotated[Notation, typer.Option(help="Spelling.")] = Notation.stateflow,
     direction: Annotated[Direction, typer.Option(help="Layout.")] = Direction.TB,
     theme: Annotated[Theme, typer.Option(help="Colours.")] = Theme.light,
     names: Annotated[bool, typer.Option("--names", help="Write the edges' names too.")] = False,
+    listed: Annotated[
+        bool, typer.Option("--list", help="List the charts, with their parameters.")
+    ] = False,
 ) -> None:
-    """Draw a state chart."""
+    """Draw a state chart, or list those that ship."""
+    from gms_fsm.app._catalogue import catalogue, chosen
+
+    if listed:
+        typer.echo(catalogue())
+        return
     import plots
 
-    if name == ChartName.gms and law is None:
-        raise ParameterError("chart gms needs --law signed or --law published; they differ")
-    chart = LUGRE if law is None else gms_element(law.value)
+    _, chart = chosen("chart", name, law)
     graph = plots.statechart(
         chart,
         elements,
@@ -267,9 +350,9 @@ def chart_command(
 @app.command("check")
 def check_command(
     name: Annotated[
-        str, typer.Argument(help="gms, lugre, or a broken reading; see --list.", show_default=False)
+        str, typer.Argument(help="Which chart; --list names all.", show_default=False)
     ] = "",
-    law: Annotated[LawName | None, typer.Option(help="Slip law of the GMS chart.")] = None,
+    law: Annotated[str, typer.Option(help=LAW, show_default=False)] = "",
     domain: Annotated[
         list[str] | None,
         typer.Option(help="Assume this instead, for example 's >= 0'; may be given again."),
@@ -284,14 +367,15 @@ def check_command(
 
     What the order of the edges settles is said, and is no refutation.
     """
+    from gms_fsm import prove
+    from gms_fsm.app._catalogue import checkable, chosen
+
     if names:
-        typer.echo("gms --law signed, gms --law published, lugre, and as demonstrations:")
-        for broken, what in BROKEN.items():
-            typer.echo(textwrap.fill(f"broken:{broken}  {what.wrong}", 78, subsequent_indent="  "))
+        typer.echo(checkable())
         return
-    chart, usual = _to_check(name, law)
+    found, chart = chosen("check", name, law)
     folder = None if output is None else output_folder(output)
-    report = prove(chart, domain or usual)
+    report = prove(chart, domain or found.domain)
     typer.echo(str(report))
     for path in [] if folder is None else _write_report(report, folder):
         typer.echo(str(path))
@@ -299,36 +383,16 @@ def check_command(
         raise typer.Exit(1)
 
 
-def _to_check(name: str, law: LawName | None) -> tuple[Chart, tuple[str, ...] | None]:
-    """Return a chart and its domain, None for the usual one."""
-    charts = {"lugre": LUGRE, **{f"broken:{key}": found.chart for key, found in BROKEN.items()}}
-    if name == "gms":
-        if law is None:
-            raise ParameterError("check gms needs --law signed or --law published; they differ")
-        return gms_element(law.value), None
-    if name not in charts:
-        said = f"name is {name!r}; it" if name else "a name is missing; it"
-        raise ParameterError(
-            f"{said} must be one of gms, {', '.join(charts)} (a chart of your own is checked in "
-            "Python: prove(chart))"
-        )
-    if law is not None:
-        raise ParameterError(f"check {name} takes no --law; only gms does")
-    found = BROKEN.get(name.removeprefix("broken:"))
-    return charts[name], None if found is None else found.domain
-
-
 def _write_report(report: Report, folder: Path) -> list[Path]:
     """Write a report, and a chart with the place marked for what is refuted or settled by order."""
     import plots
+    from plots import formats
 
     text = f"{report}\n".encode()
     found = [*report.refuted, *report.settled]
     stems = [f"{number}-{finding.check}" for number, finding in enumerate(found, start=1)]
-    endings = ("svg", "png", "dot")
-    output_folder(
-        folder, ["report.txt", *(f"{stem}.{ending}" for stem in stems for ending in endings)]
-    )
+    pictures = [name for stem in stems for name in formats.files(stem, "graph")]
+    output_folder(folder, ["report.txt", *pictures])
     written = [written_whole(folder / "report.txt", lambda file: file.write(text))]
     edges = report.chart.guards
     for stem, finding in zip(stems, found, strict=True):
@@ -338,16 +402,16 @@ def _write_report(report: Report, folder: Path) -> list[Path]:
         note = textwrap.wrap(f"{what}: {finding.text}", 50)
         note += textwrap.wrap(finding.example, 50)
         graph = plots.statechart(report.chart, marked=marked, note="\n".join(note))
-        for ending in ("svg", "png"):
-            written.append(plots.render(graph, folder / f"{stem}.{ending}"))
+        for ending in formats.endings("graph", usual=True):
+            written.append(plots.render(graph, folder / f"{stem}{ending}"))
     return list(dict.fromkeys(written))
 
 
-@app.command("blocks")
+@app.command("blocks", cls=_Drawing)
 def blocks_command(
-    output: Annotated[
-        Path, typer.Option("--output", "-o", help="Ends in .svg, .png, .pdf, .dot or .gv.")
-    ] = Path("blocks.svg"),
+    output: Annotated[Path, typer.Option("--output", "-o", help="Ends in {graph}.")] = Path(
+        "blocks.svg"
+    ),
     elements: Annotated[int, typer.Option(help="How many elements.")] = 4,
 ) -> None:
     """Draw the block diagram of the whole model (the paper's Fig. 2a)."""
@@ -364,11 +428,12 @@ def plot_command(
     end: Annotated[float | None, typer.Option(help="To t (s).")] = None,
 ) -> None:
     """Draw a run: overview, and the story of its break-aways."""
-    from plots import figures
+    from gms_fsm import Trace
+    from plots import figures, formats
 
     run = Trace.load(trace)
-    names, endings = ("overview", "ribbons"), ("png", "svg")
-    folder = output_folder(output, [f"{name}.{ending}" for name in names for ending in endings])
+    files = [formats.files(name, "figure") for name in ("overview", "ribbons")]
+    folder = output_folder(output, chain(*files))
     window = None
     if start is not None or end is not None:
         window = (
@@ -376,15 +441,15 @@ def plot_command(
             float(run.t[-1]) if end is None else end,
         )
     pictures = (figures.overview(run, window=window), figures.ribbons_figure(run, window=window))
-    for name, figure in zip(names, pictures, strict=True):
-        for ending in endings:
-            typer.echo(str(figures.save(figure, folder / f"{name}.{ending}")))
+    for figure, names in zip(pictures, files, strict=True):
+        for name in names:
+            typer.echo(str(figures.save(figure, folder / name)))
 
 
-@app.command("animate")
+@app.command("animate", cls=_Drawing)
 def animate_command(
     trace: Annotated[Path, typer.Argument(help="A trace, .npz or .csv.", show_default=False)],
-    output: Annotated[Path, typer.Option("--output", "-o", help="Ends in .gif.")] = Path(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Ends in {animation}.")] = Path(
         "film.gif"
     ),
     frames: Annotated[int, typer.Option(help="How many pictures.")] = 200,
@@ -392,11 +457,12 @@ def animate_command(
     end: Annotated[float | None, typer.Option(help="To t (s).")] = None,
 ) -> None:
     """Make a film of the chart at work, beside the force."""
+    from gms_fsm.traces.trace import Trace, files_of
     from plots.animation import animate
 
     no_input(output, *files_of(trace))
     run = Trace.load(trace)
-    with _progress(console=Console(stderr=True)) as bar:
+    with _progress() as bar:
         task = bar.add_task("frames", total=frames)
 
         def show(done: int, _: int) -> None:
@@ -407,23 +473,26 @@ def animate_command(
     typer.echo(str(film))
 
 
-@app.command("replay")
+@app.command("replay", cls=_Drawing)
 def replay_command(
     trace: Annotated[Path, typer.Argument(help="A trace, .npz or .csv.", show_default=False)],
     other: Annotated[Path | None, typer.Argument(help="A second one, shown beside it.")] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="The page, .html.")] = Path(
+    output: Annotated[Path, typer.Option("--output", "-o", help="The page, {page}.")] = Path(
         "replay.html"
     ),
     title: Annotated[str, typer.Option(help="Of the page.")] = "",
 ) -> None:
     """Write a run as one web page that is stepped, scrubbed and explained."""
-    from plots.replay import write_replay
+    from gms_fsm.traces.trace import Trace, files_of
+    from plots import formats
+    from plots.replay import replay
 
     no_input(output, *files_of(trace), *([] if other is None else files_of(other)))
     second = None if other is None else Trace.load(other)
     names = [] if other is None else [trace.stem, other.stem]
-    page = write_replay(output, Trace.load(trace), second, title=title, names=names)
-    typer.echo(str(page))
+    formats.chosen(output, "page")
+    page = replay(Trace.load(trace), second, title=title, names=names)
+    typer.echo(str(formats.save(page, output, "page")))
 
 
 @app.command("debug")
@@ -459,7 +528,7 @@ def lesson_command(
         typer.echo(listed())
         return
     chosen = numbered(number)
-    with Console(stderr=True).status(f"running lesson {chosen}"):
+    with _messages().status(f"running lesson {chosen}"):
         taught = teach(chosen, output)
     for line in taught.lines:
         typer.echo(line)
@@ -470,18 +539,26 @@ def lesson_command(
 
 @app.command("code")
 def code_command(
-    law: Annotated[LawName, typer.Option(help="Slip law; there is no default, they differ.")],
+    name: Annotated[str, typer.Argument(help="Which chart.")] = "gms",
+    law: Annotated[str, typer.Option(help=LAW, show_default=False)] = "",
     rig: Annotated[RigName, typer.Option(help="What the friction is mounted on.")] = (
         RigName.prescribed
     ),
 ) -> None:
-    """Print the if-else program made from the GMS chart (the paper's Fig. 2c); it runs alone."""
+    """Print the if-else program made from a chart (the paper's Fig. 2c); it runs alone."""
+    from gms_fsm import Prescribed, PulledSlider, Slider
+    from gms_fsm.app._catalogue import chosen
+    from gms_fsm.lowering._generated import standalone
+    from gms_fsm.lowering.program import lower
+    from gms_fsm.systems.models import demonstration
+
+    found, _ = chosen("code", name, law)
     rigs: dict[RigName, Rig] = {
-        RigName.prescribed: Prescribed(paper.VELOCITY),
-        RigName.slider: Slider(1.0, paper.FORCE),
+        RigName.prescribed: Prescribed(VELOCITY),
+        RigName.slider: Slider(1.0, FORCE),
         RigName.pulled: PulledSlider(1.0, 2.0, 0.1),
     }
-    model: Model = GMS(GMSParameters.paper("stick-slip"), law=law.value)
+    model = demonstration(found, law)
     typer.echo(standalone(lower(model, rigs[rig]).source), nl=False)
 
 
@@ -495,7 +572,7 @@ def main() -> None:
         if wishes.debug:
             _with_causes(error)
             raise
-        Console(stderr=True, soft_wrap=True).print(
+        _messages(soft_wrap=True).print(
             f"[bold red]error:[/] {_escaped(str(error))}", highlight=False, emoji=False
         )
         sys.exit(2)
@@ -517,6 +594,6 @@ def _escaped(text: str) -> str:
 
 
 def _plain_warning(message: Warning | str, *_: object, **__: object) -> None:
-    Console(stderr=True, soft_wrap=True).print(
+    _messages(soft_wrap=True).print(
         f"[bold yellow]note:[/] {_escaped(str(message))}", highlight=False, emoji=False
     )

@@ -20,7 +20,7 @@ from scipy.interpolate import make_smoothing_spline
 from gms_fsm.app.units import convert_numbers, factor
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ExpressionError, RecordError, UnitError, cut, shown
-from gms_fsm.language.expression import evaluate, names_in, parse_condition
+from gms_fsm.language import evaluate, names_in, parse_condition
 
 __all__ = ["Column", "Motion", "Record", "motion_of", "read_record"]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import re
 import warnings
@@ -16,7 +15,7 @@ import numpy as np
 from gms_fsm._files import no_input, output_folder, written_whole
 from gms_fsm.app.records import Motion, Record
 from gms_fsm.app.scenario import Loaded
-from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, FloatArray
 from gms_fsm.errors import GMSError, MissingExtraError, ScenarioError
 from gms_fsm.inspection.notes import notes_on
 from gms_fsm.lowering.scales import Setting
@@ -133,7 +132,7 @@ def run_scenario(
     """
     output = loaded.scenario.output
     names = ["summary.md", "trace.npz", "transitions.csv", "partial.npz"]
-    names += [f"overview.{ending}" for ending in output.figures]
+    names += _figure_files(loaded)
     names += ["trace.csv", "trace.transitions.csv"] if output.csv else []
     folder = output_folder(folder, names)
     for name in names:
@@ -193,8 +192,19 @@ def _reported(loaded: Loaded, trace: Trace, folder: Path, saved: Path) -> list[P
     return files
 
 
+def _figure_files(loaded: Loaded) -> list[str]:
+    """Return the names of the files that the overview is drawn to."""
+    wanted = loaded.scenario.output.figures
+    if wanted is not None:
+        return [f"overview.{ending}" for ending in wanted]
+    from plots import formats
+
+    return formats.files("overview", "figure")
+
+
 def _draw(loaded: Loaded, trace: Trace, folder: Path) -> list[Path]:
-    if not loaded.scenario.output.figures:
+    names = _figure_files(loaded)
+    if not names:
         return []
     from plots import figures
 
@@ -204,10 +214,7 @@ def _draw(loaded: Loaded, trace: Trace, folder: Path) -> list[Path]:
         position = loaded.motion.position[loaded.record.chosen]
         measured = figures.Measured(times, position, force)
     figure = figures.overview(trace, measured, title=loaded.title)
-    return [
-        figures.save(figure, folder / f"overview.{ending}")
-        for ending in loaded.scenario.output.figures
-    ]
+    return [figures.save(figure, folder / name) for name in names]
 
 
 # --------------------------------------------------------------------------- the summary
@@ -321,11 +328,14 @@ def monitor_lines(trace: Trace) -> list[str]:
 
 def _parameters(trace: Trace) -> str:
     model = trace.model
-    curve = {} if model.stribeck is None else dataclasses.asdict(model.stribeck)
-    numbers = {**model.values, **curve, "sigma_2": model.sigma_2}
-    shown = [f"{name} = {_number(value)}" for name, value in numbers.items()]
-    weights = [] if model.stribeck is None else [f"weights = {_number(model.weights)} m/N"]
-    return ", ".join([*shown, *weights])
+    numbers = [(each, model.values[each.name]) for each in model.chart.parameters]
+    if model.stribeck is not None:
+        numbers += [(each, getattr(model.stribeck, each.name)) for each in STRIBECK]
+    numbers.append((SIGMA_2, model.sigma_2))
+    if model.stribeck is not None:
+        numbers.append((WEIGHTS, model.weights))
+    shown = (f"{each.name} = {_number(value)} {each.unit}".rstrip() for each, value in numbers)
+    return ", ".join(shown)
 
 
 def _number(value: float | FloatArray) -> str:

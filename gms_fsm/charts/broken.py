@@ -1,7 +1,7 @@
 """Broken readings of the GMS element's guards: what each of them gets wrong, as data.
 
 Each is one or two edges away from `gms_fsm.charts.gms` and looks right at first sight. They are a
-demonstration for `gms_fsm.prove` and for teaching, not models: no other part of the package uses
+demonstration for `gms_fsm.prove` and for teaching, not models: nothing in the package builds on
 them. All have the signed slip law, so that nothing but the guards is wrong.
 """
 
@@ -11,9 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from gms_fsm.charts.chart import Chart, Transition
-from gms_fsm.charts.gms import gms_element
+from gms_fsm.charts.gms import TABLE_I, gms_element
+from gms_fsm.charts.registry import Entry
 
-__all__ = ["BROKEN", "Broken"]
+__all__ = ["BROKEN", "CHARTS", "Broken"]
 
 
 @dataclass(frozen=True)
@@ -79,3 +80,14 @@ BROKEN: Mapping[str, Broken] = {
         domain=("s >= 0", "v_c > 0", "C > 0"),
     ),
 }
+
+CHARTS = tuple(
+    Entry(
+        f"broken:{name}",
+        broken.chart,
+        TABLE_I["stick-slip"],
+        wrong=broken.wrong,
+        domain=broken.domain,
+    )
+    for name, broken in BROKEN.items()
+)

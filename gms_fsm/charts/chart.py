@@ -12,8 +12,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+from gms_fsm.charts.parameters import QUANTITIES, Parameter
 from gms_fsm.errors import ChartError, ExpressionError, shown
-from gms_fsm.language.expression import (
+from gms_fsm.language import (
     CONSTANTS,
     FUNCTIONS,
     MATLAB_LIKE,
@@ -121,8 +122,9 @@ class Chart:
         ``s``, the element's threshold.
     variables : sequence of str
         The element's own continuous states, for example ``("z",)``.
-    parameters : sequence of str
-        Names of constants.
+    parameters : sequence of Parameter or str
+        Constants, each with unit and rule; a plain name is short for one of unknown unit that may
+        be any number.
     states : sequence of State
         The first one is the default state.
     transitions : sequence of Transition
@@ -151,7 +153,7 @@ class Chart:
     name: str
     inputs: tuple[str, ...]
     variables: tuple[str, ...]
-    parameters: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
     states: tuple[State, ...]
     transitions: tuple[Transition, ...]
     outputs: Mapping[str, str]
@@ -163,23 +165,38 @@ class Chart:
     )
     forces: Mapping[str, Value] = field(init=False, repr=False, compare=False)
 
-    def __post_init__(self) -> None:
-        for each in ("inputs", "variables", "parameters", "states", "transitions"):
-            given = getattr(self, each)
-            if isinstance(given, str | State | Transition):
-                text = shown(given) if isinstance(given, str) else f"{type(given).__name__}(...)"
-                raise ChartError(
-                    f"chart {self.name!r}: {each} is {text}, not a tuple; write it with a comma: "
-                    f"({text},)"
-                )
-            if not isinstance(given, Iterable):
-                raise ChartError(f"chart {self.name!r}: {each} is {shown(given)}; give a tuple")
-            object.__setattr__(self, each, tuple(given))
-        outputs = _texts(self.outputs, f"chart {self.name!r}: outputs")
-        object.__setattr__(self, "outputs", outputs)
+    def __init__(
+        self,
+        name: str,
+        inputs: Iterable[str],
+        variables: Iterable[str],
+        parameters: Iterable[Parameter | str],
+        states: Iterable[State],
+        transitions: Iterable[Transition],
+        outputs: Mapping[str, str],
+        reference: str = "",
+    ) -> None:
+        here = f"chart {name!r}"
+        given: dict[str, object] = {"name": name, "reference": reference}
+        for each, parts in (
+            ("inputs", inputs),
+            ("variables", variables),
+            ("states", states),
+            ("transitions", transitions),
+        ):
+            given[each] = _tuple(parts, f"{here}: {each}")
+        constants = _tuple(parameters, f"{here}: parameters")
+        given["parameters"] = tuple(_parameter(each, here) for each in constants)
+        given["outputs"] = _texts(outputs, f"{here}: outputs")
+        for each, value in given.items():  # nobody else keeps a hand on a frozen chart
+            object.__setattr__(self, each, value)
         self._check_names()
-        symbols = self.inputs + self.variables + self.parameters
-        here = f"chart {self.name!r}"
+        self._check_rules()
+        self._read()
+
+    def _read(self) -> None:
+        """Turn the texts into trees."""
+        here, symbols = f"chart {self.name!r}", self._symbols
         guards, flows, assignments = {}, {}, {}
         for state in self.states:
             owner = f"{here}, state {state.name!r}"
@@ -241,7 +258,7 @@ class Chart:
             ("input", self.inputs),
             ("variable", self.variables),
             ("derivative", derivatives),
-            ("parameter", self.parameters),
+            ("parameter", self.parameter_names),
             ("state", [s.name for s in self.states]),
             ("edge", [t.name for t in self.transitions]),
         )
@@ -268,6 +285,15 @@ class Chart:
                         f"states: {_listed(known)}"
                     )
 
+    def _check_rules(self) -> None:
+        for each in self.parameters:
+            known = {*self.parameter_names} - {each.name}
+            for name in sorted(each.others - known):
+                raise ChartError(
+                    f"chart {self.name!r}, parameter {each.name!r}: its rule names {name!r}, which "
+                    f"is no other parameter; there are {_listed(sorted(known))}"
+                )
+
     def _only_variables(self, texts: Mapping[str, str], owner: str) -> None:
         for name in texts:
             if name not in self.variables:
@@ -277,10 +303,50 @@ class Chart:
 
     def _assignments(self, texts: Mapping[str, str], owner: str) -> dict[str, Value]:
         self._only_variables(texts, owner)
-        symbols = self.inputs + self.variables + self.parameters
-        return {name: _value(text, symbols, f"{owner} {name!r}") for name, text in texts.items()}
+        return {
+            name: _value(text, self._symbols, f"{owner} {name!r}") for name, text in texts.items()
+        }
+
+    @property
+    def _symbols(self) -> tuple[str, ...]:
+        """What its texts may name."""
+        return self.inputs + self.variables + self.parameter_names
 
     # ------------------------------------------------------------------ readers' questions
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the constants, in their order."""
+        return tuple(each.name for each in self.parameters)
+
+    @property
+    def declared(self) -> Mapping[str, Parameter]:
+        """What is known of its names: unit and rule of inputs, parameters, and the variable z."""
+        own = {each.name: each for each in self.parameters}
+        shared = self.inputs + self.variables
+        return {name: each for name, each in QUANTITIES.items() if name in shared} | own
+
+    def unit(self, name: str) -> str:
+        """Return the unit of an input, a variable or a parameter.
+
+        Parameters
+        ----------
+        name : str
+            A variable called z is a deflection [m].
+
+        Returns
+        -------
+        str
+            Empty if it is not known.
+
+        Examples
+        --------
+        >>> from gms_fsm.charts import LUGRE
+        >>> LUGRE.unit("sigma_0"), LUGRE.unit("v"), LUGRE.unit("w")
+        ('N/m', 'm/s', '')
+        """
+        found = self.declared.get(name)
+        return "" if found is None else found.unit
+
     @property
     def default_state(self) -> State:
         """The state an element starts in unless told otherwise."""
@@ -340,6 +406,28 @@ class Chart:
             For example ``"|v| <= v_c && |z| < s"``.
         """
         return spell(self.guards[edge], MATLAB_LIKE)
+
+
+def _tuple(given: Any, owner: str) -> tuple[Any, ...]:
+    """Return a copy of a sequence, which is no single thing."""
+    if isinstance(given, str | State | Transition | Parameter):
+        text = shown(given) if isinstance(given, str) else f"{type(given).__name__}(...)"
+        raise ChartError(f"{owner} is {text}, not a tuple; write it with a comma: ({text},)")
+    if not isinstance(given, Iterable):
+        raise ChartError(f"{owner} is {shown(given)}; give a tuple")
+    return tuple(given)
+
+
+def _parameter(given: object, here: str) -> Parameter:
+    """Return a parameter; a plain name has no unit, and no rule but to be finite."""
+    if isinstance(given, Parameter):
+        return given
+    if isinstance(given, str):
+        return Parameter(given)
+    raise ChartError(
+        f"{here}: parameters has {shown(given)}; write it as 'k', or as "
+        "Parameter('k', 'N/m', '> 0') with its unit and rule"
+    )
 
 
 def _texts(given: object, owner: str) -> dict[str, str]:

@@ -14,16 +14,36 @@ Friction Simulation and Compensation", IEEE Trans. Automatic Control 50 (2005), 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Literal, get_args
 
 from gms_fsm.charts.chart import Chart, State, Transition
+from gms_fsm.charts.parameters import Parameter
+from gms_fsm.charts.registry import Demonstration, Entry
+from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError
 
-__all__ = ["GMS_ELEMENT", "LAWS", "SLIP_LAWS", "Law", "gms_element"]
+__all__ = [
+    "CHARTS",
+    "GMS_ELEMENT",
+    "LAWS",
+    "PARAMETERS",
+    "SLIP_LAWS",
+    "TABLE_I",
+    "Law",
+    "gms_element",
+]
 
-Law = Literal["published", "signed"]
+Law = Literal["signed", "published"]
 LAWS: tuple[Law, ...] = get_args(Law)
 
+PARAMETERS = (
+    Parameter("k", "N/m", "> 0", meaning="stiffness"),
+    Parameter("sigma", "Ns/m", ">= 0", meaning="damping"),
+    # With C = 0 the slip flow is no law but a standstill.
+    Parameter("C", "m/s", ">= 0", assumed="> 0", meaning="attraction"),
+    Parameter("v_c", "m/s", "> 0", per_element=False, meaning="arrest velocity"),
+)
 SLIP_LAWS = {
     "published": "sgn(v) * C * (1 - z / s)",  # (1) verbatim; unstable about z = +s for v < 0
     "signed": "C * (sgn(v) - z / s)",  # s carries the sign of v (Al-Bender et al.)
@@ -63,7 +83,7 @@ def gms_element(law: Law) -> Chart:
         name=f"GMS element, {law} law",
         inputs=("v", "s"),  # s = weight * Stribeck curve, supplied by the model
         variables=("z",),
-        parameters=("k", "sigma", "C", "v_c"),
+        parameters=PARAMETERS,
         states=(
             State("stick", flow={"z": "v"}),
             State("slip", flow={"z": SLIP_LAWS[law]}),
@@ -78,4 +98,28 @@ def gms_element(law: Law) -> Chart:
     )
 
 
-GMS_ELEMENT = {law: gms_element(law) for law in LAWS}
+GMS_ELEMENT: Mapping[str, Chart] = {law: gms_element(law) for law in LAWS}
+
+# Numbers of the paper: a column for each of its two experiments, four elements, SI units.
+TABLE_I = {
+    "non-drifting": Demonstration(
+        {"k": (100, 10, 1, 0.1), "sigma": (10, 0.1, 1, 1), "C": (1, 1, 1, 1), "v_c": 1e-6},
+        "the paper's Table I, column non-drifting",
+        stribeck=Stribeck(F_c=1, F_s=1.5, v_s=1e-3),
+        sigma_2=4,
+    ),
+    "stick-slip": Demonstration(
+        {
+            "k": (0.7, 0.7, 0.7, 0.7),
+            "sigma": (0.3, 0.4, 0.5, 0.6),
+            "C": (0.1, 0.05, 0.025, 1e-4),
+            "v_c": 1e-6,
+        },
+        "the paper's Table I, column stick-slip",
+        stribeck=Stribeck(F_c=0.4, F_s=1.5, v_s=1e-3),
+        sigma_2=0.1,
+    ),
+}
+CHARTS = (
+    Entry("gms", GMS_ELEMENT, TABLE_I["stick-slip"], title="Generalized Maxwell Slip element"),
+)

@@ -9,16 +9,31 @@ Friction", IEEE Trans. Automatic Control 40 (1995).
 from __future__ import annotations
 
 from gms_fsm.charts.chart import Chart, State
+from gms_fsm.charts.gms import TABLE_I
+from gms_fsm.charts.parameters import Parameter
+from gms_fsm.charts.registry import Demonstration, Entry
 
-__all__ = ["LUGRE"]
+__all__ = ["BENCHMARK", "CHARTS", "LUGRE"]
 
 LUGRE = Chart(
     name="LuGre bristle",
     inputs=("v", "s"),
     variables=("z",),
-    parameters=("sigma_0", "sigma_1"),
+    parameters=(
+        Parameter("sigma_0", "N/m", "> 0", meaning="bristle stiffness"),
+        Parameter("sigma_1", "Ns/m", ">= 0", meaning="bristle damping"),
+    ),
     states=(State("bristle", flow={"z": "v - sigma_0 * abs(v) * z / s"}),),
     transitions=(),
     outputs={"F": "sigma_0 * z + sigma_1 * dz"},
     reference="Canudas de Wit et al. (1995)",
 )
+
+# The paper compares LuGre with a column of its Table I, and prints no numbers of the bristle.
+BENCHMARK = Demonstration(
+    {"sigma_0": 1e3, "sigma_1": 31.6},
+    "sigma_0 and sigma_1 chosen by us; the rest from the paper's Table I, column stick-slip",
+    stribeck=TABLE_I["stick-slip"].stribeck,
+    sigma_2=TABLE_I["stick-slip"].sigma_2,
+)
+CHARTS = (Entry("lugre", LUGRE, BENCHMARK, title="LuGre model"),)

@@ -1,26 +1,284 @@
-"""Parameters of the models: the Stribeck curve and the element arrays, checked when built."""
+"""Parameters as data: the name, unit and rule of every number that a chart or a model takes.
+
+A parameter is declared once, where its chart is. The checks and their messages, the keys of
+scenario files, the names that a sweep takes, what a proof assumes, and the units in reports and
+figures all come from that declaration.
+"""
 
 from __future__ import annotations
 
+import functools
 import math
-from dataclasses import dataclass
+import operator
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.errors import ChartError, ParameterError, shown
 
-__all__ = ["PAPER_COLUMNS", "FloatArray", "GMSParameters", "Stribeck"]
+__all__ = [
+    "QUANTITIES",
+    "SIGMA_2",
+    "STRIBECK",
+    "WEIGHTS",
+    "Bound",
+    "FloatArray",
+    "Parameter",
+    "as_floats",
+    "checked_array",
+    "checked_scalar",
+    "checked_values",
+    "with_shared",
+]
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
-DIP_WIDTH = 6.1  # in v_s: beyond it exp(-(v/v_s)**2) is under 1e-16, the curve is flat
-PAPER_COLUMNS = ("non-drifting", "stick-slip")
+ANY = "finite"  # the rule that every number keeps
+_HOLDS: Mapping[str, Callable[[Any, Any], Any]] = {
+    ">=": operator.ge,
+    "<=": operator.le,
+    ">": operator.gt,
+    "<": operator.lt,
+}
+_IN_WORDS = {">=": "at least", "<=": "at most", ">": "greater than", "<": "less than"}
 
 
+@dataclass(frozen=True)
+class Bound:
+    """One comparison of a rule.
+
+    Parameters
+    ----------
+    op : {">", ">=", "<", "<="}
+        How the parameter compares.
+    limit : float or str
+        A number, or the name of another parameter.
+    text : str
+        As it is written, for example ``">= F_c"``.
+    """
+
+    op: str
+    limit: float | str
+    text: str
+
+    def holds(self, value: Any, limit: Any) -> Any:
+        """Return whether a number keeps the bound, or an array of truths.
+
+        Parameters
+        ----------
+        value, limit : float or ndarray
+            What is compared.
+
+        Returns
+        -------
+        bool or ndarray of bool
+            The truth.
+        """
+        return _HOLDS[self.op](value, limit)
+
+
+@functools.lru_cache(maxsize=256)
+def bounds_of(rule: str) -> tuple[Bound, ...]:
+    """Return the comparisons of a rule; none for ``"finite"``.
+
+    Parameters
+    ----------
+    rule : str
+        ``"finite"``, or comparisons with a number or a name, joined by ``and``.
+
+    Returns
+    -------
+    tuple of Bound
+        In the order they are written.
+
+    Raises
+    ------
+    ChartError
+        If the text is no rule.
+
+    Examples
+    --------
+    >>> [(bound.op, bound.limit) for bound in bounds_of("> 0 and <= F_s")]
+    [('>', 0.0), ('<=', 'F_s')]
+    """
+    if rule == ANY:
+        return ()
+    return tuple(_bound(part.strip(), rule) for part in rule.split(" and "))
+
+
+def _bound(text: str, rule: str) -> Bound:
+    op = next((op for op in _HOLDS if text.startswith(op)), "")
+    limit = text.removeprefix(op).strip()
+    if op and limit.isidentifier():
+        return Bound(op, limit, f"{op} {limit}")
+    try:
+        number = float(limit) if op else math.nan
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise ChartError(
+            f"rule {rule!r}: {text!r} is not a bound; a rule is 'finite', or comparisons with a "
+            "number or a parameter, for example '> 0', '>= F_c', '>= 0 and < 1'"
+        )
+    return Bound(op, number, f"{op} {limit}")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that a chart or a model takes: what it is called, its unit, its rule.
+
+    In `Chart.parameters` a plain name is short for a parameter of unknown unit and without a rule.
+
+    Parameters
+    ----------
+    name : str
+        For example ``"k"``.
+    unit : str
+        An SI unit, for example ``"N/m"``; ``"1"`` for a plain number, empty if unknown.
+    rule : str
+        What its value has to keep, besides being finite: ``"finite"`` (no more than that), or
+        comparisons with numbers and other parameters: ``"> 0"``, ``">= F_c"``, ``">= 0 and < 1"``.
+    per_element : bool
+        Whether the elements of a bank may differ in it: one number per element, or one for all.
+        If False it is one number for all.
+    meaning : str
+        In a few words, for messages and tables: ``"bristle stiffness"``.
+    assumed : str
+        What a proof takes for granted in place of the rule; only where the rule allows a limit at
+        which the model is none.
+
+    Raises
+    ------
+    ChartError
+        If a rule cannot be read.
+
+    Examples
+    --------
+    >>> Parameter("F_s", "N", ">= F_c").conditions
+    ('F_s >= F_c',)
+    """
+
+    name: str
+    unit: str = ""
+    rule: str = ANY
+    per_element: bool = field(default=True, kw_only=True)
+    meaning: str = field(default="", kw_only=True)
+    assumed: str = field(default="", kw_only=True)
+
+    def __post_init__(self) -> None:
+        for name in ("name", "unit", "rule", "meaning", "assumed"):
+            given = getattr(self, name)
+            if not isinstance(given, str):
+                raise ChartError(f"parameter {shown(self.name)}: {name} is {shown(given)}, no text")
+        try:
+            bounds_of(self.rule)
+            bounds_of(self.assumed or ANY)
+        except ChartError as error:
+            raise ChartError(f"parameter {self.name!r}, {error}") from None
+
+    @property
+    def bounds(self) -> tuple[Bound, ...]:
+        """The comparisons of the rule."""
+        return bounds_of(self.rule)
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """What a proof takes for granted, as texts of the expression language."""
+        return tuple(f"{self.name} {bound.text}" for bound in bounds_of(self.assumed or self.rule))
+
+    @property
+    def others(self) -> frozenset[str]:
+        """The parameters that its rule names."""
+        every = (*self.bounds, *bounds_of(self.assumed or ANY))
+        return frozenset(bound.limit for bound in every if isinstance(bound.limit, str))
+
+    @property
+    def described(self) -> str:
+        """What is known of it, in one line.
+
+        >>> Parameter("k", "N/m", "> 0", meaning="bristle stiffness").described
+        'bristle stiffness, N/m, > 0; one number per element'
+        """
+        rule = "" if self.rule == ANY else self.rule
+        known = ", ".join(part for part in (self.meaning, self.unit, rule) if part)
+        return "; ".join(filter(None, (known, "one number per element" * self.per_element)))
+
+
+# What has the same name in every chart and on every rig.
+QUANTITIES: Mapping[str, Parameter] = {
+    each.name: each
+    for each in (
+        Parameter("t", "s", meaning="time"),
+        Parameter("x", "m", meaning="position"),
+        Parameter("v", "m/s", meaning="velocity"),
+        Parameter("s", "m", "> 0", meaning="threshold: weight times Stribeck curve"),
+        Parameter("z", "m", meaning="deflection"),
+        Parameter("F", "N", meaning="friction force"),
+    )
+}
+# What a model has besides its chart's own numbers.
+SIGMA_2 = Parameter("sigma_2", "Ns/m", ">= 0", per_element=False, meaning="viscous friction")
+WEIGHTS = Parameter("weights", "m/N", "> 0", meaning="threshold weights")
+STRIBECK = (
+    Parameter("F_c", "N", "> 0", per_element=False, meaning="Coulomb friction"),
+    Parameter("F_s", "N", ">= F_c", per_element=False, meaning="stiction"),
+    Parameter("v_s", "m/s", "> 0", per_element=False, meaning="Stribeck velocity"),
+)
+
+
+def with_shared(own: Iterable[Parameter], *, curve: bool) -> tuple[Parameter, ...]:
+    """Return a chart's parameters and those that every model has.
+
+    Parameters
+    ----------
+    own : iterable of Parameter
+        The chart's; one of them goes before a shared one of its name.
+    curve : bool
+        Whether there is a Stribeck curve, and so weights.
+
+    Returns
+    -------
+    tuple of Parameter
+        Own ones first.
+
+    Examples
+    --------
+    >>> [each.name for each in with_shared((Parameter("k"), Parameter("F_c")), curve=False)]
+    ['k', 'F_c', 'sigma_2']
+    """
+    shared = (WEIGHTS, SIGMA_2, *STRIBECK) if curve else (SIGMA_2,)
+    found: dict[str, Parameter] = {}
+    for each in (*own, *shared):
+        found.setdefault(each.name, each)
+    return tuple(found.values())
+
+
+# --------------------------------------------------------------------------- checks
 def checked_scalar(name: str, value: Any, rule: str) -> float:
-    """Return value as a float if it keeps the rule, one of ``> 0``, ``>= 0``, ``finite``."""
+    """Return a value as a float if it is finite and keeps a rule.
+
+    Parameters
+    ----------
+    name : str
+        For the message.
+    value : float
+        What is checked.
+    rule : str
+        As of a `Parameter`; bounds that name others are left to `checked_values`.
+
+    Returns
+    -------
+    float
+        The value.
+
+    Raises
+    ------
+    ParameterError
+        Naming the parameter, its value and the rule.
+    """
     try:
         if isinstance(value, str | bytes):  # float("100") is a number
             raise TypeError
@@ -31,13 +289,36 @@ def checked_scalar(name: str, value: Any, rule: str) -> float:
         raise ParameterError(f"{name} is too large a number; it must be finite") from None
     if not math.isfinite(number):
         raise ParameterError(f"{name} is {number!r}; it must be finite")
-    if (rule == "> 0" and number <= 0) or (rule == ">= 0" and number < 0):
-        raise ParameterError(f"{name} is {number!r}; it must be {rule}")
+    for bound in bounds_of(rule):
+        if not isinstance(bound.limit, str) and not bound.holds(number, bound.limit):
+            raise ParameterError(f"{name} is {number!r}; it must be {bound.text}")
     return number
 
 
 def checked_array(name: str, values: ArrayLike, n: int | None, rule: str) -> FloatArray:
-    """Return a read-only copy, shape (n,), if every entry keeps the rule."""
+    """Return a read-only copy, shape (n,), if every entry is finite and keeps a rule.
+
+    Parameters
+    ----------
+    name : str
+        For the message.
+    values : array_like, shape (n,)
+        What is checked.
+    n : int or None
+        How many there must be; None for any number of them.
+    rule : str
+        As in `checked_scalar`.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        A copy.
+
+    Raises
+    ------
+    ParameterError
+        Naming the parameter, the entry, its value and the rule.
+    """
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
@@ -51,90 +332,33 @@ def checked_array(name: str, values: ArrayLike, n: int | None, rule: str) -> Flo
     if n is not None and array.size != n:
         raise ParameterError(f"{name} has {array.size} entries, but there are {n} elements")
     broken = ~np.isfinite(array)
-    if rule != "finite":
-        broken |= array <= 0 if rule == "> 0" else array < 0
+    for bound in bounds_of(rule):
+        if not isinstance(bound.limit, str):
+            broken |= ~bound.holds(array, bound.limit)
     for i in np.flatnonzero(broken)[:1]:
         checked_scalar(f"{name}[{i}] (element {i + 1})", float(array[i]), rule)
     array.setflags(write=False)
     return array
 
 
-@dataclass(frozen=True)
-class Stribeck:
-    """The Stribeck curve ``s(v) = F_c + (F_s - F_c) * exp(-(v / v_s)**2)``, eq. (2).
+def checked_values(
+    parameters: Iterable[Parameter], values: Mapping[str, Any], n: int = 1
+) -> dict[str, float | FloatArray]:
+    """Return the values of parameters if all keep their rules.
 
     Parameters
     ----------
-    F_c : float
-        Coulomb friction, N, > 0.
-    F_s : float
-        Stiction, N, >= F_c.
-    v_s : float
-        Stribeck velocity, m/s, > 0.
+    parameters : iterable of Parameter
+        Which.
+    values : mapping of str to float or array_like, shape (n,)
+        By name; each parameter has one.
+    n : int
+        Number of elements.
 
-    Raises
-    ------
-    ParameterError
-        Naming the parameter, its value and the rule. With s = 0 both ``z >= s`` and ``z <= -s``
-        could hold at once, and z / s means nothing, hence F_c > 0.
-
-    Examples
-    --------
-    >>> curve = Stribeck(F_c=1.0, F_s=1.5, v_s=1e-3)
-    >>> float(curve(0.0)), float(curve(1.0))
-    (1.5, 1.0)
-    """
-
-    F_c: float
-    F_s: float
-    v_s: float
-
-    def __post_init__(self) -> None:
-        for name in ("F_c", "F_s", "v_s"):
-            object.__setattr__(self, name, checked_scalar(name, getattr(self, name), "> 0"))
-        if self.F_s < self.F_c:
-            raise ParameterError(
-                f"F_s is {self.F_s!r}, F_c is {self.F_c!r}; stiction must be at least the Coulomb "
-                "friction (F_s >= F_c)"
-            )
-
-    @property
-    def text(self) -> str:
-        """The curve in the expression language; every reader computes this text."""
-        return "F_c + (F_s - F_c) * exp(-(v / v_s)**2)"
-
-    @property
-    def dip(self) -> float:
-        """Speed [m/s] outside of which the curve is flat; drivers stop at +dip and -dip."""
-        return DIP_WIDTH * self.v_s
-
-    def __call__(self, v: ArrayLike) -> FloatArray:
-        """Return s(v) [N] for velocities v [m/s], any shape (for pictures and reports)."""
-        ratio = np.asarray(v, dtype=np.float64) / self.v_s
-        return np.asarray(self.F_c + (self.F_s - self.F_c) * np.exp(-ratio * ratio))
-
-
-@dataclass(frozen=True, eq=False)
-class GMSParameters:
-    """Parameters of a bank of n GMS elements.
-
-    Parameters
-    ----------
-    k : array_like, shape (n,)
-        Bristle stiffness, N/m, > 0.
-    sigma : array_like, shape (n,)
-        Bristle damping, Ns/m, >= 0.
-    C : array_like, shape (n,)
-        Attraction rate of the slip law, >= 0; m/s with unit weights (the paper).
-    sigma_2 : float
-        Viscous friction, Ns/m, >= 0.
-    stribeck : Stribeck
-        The curve common to all elements.
-    v_c : float
-        Velocity under which an element may arrest, m/s, > 0.
-    weights : array_like, shape (n,), optional
-        Threshold weights w_i, m/N, > 0: element i slips at ``|z_i| = w_i s(v)``. Left out they are
-        1 m/N, which is the paper's reading (it compares z in m with s(v) in N).
+    Returns
+    -------
+    dict of str to float or ndarray, shape (n,)
+        Floats and read-only copies.
 
     Raises
     ------
@@ -143,191 +367,51 @@ class GMSParameters:
 
     Examples
     --------
-    >>> p = GMSParameters([100, 50], [1, 1], [0.1, 0.1], sigma_2=0.4,
-    ...                   stribeck=Stribeck(1.0, 1.5, 1e-3), v_c=1e-6)
-    >>> p.n, p.weights.tolist()
-    (2, [1.0, 1.0])
+    >>> curve = Parameter("F_c", "N", "> 0"), Parameter("F_s", "N", ">= F_c")
+    >>> checked_values(curve, {"F_c": 1, "F_s": 1.5})
+    {'F_c': 1.0, 'F_s': 1.5}
+    >>> checked_values(curve, {"F_c": 1, "F_s": 0.5})
+    Traceback (most recent call last):
+    gms_fsm.errors.ParameterError: F_s is 0.5, F_c is 1.0; F_s must be at least F_c (F_s >= F_c)
     """
+    known = {each.name: each for each in parameters}
+    checked = {name: _checked(each, values[name], n) for name, each in known.items()}
+    for each in known.values():
+        for bound in each.bounds:
+            if isinstance(bound.limit, str) and bound.limit in known:
+                _compare(each, known[bound.limit], bound, checked)
+    return checked
 
-    k: FloatArray
-    sigma: FloatArray
-    C: FloatArray
-    sigma_2: float
-    stribeck: Stribeck
-    v_c: float
-    weights: FloatArray
 
-    def __init__(
-        self,
-        k: ArrayLike,
-        sigma: ArrayLike,
-        C: ArrayLike,
-        *,
-        sigma_2: float,
-        stribeck: Stribeck,
-        v_c: float,
-        weights: ArrayLike | None = None,
-    ) -> None:
-        stiffness = checked_array("k", k, None, "> 0")
-        n = stiffness.size
-        if not isinstance(stribeck, Stribeck):
-            raise ParameterError(
-                f"stribeck is {stribeck!r}; it must be a Stribeck, for example "
-                "Stribeck(1, 1.5, 1e-3)"
-            )
-        values = {
-            "k": stiffness,
-            "sigma": checked_array("sigma", sigma, n, ">= 0"),
-            "C": checked_array("C", C, n, ">= 0"),
-            "sigma_2": checked_scalar("sigma_2", sigma_2, ">= 0"),
-            "stribeck": stribeck,
-            "v_c": checked_scalar("v_c", v_c, "> 0"),
-            "weights": checked_array(
-                "weights", np.ones(n) if weights is None else weights, n, "> 0"
-            ),
-        }
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
+def _checked(parameter: Parameter, value: Any, n: int) -> float | FloatArray:
+    name, rule = parameter.name, parameter.rule
+    if not _is_list(value):
+        return checked_scalar(name, value, rule)
+    if not parameter.per_element:
+        raise ParameterError(f"{name} is {shown(value)}; it must be a number, one for all elements")
+    return checked_array(name, value, n, rule)
 
-    @property
-    def n(self) -> int:
-        """Number of elements."""
-        return int(self.k.size)
 
-    def with_weights(self, weights: ArrayLike) -> GMSParameters:
-        """Return the same parameters with other threshold weights.
+def _is_list(value: Any) -> bool:
+    try:
+        return np.ndim(value) > 0
+    except ValueError:  # rows of different lengths
+        return True
 
-        Parameters
-        ----------
-        weights : array_like, shape (n,)
-            w_i, m/N, > 0.
 
-        Returns
-        -------
-        GMSParameters
-            A new object.
-        """
-        return GMSParameters(
-            self.k,
-            self.sigma,
-            self.C,
-            sigma_2=self.sigma_2,
-            stribeck=self.stribeck,
-            v_c=self.v_c,
-            weights=weights,
-        )
-
-    @classmethod
-    def paper(cls, column: str) -> GMSParameters:
-        """Return a column of the paper's Table I (SI units, unit weights).
-
-        Parameters
-        ----------
-        column : {"non-drifting", "stick-slip"}
-            Which experiment.
-
-        Returns
-        -------
-        GMSParameters
-            Four elements.
-
-        Raises
-        ------
-        ParameterError
-            If there is no such column.
-
-        Examples
-        --------
-        >>> GMSParameters.paper("stick-slip").C.tolist()
-        [0.1, 0.05, 0.025, 0.0001]
-        """
-        if column == "non-drifting":
-            return cls(
-                [100, 10, 1, 0.1],
-                [10, 0.1, 1, 1],
-                [1, 1, 1, 1],
-                sigma_2=4,
-                stribeck=Stribeck(F_c=1, F_s=1.5, v_s=1e-3),
-                v_c=1e-6,
-            )
-        if column == "stick-slip":
-            return cls(
-                [0.7, 0.7, 0.7, 0.7],
-                [0.3, 0.4, 0.5, 0.6],
-                [0.1, 0.05, 0.025, 1e-4],
-                sigma_2=0.1,
-                stribeck=Stribeck(F_c=0.4, F_s=1.5, v_s=1e-3),
-                v_c=1e-6,
-            )
+def _compare(
+    one: Parameter, other: Parameter, bound: Bound, values: Mapping[str, float | FloatArray]
+) -> None:
+    """Check a bound that names another parameter."""
+    pair = np.broadcast_arrays(values[one.name], values[other.name])
+    value, limit = (np.atleast_1d(each) for each in pair)
+    for i in np.flatnonzero(~bound.holds(value, limit))[:1]:
+        place = f"[{i}] (element {i + 1})" if pair[0].ndim else ""
+        least = f"the {other.meaning}" if other.meaning else other.name
         raise ParameterError(
-            f"Table I has no column {column!r}; it has {' and '.join(map(repr, PAPER_COLUMNS))}"
-        )
-
-    @classmethod
-    def from_shares(
-        cls,
-        alpha: ArrayLike,
-        k: ArrayLike,
-        *,
-        C: float,
-        stribeck: Stribeck,
-        v_c: float,
-        sigma: ArrayLike | None = None,
-        sigma_2: float = 0.0,
-    ) -> GMSParameters:
-        """Return parameters in Al-Bender's form: element i carries the share alpha_i of friction.
-
-        ``w_i = alpha_i / k_i`` and ``C_i = alpha_i C / k_i``, so that in steady slip the forces
-        ``k_i z_i`` add up to s(v).
-
-        Parameters
-        ----------
-        alpha : array_like, shape (n,)
-            Shares, > 0, sum 1.
-        k : array_like, shape (n,)
-            Stiffness, N/m, > 0.
-        C : float
-            Attraction parameter of the whole bank, N/s, >= 0.
-        stribeck : Stribeck
-            The curve.
-        v_c : float
-            m/s, > 0.
-        sigma : array_like, shape (n,), optional
-            Bristle damping, Ns/m; none when left out.
-        sigma_2 : float
-            Viscous friction, Ns/m.
-
-        Returns
-        -------
-        GMSParameters
-            With weights in m/N.
-
-        Raises
-        ------
-        ParameterError
-            If the shares do not add up to 1, or a parameter breaks its rule.
-
-        Examples
-        --------
-        >>> p = GMSParameters.from_shares([0.5, 0.5], [40, 10], C=2.0,
-        ...                               stribeck=Stribeck(1, 1.5, 1e-3), v_c=1e-4)
-        >>> p.weights.tolist(), p.C.tolist()
-        ([0.0125, 0.05], [0.025, 0.1])
-        """
-        stiffness = checked_array("k", k, None, "> 0")
-        shares = checked_array("alpha", alpha, stiffness.size, "> 0")
-        rate = checked_scalar("C", C, ">= 0")
-        total = math.fsum(shares)
-        if abs(total - 1.0) > 1e-9:
-            raise ParameterError(f"alpha adds up to {total!r}; the shares must add up to 1")
-        return cls(
-            stiffness,
-            np.zeros(stiffness.size) if sigma is None else sigma,
-            shares * rate / stiffness,
-            sigma_2=sigma_2,
-            stribeck=stribeck,
-            v_c=v_c,
-            weights=shares / stiffness,
+            f"{one.name}{place} is {float(value[i])!r}, {other.name}{place} is "
+            f"{float(limit[i])!r}; {one.meaning or one.name} must be {_IN_WORDS[bound.op]} "
+            f"{least} ({one.name} {bound.text})"
         )
 
 

@@ -7,18 +7,25 @@ Printed, an explanation is the text that the debugger says; there elements count
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from gms_fsm.charts.chart import Chart, Transition
-from gms_fsm.language.expression import MATLAB_LIKE, Condition, Relation, clauses, evaluate, spell
+from gms_fsm.language import (
+    MATLAB_LIKE,
+    Condition,
+    Relation,
+    clauses,
+    evaluate,
+    names_in,
+    spell,
+)
+from gms_fsm.traces.scope import Scope
 from gms_fsm.traces.trace import Trace
 
 __all__ = ["Clause", "Explanation", "Why", "explain", "explain_state", "holds", "values_at"]
 
 ROUNDING = 1e-8  # a margin this small beside both sides is the clock's and the floats', not physics
-UNITS = {"t": "s", "x": "m", "v": "m/s", "v_c": "m/s", "z": "m", "s": "m"}
 
 
 @dataclass(frozen=True)
@@ -37,6 +44,8 @@ class Clause:
         How far it is on the true side (negative: on the false side); NaN for a compound clause.
     computable : bool
         False where it has no value (1/0); it then counts as false.
+    unit : str
+        Of the margin, where the units of its names leave no doubt; else empty.
     """
 
     text: str
@@ -45,6 +54,7 @@ class Clause:
     right: float
     margin: float
     computable: bool = True
+    unit: str = ""
 
 
 @dataclass(frozen=True)
@@ -158,17 +168,7 @@ def values_at(trace: Trace, row: int, element: int) -> dict[str, float]:
     dict of str to float
         t, x, v, s, the variables and the parameters.
     """
-    values = {
-        "t": float(trace.t[row]),
-        "x": float(trace.x[row]),
-        "v": float(trace.v[row]),
-        "s": float(trace.s[row, element]),
-    }
-    for name in trace.model.chart.variables:
-        values[name] = float(trace.variable(name)[row, element])
-    for name, value in trace.model.values.items():
-        values[name] = float(value if isinstance(value, float | int) else value[element])
-    return values
+    return Scope.at(trace, row).guards(element)
 
 
 def explain(trace: Trace, row: int, element: int) -> Why:
@@ -210,7 +210,7 @@ def explain(trace: Trace, row: int, element: int) -> Why:
             f"row {row}, element {element}: the trace has {len(trace)} rows, {trace.n} elements"
         )
     row %= len(trace)
-    chart, modes = trace.model.chart, trace.rows.mode[:, element]
+    chart, modes = trace.model.chart, trace.modes[:, element]
     fired = _edge_taken(trace, row, element)
     before = row - 1 if fired else row
     now, asked = (chart.states[int(modes[r])].name for r in (row, before))
@@ -247,7 +247,7 @@ def explain_state(
         Explanation(
             edge,
             priority,
-            tuple(_clause(part, values) for part in clauses(chart.guards[edge.name])),
+            tuple(_clause(chart, part, values) for part in clauses(chart.guards[edge.name])),
             true[edge.name],
             taken,
             bool(fired),
@@ -272,7 +272,7 @@ def _only_slides(trace: Trace, row: int) -> bool:
     return same and bool(trace.microstep[row - 1] == trace.microstep[row])
 
 
-def _clause(part: Condition, values: Mapping[str, float]) -> Clause:
+def _clause(chart: Chart, part: Condition, values: Mapping[str, float]) -> Clause:
     text = spell(part, MATLAB_LIKE)
     try:
         truth = bool(evaluate(part, values))
@@ -282,7 +282,14 @@ def _clause(part: Condition, values: Mapping[str, float]) -> Clause:
     except (ArithmeticError, ValueError):
         return Clause(text, False, math.nan, math.nan, math.nan, computable=False)
     margin = left - right if part.op in (">", ">=") else right - left
-    return Clause(text, truth, left, right, margin)
+    return Clause(text, truth, left, right, margin, unit=_unit(chart, part, text))
+
+
+def _unit(chart: Chart, part: Condition, text: str) -> str:
+    """Return the unit in which both sides of a comparison are: that of its names, if all agree."""
+    units = {chart.unit(name) for name in names_in(part)} - {""}
+    plain = not set(text) & set("*/^()")
+    return units.pop() if plain and len(units) == 1 else ""
 
 
 def holds(condition: Condition, values: Mapping[str, float]) -> bool:
@@ -348,13 +355,5 @@ def _sides(clause: Clause) -> str:
 def _amount(clause: Clause, *, signed: bool) -> str:
     if abs(clause.margin) <= ROUNDING * max(abs(clause.left), abs(clause.right)):
         return "0 (rounding)"
-    return f"{clause.margin if signed else abs(clause.margin):{'+' if signed else ''}.3g}" + _unit(
-        clause
-    )
-
-
-def _unit(clause: Clause) -> str:
-    """Return the unit of a clause's margin where its names leave no doubt."""
-    units = {UNITS.get(name, "?") for name in re.findall(r"[A-Za-z_]\w*", clause.text)}
-    plain = not set(clause.text) & set("*/^()")
-    return f" {units.pop()}" if plain and len(units) == 1 and "?" not in units else ""
+    shown = f"{clause.margin:+.3g}" if signed else f"{abs(clause.margin):.3g}"
+    return f"{shown} {clause.unit}".rstrip()

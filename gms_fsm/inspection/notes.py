@@ -12,8 +12,10 @@ import numpy as np
 
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.inspection.explain import holds, values_at
-from gms_fsm.language.expression import Call, Name, Relation, Value, clauses, evaluate
+from gms_fsm.language import Call, Name, Relation, Value, clauses, evaluate
 from gms_fsm.lowering.scales import scales_of
+from gms_fsm.systems.models import Model, parameters_of
+from gms_fsm.traces.scope import parameter_values
 from gms_fsm.traces.trace import Trace
 
 __all__ = ["notes_on"]
@@ -67,7 +69,7 @@ def _sizes(trace: Trace) -> Iterator[str]:
             yield (
                 f"no transition: no element comes near its threshold (largest |{name}| is "
                 f"{deflected:.2g} of it, the smallest threshold {thresholds.min():.3g}); if that "
-                "is not meant, check the units of k (N/m), weights (m/N) and motion (m)"
+                f"is not meant, check the units of {_scaling(model)}motion (m)"
             )
     elif stroke > FAR * float(thresholds.max()):
         yield (
@@ -75,6 +77,12 @@ def _sizes(trace: Trace) -> Iterator[str]:
             "largest threshold: nearly all of it is gross sliding; if pre-sliding is meant, check "
             "the unit of the motion (m)"
         )
+
+
+def _scaling(model: Model) -> str:
+    """Name the parameters that say how large thresholds and forces are, with their units."""
+    known = [each for each in parameters_of(model) if each.unit in ("N/m", "m/N")]
+    return ", ".join(f"{each.name} ({each.unit})" for each in known) + (" and " if known else "")
 
 
 def _windows(trace: Trace) -> Iterator[str]:
@@ -86,12 +94,8 @@ def _windows(trace: Trace) -> Iterator[str]:
     for edge, bound in _velocity_windows(chart):
         missed = []
         for i in range(whole.n):
-            values = {
-                name: float(np.broadcast_to(u, whole.n)[i])
-                for name, u in whole.model.values.items()
-            }
             try:
-                c = float(evaluate(bound, values))
+                c = float(evaluate(bound, parameter_values(whole.model, i)))
             except (KeyError, ArithmeticError, ValueError):
                 continue  # it depends on more than parameters
             inside = whole.modes[:, i] == chart.state_index(edge.source)

@@ -1,300 +1,36 @@
 """The step-by-step core: stop a run at a guard, see why, go back, change a value, compare.
 
 No user interface here. A session holds branches; a branch is a run under way, row by row, with a
-cursor. Rows once computed are kept, so going back and forward shows the same bits. A poke makes a
-new branch from the row under the cursor; the branch it came from stays as it is. A run that cannot
-go on is no exception here but an outcome of its branch.
+cursor. A poke makes a new branch from the row under the cursor; the branch it came from stays as it
+is.
 """
 
 from __future__ import annotations
 
-import json
-import signal
-import threading
-from bisect import bisect_left
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Unpack
 
-import numpy as np
-
-from gms_fsm._files import written_whole
-from gms_fsm.errors import ExpressionError, ParameterError, SessionError, TraceFileError, shown, why
-from gms_fsm.inspection.explain import Why, explain_state, holds
-from gms_fsm.language.expression import Condition, Value, evaluate, parse_condition, parse_value
+from gms_fsm.errors import SessionError, TraceFileError, why
+from gms_fsm.inspection import _breakpoints, _conditions, _session_file, _walker
+from gms_fsm.inspection._asked import check_branch, check_element, checked_settings
+from gms_fsm.inspection._branch import Branch
+from gms_fsm.inspection._breakpoints import KINDS, Breakpoint
+from gms_fsm.inspection._conditions import holds_at
+from gms_fsm.inspection._here import here_at, why_at
+from gms_fsm.inspection._poking import Edits, initial_with
+from gms_fsm.inspection._session_file import BranchRecord, SessionRecord
+from gms_fsm.inspection._told import Comparison, Fired, Here, compared
+from gms_fsm.inspection.explain import Why
+from gms_fsm.language import Condition
+from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import Run
 from gms_fsm.run.start import Start
-from gms_fsm.systems.models import Model, parameter_names
+from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
-from gms_fsm.systems.signals import Function
-from gms_fsm.traces._header import Header
-from gms_fsm.traces.failures import SimulationError
-from gms_fsm.traces.trace import Rows, Trace, interpolated, log_of
-from integrators import Firing, Stop
+from gms_fsm.traces.scope import watch_names
 
-__all__ = ["Branch", "Breakpoint", "Comparison", "Fired", "Here", "Session"]
-
-Kind = Literal["tested", "valid", "fires", "enter", "leave"]
-KINDS: tuple[Kind, ...] = ("tested", "valid", "fires", "enter", "leave")
-LOOKS = 16  # places between two rows at which a condition is tried
-HALVINGS = 60
-Row: TypeAlias = tuple[float, int, list[float], tuple[int, ...]]  # time, micro-step, y, modes
-
-
-@dataclass(frozen=True)
-class Fired:
-    """The firing that made a row.
-
-    Parameters
-    ----------
-    element : int
-        Counted from 0.
-    edge, source, target : str
-        The edge taken, the state it left and the state it entered.
-    """
-
-    element: int
-    edge: str
-    source: str
-    target: str
-
-    def __str__(self) -> str:
-        return f"element {self.element + 1}: {self.source} -> {self.target} by {self.edge}"
-
-
-@dataclass(frozen=True)
-class Here:
-    """One row of a branch; printed, it is what the debugger says after a move.
-
-    Parameters
-    ----------
-    row : int
-        Its number in the branch.
-    t, x, v, F : float
-        s, m, m/s, N.
-    microstep : int
-        0 before the firings of this time.
-    z, s, F_elements : tuple of float
-        m, m, N; one an element (z is the chart's first variable).
-    states : tuple of str
-        Active states.
-    located : bool
-        Whether it lies between rows, where a condition became true.
-    fired : Fired or None
-        The firing that made it, if one did.
-    """
-
-    row: int
-    t: float
-    microstep: int
-    x: float
-    v: float
-    F: float
-    z: tuple[float, ...]
-    s: tuple[float, ...]
-    F_elements: tuple[float, ...]
-    states: tuple[str, ...]
-    located: bool
-    fired: Fired | None
-
-    def __str__(self) -> str:
-        place = f"between rows {self.row} and {self.row + 1}" if self.located else f"row {self.row}"
-        step = f", micro-step {self.microstep}" if self.microstep else ""
-        fired = "" if self.fired is None else f"\n  {self.fired}"
-        return f"{place}, t = {self.t:.9g} s{step}: v = {self.v:.6g} m/s, F = {self.F:.6g} N{fired}"
-
-
-@dataclass
-class Breakpoint:
-    """Where `Session.proceed` stops.
-
-    Parameters
-    ----------
-    kind : {"tested", "valid", "fires", "enter", "leave"}
-        Guard of an edge asked, guard becoming true, edge taken; state entered or left.
-    name : str
-        The edge's or the state's name.
-    element : int or None
-        Counted from 0; None for all.
-    condition : str
-        Must hold too; empty for none.
-    hits : int
-        Stop at this hit, and at every one after it.
-    seen : int
-        Hits so far.
-    """
-
-    kind: Kind
-    name: str
-    element: int | None = None
-    condition: str = ""
-    hits: int = 1
-    seen: int = 0
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """Two branches against each other; printed, the debugger's text.
-
-    Parameters
-    ----------
-    branches : tuple of int
-        Their numbers.
-    t : float
-        Until when, s (the shorter of the two).
-    transitions : tuple of int
-        How many each has until then.
-    first_difference : float or None
-        Time of the first transition that differs, s; None if none does.
-    variable : str
-        The chart's first.
-    z, F : float
-        Largest differences of this variable and of the friction force [N] on common times.
-    """
-
-    branches: tuple[int, int]
-    t: float
-    transitions: tuple[int, int]
-    first_difference: float | None
-    variable: str
-    z: float
-    F: float
-
-    def __str__(self) -> str:
-        (a, b), (p, q) = self.branches, self.transitions
-        z = f"{self.variable} {self.z:.3g}{' m' if self.variable == 'z' else ''}"
-        return (
-            f"branches {a} and {b} until t = {self.t:.9g} s: {p} and {q} transitions\n"
-            + (
-                "  the same transitions\n"
-                if self.first_difference is None
-                else f"  first different transition at t = {self.first_difference:.9g} s\n"
-            )
-            + f"  largest difference: {z}, F {self.F:.3g} N"
-        )
-
-
-class Branch:
-    """A run under way, row by row, behind an unchanged part of its parent.
-
-    Parameters
-    ----------
-    run : Run
-        From where the branch begins.
-    parent : int or None
-        Number of the branch it was poked from.
-    fork : int
-        The parent's row under the cursor then; rows 0 to fork are shared.
-    shared : Branch or None
-        The parent itself.
-    edits : mapping
-        What was poked.
-    begin : row or None
-        The place of the poke, as `raw` has it, if it was between two rows: a row of this branch.
-    """
-
-    def __init__(
-        self,
-        run: Run,
-        parent: int | None = None,
-        fork: int = -1,
-        shared: Branch | None = None,
-        edits: Mapping[str, Any] | None = None,
-        begin: Row | None = None,
-    ) -> None:
-        self.run, self.parent, self.fork, self.shared = run, parent, fork, shared
-        self.edits, self.begin = dict(edits or {}), begin
-        self.outcome = ""  # "" while it goes on, "end", or the message of what stopped it
-        self.cursor = 0
-        self.between: tuple[float, list[float]] | None = None  # a located place behind the cursor
-        self.offset = fork + 1 + (begin is not None)
-        self.stops: set[int] = set()  # rows at which the machines were asked
-        self.firings: list[int] = []  # rows made by firings, own part
-        self.pull()
-
-    # ------------------------------------------------------------------ rows
-    def __len__(self) -> int:
-        return self.offset + len(self.run.recorder.rows.t)
-
-    def pull(self) -> bool:
-        """Compute at least one more row; return whether there is one."""
-        before = len(self)
-        with _unbroken():
-            while not self.outcome and len(self) == before:
-                try:
-                    if not self.run.advance():
-                        self.outcome = "end"
-                    elif isinstance(self.run.event, Stop):
-                        self.stops.add(len(self) - 1)
-                    elif isinstance(self.run.event, Firing):
-                        self.firings.append(len(self) - 1)
-                except SimulationError as error:
-                    self.outcome = str(error)
-        return len(self) > before
-
-    def complete(self) -> None:
-        """Compute all rows up to the end, or to where the run cannot go on."""
-        while self.pull():
-            pass
-
-    def raw(self, row: int) -> Row:
-        """Return time, micro-step, state and modes of a row."""
-        if row <= self.fork:
-            assert self.shared is not None
-            return self.shared.raw(row)
-        if row < self.offset:
-            assert self.begin is not None
-            return self.begin
-        rows, i = self.run.recorder.rows, row - self.offset
-        return rows.t[i], rows.microstep[i], rows.y[i], rows.mode[i]
-
-    def log(self) -> list[tuple[Any, ...]]:
-        """Return all firings so far, the shared part included."""
-        before: list[tuple[Any, ...]] = []
-        if self.shared is not None:
-            before = [self.shared.record(row) for row in self.shared.firing_rows(self.fork + 1)]
-        return before + self.run.recorder.log
-
-    def firing_rows(self, end: int) -> list[int]:
-        """Return the rows before `end` that firings made."""
-        before = [] if self.shared is None else self.shared.firing_rows(min(end, self.fork + 1))
-        return before + self.firings[: bisect_left(self.firings, end)]
-
-    def record(self, row: int) -> tuple[Any, ...]:
-        """Return the log's record of the firing that made a row."""
-        if row <= self.fork:
-            assert self.shared is not None
-            return self.shared.record(row)
-        return self.run.recorder.log[bisect_left(self.firings, row)]
-
-    def fired(self, row: int) -> Fired | None:
-        """Return the firing that made a row, None if none did."""
-        if row not in self.firing_rows(row + 1)[-1:]:
-            return None
-        _, element, edge, source, target = self.record(row)[:5]
-        return Fired(int(element), str(edge), str(source), str(target))
-
-    def trace(self) -> Trace:
-        """Return the branch so far as a trace."""
-        raw = [self.raw(row) for row in range(len(self))]
-        recorder = self.run.recorder
-        modes = recorder.start.program.modes
-        rows = Rows(
-            np.array([r[0] for r in raw]),
-            np.array([r[1] for r in raw], dtype=np.int64),
-            np.array([r[2] for r in raw]),
-            np.array([r[3] for r in raw], dtype=np.int64).reshape(len(raw), modes),
-        )
-        return Trace(
-            rows,
-            rows,
-            log_of(self.log()),
-            recorder.start.model,
-            recorder.start.rig,
-            recorder.start.settings,
-        )
+__all__ = ["KINDS", "Branch", "Breakpoint", "Comparison", "Fired", "Here", "Session"]
 
 
 class Session:
@@ -302,8 +38,8 @@ class Session:
 
     Parameters
     ----------
-    model, rig, t_end, **options
-        As for `gms_fsm.simulate` (without ``t_eval`` and ``progress``).
+    model, rig, t_end, t_start, initial, settings, **options
+        As for `gms_fsm.simulate`; there is a row at every step, so no ``t_eval``.
 
     Attributes
     ----------
@@ -335,25 +71,38 @@ class Session:
       element 1: stick -> slip by break_away_forward
     """
 
-    def __init__(self, model: Model, rig: Rig, t_end: float, **options: Any) -> None:
-        for name in ("t_eval", "progress"):
-            if name in options:
-                raise ParameterError(f"{name} does not go with a session: it stops at every row")
-        if "monitors" in options:
-            raise ParameterError(
-                "monitors look at a finished run: "
-                "gms_fsm.traces.monitors.examine(session.branch.trace(), ...)"
-            )
-        if not isinstance(options.get("engine", ""), str):
-            raise ParameterError(
-                "engine: every branch of a session makes machines of its own; use 'machines' or "
-                "'ifelse'"
-            )
-        self.model, self.rig, self.t_end, self.options = model, rig, t_end, dict(options)
-        self.branches = [Branch(Run(Start.of(model, rig, t_end, rows_at_once=1, **options)))]
+    def __init__(
+        self,
+        model: Model,
+        rig: Rig,
+        t_end: float,
+        *,
+        t_start: float = 0.0,
+        initial: Mapping[str, Any] | None = None,
+        settings: Settings | None = None,
+        **options: Unpack[SettingOptions],
+    ) -> None:
+        self.settings = checked_settings(settings, options)
+        self.model, self.rig, self.t_end = model, rig, t_end
+        self.t_start, self.initial = t_start, initial
+        self.branches = [Branch(self._run(t_start, initial))]
         self.current = 0
         self.breakpoints: list[Breakpoint] = []
         self.watches: list[str] = []
+
+    def _run(self, t_start: float, initial: Mapping[str, Any] | None) -> Run:
+        """Return a run of this model from other values."""
+        return Run(
+            Start.of(
+                self.model,
+                self.rig,
+                self.t_end,
+                self.settings,
+                t_start=t_start,
+                initial=initial,
+                rows_at_once=1,
+            )
+        )
 
     def __repr__(self) -> str:
         branch = f", branch {self.current}" if self.current else ""
@@ -386,41 +135,7 @@ class Session:
         Here
             The row.
         """
-        branch = self.branch
-        t, microstep, y, mode = branch.raw(row)
-        located = row == branch.cursor and branch.between is not None
-        if located:
-            assert branch.between is not None
-            (t, y), microstep = branch.between, 0
-        return self._here(row, t, microstep, y, mode, located)
-
-    def _here(
-        self,
-        row: int,
-        t: float,
-        microstep: int,
-        y: list[float],
-        mode: tuple[int, ...],
-        located: bool = False,
-    ) -> Here:
-        recorder, n = self.branch.run.recorder, self.model.n
-        seen = recorder.observe(t, y, mode)
-        first = recorder.start.program.first
-        names = [state.name for state in self.model.chart.states]
-        return Here(
-            row,
-            t,
-            microstep,
-            y[0],
-            seen[0],
-            seen[1],
-            tuple(y[first : first + n]),
-            tuple(seen[2 : 2 + n]),
-            tuple(seen[2 + n : 2 + 2 * n]),
-            tuple(names[m] for m in mode[:n]),
-            located,
-            None if located else self.branch.fired(row),
-        )
+        return here_at(self.branch, row)
 
     # ------------------------------------------------------------------ walking
     def step(self, count: int = 1) -> Here:
@@ -436,14 +151,7 @@ class Session:
         Here
             Where it stopped: the last row if the run ended before.
         """
-        branch = self.branch
-        if count < 0:
-            raise SessionError(f"count is {count}; it must be at least 0")
-        branch.between = None
-        for _ in range(count):
-            if branch.cursor + 1 >= len(branch) and not branch.pull():
-                break
-            branch.cursor += 1
+        _walker.step(self.branch, count)
         return self.here
 
     def back(self, count: int = 1) -> Here:
@@ -459,39 +167,17 @@ class Session:
         Here
             Where it stopped.
         """
-        branch = self.branch
-        if count < 0:
-            raise SessionError(f"count is {count}; it must be at least 0")
-        if branch.between is not None and count > 0:  # from a located place to the row before it
-            branch.between, count = None, count - 1
-        branch.cursor = max(0, branch.cursor - count)
+        _walker.back(self.branch, count)
         return self.here
-
-    def _forward(self) -> Iterator[int]:
-        """Walk forward; yield each new row's number."""
-        branch = self.branch
-        while True:
-            before = branch.cursor
-            self.step()
-            if branch.cursor == before:
-                return
-            yield branch.cursor
 
     def next_transition(self) -> Here:
         """Go forward to the next firing (or the end)."""
-        for row in self._forward():
-            if self.branch.raw(row)[1] > 0:
-                break
+        _walker.next_firing(self.branch)
         return self.here
 
     def prev_transition(self) -> Here:
         """Go back to the firing before (or the start)."""
-        branch = self.branch
-        row = branch.cursor - (branch.between is None)
-        branch.between = None
-        while row > 0 and branch.raw(row)[1] == 0:
-            row -= 1
-        branch.cursor = max(row, 0)
+        _walker.previous_firing(self.branch)
         return self.here
 
     def goto(self, t: float) -> Here:
@@ -512,18 +198,7 @@ class Session:
         SessionError
             If the time lies before the start, or is no number.
         """
-        branch = self.branch
-        start = branch.raw(0)[0]
-        if not t >= start:
-            raise SessionError(f"t = {shown(t)} s lies before the start, {start!r} s")
-        branch.between = None
-        while branch.raw(len(branch) - 1)[0] <= t and branch.pull():
-            pass
-        low, high = 0, len(branch)
-        while high - low > 1:  # rows are in time order
-            middle = (low + high) // 2
-            low, high = (middle, high) if branch.raw(middle)[0] <= t else (low, middle)
-        branch.cursor = low
+        _walker.goto(self.branch, t)
         return self.here
 
     # ------------------------------------------------------------------ conditions
@@ -533,11 +208,7 @@ class Session:
 
         A single element's variables need no number.
         """
-        elements, variables = range(1, self.model.n + 1), self.model.chart.variables
-        bare = variables if self.model.n == 1 else ()
-        threshold = () if self.model.stribeck is None else ("s",)
-        numbered = (f"{name}{i}" for name in (*variables, *threshold, "F") for i in elements)
-        return ["t", "x", "v", "F", *threshold, *bare, *numbered]
+        return watch_names(self.model)
 
     def parse(self, text: str) -> Condition:
         """Read a condition such as ``"z1 > 0.3 and state(2) == slip"``.
@@ -558,52 +229,11 @@ class Session:
         ExpressionError
             With column and what is allowed.
         """
-        states = [state.name for state in self.model.chart.states]
-        n = self.model.n
-        with self._numbered():
-            return parse_condition(text, self.names, states, n, own_state=n == 1)
+        return _conditions.read(self.model, text)
 
-    @contextmanager
-    def _numbered(self) -> Iterator[None]:
-        """Say of a variable without an element's number that it needs one."""
-        try:
-            yield
-        except ExpressionError as error:
-            for name in self.model.chart.variables:
-                if error.reason == f"unknown name {name!r}":
-                    reason = f"{error.reason}; for element 1 write {name}1"
-                    raise ExpressionError(reason, error.text, error.column, error.allowed) from None
-            raise
-
-    def values(self, here: Here | None = None) -> dict[str, Any]:
-        """Return a value for every name of a condition, at the cursor if not said otherwise."""
-        here = self.here if here is None else here
-        y = self._state_of(here)
-        found: dict[str, Any] = {
-            "t": here.t,
-            "x": here.x,
-            "v": here.v,
-            "F": here.F,
-            "s": here.s[0] / float(self.model.weights[0]),
-        }
-        n, first = self.model.n, self.branch.run.recorder.start.program.first
-        for i in range(n):
-            for j, name in enumerate(self.model.chart.variables):
-                found[f"{name}{i + 1}"] = y[first + j * n + i]
-            found |= {
-                f"s{i + 1}": here.s[i],
-                f"F{i + 1}": here.F_elements[i],
-                f"state({i + 1})": here.states[i],
-            }
-        if n == 1:
-            found |= {name: found[f"{name}1"] for name in self.model.chart.variables}
-            found["state(0)"] = here.states[0]  # what `state == name` asks for
-        return found
-
-    def _state_of(self, here: Here) -> list[float]:
-        if here.located and self.branch.between is not None:
-            return self.branch.between[1]
-        return self.branch.raw(here.row)[2]
+    def values(self) -> dict[str, Any]:
+        """Return a value for every name of a condition, at the cursor."""
+        return self.branch.scope(self.branch.here).watches()
 
     def watch(self, text: str) -> float:
         """Return the value of an expression at the cursor.
@@ -625,12 +255,7 @@ class Session:
         SessionError
             If it cannot be computed here (a division by zero).
         """
-        with self._numbered():
-            tree: Value = parse_value(text, self.names)
-        try:
-            return float(evaluate(tree, self.values()))
-        except (ArithmeticError, ValueError) as error:
-            raise SessionError(f"{text!r} cannot be computed here: {error}") from None
+        return _conditions.value_of(self.model, text, self.values())
 
     def until(self, condition: str) -> Here:
         """Go forward to where a condition next becomes true, located between the rows.
@@ -671,78 +296,8 @@ class Session:
         >>> session.reaches("t > 1"), session.here.t  # it is, and stays so
         (False, 20.0)
         """
-        tree, branch = self.parse(condition), self.branch
-        truth = self._holds(tree, self.here)
-        begin = branch.between  # a second `until` starts from a located place
-        while True:
-            row = branch.cursor
-            if row + 1 >= len(branch) and not branch.pull():
-                branch.between = None
-                branch.cursor = len(branch) - 1
-                return False
-            place, truth = self._first_true(tree, row, begin, truth)
-            begin = None
-            if place is not None:
-                branch.between = place
-                return True
-            branch.between = None
-            branch.cursor = row + 1
-            now = self._holds(tree, self.here)
-            if now and not truth:
-                return True
-            truth = now
-
-    def _holds(self, tree: Condition, here: Here) -> bool:
-        return holds(tree, self.values(here))
-
-    def _first_true(
-        self, tree: Condition, row: int, begin: tuple[float, list[float]] | None, truth: bool
-    ) -> tuple[tuple[float, list[float]] | None, bool]:
-        """Look between a row and the next for the place where the tree becomes true."""
-        branch = self.branch
-        t0, _, y0, mode = branch.raw(row)
-        t1, microstep, y1, _ = branch.raw(row + 1)
-        start = t0 if begin is None else begin[0]
-        if microstep > 0 or t1 <= start:
-            return None, truth
-        program = branch.run.recorder.start.program
-        a, b = np.array(y0), np.array(y1)
-
-        def place(t: float) -> tuple[float, list[float]]:
-            y = interpolated(program, list(mode), t0, a, t1, b, t)
-            return t, [float(u) for u in y]
-
-        def true_at(t: float) -> bool:
-            branch.between = place(t)
-            found = self._holds(tree, self._here(row, t, 0, branch.between[1], mode, True))
-            branch.between = None
-            return found
-
-        low = start
-        for look in range(1, LOOKS):
-            t = start + (t1 - start) * look / LOOKS
-            now = true_at(t)
-            if now and not truth:
-                high = t
-                for _ in range(HALVINGS):
-                    middle = 0.5 * (low + high)
-                    if not low < middle < high:
-                        break
-                    low, high = (low, middle) if true_at(middle) else (middle, high)
-                return place(high), True
-            low, truth = t, now
-        # The next row itself is looked at by the caller; the last stretch is searched here.
-        at_end = self._holds(tree, self._here(row + 1, *branch.raw(row + 1)))
-        if at_end and not truth:
-            high = t1
-            for _ in range(HALVINGS):
-                middle = 0.5 * (low + high)
-                if not low < middle < high:
-                    break
-                low, high = (low, middle) if true_at(middle) else (middle, high)
-            if high < t1:
-                return place(high), True
-        return None, truth
+        tree = self.parse(condition)
+        return _walker.reaches(self.branch, lambda row: holds_at(tree, self.branch, row))
 
     # ------------------------------------------------------------------ breakpoints
     def break_on(
@@ -776,19 +331,11 @@ class Session:
             If the condition cannot be read.
         """
         chart = self.model.chart
-        if kind not in KINDS:
-            raise SessionError(f"breakpoint kind {kind!r}; it must be one of {', '.join(KINDS)}")
-        edges, states = [e.name for e in chart.transitions], [s.name for s in chart.states]
-        known, what = (states, "state") if kind in ("enter", "leave") else (edges, "edge")
-        if name not in known:
-            raise SessionError(f"no {what} {name!r}; there are {', '.join(known) or 'none'}")
+        found = _breakpoints.new_breakpoint(chart, kind, name, element, condition, hits)
         if element is not None:
-            self._check_element(element)
-        if hits < 1:
-            raise SessionError(f"hits is {hits}; it must be at least 1")
+            check_element(element, self.model)
         if condition:
             self.parse(condition)
-        found = Breakpoint(kind, name, element, condition, hits)
         self.breakpoints.append(found)
         return found
 
@@ -800,51 +347,13 @@ class Session:
         (Here, Breakpoint or None)
             Where, and which; None at the end of the run.
         """
-        for row in self._forward():
+        for row in _walker.forward(self.branch):
             for point in self.breakpoints:
-                if self._hits(point, row):
+                if _breakpoints.hits(point, self.model, self.branch, row):
                     point.seen += 1
                     if point.seen >= point.hits:
                         return self.here, point
         return self.here, None
-
-    def _hits(self, point: Breakpoint, row: int) -> bool:
-        elements = range(self.model.n) if point.element is None else (point.element,)
-        if not any(self._happens(point, row, i) for i in elements):
-            return False
-        return not point.condition or self._holds(self.parse(point.condition), self.at(row))
-
-    def _happens(self, point: Breakpoint, row: int, i: int) -> bool:
-        chart, branch = self.model.chart, self.branch
-        before, now = branch.raw(row - 1), branch.raw(row)
-        if point.kind in ("fires", "enter", "leave"):
-            fired = branch.fired(row)
-            if fired is None or fired.element != i:
-                return False
-            names = {"fires": fired.edge, "enter": fired.target, "leave": fired.source}
-            return names[point.kind] == point.name
-        source = chart.state_index(self._source(point.name))
-        if now[3][i] != source:
-            return False
-        if point.kind == "tested":
-            # The driver asks where an arc ends, and again after every firing. That a row was
-            # such a place is known when the next one is computed.
-            if row + 1 >= len(branch):
-                branch.pull()
-            return row in branch.stops or now[1] > 0
-        guard = chart.guards[point.name]
-        held = before[3][i] == source and holds(guard, self._guard_values(row - 1, i))
-        return not held and holds(guard, self._guard_values(row, i))
-
-    def _guard_values(self, row: int, i: int) -> dict[str, float]:
-        here = self.at(row)
-        y, n = self._state_of(here), self.model.n
-        first = self.branch.run.recorder.start.program.first
-        values = {"t": here.t, "x": here.x, "v": here.v, "s": here.s[i]}
-        values |= {name: y[first + j * n + i] for j, name in enumerate(self.model.chart.variables)}
-        for name, value in self.model.values.items():
-            values[name] = float(value if isinstance(value, float | int) else value[i])
-        return values
 
     def why(self, element: int = 0, edge: str = "") -> Why:
         """Explain the edges of an element at the cursor, clause by clause.
@@ -884,37 +393,8 @@ class Session:
         >>> session.why()[0].clauses[1].holds
         False
         """
-        self._check_element(element)
-        chart, here, row = self.model.chart, self.here, self.branch.cursor
-        state, left, taken = here.states[element], "", ""
-        source = self._source(edge) if edge else ""
-        fired = here.fired
-        if fired and fired.element == element and source in ("", fired.source):
-            left, taken, row = fired.source, fired.edge, row - 1
-        asked = left or state
-        if source not in ("", asked):
-            raise SessionError(f"{edge} leaves {source}; element {element + 1} is in {state}")
-        found = explain_state(chart, asked, self._guard_values(row, element), taken)
-        edges = tuple(each for each in found if edge in ("", each.edge.name))
-        return Why(element, here.t, state, left, edges)
-
-    def _source(self, edge: str) -> str:
-        """Return the state that an edge leaves."""
-        sources = {each.name: each.source for each in self.model.chart.transitions}
-        if edge not in sources:
-            raise SessionError(f"no edge {edge!r}; there are {', '.join(sources) or 'none'}")
-        return sources[edge]
-
-    def _check_element(self, element: int) -> None:
-        whole = isinstance(element, int | np.integer) and not isinstance(element, bool)
-        if not whole or not 0 <= element < self.model.n:
-            said = shown(element)
-            if said in [repr(edge.name) for edge in self.model.chart.transitions]:
-                said += f" (an edge is asked for by edge={said})"
-            raise SessionError(
-                f"no element {said}; there are 0 to {self.model.n - 1} (counted from 0 in Python, "
-                "from 1 in text)"
-            )
+        check_element(element, self.model)
+        return why_at(self.branch, element, edge)
 
     # ------------------------------------------------------------------ branches
     def poke(
@@ -958,55 +438,16 @@ class Session:
         >>> session.here.z[:2], session.here.states[3]
         ((-1.4, 0.0), 'slip')
         """
-        here, chart, n = self.here, self.model.chart, self.model.n
-        for what, given in (("variables", variables), ("state", state)):
-            if given is not None and not isinstance(given, Mapping):
-                raise SessionError(
-                    f"{what} is {shown(given)}; give a mapping, for example "
-                    "variables={'z': {0: 0.1}} or state={0: 'slip'}"
-                )
-        variables, state = dict(variables or {}), dict(state or {})
-        for name, values in variables.items():
-            if name in parameter_names(self.model):
-                raise SessionError(
-                    f"{name} is a parameter; for another value make another model and session"
-                )
-            if name not in chart.variables:
-                raise SessionError(f"no variable {name!r}; there are {', '.join(chart.variables)}")
-            if not isinstance(values, Mapping):
-                raise SessionError(
-                    f"{name} is {shown(values)}; give its values by element, for example "
-                    f"{{{name!r}: {{0: 0.1}}}}"
-                )
-        if not (any(variables.values()) or state or v is not None):
-            raise SessionError("nothing to poke; give variables, v or state")
-        for element in (*(i for values in variables.values() for i in values), *state):
-            self._check_element(element)
+        edits = Edits.of(self.model, variables, v, state)
+        branch, here = self.branch, self.branch.here
         if not here.t < self.t_end:
             raise SessionError(f"t = {here.t!r} s is the end of the run; go back first")
-        y, first = self._state_of(here), self.branch.run.recorder.start.program.first
-        initial: dict[str, Any] = {"x": here.x}
-        for j, name in enumerate(chart.variables):
-            initial[name] = list(y[first + j * n : first + (j + 1) * n])
-            for element, value in variables.get(name, {}).items():
-                initial[name][element] = value
-        initial["states"] = [state.get(i, name) for i, name in enumerate(here.states)]
-        if v is not None:
-            initial["v"] = v
-        elif self.rig.acceleration is not None:
-            initial["v"] = here.v
-        options = {**self.options, "t_start": here.t, "initial": initial}
-        run = Run(Start.of(self.model, self.rig, self.t_end, rows_at_once=1, **options))
-        edits = {
-            "variables": {name: dict(values) for name, values in variables.items()},
-            "v": v,
-            "state": state,
-        }
-        fork = self.branch.cursor
-        begin = (here.t, 0, list(y), self.branch.raw(fork)[3]) if here.located else None
-        branch = Branch(run, self.current, fork, self.branch, edits, begin)
-        branch.cursor = branch.offset
-        self.branches.append(branch)
+        prescribed = self.rig.acceleration is None
+        initial = initial_with(edits, branch.scope(here), prescribed=prescribed)
+        run = self._run(here.t, initial)
+        new = Branch(run, self.current, branch.cursor, branch, edits, branch.between)
+        new.cursor = new.offset
+        self.branches.append(new)
         self.current = len(self.branches) - 1
         return self.current
 
@@ -1028,8 +469,7 @@ class Session:
         SessionError
             If there is no such branch.
         """
-        if not 0 <= branch < len(self.branches):
-            raise SessionError(f"no branch {branch}; there are 0 to {len(self.branches) - 1}")
+        check_branch(branch, len(self.branches))
         self.current = branch
         return self.here
 
@@ -1069,34 +509,9 @@ class Session:
         if a is None:
             raise SessionError(f"branch {b} has no parent; name two branches")
         for number in (a, b):
-            if not 0 <= number < len(self.branches):
-                raise SessionError(f"no branch {number}; there are 0 to {len(self.branches) - 1}")
+            check_branch(number, len(self.branches))
             self.branches[number].complete()
-        first, second = self.branches[a].trace(), self.branches[b].trace()
-        t = min(float(first.t[-1]), float(second.t[-1]))
-        logs = [trace.transitions[trace.transitions.t <= t] for trace in (first, second)]
-        differs = None
-        for p, q in zip(*logs, strict=False):
-            if (p.t, p.element, p.edge) != (q.t, q.element, q.edge):
-                differs = float(min(p.t, q.t))
-                break
-        else:
-            shorter = min(len(logs[0]), len(logs[1]))
-            longer = max(logs, key=len)
-            if len(longer) > shorter:
-                differs = float(longer.t[shorter])
-        start = float(first.t[0])
-        times = np.linspace(start, t, 2000)
-        p, q = first.sample(times), second.sample(times)
-        return Comparison(
-            (a, b),
-            t,
-            (len(logs[0]), len(logs[1])),
-            differs,
-            self.model.chart.variables[0],
-            float(np.abs(p.z - q.z).max()),
-            float(np.abs(p.F - q.F).max()),
-        )
+        return compared((a, b), self.branches[a].trace(), self.branches[b].trace())
 
     # ------------------------------------------------------------------ files
     def save(self, path: str | Path) -> Path:
@@ -1121,33 +536,17 @@ class Session:
         OutputError
             If the rig is of a class of your own, or the file cannot be written.
         """
-        if any(isinstance(signal, Function) for signal in self.rig.signals.values()):
-            raise SessionError("a signal is a Python function, which a file cannot hold")
-        for name, value in self.options.items():
-            if not isinstance(value, str | int | float | dict | type(None)):
-                raise SessionError(f"the option {name} = {value!r} cannot be written to a file")
-        data = {
-            "format": "gms-fsm session 1",
-            "header": json.loads(Header.of(self.model, self.rig, {}).model_dump_json()),
-            "t_end": self.t_end,
-            "options": {k: _plain(v) for k, v in self.options.items()},
-            "branches": [
-                {
-                    "parent": b.parent,
-                    "fork": b.fork,
-                    "edits": b.edits,
-                    "cursor": b.cursor,
-                    "from": None if b.begin is None else b.begin[0],
-                    "between": None if b.between is None else b.between[0],
-                }
-                for b in self.branches
-            ],
-            "current": self.current,
-            "breakpoints": [asdict(point) for point in self.breakpoints],
-            "watches": self.watches,
-        }
-        text = json.dumps(data, indent=1).encode()
-        return written_whole(Path(path), lambda file: file.write(text))
+        record = SessionRecord(
+            self.model,
+            self.rig,
+            self.t_end,
+            _session_file.options_of(self.settings, self.t_start, self.initial),
+            [BranchRecord.of(branch) for branch in self.branches],
+            self.current,
+            self.breakpoints,
+            self.watches,
+        )
+        return _session_file.write(Path(path), record)
 
     @classmethod
     def load(cls, path: str | Path) -> Session:
@@ -1170,72 +569,30 @@ class Session:
         """
         path = Path(path)
         try:
-            data = json.loads(path.read_text(encoding="utf-8"))
-            if data["format"] != "gms-fsm session 1":
-                raise ValueError(f"format is {data['format']!r}")
-            header = Header.model_validate(data["header"])
-            session = cls(header.to_model(), header.to_rig(), data["t_end"], **data["options"])
-            for number, record in enumerate(data["branches"]):
-                if number > 0:
-                    session.switch(int(record["parent"]))
-                    session._walk_to(int(record["fork"]), record["from"])
-                    edits = record["edits"]
-                    session.poke(
-                        {name: _by_number(values) for name, values in edits["variables"].items()},
-                        edits["v"],
-                        _by_number(edits["state"]),
-                    )
-            for number, record in enumerate(data["branches"]):
-                session.switch(number)
-                session._walk_to(int(record["cursor"]), record["between"])
-            session.switch(int(data["current"]))
-            for record in data["breakpoints"]:
-                seen = int(record.pop("seen", 0))
-                session.break_on(**record).seen = seen
-            session.watches = [str(text) for text in data["watches"]]
-            return session
+            return cls._of(_session_file.read(path))
         except FileNotFoundError:
             raise TraceFileError(f"{path}: no such file; check its name and the folder") from None
         except Exception as error:  # whatever a damaged file provokes, it is the file's fault
             raise TraceFileError(f"{path}: not a session file, or damaged ({why(error)})") from None
 
-    def _walk_to(self, row: int, between: float | None) -> None:
-        branch = self.branch
-        while row + (between is not None) >= len(branch) and branch.pull():
-            pass
-        branch.cursor, branch.between = min(row, len(branch) - 1), None
-        if between is not None:
-            t0, _, y0, mode = branch.raw(branch.cursor)
-            t1, _, y1, _ = branch.raw(branch.cursor + 1)
-            program = branch.run.recorder.start.program
-            y = interpolated(program, list(mode), t0, np.array(y0), t1, np.array(y1), between)
-            branch.between = (between, [float(u) for u in y])
-
-
-@contextmanager
-def _unbroken() -> Iterator[None]:
-    """Hold Ctrl-C back until the row is complete: a run that is broken off cannot go on."""
-    usual = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(usual):
-        yield
-        return
-    pressed: list[tuple[int, Any]] = []
-    signal.signal(signal.SIGINT, lambda *event: pressed.append(event))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, usual)
-    if pressed:
-        usual(*pressed[0])
-
-
-def _by_number(values: Mapping[str, Any]) -> dict[int, Any]:
-    """Return values by element with numbers for keys, which JSON makes texts."""
-    return {int(element): value for element, value in values.items()}
-
-
-def _plain(value: Any) -> Any:
-    """Return arrays inside an option as lists."""
-    if isinstance(value, Mapping):
-        return {name: _plain(each) for name, each in value.items()}
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+    @classmethod
+    def _of(cls, record: SessionRecord) -> Session:
+        """Walk to every place of a session again."""
+        session = cls(record.model, record.rig, record.t_end, **record.options)
+        for branch in record.branches:
+            if branch.edits is not None:
+                assert branch.parent is not None
+                session.switch(branch.parent)
+                _walker.walk_to(session.branch, branch.fork, branch.begin)
+                session.poke(branch.edits.variables, branch.edits.v, branch.edits.state)
+        for number, branch in enumerate(record.branches):
+            session.switch(number)
+            _walker.walk_to(session.branch, branch.cursor, branch.between)
+        session.switch(record.current)
+        for point in record.breakpoints:
+            found = session.break_on(
+                point.kind, point.name, point.element, point.condition, point.hits
+            )
+            found.seen = point.seen
+        session.watches = list(record.watches)
+        return session

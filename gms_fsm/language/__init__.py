@@ -1,1 +1,109 @@
-"""The expression language: texts to checked trees and back. Nothing here knows of friction."""
+"""The expression language: text -> checked tree -> every other spelling.
+
+All physics and all switching of this package is written as short texts (``z >= s and v > v_c``).
+Here such a text becomes a tree that can be evaluated, printed as Python or as Stateflow text,
+differentiated, and split into its atomic comparisons. Nothing is ever handed to `eval`: the text is
+parsed with `ast` and only nodes on an allow-list survive; code is generated from the checked tree
+alone. Whatever reads a tree is an algebra of `fold`.
+
+Grammar: numbers, declared names, ``pi``, ``+ - * / **``, ``< <= > >=`` (chains are split),
+``and or not``, ``abs exp sqrt sgn min max sin cos tanh``. ``==`` on floats is refused.
+``pow(a, b)``, as code prints some powers, is read as ``a**b``.
+
+Nothing here knows of friction.
+"""
+
+from gms_fsm.language._derivative import derivative
+from gms_fsm.language._evaluate import evaluate
+from gms_fsm.language._fold import Algebra, ValueAlgebra, fold
+from gms_fsm.language._functions import (
+    COMPARISONS,
+    CONSTANTS,
+    FUNCTIONS,
+    NAMESPACE,
+    OPERATIONS,
+    SEVERAL,
+    sgn,
+)
+from gms_fsm.language._normal import (
+    Comparison,
+    Literal,
+    Split,
+    clauses,
+    comparisons,
+    renamed,
+    rough_points,
+    split,
+    substitute,
+    turning_inside,
+)
+from gms_fsm.language._powers import LARGEST_PRODUCT_POWER, product_power, whole_power
+from gms_fsm.language._print import LEVELS, MATLAB_LIKE, PYTHON, Spelling, spell
+from gms_fsm.language._read import parse_condition, parse_value
+from gms_fsm.language._tree import (
+    Binary,
+    Both,
+    Call,
+    Condition,
+    Either,
+    InState,
+    Name,
+    Negative,
+    Node,
+    Not,
+    Number,
+    Relation,
+    Value,
+    names_in,
+    states_in,
+)
+
+__all__ = [
+    "COMPARISONS",
+    "CONSTANTS",
+    "FUNCTIONS",
+    "LARGEST_PRODUCT_POWER",
+    "LEVELS",
+    "MATLAB_LIKE",
+    "NAMESPACE",
+    "OPERATIONS",
+    "PYTHON",
+    "SEVERAL",
+    "Algebra",
+    "Binary",
+    "Both",
+    "Call",
+    "Comparison",
+    "Condition",
+    "Either",
+    "InState",
+    "Literal",
+    "Name",
+    "Negative",
+    "Node",
+    "Not",
+    "Number",
+    "Relation",
+    "Spelling",
+    "Split",
+    "Value",
+    "ValueAlgebra",
+    "clauses",
+    "comparisons",
+    "derivative",
+    "evaluate",
+    "fold",
+    "names_in",
+    "parse_condition",
+    "parse_value",
+    "product_power",
+    "renamed",
+    "rough_points",
+    "sgn",
+    "spell",
+    "split",
+    "states_in",
+    "substitute",
+    "turning_inside",
+    "whole_power",
+]

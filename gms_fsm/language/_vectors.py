@@ -8,28 +8,26 @@ such places are noted and decided by `evaluate` itself.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gms_fsm.language.expression import (
-    FUNCTIONS,
+from gms_fsm.language._evaluate import evaluate
+from gms_fsm.language._fold import fold
+from gms_fsm.language._functions import COMPARISONS, FUNCTIONS, OPERATIONS
+from gms_fsm.language._powers import product_power
+from gms_fsm.language._tree import (
     Binary,
     Both,
     Call,
     Condition,
     Either,
-    InState,
-    Name,
     Negative,
     Not,
-    Number,
     Relation,
     Value,
-    evaluate,
-    product_power,
 )
 
 __all__ = ["truths", "values_of"]
@@ -59,14 +57,14 @@ def truths(
 
     Examples
     --------
-    >>> from gms_fsm.language.expression import parse_condition
+    >>> from gms_fsm.language import parse_condition
     >>> truths(parse_condition("1 / z > 2", ["z"]), {"z": [0.25, 0.0, 1.0]}, (3,)).tolist()
     [True, False, False]
     """
-    reader = _Reader(columns, shape)
+    arrays = _Arrays(columns, shape)
     with np.errstate(all="ignore"):
-        found = np.array(np.broadcast_to(reader.truth(condition), shape))
-    for place in np.argwhere(reader.doubtful):
+        found = np.array(np.broadcast_to(fold(condition, arrays), shape))
+    for place in np.argwhere(arrays.doubtful):
         at = tuple(place)
         values = {name: np.broadcast_to(column, shape)[at] for name, column in columns.items()}
         try:
@@ -93,18 +91,18 @@ def values_of(tree: Value, columns: Mapping[str, ArrayLike]) -> NDArray[np.float
 
     Examples
     --------
-    >>> from gms_fsm.language.expression import parse_value
+    >>> from gms_fsm.language import parse_value
     >>> values_of(parse_value("2 * t + 1", ["t"]), {"t": [0.0, 1.0]}).tolist()
     [1.0, 3.0]
     """
     shape = np.broadcast_shapes(*(np.shape(column) for column in columns.values()))
     with np.errstate(all="ignore"):
-        found = _Reader(columns, shape).value(tree)
+        found = fold(tree, _Arrays(columns, shape))
     return np.array(np.broadcast_to(found, shape), dtype=np.float64)
 
 
-class _Reader:
-    """Computes a tree over arrays and notes where Python would have raised."""
+class _Arrays:
+    """The algebra of arrays; it notes where Python would have raised."""
 
     def __init__(self, columns: Mapping[str, ArrayLike], shape: tuple[int, ...]) -> None:
         self.columns = columns
@@ -114,54 +112,25 @@ class _Reader:
         if places.any():
             self.doubtful |= places
 
-    def truth(self, node: Condition) -> Any:
-        match node:
-            case Relation(op, left, right):
-                a, b = self.value(left), self.value(right)
-                if op == "<":
-                    return a < b
-                if op == "<=":
-                    return a <= b
-                return a > b if op == ">" else a >= b
-            case InState(element, state):
-                return np.asarray(self.columns[f"state({element})"]) == state
-            case Not(operand):
-                return ~self.truth(operand)
-            case Both(operands):
-                return np.logical_and.reduce(self.together(operands))
-            case Either(operands):
-                return np.logical_or.reduce(self.together(operands))
+    def number(self, value: float) -> Any:
+        return np.float64(value)
 
-    def together(self, operands: tuple[Condition, ...]) -> list[Any]:
-        return list(np.broadcast_arrays(*(self.truth(operand) for operand in operands)))
+    def name(self, name: str) -> Any:
+        return np.asarray(self.columns[name], dtype=np.float64)
 
-    def value(self, node: Value) -> Any:
-        match node:
-            case Number(value):
-                return np.float64(value)
-            case Name(name):
-                return np.asarray(self.columns[name], dtype=np.float64)
-            case Negative(operand):
-                return -self.value(operand)
-            case Binary("**", base, exponent):
-                return self.power(base, exponent)
-            case Binary(op, left, right):
-                a, b = self.value(left), self.value(right)
-                if op == "+":
-                    return a + b
-                if op == "-":
-                    return a - b
-                if op == "*":
-                    return a * b
-                self.doubt(b == 0.0)
-                return a / b
-            case Call(function, arguments):
-                return self.call(function, *(self.value(argument) for argument in arguments))
+    def negative(self, _: Negative, parts: Iterator[Any]) -> Any:
+        return -next(parts)
 
-    def power(self, base: Value, exponent: Value) -> Any:
-        factor, whole = self.value(base), product_power(base, exponent)
+    def binary(self, node: Binary, parts: Iterator[Any]) -> Any:
+        a, b = parts
+        if node.op == "/":
+            self.doubt(b == 0.0)
+        return OPERATIONS[node.op](a, b)
+
+    def power(self, node: Binary, parts: Iterator[Any]) -> Any:
+        factor, whole = next(parts), product_power(node.left, node.right)
         if whole is None:
-            return self.one_by_one(math.pow, factor, self.value(exponent))
+            return self.one_by_one(math.pow, factor, next(parts))
         if whole == 0:
             return np.float64(1.0)
         product = factor
@@ -172,9 +141,9 @@ class _Reader:
         self.doubt(product == 0.0)
         return 1.0 / product
 
-    def call(self, function: str, *arguments: Any) -> Any:
-        u = arguments[0]
-        match function:
+    def call(self, node: Call, parts: Iterator[Any]) -> Any:
+        u, *others = parts
+        match node.function:
             case "abs":
                 return np.abs(u)
             case "sqrt":
@@ -183,10 +152,25 @@ class _Reader:
             case "sgn":
                 return np.where(u > 0.0, 1.0, np.where(u < 0.0, -1.0, 0.0))
             case "min":  # Python's own: the second only if it is smaller, NaN or not
-                return np.where(arguments[1] < u, arguments[1], u)
+                return np.where(others[0] < u, others[0], u)
             case "max":
-                return np.where(arguments[1] > u, arguments[1], u)
-        return self.one_by_one(FUNCTIONS[function], *arguments)
+                return np.where(others[0] > u, others[0], u)
+        return self.one_by_one(FUNCTIONS[node.function], u, *others)
+
+    def relation(self, node: Relation, parts: Iterator[Any]) -> Any:
+        return COMPARISONS[node.op](*parts)
+
+    def in_state(self, element: int, state: str) -> Any:
+        return np.asarray(self.columns[f"state({element})"]) == state
+
+    def negation(self, _: Not, parts: Iterator[Any]) -> Any:
+        return ~next(parts)
+
+    def both(self, _: Both, parts: Iterator[Any]) -> Any:
+        return np.logical_and.reduce(np.broadcast_arrays(*parts))
+
+    def either(self, _: Either, parts: Iterator[Any]) -> Any:
+        return np.logical_or.reduce(np.broadcast_arrays(*parts))
 
     def one_by_one(self, function: Callable[..., float], *arguments: Any) -> Any:
         """Compute with Python's own function; where it raises it is NaN, and noted."""

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gms_fsm._extras import missing
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.errors import MissingExtraError, SignalError
-from gms_fsm.language.expression import sgn
+from gms_fsm.errors import SignalError
+from gms_fsm.language import sgn
 from gms_fsm.lowering._generated import load
 from gms_fsm.lowering._store import Store
 from gms_fsm.lowering.program import Arguments, Program
@@ -40,10 +41,7 @@ def check_numba() -> None:
     """
     for module in ("numba", "platformdirs"):
         if importlib.util.find_spec(module) is None:
-            raise MissingExtraError(
-                f"engine 'compiled' needs {module}, which is not installed: pip install "
-                "'gms-fsm[fast]', or use engine='machines' (the same result, slower)"
-            )
+            raise missing(module, "fast")
 
 
 def packed(p: Arguments) -> Packed:
@@ -223,12 +221,12 @@ def observe_rows(
 
     Returns
     -------
-    ndarray, shape (rows, program.seen)
+    ndarray, shape (rows, observed)
         Bit for bit as the readable engine.
     """
     from integrators import compiled
 
-    table = np.empty((t.size, program.seen))
+    table = np.empty((t.size, program.layout.observed.size))
     compiled.for_each_row(
         machine_code(program, "observe"),
         (np.ascontiguousarray(t), np.ascontiguousarray(y), np.ascontiguousarray(mode)),

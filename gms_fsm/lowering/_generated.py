@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.errors import GMSError, ParameterError
+from gms_fsm.language import NAMESPACE
 from gms_fsm.language._parser import PARSER
-from gms_fsm.language.expression import NAMESPACE
 from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
 
 __all__ = ["ieee", "load", "load_careful", "standalone"]

@@ -19,7 +19,7 @@ __all__ = ["armed", "observe", "rate", "sigmas"]
 
 
 def observe(program: Program, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
-    """Return v, F, then for all elements s, F_i and the rates.
+    """Return what a run observes of a state, by place (`gms_fsm.lowering.layout`).
 
     Parameters
     ----------
@@ -35,10 +35,10 @@ def observe(program: Program, t: float, y: list[float], mode: Sequence[int]) -> 
     Returns
     -------
     list of float
-        As ``observe`` of the program fills it.
+        At the places of ``program.layout.observed``.
     """
-    out = [0.0] * program.seen
-    if not any(mode[program.n :]):
+    out = [0.0] * program.layout.observed.size
+    if not any(mode[program.layout.slides]):
         program.ieee["observe"](t, y, mode, program.live, program.p, out)
     else:
         on = _sliding(program, mode, [0.0] * program.held)
@@ -59,10 +59,10 @@ def sigmas(program: Program, t: float, y: list[float], mode: Sequence[int]) -> l
     list of float
         From -1 to 1; NaN for a surface that is not slid on.
     """
-    found = [math.nan] * program.slides
-    if any(mode[program.n :]):
+    found = [math.nan] * program.layout.surfaces
+    if any(mode[program.layout.slides]):
         on = _sliding(program, mode, armed(program, t, y, mode))
-        slope_on(on, t, y, list(mode), [0.0] * program.size)
+        slope_on(on, t, y, list(mode), [0.0] * program.layout.y.size)
         for c in range(on.sliding.which[-1]):
             found[on.sliding.which[c]] = min(max(on.sliding.sigma[c], -1.0), 1.0)
     return found
@@ -103,8 +103,8 @@ def rate(
     ndarray, shape (m,)
         The slope.
     """
-    dy = [0.0] * program.size
-    if not any(mode[program.n :]):
+    dy = [0.0] * program.layout.y.size
+    if not any(mode[program.layout.slides]):
         program.ieee["flow"](t, y, mode, held, program.p, dy)
     else:
         slope_on(_sliding(program, mode, held), t, y, list(mode), dy)
@@ -117,10 +117,10 @@ def _sliding(program: Program, mode: Sequence[int], held: list[float]) -> Held:
     flow, arm, margins, normal = (program.ieee[name] for name in names)
     sliding = room_to_slide(
         program.surfaces,
-        program.size,
+        program.layout.y.size,
         program.held,
         len(program.strict),
-        program.seen,
-        mode[program.n :],
+        program.layout.observed.size,
+        mode[program.layout.slides],
     )
     return Held(Functions(flow, arm, margins, normal, program.p), held, sliding)

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import as_floats
+from gms_fsm.language import Value
 from gms_fsm.language._vectors import values_of
-from gms_fsm.language.expression import Value
 
 __all__ = ["SAMPLES", "waking_times"]
 
@@ -43,7 +43,7 @@ def waking_times(tree: Value, t_start: float, t_end: float) -> tuple[float, ...]
 
     Examples
     --------
-    >>> from gms_fsm.language.expression import parse_value
+    >>> from gms_fsm.language import parse_value
     >>> times = waking_times(parse_value("exp(-((t - 3) / 0.01)**2)", ["t"]), 0.0, 8.0)
     >>> len(times), round(times[0], 2), round(times[-1], 2)
     (9, 2.96, 3.04)

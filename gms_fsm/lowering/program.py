@@ -26,7 +26,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -36,7 +36,7 @@ import integrators
 from gms_fsm.charts.chart import RESERVED
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.errors import SignalError
-from gms_fsm.language.expression import (
+from gms_fsm.language import (
     Binary,
     Call,
     Comparison,
@@ -59,6 +59,7 @@ from gms_fsm.language.expression import (
     turning_inside,
 )
 from gms_fsm.lowering._generated import ieee, load, load_careful
+from gms_fsm.lowering.layout import Layout, Places
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import (
@@ -93,15 +94,8 @@ class Program:
     p : tuple
         (shared numbers, one list an own parameter, times and values of each corner table): an
         argument of all functions.
-    n : int
-        Number of elements.
-    size : int
-        Length of the state vector ``y = (x, [v,] variables...)``.
-    seen : int
-        How many numbers ``observe`` fills.
-    first : int
-        Index in y of the first element's first variable; element i's variable j is at
-        ``first + j * n + i``.
+    layout : Layout
+        Where everything stands in the state vector, in what ``observe`` fills and in the modes.
     held : int
         How many signs are held.
     strict : list of bool
@@ -121,10 +115,7 @@ class Program:
     ieee: Mapping[str, Callable[..., Any]]
     callables: Mapping[str, Callable[[float], float]]
     p: Arguments
-    n: int
-    size: int
-    seen: int
-    first: int
+    layout: Layout
     held: int
     strict: list[bool]
     relations: list[str]
@@ -132,16 +123,6 @@ class Program:
     surface_names: list[str]
     knots: list[float]
     jumps: list[float]
-
-    @property
-    def slides(self) -> int:
-        """How many surfaces there are."""
-        return len(self.surfaces.sign)
-
-    @property
-    def modes(self) -> int:
-        """How many modes a row has: of each element, then whether each surface is slid on."""
-        return self.n + self.slides
 
     @property
     def live(self) -> list[float]:
@@ -176,7 +157,7 @@ def lower(model: Model, rig: Rig) -> Program:
         repr(model.chart),
         model.stribeck is None,
         model.n,
-        tuple(np.ndim(model.values[name]) for name in model.chart.parameters),
+        tuple(np.ndim(model.values[name]) for name in model.chart.parameter_names),
         rig.title,
         rig.acceleration,
         tuple(rig.numbers),
@@ -238,14 +219,9 @@ def _lowered(shape: _Shape) -> Program:
         ieee={name: ieee(namespace[name], careful[name]) for name in _FUNCTION_NAMES},
         callables=callables,
         p=([], [], []),
-        n=model.n,
-        size=writer.first + model.n * len(model.chart.variables),
-        seen=2 + model.n * (2 + len(model.chart.variables)),
-        first=writer.first,
-        held=len(writer.shared_rough) + model.n * len(writer.own_rough),
-        strict=writer.expand(
-            [r.strict for r in writer.shared_relations], [r.strict for r in writer.own_relations]
-        ),
+        layout=writer.layout,
+        held=writer.held.size,
+        strict=[relation.strict for relation, _ in writer.relations],
         relations=writer.relation_names(),
         surfaces=writer.surface_table(),
         surface_names=writer.surface_names(),
@@ -267,7 +243,7 @@ def arguments(model: Model, rig: Rig) -> Arguments:
     tuple of lists
         See `Program`.
     """
-    curve, values = model.stribeck, [model.values[name] for name in model.chart.parameters]
+    curve, values = model.stribeck, [model.values[name] for name in model.chart.parameter_names]
     shared = [] if curve is None else [curve.F_c, curve.F_s, curve.v_s, curve.dip]
     shared += [model.sigma_2, *rig.numbers.values()]
     shared += [float(value) for value in values if np.ndim(value) == 0]
@@ -309,7 +285,7 @@ def equations(program: Program) -> integrators.Equations:
         surfaces=program.surfaces,
         knots=program.knots,
         jumps=program.jumps,
-        seen=program.seen,
+        seen=program.layout.observed.size,
     )
 
 
@@ -336,7 +312,6 @@ class _Lowering:
     def __init__(self, model: Model, rig: Rig) -> None:
         self.model, self.rig, self.chart = model, rig, model.chart
         self.prescribed = rig.acceleration is None
-        self.first = 1 if self.prescribed else 2
         self.curve = None
         if model.stribeck is not None:
             self.curve = parse_value(model.stribeck.text, ["F_c", "F_s", "v_s", "v"])
@@ -355,6 +330,7 @@ class _Lowering:
         self._collect_surfaces()
         self._collect_relations()
         self._collect_constants()
+        self.layout = Layout.of(model, rig, self.surfaces.size)
 
     # ------------------------------------------------------------------ collecting
     def _collect_numbers(self) -> None:
@@ -369,7 +345,7 @@ class _Lowering:
         # A chart may call its own parameter F_c or mass: it gets a name of its own in the text.
         self.rename: dict[str, str] = {_DIP: "v_dip"}
         self.rename |= {apart.id: name for name, apart in self.rig_names.items()}
-        chart_names = (*self.chart.variables, *self.chart.parameters)
+        chart_names = (*self.chart.variables, *self.chart.parameter_names)
         for name in chart_names:
             local = name
             while local in taken or (local != name and local in chart_names):
@@ -377,7 +353,7 @@ class _Lowering:
             taken.add(local)
             self.rename[name] = local
         self.locals = taken
-        for name in self.chart.parameters:
+        for name in self.chart.parameter_names:
             if np.ndim(self.model.values[name]) == 0:
                 self.shared.append(self.rename[name])
             else:
@@ -413,20 +389,22 @@ class _Lowering:
                 dict.fromkeys(u for tree in texts for u in rough_points(tree))
             )
         found = [u for rough in self.state_rough.values() for u in rough]
-        self.shared_rough = list(
-            dict.fromkeys([*self.rig_rough, *(u for u in found if self.is_shared(u))])
-        )
-        self.own_rough = list(dict.fromkeys(u for u in found if not self.is_shared(u)))
+        shared = dict.fromkeys([*self.rig_rough, *(u for u in found if self.is_shared(u))])
+        own = dict.fromkeys(u for u in found if not self.is_shared(u))
+        self.held = Places(tuple(shared), tuple(own), self.model.n)
         self.sign_names: dict[Value, str] = {}
-        for number, u in enumerate([*self.shared_rough, *self.own_rough]):
+        for number, u in enumerate([*self.held.shared, *self.held.own]):
             label = u.id if isinstance(u, Name) and u.id.isidentifier() else str(number)
             while any(f"{f}_{label}" in self.locals for f in ("sgn", "abs", "min", "max")):
                 label += "_"
             self.sign_names[u] = label
 
     def _collect_surfaces(self) -> None:
-        self.shared_surfaces = [u for u in self.shared_rough if self._can_be_slid_on(u)]
-        self.own_surfaces = [u for u in self.own_rough if self._can_be_slid_on(u)]
+        shared, own = (
+            tuple(u for u in rough if self._can_be_slid_on(u))
+            for rough in (self.held.shared, self.held.own)
+        )
+        self.surfaces = Places(shared, own, self.model.n)
 
     def _can_be_slid_on(self, u: Value) -> bool:
         """Tell whether u depends on the state, by ways that have a derivative."""
@@ -450,18 +428,17 @@ class _Lowering:
         return isinstance(signal, Corners)
 
     def _collect_relations(self) -> None:
-        zero = Number(0.0)
         wanted: list[Comparison] = []
         for edge in self.chart.transitions:
             wanted += comparisons(split(self.chart.guards[edge.name]))
-        for u in [*self.shared_rough, *self.own_rough]:
-            wanted += [Comparison(u, zero, strict=True), Comparison(u, zero, strict=False)]
+        for u in [*self.held.shared, *self.held.own]:
+            wanted += self._sign_relations(u)
         if "s" in self.chart.inputs:
             wanted += self.landmarks()
         wanted = list(dict.fromkeys(wanted))
         own = [r for r in wanted if not (self.is_shared(r.left) and self.is_shared(r.right))]
-        self.own_relations = own
-        self.shared_relations = [r for r in wanted if r not in own]
+        shared = [r for r in wanted if r not in own]
+        self.relations = Places(tuple(shared), tuple(own), self.model.n)
 
     def landmarks(self) -> list[Comparison]:
         """Where s(v) starts to change fast: a large step would jump the whole dip unseen."""
@@ -470,72 +447,28 @@ class _Lowering:
         return [Comparison(v, dip, strict=True), Comparison(Negative(dip), v, strict=True)]
 
     # ------------------------------------------------------------------ arrays
-    def expand(self, shared: Sequence[Any], own: Sequence[Any]) -> list[Any]:
-        """Lay out values a relation: the shared ones, then each own one n times."""
-        return [*shared, *(value for value in own for _ in range(self.model.n))]
-
     def relation_names(self) -> list[str]:
+        """Say each relation in words."""
         plain = {apart.id: name for name, apart in self.rig_names.items()}
-
-        def text(comparison: Comparison) -> str:
-            return spell(Literal(comparison, True).relation, rename=plain)
-
-        own = [
-            f"{text(r)} of element {i + 1}" for r in self.own_relations for i in range(self.model.n)
+        return [
+            spell(Literal(relation, True).relation, rename=plain) + _of_element(i)
+            for relation, i in self.relations
         ]
-        return [*(text(r) for r in self.shared_relations), *own]
 
     def surface_names(self) -> list[str]:
         """Say what is zero on each surface."""
         plain = {apart.id: name for name, apart in self.rig_names.items()}
-        own = [
-            f"{spell(u, rename=plain)} of element {i + 1}"
-            for u in self.own_surfaces
-            for i in range(self.model.n)
-        ]
-        return [*(spell(u, rename=plain) for u in self.shared_surfaces), *own]
+        return [spell(u, rename=plain) + _of_element(i) for u, i in self.surfaces]
 
     def surface_table(self) -> integrators.Surfaces:
         """Return where the surfaces' signs and relations stand."""
-        n = self.model.n
-        number = range(n)
-
-        def relation(u: Value, strict: bool) -> list[int]:
-            wanted = Comparison(u, Number(0.0), strict)
-            if wanted in self.shared_relations:
-                return [self.shared_relations.index(wanted)]
-            first = len(self.shared_relations) + n * self.own_relations.index(wanted)
-            return [first + i for i in number]
-
-        signs = [self.shared_rough.index(u) for u in self.shared_surfaces]
-        for u in self.own_surfaces:
-            first = len(self.shared_rough) + n * self.own_rough.index(u)
-            signs += [first + i for i in number]
-        surfaces = [*self.shared_surfaces, *self.own_surfaces]
-        return integrators.Surfaces(
-            sign=signs,
-            above=[r for u in surfaces for r in relation(u, True)],
-            at_least=[r for u in surfaces for r in relation(u, False)],
+        surfaces = [*self.surfaces.shared, *self.surfaces.own]
+        above, at_least = (
+            [r for u in surfaces for r in self.relations.all_of(_with_zero(u, strict))]
+            for strict in (True, False)
         )
-
-    def relation_index(self, comparison: Comparison) -> str:
-        if comparison in self.shared_relations:
-            return str(self.shared_relations.index(comparison))
-        return self._element_index(len(self.shared_relations), self.own_relations.index(comparison))
-
-    def held_index(self, u: Value) -> str:
-        if u in self.shared_rough:
-            return str(self.shared_rough.index(u))
-        return self._element_index(len(self.shared_rough), self.own_rough.index(u))
-
-    @staticmethod
-    def _element_index(base: int, row: int) -> str:
-        """Index of element i in row `row` of length n behind `base` shared places."""
-        block = {0: "", 1: " + n"}.get(row, f" + {row} * n")
-        return f"{base}{block} + i"
-
-    def y_index(self, variable: str) -> str:
-        return self._element_index(self.first, self.chart.variables.index(variable))
+        sign = [k for u in surfaces for k in self.held.all_of(u)]
+        return integrators.Surfaces(sign=sign, above=above, at_least=at_least)
 
     # ------------------------------------------------------------------ the text
     def source(self) -> str:
@@ -596,7 +529,7 @@ class _Lowering:
             front.append(f"S = {spell(self.curve)}  # (2)")
             used |= _words(front)
         if "v" in used:
-            front.insert(0, "v = y[1]") if not self.prescribed else None
+            front.insert(0, f"v = y[{self.layout.y.text('v')}]") if not self.prescribed else None
             used |= {"v"}
         signals: list[str] = []
         tables = 0
@@ -605,7 +538,7 @@ class _Lowering:
                 signals += self.signal_lines(name, signal, tables, live)
             tables += isinstance(signal, Corners)
         if "x" in used:
-            front.insert(0, "x = y[0]")
+            front.insert(0, f"x = y[{self.layout.y.text('x')}]")
         used |= _words(signals)
         setup: list[str] = []
         needed = [(j, name) for j, name in enumerate(self.shared) if name in used]
@@ -639,7 +572,7 @@ class _Lowering:
             if signs == "live":
                 lines.append(f"{name} = {live}")
                 continue
-            sign = f"held[{self.held_index(labels[name.partition('_')[2]])}]"
+            sign = f"held[{self.held.text(labels[name.partition('_')[2]])}]"
             a = self.spell(call.arguments[0])
             product = self.spell(Binary("*", Name(sign), call.arguments[0]))
             match call.function:
@@ -669,7 +602,7 @@ class _Lowering:
             def smooth(tree: Value, own: dict[str, Call] = own) -> Value:
                 value, calls = substitute(tree, self.sign_names)
                 for name, call in calls.items():
-                    shared = labels[name.partition("_")[2]] in self.shared_rough
+                    shared = labels[name.partition("_")[2]] in self.held.shared
                     (shared_calls if shared else own).setdefault(name, call)
                 return value
 
@@ -691,7 +624,7 @@ class _Lowering:
         """Assign the element's own variables and threshold, as far as they are used."""
         words = set(used)
         lines = [
-            f"{self.rename[variable]} = y[{self.y_index(variable)}]"
+            f"{self.rename[variable]} = y[{self.layout.y.text(variable)}]"
             for variable in self.chart.variables
             if self.rename[variable] in words
         ]
@@ -746,10 +679,8 @@ class _Lowering:
             ]
             lines.append(f"{'elif' if lines else 'if'} edge == {self.edge_constant(edge.name)}:")
             for variable, tree in steps:
-                local = self.rename[variable]
-                lines += _indented(
-                    [f"{local} = {self.spell(tree)}", f"y[{self.y_index(variable)}] = {local}"]
-                )
+                local, place = self.rename[variable], self.layout.y.text(variable)
+                lines += _indented([f"{local} = {self.spell(tree)}", f"y[{place}] = {local}"])
             lines.append(f"    mode[i] = {self.state_constant(edge.target)}")
         body = [*self.element_values(_words(lines)), *lines] or ["pass  # the chart has no edge"]
         return self.function("act(edge, i, t, y, mode, p)", "Take an edge of element i.", body)
@@ -761,12 +692,14 @@ class _Lowering:
         if not self.prescribed:
             force = "F_i" if self.force_by_state else f"{self.force(self.chart.forces['F'])}"
             inner.append(f"F += {force}" + ("" if self.force_by_state else "  # (3)"))
-        inner += [f"dy[{self.y_index(v)}] = d{self.rename[v]}" for v in self.chart.variables]
-        ends = ["dy[0] = v"]
+        inner += [f"dy[{self.layout.y.text(v)}] = d{self.rename[v]}" for v in self.chart.variables]
+        place = self.layout.y.text
+        ends = [f"dy[{place('x')}] = v"]
         if self.acceleration is not None:
             smooth, calls = substitute(self.acceleration, self.sign_names)
             shared_calls |= calls
-            ends = ["F += sigma_2 * v  # (4)", "dy[0] = v", f"dy[1] = {self.spell(smooth)}"]
+            ends += [f"dy[{place('v')}] = {self.spell(smooth)}"]
+            ends.insert(0, "F += sigma_2 * v  # (4)")
         body = [
             *self.rough_lines(shared_calls, signs),
             *([] if self.prescribed else ["F = 0.0"]),
@@ -787,6 +720,7 @@ class _Lowering:
 
     def write_observe(self) -> list[str]:
         shared_calls, branches = self.flow_branches("given", force=True)
+        place = self.layout.observed.text
         without = "nan" if self.curve is None else "weight[i] * S"
         threshold = "s" if "s" in self.chart.inputs else without
         force = (
@@ -796,20 +730,17 @@ class _Lowering:
             *self.by_state(branches),
             *force,
             "F += F_i",
-            f"out[{self._element_index(2, 0)}] = {threshold}",
-            f"out[{self._element_index(2, 1)}] = F_i",
-            *(
-                f"out[{self._element_index(2, 2 + j)}] = d{self.rename[v]}"
-                for j, v in enumerate(self.chart.variables)
-            ),
+            f"out[{place('s')}] = {threshold}",
+            f"out[{place('F_elements')}] = F_i",
+            *(f"out[{place(f'd{v}')}] = d{self.rename[v]}" for v in self.chart.variables),
         ]
         body = [
             *self.rough_lines(shared_calls, "given"),
             "F = 0.0",
             "for i in range(n):",
             *_indented([*self.element_values(_words(inner)), *inner]),
-            "out[0] = v",
-            "out[1] = F + sigma_2 * v  # (4)",
+            f"out[{place('v')}] = v",
+            f"out[{place('F')}] = F + sigma_2 * v  # (4)",
         ]
         return self.function(
             "observe(t, y, mode, held, p, out)",
@@ -819,26 +750,14 @@ class _Lowering:
 
     def write_normal(self) -> list[str]:
         lines: list[str] = []
-        for number, u in enumerate(self.shared_surfaces):
-            word = "elif" if lines else "if"
-            lines += [
-                f"{word} surface == {number}:  # {self.spell(u)}",
-                *_indented(self.gradient(u)),
-            ]
-        for number, u in enumerate(self.own_surfaces):
-            first = len(self.shared_surfaces)
-            row = f"surface - {first}" if first else "surface"
-            word = "elif" if lines else "if"
-            inner = self.gradient(u)
-            lines += [
-                f"{word} {row} < {number + 1} * n:  # {self.spell(u)}",
-                f"    i = {row} - {number} * n",
-                *_indented([*self.element_values(_words(inner)), *inner]),
-            ]
-        clear = [
-            f"for j in range({self.first + 1} + {len(self.chart.variables)} * n):",
-            "    out[j] = 0.0",
-        ]
+        for u in (*self.surfaces.shared, *self.surfaces.own):
+            word, inner = "elif" if lines else "if", self.gradient(u)
+            asked, element = self.surfaces.asking_text(u, "surface")
+            lines.append(f"{word} {asked}:  # {self.spell(u)}")
+            if element:
+                inner = [f"i = {element}", *self.element_values(_words(inner)), *inner]
+            lines += _indented(inner)
+        clear = [f"for j in range({self.layout.y.size_text(1)}):", "    out[j] = 0.0"]
         body = [*clear, *lines] if lines else ["pass"]
         return self.function(
             "normal(surface, t, y, mode, p, out)",
@@ -848,12 +767,12 @@ class _Lowering:
 
     def gradient(self, u: Value) -> list[str]:
         """Write the gradient of u over y, and its rate in t."""
-        time = f"{self.first} + {len(self.chart.variables)} * n"
-        places = {"x": "0", **{v: self.y_index(v) for v in self.chart.variables}}
-        lines = []
-        for name, place in places.items():
-            if name in names_in(u):
-                lines.append(f"out[{place}] = {self.spell(_known(u, name))}")
+        place = self.layout.y.text
+        lines = [
+            f"out[{place(name)}] = {self.spell(_known(u, name))}"
+            for name in ("x", *self.chart.variables)
+            if name in names_in(u)
+        ]
         by_v = [self.spell(_known(u, "v"))] if "v" in names_in(u) else []
         if "s" in names_in(u):
             assert self.curve is not None  # charts with s have one
@@ -862,7 +781,7 @@ class _Lowering:
             by_v.append(f"({self.spell(_known(u, 's'))}) * weight[i] * dS")
         rates = [self.spell(_known(u, "t"))] if "t" in names_in(u) else []
         if by_v and not self.prescribed:
-            lines.append(f"out[1] = {' + '.join(by_v)}")
+            lines.append(f"out[{place('v')}] = {' + '.join(by_v)}")
         elif by_v:
             rates.append(f"({' + '.join(by_v)}) * {self.signal_slope('v')}")
         rates += [
@@ -870,7 +789,8 @@ class _Lowering:
             for name, apart in self.rig_names.items()
             if name in self.rig.signals and apart.id in names_in(u)
         ]
-        return lines + ([f"out[{time}] = {' + '.join(rates)}"] if rates else [])
+        behind = self.layout.y.size_text()
+        return lines + ([f"out[{behind}] = {' + '.join(rates)}"] if rates else [])
 
     def signal_slope(self, name: str) -> str:
         """Spell the rate of a signal."""
@@ -886,15 +806,15 @@ class _Lowering:
         always = [r for u in self.rig_rough for r in self._sign_relations(u)]
         if "s" in self.chart.inputs:
             always += self.landmarks()
-        body = [f"watch[{self.relation_index(r)}] = 1" for r in dict.fromkeys(always)]
-        body += [f"held[{self.held_index(u)}] = sgn({self.spell(u)})" for u in self.shared_rough]
+        body = [f"watch[{self.relations.text(r)}] = 1" for r in dict.fromkeys(always)]
+        body += [f"held[{self.held.text(u)}] = sgn({self.spell(u)})" for u in self.held.shared]
         branches = {}
         for state in self.chart.states:
             lines = []
             for u in self.state_rough[state.name]:
-                if u in self.own_rough:
-                    lines.append(f"held[{self.held_index(u)}] = sgn({self.spell(u)})")
-                lines += [f"watch[{self.relation_index(r)}] = 1" for r in self._sign_relations(u)]
+                if u in self.held.own:
+                    lines.append(f"held[{self.held.text(u)}] = sgn({self.spell(u)})")
+                lines += [f"watch[{self.relations.text(r)}] = 1" for r in self._sign_relations(u)]
             for _, edge in self.chart.leaving(state.name):
                 lines.append(f"# {edge.name}: {self.spell(self.chart.guards[edge.name])}")
                 lines += self.witness(split(self.chart.guards[edge.name]))
@@ -912,7 +832,7 @@ class _Lowering:
         )
 
     def _sign_relations(self, u: Value) -> list[Comparison]:
-        return [Comparison(u, Number(0.0), strict=True), Comparison(u, Number(0.0), strict=False)]
+        return [_with_zero(u, strict=True), _with_zero(u, strict=False)]
 
     def witness(self, part: Split) -> list[str]:
         """Write: if this part is false, watch what keeps it false."""
@@ -920,7 +840,7 @@ class _Lowering:
             # Not the opposite comparison: of NaN neither is true, and it has to be watched.
             return [
                 f"if not {self.spell(part.relation)}:",
-                f"    watch[{self.relation_index(part.comparison)}] = 1",
+                f"    watch[{self.relations.text(part.comparison)}] = 1",
             ]
         word, parts = part
         if word == "either":
@@ -945,8 +865,8 @@ class _Lowering:
         )
 
     def write_margins(self) -> list[str]:
-        shared = [self.margin_lines(r) for r in self.shared_relations]
-        own = [line for r in self.own_relations for line in self.margin_lines(r)]
+        shared = [self.margin_lines(r) for r in self.relations.shared]
+        own = [line for r in self.relations.own for line in self.margin_lines(r)]
         body = [line for lines in shared for line in lines]
         if own:
             body += ["for i in range(n):", *_indented([*self.element_values(_words(own)), *own])]
@@ -957,13 +877,22 @@ class _Lowering:
         )
 
     def margin_lines(self, comparison: Comparison) -> list[str]:
-        index = self.relation_index(comparison)
+        index = self.relations.text(comparison)
         margin = self.spell(comparison.left)
         if comparison.right != Number(0.0):
             right = spell(comparison.right, rename=self.rename)
             simple = isinstance(comparison.right, Name | Number | Negative)
             margin = f"{margin} - {right if simple else f'({right})'}"
         return [f"if watch[{index}]:", f"    out[{index}] = {margin}"]
+
+
+def _with_zero(u: Value, strict: bool) -> Comparison:
+    return Comparison(u, Number(0.0), strict)
+
+
+def _of_element(element: int | None) -> str:
+    """Name an element, counted from 1 in texts; nothing where all share what is named."""
+    return "" if element is None else f" of element {element + 1}"
 
 
 def _known(value: Value, name: str) -> Value:

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import as_floats
-from gms_fsm.language.expression import (
+from gms_fsm.language import (
     Binary,
     Number,
     Value,
@@ -176,7 +176,7 @@ def _sizes(key: _Same[Chart]) -> _Sizes:
     states = ("x", "v", *chart.variables)
     rates = [f"d{name}" for name in chart.variables]
     rest: dict[str, Value] = dict.fromkeys(("t", *states, *rates), Number(0.0))
-    arguments = ", ".join(("s", *chart.parameters))
+    arguments = ", ".join(("s", *chart.parameter_names))
 
     def function(tree: Value, *, moving: bool = False) -> Numbers:
         still = {name: zero for name, zero in rest.items() if not (moving and name == "v")}

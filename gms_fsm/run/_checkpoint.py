@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from gms_fsm._files import written_whole
 from gms_fsm.errors import CheckpointError, ParameterError, SignalError, cut, shown, why
+from gms_fsm.lowering.layout import LOG_TEXTS
 from gms_fsm.run._identity import identity
 from gms_fsm.run.start import Start
 from gms_fsm.systems.signals import Function
@@ -176,6 +177,7 @@ def _check(run: Resumable, state: Mapping[str, Any], kept: Mapping[str, Any]) ->
     for name, column in run.kept().items():
         _expect(name, kept[name], np.asarray(column), rows=name not in ("counts", "seen"))
     states, edges, n = len(chart.states), len(chart.transitions), len(b.now.mode)
+    layout = start.program.layout
     counts, cursor = state["counts"], state["cursor"]
     # Compiled rows lie in the columns that were kept, others in the buffer.
     capacity = max(len(kept["rows_t"]), len(b.out.rows_t))
@@ -195,21 +197,21 @@ def _check(run: Resumable, state: Mapping[str, Any], kept: Mapping[str, Any]) ->
         "rows taken": (counts[loop.TAKEN], 0, cursor[ROW]),
         "wanted time": (cursor[NEXT_TIME], 0, len(b.out.times)),
         "knot": (cursor[NEXT_KNOT], 0, len(b.plan.knots)),
-        "surfaces": (state["which"][:-1], 0, max(0, start.program.slides - 1)),
+        "surfaces": (state["which"][:-1], 0, max(0, layout.surfaces - 1)),
         "surfaces slid on": (state["which"][-1], 0, len(b.sliding.sigma)),
         "slid": (state["slid"], 0, 1),
         "arrived": (state["arrived"], 0, 1),
-        "rows' mode": (kept["rows_mode"][:, :n], 0, states - 1),
-        "stops' mode": (kept["stops_mode"][:, :n], 0, states - 1),
-        "rows slid": (kept["rows_mode"][:, n:], 0, 1),
-        "stops slid": (kept["stops_mode"][:, n:], 0, 1),
+        "rows' mode": (kept["rows_mode"][:, layout.elements], 0, states - 1),
+        "stops' mode": (kept["stops_mode"][:, layout.elements], 0, states - 1),
+        "rows slid": (kept["rows_mode"][:, layout.slides], 0, 1),
+        "stops slid": (kept["stops_mode"][:, layout.slides], 0, 1),
     }
     groups = [[name for name in kept if name.startswith(kind)] for kind in ("rows_", "stops_")]
     if "log" in kept:  # of a run by Python
         log = kept["log"]
         within["log"] = log["element"], 0, n - 1
         known = {(edge.name, edge.source, edge.target) for edge in chart.transitions}
-        if not known >= {tuple(row) for row in log[["edge", "source", "target"]].tolist()}:
+        if not known >= {tuple(row) for row in log[[*LOG_TEXTS]].tolist()}:
             raise ValueError("log: an edge that the chart has not")
     else:  # of a compiled one
         groups.append(["t", "machine", "edge", "numbers"])

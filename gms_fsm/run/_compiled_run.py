@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from gms_fsm.lowering import _compiled as compiled
-from gms_fsm.lowering._observing import observe
+from gms_fsm.lowering.layout import LOG_NUMBERS, LOG_TEXTS
 from gms_fsm.lowering.program import equations
 from gms_fsm.run._recording import PATIENCE, Recording, check_end, check_pace, explained, meddled
 from gms_fsm.run.machines import ElementMachines, MachineEngine, Meddling
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
+from gms_fsm.traces._log import log_from
 from gms_fsm.traces.failures import SimulationError
-from gms_fsm.traces.trace import Rows, Trace, log_from
+from gms_fsm.traces.rows import Rows
+from gms_fsm.traces.trace import Trace
 from integrators import hybrid, loop
 from integrators.advance import ROW, STEPS
 from integrators.loop import FIRINGS, STOPS
@@ -67,7 +69,7 @@ class CompiledRun:
         counts: Any = self.buffers.memory.counts
         t, y, mode = self.columns.latest
         if self.engine is not None:
-            self.engine.go_on_from(t, y, mode[: self.start.model.n], self.start.program.p)
+            self.engine.go_on_from(t, y, mode[self.start.program.layout.elements])
             if counts[loop.PHASE] == loop.FIRE:  # its callbacks have run, the loop is yet to follow
                 edge = self.start.model.chart.transitions[counts[loop.EDGE]]
                 self.engine.set_state(int(counts[loop.MACHINE]), edge.target)
@@ -100,10 +102,11 @@ class CompiledRun:
         columns = self.columns
         columns.make_room()
         b, start, before = columns.buffers, columns.start, columns.latest
+        layout = start.program.layout
         try:
             flow, arm, margins, normal, *machines = self.code
             functions = Functions(flow, arm, margins, normal, columns.p)
-            first, pause = start.program.first, self.engine is not None
+            first, pause = layout.y.index(layout.variable), self.engine is not None
             event = record(
                 (functions, loop.Machines(*machines), b, columns.log, first, STEPS_AT_ONCE, pause),
                 compiled.store(),
@@ -138,7 +141,7 @@ class CompiledRun:
         memory, (t, y, mode) = self.columns.buffers.memory, self.columns.latest
         start = self.columns.start
         if memory.counts[loop.FIRED_ONE] == 0:  # the elements saw these values when asked
-            engine.show(t, y, list(mode[: start.model.n]), start.program.p)
+            engine.show(t, y, list(mode[start.program.layout.elements]))
         try:
             engine.trigger(int(memory.counts[loop.EDGE]), int(memory.counts[loop.MACHINE]), t)
         except Meddling as error:
@@ -161,8 +164,9 @@ class Columns:
 
         self.start = start
         self.p = compiled.packed(start.program.p) if p is None else p
-        size, n = start.program.size, start.program.modes
-        made, options = equations(start.program), start.options
+        layout, options = start.program.layout, start.options
+        size, modes = layout.y.size, layout.modes
+        made = equations(start.program)
         b = arrays(hybrid.buffers(made, start.t_start, start.y, start.mode, start.last, options, 0))
         few = max(16, min(1024, 4_000_000 // size))  # rows to begin with
         rows = {"all": few, "t_eval": len(start.options.times or ()), "end": 0}[start.output]
@@ -176,19 +180,18 @@ class Columns:
             t=floats(256),
             machine=ints(256),
             edge=ints(256),
-            numbers=floats((256, 5)),
-            seen=floats(start.program.seen),
+            numbers=floats((256, len(LOG_NUMBERS))),
+            seen=floats(layout.observed.size),
             rows_microstep=ints(rows),
-            rows_mode=ints((rows, n)),
+            rows_mode=ints((rows, modes)),
             stops_t=floats(stops),
             stops_microstep=ints(stops),
             stops_y=floats((stops, size)),
-            stops_mode=ints((stops, n)),
+            stops_mode=ints((stops, modes)),
         )
         if stops:
-            modes = start.mode + [0] * start.program.slides
             self.log.stops_t[0], self.log.stops_y[0] = start.t_start, self.buffers.now.y
-            self.log.stops_mode[0] = modes
+            self.log.stops_mode[0] = list(layout.not_sliding(start.mode))
             self.log.counts[STOPS] = 1
 
     def begin_again(self, model: Model, rig: Rig) -> None:
@@ -278,10 +281,6 @@ class Columns:
         sliding = b.sliding._replace(flags=b.sliding.flags.tolist())
         return self.buffers._replace(now=b.now._replace(**lists), memory=memory, sliding=sliding)
 
-    def observe(self, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
-        """Return v, F, s, F_i, dz of a state."""
-        return observe(self.start.program, t, y, mode)
-
     def transitions(self) -> Any:
         """Return the transition log."""
         chart, log, count = self.start.model.chart, self.log, int(self.log.counts[FIRINGS])
@@ -290,9 +289,12 @@ class Columns:
             np.array([getattr(edge, name) for edge in chart.transitions], dtype=np.str_)[edges]
             for name in ("name", "source", "target")
             if chart.transitions
-        ] or [np.empty(0, dtype=np.str_)] * 3
-        columns: Any = log.numbers
-        return log_from([log.t[:count], log.machine[:count], *texts, *columns[:count].T])
+        ] or [np.empty(0, dtype=np.str_) for _ in LOG_TEXTS]
+        numbers: Any = log.numbers
+        columns = {"t": log.t[:count], "element": log.machine[:count]}
+        columns |= zip(LOG_TEXTS, texts, strict=True)
+        columns |= zip(LOG_NUMBERS, numbers[:count].T, strict=True)
+        return log_from(columns)
 
     def trace(self) -> Trace:
         """Return all that was kept."""

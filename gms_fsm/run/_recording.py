@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -11,10 +11,12 @@ import numpy as np
 
 import integrators
 from gms_fsm.charts.chart import Chart
-from gms_fsm.language.expression import rough_points
-from gms_fsm.lowering._observing import armed, observe, rate
+from gms_fsm.language import rough_points
+from gms_fsm.lowering._observing import armed, rate
+from gms_fsm.lowering.layout import Layout, LogRecord
 from gms_fsm.run.machines import Meddling
 from gms_fsm.run.start import Start
+from gms_fsm.traces._log import log_of
 from gms_fsm.traces.failures import (
     CallbackError,
     LivelockError,
@@ -24,7 +26,9 @@ from gms_fsm.traces.failures import (
     StepLimitError,
     StepSizeError,
 )
-from gms_fsm.traces.trace import Rows, Trace, log_of
+from gms_fsm.traces.rows import Rows
+from gms_fsm.traces.scope import Scope
+from gms_fsm.traces.trace import Trace
 from integrators import (
     Arc,
     Firing,
@@ -48,6 +52,7 @@ __all__ = [
     "check_pace",
     "explained",
     "meddled",
+    "scope_of",
 ]
 
 POWERS = 12  # turns of the power iteration
@@ -65,9 +70,6 @@ class Recording(Protocol):
     @property
     def latest(self) -> tuple[float, list[float], tuple[int, ...]]:
         """Time, state and modes reached."""
-
-    def observe(self, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
-        """Return v, F, s, F_i, dz of a state."""
 
     def trace(self) -> Trace:
         """Return all that was kept."""
@@ -88,13 +90,13 @@ class _Columns:
         self.y.append(y)
         self.mode.append(mode)
 
-    def rows(self, size: int, n: int) -> Rows:
+    def rows(self, layout: Layout) -> Rows:
         count = min(map(len, vars(self).values()))  # Ctrl-C may come between two columns
         return Rows(
             np.array(self.t[:count], dtype=np.float64),
             np.array(self.microstep[:count], dtype=np.int64),
-            np.array(self.y[:count], dtype=np.float64).reshape(count, size),
-            np.array(self.mode[:count], dtype=np.int64).reshape(count, n),
+            np.array(self.y[:count], dtype=np.float64).reshape(count, layout.y.size),
+            np.array(self.mode[:count], dtype=np.int64).reshape(count, layout.modes),
         )
 
 
@@ -111,10 +113,11 @@ class Recorder:
         self.start = start
         self.rows = _Columns([], [], [], [])
         self.stops = _Columns([], [], [], [])
-        self.log: list[tuple[Any, ...]] = []
-        self.latest = start.t_start, start.y, (*start.mode, *[0] * start.program.slides)
+        self.log: list[LogRecord] = []
+        mode = start.program.layout.not_sliding(start.mode)
+        self.latest = start.t_start, start.y, mode
         if start.output == "t_eval":
-            self.stops.add(start.t_start, 0, list(start.y), self.latest[2])
+            self.stops.add(start.t_start, 0, list(start.y), mode)
 
     def take(self, event: integrators.Event) -> None:
         """Keep one event."""
@@ -141,12 +144,12 @@ class Recorder:
 
     def state(self) -> dict[str, Any]:
         """Return what was kept, as arrays, for a checkpoint."""
-        size, n = self.start.program.size, self.start.program.modes
+        layout = self.start.program.layout
         tables = {"rows": self.rows, "stops": self.stops}
         kept = {
             f"{name}_{column}": values
             for name, table in tables.items()
-            for column, values in vars(table.rows(size, n)).items()
+            for column, values in vars(table.rows(layout)).items()
         }
         return kept | {"log": np.asarray(log_of(self.log))}
 
@@ -159,44 +162,39 @@ class Recorder:
                 state[f"{name}_{column}"].tolist() for column in ("t", "microstep", "y", "mode")
             )
             setattr(self, name, _Columns(t, microstep, y, [tuple(row) for row in mode]))
-        self.log = state["log"].tolist()
+        self.log = [LogRecord(*record) for record in state["log"].tolist()]
         self.latest = latest
 
-    def _record(self, firing: Firing) -> tuple[Any, ...]:
-        chart, i = self.start.model.chart, firing.machine
-        edge = chart.transitions[firing.edge]
+    def _record(self, firing: Firing) -> LogRecord:
+        start, i = self.start, firing.machine
+        edge = start.model.chart.transitions[firing.edge]
         before, after = (
-            self.observe(firing.t, y, mode)
+            Scope.of(start.model, start.program, firing.t, y, mode)
             for y, mode in ((firing.y_before, firing.mode_before), (firing.y, firing.mode))
         )
-        z = firing.y_before[self.start.program.first + i]
-        return (
-            firing.t,
-            i,
-            edge.name,
-            edge.source,
-            edge.target,
-            z,
-            before[0],
-            before[2 + i],
-            before[1],
-            after[1],
+        return LogRecord(
+            t=firing.t,
+            element=i,
+            edge=edge.name,
+            source=edge.source,
+            target=edge.target,
+            z=before.z[i],
+            v=before.v,
+            s=before.s[i],
+            F_before=before.F,
+            F_after=after.F,
         )
-
-    def observe(self, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
-        """Return v, F, s, F_i, dz of a state."""
-        return observe(self.start.program, t, y, mode)
 
     def trace(self) -> Trace:
         """Return all that was kept."""
         start = self.start
-        size, n = start.program.size, start.program.modes
+        layout = start.program.layout
         if start.output == "end":
             self.rows = _Columns([], [], [], [])
             t, y, mode = self.latest
             self.rows.add(t, 0, y, mode)
-        rows = self.rows.rows(size, n)
-        stops = self.stops.rows(size, n) if start.output == "t_eval" else rows
+        rows = self.rows.rows(layout)
+        stops = self.stops.rows(layout) if start.output == "t_eval" else rows
         return Trace(rows, stops, log_of(self.log), start.model, start.rig, start.settings)
 
 
@@ -214,22 +212,21 @@ class Moment:
     @property
     def states(self) -> list[str]:
         """Active state of each element."""
-        states = self._recording.start.model.chart.states
-        return [states[mode].name for mode in self._recording.latest[2][: self._n]]
-
-    @property
-    def _n(self) -> int:
-        return self._recording.start.model.n
+        start, (_, _, mode) = self._recording.start, self._recording.latest
+        states = start.model.chart.states
+        return [states[each].name for each in mode[start.program.layout.elements]]
 
     @property
     def values(self) -> dict[str, Any]:
         """``x`` [m], ``v`` [m/s] and ``F`` [N]; ``z`` and ``s`` [m], one an element."""
-        recording, start = self._recording, self._recording.start
-        t, y, mode = recording.latest
-        seen = recording.observe(t, y, mode)
-        first, n = start.program.first, self._n
-        elements = {"z": y[first : first + n], "s": seen[2 : 2 + n]}
-        return {"x": y[0], "v": seen[0], "F": seen[1], **elements}
+        here = scope_of(self._recording)
+        return {"x": here.x, "v": here.v, "F": here.F, "z": here.z, "s": here.s}
+
+
+def scope_of(recording: Recording) -> Scope:
+    """Return the values of the latest row."""
+    start = recording.start
+    return Scope.of(start.model, start.program, *recording.latest)
 
 
 # --------------------------------------------------------------------------- explaining
@@ -273,12 +270,12 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
         )
     if not isinstance(error, Livelock):
         return SimulationError(f"{error} at {scene}; {kept}", trace)
-    seen = recorder.observe(error.t, error.y, error.mode)
+    start = recorder.start
+    scope = Scope.of(start.model, start.program, error.t, error.y, error.mode)
 
     def values(i: int) -> str:
-        z = error.y[recorder.start.program.first + i]
-        s = f", s = {seen[2 + i]:.6g}" if "s" in chart.inputs else ""
-        return f"{chart.variables[0]} = {z:.6g}{s}, v = {seen[0]:.6g}"
+        s = f", s = {scope.s[i]:.6g}" if "s" in chart.inputs else ""
+        return f"{chart.variables[0]} = {scope.z[i]:.6g}{s}, v = {scope.v:.6g}"
 
     if error.machine is not None:
         log = trace.transitions
@@ -302,7 +299,7 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
         )
     rough = [
         i
-        for i, state in enumerate(error.mode[: recorder.start.model.n])
+        for i, state in enumerate(error.mode[start.program.layout.elements])
         if any(rough_points(chart.flows[chart.states[state].name, u]) for u in chart.variables)
     ]
     i = rough[0] if rough else 0
@@ -409,15 +406,15 @@ def _way_back(chart: Chart, taken: Any) -> str:
 
 def _not_finite(error: NotFinite, recorder: Recording) -> str:
     """Name what is not finite where a run ended, as far as it shows there."""
-    model = recorder.start.model
-    seen = recorder.observe(error.t, error.y, error.mode)
-    if not math.isfinite(seen[0]):
+    start = recorder.start
+    scope = Scope.of(start.model, start.program, error.t, error.y, error.mode)
+    if not math.isfinite(scope.v):
         return "the velocity v is not finite"
-    rates = seen[2 + 2 * model.n :]
-    for j, variable in enumerate(model.chart.variables):
-        for i, mode in enumerate(error.mode[: model.n]):
-            if not math.isfinite(rates[j * model.n + i]):
-                state = model.chart.states[mode]
+    states = {state.name: state for state in start.model.chart.states}
+    for variable in start.model.chart.variables:
+        for i, name in enumerate(scope.states):
+            if not math.isfinite(scope.each(f"d{variable}")[i]):
+                state = states[name]
                 return (
                     f"the flow of {variable} in state {state.name}, [{state.flow[variable]}], is "
                     f"not finite in element {i + 1}"

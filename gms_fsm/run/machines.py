@@ -14,10 +14,11 @@ from transitions import Machine, MachineError
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ChartError, ParameterError, shown
-from gms_fsm.language.expression import PYTHON, Condition, names_in, spell
+from gms_fsm.language import PYTHON, Condition, names_in, spell
 from gms_fsm.lowering._generated import ieee, load, load_careful
 from gms_fsm.lowering.program import Arguments, Program
 from gms_fsm.systems.models import Model
+from gms_fsm.traces.scope import GuardValues, parameter_values
 
 __all__ = ["Element", "ElementMachines", "Engine", "IfElse", "Meddling"]
 
@@ -188,8 +189,7 @@ def _new_element(kind: type[Element], model: Model, index: int) -> Element:
     element = kind()
     values = vars(element)  # past __setattr__, as an __init__ may have set these names
     values["index"] = index
-    for name, value in model.values.items():
-        values[name] = float(value if isinstance(value, float | int) else value[index])
+    values |= parameter_values(model, index)
     values["_fixed"] = frozenset(model.values) | {"index"}
     return element
 
@@ -220,19 +220,17 @@ class MachineEngine:
         self.machines, self.program = machines, program
         self.chart = machines.model.chart
         self.table = machines.table(self.chart)
-        n = len(mode)
-        self.seen, self.live = [0.0] * program.seen, program.live
-        self.places = [
-            (variable, program.first + j * n) for j, variable in enumerate(self.chart.variables)
-        ]
+        self.seen, self.live = [0.0] * program.layout.observed.size, program.live
+        self.values = GuardValues(program.layout)
+        # Past __setattr__ of the elements, which would cost time.
         self.seen_by = [vars(element) for element in machines.elements]
-        self.states = [""] * n
+        self.states = [""] * len(mode)
         self.set_states(mode)
 
-    def go_on_from(self, t: float, y: list[float], mode: Sequence[int], p: Arguments) -> None:
+    def go_on_from(self, t: float, y: list[float], mode: Sequence[int]) -> None:
         """Put every element where it was when a run was interrupted."""
         self.set_states(mode)
-        self.show(t, y, list(mode), p)  # perhaps between two firings of a set
+        self.show(t, y, list(mode))  # perhaps between two firings of a set
 
     def set_states(self, mode: Sequence[int]) -> None:
         """Put every element into a state, without callbacks."""
@@ -244,21 +242,18 @@ class MachineEngine:
         self.machines.machine.set_state(state, self.machines.elements[machine])
         self.states[machine] = state
 
-    def show(self, t: float, y: list[float], mode: list[int], p: Arguments) -> None:
+    def show(self, t: float, y: list[float], mode: list[int]) -> None:
         """Put the present values at hand of every element."""
-        seen = self.seen
-        self.program.ieee["observe"](t, y, mode, self.live, p, seen)
-        x, v = y[0], seen[0]
-        for i, values in enumerate(self.seen_by):  # past __setattr__, which would cost time
-            values["t"], values["x"], values["v"], values["s"] = t, x, v, seen[2 + i]
-            for variable, base in self.places:
-                values[variable] = y[base + i]
+        program = self.program
+        program.ieee["observe"](t, y, mode, self.live, program.p, self.seen)
+        self.values.put(t, y, self.seen, self.seen_by)
 
     def ask(
         self, t: float, y: list[float], mode: list[int], p: Arguments, edges: list[int]
     ) -> None:
         """Fill the first enabled edge of each element, or -1."""
-        self.show(t, y, mode, p)
+        del p  # the program has the same
+        self.show(t, y, mode)
         for i, element in enumerate(self.machines.elements):
             edges[i] = -1
             for edge, guard in self.table[mode[i]]:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
-
-from numpy.typing import ArrayLike
+from typing import Any, Unpack
 
 import integrators
 from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.lowering.program import equations
-from gms_fsm.lowering.scales import Tolerance
 from gms_fsm.run._checkpoint import Keeper
 from gms_fsm.run._compiled_run import CompiledRun
 from gms_fsm.run._recording import (
@@ -25,7 +21,8 @@ from gms_fsm.run._recording import (
     meddled,
 )
 from gms_fsm.run.machines import ElementMachines, IfElse, MachineEngine, Meddling
-from gms_fsm.run.start import MOST_STEPS, Start
+from gms_fsm.run.settings import RunOptions, SettingOptions, Settings
+from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.traces.failures import SimulationError
@@ -44,22 +41,15 @@ def simulate(
     t_end: float,
     *,
     t_start: float = 0.0,
-    method: str | type[Any] = "dp45",
-    step: float | None = None,
-    rtol: float = 1e-6,
-    atol: Tolerance = None,
-    max_step: float = math.inf,
-    max_steps: int = MOST_STEPS,
-    events: str = "located",
-    engine: str | ElementMachines = "machines",
-    machines: ElementMachines | None = None,
-    output: str | None = None,
-    t_eval: ArrayLike | None = None,
     initial: Mapping[str, Any] | None = None,
+    settings: Settings | None = None,
+    engine: str | ElementMachines | None = None,
+    machines: ElementMachines | None = None,
     progress: Callable[[Moment], object] | None = None,
     checkpoint: str | Path | None = None,
     checkpoint_every: float = 60.0,
     monitors: str | Iterable[str | Monitor] = (),
+    **options: Unpack[RunOptions],
 ) -> Trace:
     """Run a friction model on a rig.
 
@@ -74,44 +64,17 @@ def simulate(
         What it is mounted on.
     t_end, t_start : float
         s.
-    method : {"dp45", "bs23", "rk4", "heun", "euler"} or OdeSolver class
-        dp45 and bs23 choose their steps, the others need `step`. Any `scipy.integrate.OdeSolver`
-        class (Radau, BDF, LSODA ...) for stiff cases.
-    step : float, optional
-        Fixed steps of this length [s], the last one cut to t_end; at a located crossing a step is
-        cut and the grid is met again after it. A SciPy class is led from grid point to grid point.
-    rtol : float
-        Relative tolerance of adaptive steps; the error is the largest component's.
-    atol : float or mapping, optional
-        Absolute tolerance of all components, or by name: ``x`` [m], ``v`` [m/s], the chart's
-        variables, a number or one per element. What is left out comes from the model's own scales
-        (`gms_fsm.lowering.scales`): a tenth of rtol times the smallest deflection at which a
-        guard changes, or times v_c. A component for which the chart has no scale is measured
-        by the largest value it has had. What was used stands in ``Trace.settings``.
-    max_step : float
-        Longest adaptive step, s. Accuracy does not need it.
-    max_steps : int
-        How many steps may be tried; a run that needs more ends in a `StepLimitError`.
-    events : {"located", "step"}
-        ``"located"`` finds the place of each switch. ``"step"`` looks at the guards once at the end
-        of a step, at most one edge per element, like an if-else in a block diagram: it loses
-        switches and is here to show that. It needs `step` or a finite `max_step`.
-    engine : {"machines", "ifelse", "compiled"} or ElementMachines
-        Who decides: the `transitions` machines, the generated if-else text, or that text as machine
-        code (extra ``fast``). The results are the same to the last bit. Machines of your own, with
-        callbacks, may stand here instead of ``"machines"``.
-    machines : ElementMachines, optional
-        Machines of your own; with the compiled engine each firing is replayed through them, so that
-        callbacks run and their states are right at the end.
-    output : {"all", "t_eval", "end"}, optional
-        Rows to keep: every accepted step, the times of `t_eval`, or only the state at the end. The
-        transition log is always complete. By default ``"t_eval"`` if it is given, else ``"all"``.
-    t_eval : array_like, shape (m,), optional
-        Wanted times [s], increasing; the trace has exactly these rows. All accepted steps and
-        micro-steps otherwise.
     initial : mapping, optional
         Any of the chart's variables by name, such as ``z`` (n,) [m], ``states`` (n,) names, ``v``
         [m/s] (not with a prescribed velocity) and ``x`` [m].
+    settings : Settings, optional
+        How to integrate and what to keep; the defaults when left out.
+    engine : {"machines", "ifelse", "compiled"} or ElementMachines, optional
+        Field of `Settings`. Machines of your own, with callbacks, may stand here instead of
+        ``"machines"``.
+    machines : ElementMachines, optional
+        Machines of your own; with the compiled engine each firing is replayed through them, so that
+        callbacks run and their states are right at the end.
     progress : callable, optional
         Called now and then with the `Moment` reached.
     checkpoint : str or Path, optional
@@ -126,6 +89,9 @@ def simulate(
         of these, invariants such as ``"abs(z) <= 2*s"``, or objects of `gms_fsm.traces.monitors`.
         What they say is in ``Trace.monitors``. They look at the rows and the log when the run has
         ended, or has failed.
+    **options
+        Fields of `Settings` by name, in place of those of `settings`: ``method``, ``step``,
+        ``rtol``, ``atol``, ``max_step``, ``max_steps``, ``events``, ``output``, ``t_eval``.
 
     Returns
     -------
@@ -158,30 +124,16 @@ def simulate(
         if machines is not None:
             raise ParameterError("engine and machines are both machines of yours; give one of them")
         machines, engine = engine, "machines"
+    given: SettingOptions = {**options} if engine is None else {**options, "engine": engine}  # type: ignore[typeddict-item]
+    chosen = Settings.of(settings, "simulate", **given)
     if machines is not None:
         if machines.model is not model:
             raise ParameterError("machines: these ElementMachines were made for another model")
-        if engine == "ifelse":
+        if chosen.engine == "ifelse":
             raise ParameterError("engine 'ifelse' asks no machines; leave machines=... out")
-    start = Start.of(
-        model,
-        rig,
-        t_end,
-        t_start=t_start,
-        method=method,
-        step=step,
-        rtol=rtol,
-        atol=atol,
-        max_step=max_step,
-        max_steps=max_steps,
-        events=events,
-        engine=engine,
-        output=output,
-        t_eval=t_eval,
-        initial=initial,
-    )
+    start = Start.of(model, rig, t_end, chosen, t_start=t_start, initial=initial)
     watching = checked(monitors, model, start.output).values() if monitors else ()
-    run = CompiledRun(start, machines) if engine == "compiled" else Run(start, machines)
+    run = CompiledRun(start, machines) if chosen.engine == "compiled" else Run(start, machines)
     keeper = None if checkpoint is None else Keeper(run, Path(checkpoint), checkpoint_every)
     try:
         while run.advance():
@@ -225,7 +177,7 @@ class Run:
         self.start = start
         switch: MachineEngine | IfElse = IfElse(start.program)
         self.engine: MachineEngine | None = None
-        if start.settings["engine"] != "ifelse":
+        if start.chosen.engine != "ifelse":
             machines = ElementMachines(start.model) if machines is None else machines
             switch = self.engine = MachineEngine(machines, start.program, start.mode)
         self.recorder, self.next_look = Recorder(start), PATIENCE
@@ -244,7 +196,7 @@ class Run:
         t, y = now.clock[T], list(now.y)
         self.recorder.put_back(kept, (t, y, hybrid.modes_of(self.buffers)))
         if self.engine is not None:
-            self.engine.go_on_from(t, list(y), now.mode, self.start.program.p)
+            self.engine.go_on_from(t, list(y), now.mode)
 
     def advance(self) -> bool:
         """Let the next thing happen.

@@ -8,24 +8,23 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 import integrators
 from gms_fsm.charts.parameters import as_floats, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError, SignalError, shown
 from gms_fsm.lowering._pulses import waking_times
+from gms_fsm.lowering.layout import Layout
 from gms_fsm.lowering.program import Program, arguments, lower
 from gms_fsm.lowering.scales import Setting, Tolerance, scales_of
+from gms_fsm.run.settings import Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Corners, Formula
 from integrators import Options
 
-__all__ = ["ENGINES", "MOST_STEPS", "Start"]
+__all__ = ["Start"]
 
 LATEST = 1e9  # s; one tick of a double is then 1e-7 s
-MOST_STEPS = 1_000_000  # of a run, unless told otherwise
-ENGINES = ("machines", "ifelse", "compiled")
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,12 +45,10 @@ class Start:
         Initial states of the elements.
     options : integrators.Options
         How to integrate.
-    output : {"all", "t_eval", "end"}
-        What to keep.
     settings : mapping
         As they are kept in the trace.
-    atol : float or mapping, optional
-        As it was given.
+    chosen : Settings
+        As they were given.
     """
 
     model: Model
@@ -63,9 +60,14 @@ class Start:
     y: list[float]
     mode: list[int]
     options: Options
-    output: str
     settings: Mapping[str, Setting]
-    atol: Tolerance
+    chosen: Settings
+
+    @property
+    def output(self) -> str:
+        """What to keep: ``"all"``, ``"t_eval"`` or ``"end"``."""
+        assert self.chosen.output is not None  # Settings fills it in
+        return self.chosen.output
 
     @classmethod
     def of(
@@ -73,18 +75,9 @@ class Start:
         model: Model,
         rig: Rig,
         t_end: float,
+        settings: Settings | None = None,
         *,
         t_start: float = 0.0,
-        method: str | type[Any] = "dp45",
-        step: float | None = None,
-        rtol: float = 1e-6,
-        atol: Tolerance = None,
-        max_step: float = math.inf,
-        max_steps: int = MOST_STEPS,
-        events: str = "located",
-        engine: str = "machines",
-        output: str | None = None,
-        t_eval: ArrayLike | None = None,
         initial: Mapping[str, Any] | None = None,
         rows_at_once: int = integrators.ROWS_AT_ONCE,
     ) -> Start:
@@ -92,10 +85,10 @@ class Start:
 
         Parameters
         ----------
-        model, rig, t_end, t_start, method, step, rtol, atol, max_step, max_steps, events, engine
+        model, rig, t_end, t_start, initial
             See `gms_fsm.simulate`.
-        output, t_eval, initial
-            See `gms_fsm.simulate`.
+        settings : Settings, optional
+            How to integrate; the defaults when left out.
         rows_at_once : int
             How many steps an arc holds at most.
 
@@ -117,62 +110,46 @@ class Start:
                 raise ParameterError(
                     f"{what} is {shown(given)}; it must be a {what}, for example {example}"
                 )
-        t_start = checked_scalar("t_start", t_start, "finite")
-        t_end = checked_scalar("t_end", t_end, "finite")
-        for name, time in (("t_start", t_start), ("t_end", t_end)):
-            if abs(time) > LATEST:
-                raise ParameterError(
-                    f"{name} is {time!r} s; beyond {LATEST:g} s the clock is too coarse"
-                )
-        if t_end <= t_start:
-            raise ParameterError(f"t_end is {t_end!r}, t_start is {t_start!r}; t_end must be later")
-        if engine not in ENGINES:
-            raise ParameterError(
-                f"engine is {shown(engine)}; it must be {', '.join(map(repr, ENGINES))}, or an "
-                "ElementMachines"
-            )
-        if engine == "compiled" and isinstance(method, type):
-            raise ParameterError(
-                f"engine 'compiled' runs our own methods ({', '.join(integrators.METHODS)}), not "
-                f"{method.__name__}; use engine='machines' for SciPy's solvers"
-            )
-        output = _output(output, t_eval)
-        rtol = checked_scalar("rtol", rtol, "> 0")
+        chosen = Settings() if settings is None else settings
+        t_start, t_end = _times(t_start, t_end)
+        _check_resolution(chosen, t_start, t_end)
         scales = scales_of(model)
-        tolerances, used = _tolerances(model, rig, atol, scales.tolerances(rtol))
-        options = _options(
-            method,
-            step,
-            rtol,
+        tolerances, used = _tolerances(model, rig, chosen.atol, scales.tolerances(chosen.rtol))
+        method = chosen.method
+        if not isinstance(method, str) and min(tolerances) == 0.0:
+            raise ParameterError(
+                f"method {method.__name__} needs an absolute tolerance, and the chart gives no "
+                "scale for every component; give one, for example atol=1e-9, or by name "
+                "atol={'x': 1e-9}"
+            )
+        options = Options(
+            integrators.METHODS[method] if isinstance(method, str) else method,
+            chosen.step,
+            chosen.rtol,
             tolerances,
-            max_step,
+            chosen.max_step,
             scales.time,
-            _count(max_steps),
-            events,
-            t_eval,
-            output,
-            t_start,
-            t_end,
+            chosen.max_steps,
+            chosen.events == "located",
+            [] if chosen.output == "end" else _wanted(chosen, t_start, t_end),
             rows_at_once,
         )
         last = _covered(rig, t_start, t_end)
         program = _watchful(lower(model, rig), rig, t_start, last)
         y, mode = _initial(model, rig, {} if initial is None else initial)
-        settings: dict[str, Setting] = {
-            "method": method if isinstance(method, str) else method.__name__,
-            "step": step,
-            "rtol": rtol,
+        kept: dict[str, Setting] = {
+            "method": chosen.method_name,
+            "step": chosen.step,
+            "rtol": chosen.rtol,
             "atol": used,
-            "max_step": max_step if math.isfinite(max_step) else None,
-            "max_steps": max_steps,
-            "events": events,
-            "engine": engine,
+            "max_step": chosen.max_step if math.isfinite(chosen.max_step) else None,
+            "max_steps": chosen.max_steps,
+            "events": chosen.events,
+            "engine": chosen.engine,
             "t_start": t_start,
             "t_end": t_end,
         }
-        return cls(
-            model, rig, program, t_start, t_end, last, y, mode, options, output, settings, atol
-        )
+        return cls(model, rig, program, t_start, t_end, last, y, mode, options, kept, chosen)
 
     def with_numbers(self, model: Model, rig: Rig) -> Start:
         """Return the same start with other numbers; signals and initial values stay.
@@ -189,7 +166,7 @@ class Start:
         """
         scales = scales_of(model)
         default = scales.tolerances(self.options.rtol)
-        tolerances, used = _tolerances(model, rig, self.atol, default)
+        tolerances, used = _tolerances(model, rig, self.chosen.atol, default)
         return replace(
             self,
             model=model,
@@ -200,127 +177,65 @@ class Start:
         )
 
 
-def _output(output: str | None, t_eval: ArrayLike | None) -> str:
-    if output is None:
-        return "all" if t_eval is None else "t_eval"
-    if output not in ("all", "t_eval", "end"):
-        raise ParameterError(f"output is {shown(output)}; it must be 'all', 't_eval' or 'end'")
-    if (output == "t_eval") != (t_eval is not None):
-        raise ParameterError(
-            "output='t_eval' needs t_eval=..., the times of the rows"
-            if t_eval is None
-            else f"output is {output!r}, but t_eval asks for rows at given times; leave one out"
-        )
-    return output
+def _times(t_start: float, t_end: float) -> tuple[float, float]:
+    t_start = checked_scalar("t_start", t_start, "finite")
+    t_end = checked_scalar("t_end", t_end, "finite")
+    for name, time in (("t_start", t_start), ("t_end", t_end)):
+        if abs(time) > LATEST:
+            raise ParameterError(
+                f"{name} is {time!r} s; beyond {LATEST:g} s the clock is too coarse"
+            )
+    if t_end <= t_start:
+        raise ParameterError(f"t_end is {t_end!r}, t_start is {t_start!r}; t_end must be later")
+    return t_start, t_end
 
 
-def _count(max_steps: Any) -> int:
-    if isinstance(max_steps, bool) or not isinstance(max_steps, int) or max_steps < 1:
-        raise ParameterError(
-            f"max_steps is {shown(max_steps)}; it must be a whole number of steps, at least 1"
-        )
-    return max_steps
+def _check_resolution(chosen: Settings, t_start: float, t_end: float) -> None:
+    """Refuse steps that the clock cannot make at these times."""
+    tick = 16.0 * math.ulp(max(abs(t_start), abs(t_end)))
+    for name, length in (("step", chosen.step), ("max_step", chosen.max_step)):
+        if length is not None and length <= tick:
+            raise ParameterError(
+                f"{name} is {length!r} s, under the resolution of the clock ({tick:.2g} s here); "
+                "give a longer one"
+            )
+
+
+def _wanted(chosen: Settings, t_start: float, t_end: float) -> list[float] | None:
+    """Return the wanted times, if there are any; all lie within the run."""
+    if chosen.t_eval is None:
+        return None
+    times = as_floats(np.asarray(chosen.t_eval))
+    for time in times:
+        if not t_start <= time <= t_end:
+            raise ParameterError(
+                f"t_eval has {time!r}, outside of t_start = {t_start!r} to t_end = {t_end!r}"
+            )
+    return times
 
 
 def _tolerances(
     model: Model, rig: Rig, atol: Tolerance, default: Mapping[str, list[float]]
 ) -> tuple[list[float], float | dict[str, float | list[float]]]:
     """Return the absolute tolerance of each component, and what to say of them."""
-    moved = ("x",) if rig.acceleration is None else ("x", "v")
-    names = (*moved, *model.chart.variables)
+    places = Layout.state(model, rig)
     if atol is not None and not isinstance(atol, Mapping):
-        number = checked_scalar("atol", atol, "> 0")
-        return [number] * (len(moved) + model.n * len(model.chart.variables)), number
-    rows = {name: default[name] for name in names}
+        return [atol] * places.size, atol
+    rows = {name: default[name] for name in (*places.shared, *places.own)}
     by_name: Mapping[str, Any] = {} if atol is None else atol
     for name, given in by_name.items():
         if name not in rows:
             raise ParameterError(
-                f"atol has the key {shown(name)}; known are {', '.join(map(repr, names))}"
+                f"atol has the key {shown(name)}; known are {', '.join(map(repr, rows))}"
             )
         if np.ndim(given) == 0:
             rows[name] = [checked_scalar(f"atol[{name!r}]", given, "> 0")] * len(rows[name])
         else:
             rows[name] = as_floats(checked_array(f"atol[{name!r}]", given, len(rows[name]), "> 0"))
     used: dict[str, float | list[float]] = {
-        name: row if name in model.chart.variables else row[0] for name, row in rows.items()
+        name: row if name in places.own else row[0] for name, row in rows.items()
     }
-    return [each for name in names for each in rows[name]], used
-
-
-def _options(
-    method: str | type[Any],
-    step: float | None,
-    rtol: float,
-    atol: list[float],
-    max_step: float,
-    time_scale: float,
-    max_steps: int,
-    events: str,
-    t_eval: ArrayLike | None,
-    output: str,
-    t_start: float,
-    t_end: float,
-    rows_at_once: int,
-) -> Options:
-    chosen: Any = method
-    if isinstance(method, str):
-        if method not in integrators.METHODS:
-            raise ParameterError(
-                f"method is {shown(method)}; it must be one of {', '.join(integrators.METHODS)}, "
-                "or a scipy.integrate.OdeSolver class"
-            )
-        chosen = integrators.METHODS[method]
-        if step is None and not chosen.adaptive:
-            raise ParameterError(
-                f"method {method!r} has no error estimate; give step=..., or use 'dp45' or 'bs23'"
-            )
-    elif not (isinstance(method, type) and hasattr(method, "TOO_SMALL_STEP")):
-        raise ParameterError(
-            f"method is {shown(method)}; it must be a name ({', '.join(integrators.METHODS)}) or a "
-            "scipy.integrate.OdeSolver class"
-        )
-    elif min(atol) == 0.0:
-        raise ParameterError(
-            f"method {method.__name__} needs an absolute tolerance, and the chart gives no scale "
-            "for every component; give one, for example atol=1e-9, or by name atol={'x': 1e-9}"
-        )
-    if step is not None:
-        step = checked_scalar("step", step, "> 0")
-    if max_step != math.inf:
-        max_step = checked_scalar("max_step", max_step, "> 0")
-    tick = 16.0 * math.ulp(max(abs(t_start), abs(t_end)))
-    for name, length in (("step", step), ("max_step", max_step)):
-        if length is not None and length <= tick:
-            raise ParameterError(
-                f"{name} is {length!r} s, under the resolution of the clock ({tick:.2g} s here); "
-                "give a longer one"
-            )
-    if events not in ("located", "step"):
-        raise ParameterError(f"events is {shown(events)}; it must be 'located' or 'step'")
-    if events == "step" and step is None and not math.isfinite(max_step):
-        raise ParameterError(
-            "events='step' looks at the guards once a step: give step=... or a finite max_step"
-        )
-    times: list[float] | None = [] if output == "end" else None
-    if t_eval is not None:
-        wanted = checked_array("t_eval", t_eval, None, "finite")
-        for outside in wanted[(wanted < t_start) | (wanted > t_end)][:1]:
-            raise ParameterError(
-                f"t_eval has {float(outside)!r}, outside of t_start = {t_start!r} to "
-                f"t_end = {t_end!r}"
-            )
-        if (np.diff(wanted) <= 0).any():
-            i = int(np.flatnonzero(np.diff(wanted) <= 0)[0])
-            raise ParameterError(
-                f"t_eval[{i}] = {wanted[i]} is not before t_eval[{i + 1}] = {wanted[i + 1]}; "
-                "times must increase"
-            )
-        times = as_floats(wanted)
-    located = events == "located"
-    return Options(
-        chosen, step, rtol, atol, max_step, time_scale, max_steps, located, times, rows_at_once
-    )
+    return places.joined(used), used
 
 
 def _watchful(program: Program, rig: Rig, t_start: float, t_end: float) -> Program:
@@ -362,10 +277,12 @@ def _initial(model: Model, rig: Rig, initial: Mapping[str, Any]) -> tuple[list[f
             raise ParameterError(
                 f"initial has the key {shown(name)}; known are {', '.join(map(repr, known))}"
             )
-    y = [checked_scalar("initial['x']", initial.get("x", 0.0), "finite")]
-    if rig.acceleration is not None:
-        y.append(checked_scalar("initial['v']", initial.get("v", 0.0), "finite"))
-    elif "v" in initial:
+    places = Layout.state(model, rig)
+    y: dict[str, Any] = {
+        name: checked_scalar(f"initial[{name!r}]", initial.get(name, 0.0), "finite")
+        for name in places.shared
+    }
+    if "v" in initial and "v" not in y:
         raise ParameterError(
             f"initial has 'v' = {shown(initial['v'])}, but the rig prescribes the velocity; leave "
             "it out"
@@ -376,8 +293,8 @@ def _initial(model: Model, rig: Rig, initial: Mapping[str, Any]) -> tuple[list[f
             raise ParameterError(
                 f"initial[{name!r}] has {values.size} entries; the model has {n} elements"
             )
-        y += as_floats(values)
+        y[name] = as_floats(values)
     names: Any = initial.get("states", [chart.default_state.name] * n)
     if isinstance(names, str) or np.ndim(names) != 1 or len(names) != n:
         raise ParameterError(f"initial['states'] is {shown(names)}; it must list {n} state names")
-    return y, [chart.state_index(str(name)) for name in names]
+    return places.joined(y), [chart.state_index(str(name)) for name in names]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
 import math
 import os
 import signal
@@ -13,16 +12,16 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gms_fsm._extras import require
 from gms_fsm._files import written_whole
-from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.charts.parameters import QUANTITIES, WEIGHTS, FloatArray
 from gms_fsm.errors import (
     GMSError,
-    MissingExtraError,
     OutputError,
     ParameterError,
     TraceFileError,
@@ -31,13 +30,16 @@ from gms_fsm.errors import (
     why,
 )
 from gms_fsm.lowering._compiled import check_numba
+from gms_fsm.lowering.layout import LOG_NUMBERS
 from gms_fsm.run._compiled_run import CompiledRun
+from gms_fsm.run._recording import scope_of
+from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import Run
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model, parameter_names, with_values
 from gms_fsm.systems.rigs import Rig, with_numbers
 from gms_fsm.traces._archives import member
-from gms_fsm.traces.trace import column_name
+from gms_fsm.traces.rows import column_name
 
 if TYPE_CHECKING:
     import pandas
@@ -46,29 +48,13 @@ if TYPE_CHECKING:
 __all__ = ["Sweep", "sweep"]
 
 AT_ONCE = 64  # runs a task, at most
-_OPTIONS = (
-    "t_start",
-    "method",
-    "step",
-    "rtol",
-    "atol",
-    "max_step",
-    "max_steps",
-    "events",
-    "t_eval",
-    "initial",
-)
 _LOG = np.dtype(
     [
         ("run", "i8"),
         ("t", "f8"),
         ("element", "i8"),
         ("edge", "i8"),
-        ("z", "f8"),
-        ("v", "f8"),
-        ("s", "f8"),
-        ("F_before", "f8"),
-        ("F_after", "f8"),
+        *((name, "f8") for name in LOG_NUMBERS),
     ]
 )
 
@@ -147,16 +133,24 @@ class Sweep:
         log = self.transitions[self.transitions["run"] == run]
         return [(int(i), self.edges[edge]) for i, edge in zip(log.element, log.edge, strict=True)]
 
-    def to_dataframe(self) -> pandas.DataFrame:
-        """Return one row a run as a pandas DataFrame (extra ``pandas``).
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per run, by column.
 
         Returns
         -------
-        DataFrame
-            Parameters, outcome, end of the run; columns of elements are numbered from 1.
+        dict of str to ndarray, shape (runs,)
+            Parameters, outcome, end of the run; columns of elements are numbered from 1. A
+            parameter with the name of a result is called ``parameter_<name>``.
+
+        Examples
+        --------
+        >>> from gms_fsm import GMS, GMSParameters, Prescribed
+        >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+        >>> result = sweep(model, Prescribed("0.2"), 1.0, {"F_s": [1.5]}, engine="machines")
+        >>> list(result.columns())[:8]
+        ['F_s', 'outcome', 'message', 't', 'x', 'v', 'F', 'z1']
         """
-        pandas = _imported("pandas", "pandas")
-        results = {
+        results: dict[str, NDArray[Any]] = {
             "outcome": self.outcome,
             "message": self.message,
             "t": self.t,
@@ -166,13 +160,23 @@ class Sweep:
         }
         results |= _numbered("z", self.z) | _numbered("state", self.states)
         results |= {"transitions": self.transition_count}
-        columns = {
+        parameters = {
             _apart(column, results): numbers
             for name, values in self.parameters.items()
             for column, numbers in _numbered(name, values).items()
         }
-        index = pandas.RangeIndex(len(self), name="run")
-        return pandas.DataFrame(columns | results, index=index)
+        return parameters | results
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Return one row per run as a pandas DataFrame (extra ``pandas``).
+
+        Returns
+        -------
+        DataFrame
+            What `columns` gives.
+        """
+        pandas = require("pandas", "pandas")
+        return pandas.DataFrame(self.columns(), index=pandas.RangeIndex(len(self), name="run"))
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the results as an xarray Dataset (extra ``sweep``).
@@ -182,8 +186,8 @@ class Sweep:
         Dataset
             Dimensions ``run``, ``element`` (from 1) and, with rows, ``time``; units as attributes.
         """
-        xarray = _imported("xarray", "sweep")
-        units = {"t": "s", "x": "m", "v": "m/s", "F": "N", "z": "m"}
+        xarray = require("xarray", "sweep")
+        units = {name: QUANTITIES[name].unit for name in ("t", "x", "v", "F", "z")}
         data: dict[str, Any] = {}
         for name in ("outcome", "message", "t", "x", "v", "F"):
             data[f"{name}_end" if name in units else name] = ("run", getattr(self, name))
@@ -238,8 +242,8 @@ class Sweep:
             arrays["edges"] = np.array(self.edges, dtype=np.str_)
             return written_whole(path, lambda file: np.savez_compressed(file, **arrays))
         if path.suffix == ".parquet":
-            pandas = _imported("pandas", "sweep")
-            _imported("pyarrow", "sweep")
+            pandas = require("pandas", "sweep")
+            require("pyarrow", "sweep")
             log = pandas.DataFrame(
                 {name: self.transitions[name] for name in _LOG.names or ()}
                 | {"edge": np.array(self.edges, dtype=object)[self.transitions["edge"]]}
@@ -344,10 +348,11 @@ def sweep(
     parameters: Mapping[str, ArrayLike] | pandas.DataFrame,
     *,
     executor: Executor | None = None,
-    output: str = "end",
-    engine: str = "compiled",
+    t_start: float = 0.0,
+    initial: Mapping[str, Any] | None = None,
+    settings: Settings | None = None,
     progress: bool | None = None,
-    **options: Any,
+    **options: Unpack[SettingOptions],
 ) -> Sweep:
     """Run a model on a rig once for each set of parameters.
 
@@ -363,14 +368,16 @@ def sweep(
     executor : concurrent.futures.Executor, optional
         Where to run: a process pool, or the executor of a Dask ``Client`` (extra ``cluster``).
         Threads on this machine when left out; compiled runs do not hold the interpreter.
-    output : {"end", "t_eval"}
-        Keep the end of each run, or also rows at ``t_eval``.
-    engine : {"compiled", "machines", "ifelse"}
-        As in `simulate`; ``"compiled"`` needs the extra ``fast``.
+    t_start, initial
+        As in `simulate`.
+    settings : Settings, optional
+        How to integrate and what to keep: the end of each run (also where it says ``"all"``: runs
+        have different steps), or rows at ``t_eval``. When left out, ``engine="compiled"``, which
+        needs the extra ``fast``.
     progress : bool, optional
         Show a progress bar on standard error; by default where that is a terminal.
     **options
-        Further arguments of `simulate`: ``rtol``, ``method``, ``t_eval`` ...
+        Fields of `Settings` by name, in place of those of `settings`.
 
     Returns
     -------
@@ -391,22 +398,13 @@ def sweep(
     >>> result.outcome.tolist(), result.transition_count.tolist()
     (['ok', 'ok'], [4, 4])
     """
-    if output not in ("end", "t_eval"):
-        raise ParameterError(
-            f"output is {output!r}; a sweep keeps 'end' or 't_eval' (runs have different steps)"
-        )
-    if engine == "compiled":
+    begin = _Begin(t_end, t_start, initial, _chosen(settings, options))
+    if begin.settings.engine == "compiled":
         check_numba()
-    for name in options:
-        if name not in _OPTIONS:
-            raise ParameterError(
-                f"a sweep takes no {name!r}; of simulate's arguments it takes {', '.join(_OPTIONS)}"
-            )
-    options = {**options, "engine": engine, "output": output}
-    Start.of(model, rig, t_end, **options)  # what is wrong for all is said once, here
+    begin.start(model, rig)  # what is wrong for all is said once, here
     values = _values(model, rig, parameters)
     runs = len(next(iter(values.values())))
-    collected = _Collected(model, runs, options.get("t_eval"))
+    collected = _Collected(model, runs, begin.settings.t_eval)
     size = max(1, min(AT_ONCE, runs // AT_ONCE))
     chunks = [range(start, min(start + size, runs)) for start in range(0, runs, size)]
     # Dask takes tasks with equal arguments for one, and a failure of before for its result.
@@ -421,7 +419,7 @@ def sweep(
                 for chunk in chunks:
                     part = {key: array[chunk.start : chunk.stop] for key, array in values.items()}
                     try:
-                        task = executor.submit(_run_chunk, model, rig, t_end, part, options, name)
+                        task = executor.submit(_run_chunk, model, rig, begin, part, name)
                     except Exception as error:
                         if not isinstance(error, BrokenExecutor):  # by a task before this one
                             error = _NotSent(f"{type(error).__name__}: {error}")
@@ -462,7 +460,7 @@ def _values(
             array = np.array(value, dtype=np.float64)
         except (TypeError, ValueError):
             raise ParameterError(f"parameters[{name!r}] is not an array of numbers") from None
-        wide = name == "weights" or np.ndim(model.values.get(name, 0.0)) > 0
+        wide = name == WEIGHTS.name or np.ndim(model.values.get(name, 0.0)) > 0
         if array.shape[1:] not in (((), (model.n,)) if wide else ((),)) or array.ndim == 0:
             wanted = f"(runs,) or (runs, {model.n})" if wide else "(runs,)"
             raise ParameterError(
@@ -502,17 +500,46 @@ class _Result:
 
     outcome: str
     message: str
-    end: tuple[float, list[float], tuple[int, ...], list[float]] | None  # t, y, mode, observed
+    end: Mapping[str, Any] | None  # t, x, v, F, z, mode
     log: NDArray[Any]
     rows: Mapping[str, FloatArray] | None
+
+
+@dataclass(frozen=True)
+class _Begin:
+    """What all runs of a sweep share."""
+
+    t_end: float
+    t_start: float
+    initial: Mapping[str, Any] | None
+    settings: Settings
+
+    def start(self, model: Model, rig: Rig) -> Start:
+        return Start.of(
+            model, rig, self.t_end, self.settings, t_start=self.t_start, initial=self.initial
+        )
+
+
+def _chosen(settings: Settings | None, options: SettingOptions) -> Settings:
+    """Return the settings of each run: a sweep keeps ends, if not rows at wanted times."""
+    whole = settings is None or settings.output == "all"
+    if whole and options.get("t_eval") is None and options.get("output") is None:
+        options = {**options, "output": "end"}
+    if settings is None:
+        options = {"engine": "compiled", **options}
+    chosen = Settings.of(settings, "a sweep", **options)
+    if chosen.output == "all":
+        raise ParameterError(
+            "output is 'all'; a sweep keeps 'end' or 't_eval' (runs have different steps)"
+        )
+    return chosen
 
 
 def _run_chunk(
     model: Model,
     rig: Rig,
-    t_end: float,
+    begin: _Begin,
     part: Mapping[str, FloatArray],
-    options: Mapping[str, Any],
     _sweep: str,
 ) -> list[_Result]:
     """Run some sets of parameters, one after the other, for one sweep."""
@@ -527,10 +554,10 @@ def _run_chunk(
             if compiled is not None:  # the same buffers and machine code, other numbers
                 compiled.begin_again(its_model, its_rig)
                 run = compiled
-            elif options["engine"] == "compiled":
-                run = compiled = CompiledRun(Start.of(its_model, its_rig, t_end, **options))
+            elif begin.settings.engine == "compiled":
+                run = compiled = CompiledRun(begin.start(its_model, its_rig))
             else:
-                run = Run(Start.of(its_model, its_rig, t_end, **options))
+                run = Run(begin.start(its_model, its_rig))
             while run.advance():
                 pass
         except GMSError as error:
@@ -543,7 +570,6 @@ def _result(run: Run | CompiledRun | None, outcome: str, message: str) -> _Resul
     if run is None:
         return _Result(outcome, message, None, np.empty(0, dtype=_LOG), None)
     recorder, trace = run.recorder, run.recorder.trace()
-    t, y, mode = recorder.latest
     edges = {edge.name: index for index, edge in enumerate(trace.model.chart.transitions)}
     log = np.empty(len(trace.transitions), dtype=_LOG)
     for name in (_LOG.names or ())[1:]:
@@ -555,7 +581,9 @@ def _result(run: Run | CompiledRun | None, outcome: str, message: str) -> _Resul
     rows = None
     if recorder.start.output == "t_eval":
         rows = {name: getattr(trace, name) for name in ("x", "v", "F", "z")}
-    end = t, y, mode[: recorder.start.model.n], recorder.observe(t, y, mode)
+    here = scope_of(recorder)
+    end = {name: getattr(here, name) for name in ("t", "x", "v", "F", "z")}
+    end["mode"] = here.mode[here.layout.elements]
     return _Result(outcome, message, end, log, rows)
 
 
@@ -602,17 +630,14 @@ class _Collected:
 
     def take(self, chunk: range, results: Sequence[_Result]) -> None:
         """Put results in their rows."""
-        n = self.model.n
-        first = -n * len(self.model.chart.variables)
         for run, result in zip(chunk, results, strict=True):
             self.outcome[run], self.message[run] = result.outcome, result.message
             result.log["run"] = run
             self.logs[run] = result.log
             if result.end is not None:
-                t, y, mode, seen = result.end
-                self.ends[run] = t, y[0], seen[0], seen[1]
-                z = y[first:][:n]
-                self.z[run], self.mode[run] = z, mode
+                end = result.end
+                self.ends[run] = end["t"], end["x"], end["v"], end["F"]
+                self.z[run], self.mode[run] = end["z"], end["mode"]
             for name, values in (result.rows or {}).items():
                 self.rows[name][run, : len(values)] = values
 
@@ -685,12 +710,3 @@ def _numbered(name: str, values: NDArray[Any]) -> dict[str, Any]:
 def _apart(name: str, taken: Collection[str]) -> str:
     """Return a parameter's column name that is not one of the results'."""
     return f"parameter_{name}" if name in taken else name
-
-
-def _imported(module: str, extra: str) -> Any:
-    try:
-        return importlib.import_module(module)
-    except ImportError:
-        raise MissingExtraError(
-            f"{module} is not installed: pip install 'gms-fsm[{extra}]'"
-        ) from None

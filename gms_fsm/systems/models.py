@@ -17,15 +17,30 @@ from gms_fsm.charts.chart import SUPPLIED, Chart
 from gms_fsm.charts.gms import GMS_ELEMENT, Law, gms_element
 from gms_fsm.charts.lugre import LUGRE
 from gms_fsm.charts.parameters import (
+    SIGMA_2,
+    WEIGHTS,
     FloatArray,
-    GMSParameters,
-    Stribeck,
+    Parameter,
     checked_array,
     checked_scalar,
+    checked_values,
+    with_shared,
 )
+from gms_fsm.charts.registry import Entry
+from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError, shown
+from gms_fsm.systems.gms_parameters import GMSParameters
 
-__all__ = ["GMS", "ChartModel", "LuGre", "Model", "parameter_names", "with_values"]
+__all__ = [
+    "GMS",
+    "ChartModel",
+    "LuGre",
+    "Model",
+    "demonstration",
+    "parameter_names",
+    "parameters_of",
+    "with_values",
+]
 
 
 class Model(Protocol):
@@ -174,8 +189,9 @@ class LuGre:
     stribeck: Stribeck
 
     def __post_init__(self) -> None:
-        for name, rule in (("sigma_0", "> 0"), ("sigma_1", ">= 0"), ("sigma_2", ">= 0")):
-            object.__setattr__(self, name, checked_scalar(name, getattr(self, name), rule))
+        for each in (*LUGRE.parameters, SIGMA_2):
+            value = checked_scalar(each.name, getattr(self, each.name), each.rule)
+            object.__setattr__(self, each.name, value)
         if not isinstance(self.stribeck, Stribeck):
             raise ParameterError(f"stribeck is {self.stribeck!r}; it must be a Stribeck")
 
@@ -264,27 +280,80 @@ class ChartModel:
                 f"values is {shown(self.values)}; it must give a number for each parameter of the "
                 "chart, for example {'k': 1.0}"
             )
-        wanted, given = set(self.chart.parameters), set(self.values)
+        wanted, given = set(self.chart.parameter_names), set(self.values)
         if wanted != given:
             raise ParameterError(
                 f"chart {self.chart.name!r} has the parameters {sorted(wanted)}; missing values: "
                 f"{sorted(wanted - given) or 'none'}, unknown: {sorted(given - wanted) or 'none'}"
             )
-        checked = {name: _number_or_array(name, v, self.n) for name, v in self.values.items()}
-        object.__setattr__(self, "values", checked)
-        object.__setattr__(self, "sigma_2", checked_scalar("sigma_2", self.sigma_2, ">= 0"))
+        values = checked_values(self.chart.parameters, self.values, self.n)
+        object.__setattr__(self, "values", values)
+        sigma_2 = checked_scalar(SIGMA_2.name, self.sigma_2, SIGMA_2.rule)
+        object.__setattr__(self, "sigma_2", sigma_2)
         weights: ArrayLike = np.ones(self.n) if self.weights is None else self.weights
-        object.__setattr__(self, "weights", checked_array("weights", weights, self.n, "> 0"))
+        weights = checked_array(WEIGHTS.name, weights, self.n, WEIGHTS.rule)
+        object.__setattr__(self, "weights", weights)
         object.__setattr__(self, "title", self.title or self.chart.name)
 
 
-def _number_or_array(name: str, value: float | FloatArray, n: int) -> float | FloatArray:
-    if np.ndim(value) == 0:
-        return checked_scalar(name, value, "finite")
-    return checked_array(name, value, n, "finite")
+def demonstration(entry: Entry, law: str = "") -> ChartModel:
+    """Return a model of a chart that ships, with the numbers it is shown with.
+
+    Parameters
+    ----------
+    entry : Entry
+        From `gms_fsm.charts.registry`.
+    law : str
+        One of its laws; empty where it has none.
+
+    Returns
+    -------
+    ChartModel
+        With as many elements as the numbers have.
+
+    Raises
+    ------
+    ParameterError
+        If a law is missing, or not known.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts.registry import entry
+    >>> demonstration(entry("gms"), "signed").n
+    4
+    """
+    given = entry.demonstration
+    numbers: dict[str, Any] = {"values": given.values, "weights": given.weights}
+    return ChartModel(
+        entry.chart(law), **numbers, n=given.n, stribeck=given.stribeck, sigma_2=given.sigma_2
+    )
 
 
 # --------------------------------------------------------------------------- varying
+def parameters_of(model: Model) -> tuple[Parameter, ...]:
+    """Return what `with_values` can vary in a model.
+
+    Parameters
+    ----------
+    model : Model
+        Any.
+
+    Returns
+    -------
+    tuple of Parameter
+        The chart's parameters and what all models share: ``sigma_2``, and where there is a Stribeck
+        curve its numbers and the weights.
+
+    Examples
+    --------
+    >>> [each.unit for each in parameters_of(GMS(GMSParameters.paper("stick-slip"), law="signed"))]
+    ['N/m', 'Ns/m', 'm/s', 'm/s', 'm/N', 'Ns/m', 'N', 'N', 'm/s']
+    """
+    every = with_shared(model.chart.parameters, curve=model.stribeck is not None)
+    fixed = isinstance(model, LuGre)  # its bristle takes the curve as it is
+    return tuple(each for each in every if not (fixed and each == WEIGHTS))
+
+
 def parameter_names(model: Model) -> tuple[str, ...]:
     """Return the names `with_values` takes for a model.
 
@@ -296,18 +365,14 @@ def parameter_names(model: Model) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        The chart's parameters and what all models share: ``sigma_2``, and where there is a Stribeck
-        curve its numbers and the weights.
+        Of `parameters_of`.
 
     Examples
     --------
     >>> parameter_names(GMS(GMSParameters.paper("stick-slip"), law="signed"))
     ('k', 'sigma', 'C', 'v_c', 'weights', 'sigma_2', 'F_c', 'F_s', 'v_s')
     """
-    if model.stribeck is None:
-        return tuple(dict.fromkeys([*model.values, "sigma_2"]))
-    weights = () if isinstance(model, LuGre) else ("weights",)
-    return tuple(dict.fromkeys([*model.values, *weights, "sigma_2", "F_c", "F_s", "v_s"]))
+    return tuple(each.name for each in parameters_of(model))
 
 
 def with_values(model: Model, values: Mapping[str, ArrayLike]) -> Model:

@@ -8,14 +8,16 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from numpy.typing import ArrayLike
 
-from gms_fsm.charts.parameters import checked_scalar
+from gms_fsm.charts.parameters import Parameter, checked_scalar
 from gms_fsm.systems.signals import Signal, SignalLike, as_signal
 
-__all__ = ["Prescribed", "PulledSlider", "Rig", "Slider", "with_numbers"]
+__all__ = ["Prescribed", "PulledSlider", "Rig", "Slider", "numbers_of", "with_numbers"]
+
+MASS = Parameter("mass", "kg", "> 0", per_element=False, meaning="mass")
 
 
 class Rig(Protocol):
@@ -58,6 +60,7 @@ class Prescribed:
 
     title = "prescribed velocity"
     acceleration = None
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "signals", {"v": as_signal(self.velocity)})
@@ -91,15 +94,16 @@ class Slider:
 
     title = "slider pushed by a force"
     acceleration = "(F_a - F) / mass"
+    parameters: ClassVar[tuple[Parameter, ...]] = (MASS,)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mass", checked_scalar("mass", self.mass, "> 0"))
+        _check(self)
         object.__setattr__(self, "signals", {"F_a": as_signal(self.force)})
 
     @property
     def numbers(self) -> Mapping[str, float]:
         """The mass."""
-        return {"mass": self.mass}
+        return {each.name: getattr(self, each.name) for each in self.parameters}
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,10 +133,14 @@ class PulledSlider:
 
     title = "slider pulled through a spring"
     acceleration = "(stiffness * (speed * t - x) - F) / mass"
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        MASS,
+        Parameter("stiffness", "N/m", "> 0", per_element=False, meaning="stiffness of the spring"),
+        Parameter("speed", "m/s", per_element=False, meaning="speed of the spring's far end"),
+    )
 
     def __post_init__(self) -> None:
-        for name, rule in (("mass", "> 0"), ("stiffness", "> 0"), ("speed", "finite")):
-            object.__setattr__(self, name, checked_scalar(name, getattr(self, name), rule))
+        _check(self)
 
     @property
     def signals(self) -> Mapping[str, Signal]:
@@ -142,7 +150,35 @@ class PulledSlider:
     @property
     def numbers(self) -> Mapping[str, float]:
         """Mass, stiffness, speed."""
-        return {"mass": self.mass, "stiffness": self.stiffness, "speed": self.speed}
+        return {each.name: getattr(self, each.name) for each in self.parameters}
+
+
+def _check(rig: Slider | PulledSlider) -> None:
+    for each in rig.parameters:
+        number = checked_scalar(each.name, getattr(rig, each.name), each.rule)
+        object.__setattr__(rig, each.name, number)
+
+
+def numbers_of(rig: Rig) -> tuple[Parameter, ...]:
+    """Return what `with_numbers` can vary in a rig.
+
+    Parameters
+    ----------
+    rig : Rig
+        Any; one without ``parameters`` has numbers of unknown units.
+
+    Returns
+    -------
+    tuple of Parameter
+        In the order of ``rig.numbers``.
+
+    Examples
+    --------
+    >>> [(each.name, each.unit) for each in numbers_of(PulledSlider(1.0, 2.0, 0.1))]
+    [('mass', 'kg'), ('stiffness', 'N/m'), ('speed', 'm/s')]
+    """
+    known = {each.name: each for each in getattr(rig, "parameters", ())}
+    return tuple(known.get(name, Parameter(name)) for name in rig.numbers)
 
 
 def with_numbers(rig: Rig, values: Mapping[str, ArrayLike]) -> Rig:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ExpressionError, SignalError, shown
-from gms_fsm.language.expression import Value, parse_value
+from gms_fsm.language import Value, parse_value
 
 __all__ = ["Corners", "Formula", "Function", "Signal", "SignalLike", "as_signal", "piecewise_slope"]
 

@@ -9,7 +9,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from gms_fsm.charts.chart import Chart, State, Transition
-from gms_fsm.charts.parameters import Stribeck
+from gms_fsm.charts.parameters import Parameter
+from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import OutputError, SignalError
 from gms_fsm.lowering.scales import Setting
 from gms_fsm.systems.models import ChartModel, Model
@@ -30,11 +31,18 @@ class ChartRecord(_Record):
     name: str
     inputs: tuple[str, ...]
     variables: tuple[str, ...]
-    parameters: tuple[str, ...]
+    parameters: tuple[Parameter | str, ...]
     states: tuple[State, ...]
     transitions: tuple[Transition, ...]
     outputs: dict[str, str]
     reference: str
+
+    @classmethod
+    def of(cls, chart: Chart) -> ChartRecord:
+        """Describe a chart; of a parameter without unit and rule only the name."""
+        fields = {name: getattr(chart, name) for name in cls.model_fields}
+        plain = [each.name if each == Parameter(each.name) else each for each in chart.parameters]
+        return cls(**{**fields, "parameters": plain})
 
 
 class ModelRecord(_Record):
@@ -121,9 +129,7 @@ class Header(_Record):
             model=ModelRecord(
                 title=model.title,
                 n=model.n,
-                chart=ChartRecord(
-                    **{name: getattr(chart, name) for name in ChartRecord.model_fields}
-                ),
+                chart=ChartRecord.of(chart),
                 values={
                     name: float(value) if np.ndim(value) == 0 else np.asarray(value).tolist()
                     for name, value in model.values.items()
@@ -145,7 +151,7 @@ class Header(_Record):
         """Return a model that computes the same."""
         record = self.model
         return ChartModel(
-            Chart(**{name: getattr(record.chart, name) for name in ChartRecord.model_fields}),
+            Chart(**vars(record.chart)),
             {
                 name: np.array(value) if isinstance(value, list) else value
                 for name, value in record.values.items()

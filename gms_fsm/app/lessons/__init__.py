@@ -165,8 +165,8 @@ def teach(number: int, folder: str | Path) -> Taught:
     number : int
         1 to 8.
     folder : str or Path
-        Made where missing, before anything is run. ``lesson_N.txt``, ``.png``, ``.svg`` and
-        ``.html`` go there.
+        Made where missing, before anything is run. ``lesson_N.txt``, its picture and its replay
+        page go there.
 
     Returns
     -------
@@ -185,13 +185,15 @@ def teach(number: int, folder: str | Path) -> Taught:
     UserWarning
         If a picture or the page is left out because an extra is not installed.
     """
+    from plots import formats
+
     chosen = lesson(number)
-    folder = output_folder(
-        folder, [f"lesson_{number}.{ending}" for ending in ("txt", "png", "svg", "html")]
-    )
+    stem = f"lesson_{number}"
+    pictures, pages = formats.files(stem, "figure"), formats.files(stem, "page")
+    folder = output_folder(folder, [f"{stem}.txt", *pictures, *pages])
     result = chosen.run()
     text = ("\n".join(result.lines()) + "\n").encode()
-    files = [written_whole(folder / f"lesson_{number}.txt", lambda file: file.write(text))]
+    files = [written_whole(folder / f"{stem}.txt", lambda file: file.write(text))]
     for what, write in (("picture", _draw), ("replay page", _replay)):
         try:
             files += write(number, result, folder)
@@ -201,16 +203,19 @@ def teach(number: int, folder: str | Path) -> Taught:
 
 
 def _draw(number: int, result: Result, folder: Path) -> list[Path]:
-    from plots import figures
+    from plots import figures, formats
 
     figure = LESSONS[number].figure(result)
-    return [figures.save(figure, folder / f"lesson_{number}.{ending}") for ending in ("png", "svg")]
+    names = formats.files(f"lesson_{number}", "figure")
+    return [figures.save(figure, folder / name) for name in names]
 
 
 def _replay(number: int, result: Result, folder: Path) -> list[Path]:
-    from plots.replay import write_replay
+    from plots import formats
+    from plots.replay import replay
 
     runs = result.replayed
     title = f"Lesson {number}: {LESSONS[number].QUESTION}"
-    page = folder / f"lesson_{number}.html"
-    return [write_replay(page, *runs.values(), title=title, names=list(runs))]
+    page = replay(*runs.values(), title=title, names=list(runs))
+    names = formats.files(f"lesson_{number}", "page")
+    return [formats.save(page, folder / name, "page") for name in names]

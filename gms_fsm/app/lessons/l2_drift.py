@@ -20,9 +20,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gms_fsm import GMS, GMSParameters, Slider, Trace, simulate
-from gms_fsm.app.paper import FORCE, lugre_like
+from gms_fsm.app.paper import FORCE
+from gms_fsm.app.paper.experiments import lugre_like
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.language.expression import evaluate
+from gms_fsm.language import evaluate
 from gms_fsm.systems.signals import Formula
 
 if TYPE_CHECKING:

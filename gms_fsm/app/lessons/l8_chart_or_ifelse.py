@@ -20,7 +20,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gms_fsm import GMS, GMSParameters, Prescribed, Trace, simulate
-from gms_fsm.app.paper import PAPER_RTOL, PAPER_STEP, VELOCITY, differing_numbers, force_difference
+from gms_fsm.app.paper import PAPER_RTOL, PAPER_STEP, VELOCITY
+from gms_fsm.app.paper.claims import differing_numbers, force_difference
 from gms_fsm.charts.parameters import FloatArray
 
 if TYPE_CHECKING:

@@ -1,0 +1,85 @@
+"""Optional packages: what each extra is for, and one text for all that are missing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from typing import Any
+
+from gms_fsm.errors import MissingExtraError, why
+
+__all__ = ["EXTRAS", "missing", "require"]
+
+# By extra: who needs it, and what to do without it.
+EXTRAS: Mapping[str, tuple[str, str]] = {
+    "plots": ("figures and animations need", "runs, traces and charts need no extra"),
+    "render": (
+        "pictures of charts need",
+        "Graphviz's program dot draws them too, and charts can be written as texts",
+    ),
+    "pandas": ("data frames need", "Trace.columns() has the same numbers, and so has a CSV file"),
+    "fast": ("engine 'compiled' needs", "engine='machines' gives the same result, slower"),
+    "sweep": ("tables of a sweep need", "Sweep.save writes .npz files"),
+    "replay": ("a replay page needs", "gms-fsm plot and gms-fsm debug show a run too"),
+    "check": ("checking a chart needs", "a chart runs without its proofs"),
+}
+
+
+def require(module: str, extra: str) -> Any:
+    """Import an optional module, or say how to get it.
+
+    Parameters
+    ----------
+    module : str
+        Its name, for example ``"pandas"``.
+    extra : str
+        Which extra of gms-fsm brings it, a key of `EXTRAS`.
+
+    Returns
+    -------
+    module
+        The module.
+
+    Raises
+    ------
+    MissingExtraError
+        If it is not installed, or cannot be imported.
+
+    Examples
+    --------
+    >>> require("math", "plots").tau > 6
+    True
+    >>> require("no_such_module", "pandas")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    gms_fsm.errors.MissingExtraError: data frames need no_such_module, which is not installed: ...
+    """
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        raise missing(error.name or module, extra) from None
+    except ImportError as error:
+        raise missing(module, extra, f"cannot be imported ({why(error)})") from error
+
+
+def missing(name: str, extra: str, state: str = "is not installed") -> MissingExtraError:
+    """Return the error that says what is missing, which extra brings it, and what works without it.
+
+    Parameters
+    ----------
+    name : str
+        A module, or a program.
+    extra : str
+        A key of `EXTRAS`.
+    state : str, optional
+        What is wrong with it.
+
+    Returns
+    -------
+    MissingExtraError
+        To be raised.
+    """
+    needed, without = EXTRAS[extra]
+    return MissingExtraError(
+        f'{needed} {name}, which {state}: pip install "gms-fsm[{extra}]" brings it '
+        f"(without it: {without})"
+    )

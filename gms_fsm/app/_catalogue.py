@@ -1,0 +1,101 @@
+"""The charts that ship, as the command line names and lists them."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator
+
+from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.registry import Entry, entry, registered
+from gms_fsm.errors import ParameterError
+
+__all__ = ["catalogue", "checkable", "chosen"]
+
+WIDTH = 78
+OWN = "in Python, plots.statechart(chart), prove(chart); or as a file in gms_fsm/charts"
+
+
+def chosen(verb: str, name: str, law: str) -> tuple[Entry, Chart]:
+    """Return the chart that a verb is asked for.
+
+    Parameters
+    ----------
+    verb : str
+        For the message.
+    name : str
+        A chart that ships.
+    law : str
+        What ``--law`` says; empty if it is not given.
+
+    Returns
+    -------
+    (Entry, Chart)
+        What is listed under the name, and its chart under the law.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such chart, or a law is missing, unknown or not wanted.
+    """
+    try:
+        found = entry(name)
+    except ParameterError as error:
+        raise ParameterError(f"{error} (a chart of your own: {OWN})") from None
+    options = " or ".join(f"--law {each}" for each in found.laws)
+    if law and not options:
+        others = [each.name for each in registered().values() if each.laws]
+        raise ParameterError(f"{verb} {name} takes no --law; only {', '.join(others)} does")
+    if options and not law:
+        raise ParameterError(f"{verb} {name} needs {options}; they differ")
+    if law not in found.laws and options:
+        raise ParameterError(f"{verb} {name} has no law {law!r}; give {options}")
+    return found, found.chart(law)
+
+
+def catalogue() -> str:
+    """Return the charts that ship, with their parameters.
+
+    Returns
+    -------
+    str
+        For people, at most 78 columns wide where it can be.
+
+    Examples
+    --------
+    >>> "  v_c      arrest velocity, m/s, > 0" in catalogue().splitlines()
+    True
+    """
+    sound = [each for each in registered().values() if not each.wrong]
+    return "\n\n".join(["\n".join(_described(each)) for each in sound] + [_faulty()])
+
+
+def checkable() -> str:
+    """Return what a proof can be asked about, with what is wrong with the faulty ones.
+
+    Returns
+    -------
+    str
+        For people.
+    """
+    sound = [_name(each) for each in registered().values() if not each.wrong]
+    return f"{', '.join(sound)}, and as demonstrations:\n{_faulty()}"
+
+
+def _name(each: Entry) -> str:
+    return ", ".join(f"{each.name} --law {law}" for law in each.laws) or each.name
+
+
+def _described(each: Entry) -> Iterator[str]:
+    yield f"{_name(each)}: {each.title}"
+    rows = [(one.name, one.described) for one in each.parameters]
+    rows.append(("numbers", each.demonstration.source))
+    wide = max(len(name) for name, _ in rows)
+    for name, told in rows:
+        lead, rest = f"  {name:<{wide}}  ", " " * (wide + 4)
+        yield textwrap.fill(lead + told, WIDTH, subsequent_indent=rest).rstrip()
+
+
+def _faulty() -> str:
+    found = [each for each in registered().values() if each.wrong]
+    told = (f"{each.name}  {each.wrong}" for each in found)
+    return "\n".join(textwrap.fill(each, WIDTH, subsequent_indent="  ") for each in told)

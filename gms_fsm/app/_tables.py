@@ -1,0 +1,240 @@
+"""Tables of a scenario file: every key, its type and what it says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+import scipy.integrate
+from pydantic import AfterValidator, Discriminator, Field, PositiveFloat, Tag, model_validator
+from pydantic_core import PydanticKnownError
+
+from gms_fsm.app._model_tables import BY_CHART, BY_KIND, LIST, ONE, ModelTable, Table
+from gms_fsm.app.records import Column
+from gms_fsm.run.settings import MOST_STEPS
+from gms_fsm.systems.rigs import PulledSlider
+
+__all__ = [
+    "FORMS",
+    "PrescribedTable",
+    "PulledTable",
+    "RecordTable",
+    "RecordedTable",
+    "Scenario",
+    "SignalField",
+    "SignalRecordTable",
+    "SliderTable",
+]
+
+# Tags of forms in pydantic's findings; no key of a file looks like these.
+TEXT, RAMPS, TABLE = "<text>", "<ramps>", "<table>"
+FORMS = (BY_KIND, BY_CHART, ONE, LIST, TEXT, RAMPS, TABLE)
+SCIPY_METHODS = ("RK45", "DOP853", "Radau", "BDF", "LSODA")
+
+
+# --------------------------------------------------------------------------- records
+class ColumnTable(Table):
+    """Where a quantity stands."""
+
+    column: str = Field(description="head of the column")
+    unit: str = Field(description='for example "mm"')
+    sign: Literal[1, -1] = Field(1, description="-1 turns the quantity around")
+
+    def build(self) -> Column:
+        """Return the column."""
+        return Column(self.column, self.unit, self.sign)
+
+
+Delimiter = Literal["\t", ";", ",", "|", " "]
+
+
+class RecordTable(Table):
+    """A measured motion, with the force measured along with it where there is one."""
+
+    file: str = Field(description="CSV or TSV, beside the scenario or in GMS_FSM_DATA")
+    time: ColumnTable
+    position: ColumnTable | None = None
+    velocity: ColumnTable | None = None
+    force: ColumnTable | None = Field(None, description="measured friction, to compare with")
+    normal: ColumnTable | None = Field(None, description="normal force")
+    where: str = Field("", description='which rows count, for example "normal > 4.5 N"')
+    smoothing: float | None = Field(None, ge=0, description="time constant of the spline, s")
+    delimiter: Delimiter | None = None
+
+    def columns(self) -> dict[str, Column]:
+        """Return the columns that are given."""
+        names = ("time", "position", "velocity", "force", "normal")
+        tables = {name: getattr(self, name) for name in names}
+        return {name: table.build() for name, table in tables.items() if table is not None}
+
+
+class SignalRecordTable(Table):
+    """One measured signal: a time column and a value column."""
+
+    file: str
+    time: ColumnTable
+    value: ColumnTable
+    where: str = Field("", description='which rows count, for example "time > 0.5 s"')
+    delimiter: Delimiter | None = None
+
+
+def _signal_form(given: Any) -> str:
+    if isinstance(given, dict | SignalRecordTable):
+        return TABLE
+    if isinstance(given, list):
+        return RAMPS
+    return ONE if isinstance(given, int | float) else TEXT
+
+
+SignalField = Annotated[
+    Annotated[str, Tag(TEXT)]
+    | Annotated[float, Tag(ONE)]
+    | Annotated[list[Annotated[list[float], Field(min_length=2, max_length=2)]], Tag(RAMPS)]
+    | Annotated[SignalRecordTable, Tag(TABLE)],
+    Discriminator(_signal_form),
+]
+_SIGNAL = "expression of t in quotes, ramps [[t, value], ...], or a record {file, time, value}"
+
+
+# --------------------------------------------------------------------------- rigs
+_TOLD: Mapping[str, str] = {each.name: each.described for each in PulledSlider.parameters}
+
+
+class PrescribedTable(Table):
+    """Open loop: v(t) is given."""
+
+    kind: Literal["prescribed"]
+    velocity: SignalField = Field(description=f"m/s: {_SIGNAL}")
+
+
+class RecordedTable(Table):
+    """Open loop: the motion of the table [record]."""
+
+    kind: Literal["record"]
+
+
+class SliderTable(Table):
+    """A mass pushed by a force."""
+
+    kind: Literal["slider"]
+    mass: float = Field(description=_TOLD["mass"])
+    force: SignalField = Field(description=f"N: {_SIGNAL}")
+
+
+class PulledTable(Table):
+    """A mass pulled through a spring."""
+
+    kind: Literal["pulled"]
+    mass: float = Field(description=_TOLD["mass"])
+    stiffness: float = Field(description=_TOLD["stiffness"])
+    speed: float = Field(description=_TOLD["speed"])
+
+
+# --------------------------------------------------------------------------- the run
+class RunTable(Table):
+    """How to integrate; see `gms_fsm.simulate`."""
+
+    t_end: float | None = Field(None, description="s; the record's end when left out")
+    t_start: float | None = Field(None, description="s; 0, or the record's start")
+    method: Literal[
+        "dp45", "bs23", "rk4", "heun", "euler", "RK45", "DOP853", "Radau", "BDF", "LSODA"
+    ] = "dp45"
+    step: float | None = Field(None, gt=0, description="fixed step, s")
+    rtol: float = Field(1e-6, gt=0)
+    atol: PositiveFloat | dict[str, PositiveFloat | list[PositiveFloat]] | None = Field(
+        None,
+        description="absolute tolerance of all components, or by name { x, v, z }; from the "
+        "model's own scales where left out",
+    )
+    max_step: float | None = Field(None, gt=0, description="s")
+    max_steps: int = Field(MOST_STEPS, ge=1, description="a run that needs more is an error")
+    events: Literal["located", "step"] = "located"
+    engine: Literal["machines", "ifelse", "compiled"] = "machines"
+    monitors: list[str] = Field(
+        [],
+        description='what to watch for: "chattering", "passivity", "coverage", "all" of these, '
+        'and invariants such as "abs(z) <= 2*s"',
+    )
+
+    def options(self) -> dict[str, Any]:
+        """Return the options for `simulate`."""
+        scipy_method = self.method in SCIPY_METHODS
+        options: dict[str, Any] = {
+            "method": getattr(scipy.integrate, self.method) if scipy_method else self.method,
+            "step": self.step,
+            "rtol": self.rtol,
+            "atol": self.atol,
+            "max_steps": self.max_steps,
+            "events": self.events,
+            "engine": self.engine,
+        }
+        if self.max_step is not None:
+            options["max_step"] = self.max_step
+        return options
+
+
+class InitialTable(Table):
+    """Where the run starts."""
+
+    z: list[float] | None = None
+    states: list[str] | None = None
+    v: float | None = None
+    x: float | None = None
+
+
+def _figure_ending(value: str) -> str:
+    from plots import formats
+
+    known = [ending.removeprefix(".") for ending in formats.endings("figure")]
+    if value not in known:
+        listed = formats.either([repr(ending) for ending in known])
+        raise PydanticKnownError("literal_error", {"expected": listed})
+    return value
+
+
+def _with_figure_endings(schema: dict[str, Any]) -> None:
+    """Name the endings in a schema; they are not known before somebody asks."""
+    from plots import formats
+
+    endings = [ending.removeprefix(".") for ending in formats.endings("figure")]
+    schema["anyOf"][0]["items"]["enum"] = endings
+
+
+class OutputTable(Table):
+    """What is written."""
+
+    every: float | None = Field(
+        None, gt=0, description="rows this far apart [s]; every accepted step when left out"
+    )
+    figures: list[Annotated[str, AfterValidator(_figure_ending)]] | None = Field(
+        None,
+        description="endings of the overview figure; the usual ones when left out",
+        json_schema_extra=_with_figure_endings,
+    )
+    csv: bool = Field(False, description="write the trace as CSV too")
+
+
+class Scenario(Table):
+    """A scenario file."""
+
+    title: str = ""
+    notes: str = Field("", description="said in the summary")
+    model: ModelTable
+    rig: Annotated[
+        PrescribedTable | RecordedTable | SliderTable | PulledTable, Field(discriminator="kind")
+    ]
+    record: RecordTable | None = None
+    run: RunTable = RunTable()
+    initial: InitialTable = InitialTable()
+    output: OutputTable = OutputTable()
+
+    @model_validator(mode="after")
+    def _fits(self) -> Scenario:
+        if isinstance(self.rig, RecordedTable) and self.record is None:
+            raise ValueError("rig.kind = 'record' needs a table [record]")
+        if not isinstance(self.rig, RecordedTable):
+            if self.record is not None:
+                raise ValueError("the table [record] goes with rig.kind = 'record'")
+            if self.run.t_end is None:
+                raise ValueError("run.t_end is missing; only a record knows its own end")
+        return self

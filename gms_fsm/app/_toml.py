@@ -1,0 +1,122 @@
+"""Reading TOML with care, and changing single keys of it."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from gms_fsm.errors import ScenarioError, cut, shown
+
+__all__ = ["override", "parsed"]
+
+LARGEST_FILE = 1_000_000  # bytes
+DEEPEST_KEY = 6  # parts
+# A key of very many parts keeps tomllib busy for hours (its work grows with their square).
+_ENDLESS_KEY = re.compile(
+    r"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){20}"""
+)
+_TEXT_OR_COMMENT = re.compile(r""""[^"]*"?|'[^']*'?|#.*""")
+_HALF_A_NUMBER = re.compile(  # a digit on one side of the point only
+    r"(?<![\w.+-])([+-]?)(?:(\d+)\.|\.(\d+))((?:[eE][+-]?\d+)?)(?![\w.])"
+)
+
+
+def parsed(path: Path) -> dict[str, Any]:
+    """Return the contents of a TOML file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    dict
+        Tables and values as written.
+
+    Raises
+    ------
+    ScenarioError
+        If it cannot be read, is too large, or is not TOML.
+    """
+    try:
+        with path.open("rb") as file:
+            raw = file.read(LARGEST_FILE + 1)
+    except FileNotFoundError:
+        raise ScenarioError(f"{path}: no such file; check its name and the folder") from None
+    except OSError as error:
+        raise ScenarioError(
+            f"{path}: cannot be read ({error.strerror}); give a file that can"
+        ) from None
+    if len(raw) > LARGEST_FILE:
+        raise ScenarioError(f"{path}: larger than {LARGEST_FILE} bytes; records go in own files")
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise ScenarioError(f"{path}: not UTF-8 text; a scenario is a TOML file") from None
+    if endless := _ENDLESS_KEY.search(text):
+        line = text.count("\n", 0, endless.start()) + 1
+        raise ScenarioError(
+            f"{path}: line {line}: a key of more than 20 parts; no key lies this deep"
+        )
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # a number of 5,000 digits is a ValueError
+        hint = _with_digits(text)
+        raise ScenarioError(f"{path}: not valid TOML: {cut(str(error))}{hint}") from None
+
+
+def _with_digits(text: str) -> str:
+    """Return advice on the first number of a text that TOML does not take: .25 or 5."""
+    for number, line in enumerate(text.splitlines(), start=1):
+        found = _HALF_A_NUMBER.search(_TEXT_OR_COMMENT.sub("", line))
+        if found:
+            sign, whole, part, exponent = found.groups()
+            better = f"{sign}{whole or 0}.{part or 0}{exponent}"
+            return f"; line {number}: write {better}, not {found[0]}"
+    return ""
+
+
+def override(data: dict[str, Any], setting: str) -> None:
+    """Change one key.
+
+    Parameters
+    ----------
+    data : dict
+        Contents of a file; changed.
+    setting : str
+        ``"model.law=published"``: a path of keys and a TOML value; a bare word is a text.
+
+    Raises
+    ------
+    ScenarioError
+        If the text is no such setting.
+    """
+    key, equals, text = setting.partition("=")
+    parts = [part.strip() for part in key.split(".")]
+    if not equals or not all(parts):
+        raise ScenarioError(f"--set {cut(setting)}: give it as key=value, for example run.t_end=10")
+    if "\n" in setting:
+        line = setting.partition("\n")[0]
+        raise ScenarioError(f"--set {cut(line)}: one key and one value, on one line")
+    if len(parts) > DEEPEST_KEY:
+        raise ScenarioError(f"--set {cut(setting)}: no key lies this deep")
+    if _ENDLESS_KEY.search(text):
+        raise ScenarioError(f"--set {cut(setting)}: no key lies this deep")
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = text.strip()
+        hint = _with_digits(text)
+        if hint and (value[0] in "[{" or _HALF_A_NUMBER.fullmatch(value)):
+            raise ScenarioError(f"--set {cut(setting)}: not valid TOML{hint}") from None
+    except (ValueError, RecursionError) as error:
+        raise ScenarioError(f"--set {cut(setting)}: {cut(str(error))}") from None
+    table = data
+    for part in parts[:-1]:
+        table = table.setdefault(part, {})
+        if not isinstance(table, dict):
+            raise ScenarioError(f"--set {cut(setting)}: {shown(part)} is a value, not a table")
+    table[parts[-1]] = value

@@ -1,0 +1,511 @@
+"""The debugger's commands: each reads its argument, acts on the session, and answers in lines.
+
+A command yields its lines as they come, so that what was said before an interruption stays said.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+from gms_fsm.app.debugger import _text as text_of
+from gms_fsm.app.debugger._help import ALIASES, COMMANDS, help_of, overview
+from gms_fsm.app.debugger._view import branches, chart_states, ribbons, view
+from gms_fsm.errors import GMSError, SessionError
+from gms_fsm.inspection.explain import holds
+from gms_fsm.inspection.session import KINDS, Breakpoint, Session
+from gms_fsm.language import evaluate
+from gms_fsm.systems.models import parameter_names
+
+__all__ = ["Commands"]
+
+
+class Commands:
+    """Commands over a session.
+
+    Parameters
+    ----------
+    session : Session
+        What is walked.
+    marks : Marks
+        Characters to draw with.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed
+    >>> session = Session(GMS(GMSParameters.paper("stick-slip"), law="published"),
+    ...                   Prescribed("0.15"), 1.0)
+    >>> list(Commands(session).answer("print", "s1"))
+    ['0.4']
+    """
+
+    def __init__(self, session: Session, marks: text_of.Marks = text_of.PLAIN) -> None:
+        self.session, self.marks, self.element = session, marks, 0
+
+    def answer(self, name: str, arg: str) -> Iterator[str]:
+        """Do a command.
+
+        Parameters
+        ----------
+        name : str
+            In full.
+        arg : str
+            What stands behind it.
+
+        Yields
+        ------
+        str
+            Lines of the answer.
+
+        Raises
+        ------
+        GMSError
+            For a mistake; the session is as it was.
+        """
+        if name not in COMMANDS:
+            near = difflib.get_close_matches(name, COMMANDS, 1)
+            hint = f"did you mean {near[0]}? " if near else ""
+            raise SessionError(f"no command {name!r}; {hint}help lists them")
+        yield from getattr(self, f"do_{name}")(arg)
+
+    def words(self, name: str, before: str) -> Sequence[str]:
+        """Return what can stand behind a command: edges, states, names, numbers.
+
+        Parameters
+        ----------
+        name : str
+            The command, in full.
+        before : str
+            The line up to the word that is completed.
+
+        Returns
+        -------
+        sequence of str
+            Words.
+        """
+        chart, session = self.session.model.chart, self.session
+        states, edges = self._states, self._edges
+        elements = [str(i + 1) for i in range(session.model.n)]
+        names = [*session.names, *(f"state({i})" for i in elements)]
+        if before.endswith("="):
+            return states
+        match name:
+            case "break":
+                return [*KINDS, *edges, *states, "element", "if", "hits", *names]
+            case "until" | "print" | "watch":
+                return [*names, *states]
+            case "poke":
+                return [*(f"{u}{i}=" for u in (*chart.variables, "state") for i in elements), "v="]
+            case "why":
+                return [*elements, *edges]
+            case "element":
+                return elements
+            case "help":
+                return list(COMMANDS)
+            case "branch" | "compare":
+                return [str(i) for i in range(len(session.branches))]
+            case "clear":
+                return [*(str(i + 1) for i in range(len(session.breakpoints))), "all"]
+            case "unwatch":
+                return [*(str(i + 1) for i in range(len(session.watches))), "all"]
+        return ()
+
+    @property
+    def _states(self) -> list[str]:
+        return [state.name for state in self.session.model.chart.states]
+
+    @property
+    def _edges(self) -> list[str]:
+        return [edge.name for edge in self.session.model.chart.transitions]
+
+    def _usage(self, name: str) -> str:
+        each = help_of(name, self.session)
+        return f"usage: {each.usage}, for example: {each.examples[-1]}"
+
+    def _path(self, name: str, text: str) -> Path:
+        if not text:
+            raise SessionError(f"a file name is missing; {self._usage(name)}")
+        return Path(text.strip("\"'")).expanduser()
+
+    # ------------------------------------------------------------------ help
+    def do_help(self, arg: str) -> Iterator[str]:
+        """Show the overview, or one command."""
+        if not arg:
+            yield overview(self.session)
+            return
+        name = ALIASES.get(arg, arg)
+        if name not in COMMANDS:
+            raise SessionError(f"no command {arg!r}; help lists them")
+        each = help_of(name, self.session)
+        alias = f"   (short: {each.alias})" if each.alias else ""
+        yield f"{each.usage}{alias}\n{each.says}"
+        yield "\n".join(f"  example: {example}" for example in each.examples)
+
+    # ------------------------------------------------------------------ moving
+    def _ahead(self) -> None:
+        """Refuse to go forward from the end."""
+        branch = self.session.branch
+        last = branch.between is None and branch.cursor + 1 == len(branch)
+        if last and not branch.pull() and branch.outcome == "end":
+            raise SessionError("this is the end of the run; go back first")
+
+    def here(self) -> Iterator[str]:
+        """Say where we are, after a move.
+
+        Yields
+        ------
+        str
+            The place, the ending if it is the last row, the watches.
+        """
+        yield str(self.session.here)
+        yield from text_of.ending_lines(view(self.session).ending)
+        if self.session.watches:
+            yield from self.do_watch("")
+
+    def do_step(self, arg: str) -> Iterator[str]:
+        """Go forward."""
+        count = _count("step", arg)
+        self._ahead()
+        self.session.step(count)
+        yield from self.here()
+
+    def do_back(self, arg: str) -> Iterator[str]:
+        """Go back."""
+        self.session.back(_count("back", arg))
+        yield from self.here()
+
+    def do_next(self, arg: str) -> Iterator[str]:
+        """Go to the next transition."""
+        _nothing("next", arg)
+        self._ahead()
+        if self.session.next_transition().fired is None:
+            yield "no transition before the end"
+        yield from self.here()
+
+    def do_prev(self, arg: str) -> Iterator[str]:
+        """Go to the transition before."""
+        _nothing("prev", arg)
+        self.session.prev_transition()
+        yield from self.here()
+
+    def do_goto(self, arg: str) -> Iterator[str]:
+        """Go to a time."""
+        try:
+            t = float(arg.removesuffix("s"))
+        except ValueError:
+            raise SessionError(f"{arg!r} is no time; {self._usage('goto')}") from None
+        try:
+            self.session.goto(t)
+        except KeyboardInterrupt:
+            self.session.goto(self.session.branch.last.t)
+            raise
+        yield from self.here()
+
+    def do_until(self, arg: str) -> Iterator[str]:
+        """Go to where a condition becomes true."""
+        if not arg:
+            raise SessionError(f"a condition is missing; {self._usage('until')}")
+        condition, session, branch = self._with_states(arg), self.session, self.session.branch
+        already = holds(session.parse(condition), session.values())
+        self._ahead()
+        start = branch.cursor, branch.between
+        if not session.reaches(condition):
+            if already:
+                branch.cursor, branch.between = start
+                yield (
+                    "it is true here already and does not become true again; until waits for "
+                    "it to become true"
+                )
+            else:
+                yield "it does not become true before the end"
+        yield from self.here()
+
+    def _with_states(self, condition: str) -> str:
+        """Return a condition with the states' own capitals."""
+        return re.sub(
+            r"(\bstate\b\s*(?:\(\s*\d+\s*\)\s*)?[=!]=\s*)(\w+)",
+            lambda found: found[1] + _spelt(found[2], self._states),
+            condition,
+        )
+
+    def do_continue(self, arg: str) -> Iterator[str]:
+        """Go to the next breakpoint."""
+        _nothing("continue", arg)
+        self._ahead()
+        _, point = self.session.proceed()
+        if point is None:
+            yield "no breakpoint hit" if self.session.breakpoints else "no breakpoint is set"
+        else:
+            number = self.session.breakpoints.index(point) + 1
+            yield f"breakpoint {number}: {text_of.breakpoint_text(point)}"
+        yield from self.here()
+
+    def do_run(self, arg: str) -> Iterator[str]:
+        """Compute to the end."""
+        _nothing("run", arg)
+        self.session.branch.complete()
+        current = branches(self.session)[self.session.current]
+        yield f"branch {current.number}: {text_of.progress(current)}"
+
+    # ------------------------------------------------------------------ looking
+    def do_where(self, arg: str) -> Iterator[str]:
+        """Show everything."""
+        _nothing("where", arg)
+        states = ribbons(self.session, text_of.RIBBON)
+        chart = self.session.model.chart
+        yield from text_of.screen_lines(view(self.session), states, chart, self.element, self.marks)
+
+    def do_why(self, arg: str) -> Iterator[str]:
+        """Explain the guards of an element."""
+        i, edge, words = self.element, "", arg.split()
+        if words and words[0].isdigit():
+            i = self._element("why", words.pop(0))
+        if words:
+            edge = _spelt(words.pop(0), self._edges)
+            if edge not in self._edges or words:
+                raise SessionError(
+                    f"{' '.join([edge, *words])!r} is no edge; there are "
+                    f"{', '.join(self._edges) or 'none'}; {self._usage('why')}"
+                )
+        found, branch = self.session.why(i, edge), self.session.branch
+        yield str(found)
+        if found.left and not edge and (branch.cursor + 1 < len(branch) or branch.pull()):
+            which = "" if i == self.element else f" {i + 1}"
+            yield f"step, then why{which}: the edges that leave {found.state}"
+
+    def do_list(self, arg: str) -> Iterator[str]:
+        """Draw the chart."""
+        _nothing("list", arg)
+        i, session = self.element, self.session
+        name = session.model.chart.name
+        yield f"element {i + 1} of {session.model.n}: {name}, t = {session.here.t:.9g} s"
+        yield from text_of.chart_lines(chart_states(session, i), self.marks)
+
+    def do_log(self, arg: str) -> Iterator[str]:
+        """Show the last transitions."""
+        count, branch = _count("log", arg, 10), self.session.branch
+        rows = branch.firing_rows(self.session.here.row + 1)
+        if not rows:
+            yield "no transition up to here"
+        for row in rows[-count:]:
+            yield f"  t = {branch.raw(row).t:<12.9g} s  row {row:<5} {branch.fired(row)}"
+        if len(rows) > count:
+            yield f"  ({len(rows) - count} before these)"
+
+    def do_print(self, arg: str) -> Iterator[str]:
+        """Show a value."""
+        if not arg:
+            raise SessionError(f"an expression is missing; {self._usage('print')}")
+        yield self._value(arg)
+
+    def _value(self, text: str) -> str:
+        if re.search(r"[<>]|==|\b(and|or|not|state)\b", text):
+            return "true" if self._truth(text) else "false"
+        return f"{self.session.watch(text):.9g}"
+
+    def _truth(self, text: str) -> bool:
+        tree = self.session.parse(self._with_states(text))
+        try:
+            return bool(evaluate(tree, self.session.values()))
+        except (ArithmeticError, ValueError) as error:
+            raise SessionError(f"{text!r} cannot be computed here: {error}") from None
+
+    def do_watch(self, arg: str) -> Iterator[str]:
+        """Add a watch, show all."""
+        if arg:
+            self._value(arg)  # refuses what cannot be read
+            self.session.watches.append(arg)
+        for number, text in enumerate(self.session.watches, start=1):
+            try:
+                value = self._value(text)
+            except GMSError as error:
+                value = str(error).partition("\n")[0]
+            yield f"  watch {number}: {text} = {value}"
+        if not self.session.watches:
+            yield "nothing is watched"
+
+    def do_unwatch(self, arg: str) -> Iterator[str]:
+        """Take watches away."""
+        _remove(self.session.watches, "unwatch", arg)
+        yield from self.do_watch("")
+
+    def do_element(self, arg: str) -> Iterator[str]:
+        """Choose an element."""
+        self.element = self._element("element", arg)
+        yield f"element {self.element + 1} is in {self.session.here.states[self.element]}"
+
+    def _element(self, command: str, text: str) -> int:
+        number = _whole(text, help_of(command, self.session).usage)
+        if not 1 <= number <= self.session.model.n:
+            raise SessionError(f"no element {number}; there are 1 to {self.session.model.n}")
+        return number - 1
+
+    # ------------------------------------------------------------------ breakpoints
+    def do_break(self, arg: str) -> Iterator[str]:
+        """Set a breakpoint."""
+        if not arg:
+            yield from self.do_breaks("")
+            return
+        form = re.fullmatch(
+            rf"(?:({'|'.join(KINDS)})\s+)?(\w+)(?:\s+(?:element\s+)?(\d+|all))?"
+            r"(?:\s+if\s+(.+?))?(?:\s+hits\s+(\d+))?",
+            arg,
+        )
+        if form is None:
+            raise SessionError(f"{arg!r} is no breakpoint; {self._usage('break')}")
+        kind, name, element, condition, hits = form.groups()
+        states, edges = self._states, self._edges
+        asked = {None: states + edges, "enter": states, "leave": states}.get(kind, edges)
+        name = _spelt(name, asked)
+        if name not in states + edges:
+            raise SessionError(
+                f"no edge or state {name!r}; edges: {', '.join(edges) or 'none'}; "
+                f"states: {', '.join(states)}"
+            )
+        point = self.session.break_on(
+            kind or ("enter" if name in states else "fires"),
+            name,
+            None if element in (None, "all") else self._element("break", element),
+            self._with_states(condition or ""),
+            _whole(hits, "hits K") if hits else 1,
+        )
+        yield f"breakpoint {len(self.session.breakpoints)}: {text_of.breakpoint_text(point)}"
+
+    def do_breaks(self, arg: str) -> Iterator[str]:
+        """Show breakpoints."""
+        _nothing("breaks", arg)
+        for number, point in enumerate(self.session.breakpoints, start=1):
+            yield f"  {number}  {text_of.breakpoint_text(point)}; seen {point.seen}"
+        if not self.session.breakpoints:
+            yield "no breakpoint is set"
+
+    def do_clear(self, arg: str) -> Iterator[str]:
+        """Take breakpoints away."""
+        _remove(self.session.breakpoints, "clear", arg)
+        yield from self.do_breaks("")
+
+    # ------------------------------------------------------------------ branches
+    def do_poke(self, arg: str) -> Iterator[str]:
+        """Change values in a new branch."""
+        variables: dict[str, dict[int, float]] = {}
+        states: dict[int, str] = {}
+        v: float | None = None
+        for part in re.sub(r"\s*=\s*", "=", arg).split():
+            name, _, value = part.partition("=")
+            if name == "v" and value:
+                v = self.session.watch(value)
+                continue
+            what, i = self._pokeable(name)
+            if not what and name in parameter_names(self.session.model):
+                raise SessionError(
+                    f"{name} is a parameter; for another value start a session with another model"
+                )
+            if not value or not what:
+                raise SessionError(f"{part!r} cannot be poked; {self._usage('poke')}")
+            if what == "state":
+                states[i] = _spelt(value, self._states)
+            else:
+                variables.setdefault(what, {})[i] = self.session.watch(value)
+        parent = self.session.current
+        number = self.session.poke(variables, v, states)
+        yield f"branch {number}, from branch {parent}: {self.session.branch.edits}"
+        yield from self.here()
+
+    def _pokeable(self, name: str) -> tuple[str, int]:
+        """Return variable (or 'state') and element; an empty text for another name."""
+        known = (*self.session.model.chart.variables, "state")
+        form = re.fullmatch(rf"({'|'.join(map(re.escape, known))})(\d*)", name)
+        if form is None:
+            return "", 0
+        if form[2]:
+            return form[1], self._element("poke", form[2])
+        if self.session.model.n > 1:
+            raise SessionError(f"{name!r} cannot be poked; for element 1 write {name}1")
+        return form[1], 0
+
+    def do_branches(self, arg: str) -> Iterator[str]:
+        """Show branches."""
+        _nothing("branches", arg)
+        yield from text_of.branch_lines(branches(self.session))
+
+    def do_branch(self, arg: str) -> Iterator[str]:
+        """Walk another branch."""
+        self.session.switch(_whole(arg, "branch N"))
+        yield f"branch {self.session.current}"
+        yield from self.here()
+
+    def do_compare(self, arg: str) -> Iterator[str]:
+        """Compare branches."""
+        numbers = [_whole(text, "compare A B") for text in arg.split()]
+        if len(numbers) not in (0, 2):
+            raise SessionError(f"two branches are needed; {self._usage('compare')}")
+        yield str(self.session.compare(*numbers))
+
+    def do_plot(self, arg: str) -> Iterator[str]:
+        """Draw branches."""
+        path = self._path("plot", arg)
+        from plots import figures, formats
+
+        formats.chosen(path, "figure")
+        runs = {}
+        for number, branch in enumerate(self.session.branches):
+            branch.complete()
+            trace = branch.trace()
+            if not trace.t[-1] > trace.t[0]:
+                raise SessionError(f"branch {number} failed at once; there is nothing to draw")
+            edits = f": {branch.edits}" if branch.edits else ""
+            runs[text_of.short(f"branch {number}{edits}", 50)] = trace
+        yield f"written to {figures.save(figures.compare_laws(runs), path)}"
+
+    # ------------------------------------------------------------------ files
+    def do_save(self, arg: str) -> Iterator[str]:
+        """Write the session."""
+        yield f"written to {self.session.save(self._path('save', arg))}"
+
+    def do_load(self, arg: str) -> Iterator[str]:
+        """Read a session."""
+        self.session = Session.load(self._path("load", arg))
+        self.element = min(self.element, self.session.model.n - 1)
+        yield f"{self.session.model.title}, {len(self.session.branches)} branches"
+        yield from self.here()
+
+    def do_quit(self, arg: str) -> Iterator[str]:
+        """Leave: whoever asks for commands does."""
+        _nothing("quit", arg)
+        yield from ()
+
+
+def _whole(text: str, usage: str) -> int:
+    if not re.fullmatch(r"\d{1,9}", text):
+        raise SessionError(f"{text!r} is not an integer; usage: {usage}")
+    return int(text)
+
+
+def _count(name: str, text: str, default: int = 1) -> int:
+    count = _whole(text, COMMANDS[name].usage) if text else default
+    if count < 1:
+        raise SessionError(f"{name} {count} goes nowhere; usage: {COMMANDS[name].usage}")
+    return count
+
+
+def _nothing(name: str, arg: str) -> None:
+    if arg:
+        raise SessionError(f"{name} takes no argument, it got {arg!r}")
+
+
+def _remove(where: list[Breakpoint] | list[str], name: str, arg: str) -> None:
+    if arg == "all":
+        where.clear()
+        return
+    number = _whole(arg, COMMANDS[name].usage)
+    if not 1 <= number <= len(where):
+        raise SessionError(f"there is no number {number}; there are {len(where)}")
+    del where[number - 1]
+
+
+def _spelt(name: str, known: Iterable[str]) -> str:
+    """Return the known name that is the same but for capitals; the name as it is if in doubt."""
+    same = [each for each in known if each.casefold() == name.casefold()]
+    return same[0] if len(same) == 1 else name

@@ -1,0 +1,290 @@
+"""The terminal face of a session: one command per line, answers as plain text of 80 columns.
+
+Nothing is ever redrawn: what was said stays above, so that a transcript, a pipe and a screen reader
+all get the same words. Colour is put on last and says nothing that the words do not.
+"""
+
+from __future__ import annotations
+
+import cmd
+import io
+import os
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TextIO
+
+from gms_fsm.app.debugger._commands import Commands
+from gms_fsm.app.debugger._help import ALIASES, COMMANDS, MOVES
+from gms_fsm.app.debugger._text import DRAWN, PLAIN, wrapped
+from gms_fsm.app.scenario import Loaded, load_scenario
+from gms_fsm.errors import GMSError, ScenarioError
+from gms_fsm.inspection.session import Session
+
+__all__ = ["Debugger", "run_debugger", "scenario_to_debug"]
+
+COLOURS = ("34", "33", "35", "36", "32")  # of states
+WORDS = {"true": "32", "false": "31", "fired": "1", "FIRED": "1", "error:": "1;31", "ACTIVE": "1"}
+
+
+class Debugger(cmd.Cmd):
+    r"""Reads commands and shows a session: ``Debugger(Session(model, rig, t_end)).run()``.
+
+    Parameters
+    ----------
+    session : Session
+        What is walked.
+    title : str, optional
+        Said by `run` before the titles of the model and the rig.
+    stdin, stdout : text files, optional
+        The terminal when left out. Commands that do not come from a terminal are echoed, so that a
+        transcript reads well.
+
+    Examples
+    --------
+    At a terminal ``Debugger(session).run()`` asks for commands. Here they come from a text:
+
+    >>> import io
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed
+    >>> session = Session(GMS(GMSParameters.paper("stick-slip"), law="published"),
+    ...                   Prescribed("0.15*sin(2*pi*t/25)"), 100.0)
+    >>> print(Debugger(session).reply("print s1"))
+    1.5
+    >>> code = Debugger(session, stdin=io.StringIO("next\nquit\n")).run()
+    GMS, 4 elements, published law; prescribed velocity, to t = 100 s
+    help shows the commands, where shows everything, quit leaves.
+    (t=0.0000 s) next
+    row 12, t = 4.91276067 s, micro-step 1: v = 0.141608 m/s, F = 1.34657 N
+      element 1: stick -> slip by break_away_forward
+    (t=4.9128 s) quit
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        title: str = "",
+        stdin: TextIO | None = None,
+        stdout: TextIO | None = None,
+    ) -> None:
+        super().__init__(stdin=stdin, stdout=stdout)
+        self.title = title
+        self.typed = stdin is None and sys.stdin is not None and sys.stdin.isatty()
+        self.use_rawinput = self.typed
+        self.coloured = (
+            self.stdout.isatty()
+            and not os.environ.get("NO_COLOR")
+            and os.environ.get("TERM") != "dumb"
+        )
+        self.encoding = (getattr(self.stdout, "encoding", None) or "utf-8").lower()
+        drawn = self.coloured and self.encoding.startswith("utf")
+        self.commands = Commands(session, DRAWN if drawn else PLAIN)
+        self.last_move = ""
+        self._new_prompt()
+
+    @property
+    def session(self) -> Session:
+        """What is walked; `load` changes it."""
+        return self.commands.session
+
+    # ------------------------------------------------------------------ the loop
+    def run(self) -> int:
+        """Greet, then read and answer until `quit` or the end of input.
+
+        Returns
+        -------
+        int
+            0, the exit code.
+        """
+        model, rig = self.session.model, self.session.rig
+        if self.title:
+            self.say(self.title)
+        self.say(f"{model.title}; {rig.title}, to t = {self.session.t_end:g} s")
+        self.say("help shows the commands, where shows everything, quit leaves.")
+        while True:
+            try:
+                self.cmdloop()
+            except KeyboardInterrupt:  # at the prompt
+                self.say("\nquit leaves")
+            else:
+                return 0
+
+    def precmd(self, line: str) -> str:
+        """Echo a command that nobody typed."""
+        if not self.typed:
+            self.stdout.write("\n" if line == "EOF" else f"{line}\n")
+        return line
+
+    def postcmd(self, stop: bool, line: str) -> bool:  # noqa: ARG002 (the base's signature)
+        """Say in the prompt where we are."""
+        self._new_prompt()
+        return stop
+
+    def _new_prompt(self) -> None:
+        session = self.session
+        branch = f", branch {session.current}" if session.current else ""
+        self.prompt = f"(t={session.here.t:.4f} s{branch}) "
+
+    def onecmd(self, line: str) -> bool:
+        """Do one command; a mistake is answered and never ends the session.
+
+        Parameters
+        ----------
+        line : str
+            As typed.
+
+        Returns
+        -------
+        bool
+            Whether to leave.
+        """
+        name, rest = ([*line.split(None, 1), "", ""])[:2]
+        if not name:
+            if not self.typed or not self.last_move:
+                return False
+            return self.onecmd(self.last_move)
+        if name.startswith("#"):
+            return False
+        if name == "EOF":
+            return True
+        name = ALIASES.get(name, name)
+        if name in MOVES:
+            self.last_move = line
+        try:
+            for said in self.commands.answer(name, rest.strip()):
+                self.say(said)
+        except KeyboardInterrupt:
+            self.say("stopped")
+            for said in self.commands.here():
+                self.say(said)
+        except GMSError as error:
+            self.say(f"error: {error}")
+        except BrokenPipeError:
+            raise
+        except Exception as error:  # losing a session would be worse than an odd message
+            self.say(f"error: {type(error).__name__}: {error}")
+        else:
+            return name == "quit"
+        return False
+
+    def reply(self, line: str) -> str:
+        """Return what a command answers, for scripts.
+
+        Parameters
+        ----------
+        line : str
+            A command.
+
+        Returns
+        -------
+        str
+            The answer without the last line break.
+        """
+        stdout, self.stdout = self.stdout, io.StringIO()
+        try:
+            self.onecmd(line)
+            return self.stdout.getvalue().rstrip("\n")
+        finally:
+            self.stdout = stdout
+
+    def say(self, text: str) -> None:
+        """Write lines, none wider than the screen."""
+        for line in text.split("\n"):
+            for part in wrapped(line):
+                part = part.encode(self.encoding, "replace").decode(self.encoding)
+                self.stdout.write(f"{self._painted(part)}\n")
+
+    def _painted(self, line: str) -> str:
+        if not self.coloured:
+            return line
+        states = [state.name for state in self.session.model.chart.states]
+        codes = WORDS | {name: COLOURS[i % len(COLOURS)] for i, name in enumerate(states)}
+        words = "|".join(re.escape(word) for word in codes)
+        return re.sub(
+            rf"(?<!\w)({words})(?!\w)", lambda m: f"\x1b[{codes[m[0]]}m{m[0]}\x1b[0m", line
+        )
+
+    # ------------------------------------------------------------------ completion
+    def completenames(self, text: str, *_: object) -> list[str]:
+        """Complete a command."""
+        return [name for name in COMMANDS if name.startswith(text)]
+
+    def completedefault(self, *arguments: object) -> list[str]:
+        """Complete an argument: edges, states, names, numbers, whatever the command takes."""
+        text, line, begin = str(arguments[0]), str(arguments[1]), int(str(arguments[2]))
+        name = line.split(None, 1)[0]
+        words = self.commands.words(ALIASES.get(name, name), line[:begin])
+        return [word for word in words if word.startswith(text)]
+
+    complete_help = completedefault
+
+
+def scenario_to_debug(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
+    """Read the scenario that ``gms-fsm debug`` is given; say where another file belongs.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file.
+    overrides : sequence of str
+        See `gms_fsm.app.scenario.load_scenario`.
+
+    Returns
+    -------
+    Loaded
+        For `run_debugger`.
+
+    Raises
+    ------
+    ScenarioError
+        If it is a trace, a Python file, or no valid scenario.
+
+    Examples
+    --------
+    >>> scenario_to_debug("t.npz")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    gms_fsm.errors.ScenarioError: t.npz is a trace; `gms-fsm replay t.npz` steps through it; ...
+    """
+    match Path(path).suffix.lower():
+        case ".py":
+            raise ScenarioError(
+                f"{path} is Python; debug takes a scenario (.toml); for a model of your own: "
+                "Debugger(Session(model, rig, t_end)).run(), see docs/howto/debugging.md"
+            )
+        case ".npz" | ".csv":
+            raise ScenarioError(
+                f"{path} is a trace; `gms-fsm replay {path}` steps through it; debug takes a "
+                "scenario (.toml)"
+            )
+    return load_scenario(path, overrides)
+
+
+def run_debugger(loaded: Loaded, stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
+    """Open a scenario in the debugger.
+
+    Parameters
+    ----------
+    loaded : Loaded
+        From `gms_fsm.app.scenario.load_scenario`. Wanted times are left out: a session stops at
+        every row.
+    stdin, stdout : text files, optional
+        The terminal when left out.
+
+    Returns
+    -------
+    int
+        Exit code: 0 at `quit` and at the end of input.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario's run cannot be set up.
+    """
+    not_here = ("t_eval", "monitors")
+    options = {name: value for name, value in loaded.arguments.items() if name not in not_here}
+    try:
+        session = Session(loaded.model, loaded.rig, options.pop("t_end"), **options)
+    except GMSError as error:
+        raise ScenarioError(f"{loaded.path}: {error}") from None
+    return Debugger(session, loaded.title, stdin, stdout).run()

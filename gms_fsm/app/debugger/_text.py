@@ -1,0 +1,266 @@
+"""Lines of at most 80 columns for what a debugger shows."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from gms_fsm.app.debugger._view import BranchView, Ribbons, StateView, View
+from gms_fsm.charts.chart import Chart
+from gms_fsm.inspection.session import Breakpoint
+
+__all__ = [
+    "DRAWN",
+    "PLAIN",
+    "WIDTH",
+    "Marks",
+    "branch_lines",
+    "breakpoint_text",
+    "chart_lines",
+    "ending_lines",
+    "progress",
+    "screen_lines",
+    "short",
+    "wrapped",
+]
+
+WIDTH = 80
+RIBBON = WIDTH - 6
+BAR = 8  # characters of |z|/s = 1
+
+
+@dataclass(frozen=True)
+class Marks:
+    """Characters to draw with: no and yes, bar, a ribbon's states, a box, the active box."""
+
+    truth: str
+    bar: str
+    ribbon: str
+    box: str
+    active: str
+
+
+PLAIN = Marks("ny", ".#", "-#=+%o", "+-+|++", "+=+|++")
+DRAWN = Marks("✗✓", "░█", "─▓═┼▒┄", "┌─┐│└┘", "╔═╗║╚╝")
+
+
+def screen_lines(
+    view: View, ribbons: Ribbons, chart: Chart, chosen: int, marks: Marks
+) -> Iterator[str]:
+    """Yield one screen: the place, each element with its numbers and edges, the states over time.
+
+    Parameters
+    ----------
+    view, ribbons : View, Ribbons
+        What is shown.
+    chart : Chart
+        The session's.
+    chosen : int
+        The marked element, counted from 0.
+    marks : Marks
+        Characters.
+
+    Yields
+    ------
+    str
+        Lines.
+    """
+    step = f", micro-step {view.microstep}" if view.microstep else ""
+    yield f"t = {view.t:.9g} s, row {view.row}{step}, branch {view.branch}"
+    yield f"v = {view.v:.6g} m/s, x = {view.x:.6g} m, F = {view.F:.6g} N"
+    yield from ending_lines(view.ending)
+    wide = max(5, min(8, max(len(state.name) for state in chart.states)))
+    yield "  ".join(["  el", " ".join([f"{'state':<{wide}}", *_heads(chart)]), "edges"])
+    for each in view.elements:
+        lead = f"{'>' if each.number == chosen + 1 else ' '}{each.number:>3}  "
+        cells = [f"{value:>10.4g}" for value in each.variables]
+        if each.s is not None and each.ratio is not None:
+            shown = f"{each.ratio:.3f}" if each.ratio < 100 else f"{each.ratio:.1e}"
+            cells += [f"{each.s:>9.4g}", f"{shown:>7}"]
+            if len(each.variables) == 1:  # further variables need the bar's place
+                cells.append(_bar(each.ratio, marks))
+        cells.append(f"{each.F:>10.4g}")
+        line = lead + " ".join([f"{short(each.state, wide):<{wide}}", *cells])
+        edges = " ".join(
+            f"{edge.priority}:"
+            + "".join(" ?" if holds is None else marks.truth[holds] for holds in edge.clauses)
+            + ("*" if edge.fired else "")
+            for edge in each.edges
+        )
+        if len(line) + 2 + len(edges) <= WIDTH:
+            yield f"{line}  {edges}"
+        else:
+            yield line
+            yield f"      {edges}"
+    no, yes = tuple(marks.truth)
+    yield f"edges by priority, one mark per clause: {yes} true, {no} false, * just taken; see why"
+    yield from _ribbon_lines(ribbons, chart, len(view.elements), marks)
+
+
+def _heads(chart: Chart) -> list[str]:
+    """Return the headings of an element's numbers, as wide as these."""
+    units = {name: chart.unit(name) for name in chart.variables}
+    names = [f"{name} [{unit}]" if unit else name for name, unit in units.items()]
+    heads = [f"{short(name, 10):>10}" for name in names]
+    if "s" in chart.inputs:
+        heads += [f"{'s [m]':>9}", f"{short(f'|{chart.variables[0]}|/s', 7):>7}"]
+        if len(names) == 1:
+            heads.append(" " * (BAR + 2))
+    return [*heads, f"{'F_i [N]':>10}"]
+
+
+def _bar(ratio: float, marks: Marks) -> str:
+    empty, full = tuple(marks.bar)
+    filled = min(BAR, round(BAR * min(ratio, 1.0)))
+    return f"[{full * filled}{empty * (BAR - filled)}{'>' if ratio > 1 else ']'}"
+
+
+def _ribbon_lines(ribbons: Ribbons, chart: Chart, n: int, marks: Marks) -> Iterator[str]:
+    """Yield every element's states over time, and where we are."""
+    drawn = marks.ribbon
+    scale = f"{ribbons.start:g} s"
+    yield f"      {scale}{f'{ribbons.end:g} s':>{len(ribbons.modes) - len(scale)}}"
+    for i in range(n):
+        states = (" " if mode is None else drawn[mode[i] % len(drawn)] for mode in ribbons.modes)
+        yield f" E{i + 1:<3} {''.join(states)}".rstrip()
+    key = "  ".join(f"{drawn[j % len(drawn)]} {s.name}" for j, s in enumerate(chart.states))
+    yield f"      {' ' * ribbons.now}^"
+    yield f"      {key}  ^ now  (blank: not computed)"
+
+
+def ending_lines(ending: str) -> Iterator[str]:
+    """Yield what there is to say at the last row.
+
+    Parameters
+    ----------
+    ending : str
+        See `View`.
+
+    Yields
+    ------
+    str
+        Lines; none before the last row.
+    """
+    if ending == "end":
+        yield "  end of the run"
+    elif ending:
+        yield f"  the run cannot go on: {ending.partition('; the run up to there')[0]}"
+        yield "  go back, look, or poke something to go on in another branch"
+
+
+def chart_lines(states: Sequence[StateView], marks: Marks) -> Iterator[str]:
+    """Yield a chart as boxes, the active one marked, with the edges below each.
+
+    Parameters
+    ----------
+    states : sequence of StateView
+        The chart's.
+    marks : Marks
+        Characters.
+
+    Yields
+    ------
+    str
+        Lines.
+    """
+    for state in states:
+        lines = [state.name + ("  ACTIVE" if state.active else "")]
+        lines += [f"  d{name} = {text}" for name, text in state.flow]
+        box, lead = (marks.active, "> ") if state.active else (marks.box, "  ")
+        yield from _boxed(lines, box, lead)
+        for edge in state.edges:
+            fired = "  FIRED" if edge.fired else ""
+            yield f"     {edge.priority} {edge.name} -> {edge.target}{fired}"
+            truths = " ".join("true" if holds else "false" for holds in edge.clauses)
+            yield f"         [{edge.guard}]{f'  {truths}' if truths else ''}"
+
+
+def _boxed(lines: Sequence[str], box: str, lead: str) -> Iterator[str]:
+    left, across, right, side, low_left, low_right = tuple(box)
+    lines = [short(line, WIDTH - 8) for line in lines]
+    wide = max(30, *(len(line) for line in lines)) + 2
+    yield f"  {left}{across * wide}{right}"
+    for number, line in enumerate(lines):
+        yield f"{'  ' if number else lead}{side} {line:<{wide - 1}}{side}"
+    yield f"  {low_left}{across * wide}{low_right}"
+
+
+def branch_lines(branches: Sequence[BranchView]) -> Iterator[str]:
+    """Yield the branches of a session.
+
+    Parameters
+    ----------
+    branches : sequence of BranchView
+        All of them.
+
+    Yields
+    ------
+    str
+        Lines.
+    """
+    for each in branches:
+        yield f"{'>' if each.current else ' '} {each.number}  {progress(each)}"
+        if each.parent is not None:
+            yield f"     from branch {each.parent} at t = {each.t_fork:.9g} s: {each.edits}"
+
+
+def progress(branch: BranchView) -> str:
+    """Return how far a branch is computed.
+
+    Parameters
+    ----------
+    branch : BranchView
+        One of a session's.
+
+    Returns
+    -------
+    str
+        Rows, transitions, time.
+    """
+    how = {"": "not at its end", "end": "at its end"}.get(branch.outcome, "it cannot go on")
+    return (
+        f"{branch.rows} rows, {branch.transitions} transitions, computed to "
+        f"t = {branch.t_computed:.9g} s; {how}"
+    )
+
+
+def breakpoint_text(point: Breakpoint) -> str:
+    """Return what a breakpoint waits for.
+
+    Parameters
+    ----------
+    point : Breakpoint
+        One of a session's.
+
+    Returns
+    -------
+    str
+        One line.
+    """
+    who = "all elements" if point.element is None else f"element {point.element + 1}"
+    condition = f", if {point.condition}" if point.condition else ""
+    hits = f", from hit {point.hits} on" if point.hits > 1 else ""
+    return f"{point.kind} {point.name}, {who}{condition}{hits}"
+
+
+def short(text: str, wide: int) -> str:
+    """Return a text that fits a column.
+
+    >>> short("break_away_forward", 8)
+    'break_a~'
+    """
+    return text if len(text) <= wide else text[: wide - 1] + "~"
+
+
+def wrapped(line: str) -> Iterator[str]:
+    """Yield a line in parts that fit the screen.
+
+    >>> [len(part) <= WIDTH for part in wrapped("word " * 40)]
+    [True, True, True]
+    """
+    if len(line) <= WIDTH:
+        yield line.rstrip()
+        return
+    indent = " " * (len(line) - len(line.lstrip()) + 2)
+    yield from textwrap.wrap(line, WIDTH, subsequent_indent=indent[:40])

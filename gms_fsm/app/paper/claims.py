@@ -1,0 +1,324 @@
+"""The paper's claims, each held against the runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from gms_fsm.app.paper import FIG3_END
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.traces.trace import Trace
+
+__all__ = ["Claim", "differing_numbers", "force_difference", "judge"]
+
+SAMPLES_PER_SECOND = 200  # of the common grid on which forces are subtracted
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One claim of the paper with what was measured and what follows.
+
+    Parameters
+    ----------
+    figure : str
+        Where the paper makes it.
+    text : str
+        The claim.
+    measured : str
+        Figures with units.
+    verdict : str
+        ``holds``, ``holds only with ...`` or ``differs``, with a reason.
+    """
+
+    figure: str
+    text: str
+    measured: str
+    verdict: str
+
+
+def judge(traces: Mapping[str, Trace]) -> list[Claim]:
+    """Hold every claim of the paper against the runs.
+
+    Parameters
+    ----------
+    traces : mapping of str to Trace
+        From `run`, with the default signals (the claims are about those).
+
+    Returns
+    -------
+    list of Claim
+        In the paper's order.
+    """
+    return [*_judge_figure_3(traces), *_judge_figure_4(traces), *_judge_implementations(traces)]
+
+
+def _judge_figure_3(traces: Mapping[str, Trace]) -> list[Claim]:
+    gms, lugre = traces["fig3_chart"], traces["fig3_lugre"]
+    earned = traces["fig3_slipping_chart"]
+    K = float(gms.model.values["k"].sum())  # type: ignore[union-attr]
+
+    rising = gms.sample(np.linspace(0.2, 2.0, 200))
+    slope, offset = np.polyfit(rising.x, rising.F, 1)
+    bend = np.abs(rising.F - (slope * rising.x + offset)).max() / rising.F.max()
+    up, down = gms.sample(np.linspace(0.0, 2.0, 400)), gms.sample(np.linspace(2.0, 4.0, 400))
+    x_common = np.linspace(0.55, 0.95, 50) * up.x.max()
+    gap = np.interp(x_common, up.x, up.F) - np.interp(x_common, down.x[::-1], down.F[::-1])
+
+    low, high, drift = _cycles(gms, 0.5, 10.0)
+    _, _, creep = _cycles(lugre, 0.5, 10.0)
+    lugre_x = lugre.sample([2.0, FIG3_END]).x
+    low2, high2, drift2 = _cycles(earned, 0.5, 10.0)
+    log = earned.transitions
+    broke = ", ".join(f"element {r.element + 1} {r.edge} at {r.t:.3f} s" for r in log)
+    spring_only = "as that of a linear spring-damper: no element can slip here"
+    return [
+        Claim(
+            "Fig. 3b",
+            "GMS is linearly elastic while the force rises",
+            f"0.2–2 s: F against x is a line of {slope:.1f} N/m (sum of k: {K:.1f} N/m), largest "
+            f"deviation {100 * bend:.2f} % of F",
+            _verdict(abs(slope / K - 1) < 0.05 and bend < 0.02),
+        ),
+        Claim(
+            "Fig. 3b",
+            "hysteresis when the force falls",
+            f"at equal x the rising branch lies {1e3 * gap.min():.1f} to {1e3 * gap.max():.1f} mN "
+            "above the falling one; all of it is viscous (every element sticks)",
+            f"holds only {spring_only.replace('as that of', 'as the damping of')}"
+            if gap.min() > 0
+            else "differs: no loop",
+        ),
+        Claim(
+            "Fig. 3b",
+            "GMS is bounded: it does not drift",
+            f"x between {1e3 * low:.3f} and {1e3 * high:.3f} mm in every cycle after 10 s, drift "
+            f"{drift:.1e} m/s. With Table I element 1 would need k_1 F_s = "
+            f"{float(gms.model.values['k'][0]) * gms.model.stribeck.F_s:.0f} N to slip",  # type: ignore[index, union-attr]
+            f"holds only {spring_only}" if abs(drift) < 1e-9 else "differs",
+        ),
+        Claim(
+            "Fig. 3b",
+            "… and where elements slip (weights 0.25/k, signed law; our addition)",
+            f"{broke} (where sigma_1 dz_1 in the Stribeck dip makes a force peak of "
+            f"{earned.F.max():.2f} N); then x between {1e3 * low2:.2f} and {1e3 * high2:.2f} mm, "
+            f"drift {drift2:.1e} m/s",
+            _verdict(len(log) > 0 and abs(drift2) < 1e-9),
+        ),
+        Claim(
+            "Fig. 3d",
+            "LuGre drifts steadily under a force below break-away",
+            f"x = {1e3 * lugre_x[0]:.2f} mm at 2 s, {1e3 * lugre_x[1]:.2f} mm at 30 s; after 10 s "
+            f"a steady {creep:.2e} m/s",
+            _verdict(creep > 1e-5),
+        ),
+        Claim(
+            "Fig. 3",
+            "no GMS transition fires",
+            f"{len(gms.transitions)} transitions in {FIG3_END:g} s",
+            _verdict(len(gms.transitions) == 0),
+        ),
+    ]
+
+
+def _judge_figure_4(traces: Mapping[str, Trace]) -> list[Claim]:
+    published, signed = traces["fig4_chart"], traces["fig4_signed_chart"]
+    lugre = traces["fig4_lugre"]
+    first = published.transitions.t[:4]
+    peaks = {name: _break_aways(t) for name, t in (("published", published), ("signed", signed))}
+    odd = {
+        name: _asymmetry(t, half_period=12.5)
+        for name, t in (("published", published), ("signed", signed), ("lugre", lugre))
+    }
+    heights = _peak_heights(lugre, half_period=12.5)
+    z_end = ", ".join(f"{z:.2f}" for z in published.z[-1])
+    z_range = f"{np.abs(signed.z).max():.2f}"
+
+    def counts(name: str) -> str:
+        return ", ".join(
+            f"{len(times)} at {times[0]:.2f}" + (f"–{times[-1]:.2f}" if len(times) > 1 else "")
+            for times in peaks[name]
+        )
+
+    later = max(len(times) for times in peaks["published"][1:])
+    later_signed = max(len(times) for times in peaks["signed"])
+    sign = "holds only with s(v) unsigned for v < 0 (eq. (1) as printed)"
+    return [
+        Claim(
+            "Fig. 4b",
+            "break-away near t = 5 s",
+            f"all four elements at t = {first.min():.4f} s (spread {np.ptp(first):.1e} s)",
+            _verdict(abs(first.min() - 5.0) < 0.2),
+        ),
+        Claim(
+            "Fig. 4d",
+            "one break-away peak first",
+            f"{len(peaks['published'][0])} peak in the first half period",
+            _verdict(len(peaks["published"][0]) == 1),
+        ),
+        Claim(
+            "Fig. 4d",
+            "several break-away peaks later",
+            "peaks (over 0.1 s apart) in each half period, with their times [s]: "
+            f"published {counts('published')}; signed {counts('signed')}",
+            sign if later > 1 and later_signed == 1 else _verdict(later > 1),
+        ),
+        Claim(
+            "Fig. 4d",
+            "the force is not symmetric",
+            "largest |F(t) + F(t + 12.5 s)| in the last 50 s: "
+            f"published {odd['published']:.2f} N, signed {odd['signed']:.2e} N; published z_i end "
+            f"at {z_end} m, signed |z_i| stay under {z_range} m",
+            sign
+            if odd["published"] > 0.1 and odd["signed"] < 0.05
+            else _verdict(odd["published"] > 0.1),
+        ),
+        Claim(
+            "Fig. 4f",
+            "LuGre is uniform",
+            f"peak |F| in half periods 2 to 8: {heights[1:].min():.4f} to {heights[1:].max():.4f} "
+            f"N; largest |F(t) + F(t + 12.5 s)| in the last 50 s {odd['lugre']:.1e} N",
+            _verdict(bool(np.ptp(heights[1:]) < 0.01) and odd["lugre"] < 0.05),
+        ),
+    ]
+
+
+def _judge_implementations(traces: Mapping[str, Trace]) -> list[Claim]:
+    same = {
+        name: differing_numbers(traces[f"{name}_chart"], traces[f"{name}_ifelse"])
+        for name in ("fig3", "fig3_slipping", "fig4", "fig4_signed")
+    }
+    numbers = ", ".join(f"{n}: {bad} of {count}" for n, (bad, count) in same.items())
+    identical = all(bad == 0 for bad, _ in same.values())
+    total = len(traces["fig4_chart"].transitions)
+    lost = total - len(traces["fig4_step"].transitions)
+    t4, d4 = force_difference(traces["fig4_step"], traces["fig4_chart"])
+    _, d3 = force_difference(traces["fig3_step"], traces["fig3_chart"])
+    x3 = _differences(traces["fig3_step"], traces["fig3_chart"], "x")[1]
+    arrest = float(traces["fig4_chart"].transitions.t[4])
+    quiet = np.abs(d4[t4 < 4.9])
+    between = np.abs(d4[(t4 >= 4.9) & (t4 < arrest)])
+    after = np.abs(d4[t4 >= arrest])
+    return [
+        Claim(
+            "Fig. 4d–e",
+            "a residual of about 1e-3 N between the two implementations",
+            f"chart and generated if-else under the same driver, numbers that differ: {numbers}",
+            "differs: the implementations are identical, exactly" if identical else "differs",
+        ),
+        Claim(
+            "Fig. 4d–e",
+            "… with spikes at the transitions",
+            "if-else looked at once a step (max step 1e-3 s, rtol 1e-4) against located switches: "
+            f"|dF| {np.median(quiet):.1e} N before the first break-away (median), a spike of "
+            f"{between.max():.2f} N at it, then {np.median(between):.1e} N (median) to the "
+            "reversal at 12.5 s. There the sampled guards miss the arrest, and the runs part: "
+            f"up to {after.max():.1f} N, {lost} of {total} transitions lost",
+            "holds only with guards looked at once a step: the residual is the switching rule's "
+            "sampling, not the implementation",
+        ),
+        Claim(
+            "Fig. 3b–c",
+            "a residual of about 1e-4 N and 1e-6 m in the non-drifting run",
+            f"the same comparison in Fig. 3: largest |dF| {np.abs(d3).max():.1e} N, |dx| "
+            f"{np.abs(x3).max():.1e} m; it comes from the tolerance 1e-4 alone (no transition)",
+            "differs: identical under one driver, and looking once a step at the paper's tolerance "
+            "explains less than the paper prints",
+        ),
+    ]
+
+
+def _verdict(holds: bool) -> str:
+    return "holds" if holds else "differs"
+
+
+def _cycles(trace: Trace, period: float, start: float) -> tuple[float, float, float]:
+    """Return the lowest and highest x after start [m], and the drift of cycle means [m/s]."""
+    count = int((trace.t[-1] - start) / period)
+    grid = start + period * np.arange(count * 50) / 50
+    x = trace.sample(grid).x
+    means = x.reshape(count, 50).mean(axis=1)
+    drift = np.polyfit(period * np.arange(count), means, 1)[0]
+    return float(x.min()), float(x.max()), float(drift)
+
+
+def _break_aways(trace: Trace, half_period: float = 12.5) -> list[list[float]]:
+    """Return, for each half period, the times of break-aways more than 0.1 s apart."""
+    log = trace.transitions
+    groups: list[list[float]] = []
+    for half in range(int(trace.t[-1] / half_period)):
+        inside = (log.t >= half * half_period) & (log.t < (half + 1) * half_period)
+        times: list[float] = []
+        for t in log.t[inside & (log.target == "slip")]:
+            if not times or t - times[-1] > 0.1:
+                times.append(float(t))
+        if times:
+            groups.append(times)
+    return groups
+
+
+def _asymmetry(trace: Trace, half_period: float) -> float:
+    """Return the largest |F(t) + F(t + half period)| [N] in the second half of the run."""
+    end = trace.t[-1]
+    # A millisecond beside the break-aways: there two equal jumps need not fall on the same sample.
+    grid = np.arange(end / 2, end - half_period, 1 / SAMPLES_PER_SECOND)
+    jumps = np.concatenate([trace.transitions.t, trace.transitions.t - half_period])
+    if jumps.size:
+        grid = grid[np.abs(grid[:, None] - jumps).min(axis=1) > 0.02]
+    return float(np.abs(trace.sample(grid).F + trace.sample(grid + half_period).F).max())
+
+
+def _peak_heights(trace: Trace, half_period: float) -> FloatArray:
+    halves = [
+        (trace.t >= h * half_period) & (trace.t < (h + 1) * half_period)
+        for h in range(int(trace.t[-1] / half_period))
+    ]
+    return np.array([np.abs(trace.F[half]).max() for half in halves])
+
+
+def differing_numbers(a: Trace, b: Trace) -> tuple[int, int]:
+    """Count the numbers in which two traces differ, bit for bit.
+
+    Parameters
+    ----------
+    a, b : Trace
+        Of the same model and rig.
+
+    Returns
+    -------
+    (int, int)
+        How many differ, of how many; all differ if the traces have other lengths.
+    """
+    total = sum(getattr(a, name).size for name in ("t", "x", "v", "z", "F", "F_elements"))
+    if len(a) != len(b):
+        return total, total
+    bad = sum(
+        int((getattr(a, name) != getattr(b, name)).sum())
+        for name in ("t", "x", "v", "z", "F", "F_elements")
+    )
+    return bad, total
+
+
+def force_difference(a: Trace, b: Trace) -> tuple[FloatArray, FloatArray]:
+    """Return common times [s] and the difference of the friction forces there [N].
+
+    The times are an even grid and the transitions of `b`, where the residual has its spikes.
+
+    Parameters
+    ----------
+    a, b : Trace
+        Of the same length in time.
+
+    Returns
+    -------
+    (ndarray, ndarray)
+        Each of shape (m,).
+    """
+    return _differences(a, b, "F")
+
+
+def _differences(a: Trace, b: Trace, name: str) -> tuple[FloatArray, FloatArray]:
+    grid = np.union1d(np.arange(a.t[0], a.t[-1], 1 / SAMPLES_PER_SECOND), b.transitions.t)
+    difference: FloatArray = getattr(a.sample(grid), name) - getattr(b.sample(grid), name)
+    return grid, difference

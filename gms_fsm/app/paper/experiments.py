@@ -1,0 +1,150 @@
+"""The runs of the paper's two experiments: what runs, and how."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from gms_fsm.app.paper import FIG3_END, FIG4_END, FORCE, PAPER_RTOL, PAPER_STEP, VELOCITY
+from gms_fsm.charts.lugre import BENCHMARK
+from gms_fsm.run.simulate import Moment, simulate
+from gms_fsm.systems.gms_parameters import GMSParameters
+from gms_fsm.systems.models import GMS, LuGre, Model
+from gms_fsm.systems.rigs import Prescribed, Rig, Slider
+from gms_fsm.traces.trace import Trace
+
+__all__ = ["Experiment", "Progress", "experiments", "lugre_like", "run", "run_one"]
+
+Progress = Callable[[str, float], object]
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One run of the reproduction: its name, what runs, and how.
+
+    Parameters
+    ----------
+    name : str
+        File name of its trace.
+    model, rig
+        What runs.
+    t_end : float
+        s.
+    engine : str
+        Who decides.
+    paper_settings : bool
+        Guards looked at once a step, step at most 1e-3 s, rtol 1e-4, instead of located switches.
+    """
+
+    name: str
+    model: Model
+    rig: Rig
+    t_end: float
+    engine: str = "machines"
+    paper_settings: bool = False
+
+
+def experiments(force: str = FORCE, velocity: str = VELOCITY) -> tuple[Experiment, ...]:
+    """Return every run of the reproduction.
+
+    Parameters
+    ----------
+    force : str
+        F_a(t) of Fig. 3, N, in the expression language.
+    velocity : str
+        v(t) of Fig. 4, m/s.
+
+    Returns
+    -------
+    tuple of Experiment
+        Fig. 3 first.
+
+    Examples
+    --------
+    >>> [e.name for e in experiments()][:3]
+    ['fig3_chart', 'fig3_ifelse', 'fig3_lugre']
+    """
+    slow, slip = GMSParameters.paper("non-drifting"), GMSParameters.paper("stick-slip")
+    earned = slow.with_weights(0.25 / slow.k)
+    push, move = Slider(1.0, force), Prescribed(velocity)
+    fig3, fig4 = GMS(slow, law="published"), GMS(slip, law="published")
+    signed3, signed4 = GMS(earned, law="signed"), GMS(slip, law="signed")
+    return (
+        Experiment("fig3_chart", fig3, push, FIG3_END),
+        Experiment("fig3_ifelse", fig3, push, FIG3_END, engine="ifelse"),
+        Experiment("fig3_lugre", lugre_like(slow), push, FIG3_END),
+        Experiment("fig3_slipping_chart", signed3, push, FIG3_END),
+        Experiment("fig3_slipping_ifelse", signed3, push, FIG3_END, engine="ifelse"),
+        Experiment("fig3_step", fig3, push, FIG3_END, engine="ifelse", paper_settings=True),
+        Experiment("fig4_chart", fig4, move, FIG4_END),
+        Experiment("fig4_ifelse", fig4, move, FIG4_END, engine="ifelse"),
+        Experiment("fig4_lugre", lugre_like(slip), move, FIG4_END),
+        Experiment("fig4_signed_chart", signed4, move, FIG4_END),
+        Experiment("fig4_signed_ifelse", signed4, move, FIG4_END, engine="ifelse"),
+        Experiment("fig4_step", fig4, move, FIG4_END, engine="ifelse", paper_settings=True),
+    )
+
+
+def lugre_like(parameters: GMSParameters) -> LuGre:
+    """Return the LuGre model a column is compared with."""
+    own: Any = BENCHMARK.values
+    return LuGre(**own, sigma_2=parameters.sigma_2, stribeck=parameters.stribeck)
+
+
+def run(
+    force: str = FORCE, velocity: str = VELOCITY, progress: Progress | None = None
+) -> dict[str, Trace]:
+    """Run both experiments in all their variants.
+
+    Parameters
+    ----------
+    force, velocity : str
+        The signals the paper does not print.
+    progress : callable, optional
+        ``progress(name, done)`` with done from 0 to 1.
+
+    Returns
+    -------
+    dict of str to Trace
+        By the experiments' names.
+
+    Raises
+    ------
+    SimulationError
+        If a run cannot go on (a signal that is not finite, say).
+    """
+    return {e.name: run_one(e, progress) for e in experiments(force, velocity)}
+
+
+def run_one(experiment: Experiment, progress: Progress | None = None) -> Trace:
+    """Run one experiment.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        What to run.
+    progress : callable, optional
+        ``progress(name, done)`` with done from 0 to 1.
+
+    Returns
+    -------
+    Trace
+        The run.
+    """
+
+    def reached(moment: Moment) -> None:
+        if progress is not None:
+            progress(experiment.name, moment.t / experiment.t_end)
+
+    arguments = (experiment.model, experiment.rig, experiment.t_end)
+    if experiment.paper_settings:
+        return simulate(
+            *arguments,
+            engine=experiment.engine,
+            progress=reached,
+            events="step",
+            max_step=PAPER_STEP,
+            rtol=PAPER_RTOL,
+        )
+    return simulate(*arguments, engine=experiment.engine, progress=reached)

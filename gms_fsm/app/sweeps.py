@@ -1,0 +1,260 @@
+"""Sweeps of a scenario: the same run over a grid of parameters, written as files and a table."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gms_fsm._files import no_input, output_folder, written_whole
+from gms_fsm.app.report import plain
+from gms_fsm.app.scenario import Loaded
+from gms_fsm.charts.parameters import FloatArray, Parameter
+from gms_fsm.errors import ParameterError, cut
+from gms_fsm.run.sweep import Sweep, sweep
+from gms_fsm.systems.models import parameters_of
+from gms_fsm.systems.rigs import numbers_of
+
+__all__ = ["Axis", "axis", "sweep_scenario", "sweep_summary"]
+
+MOST_RUNS = 1_000_000
+LONGEST_TABLE = 100  # runs in a summary; all are in runs.csv
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """What is varied, and over which values.
+
+    Parameters
+    ----------
+    name : str
+        Of a parameter.
+    values : ndarray, shape (count,)
+        In its unit.
+    spacing : {"linear", "logarithmic"}
+        How they lie.
+    """
+
+    name: str
+    values: FloatArray
+    spacing: str
+
+
+def axis(text: str) -> Axis:
+    """Read what ``--over`` says.
+
+    Parameters
+    ----------
+    text : str
+        ``"name=from:to:count"``; with ``",log"`` behind it the values are spaced evenly in their
+        logarithm.
+
+    Returns
+    -------
+    Axis
+        Name and values, both ends included.
+
+    Raises
+    ------
+    ParameterError
+        If the text is not of this form.
+
+    Examples
+    --------
+    >>> axis("F_s=1:2:3").values.tolist()
+    [1.0, 1.5, 2.0]
+    >>> axis("v_s=1e-3:0.1:3,log").values.round(6).tolist()
+    [0.001, 0.01, 0.1]
+    """
+    here = f"--over {cut(text)}"
+    name, equals, form = (part.strip() for part in text.partition("="))
+    form, comma, word = (part.strip() for part in form.partition(","))
+    parts = form.split(":")
+    if not (name and equals) or len(parts) != 3 or (comma and word != "log"):
+        raise ParameterError(
+            f"{here}: give it as name=from:to:count, for example F_s=1:2:11, or with ,log behind "
+            "it for even steps of the logarithm"
+        )
+    try:
+        start, stop, count = float(parts[0]), float(parts[1]), int(parts[2])
+    except ValueError:
+        raise ParameterError(
+            f"{here}: from and to must be numbers, and count a whole number"
+        ) from None
+    if not (math.isfinite(start) and math.isfinite(stop)):
+        raise ParameterError(f"{here}: from and to must be finite")
+    if not 2 <= count <= MOST_RUNS:
+        raise ParameterError(f"{here}: count is {count}; it must be between 2 and {MOST_RUNS}")
+    if not comma:
+        return Axis(name, np.linspace(start, stop, count), "linear")
+    if not (start > 0.0 and stop > 0.0):
+        raise ParameterError(f"{here}: with log both from and to must be > 0")
+    return Axis(name, np.geomspace(start, stop, count), "logarithmic")
+
+
+def sweep_scenario(
+    loaded: Loaded, axes: Sequence[Axis], folder: str | Path, *, engine: str = "compiled"
+) -> tuple[Sweep, list[Path]]:
+    """Run a scenario over a grid of parameters and write what came of it.
+
+    Parameters
+    ----------
+    loaded : Loaded
+        From `gms_fsm.app.scenario.load_scenario`.
+    axes : sequence of Axis
+        At least one; every combination of their values is run, the last one varying fastest.
+    folder : str or Path
+        Made where missing, before anything is run.
+    engine : {"compiled", "machines", "ifelse"}
+        As in `gms_fsm.sweep`.
+
+    Returns
+    -------
+    (Sweep, list of Path)
+        The results, and the files, ``summary.md`` first.
+
+    Raises
+    ------
+    ParameterError
+        If a name is not known, or there are too many runs.
+    OutputError
+        If the folder cannot be written, or one of the files is there and not ours, or is read
+        here.
+    """
+    _check(axes, _known(loaded))
+    names = ["summary.md", "runs.csv", "sweep.npz"]
+    folder = output_folder(folder, names)
+    for name in names:
+        no_input(folder / name, loaded.path, *([loaded.record.path] if loaded.record else []))
+    grid = np.meshgrid(*(each.values for each in axes), indexing="ij")
+    parameters = {each.name: values.ravel() for each, values in zip(axes, grid, strict=True)}
+    options: dict[str, Any] = dict(loaded.arguments)
+    for name in ("engine", "monitors"):  # a sweep keeps no rows to be watched
+        options.pop(name, None)
+    if loaded.scenario.output.every is None:
+        options.pop("t_eval", None)
+    else:
+        options["output"] = "t_eval"
+    t_end = options.pop("t_end")
+    result = sweep(loaded.model, loaded.rig, t_end, parameters, engine=engine, **options)
+    saved = result.save(folder / "sweep.npz")  # first of all: nothing after it can lose the runs
+    table = _csv(result).encode()
+    text = sweep_summary(loaded, axes, result, engine).encode()
+    return result, [
+        written_whole(folder / "summary.md", lambda file: file.write(text)),
+        written_whole(folder / "runs.csv", lambda file: file.write(table)),
+        saved,
+    ]
+
+
+def _known(loaded: Loaded) -> tuple[Parameter, ...]:
+    """Return what can be varied."""
+    return (*parameters_of(loaded.model), *numbers_of(loaded.rig))
+
+
+def _check(axes: Sequence[Axis], known: Sequence[Parameter]) -> None:
+    if not axes:
+        raise ParameterError("nothing to vary; give --over name=from:to:count at least once")
+    names = [each.name for each in axes]
+    for name in names:
+        if name not in [each.name for each in known]:
+            units = (f"{each.name} [{each.unit}]".removesuffix(" []") for each in known)
+            raise ParameterError(f"--over {cut(name)}: known here are {', '.join(units)}")
+        if names.count(name) > 1:
+            raise ParameterError(f"--over {name}: it is given twice; once is enough")
+    runs = math.prod(each.values.size for each in axes)
+    if runs > MOST_RUNS:
+        raise ParameterError(f"--over makes {runs} runs; make fewer, at most {MOST_RUNS}")
+
+
+# --------------------------------------------------------------------------- what is written
+def _csv(result: Sweep) -> str:
+    columns = {"run": np.arange(len(result)), **result.columns()}
+    out = io.StringIO()
+    table = csv.writer(out, lineterminator="\n")
+    table.writerow(columns)
+    table.writerows(zip(*(each.tolist() for each in columns.values()), strict=True))
+    return out.getvalue()
+
+
+def sweep_summary(loaded: Loaded, axes: Sequence[Axis], result: Sweep, engine: str) -> str:
+    """Write the summary of a sweep.
+
+    Parameters
+    ----------
+    loaded : Loaded
+        The scenario.
+    axes : sequence of Axis
+        What was varied.
+    result : Sweep
+        Its runs.
+    engine : str
+        What ran them.
+
+    Returns
+    -------
+    str
+        Markdown: what was varied, how the runs ended, a table of the first ones.
+    """
+    units = {each.name: each.unit for each in _known(loaded)}
+    bad = int((result.outcome != "ok").sum())
+    heads = [f"{each.name} [{units[each.name]}]".removesuffix(" []") for each in axes]
+    numbers = [result.parameters[each.name] for each in axes]
+    heads += ["outcome", "transitions", "t [s]", "x [m]", "v [m/s]", "F [N]"]
+    rows = [
+        [
+            *(f"{values[run]:.6g}" for values in numbers),
+            str(result.outcome[run]),
+            str(count),
+            *(f"{values[run]:.6g}" for values in (result.t, result.x, result.v, result.F)),
+        ]
+        for run, count in enumerate(result.transition_count[:LONGEST_TABLE].tolist())
+    ]
+    lines = [
+        f"# {plain(' '.join(loaded.title.split()))}, swept",
+        "",
+        f"- model: {plain(loaded.model.title)}",
+        f"- rig: {plain(loaded.rig.title)}",
+        *(f"- {_varied(each, units[each.name])}" for each in axes),
+        f"- runs: {len(result)}, to t = {loaded.arguments['t_end']:g} s, engine {engine}",
+        f"- result: {len(result.transitions)} transitions, {bad} runs failed",
+        *(f"- run {run}: {plain(message)}" for run, message in failures(result)),
+        "",
+        *("| " + " | ".join(row) + " |" for row in [heads, ["---"] * len(heads), *rows]),
+    ]
+    if len(result) > LONGEST_TABLE:
+        lines += ["", f"The first {LONGEST_TABLE} runs; `runs.csv` has all {len(result)}."]
+    return "\n".join(lines) + "\n"
+
+
+def _varied(one: Axis, unit: str) -> str:
+    first, last = one.values[0], one.values[-1]
+    return (
+        f"{one.name}: {one.values.size} values from {first:.6g} to {last:.6g}"
+        f"{f' {unit}' if unit else ''}, {one.spacing}"
+    )
+
+
+def failures(result: Sweep, most: int = 5) -> list[tuple[int, str]]:
+    """Return the first runs that failed, with their messages.
+
+    Parameters
+    ----------
+    result : Sweep
+        A sweep.
+    most : int
+        How many at most.
+
+    Returns
+    -------
+    list of (int, str)
+        Runs count from 0.
+    """
+    runs = np.flatnonzero(result.outcome != "ok")[:most].tolist()
+    return [(run, f"{result.outcome[run]}: {result.message[run]}") for run in runs]

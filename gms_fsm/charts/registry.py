@@ -1,0 +1,261 @@
+"""The charts that ship, found by looking into this folder: one file is all that a chart takes.
+
+A module of `gms_fsm.charts` that has a tuple ``CHARTS`` of entries is found. The command line, the
+scenario files and the documentation then know its charts by name.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import pkgutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import gms_fsm.charts
+from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.parameters import Parameter, checked_values
+from gms_fsm.charts.stribeck import Stribeck
+from gms_fsm.errors import ChartError, GMSError, ParameterError, shown, why
+
+__all__ = ["Demonstration", "Entry", "entry", "registered"]
+
+# Keys of a scenario's table [model] that are no parameter.
+KEYS = ("chart", "law", "n", "stribeck")
+
+
+@dataclass(frozen=True)
+class Demonstration:
+    """Numbers with which a chart can be tried out; the same as `ChartModel` takes.
+
+    Parameters
+    ----------
+    values : mapping of str to float or tuple of float
+        For each parameter of the chart a number, or one per element.
+    source : str
+        Where they are printed, or ``"chosen by us"``.
+    stribeck : Stribeck, optional
+        The curve behind the input ``s``; None for charts without this input.
+    sigma_2 : float
+        Viscous friction, Ns/m.
+    weights : tuple of float, optional
+        Threshold weights, m/N; 1 where left out.
+    """
+
+    values: Mapping[str, float | tuple[float, ...]]
+    source: str
+    stribeck: Stribeck | None = None
+    sigma_2: float = 0.0
+    weights: tuple[float, ...] | None = None
+
+    @property
+    def n(self) -> int:
+        """Number of elements: as many as the longest list has."""
+        lists = [self.weights or (), *self.values.values()]
+        return max((len(each) for each in lists if isinstance(each, tuple)), default=0) or 1
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A chart as the command line, scenario files and tables know it.
+
+    Parameters
+    ----------
+    name : str
+        For example ``"lugre"``.
+    charts : Chart or mapping of str to Chart
+        The chart; of a model with several laws one for each, by the law's name.
+    demonstration : Demonstration
+        Numbers to try it out.
+    title : str, optional
+        The chart's name where left out.
+    wrong : str, optional
+        What is wrong with a chart that is there to show a fault.
+    domain : sequence of str, optional
+        What a proof assumes; `gms_fsm.inspection.prove.default_domain` where left out.
+
+    Raises
+    ------
+    ChartError
+        If the charts' inputs and parameters differ, or the demonstration does not fit them.
+
+    Examples
+    --------
+    >>> entry("gms").laws
+    ('signed', 'published')
+    """
+
+    name: str
+    charts: Chart | Mapping[str, Chart]
+    demonstration: Demonstration
+    title: str = ""
+    wrong: str = ""
+    domain: tuple[str, ...] | None = None
+
+    def __post_init__(self) -> None:
+        here = f"entry {shown(self.name)}"
+        charts = [self.charts] if isinstance(self.charts, Chart) else list(self.charts.values())
+        if not charts:
+            raise ChartError(f"{here}: it has no chart; give one")
+        first = charts[0]
+        object.__setattr__(self, "title", self.title or first.name)
+        for other in charts[1:]:
+            if (other.inputs, other.parameters) != (first.inputs, first.parameters):
+                raise ChartError(
+                    f"{here}: {first.name!r} and {other.name!r} have other inputs or parameters; "
+                    "give them entries of their own"
+                )
+        for name in KEYS:
+            if name in first.parameter_names:
+                raise ChartError(
+                    f"{here}: the parameter {name!r} has the name of a key of scenario files; call "
+                    "it otherwise"
+                )
+        self._check_demonstration()
+
+    def _check_demonstration(self) -> None:
+        here, given = f"entry {shown(self.name)}, demonstration", self.demonstration
+        wanted, names = {*self._any.parameter_names}, {*given.values}
+        if wanted != names:
+            raise ChartError(
+                f"{here}: missing values: {sorted(wanted - names) or 'none'}, unknown: "
+                f"{sorted(names - wanted) or 'none'}"
+            )
+        if self.curve != (given.stribeck is not None):
+            raise ChartError(
+                f"{here}: stribeck is {shown(given.stribeck)}; a chart with the input s takes a "
+                "curve, Stribeck(F_c, F_s, v_s), any other none"
+            )
+        try:
+            checked_values(self._any.parameters, given.values, given.n)
+        except ParameterError as error:
+            raise ChartError(f"{here}: {error}") from None
+
+    @property
+    def _any(self) -> Chart:
+        return self.charts if isinstance(self.charts, Chart) else next(iter(self.charts.values()))
+
+    @property
+    def laws(self) -> tuple[str, ...]:
+        """Names of the laws among which one has to be chosen; empty where there is one chart."""
+        return () if isinstance(self.charts, Chart) else tuple(self.charts)
+
+    @property
+    def curve(self) -> bool:
+        """Whether its charts need a Stribeck curve."""
+        return "s" in self._any.inputs
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """What its charts take."""
+        return self._any.parameters
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Their names."""
+        return self._any.parameter_names
+
+    def chart(self, law: str = "") -> Chart:
+        """Return the chart under a law.
+
+        Parameters
+        ----------
+        law : str
+            One of `laws`; empty where there are none.
+
+        Returns
+        -------
+        Chart
+            The chart.
+
+        Raises
+        ------
+        ParameterError
+            If a law is missing, or not known.
+        """
+        if isinstance(self.charts, Chart):
+            if law:
+                raise ParameterError(f"{self.name} has one law only; leave law={law!r} out")
+            return self.charts
+        if law not in self.charts:
+            raise ParameterError(
+                f"law is {shown(law)}; {self.name} has {' and '.join(map(repr, self.laws))}, which "
+                "differ; choose one"
+            )
+        return self.charts[law]
+
+
+@functools.cache
+def registered() -> Mapping[str, Entry]:
+    """Return the charts that ship, by name; those that show a fault come last.
+
+    Returns
+    -------
+    mapping of str to Entry
+        What the modules of this folder list in ``CHARTS``.
+
+    Raises
+    ------
+    ChartError
+        If a module cannot be imported, or two of them use one name.
+
+    Examples
+    --------
+    >>> registered()["gms"].title
+    'Generalized Maxwell Slip element'
+    """
+    found: dict[str, tuple[Entry, str]] = {}
+    for module in pkgutil.iter_modules(gms_fsm.charts.__path__):
+        place = f"gms_fsm/charts/{module.name}.py"
+        for each in _entries(f"gms_fsm.charts.{module.name}", place):
+            if each.name in found:
+                raise ChartError(
+                    f"{place}: the name {each.name!r} is taken by {found[each.name][1]}; choose "
+                    "another"
+                )
+            found[each.name] = each, place
+    entries = sorted((each for each, _ in found.values()), key=lambda each: bool(each.wrong))
+    return {each.name: each for each in entries}
+
+
+def _entries(module: str, place: str) -> tuple[Entry, ...]:
+    try:
+        page: Any = importlib.import_module(module)
+    except GMSError as error:
+        raise ChartError(f"{place}: {error}") from error
+    except Exception as error:
+        raise ChartError(f"{place}: it cannot be imported ({why(error)}); mend it") from error
+    entries = getattr(page, "CHARTS", ())
+    if not isinstance(entries, tuple) or not all(isinstance(each, Entry) for each in entries):
+        raise ChartError(f"{place}: CHARTS is {shown(entries)}; it must be a tuple of Entry(...)")
+    return entries
+
+
+def entry(name: str) -> Entry:
+    """Return a chart that ships.
+
+    Parameters
+    ----------
+    name : str
+        For example ``"gms"``.
+
+    Returns
+    -------
+    Entry
+        Its charts and numbers.
+
+    Raises
+    ------
+    ParameterError
+        If there is none of that name.
+
+    Examples
+    --------
+    >>> entry("lugre").chart().default_state.name
+    'bristle'
+    """
+    if name not in registered():
+        said = f"name is {shown(name)}; it" if name else "a name is missing; it"
+        raise ParameterError(f"{said} must be one of {', '.join(registered())}")
+    return registered()[name]

@@ -1,0 +1,214 @@
+"""A branch of a session: a run under way, row by row, with a cursor.
+
+Rows once computed are kept, so going back and forward shows the same bits. A run that cannot go on
+is no exception here but an outcome of its branch.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gms_fsm.inspection._poking import Edits
+from gms_fsm.inspection._told import Fired
+from gms_fsm.lowering.layout import LogRecord
+from gms_fsm.run.simulate import Run
+from gms_fsm.traces._between import interpolated
+from gms_fsm.traces._log import log_of
+from gms_fsm.traces.failures import SimulationError
+from gms_fsm.traces.rows import Rows
+from gms_fsm.traces.scope import Scope
+from gms_fsm.traces.trace import Trace
+from integrators import Firing, Stop
+
+__all__ = ["Branch", "Row"]
+
+
+class Row(NamedTuple):
+    """A row of a branch, or a place between two of them (then of micro-step 0)."""
+
+    t: float
+    microstep: int
+    y: list[float]
+    mode: tuple[int, ...]
+
+
+class Branch:
+    """A run under way, row by row, behind an unchanged part of its parent.
+
+    Parameters
+    ----------
+    run : Run
+        From where the branch begins.
+    parent : int or None
+        Number of the branch it was poked from.
+    fork : int
+        The parent's row under the cursor then; rows 0 to fork are shared.
+    shared : Branch or None
+        The parent itself.
+    edits : Edits or None
+        What was poked; None for the run itself.
+    begin : Row or None
+        The place of the poke, if it was between two rows: a row of this branch.
+    """
+
+    def __init__(
+        self,
+        run: Run,
+        parent: int | None = None,
+        fork: int = -1,
+        shared: Branch | None = None,
+        edits: Edits | None = None,
+        begin: Row | None = None,
+    ) -> None:
+        self.run, self.parent, self.fork, self.shared = run, parent, fork, shared
+        self.edits, self.begin = edits, begin
+        self.outcome = ""  # "" while it goes on, "end", or the message of what stopped it
+        self.cursor = 0
+        self.between: Row | None = None  # a located place behind the cursor
+        self.offset = fork + 1 + (begin is not None)
+        self.stops: set[int] = set()  # rows at which the machines were asked
+        self.firings: list[int] = []  # rows made by firings, own part
+        self.pull()
+
+    # ------------------------------------------------------------------ rows
+    def __len__(self) -> int:
+        return self.offset + len(self.run.recorder.rows.t)
+
+    def pull(self) -> bool:
+        """Compute at least one more row; return whether there is one."""
+        before = len(self)
+        with _unbroken():
+            while not self.outcome and len(self) == before:
+                try:
+                    if not self.run.advance():
+                        self.outcome = "end"
+                    elif isinstance(self.run.event, Stop):
+                        self.stops.add(len(self) - 1)
+                    elif isinstance(self.run.event, Firing):
+                        self.firings.append(len(self) - 1)
+                except SimulationError as error:
+                    self.outcome = str(error)
+        return len(self) > before
+
+    def complete(self) -> None:
+        """Compute all rows up to the end, or to where the run cannot go on."""
+        while self.pull():
+            pass
+
+    def raw(self, row: int) -> Row:
+        """Return time, micro-step, state and modes of a row."""
+        if row <= self.fork:
+            assert self.shared is not None
+            return self.shared.raw(row)
+        if row < self.offset:
+            assert self.begin is not None
+            return self.begin
+        rows, i = self.run.recorder.rows, row - self.offset
+        return Row(rows.t[i], rows.microstep[i], rows.y[i], rows.mode[i])
+
+    @property
+    def last(self) -> Row:
+        """The last row computed so far."""
+        return self.raw(len(self) - 1)
+
+    @property
+    def here(self) -> Row:
+        """The place under the cursor."""
+        return self.place(self.cursor)
+
+    def place(self, row: int) -> Row:
+        """Return a row; for that under the cursor the located place behind it, if there is one."""
+        if row == self.cursor and self.between is not None:
+            return self.between
+        return self.raw(row)
+
+    def row_at(self, t: float) -> int:
+        """Return the last computed row at or before a time; -1 if it is before all of them."""
+        return bisect_right(range(len(self)), t, key=lambda row: self.raw(row).t) - 1
+
+    def behind(self, row: int) -> Callable[[float], Row]:
+        """Return what gives the place at a time between a row and the next."""
+        before, after = self.raw(row), self.raw(row + 1)
+        program, mode = self.run.start.program, list(before.mode)
+        ends = before.t, np.array(before.y), after.t, np.array(after.y)
+
+        def place(t: float) -> Row:
+            return Row(t, 0, interpolated(program, mode, *ends, t).tolist(), before.mode)
+
+        return place
+
+    def scope(self, row: Row) -> Scope:
+        """Return the values at a row or a place by name."""
+        start = self.run.start
+        return Scope.of(start.model, start.program, row.t, row.y, row.mode)
+
+    def state(self, row: Row, element: int) -> str:
+        """Return the active state of an element at a row."""
+        start = self.run.start
+        active = row.mode[start.program.layout.elements][element]
+        return start.model.chart.states[active].name
+
+    # ------------------------------------------------------------------ firings
+    def log(self) -> list[LogRecord]:
+        """Return all firings so far, the shared part included."""
+        before: list[LogRecord] = []
+        if self.shared is not None:
+            before = [self.shared.record(row) for row in self.shared.firing_rows(self.fork + 1)]
+        return before + self.run.recorder.log
+
+    def firing_rows(self, end: int) -> list[int]:
+        """Return the rows before `end` that firings made."""
+        before = [] if self.shared is None else self.shared.firing_rows(min(end, self.fork + 1))
+        return before + self.firings[: bisect_left(self.firings, end)]
+
+    def record(self, row: int) -> LogRecord:
+        """Return the log's record of the firing that made a row."""
+        if row <= self.fork:
+            assert self.shared is not None
+            return self.shared.record(row)
+        return self.run.recorder.log[bisect_left(self.firings, row)]
+
+    def fired(self, row: int) -> Fired | None:
+        """Return the firing that made a row, None if none did."""
+        if row not in self.firing_rows(row + 1)[-1:]:
+            return None
+        record = self.record(row)
+        return Fired(record.element, record.edge, record.source, record.target)
+
+    def trace(self) -> Trace:
+        """Return the branch so far as a trace."""
+        raw = [self.raw(row) for row in range(len(self))]
+        start = self.run.start
+        rows = Rows(
+            np.array([row.t for row in raw]),
+            np.array([row.microstep for row in raw], dtype=np.int64),
+            np.array([row.y for row in raw]),
+            np.array([row.mode for row in raw], dtype=np.int64).reshape(
+                len(raw), start.program.layout.modes
+            ),
+        )
+        return Trace(rows, rows, log_of(self.log()), start.model, start.rig, start.settings)
+
+
+@contextmanager
+def _unbroken() -> Iterator[None]:
+    """Hold Ctrl-C back until the row is complete: a run that is broken off cannot go on."""
+    usual = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(usual):
+        yield
+        return
+    pressed: list[tuple[int, Any]] = []
+    signal.signal(signal.SIGINT, lambda *event: pressed.append(event))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
+    if pressed:
+        usual(*pressed[0])

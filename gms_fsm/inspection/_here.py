@@ -1,0 +1,69 @@
+"""Looking at a place of a branch: its values, and why an element's edges fire there or do not."""
+
+from __future__ import annotations
+
+from gms_fsm.errors import SessionError
+from gms_fsm.inspection._asked import source_of
+from gms_fsm.inspection._branch import Branch
+from gms_fsm.inspection._told import Here
+from gms_fsm.inspection.explain import Why, explain_state
+
+__all__ = ["here_at", "why_at"]
+
+
+def here_at(branch: Branch, row: int) -> Here:
+    """Return what a session says of a row; under the cursor it may be a place behind the row."""
+    place = branch.place(row)
+    located = place is branch.between
+    scope = branch.scope(place)
+    return Here(
+        row,
+        place.t,
+        place.microstep,
+        scope.x,
+        scope.v,
+        scope.F,
+        tuple(scope.z),
+        tuple(scope.s),
+        tuple(scope.each("F_elements")),
+        tuple(scope.states),
+        located,
+        None if located else branch.fired(row),
+    )
+
+
+def why_at(branch: Branch, element: int, edge: str) -> Why:
+    """Explain the edges of an element at the cursor, or one of them.
+
+    Parameters
+    ----------
+    branch : Branch
+        What is walked.
+    element : int
+        Counted from 0.
+    edge : str
+        Empty for all.
+
+    Returns
+    -------
+    Why
+        On a row where the element fired: of the state it left, with the values before.
+
+    Raises
+    ------
+    SessionError
+        If there is no such edge, or it leaves another state.
+    """
+    chart, row, place = branch.run.start.model.chart, branch.cursor, branch.here
+    state, left, taken = branch.state(place, element), "", ""
+    source = source_of(edge, chart) if edge else ""
+    fired = None if branch.between is not None else branch.fired(row)
+    before = place
+    if fired and fired.element == element and source in ("", fired.source):
+        left, taken, before = fired.source, fired.edge, branch.raw(row - 1)
+    asked = left or state
+    if source not in ("", asked):
+        raise SessionError(f"{edge} leaves {source}; element {element + 1} is in {state}")
+    found = explain_state(chart, asked, branch.scope(before).guards(element), taken)
+    edges = tuple(each for each in found if edge in ("", each.edge.name))
+    return Why(element, place.t, state, left, edges)

@@ -1,0 +1,108 @@
+"""Changing values at a place of a run: what may be changed, and the start that follows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from gms_fsm.errors import SessionError, shown
+from gms_fsm.inspection._asked import check_element
+from gms_fsm.systems.models import Model, parameter_names
+from gms_fsm.traces.scope import Scope
+
+__all__ = ["Edits", "initial_with"]
+
+
+@dataclass(frozen=True)
+class Edits:
+    """What a poke changes.
+
+    Parameters
+    ----------
+    variables : mapping of str to mapping of int to float
+        New values of the chart's variables, each by element.
+    v : float or None
+        New velocity, m/s.
+    state : mapping of int to str
+        New states by element.
+    """
+
+    variables: Mapping[str, Mapping[int, float]]
+    v: float | None
+    state: Mapping[int, str]
+
+    @classmethod
+    def of(
+        cls,
+        model: Model,
+        variables: Mapping[str, Mapping[int, float]] | None,
+        v: float | None,
+        state: Mapping[int, str] | None,
+    ) -> Edits:
+        """Return edits of a model, complete; raise a `SessionError` for what it does not have."""
+        for what, given in (("variables", variables), ("state", state)):
+            if given is not None and not isinstance(given, Mapping):
+                raise SessionError(
+                    f"{what} is {shown(given)}; give a mapping, for example "
+                    "variables={'z': {0: 0.1}} or state={0: 'slip'}"
+                )
+        for name, values in (variables or {}).items():
+            if name in parameter_names(model):
+                raise SessionError(
+                    f"{name} is a parameter; for another value make another model and session"
+                )
+            if name not in model.chart.variables:
+                known = ", ".join(model.chart.variables)
+                raise SessionError(f"no variable {name!r}; there are {known}")
+            if not isinstance(values, Mapping):
+                raise SessionError(
+                    f"{name} is {shown(values)}; give its values by element, for example "
+                    f"{{{name!r}: {{0: 0.1}}}}"
+                )
+        own = {name: dict(values) for name, values in (variables or {}).items()}
+        edits = cls(own, v, dict(state or {}))
+        if not (any(edits.variables.values()) or edits.state or v is not None):
+            raise SessionError("nothing to poke; give variables, v or state")
+        for element in (*(i for values in own.values() for i in values), *edits.state):
+            check_element(element, model)
+        return edits
+
+    def __str__(self) -> str:
+        """Such as ``z1 = 0.2, state 2 = slip``; elements count from 1."""
+        parts = [
+            f"{name}{i + 1} = {value:.6g}"
+            for name, values in self.variables.items()
+            for i, value in values.items()
+        ]
+        if self.v is not None:
+            parts.append(f"v = {self.v:.6g}")
+        parts += [f"state {i + 1} = {name}" for i, name in self.state.items()]
+        return ", ".join(parts)
+
+
+def initial_with(edits: Edits, here: Scope, *, prescribed: bool) -> dict[str, Any]:
+    """Return the ``initial`` of a run that goes on from a place with edits.
+
+    Parameters
+    ----------
+    edits : Edits
+        What changes.
+    here : Scope
+        The place.
+    prescribed : bool
+        Whether the rig prescribes the velocity.
+
+    Returns
+    -------
+    dict
+        As `gms_fsm.simulate` takes it.
+    """
+    initial: dict[str, Any] = {"x": here.x}
+    for name in here.layout.y.own:
+        values = edits.variables.get(name, {})
+        initial[name] = [values.get(i, old) for i, old in enumerate(here.each(name))]
+    initial["states"] = [edits.state.get(i, name) for i, name in enumerate(here.states)]
+    if edits.v is not None or not prescribed:
+        initial["v"] = here.v if edits.v is None else edits.v
+    return initial

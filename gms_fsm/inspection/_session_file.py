@@ -1,0 +1,177 @@
+"""Sessions as files: what runs, the pokes, cursors, breakpoints and watches; no rows."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gms_fsm._files import written_whole
+from gms_fsm.errors import SessionError
+from gms_fsm.inspection._branch import Branch
+from gms_fsm.inspection._breakpoints import Breakpoint
+from gms_fsm.inspection._poking import Edits
+from gms_fsm.run.settings import Settings
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.rigs import Rig
+from gms_fsm.systems.signals import Function
+from gms_fsm.traces._header import Header
+
+__all__ = ["BranchRecord", "SessionRecord", "options_of", "read", "write"]
+
+FORMAT = "gms-fsm session 1"
+
+
+@dataclass(frozen=True)
+class BranchRecord:
+    """How a branch was made, and where its cursor stands.
+
+    Parameters
+    ----------
+    parent, fork
+        As in `Branch`.
+    edits : Edits or None
+        What was poked; None for the run itself.
+    cursor : int
+        The row under the cursor.
+    begin, between : float or None
+        s: where the poke was, and where the cursor is, if that is between two rows.
+    """
+
+    parent: int | None
+    fork: int
+    edits: Edits | None
+    cursor: int
+    begin: float | None
+    between: float | None
+
+    @classmethod
+    def of(cls, branch: Branch) -> BranchRecord:
+        """Describe a branch."""
+        begin, between = (
+            None if place is None else place.t for place in (branch.begin, branch.between)
+        )
+        return cls(branch.parent, branch.fork, branch.edits, branch.cursor, begin, between)
+
+
+@dataclass(frozen=True)
+class SessionRecord:
+    """All that makes a session again.
+
+    Parameters
+    ----------
+    model, rig, t_end, options
+        As `Session` takes them.
+    branches : sequence of BranchRecord
+        The first is the run itself.
+    current : int
+        The branch that is walked.
+    breakpoints : sequence of Breakpoint
+        With their hits so far.
+    watches : sequence of str
+        Expressions.
+    """
+
+    model: Model
+    rig: Rig
+    t_end: float
+    options: Mapping[str, Any]
+    branches: Sequence[BranchRecord]
+    current: int
+    breakpoints: Sequence[Breakpoint]
+    watches: Sequence[str]
+
+
+def options_of(
+    settings: Settings, t_start: float, initial: Mapping[str, Any] | None
+) -> dict[str, Any]:
+    """Return the arguments of a session that are not at their defaults."""
+    usual = Settings()
+    chosen = {
+        each.name: getattr(settings, each.name)
+        for each in fields(Settings)
+        if getattr(settings, each.name) != getattr(usual, each.name)
+    }
+    if t_start != 0.0:
+        chosen["t_start"] = t_start
+    return chosen if initial is None else chosen | {"initial": dict(initial)}
+
+
+def write(path: Path, record: SessionRecord) -> Path:
+    """Write a session; raise a `SessionError` for what a file cannot hold."""
+    if any(isinstance(signal, Function) for signal in record.rig.signals.values()):
+        raise SessionError("a signal is a Python function, which a file cannot hold")
+    for name, value in record.options.items():
+        if not isinstance(value, str | int | float | dict | type(None)):
+            raise SessionError(f"the option {name} = {value!r} cannot be written to a file")
+    data = {
+        "format": FORMAT,
+        "header": json.loads(Header.of(record.model, record.rig, {}).model_dump_json()),
+        "t_end": record.t_end,
+        "options": {name: _plain(value) for name, value in record.options.items()},
+        "branches": [
+            {
+                "parent": branch.parent,
+                "fork": branch.fork,
+                "edits": {} if branch.edits is None else asdict(branch.edits),
+                "cursor": branch.cursor,
+                "from": branch.begin,
+                "between": branch.between,
+            }
+            for branch in record.branches
+        ],
+        "current": record.current,
+        "breakpoints": [asdict(point) for point in record.breakpoints],
+        "watches": record.watches,
+    }
+    text = json.dumps(data, indent=1).encode()
+    return written_whole(path, lambda file: file.write(text))
+
+
+def read(path: Path) -> SessionRecord:
+    """Read a session; whatever is wrong with the file is an error of some kind."""
+    data = json.loads(path.read_text(encoding="utf-8"))
+    if data["format"] != FORMAT:
+        raise ValueError(f"format is {data['format']!r}")
+    header = Header.model_validate(data["header"])
+    return SessionRecord(
+        header.to_model(),
+        header.to_rig(),
+        data["t_end"],
+        data["options"],
+        [_branch(record) for record in data["branches"]],
+        int(data["current"]),
+        [Breakpoint(**record) for record in data["breakpoints"]],
+        [str(text) for text in data["watches"]],
+    )
+
+
+def _branch(record: Mapping[str, Any]) -> BranchRecord:
+    edits, given = None, record["edits"]
+    if given:
+        own = {name: _by_number(values) for name, values in given["variables"].items()}
+        edits = Edits(own, given["v"], _by_number(given["state"]))
+    return BranchRecord(
+        record["parent"],
+        int(record["fork"]),
+        edits,
+        int(record["cursor"]),
+        record["from"],
+        record["between"],
+    )
+
+
+def _by_number(values: Mapping[str, Any]) -> dict[int, Any]:
+    """Return values by element with numbers for keys, which JSON makes texts."""
+    return {int(element): value for element, value in values.items()}
+
+
+def _plain(value: Any) -> Any:
+    """Return arrays inside an option as lists."""
+    if isinstance(value, Mapping):
+        return {name: _plain(each) for name, each in value.items()}
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value

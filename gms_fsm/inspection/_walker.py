@@ -1,0 +1,143 @@
+"""Walking a branch: forward and back by rows, by firings, to a time, to where something is true."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+
+from gms_fsm.errors import SessionError, shown
+from gms_fsm.inspection._asked import check_count
+from gms_fsm.inspection._branch import Branch, Row
+from gms_fsm.traces._between import first_true
+
+__all__ = [
+    "back",
+    "forward",
+    "goto",
+    "next_firing",
+    "previous_firing",
+    "reaches",
+    "step",
+    "walk_to",
+]
+
+LOOKS = 16  # places between two rows at which a condition is tried
+
+
+def forward(branch: Branch) -> Iterator[int]:
+    """Walk forward by rows to the end; yield the number of each new row."""
+    branch.between = None
+    while branch.cursor + 1 < len(branch) or branch.pull():
+        branch.cursor += 1
+        yield branch.cursor
+
+
+def step(branch: Branch, count: int) -> None:
+    """Go forward by rows, or to the end."""
+    check_count(count)
+    branch.between = None
+    for _ in itertools.islice(forward(branch), count):
+        pass
+
+
+def back(branch: Branch, count: int) -> None:
+    """Go back by rows; from a located place the first is the row before it."""
+    check_count(count)
+    if branch.between is not None and count > 0:
+        branch.between, count = None, count - 1
+    branch.cursor = max(0, branch.cursor - count)
+
+
+def next_firing(branch: Branch) -> None:
+    """Go forward to the next firing, or the end."""
+    for row in forward(branch):
+        if branch.raw(row).microstep > 0:
+            return
+
+
+def previous_firing(branch: Branch) -> None:
+    """Go back to the firing before, or the start."""
+    row = branch.cursor - (branch.between is None)
+    branch.between = None
+    while row > 0 and branch.raw(row).microstep == 0:
+        row -= 1
+    branch.cursor = max(row, 0)
+
+
+def goto(branch: Branch, t: float) -> None:
+    """Go to the last row at or before a time; a time before the start is a `SessionError`."""
+    start = branch.raw(0).t
+    if not t >= start:
+        raise SessionError(f"t = {shown(t)} s lies before the start, {start!r} s")
+    branch.between = None
+    while branch.last.t <= t and branch.pull():
+        pass
+    branch.cursor = branch.row_at(t)
+
+
+def walk_to(branch: Branch, row: int, t: float | None) -> None:
+    """Go to a row, or to a time between it and the next, computing as far as needed."""
+    while row + (t is not None) >= len(branch) and branch.pull():
+        pass
+    branch.cursor = min(row, len(branch) - 1)
+    branch.between = None if t is None else branch.behind(branch.cursor)(t)
+
+
+def reaches(branch: Branch, holds: Callable[[Row], bool]) -> bool:
+    """Go forward to where a condition next becomes true, located between the rows.
+
+    Parameters
+    ----------
+    branch : Branch
+        What is walked.
+    holds : callable
+        The condition. If it is true already it must first become false.
+
+    Returns
+    -------
+    bool
+        False at the end of the run.
+    """
+    truth = holds(branch.here)
+    begin = None if branch.between is None else branch.between.t  # a second `until` starts there
+    while True:
+        row = branch.cursor
+        if row + 1 >= len(branch) and not branch.pull():
+            branch.between = None
+            branch.cursor = len(branch) - 1
+            return False
+        place, truth = _first_true(branch, row, begin, holds, truth)
+        begin = None
+        branch.between = place
+        if place is not None:
+            return True
+        branch.cursor = row + 1
+        now = holds(branch.here)
+        if now and not truth:
+            return True
+        truth = now
+
+
+def _first_true(
+    branch: Branch, row: int, begin: float | None, holds: Callable[[Row], bool], truth: bool
+) -> tuple[Row | None, bool]:
+    """Look between a row and the next for the place where a condition becomes true.
+
+    The next row itself is left to the caller. Returns the place, and the truth reached.
+    """
+    before, after = branch.raw(row), branch.raw(row + 1)
+    start = before.t if begin is None else begin
+    if after.microstep > 0 or after.t <= start:
+        return None, truth
+    low, place = start, branch.behind(row)
+    for look in range(1, LOOKS + 1):
+        at_end = look == LOOKS
+        t = after.t if at_end else start + (after.t - start) * look / LOOKS
+        now = holds(after if at_end else place(t))
+        if now and not truth:
+            found = first_true(low, t, lambda t: holds(place(t)))
+            if at_end and found == after.t:
+                break
+            return place(found), True
+        low, truth = t, now
+    return None, truth

@@ -1,0 +1,134 @@
+"""Partial derivatives of values, as values of the same language."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from gms_fsm.language._fold import fold
+from gms_fsm.language._functions import SEVERAL
+from gms_fsm.language._tree import Binary, Call, Negative, Number, Value, names_in
+
+__all__ = ["derivative"]
+
+ZERO, ONE = Number(0.0), Number(1.0)
+
+
+def derivative(value: Value, name: str) -> Value | None:
+    """Return the partial derivative of a value by a name; its corners count as smooth.
+
+    Parameters
+    ----------
+    value : Value
+        A flow, a signal, one side of a guard.
+    name : str
+        By which.
+
+    Returns
+    -------
+    Value or None
+        None where the language cannot write it: a power with the name in its exponent.
+
+    Examples
+    --------
+    >>> from gms_fsm.language import derivative, parse_value, spell
+    >>> print(spell(derivative(parse_value("C * (sgn(v) - z / s)", "Cvzs"), "z")))
+    C * -(1.0 / s)
+    """
+    try:
+        return fold(value, _Slope(name))
+    except ArithmeticError:
+        return None
+
+
+class _Slope:
+    """The algebra of derivatives by one name."""
+
+    def __init__(self, by: str) -> None:
+        self.by = by
+
+    def number(self, _: float) -> Value:
+        return ZERO
+
+    def name(self, name: str) -> Value:
+        return ONE if name == self.by else ZERO
+
+    def negative(self, _: Negative, parts: Iterator[Value]) -> Value:
+        return _minus(ZERO, next(parts))
+
+    def binary(self, node: Binary, parts: Iterator[Value]) -> Value:
+        a, b = node.parts
+        da, db = parts
+        match node.op:
+            case "+":
+                return _plus(da, db)
+            case "-":
+                return _minus(da, db)
+            case "*":
+                return _plus(_times(da, b), _times(a, db))
+        return _over(_minus(da, _times(node, db)), b)
+
+    def power(self, node: Binary, parts: Iterator[Value]) -> Value:
+        base, exponent = node.parts
+        if self.by in names_in(exponent):
+            raise ArithmeticError("a logarithm is not part of the language")
+        power = Binary("**", base, _minus(exponent, ONE))
+        return _times(_times(exponent, power), next(parts))
+
+    def call(self, node: Call, parts: Iterator[Value]) -> Value:
+        if self.by not in names_in(node):
+            return ZERO
+        if node.function in SEVERAL:
+            # The mean of both on the corner itself.
+            du, dw = parts
+            apart = _times(Call("sgn", (Binary("-", *node.arguments),)), _minus(du, dw))
+            half = Binary("*", Number(0.5), _plus(du, dw))
+            other = Binary("*", Number(0.5), apart)
+            return _minus(half, other) if node.function == "min" else _plus(half, other)
+        return _times(_outer(node), next(parts))
+
+
+def _outer(call: Call) -> Value:
+    """Return the derivative of a function of one argument by that argument."""
+    (u,) = call.arguments
+    match call.function:
+        case "abs":
+            return Call("sgn", (u,))
+        case "sgn":
+            return ZERO
+        case "exp":
+            return call
+        case "sqrt":
+            return Binary("/", Number(0.5), call)
+        case "sin":
+            return Call("cos", (u,))
+        case "cos":
+            return Negative(Call("sin", (u,)))
+        case "tanh":
+            return Binary("-", ONE, Binary("*", call, call))
+    raise ArithmeticError(f"no derivative of {call.function} is known")
+
+
+def _plus(a: Value, b: Value) -> Value:
+    if a == ZERO:
+        return b
+    return a if b == ZERO else Binary("+", a, b)
+
+
+def _minus(a: Value, b: Value) -> Value:
+    if b == ZERO:
+        return a
+    if isinstance(a, Number) and isinstance(b, Number):
+        return Number(a.value - b.value)
+    return Negative(b) if a == ZERO else Binary("-", a, b)
+
+
+def _times(a: Value, b: Value) -> Value:
+    if ZERO in (a, b):
+        return ZERO
+    if a == ONE:
+        return b
+    return a if b == ONE else Binary("*", a, b)
+
+
+def _over(a: Value, b: Value) -> Value:
+    return ZERO if a == ZERO else Binary("/", a, b)

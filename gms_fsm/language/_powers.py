@@ -1,0 +1,60 @@
+"""Which powers are computed as products: alike in every engine, for pow rounds otherwise."""
+
+from __future__ import annotations
+
+from gms_fsm.language._tree import Binary, Name, Negative, Number, Value
+
+__all__ = ["LARGEST_PRODUCT_POWER", "product_power", "whole_power"]
+
+LARGEST_PRODUCT_POWER = 8  # x**8 and below are printed as products ...
+LARGEST_PRODUCT = 64  # ... unless the text would grow beyond this many parts
+
+
+def product_power(base: Value, exponent: Value) -> int | None:
+    """Return the power if it is computed as a product, else None (it is computed by pow).
+
+    Parameters
+    ----------
+    base, exponent : Value
+        Of ``base**exponent``.
+
+    Returns
+    -------
+    int or None
+        The whole power, -8 to 8.
+
+    Examples
+    --------
+    >>> from gms_fsm.language import Name, Number, product_power
+    >>> product_power(Name("v"), Number(2.0)), product_power(Name("v"), Number(0.5))
+    (2, None)
+    """
+    return _fitting_power(_parts(base), exponent)
+
+
+def _fitting_power(parts: int, exponent: Value) -> int | None:
+    whole = whole_power(exponent)
+    return None if whole is None or abs(whole) * parts > LARGEST_PRODUCT else whole
+
+
+def _parts(node: Value) -> int:
+    """Count the names and numbers of a value as printed, powers as products."""
+    match node:
+        case Number() | Name():
+            return 1
+        case Binary("**", base, exponent):
+            parts = _parts(base)  # once: a power of a power of a power would double the work
+            whole = _fitting_power(parts, exponent)
+            return parts + _parts(exponent) if whole is None else max(1, parts * abs(whole))
+    return sum(map(_parts, node.parts))
+
+
+def whole_power(exponent: Value) -> int | None:
+    """Return the power that an exponent stands for: a small whole number, or None."""
+    sign = 1.0
+    while isinstance(exponent, Negative):
+        sign, exponent = -sign, exponent.operand
+    if not isinstance(exponent, Number) or not exponent.value.is_integer():
+        return None
+    whole = int(sign * exponent.value)
+    return whole if abs(whole) <= LARGEST_PRODUCT_POWER else None

@@ -1,0 +1,400 @@
+"""Reading: text -> checked tree.
+
+Nothing is ever handed to `eval`: a text is parsed with `ast`, and only nodes on an allow-list
+survive. An error says where in the text, and what would be allowed.
+"""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import math
+import re
+import warnings
+from collections.abc import Iterable, Mapping
+
+from gms_fsm.errors import ExpressionError, shown
+from gms_fsm.language._functions import CONSTANTS, FUNCTIONS, NAMESPACE, SEVERAL
+from gms_fsm.language._parser import PARSER
+from gms_fsm.language._tree import (
+    Binary,
+    Both,
+    Call,
+    Condition,
+    Either,
+    InState,
+    Name,
+    Negative,
+    Not,
+    Number,
+    Relation,
+    Value,
+)
+
+__all__ = ["parse_condition", "parse_value"]
+
+LONGEST_TEXT = 10_000  # characters; a chart's text is a line, not a program
+DEEPEST_TREE = 60  # levels; keeps every recursive reader far from Python's own limit
+MOST_ARGUMENTS = 50  # of min and max
+MOST_COMPARISONS = 100  # in one text; a guard is a line, and each is watched on its own
+
+_OPERATORS: Mapping[type[ast.operator], str] = {
+    ast.Add: "+",
+    ast.Sub: "-",
+    ast.Mult: "*",
+    ast.Div: "/",
+    ast.Pow: "**",
+}
+_COMPARISONS: Mapping[type[ast.cmpop], str] = {
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
+}
+# What pictures show and other languages write, and what is written here.
+_INSTEAD: Mapping[str, str] = {
+    "&&": "and",
+    "&": "and",
+    "∧": "and",
+    "||": "or",
+    "∨": "or",
+    "|": "abs(...)",
+    "!": "not",
+    "¬": "not",
+    "=": "<= or >=",
+    "≤": "<=",
+    "≥": ">=",
+    "^": "**",
+    "·": "*",
+    "−": "-",
+}
+_FOREIGN = re.compile(r"&&?|\|\|?|!(?!=)|(?<![<>=!:])=(?![=>])|[∧∨¬≤≥^·−]")
+_ALIASES: Mapping[str, str] = {"sign": "sgn", "signum": "sgn", "fabs": "abs"}
+_GRAMMAR = "numbers, names, + - * / **, < <= > >=, and or not, " + " ".join(FUNCTIONS) + " pi"
+
+
+def parse_value(text: str, names: Iterable[str]) -> Value:
+    """Read a text that stands for a number.
+
+    Parameters
+    ----------
+    text : str
+        For example ``"C * (sgn(v) - z / s)"``.
+    names : iterable of str
+        The names that may occur.
+
+    Returns
+    -------
+    Value
+        The checked tree.
+
+    Raises
+    ------
+    ExpressionError
+        With the text, the column and what would be allowed.
+
+    Examples
+    --------
+    >>> from gms_fsm.language import parse_value
+    >>> parse_value("2 * v", ["v"])
+    Binary(op='*', left=Number(value=2.0), right=Name(id='v'))
+    """
+    return _Reader(text, names).value(_parsed(text), 0)
+
+
+def parse_condition(
+    text: str,
+    names: Iterable[str],
+    states: Iterable[str] = (),
+    elements: int = 0,
+    *,
+    own_state: bool = False,
+) -> Condition:
+    """Read a text that is true or false, such as a guard.
+
+    Parameters
+    ----------
+    text : str
+        For example ``"abs(v) <= v_c and abs(z) < s"``.
+    names : iterable of str
+        The names that may occur.
+    states : iterable of str, optional
+        State names that ``state(i) == name`` may ask for (breakpoints do, guards do not).
+    elements : int, optional
+        How many elements there are; i counts from 1.
+    own_state : bool
+        Whether ``state == name`` may ask for the element at hand (invariants do).
+
+    Returns
+    -------
+    Condition
+        The checked tree; a chain ``a < b < c`` is split at once.
+
+    Raises
+    ------
+    ExpressionError
+        With the text, the column and what would be allowed.
+
+    Examples
+    --------
+    >>> from gms_fsm.language import parse_condition, spell
+    >>> spell(parse_condition("0 < v < 1", ["v"]))
+    '0.0 < v and v < 1.0'
+    """
+    return _Reader(text, names, states, elements, own_state).condition(_parsed(text), 0)
+
+
+def _parsed(text: str) -> ast.expr:
+    if not isinstance(text, str):
+        raise ExpressionError(
+            f"expected a text, got {type(text).__name__}", repr(text), 1, "a text in quotes"
+        )
+    if len(text) > LONGEST_TEXT:
+        raise ExpressionError(
+            f"the text has {len(text)} characters",
+            text,
+            LONGEST_TEXT + 1,
+            f"at most {LONGEST_TEXT} characters",
+        )
+    for column, mark in enumerate(text, start=1):
+        if mark in "#\\\0;" or "\ud800" <= mark <= "\udfff":
+            reason = (
+                f"unexpected {mark!a}" if mark < "\ud800" else "half a character cannot be read"
+            )
+            raise ExpressionError(reason, text, column, _GRAMMAR)
+    foreign = _FOREIGN.search(text)
+    if foreign:
+        mark = foreign[0]
+        raise ExpressionError(
+            f"{mark} is not part of the language",
+            text,
+            foreign.start() + 1,
+            f"{_INSTEAD[mark]}, in its place",
+        )
+    flat = "".join(" " if c.isspace() else c for c in text)  # same length: columns stay true
+    lead = len(flat) - len(flat.lstrip())
+    if lead == len(flat):
+        raise ExpressionError("the text is empty", text, 1, _GRAMMAR)
+    try:
+        with PARSER, warnings.catch_warnings():
+            warnings.simplefilter("error")  # "1and v" is a warning to Python, a mistake here
+            body = ast.parse(flat[lead:], mode="eval").body
+    except SyntaxError as error:
+        # Python reports offset 0 where it reached the end and wanted more.
+        column = min(error.offset + lead, len(text) + 1) if error.offset else len(text) + 1
+        reason = "the text ends too early" if column > len(text) else "cannot be read from here"
+        raise ExpressionError(reason, text, column, _GRAMMAR) from None
+    except (ValueError, RecursionError, MemoryError):
+        raise ExpressionError("cannot be read (nested too deeply)", text, 1, _GRAMMAR) from None
+    raw = flat[lead:].encode()
+    for node in ast.walk(body):
+        if isinstance(node, ast.expr):  # ast counts bytes, a reader counts characters
+            node.col_offset = lead + len(raw[: node.col_offset].decode(errors="ignore"))
+    return body
+
+
+def _meant(name: str, known: Iterable[str]) -> str:
+    """Return the known name that is nearest to a wrong one, as a question."""
+    by_case = {each.casefold(): each for each in known}
+    wanted = _ALIASES.get(name, name).casefold()
+    near = difflib.get_close_matches(wanted[:100], by_case, n=1, cutoff=0.75)
+    return f" (did you mean {by_case[near[0]]!r}?)" if near else ""
+
+
+class _Reader:
+    """Turns `ast` nodes into our own, refusing everything that is not on the list."""
+
+    def __init__(
+        self,
+        text: str,
+        names: Iterable[str],
+        states: Iterable[str] = (),
+        elements: int = 0,
+        own_state: bool = False,
+    ) -> None:
+        self.text = text
+        self.names = tuple(dict.fromkeys(names))
+        self.states, self.elements, self.own_state = tuple(states), elements, own_state
+        self.comparisons = 0
+
+    def refuse(self, reason: str, node: ast.expr, allowed: str = _GRAMMAR) -> ExpressionError:
+        return ExpressionError(reason, self.text, node.col_offset + 1, allowed)
+
+    def deeper(self, node: ast.expr, depth: int) -> int:
+        if depth >= DEEPEST_TREE:
+            raise self.refuse(
+                "nested too deeply", node, f"at most {DEEPEST_TREE} levels of nesting"
+            )
+        return depth + 1
+
+    def value(self, node: ast.expr, depth: int) -> Value:
+        depth = self.deeper(node, depth)
+        match node:
+            case ast.Constant(value=bool()):
+                raise self.refuse(f"{node.value!r} is not a number", node)
+            case ast.Constant(value=int() | float() as number):
+                try:
+                    real = float(number)
+                except OverflowError:
+                    real = math.inf
+                if not math.isfinite(real):
+                    raise self.refuse("the number is too large", node, "finite numbers")
+                return Number(real)
+            case ast.Name(id=name):
+                if name in self.names:
+                    return Name(name)
+                if name in CONSTANTS:
+                    return Number(CONSTANTS[name])
+                if name in FUNCTIONS:
+                    raise self.refuse(f"the function {name!r} needs (...)", node, f"{name}(...)")
+                known = ", ".join(self.names) or "none"
+                raise self.refuse(
+                    f"unknown name {shown(name)}{_meant(name, self.names)}",
+                    node,
+                    f"the names {known}, and pi",
+                )
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                return Negative(self.value(operand, depth))
+            case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+                return self.value(operand, depth)
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
+                return Binary(
+                    _OPERATORS[type(op)], self.value(left, depth), self.value(right, depth)
+                )
+            case ast.Call(func=ast.Name(id=function), args=arguments, keywords=[]):
+                self.known(node, function)
+                return self.call(node, function, arguments, depth)
+            case ast.Compare() | ast.BoolOp() | ast.UnaryOp(op=ast.Not()):
+                raise self.refuse("a comparison stands where a number is needed", node)
+        raise self.refuse(f"{_plain(node)} is not part of the language", node)
+
+    def known(self, node: ast.expr, function: str) -> None:
+        if function not in NAMESPACE:
+            raise self.refuse(
+                f"unknown function {shown(function)}{_meant(function, FUNCTIONS)}",
+                node,
+                "the functions " + ", ".join(FUNCTIONS),
+            )
+
+    def call(self, node: ast.expr, function: str, arguments: list[ast.expr], depth: int) -> Value:
+        if function == "pow":
+            if len(arguments) != 2:
+                raise self.refuse(f"pow got {len(arguments)} arguments", node, "two arguments")
+            return Binary("**", self.value(arguments[0], depth), self.value(arguments[1], depth))
+        several = function in SEVERAL
+        if (len(arguments) < 2) if several else (len(arguments) != 1):
+            wanted = "two or more arguments" if several else "one argument"
+            raise self.refuse(f"{function} got {len(arguments)} arguments", node, wanted)
+        if len(arguments) > MOST_ARGUMENTS:
+            raise self.refuse(
+                f"{function} got {len(arguments)} arguments", node, f"at most {MOST_ARGUMENTS}"
+            )
+        # min(a, b, c) is min(min(a, b), c), one corner at a time: the first arguments lie deepest.
+        folds = max(0, len(arguments) - 2)
+        values = [
+            self.value(argument, depth + min(folds, len(arguments) - 1 - i))
+            for i, argument in enumerate(arguments)
+        ]
+        result = Call(function, tuple(values[:2]))
+        for value in values[2:]:
+            result = Call(function, (result, value))
+        return result
+
+    def condition(self, node: ast.expr, depth: int) -> Condition:
+        depth = self.deeper(node, depth)
+        match node:
+            case ast.Compare(
+                left=ast.Call(func=ast.Name(id="state")) as call, ops=[op], comparators=[name]
+            ) if self.states:
+                return self.in_state(self.numbered(call), op, name)
+            case ast.Compare(left=ast.Name(id="state"), ops=[op], comparators=[name]) if (
+                self.own_state
+            ):
+                return self.in_state(0, op, name)
+            case ast.Compare(left=left, ops=ops, comparators=comparators):
+                sides = [left, *comparators]
+                self.comparisons += len(ops)
+                if self.comparisons > MOST_COMPARISONS:
+                    raise self.refuse(
+                        "too many comparisons", node, f"at most {MOST_COMPARISONS} in one text"
+                    )
+                parts: list[Condition] = []
+                for i, op in enumerate(ops):
+                    if type(op) not in _COMPARISONS:
+                        raise self.refuse(
+                            "only < <= > >= compare floats (== and != almost never hold)",
+                            sides[i + 1],
+                            "< <= > >=, for example a <= x <= b",
+                        )
+                    parts.append(
+                        Relation(
+                            _COMPARISONS[type(op)],
+                            self.value(sides[i], depth),
+                            self.value(sides[i + 1], depth),
+                        )
+                    )
+                return parts[0] if len(parts) == 1 else Both(tuple(parts))
+            case ast.BoolOp(op=op, values=values):
+                operands = tuple(self.condition(value, depth) for value in values)
+                return Both(operands) if isinstance(op, ast.And) else Either(operands)
+            case ast.UnaryOp(op=ast.Not(), operand=operand):
+                return Not(self.condition(operand, depth))
+            case ast.Constant() | ast.Name() | ast.BinOp() | ast.UnaryOp() | ast.Call():
+                match node:
+                    case ast.Call(func=ast.Name(id=function)):  # after(0.2), say
+                        self.known(node, function)
+                raise self.refuse(
+                    "a number stands where a comparison is needed", node, "for example v > v_c"
+                )
+        raise self.refuse(f"{_plain(node)} is not part of the language", node)
+
+    def numbered(self, call: ast.Call) -> int:
+        match call.args:
+            case [ast.Constant(value=element)] if type(element) is int:  # True is not 1 here
+                if 1 <= element <= self.elements:
+                    return element
+        raise self.refuse(
+            "state(...) takes an element's number", call, f"state(1) to state({self.elements})"
+        )
+
+    def in_state(self, element: int, op: ast.cmpop, name: ast.expr) -> Condition:
+        if not isinstance(name, ast.Name) or name.id not in self.states:
+            raise self.refuse("unknown state", name, "the states " + ", ".join(self.states))
+        if not isinstance(op, ast.Eq | ast.NotEq):
+            raise self.refuse("states are compared by == or !=", name, "state(1) == slip")
+        found = InState(element, name.id)
+        return found if isinstance(op, ast.Eq) else Not(found)
+
+
+def _plain(node: ast.expr) -> str:
+    match node:
+        case ast.Constant(value=value) if value is not ...:
+            return f"the constant {shown(value)}"
+        case ast.BinOp(op=op) | ast.UnaryOp(op=op):
+            signs = {
+                "Mod": "%",
+                "FloorDiv": "//",
+                "MatMult": "@",
+                "BitAnd": "&",
+                "BitOr": "|",
+                "BitXor": "^",
+                "LShift": "<<",
+                "RShift": ">>",
+                "Invert": "~",
+            }
+            return f"the operator {signs.get(type(op).__name__, type(op).__name__.lower())}"
+    words = {
+        ast.Attribute: "an attribute (.)",
+        ast.Subscript: "an index ([ ])",
+        ast.Lambda: "lambda",
+        ast.IfExp: "if ... else",
+        ast.NamedExpr: "an assignment (:=)",
+        ast.JoinedStr: "an f-string",
+        ast.Call: "this call",
+        ast.Tuple: "a comma",
+        ast.Starred: "a star",
+        ast.Await: "await",
+        ast.Yield: "yield",
+        ast.YieldFrom: "yield",
+    }
+    return words.get(type(node), "a bracket like this")

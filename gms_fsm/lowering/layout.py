@@ -1,0 +1,356 @@
+"""Where everything stands: in the state vector y, in what a run observes, in the modes, in the log.
+
+No other module computes such a place, neither as a number nor as text: it asks by name.
+
+y            ``x, [v,]`` then each variable of the chart, one per element
+observed     ``v, F`` then ``s``, ``F_elements`` and the rate of each variable, one per element
+modes        the active state of each element, then for each surface whether the motion slides on it
+log          the fields of `LogRecord`
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Generic, NamedTuple, TypeVar
+
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.rigs import Rig
+
+__all__ = ["LOG_NUMBERS", "LOG_TEXTS", "Layout", "LogRecord", "Places"]
+
+Name = TypeVar("Name", bound=Hashable)
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Places(Generic[Name]):
+    """The places of an array: shared ones first, then for each own name one place per element.
+
+    In generated text the number of elements is called ``n`` and the element ``i``.
+
+    Parameters
+    ----------
+    shared : tuple
+        Names with one place each.
+    own : tuple
+        Names with one place per element each.
+    n : int
+        Number of elements.
+
+    Examples
+    --------
+    >>> y = Places(("x", "v"), ("z", "w"), n=3)
+    >>> y.size, y.index("v"), y.index("w", 2), y.block("z")
+    (8, 1, 7, slice(2, 5, None))
+    >>> y.text("v"), y.text("z"), y.text("w"), y.size_text()
+    ('1', '2 + i', '2 + n + i', '2 + 2 * n')
+    >>> y.named([0.0, 0.1, 1, 2, 3, 4, 5, 6])
+    {'x': 0.0, 'v': 0.1, 'z': [1, 2, 3], 'w': [4, 5, 6]}
+    """
+
+    shared: tuple[Name, ...]
+    own: tuple[Name, ...]
+    n: int
+
+    @cached_property
+    def size(self) -> int:
+        """How many places there are."""
+        return len(self.shared) + len(self.own) * self.n
+
+    def __iter__(self) -> Iterator[tuple[Name, int | None]]:
+        """Yield for each place, in order, its name and its element (None if shared)."""
+        yield from ((name, None) for name in self.shared)
+        yield from ((name, i) for name in self.own for i in range(self.n))
+
+    def index(self, name: Name, element: int = 0) -> int:
+        """Return the place of a shared name, or of an own name of one element.
+
+        Parameters
+        ----------
+        name : str or other key
+            One of `shared` or `own`.
+        element : int
+            Counted from 0; does not matter for a shared name.
+
+        Returns
+        -------
+        int
+            The place.
+        """
+        start = self._starts[name]
+        return start if start < len(self.shared) else start + element
+
+    @cached_property
+    def _starts(self) -> Mapping[Name, int]:
+        """The first place of each name."""
+        starts = {name: place for place, name in enumerate(self.shared)}
+        for row, name in enumerate(self.own):
+            starts[name] = len(self.shared) + row * self.n
+        return starts
+
+    def block(self, name: Name) -> slice:
+        """Return the places of an own name, one per element.
+
+        Parameters
+        ----------
+        name : str or other key
+            One of `own`.
+
+        Returns
+        -------
+        slice
+            Of length n.
+        """
+        start = self.index(name)
+        return slice(start, start + self.n)
+
+    def where(self, name: Name) -> int | slice:
+        """Return what to subscript an array with to have all that stands under a name.
+
+        Parameters
+        ----------
+        name : str or other key
+            One of `shared` or `own`.
+
+        Returns
+        -------
+        int or slice
+            As `index` for a shared name, as `block` for an own one.
+        """
+        return self._all[name]
+
+    @cached_property
+    def _all(self) -> Mapping[Name, int | slice]:
+        """What stands under each name."""
+        shared = {name: self._starts[name] for name in self.shared}
+        return shared | {name: self.block(name) for name in self.own}
+
+    def all_of(self, name: Name) -> range:
+        """Return the places of a name: one if it is shared, else one per element.
+
+        Parameters
+        ----------
+        name : str or other key
+            One of `shared` or `own`.
+
+        Returns
+        -------
+        range
+            In order.
+        """
+        start = self.index(name)
+        return range(start, start + (1 if name in self.shared else self.n))
+
+    def named(self, values: Any) -> dict[Name, Any]:
+        """Return by name what stands at the places.
+
+        Parameters
+        ----------
+        values : sequence, or ndarray with the places as its first axis
+            One entry per place.
+
+        Returns
+        -------
+        dict
+            For a shared name its entry, for an own name its part of `values`, one per element.
+        """
+        return {name: values[where] for name, where in self._all.items()}
+
+    def joined(self, values: Mapping[Name, Any]) -> list[Any]:
+        """Return entries in the order of the places; the inverse of `named`.
+
+        Parameters
+        ----------
+        values : mapping
+            For a shared name its entry, for an own name a sequence with one entry per element.
+
+        Returns
+        -------
+        list
+            One entry per place.
+        """
+        return [values[name] if i is None else values[name][i] for name, i in self]
+
+    # ------------------------------------------------------------------ as text
+    def text(self, name: Name) -> str:
+        """Return a place as Python text over ``n`` and ``i``.
+
+        Parameters
+        ----------
+        name : str or other key
+            One of `shared` or `own`.
+
+        Returns
+        -------
+        str
+            Such as ``"1"`` or ``"2 + n + i"``.
+        """
+        if name in self.shared:
+            return str(self.shared.index(name))
+        row = self.own.index(name)
+        blocks = {0: "", 1: " + n"}.get(row, f" + {row} * n")
+        return f"{len(self.shared)}{blocks} + i"
+
+    def size_text(self, more: int = 0) -> str:
+        """Return how many places there are, and some more, as Python text over ``n``."""
+        return f"{len(self.shared) + more} + {len(self.own)} * n"
+
+    def asking_text(self, name: Name, place: str) -> tuple[str, str]:
+        """Return texts that find out whose a place is, where names are asked in order.
+
+        Parameters
+        ----------
+        name : str or other key
+            One of `shared` or `own`; all names before it have been asked already.
+        place : str
+            Text of the place.
+
+        Returns
+        -------
+        (str, str)
+            Whether the place is of this name; which element it is of (empty for a shared name).
+        """
+        if name in self.shared:
+            return f"{place} == {self.shared.index(name)}", ""
+        behind = f"{place} - {len(self.shared)}" if self.shared else place
+        row = self.own.index(name)
+        return f"{behind} < {row + 1} * n", f"{behind} - {row} * n"
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The places of a model on a rig.
+
+    Parameters
+    ----------
+    y : Places
+        Of the state vector: ``x``, ``v`` unless it is prescribed, and the chart's variables.
+    observed : Places
+        Of what a run observes: ``v, F``; ``s``, ``F_elements``, and ``d`` before each variable.
+    surfaces : int
+        How many surfaces the motion can slide on.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> layout = Layout.of(model, Prescribed("0.1*t"), surfaces=0)
+    >>> layout.y.index("z", 3), layout.observed.block("s"), layout.modes
+    (4, slice(2, 6, None), 4)
+    """
+
+    y: Places[str]
+    observed: Places[str]
+    surfaces: int
+
+    @classmethod
+    def of(cls, model: Model, rig: Rig, surfaces: int) -> Layout:
+        """Lay out a model on a rig.
+
+        Parameters
+        ----------
+        model, rig
+            What runs.
+        surfaces : int
+            How many surfaces the motion can slide on.
+
+        Returns
+        -------
+        Layout
+            Of this run.
+        """
+        variables = model.chart.variables
+        rates = tuple(f"d{name}" for name in variables)
+        return cls(
+            cls.state(model, rig),
+            Places(("v", "F"), ("s", "F_elements", *rates), model.n),
+            surfaces,
+        )
+
+    @staticmethod
+    def state(model: Model, rig: Rig) -> Places[str]:
+        """Lay out the state vector alone, which needs no generated program.
+
+        Parameters
+        ----------
+        model, rig
+            What runs.
+
+        Returns
+        -------
+        Places
+            See `Layout.y`.
+        """
+        moved = ("x",) if rig.acceleration is None else ("x", "v")
+        return Places(moved, model.chart.variables, model.n)
+
+    @property
+    def n(self) -> int:
+        """Number of elements."""
+        return self.y.n
+
+    @property
+    def variable(self) -> str:
+        """The chart's first variable, the deflection: the one that the log and `Trace.z` show."""
+        return self.y.own[0]
+
+    @property
+    def rate(self) -> str:
+        """Name of its rate in what is observed."""
+        return f"d{self.variable}"
+
+    # ------------------------------------------------------------------ modes
+    @cached_property
+    def modes(self) -> int:
+        """How many modes a row has."""
+        return self.n + self.surfaces
+
+    @cached_property
+    def elements(self) -> slice:
+        """Places of the elements' states among the modes."""
+        return slice(0, self.n)
+
+    @cached_property
+    def slides(self) -> slice:
+        """Places of the surfaces' flags among the modes."""
+        return slice(self.n, None)
+
+    def not_sliding(self, states: Sequence[int]) -> tuple[int, ...]:
+        """Return the modes of elements in these states, sliding nowhere.
+
+        Parameters
+        ----------
+        states : sequence of int, shape (n,)
+            Active state of each element.
+
+        Returns
+        -------
+        tuple of int, shape (modes,)
+            Those of a row.
+        """
+        return (*states, *[0] * self.surfaces)
+
+
+class LogRecord(NamedTuple):
+    """One firing, as the transition log has it.
+
+    ``z``, ``v`` and ``s`` are the element's first variable, the velocity and its threshold before.
+    """
+
+    t: float
+    element: int  # from 0
+    edge: str
+    source: str
+    target: str
+    z: float
+    v: float
+    s: float
+    F_before: float
+    F_after: float
+
+
+LOG_TEXTS = ("edge", "source", "target")
+# In the order in which machine code keeps them for a firing.
+LOG_NUMBERS = ("z", "v", "s", "F_before", "F_after")

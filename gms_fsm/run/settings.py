@@ -1,0 +1,256 @@
+"""How to integrate: one object that runs, sessions, sweeps and scenario files share."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypedDict, Unpack
+
+from numpy.typing import ArrayLike
+
+import integrators
+from gms_fsm.charts.parameters import as_floats, checked_array, checked_scalar
+from gms_fsm.errors import ParameterError, shown
+from gms_fsm.lowering.scales import Tolerance
+
+__all__ = ["ENGINES", "EVENTS", "MOST_STEPS", "OUTPUTS", "RunOptions", "SettingOptions", "Settings"]
+
+MOST_STEPS = 1_000_000  # of a run, unless told otherwise
+ENGINES = ("machines", "ifelse", "compiled")
+EVENTS = ("located", "step")
+OUTPUTS = ("all", "t_eval", "end")
+
+
+class RunOptions(TypedDict, total=False):
+    """The fields of `Settings` but the engine, as arguments of `simulate`."""
+
+    method: str | type[Any]
+    step: float | None
+    rtol: float
+    atol: Tolerance
+    max_step: float
+    max_steps: int
+    events: str
+    output: str | None
+    t_eval: ArrayLike | None
+
+
+class SettingOptions(RunOptions, total=False):
+    """The fields of `Settings`, as arguments of `Session` and `sweep`."""
+
+    engine: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """How to integrate, which engine decides, and what to keep.
+
+    Parameters
+    ----------
+    method : {"dp45", "bs23", "rk4", "heun", "euler"} or OdeSolver class
+        dp45 and bs23 choose their steps, the others need `step`. Any `scipy.integrate.OdeSolver`
+        class (Radau, BDF, LSODA ...) for stiff cases.
+    step : float, optional
+        Fixed steps of this length [s], the last one cut to t_end; at a located crossing a step is
+        cut and the grid is met again after it. A SciPy class is led from grid point to grid point.
+    rtol : float
+        Relative tolerance of adaptive steps; the error is the largest component's.
+    atol : float or mapping, optional
+        Absolute tolerance of all components, or by name: ``x`` [m], ``v`` [m/s], the chart's
+        variables, a number or one per element. What is left out comes from the model's own scales
+        (`gms_fsm.lowering.scales`): a tenth of rtol times the smallest deflection at which a
+        guard changes, or times v_c. A component for which the chart has no scale is measured
+        by the largest value it has had. What was used stands in ``Trace.settings``.
+    max_step : float
+        Longest adaptive step, s. Accuracy does not need it.
+    max_steps : int
+        How many steps may be tried; a run that needs more ends in a `StepLimitError`.
+    events : {"located", "step"}
+        ``"located"`` finds the place of each switch. ``"step"`` looks at the guards once at the end
+        of a step, at most one edge per element, like an if-else in a block diagram: it loses
+        switches and is here to show that. It needs `step` or a finite `max_step`.
+    engine : {"machines", "ifelse", "compiled"}
+        Who decides: the `transitions` machines, the generated if-else text, or that text as machine
+        code (extra ``fast``). The results are the same to the last bit.
+    output : {"all", "t_eval", "end"}, optional
+        Rows to keep: every accepted step, the times of `t_eval`, or only the state at the end. The
+        transition log is always complete. By default ``"t_eval"`` if it is given, else ``"all"``.
+    t_eval : array_like, shape (m,), optional
+        Wanted times [s], increasing; the trace has exactly these rows. All accepted steps and
+        micro-steps otherwise.
+
+    Raises
+    ------
+    ParameterError
+        If a field breaks its rule, or two contradict each other.
+
+    Examples
+    --------
+    >>> Settings(method="rk4", step=1e-3).method
+    'rk4'
+    >>> Settings(method="rk4")
+    Traceback (most recent call last):
+    ...
+    gms_fsm.errors.ParameterError: method 'rk4' has no error estimate; give step=..., or use \
+'dp45' or 'bs23'
+    """
+
+    method: str | type[Any] = "dp45"
+    step: float | None = None
+    rtol: float = 1e-6
+    atol: Tolerance = None
+    max_step: float = math.inf
+    max_steps: int = MOST_STEPS
+    events: str = "located"
+    engine: str = "machines"
+    output: str | None = None
+    t_eval: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        self._check_method()
+        put(self, "rtol", checked_scalar("rtol", self.rtol, "> 0"))
+        if self.step is not None:
+            put(self, "step", checked_scalar("step", self.step, "> 0"))
+        if self.max_step != math.inf:
+            put(self, "max_step", checked_scalar("max_step", self.max_step, "> 0"))
+        if isinstance(self.atol, Mapping):
+            put(self, "atol", dict(self.atol))  # what a tolerance belongs to, the model says
+        elif self.atol is not None:
+            put(self, "atol", checked_scalar("atol", self.atol, "> 0"))
+        _check_count(self.max_steps)
+        _check_choice("events", self.events, EVENTS)
+        if self.events == "step" and self.step is None and not math.isfinite(self.max_step):
+            raise ParameterError(
+                "events='step' looks at the guards once a step: give step=... or a finite max_step"
+            )
+        if self.t_eval is not None:
+            put(self, "t_eval", _increasing(self.t_eval))
+        put(self, "output", self._output())
+
+    def _check_method(self) -> None:
+        method = self.method
+        if not isinstance(self.engine, str) or self.engine not in ENGINES:
+            raise ParameterError(
+                f"engine is {shown(self.engine)}; it must be {', '.join(map(repr, ENGINES))}, or "
+                "an ElementMachines"
+            )
+        if isinstance(method, str):
+            if method not in integrators.METHODS:
+                raise ParameterError(
+                    f"method is {shown(method)}; it must be one of "
+                    f"{', '.join(integrators.METHODS)}, or a scipy.integrate.OdeSolver class"
+                )
+            if self.step is None and not integrators.METHODS[method].adaptive:
+                raise ParameterError(
+                    f"method {method!r} has no error estimate; give step=..., or use 'dp45' or "
+                    "'bs23'"
+                )
+        elif not (isinstance(method, type) and hasattr(method, "TOO_SMALL_STEP")):
+            raise ParameterError(
+                f"method is {shown(method)}; it must be a name ({', '.join(integrators.METHODS)}) "
+                "or a scipy.integrate.OdeSolver class"
+            )
+        elif self.engine == "compiled":
+            raise ParameterError(
+                f"engine 'compiled' runs our own methods ({', '.join(integrators.METHODS)}), not "
+                f"{method.__name__}; use engine='machines' for SciPy's solvers"
+            )
+
+    def _output(self) -> str:
+        if self.output is None:
+            return "all" if self.t_eval is None else "t_eval"
+        _check_choice("output", self.output, OUTPUTS)
+        if (self.output == "t_eval") != (self.t_eval is not None):
+            raise ParameterError(
+                "output='t_eval' needs t_eval=..., the times of the rows"
+                if self.t_eval is None
+                else f"output is {self.output!r}, but t_eval asks for rows at given times; leave "
+                "one out"
+            )
+        return self.output
+
+    @classmethod
+    def of(
+        cls, settings: Settings | None, whose: str, **options: Unpack[SettingOptions]
+    ) -> Settings:
+        """Return settings with some fields replaced.
+
+        Parameters
+        ----------
+        settings : Settings or None
+            What to begin with; the defaults if None.
+        whose : str
+            Who was given the options, for messages.
+        **options
+            Fields by name.
+
+        Returns
+        -------
+        Settings
+            Checked anew.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such field, or one breaks its rule.
+
+        Examples
+        --------
+        >>> Settings.of(Settings(rtol=1e-8), "simulate", engine="ifelse").rtol
+        1e-08
+        >>> Settings.of(None, "simulate", rtoll=1e-8)
+        Traceback (most recent call last):
+        ...
+        gms_fsm.errors.ParameterError: simulate takes no argument 'rtoll'; did you mean 'rtol'?
+        """
+        if not (settings is None or isinstance(settings, Settings)):
+            raise ParameterError(
+                f"settings is {shown(settings)}; it must be a Settings, for example "
+                "Settings(rtol=1e-8)"
+            )
+        fields = [each.name for each in dataclasses.fields(cls)]
+        for name in options:
+            if name not in fields:
+                near = difflib.get_close_matches(name, fields, 1)
+                hint = f"did you mean {near[0]!r}?" if near else f"it takes {', '.join(fields)}"
+                raise ParameterError(f"{whose} takes no argument {name!r}; {hint}")
+        if settings is None:
+            return cls(**options)
+        if "t_eval" in options and "output" not in options:
+            options["output"] = None
+        return dataclasses.replace(settings, **options)
+
+    @property
+    def method_name(self) -> str:
+        """The method's name, also of a class."""
+        return self.method if isinstance(self.method, str) else self.method.__name__
+
+
+def _check_choice(name: str, given: object, choices: tuple[str, ...]) -> None:
+    if not isinstance(given, str) or given not in choices:
+        said = [repr(each) for each in choices]
+        raise ParameterError(
+            f"{name} is {shown(given)}; it must be {', '.join(said[:-1])} or {said[-1]}"
+        )
+
+
+def _check_count(max_steps: object) -> None:
+    if isinstance(max_steps, bool) or not isinstance(max_steps, int) or max_steps < 1:
+        raise ParameterError(
+            f"max_steps is {shown(max_steps)}; it must be an integer, at least 1 step"
+        )
+
+
+def _increasing(t_eval: ArrayLike) -> tuple[float, ...]:
+    wanted = as_floats(checked_array("t_eval", t_eval, None, "finite"))
+    for i, (one, after) in enumerate(itertools.pairwise(wanted)):
+        if after <= one:
+            raise ParameterError(
+                f"t_eval[{i}] = {one} is not before t_eval[{i + 1}] = {after}; times must increase"
+            )
+    return tuple(wanted)

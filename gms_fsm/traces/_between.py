@@ -1,0 +1,104 @@
+"""Between two rows of one arc: the state by interpolation, the place of a change by bisection."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.lowering._observing import armed, rate
+from gms_fsm.lowering.program import Program
+
+__all__ = ["first_true", "interpolated", "slopes"]
+
+HALVINGS = 60  # of a stretch between two rows
+
+
+def first_true(low: float, high: float, holds: Callable[[float], bool]) -> float:
+    """Return where a condition turns true, by bisection.
+
+    Parameters
+    ----------
+    low, high : float
+        It is false at low and true at high; neither is asked again.
+    holds : callable
+        The condition.
+
+    Returns
+    -------
+    float
+        The right end of the bracket: the condition holds there.
+
+    Examples
+    --------
+    >>> first_true(0.0, 1.0, lambda t: t >= 0.3)
+    0.3
+    """
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if not low < middle < high:
+            break
+        low, high = (low, middle) if holds(middle) else (middle, high)
+    return high
+
+
+def interpolated(
+    program: Program,
+    mode: list[int],
+    t0: float,
+    y0: FloatArray,
+    t1: float,
+    y1: FloatArray,
+    t: float,
+) -> FloatArray:
+    """Return the state at t between two rows of one arc: cubic Hermite, slopes from the flow.
+
+    Parameters
+    ----------
+    program : Program
+        Of the run.
+    mode : list of int
+        Active states between the rows.
+    t0, t1 : float
+        Times of the rows, s.
+    y0, y1 : ndarray, shape (m,)
+        Their states.
+    t : float
+        s, from t0 to t1.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        The state.
+    """
+    with np.errstate(all="ignore"):  # as in a run: beyond the largest float lies inf
+        at_start, at_end = slopes(program, mode, t0, y0, t1, y1)
+        h = t1 - t0
+        theta = (t - t0) / h
+        rise = y1 - y0
+        bend = h * at_start - rise
+        twist = rise - h * at_end - bend
+        value: FloatArray = y0 + theta * (rise + (1 - theta) * (bend + theta * twist))
+    return value
+
+
+def slopes(
+    program: Program, mode: list[int], t0: float, y0: FloatArray, t1: float, y1: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return dy/dt at two neighbouring rows of one arc, both as seen from between them.
+
+    Parameters
+    ----------
+    program, mode, t0, y0, t1, y1
+        As in `interpolated`.
+
+    Returns
+    -------
+    tuple of ndarray, shape (m,)
+        At the first row and at the second.
+    """
+    # Signs as they hold inside the interval; at its ends they may just be turning.
+    held = armed(program, 0.5 * (t0 + t1), (0.5 * (y0 + y1)).tolist(), mode)
+    at_start, at_end = (rate(program, t, y.tolist(), mode, held) for t, y in ((t0, y0), (t1, y1)))
+    return at_start, at_end

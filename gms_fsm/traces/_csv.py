@@ -1,0 +1,168 @@
+"""Traces as text (``.csv``): the header and the rows in one file, the transition log beside it.
+
+Numbers are printed so that they read back equal. The rows name their log by a stamp, so that a
+process killed between the two files leaves no mixture.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm._files import in_turn, leftovers, written_together
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.errors import TraceFileError
+from gms_fsm.lowering.layout import LOG_NUMBERS, LOG_TEXTS, Layout, Places
+from gms_fsm.systems.models import Model
+from gms_fsm.traces._header import Header
+from gms_fsm.traces._log import log_from
+from gms_fsm.traces._parts import Parts
+from gms_fsm.traces.rows import Rows, column_name
+
+__all__ = ["log_path", "log_text", "read", "write"]
+
+
+def log_path(path: Path) -> Path:
+    """Return where the log of a trace lies."""
+    return path.with_name(f"{path.stem}.transitions.csv")
+
+
+def log_text(log: Any) -> str:
+    """Return a transition log as CSV text; elements counted from 1, as texts do."""
+    names = log.dtype.names
+    rows = (
+        [_cell(name, value) for name, value in zip(names, record, strict=True)]
+        for record in log.tolist()
+    )
+    return _text(names, rows)
+
+
+def write(path: Path, header: Header, columns: Mapping[str, NDArray[Any]], log: Any) -> Path:
+    """Write a trace and its log, both whole or neither."""
+    its_log = log_text(log)
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    head = json.loads(header.model_copy(update={"log": _stamp(its_log)}).model_dump_json())
+    cells = ([_cell("", value) for value in row] for row in rows)
+    text = f"# {json.dumps(head)}\n" + _text(columns, cells)
+    written_together(
+        {
+            path: lambda file: file.write(text.encode()),
+            log_path(path): lambda file: file.write(its_log.encode()),
+        }
+    )
+    return path
+
+
+def read(path: Path) -> Parts:
+    """Read a trace and the log beside it."""
+    with in_turn(path.parent, shared=True):  # rows and log of one run, not one of each
+        with path.open(encoding="utf-8", newline="") as file:
+            header = _header(path, file.readline())
+            table = _read_columns(file, path, 2)
+        log = _read_columns(io.StringIO(_log_of(path, header.log)), log_path(path), 1)
+    model, rig = header.to_model(), header.to_rig()
+    rows = _rows(table, model, Layout.state(model, rig))
+    observed = {
+        "v": _numbers(table, "v"),
+        "F": _numbers(table, "F"),
+        "s": _block(table, "s", model.n),
+        "F_elements": _block(table, "F", model.n),
+        "dz": _block(table, f"d{model.chart.variables[0]}", model.n),
+    }
+    return Parts(header, model, rig, rows, rows, _log(log), observed)
+
+
+def _header(path: Path, line: str) -> Header:
+    if not line.startswith("# {"):
+        what = "line 1 must be '# ' and the trace's header"
+        if line.startswith("t,element,"):
+            what = "this is a log of transitions; give the trace itself, .npz or .csv"
+        raise TraceFileError(f"{path}: {what}")
+    return Header.model_validate_json(line[2:])
+
+
+def _rows(table: Mapping[str, list[str]], model: Model, places: Places[str]) -> Rows:
+    y = [_numbers(table, name if i is None else column_name(name, i)) for name, i in places]
+    states = [state.name for state in model.chart.states]
+    mode = [[states.index(c) for c in table[column_name("state", i)]] for i in range(model.n)]
+    slid = sum(name.startswith("slides") and name[6:].isdigit() for name in table)
+    mode += [[int(c) for c in table[column_name("slides", k)]] for k in range(slid)]
+    return Rows(
+        _numbers(table, "t"),
+        np.array([int(c) for c in table["microstep"]], dtype=np.int64),
+        np.array(y).T,
+        np.array(mode, dtype=np.int64).T,
+    )
+
+
+def _numbers(table: Mapping[str, list[str]], name: str) -> FloatArray:
+    return np.array([float(cell) for cell in table[name]])
+
+
+def _block(table: Mapping[str, list[str]], name: str, n: int) -> FloatArray:
+    return np.array([_numbers(table, column_name(name, i)) for i in range(n)]).T
+
+
+def _log(table: Mapping[str, list[str]]) -> Any:
+    columns: dict[str, NDArray[Any]] = {name: _numbers(table, name) for name in ("t", *LOG_NUMBERS)}
+    columns["element"] = np.array([int(cell) - 1 for cell in table["element"]])
+    columns |= {name: np.array(table[name], dtype=np.str_) for name in LOG_TEXTS}
+    return log_from(columns)
+
+
+def _stamp(text: str) -> str:
+    """Return what tells one text from another; how its lines end does not count."""
+    return hashlib.sha256("\n".join(text.splitlines()).encode()).hexdigest()[:16]
+
+
+def _log_of(path: Path, stamp: str) -> str:
+    """Read the text of the transition log that belongs to a trace.
+
+    Where the process was killed after the rows took their place and before the log did, the log is
+    complete under its temporary name.
+    """
+    log = log_path(path)
+    for place in (log, *leftovers(log)):
+        with place.open(encoding="utf-8", newline="") as file:
+            text = file.read()
+        if stamp in ("", _stamp(text)):
+            return text
+    raise TraceFileError(
+        f"{log}: belongs to another run than {path.name}, or was changed; keep the two together"
+    )
+
+
+def _cell(name: str, value: Any) -> str:
+    if name == "element":
+        return str(value + 1)
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+def _text(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(head)
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def _read_columns(file: IO[str], path: Path, line: int) -> dict[str, list[str]]:
+    reader = csv.reader(file)
+    head = next(reader, None)
+    if not head:
+        raise TraceFileError(f"{path}: line {line} must name the columns")
+    rows = list(reader)
+    for number, row in enumerate(rows, start=line + 1):
+        if len(row) != len(head):
+            raise TraceFileError(
+                f"{path}: line {number} has {len(row)} cells, the head line has {len(head)}"
+            )
+    return {name: [row[j] for row in rows] for j, name in enumerate(head)}

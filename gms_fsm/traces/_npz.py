@@ -1,0 +1,46 @@
+"""Traces as NumPy archives (``.npz``): arrays of the rows, the log, and the header as JSON."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from gms_fsm._files import written_whole
+from gms_fsm.lowering.program import lower
+from gms_fsm.traces._archives import member
+from gms_fsm.traces._header import Header
+from gms_fsm.traces._parts import OBSERVED, Parts
+from gms_fsm.traces.rows import Rows
+
+__all__ = ["read", "write"]
+
+
+def write(path: Path, parts: Parts) -> Path:
+    """Write a trace, whole or not at all."""
+    arrays = {
+        **{f"rows_{name}": value for name, value in vars(parts.rows).items()},
+        **{f"stops_{name}": value for name, value in vars(parts.stops).items()},
+        **{f"observed_{name}": value for name, value in parts.stored.items()},
+        "transitions": np.asarray(parts.log),
+        "header": np.array(parts.header.model_dump_json()),
+    }
+    return written_whole(path, lambda file: np.savez_compressed(file, **arrays))
+
+
+def read(path: Path) -> Parts:
+    """Read a trace; no array is larger than that of a trace with so many rows."""
+    with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
+        header = Header.model_validate_json(str(member(file, "header")))
+        model, rig = header.to_model(), header.to_rig()
+        layout = lower(model, rig).layout
+        width = 8 * max(layout.y.size, layout.observed.size, layout.modes)  # bytes a row
+        tables = {}
+        for kind in ("rows", "stops"):
+            t = member(file, f"{kind}_t")
+            names = [f"{kind}_{name}" for name in ("microstep", "y", "mode")]
+            tables[kind] = Rows(t, *(member(file, name, width * t.size) for name in names))
+        most = width * len(tables["rows"])
+        stored = {name: member(file, f"observed_{name}", most) for name in OBSERVED}
+        log = member(file, "transitions").view(np.recarray)
+    return Parts(header, model, rig, tables["rows"], tables["stops"], log, stored)

@@ -1,0 +1,80 @@
+"""What is observed at all rows of a run: the very numbers the run saw."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.errors import SignalError
+from gms_fsm.lowering._compiled import observe_rows
+from gms_fsm.lowering._observing import armed, observe
+from gms_fsm.lowering.program import Program
+from gms_fsm.traces.rows import Rows
+from integrators import LIVE
+
+__all__ = ["observed_rows"]
+
+
+def observed_rows(program: Program, rows: Rows, *, compiled: bool) -> FloatArray:
+    """Observe rows.
+
+    Parameters
+    ----------
+    program : Program
+        Of the run.
+    rows : Rows
+        All of its rows.
+    compiled : bool
+        Whether machine code is there to do it; the numbers are the same.
+
+    Returns
+    -------
+    ndarray, shape (rows, observed)
+        At the places of ``program.layout.observed``.
+    """
+    if compiled:
+        table = observe_rows(program, rows.t, rows.y, rows.mode)
+        slid = np.flatnonzero(rows.mode[:, program.layout.slides].any(axis=1))
+        table[slid] = _one_by_one(program, rows.at(slid))
+    else:
+        table = _one_by_one(program, rows)
+    _show_one_side(program, rows, table)
+    return table
+
+
+def _one_by_one(program: Program, rows: Rows) -> FloatArray:
+    # With scalar functions, as the run itself.
+    table = np.empty((len(rows), program.layout.observed.size))
+    modes = rows.mode.tolist()
+    for row, (t, y) in enumerate(zip(rows.t.tolist(), rows.y.tolist(), strict=True)):
+        try:
+            table[row] = observe(program, t, y, modes[row])
+        except SignalError:  # the row at which a Python function failed
+            table[row] = np.nan
+    return table
+
+
+def _show_one_side(program: Program, rows: Rows, table: FloatArray) -> None:
+    """Observe the rows beside a slide as the arc did that they belong to.
+
+    They lie on the surface or a rounding behind it, where the sign as it is seen is not the one
+    that was held: before a slide that of the arc before, after it that of the arc that follows.
+    """
+    t, slid = rows.t, rows.mode[:, program.layout.slides]
+    turns = np.flatnonzero((np.diff(slid, axis=0) != 0).any(axis=1) & (np.diff(t) == 0.0))
+    for turn in turns.tolist():
+        before, after = np.searchsorted(t, t[turn]) - 1, np.searchsorted(t, t[turn], "right")
+        change = np.diff(slid[turn : turn + 2], axis=0)[0]
+        for row, other, joined in ((turn, before, 1), (turn + 1, after, -1)):
+            changed = np.flatnonzero(change == joined)
+            if slid[row].any() or not changed.size or not 0 <= other < len(rows):
+                continue
+            mode, signs = rows.mode[row].tolist(), program.live
+            held = armed(program, float(t[other]), rows.y[other].tolist(), mode)
+            for place in (program.surfaces.sign[k] for k in changed):
+                signs[place] = held[place] or LIVE
+            out = [0.0] * program.layout.observed.size
+            program.ieee["observe"](
+                float(t[row]), rows.y[row].tolist(), mode, signs, program.p, out
+            )
+            table[row] = out

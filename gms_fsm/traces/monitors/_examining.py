@@ -1,0 +1,160 @@
+"""Monitors checked against a model, and asked about a run."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+from gms_fsm.errors import ParameterError, shown
+from gms_fsm.systems.models import Model
+from gms_fsm.traces.monitors._chattering import chattering
+from gms_fsm.traces.monitors._coverage import coverage
+from gms_fsm.traces.monitors._invariants import invariant_verdict, read_invariant
+from gms_fsm.traces.monitors._kinds import (
+    ALL,
+    KNOWN,
+    Chattering,
+    Coverage,
+    Invariant,
+    Monitor,
+    Passivity,
+)
+from gms_fsm.traces.monitors._passivity import passivity
+from gms_fsm.traces.trace import Trace
+from gms_fsm.traces.verdicts import Verdict
+
+__all__ = ["checked", "examine", "watched"]
+
+
+def checked(
+    monitors: str | Iterable[str | Monitor], model: Model, output: str = "all"
+) -> dict[str, Monitor]:
+    """Return monitors by name, after a look at every one of them.
+
+    Parameters
+    ----------
+    monitors : str or iterable of str or Monitor
+        ``"chattering"``, ``"passivity"``, ``"coverage"``, ``"all"`` of these three, or an
+        invariant's text.
+    model : Model
+        What they will watch.
+    output : {"all", "t_eval", "end"}
+        Rows there will be.
+
+    Returns
+    -------
+    dict of str to Monitor
+        By name.
+
+    Raises
+    ------
+    ParameterError
+        If one is unknown, given twice, or needs rows where there will be none.
+    ExpressionError
+        If an invariant cannot be read.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters
+    >>> list(checked(["all", "z <= s"], GMS(GMSParameters.paper("stick-slip"), law="signed")))
+    ['chattering', 'passivity', 'coverage', 'z <= s']
+    """
+    given = [monitors] if isinstance(monitors, str | Monitor) else list(monitors)
+    found: dict[str, Monitor] = {}
+    for each in given:
+        for monitor in ALL if each == "all" else (_monitor(each),):
+            if monitor.name in found:
+                raise ParameterError(f"monitors has {shown(monitor.name)} twice; give it once")
+            if isinstance(monitor, Invariant):
+                read_invariant(monitor, model)
+            if output == "end" and not isinstance(monitor, Chattering):
+                raise ParameterError(
+                    f"the monitor {shown(monitor.name)} looks at the rows of a run, but output is "
+                    "'end'; use output='all'"
+                )
+            found[monitor.name] = monitor
+    return found
+
+
+def _monitor(given: str | Monitor) -> Monitor:
+    if isinstance(given, Monitor):
+        return given
+    if not isinstance(given, str):
+        raise ParameterError(
+            f"monitors has {shown(given)}; a monitor is {', '.join(map(repr, KNOWN))}, an "
+            "invariant's text, or an object of gms_fsm.traces.monitors"
+        )
+    word = given.strip()
+    if word.isidentifier() and word not in KNOWN:
+        near = difflib.get_close_matches(word[:40], KNOWN, n=1)
+        raise ParameterError(
+            f"no monitor {shown(word)}; {f'did you mean {near[0]!r}? ' if near else ''}there are "
+            f"{', '.join(map(repr, KNOWN))}, 'all', and invariants such as 'abs(z) <= 2*s'"
+        )
+    return KNOWN.get(word) or Invariant(given)
+
+
+def examine(
+    trace: Trace,
+    monitors: str | Iterable[str | Monitor],
+    error: Exception | None = None,
+) -> dict[str, Verdict]:
+    """Let monitors look at a run.
+
+    Parameters
+    ----------
+    trace : Trace
+        A run, also one that was read from a file.
+    monitors : str or iterable of str or Monitor
+        As `checked` takes them.
+    error : Exception, optional
+        What ended the run.
+
+    Returns
+    -------
+    dict of str to Verdict
+        What each says, by its name.
+
+    Raises
+    ------
+    ParameterError, ExpressionError
+        As `checked`.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    >>> trace = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"),
+    ...                  Prescribed("0.2"), 3.0)
+    >>> found = examine(trace, ["coverage", "z <= 0.3"])
+    >>> found["coverage"].never[0], round(found["z <= 0.3"].t, 9)
+    ('edge break_away_backward', 1.5)
+    """
+    rows = trace.whole()
+    found: dict[str, Verdict] = {}
+    for name, monitor in checked(monitors, trace.model).items():
+        match monitor:
+            case Chattering():
+                found[name] = chattering(monitor, trace, error)
+            case Invariant():
+                found[name] = invariant_verdict(monitor, rows)
+            case Passivity():
+                found[name] = passivity(monitor, rows)
+            case Coverage():
+                found[name] = coverage(rows)
+    return found
+
+
+def watched(trace: Trace, monitors: Iterable[Monitor], error: Exception | None = None) -> Trace:
+    """Return a run with what its monitors say.
+
+    Parameters
+    ----------
+    trace, monitors, error
+        As in `examine`.
+
+    Returns
+    -------
+    Trace
+        The same, with `Trace.monitors`.
+    """
+    return trace.with_monitors(examine(trace, monitors, error))

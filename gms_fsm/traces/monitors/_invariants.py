@@ -1,0 +1,127 @@
+"""Whether a condition held at every row, and where it broke first."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.errors import ExpressionError, SignalError
+from gms_fsm.language import Condition, names_in, parse_condition, states_in
+from gms_fsm.language._vectors import truths
+from gms_fsm.systems.models import Model
+from gms_fsm.traces._between import first_true, interpolated
+from gms_fsm.traces._parts import OBSERVED
+from gms_fsm.traces.monitors._kinds import Invariant
+from gms_fsm.traces.monitors._words import elements_text, values_text
+from gms_fsm.traces.rows import Rows
+from gms_fsm.traces.scope import Scope, invariant_names
+from gms_fsm.traces.trace import Trace
+from gms_fsm.traces.verdicts import InvariantVerdict
+
+__all__ = ["invariant_verdict", "read_invariant"]
+
+
+def read_invariant(monitor: Invariant, model: Model) -> Condition:
+    names, states = invariant_names(model), [state.name for state in model.chart.states]
+    try:
+        return parse_condition(monitor.text, names, states, model.n, own_state=True)
+    except ExpressionError as error:
+        raise error.at("invariant") from None
+
+
+@dataclass(frozen=True)
+class _Held:
+    """An invariant read for a model."""
+
+    tree: Condition
+    of_elements: bool
+
+    def columns(self, trace: Trace) -> dict[str, NDArray[Any]]:
+        """Return the columns it names."""
+        asked = states_in(self.tree)
+        names = [*sorted(names_in(self.tree)), *(f"state({i})" for i in sorted(asked))]
+        columns = Scope.over(trace).invariants(states=bool(asked))
+        return {name: columns[name] for name in names}
+
+    def at(self, trace: Trace) -> NDArray[np.bool_]:
+        """Return where it holds, shape (n, rows), or (1, rows) if it is not of elements."""
+        width = trace.n if self.of_elements else 1
+        return truths(self.tree, self.columns(trace), (width, len(trace)))
+
+
+def _of_elements(tree: Condition, model: Model) -> bool:
+    own = {"s", *model.chart.variables}
+    own |= {name for name, value in model.values.items() if np.ndim(value) > 0}
+    return bool(own & names_in(tree)) or 0 in states_in(tree)
+
+
+def invariant_verdict(monitor: Invariant, trace: Trace) -> InvariantVerdict:
+    tree = read_invariant(monitor, trace.model)
+    invariant, rows = _Held(tree, _of_elements(tree, trace.model)), len(trace)
+    broken = np.flatnonzero(~invariant.at(trace).all(axis=0))
+    if not broken.size:
+        text = f"held at all {rows} rows"
+        return InvariantVerdict(True, text, monitor.text, rows, 0, None, None, "", {}, None)
+    place = _located(invariant, trace, int(broken[0]))
+    i = int(np.argmin(invariant.at(place)[:, 0]))
+    values = {
+        name: float(np.broadcast_to(column, (trace.n, 1))[i, 0])
+        for name, column in invariant.columns(place).items()
+        if np.asarray(column).dtype.kind == "f"
+    }
+    t, t_last = float(place.t[0]), float(trace.t[broken[-1]])
+    who, state = "", ""
+    if invariant.of_elements:
+        state = str(place.states[0, i])
+        who = f", {elements_text([i])} in {state}"
+    text = (
+        f"broken first at t = {t:.9g} s{who}{f' ({values_text(values)})' if values else ''}, at "
+        f"{broken.size} of {rows} rows, last at t = {t_last:.9g} s; look there with "
+        f"`goto {t:.9g}` in gms-fsm debug, or widen the bound if this is meant"
+    )
+    return InvariantVerdict(
+        False,
+        text,
+        monitor.text,
+        rows,
+        int(broken.size),
+        t,
+        i if who else None,
+        state,
+        values,
+        t_last,
+    )
+
+
+def _located(invariant: _Held, trace: Trace, row: int) -> Trace:
+    """Return as one row the place where an invariant breaks, between the row before and this."""
+    rows = trace.rows
+    seen = {name: getattr(trace, name)[row : row + 1] for name in OBSERVED}
+
+    def at(t: float, y: FloatArray, stored: Mapping[str, FloatArray]) -> Trace:
+        one = Rows(np.array([t]), np.zeros(1, np.int64), y[np.newaxis], rows.mode[row : row + 1])
+        return replace(trace, rows=one, stops=one, stored=stored)
+
+    place = at(float(rows.t[row]), rows.y[row], seen)
+    low, high = float(rows.t[max(0, row - 1)]), float(rows.t[row])
+    ends = low, rows.y[row - 1], high, rows.y[row]
+
+    def breaks(t: float) -> bool:
+        nonlocal place
+        y = interpolated(trace.program, rows.mode[row].tolist(), *ends, t)
+        there = at(t, y, {})
+        if invariant.at(there).all():
+            return False
+        place = there
+        return True
+
+    # A trace from a file may not have its signal any more, if it was a Python function.
+    with contextlib.suppress(SignalError):
+        first_true(low, high, breaks)
+    return place

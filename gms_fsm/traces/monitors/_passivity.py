@@ -1,0 +1,194 @@
+"""Whether an element gave more energy than it had taken."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from gms_fsm.charts import GMS_ELEMENT
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.errors import SignalError
+from gms_fsm.language import MATLAB_LIKE, Binary, Name, spell
+from gms_fsm.systems.models import Model
+from gms_fsm.traces._between import slopes
+from gms_fsm.traces.monitors._kinds import Passivity
+from gms_fsm.traces.monitors._words import elements_text
+from gms_fsm.traces.trace import Trace
+from gms_fsm.traces.verdicts import PassivityVerdict
+
+__all__ = ["passivity"]
+
+
+def passivity(monitor: Passivity, trace: Trace) -> PassivityVerdict:
+    spring = _spring(trace.model)
+    if spring is None:
+        force = spell(trace.model.chart.forces["F"], MATLAB_LIKE)
+        return PassivityVerdict(
+            True, f"not applicable: F = {force} is not a spring's force k * z [+ sigma * dz]", False
+        )
+    k, sigma = spring
+    t, z = trace.t, trace.z
+    with np.errstate(all="ignore"):  # of a run that grew without bound
+        lost, doubt = _lost(trace, k, sigma)
+        wound = 0.5 * k * np.diff(z**2, axis=0)
+        endless = np.flatnonzero(~np.isfinite(lost + wound + doubt).all(axis=1))
+        end = int(endless[0]) if endless.size else len(lost)
+        lost, wound, doubt = lost[:end], wound[:end], doubt[:end]
+    turnover = np.abs(lost + wound).sum(axis=0)
+    # The solver knows z no better than to its absolute tolerance.
+    allowed: Any = trace.settings["atol"]
+    allowed = allowed[trace.model.chart.variables[0]] if isinstance(allowed, Mapping) else allowed
+    blur = k * np.abs(z[: end + 1]).max(axis=0, initial=0.0) * np.asarray(allowed or 0.0)
+    tolerance = monitor.tolerance * turnover + doubt.sum(axis=0) + blur
+    n = trace.n
+    heat = np.concatenate([np.zeros((1, n)), lost.cumsum(axis=0)])
+    times = t if t.size else np.array([trace.settings["t_start"]], dtype=np.float64)
+    lowest, element = heat.argmin(axis=0), np.arange(n)
+    deficit = heat[0] - heat[lowest, element]  # 0.0 at the start
+    fall = np.maximum.accumulate(heat, axis=0) - heat
+    until = fall.argmax(axis=0)
+    since = [int(heat[: until[i] + 1, i].argmax()) for i in range(n)]
+    made = fall[until, element]
+    verdict = PassivityVerdict(
+        ok=bool((deficit <= tolerance).all()),
+        text="",
+        applicable=True,
+        taken=tuple((lost + wound).sum(axis=0).tolist()),
+        stored=tuple(wound.sum(axis=0).tolist()),
+        deficit=tuple(deficit.tolist()),
+        t_deficit=tuple(times[lowest].tolist()),
+        made=tuple(made.tolist()),
+        made_from=tuple(times[since].tolist()),
+        made_until=tuple(times[until].tolist()),
+        tolerance=tuple(tolerance.tolist()),
+    )
+    parts = _told(verdict, trace, lost)
+    if endless.size:
+        parts.append(f"values are not finite after t = {t[end]:.6g} s")
+    if (doubt.sum(axis=0) > 0.01 * turnover).any():
+        parts.append(
+            "the rows lie far apart for these sums: keep every step (output='all'), or take "
+            "shorter ones"
+        )
+    return replace(verdict, text="; ".join(parts))
+
+
+def _spring(model: Model) -> tuple[FloatArray, FloatArray] | None:
+    """Return stiffness and damping of each element, shape (n,), if that is all its force is."""
+    z, values = model.chart.variables[0], model.values
+    match model.chart.forces["F"]:
+        case Binary("+", Binary("*", Name(k), Name(bristle)), Binary("*", Name(sigma), Name(rate))):
+            known = rate == f"d{z}" and sigma in values
+        case Binary("*", Name(k), Name(bristle)):
+            sigma, known = "", True
+        case _:
+            return None
+    if not known or bristle != z or k not in values:
+        return None
+    return np.full(model.n, values[k]), np.full(model.n, values.get(sigma, 0.0))
+
+
+# x and z run between two rows as the cubics that `Trace.sample` draws. The heat
+# integral of F_i v - k z dz = k z (v - dz) + sigma dz v is then a polynomial of degree 5 in time:
+# three Gauss points are exact.
+GAUSS = ((0.5 - math.sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + math.sqrt(0.15), 5 / 18))
+
+
+def _lost(trace: Trace, k: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the heat made between neighbouring rows, shape (rows - 1, n), and its uncertainty."""
+    t, x, v = trace.t[:, np.newaxis], trace.x[:, np.newaxis], trace.v[:, np.newaxis]
+    h, z, dz = np.diff(t, axis=0), trace.z, trace.dz
+    lost, doubt = _heat(k, sigma, h, x[:-1], x[1:], z[:-1], z[1:], v[:-1], v[1:], dz[:-1], dz[1:])
+    # At a stop a row's rates may be those of the far side: where it counts, take them from inside.
+    counts = (doubt > 1e-7 * np.abs(lost).sum(axis=0)).any(axis=1) & (h[:, 0] > 0.0)
+    left = np.flatnonzero(counts)
+    if left.size and trace.settings["events"] == "located":
+        try:
+            rates = np.array([_rates(trace, row) for row in left.tolist()])
+        except SignalError:  # of a trace from a file, whose signal was a Python function
+            return lost, doubt
+        right, places = left + 1, trace.program.layout.y
+        v0, v1 = np.moveaxis(rates[:, :, [places.index("x")]], 1, 0)
+        dz0, dz1 = np.moveaxis(rates[:, :, places.block(places.own[0])], 1, 0)
+        lost[left], doubt[left] = _heat(
+            k, sigma, h[left], x[left], x[right], z[left], z[right], v0, v1, dz0, dz1
+        )
+    return lost, doubt
+
+
+def _heat(
+    k: FloatArray,
+    sigma: FloatArray,
+    h: FloatArray,
+    x0: FloatArray,
+    x1: FloatArray,
+    z0: FloatArray,
+    z1: FloatArray,
+    v0: FloatArray,
+    v1: FloatArray,
+    dz0: FloatArray,
+    dz1: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    inverse = np.divide(1.0, h, out=np.zeros_like(h), where=h > 0.0)
+    rise_x, rise_z = x1 - x0, z1 - z0
+    bend_x, bend_z = h * v0 - rise_x, h * dz0 - rise_z
+    twist_x, twist_z = rise_x - h * v1 - bend_x, rise_z - h * dz1 - bend_z
+    heat = np.zeros_like(rise_z)
+    for theta, weight in GAUSS:
+        a, b = 1 - 2 * theta, theta * (2 - 3 * theta)
+        moved = rise_x + a * bend_x + b * twist_x
+        wound = rise_z + a * bend_z + b * twist_z
+        z = z0 + theta * (rise_z + (1 - theta) * (bend_z + theta * twist_z))
+        heat += weight * (k * z * (moved - wound) + sigma * wound * moved * inverse)
+    ends = [k * z * (v - dz) + sigma * dz * v for z, v, dz in ((z0, v0, dz0), (z1, v1, dz1))]
+    # The trapezoid's error is of order h^3, its square over the heat h^5, as the error here.
+    rough = np.abs(heat - 0.5 * h * (ends[0] + ends[1]))
+    size = np.maximum(np.abs(heat), 0.5 * h * (np.abs(ends[0]) + np.abs(ends[1])))
+    share = np.divide(rough, size, out=np.zeros_like(rough), where=size > 0.0)
+    return heat, rough * np.minimum(1.0, share)
+
+
+def _rates(trace: Trace, row: int) -> tuple[FloatArray, FloatArray]:
+    """Return the slopes at a row and the next, as seen from between them."""
+    rows = trace.rows
+    return slopes(
+        trace.program,
+        rows.mode[row].tolist(),
+        float(rows.t[row]),
+        rows.y[row],
+        float(rows.t[row + 1]),
+        rows.y[row + 1],
+    )
+
+
+def _told(verdict: PassivityVerdict, trace: Trace, lost: FloatArray) -> list[str]:
+    """Put the energies into words."""
+    chart, tolerance = trace.model.chart, verdict.tolerance
+    over = [i for i in range(trace.n) if verdict.deficit[i] > tolerance[i]]
+    made = [i for i in range(trace.n) if verdict.made[i] > tolerance[i]]
+    parts = [f"no element gave more than it had taken (tolerance {max(tolerance):.2g} J)"]
+    if over:
+        i = max(over, key=lambda i: verdict.deficit[i])
+        others = f" ({elements_text(j for j in over if j != i)} too)" if over[1:] else ""
+        parts = [
+            f"{elements_text([i])}{others} had made {verdict.deficit[i]:.6g} J out of nothing by "
+            f"t = {verdict.t_deficit[i]:.6g} s (tolerance {tolerance[i]:.2g} J)"
+        ]
+    if made:
+        i = max(made, key=lambda i: verdict.made[i])
+        state = chart.states[int(trace.modes[int(lost[:, i].argmin()), i])]
+        z = chart.variables[0]
+        parts.append(
+            f"the most made between two times: {elements_text([i])}, {verdict.made[i]:.6g} J from "
+            f"t = {verdict.made_from[i]:.6g} to {verdict.made_until[i]:.6g} s, mostly in "
+            f"{state.name}, where d{z} = {state.flow[z]} moves {z} otherwise than the motion does"
+        )
+    if over and chart == GMS_ELEMENT["published"]:
+        parts.append(
+            "the published law does so whenever an element slips backward; try law='signed'"
+        )
+    return parts

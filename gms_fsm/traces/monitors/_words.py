@@ -1,0 +1,17 @@
+"""Values and elements in the texts of verdicts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+__all__ = ["elements_text", "values_text"]
+
+
+def values_text(values: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
+
+
+def elements_text(numbers: Iterable[int]) -> str:
+    """Name elements, counted from 1 in texts."""
+    words = [str(i + 1) for i in numbers]
+    return f"element{'s' if len(words) > 1 else ''} {', '.join(words)}"

@@ -1,0 +1,96 @@
+"""The rows of a run: times, micro-steps, states y and modes, as columns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm.charts.parameters import FloatArray
+
+__all__ = ["Rows", "column_name", "merged"]
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Times, micro-steps, states y and modes, row by row.
+
+    Modes are those of the elements, then for each surface whether the motion slides on it
+    (`gms_fsm.lowering.layout`).
+    """
+
+    t: FloatArray
+    microstep: NDArray[np.int64]
+    y: FloatArray
+    mode: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return int(self.t.size)
+
+    def at(self, chosen: NDArray[Any] | slice) -> Rows:
+        """Return some of the rows."""
+        return Rows(self.t[chosen], self.microstep[chosen], self.y[chosen], self.mode[chosen])
+
+
+def merged(rows: Rows, stops: Rows) -> Rows:
+    """Merge two tables in time order; rows that both have are kept once.
+
+    Parameters
+    ----------
+    rows, stops : Rows
+        Wanted times, and both sides of every stop.
+
+    Returns
+    -------
+    Rows
+        A wanted row on an event holds the values after it: it stands behind the micro-steps.
+    """
+    if rows is stops or not len(stops):
+        return rows
+    rows = rows.at(~_found_in(rows, stops))
+    t = np.concatenate([rows.t, stops.t])
+    microstep = np.concatenate([rows.microstep, stops.microstep])
+    rank = np.concatenate([np.ones(len(rows)), np.zeros(len(stops))])
+    order = np.lexsort((microstep, rank, t))
+    return Rows(
+        t[order],
+        microstep[order],
+        np.concatenate([rows.y, stops.y])[order],
+        np.concatenate([rows.mode, stops.mode])[order],
+    )
+
+
+def _found_in(rows: Rows, stops: Rows) -> NDArray[np.bool_]:
+    """Tell which rows the stops have too, to the bit."""
+    found = np.isin(rows.t, stops.t)
+    if not found.any():
+        return found
+
+    def texts(table: Rows) -> list[bytes]:
+        columns = table.t, table.microstep, table.y, table.mode
+        both = np.column_stack([np.asarray(column, np.float64) for column in columns])
+        return [row.tobytes() for row in both]
+
+    known = set(texts(stops))
+    found[found] = [text in known for text in texts(rows.at(found))]
+    return found
+
+
+def column_name(name: str, i: int) -> str:
+    """Return the column of element i in a flat table: z1, but z1_1 for a variable called z1.
+
+    Parameters
+    ----------
+    name : str
+        A quantity that each element has.
+    i : int
+        Counted from 0.
+
+    Returns
+    -------
+    str
+        Counted from 1, as texts do.
+    """
+    return f"{name}{'_' if name[-1].isdigit() or name[-1] == '_' else ''}{i + 1}"

@@ -1,0 +1,117 @@
+"""Texts of a drawn chart: the pieces of its labels, its counts, and the ids of its parts."""
+
+from __future__ import annotations
+
+import html
+import re
+import textwrap
+from collections import Counter
+from dataclasses import dataclass
+
+from gms_fsm.traces.trace import Trace, dwell_times
+
+__all__ = ["Piece", "Row", "Tally", "element_id", "escape", "part_id", "printable", "wrapped"]
+
+LONGEST_LINE = 52  # characters; longer texts are wrapped
+DOT, TRUE, FALSE, UNKNOWN = "●", "✓", "✗", "?"
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One text of a label: Graphviz writes each as one text of the SVG, in this order.
+
+    Parameters
+    ----------
+    text : str
+        What is written.
+    role : str
+        What it is: ``title``, ``dot``, ``word``, ``code``, ``priority``, ``clause``, ``mark``, ...
+    clause : int
+        For a clause and its mark, which clause of the guard; else -1.
+    """
+
+    text: str
+    role: str = "code"
+    clause: int = -1
+
+
+Row = list[Piece]
+
+
+class Tally:
+    """How long each element was in each state, and how often it took each edge.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run; its log is complete whatever its rows are.
+    """
+
+    def __init__(self, trace: Trace) -> None:
+        log = trace.transitions
+        self.states = [state.name for state in trace.model.chart.states]
+        self.firings: Counter[tuple[int, str]] = Counter(
+            zip(log.element.tolist(), log.edge.tolist(), strict=True)
+        )
+        self.dwell = dwell_times(trace)
+
+    def of_state(self, element: int, state: str) -> str:
+        """Write how long a state was active."""
+        seconds, whole = self.dwell[element, self.states.index(state)], self.dwell[element].sum()
+        share = f" ({100 * seconds / whole:.0f} %)" if whole > 0 else ""
+        return f"active {seconds:.4g} s{share}"
+
+    def of_edge(self, element: int, edge: str) -> str:
+        """Write how often an edge was taken."""
+        times = self.firings[element, edge]
+        if not times:
+            return "never taken"
+        return "taken once" if times == 1 else f"taken {times} times"
+
+
+def wrapped(text: str) -> list[str]:
+    """Return a text as lines that are not too long."""
+    if len(text) <= LONGEST_LINE:
+        return [text] if text else []
+    # An indent tells that the line goes on; a word longer than the line is not cut.
+    return textwrap.wrap(
+        text,
+        LONGEST_LINE,
+        subsequent_indent="  ",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def escape(text: str) -> str:
+    """Write a text for an HTML label: nothing in it is markup, and an indent stays."""
+    core = text.strip(" ")
+    words = html.escape(printable(core))
+    # Graphviz 2.43 refuses a bare ] in a label; one backslash would begin an escape sequence.
+    words = words.replace("[", "&#91;").replace("]", "&#93;").replace("\\", "&#92;" * 2)
+    start = len(text) - len(text.lstrip(" ")) if core else len(text)
+    return "&#160;" * start + words + "&#160;" * (len(text) - start - len(core))
+
+
+def printable(text: str) -> str:
+    """Return a text without control characters."""
+    return "".join(c if c.isprintable() else " " for c in text)
+
+
+def element_id(number: int) -> str:
+    """Return the id of an element counted from 0; ids count from 1, as pictures do.
+
+    >>> element_id(0)
+    'element1'
+    """
+    return f"element{number + 1}"
+
+
+def part_id(element: str, kind: str, name: str) -> str:
+    """Return the id of a state, guard or edge.
+
+    >>> part_id("element1", "state", "slip")
+    'element1-state-slip'
+    """
+    # Names of a chart are identifiers; whatever else came in here could be read as a port or DOT.
+    return f"{element}-{kind}-" + re.sub(r"\W", "_", name)

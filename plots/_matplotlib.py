@@ -1,0 +1,49 @@
+"""What the pictures use of matplotlib; without it, the import says which extra brings it.
+
+Modules of `plots` import these names from here and not from matplotlib, so that this is the only
+place where it can be missing.
+"""
+
+# ruff: noqa: E402  require() stands before the imports that it is about
+
+from __future__ import annotations
+
+from gms_fsm._extras import require
+
+require("matplotlib", "plots")
+require("PIL", "plots")  # comes with matplotlib
+
+from matplotlib import colormaps, patches, rc_context
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backend_bases import RendererBase
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
+from matplotlib.colors import BoundaryNorm, ListedColormap, to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyArrowPatch, Rectangle
+from matplotlib.path import Path as Curve
+from matplotlib.text import Text
+from matplotlib.ticker import MaxNLocator
+from PIL import Image
+
+__all__ = [
+    "Artist",
+    "Axes",
+    "BoundaryNorm",
+    "Curve",
+    "FancyArrowPatch",
+    "Figure",
+    "FigureCanvasAgg",
+    "Image",
+    "LineCollection",
+    "ListedColormap",
+    "MaxNLocator",
+    "Rectangle",
+    "RendererBase",
+    "Text",
+    "colormaps",
+    "patches",
+    "rc_context",
+    "to_rgb",
+]

@@ -1,0 +1,129 @@
+"""How the texts of a chart are written: as Stateflow does, or as formulas do."""
+
+from __future__ import annotations
+
+import math
+import re
+import unicodedata
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from gms_fsm.charts.chart import Chart
+from gms_fsm.language import (
+    MATLAB_LIKE,
+    Both,
+    Condition,
+    Either,
+    Spelling,
+    Value,
+    spell,
+)
+
+__all__ = ["NOTATIONS", "Writer"]
+
+NOTATIONS = ("stateflow", "math")
+
+MATH = Spelling(" ∧ ", " ∨ ", "!", bars=True, products=False)  # ! brackets what it negates
+# What differs between the tokens of the two notations; numbers are tokens of their own, so the
+# minus of 1e-06 is not taken for an operator.
+_TOKEN = re.compile(
+    r"(?P<power>\^\d+(?![\w.]))|(?P<number>\d[\d.]*(?:e[+-]?\d+)?)|(?P<name>\w+)|>=|<=|[*!-]"
+)
+_SIGNS = {">=": "≥", "<=": "≤", "*": "·", "-": "−", "!": "¬", "sqrt": "√"}
+_RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+_LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+_GREEK = {
+    unicodedata.name(c).removeprefix("GREEK SMALL LETTER ").lower(): c
+    for c in "αβγδεζηθκμνξρστφχψω"
+}
+
+
+@dataclass(frozen=True)
+class Writer:
+    """Writes the texts of a chart in one notation, always from the checked trees.
+
+    Parameters
+    ----------
+    chart : Chart
+        Whose names are written.
+    notation : {"stateflow", "math"}
+        How.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts import GMS_ELEMENT
+    >>> chart = GMS_ELEMENT["signed"]
+    >>> Writer(chart, "math").text(chart.guards["arrest"])
+    '|v| ≤ v_c ∧ |z| < s(v)'
+    """
+
+    chart: Chart
+    notation: str
+
+    @property
+    def math(self) -> bool:
+        """Whether the notation is that of formulas."""
+        return self.notation == "math"
+
+    def text(self, tree: Value | Condition) -> str:
+        """Write a tree."""
+        if not self.math:
+            return spell(tree, MATLAB_LIKE)
+        chart = self.chart
+        known = chart.inputs + chart.variables + chart.parameter_names
+        names = {name: _symbol(name) for name in known}
+        if "s" in chart.inputs:
+            names["s"] = "s(v)"  # the threshold that the model supplies depends on the velocity
+        return _TOKEN.sub(_formula_token, spell(tree, MATH, names))
+
+    def rate(self, variable: str) -> str:
+        """Write the time derivative of a variable."""
+        if not self.math:
+            return f"d{variable}"
+        dotted = unicodedata.normalize("NFC", variable + "\u0307")
+        return dotted if len(dotted) == 1 else f"d{_symbol(variable)}/dt"
+
+    def flow(self, variable: str, tree: Value) -> str:
+        """Write a flow."""
+        return f"{self.rate(variable)} = {self.text(tree)}{'' if self.math else ';'}"
+
+    def assignment(self, variable: str, tree: Value) -> str:
+        """Write an assignment."""
+        if self.math:
+            return f"{_symbol(variable)} := {self.text(tree)}"
+        return f"{variable} = {self.text(tree)};"
+
+    @property
+    def words(self) -> Mapping[type, str]:
+        """Between the parts of a conjunction or an alternative."""
+        spelling = MATH if self.math else MATLAB_LIKE
+        return {Both: spelling.both.strip(), Either: spelling.either.strip()}
+
+    def actions(self, trees: Mapping[str, Value]) -> str:
+        """Write the assignments of an edge in one line; empty if there are none."""
+        if not trees:
+            return ""
+        texts = [self.assignment(name, tree) for name, tree in trees.items()]
+        return "/ " + ", ".join(texts) if self.math else "{" + " ".join(texts) + "}"
+
+
+def _symbol(name: str) -> str:
+    """Write a name as formulas do: sigma_0 as σ₀."""
+    head, _, index = name.partition("_")
+    head = _GREEK.get(head, head)
+    if not index:
+        return head if name == name.rstrip("_") else name
+    return head + index.translate(_LOWERED) if index.isdecimal() else f"{head}_{index}"
+
+
+def _formula_token(match: re.Match[str]) -> str:
+    token = match[0]
+    if match["power"]:
+        return token[1:].translate(_RAISED)
+    if match["number"]:
+        if float(token) == math.pi:
+            return "π"
+        digits, _, exponent = token.partition("e")
+        power = f"10{str(int(exponent)).translate(_RAISED)}" if exponent else ""
+        return (power if digits == "1" else f"{digits}·{power}") if power else digits
+    return _SIGNS.get(token, token)

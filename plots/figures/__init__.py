@@ -1,0 +1,25 @@
+"""Composite figures: the paper's Fig. 3 and 4, a run at a glance, ribbons and cascades.
+
+Figures are made without pyplot: no global state, no display.
+"""
+
+from __future__ import annotations
+
+from plots.figures._paper import FIG3_PHASES, compare_laws, figure_3, figure_4, residuals
+from plots.figures._runs import Measured, cascade_figure, overview, ribbons_figure
+from plots.figures._saving import save
+from plots.panels._shown import SMOOTH
+
+__all__ = [
+    "FIG3_PHASES",
+    "SMOOTH",
+    "Measured",
+    "cascade_figure",
+    "compare_laws",
+    "figure_3",
+    "figure_4",
+    "overview",
+    "residuals",
+    "ribbons_figure",
+    "save",
+]

@@ -1,0 +1,66 @@
+"""What figures share: titles, letters, legends, and the part of a long run that they show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gms_fsm.traces.trace import Trace
+from plots._matplotlib import Axes, Figure
+from plots.panels._shown import Window
+
+
+def head(trace: Trace, title: str) -> str:
+    """Return the title of a figure: what it is given, the model and its law."""
+    return f"{title}: {trace.model.title}" if title else trace.model.title
+
+
+def letter_panels(axes: Sequence[Axes], names: Sequence[str]) -> None:
+    """Name the panels of a figure: a), b), ..."""
+    for number, (ax, name) in enumerate(zip(axes, names, strict=True)):
+        # Above the labels of the marks, where there are any.
+        ax.set_title(f"{chr(ord('a') + number)}) {name}", pad=16 if ax.texts else 6)
+
+
+def legend_above(ax: Axes) -> None:
+    """Put the legend beside the title, where no curve is."""
+    ax.legend(
+        loc="lower right",
+        bbox_to_anchor=(1, 1),
+        ncols=6,
+        borderaxespad=0.1,
+        columnspacing=1.2,
+        handlelength=2.2,
+        handletextpad=0.5,
+    )
+
+
+def element_legend(figure: Figure, *axes: Axes) -> None:
+    """Explain elements and states under the figure, each once."""
+    found = [ax.get_legend_handles_labels() for ax in axes]
+    entries = {name: handle for pair in found for handle, name in zip(*pair, strict=True)}
+    figure.legend(
+        list(entries.values()),
+        list(entries),
+        loc="outside lower left",
+        ncols=min(10, len(entries)),
+        handlelength=2.6,
+    )
+
+
+def one_time_axis(column: Sequence[Axes]) -> None:
+    """Let the lowest panel of a column tell the time for all."""
+    for ax in column[:-1]:
+        ax.set_xlabel("")
+        ax.tick_params(labelbottom=False)
+
+
+def last_cycles(trace: Trace) -> Window:
+    """Return what of the time is shown: all of a short run, the last three cycles of a long one."""
+    quiet = 0.05 * np.nanmax(np.abs(trace.v))
+    signs = np.sign(trace.v) * (np.abs(trace.v) > quiet)
+    moving = np.flatnonzero(signs)
+    turns = moving[1:][np.diff(signs[moving]) != 0]
+    begin = trace.t[0] if turns.size <= 12 else trace.t[turns[-7]]
+    return float(begin), float(trace.t[-1])

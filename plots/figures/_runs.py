@@ -1,0 +1,293 @@
+"""Figures of one run: at a glance, its ribbons, one cascade of break-aways."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm.errors import ParameterError
+from gms_fsm.traces.trace import Trace, check_trace
+from plots import panels
+from plots._matplotlib import Axes, Figure, LineCollection, rc_context
+from plots.figures._parts import (
+    element_legend,
+    head,
+    last_cycles,
+    legend_above,
+    letter_panels,
+    one_time_axis,
+)
+from plots.panels._axes import VECTOR_ROWS
+from plots.panels._cascades import CASCADE
+from plots.panels._shown import Window, checked_window, scaled, shown
+from plots.style import BLUE, PALE_GREY, RC, VERMILION
+
+__all__ = ["Measured", "cascade_figure", "overview", "ribbons_figure"]
+
+MOST_SPANS = 30  # an element: more states than that are not read side by side
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A measured friction beside a run.
+
+    Parameters
+    ----------
+    t, x, F : ndarray, shape (m,)
+        s, m, N.
+
+    Raises
+    ------
+    ParameterError
+        If they are not equally long flat lists, or times go backward.
+    """
+
+    t: NDArray[np.float64]
+    x: NDArray[np.float64]
+    F: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        shapes = [np.shape(values) for values in (self.t, self.x, self.F)]
+        if len(shapes[0]) != 1 or len(set(shapes)) > 1 or shapes[0] == (0,):
+            raise ParameterError(
+                f"t, x and F of a measurement have the shapes {shapes}; they must be equally long "
+                "flat lists, not empty"
+            )
+        if not (np.diff(self.t) >= 0).all():
+            raise ParameterError("t of a measurement goes backward; times must grow")
+
+
+def overview(
+    trace: Trace,
+    measured: Measured | None = None,
+    *,
+    title: str = "",
+    window: Window | None = None,
+    elements: Sequence[int] | None = None,
+) -> Figure:
+    """Draw a run at a glance: motion, force, states, hysteresis, friction against velocity.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run.
+    measured : Measured, optional
+        Drawn beside the model.
+    title : str
+        Of the figure; the model and its law are added.
+    window : (float, float), optional
+        From when to when, s. When left out: on the right the whole run, on the left the last three
+        cycles of a long one.
+    elements : sequence of int, optional
+        Whose states, counted from 0; all when left out.
+
+    Returns
+    -------
+    Figure
+        On the left over time, on the right F against x and v.
+    """
+    check_trace(trace)
+    begin, end = last_cycles(trace) if window is None else checked_window(trace, window)
+    whole = window is None and begin == trace.t[0]
+    part = shown(trace, window)
+    left_part = part if whole or window is not None else shown(trace, (begin, end))
+    with rc_context(RC):
+        figure = Figure(figsize=(11.0, 6.6), layout="constrained")
+        grid = figure.add_gridspec(1, 2, width_ratios=(1.5, 1))
+        left, right = (figure.add_subfigure(grid[0, column]) for column in (0, 1))
+        time = left.subplots(3, 1, sharex=True)
+        loop, portrait = right.subplots(2, 1)
+        panels.velocity(time[0], left_part, window=(begin, end))
+        panels.force(time[1], left_part, window=(begin, end))
+        panels.ribbons(time[2], left_part, window=(begin, end), elements=elements)
+        panels.hysteresis(loop, trace, window=window)
+        panels.portrait(portrait, part, elements=elements)
+        if measured is not None:
+            _add_measured(time[1], loop, measured, trace, (begin, end))
+        if trace.model.chart.transitions:
+            legend_above(time[2])
+        for ax in time[:2]:
+            ax.set_xlabel("")
+        note = "" if whole or window is not None else f", last {end - begin:.3g} s"
+        for ax, name in zip(time, ("velocity", "friction", "active states"), strict=True):
+            ax.set_title(name + note)
+        loop.set_title("hysteresis")
+        portrait.set_title("friction against velocity")
+        figure.suptitle(head(trace, title), x=0.01, ha="left")
+    return figure
+
+
+def _add_measured(ax: Axes, loop: Axes, measured: Measured, trace: Trace, window: Window) -> None:
+    """Draw the measured friction over time and over x."""
+    inside = (measured.t >= window[0]) & (measured.t <= window[1])
+    ax.lines[0].set(color=BLUE, label="model", zorder=3)
+    ax.plot(
+        measured.t[inside],
+        measured.F[inside],
+        color=VERMILION,
+        linewidth=1.0,
+        label="measured",
+        rasterized=bool(inside.sum() > VECTOR_ROWS),
+    )
+    legend_above(ax)
+    factor, _ = scaled(trace.x - trace.x[0], "m")
+    loop.lines[0].set(linewidth=0.9, zorder=3, rasterized=True)
+    loop.plot(
+        factor * (measured.x - trace.x[0]),
+        measured.F,
+        color=VERMILION,
+        linewidth=0.5,
+        alpha=0.7,
+        rasterized=True,
+    )
+
+
+def ribbons_figure(
+    trace: Trace,
+    around: float | None = None,
+    *,
+    window: Window | None = None,
+    elements: Sequence[int] | None = None,
+    within: float = CASCADE,
+    title: str = "",
+) -> Figure:
+    """Draw what a run does, why, and in which order: ribbons, a cascade, portraits.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run.
+    around : float, optional
+        Which break-away the middle column zooms at, s; see `plots.panels.cascade_window`.
+    window : (float, float), optional
+        Of the left and right columns, s. When left out the whole run; where its states would be too
+        many to read, the last three cycles on the left.
+    elements : sequence of int, optional
+        Which elements, counted from 0; all when left out.
+    within : float
+        How near to each other break-aways make one cascade, s.
+    title : str
+        Of the figure; the model and its law are added.
+
+    Returns
+    -------
+    Figure
+        Left: v, z / s, F and states over time. Middle: the zoom (left out if nothing ever breaks
+        away and `around` is not given). Right: F against v and x.
+    """
+    limits = checked_window(trace, window)
+    crowded = window is None and len(trace.transitions) > MOST_SPANS * trace.n
+    if crowded:
+        limits = last_cycles(trace)
+    part = shown(trace, limits)
+    # Rather a cascade that the left column shows too.
+    zoom = panels.cascade_window(part if around is None else trace, around, within=within)
+    if zoom is None and window is None:
+        zoom = panels.cascade_window(trace, around, within=within)
+    with rc_context(RC):
+        figure = Figure(figsize=(13.2 if zoom else 9.6, 9.2), layout="constrained")
+        halves = figure.add_gridspec(1, 2, width_ratios=(2.1, 1) if zoom else (1.3, 1))
+        parts = [figure.add_subfigure(halves[0, column]) for column in (0, 1)]
+        grid = parts[0].subplots(
+            4,
+            2 if zoom else 1,
+            squeeze=False,
+            width_ratios=(1.45, 1) if zoom else None,
+            height_ratios=(1, 1.2, 1.2, 1),
+        )
+        left, right = list(grid[:, 0]), list(parts[1].subplots(2, 1))
+        panels.velocity(left[0], part, window=limits)
+        panels.ratio(left[1], part, window=limits, elements=elements)
+        panels.force(left[2], part, window=limits)
+        panels.ribbons(left[3], part, window=limits, elements=elements)
+        one_time_axis(left)
+        axes = left + right
+        second = "first variable"
+        if "s" in trace.model.chart.inputs:
+            second = "threshold ratio" if panels.has_threshold(trace) else "deflection over s(v)"
+        names = ["velocity", second, "friction", "active states"]
+        if limits[0] > trace.t[0] and crowded:
+            names = [f"{name}, last {limits[1] - limits[0]:.3g} s" for name in names]
+        if zoom:
+            middle = list(grid[:, 1])
+            _cascade_column(middle, trace, zoom, elements)
+            for ax in left:
+                ax.axvspan(*zoom, color=PALE_GREY, linewidth=1.0, alpha=0.6, zorder=0)
+            axes = left + middle + right
+            names += _zoom_names(zoom)
+        (lines,) = panels.portrait(right[0], trace, window=window, elements=elements, bar=False)
+        panels.hysteresis(right[1], trace, window=window, elements=elements, slipping=True)
+        assert isinstance(lines, LineCollection)
+        panels.slip_bar(lines, trace, right)
+        letter_panels(axes, [*names, "friction against velocity", "hysteresis"])
+        parts[0].align_ylabels(left)
+        figure.suptitle(head(trace, title), x=0.01, ha="left")
+        element_legend(figure, left[1], left[3])
+    return figure
+
+
+def cascade_figure(
+    trace: Trace,
+    around: float | None = None,
+    *,
+    window: Window | None = None,
+    elements: Sequence[int] | None = None,
+    within: float = CASCADE,
+    title: str = "",
+) -> Figure:
+    """Draw one cascade of break-aways: velocity, margins, the steps of F, the order of slipping.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run.
+    around, within : float, optional
+        Which break-away, s; see `plots.panels.cascade_window`.
+    window : (float, float), optional
+        From when to when instead, s.
+    elements : sequence of int, optional
+        Which elements, counted from 0; all when left out.
+    title : str
+        Of the figure; the model and its law are added.
+
+    Returns
+    -------
+    Figure
+        Four panels over the same time; over the whole run if nothing ever breaks away.
+    """
+    zoom = window or panels.cascade_window(trace, around, within=within)
+    limits = checked_window(trace, zoom)
+    with rc_context(RC):
+        figure = Figure(figsize=(6.4, 9.2), layout="constrained")
+        axes = list(figure.subplots(4, 1, height_ratios=(1, 1.2, 1.2, 1)))
+        _cascade_column(axes, trace, limits, elements)
+        names = _zoom_names(limits)
+        letter_panels(axes, names if zoom else ["velocity", "margin", "friction", "active states"])
+        figure.suptitle(head(trace, title), x=0.01, ha="left")
+        element_legend(figure, axes[1], axes[3])
+    return figure
+
+
+def _cascade_column(
+    axes: Sequence[Axes], trace: Trace, zoom: Window, elements: Sequence[int] | None
+) -> None:
+    part = shown(trace, zoom)
+    panels.velocity(axes[0], part, window=zoom)
+    panels.margins(axes[1], part, window=zoom, elements=elements)
+    panels.cascade(axes[2], part, window=zoom, elements=elements)
+    panels.ribbons(axes[3], part, window=zoom, elements=elements)
+    one_time_axis(axes)
+
+
+def _zoom_names(zoom: Window) -> list[str]:
+    middle, width = (zoom[0] + zoom[1]) / 2, zoom[1] - zoom[0]
+    factor, unit = scaled(np.array([width]), "s")
+    return [
+        f"velocity, {factor * width:.3g} {unit} at t = {middle:.5g} s",
+        "margin to the threshold",
+        "steps of F (open: before, full: after)",
+        "order of slipping",
+    ]

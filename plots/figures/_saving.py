@@ -1,0 +1,75 @@
+"""Saves figures."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from io import BytesIO
+from pathlib import Path
+
+from plots import formats
+from plots._matplotlib import Figure, rc_context
+from plots.style import RC
+
+__all__ = ["picture", "save"]
+
+
+def save(figure: Figure, path: str | Path) -> Path:
+    """Write a figure; the ending chooses the format.
+
+    Parameters
+    ----------
+    figure : Figure
+        What.
+    path : str or Path
+        Ends like one of the figures' formats in `plots.formats.FORMATS`.
+
+    Returns
+    -------
+    Path
+        The file, written whole.
+
+    Raises
+    ------
+    ParameterError
+        If the ending is another one.
+    OutputError
+        If the folder cannot be written.
+    """
+    return formats.save(figure, path, "figure")
+
+
+def picture(figure: Figure, form: str, metadata: Mapping[str, None]) -> bytes:
+    """Return a figure as bytes.
+
+    Parameters
+    ----------
+    figure : Figure
+        What.
+    form : str
+        A format of matplotlib, for example ``"png"``.
+    metadata : mapping of str to None
+        What matplotlib leaves out, such as the date.
+
+    Returns
+    -------
+    bytes
+        The same for the same trace, whenever it is drawn.
+    """
+    buffer = BytesIO()
+    with rc_context(RC):
+        figure.savefig(buffer, format=form, metadata=metadata)
+    return _named_clips(buffer.getvalue()) if form == "svg" else buffer.getvalue()
+
+
+def _named_clips(svg: bytes) -> bytes:
+    """Return an SVG with its clips numbered, so that the same trace gives the same file.
+
+    matplotlib names them by a hash of their corners, which the layout finds to 13 digits only.
+    """
+    names: dict[bytes, bytes] = {}
+
+    def name(match: re.Match[bytes]) -> bytes:
+        return names.setdefault(match[0], b"clip%d" % len(names))
+
+    return re.sub(rb'(?<=[#"])p[0-9a-f]{10}(?=[")])', name, svg)

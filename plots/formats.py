@@ -1,0 +1,324 @@
+"""The formats of files: what pictures and texts can be written to, by whom, and what that needs.
+
+`FORMATS` is the one list of endings. The help of the command line, `plots.render`,
+`plots.figures.save`, `plots.animate`, scenario files and the messages about a wrong ending read it.
+A format is added by one row here, or by `register` from anywhere else.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from gms_fsm._extras import EXTRAS
+from gms_fsm._files import written_whole
+from gms_fsm.errors import ParameterError, shown
+
+__all__ = [
+    "FORMATS",
+    "Format",
+    "Subject",
+    "chosen",
+    "either",
+    "endings",
+    "files",
+    "listed",
+    "register",
+    "save",
+]
+
+Subject = Literal["graph", "chart", "figure", "animation", "page"]
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of file.
+
+    Parameters
+    ----------
+    ending : str
+        Of the file's name, for example ``".svg"``; small letters.
+    subject : {"graph", "chart", "figure", "animation", "page"}
+        What is written: any Graphviz graph, the graph of a state chart only, a matplotlib figure,
+        an animation, a replay page.
+    kind : str
+        What the file holds, for messages, for example ``"a picture"``.
+    writer : str
+        Who writes it, for example ``"Graphviz"``.
+    write : callable
+        Takes the subject and returns the file's bytes. It may raise `MissingExtraError`.
+    extra : str
+        Which extra of gms-fsm it needs; empty if none.
+    usual : bool
+        Whether verbs that write several pictures into a folder write this one.
+
+    Raises
+    ------
+    ParameterError
+        If the ending, the subject or the extra is not one of those above.
+    """
+
+    ending: str
+    subject: Subject
+    kind: str
+    writer: str
+    write: Callable[[Any], bytes]
+    extra: str = ""
+    usual: bool = False
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.ending, str) or not re.fullmatch(r"\.[a-z0-9]+", self.ending):
+            raise ParameterError(
+                f"ending is {shown(self.ending)}; it must be a dot and small letters or digits"
+            )
+        for name, known in (("subject", get_args(Subject)), ("extra", ("", *EXTRAS))):
+            value = getattr(self, name)
+            if value not in known:
+                raise ParameterError(
+                    f"{name} is {shown(value)}; it must be one of {', '.join(map(repr, known))}"
+                )
+
+
+# --------------------------------------------------------------------------- who writes
+def _graphviz(form: str) -> Callable[[Any], bytes]:
+    def write(graph: Any) -> bytes:
+        from plots.render import picture
+
+        return picture(graph, form)
+
+    return write
+
+
+def _dot(graph: Any) -> bytes:
+    text: str = graph.source
+    return text.encode()
+
+
+def _mermaid(graph: Any) -> bytes:
+    from plots.mermaid import mermaid
+
+    return mermaid(graph.chart).encode()
+
+
+def _matplotlib(form: str, **metadata: None) -> Callable[[Any], bytes]:
+    def write(figure: Any) -> bytes:
+        from plots.figures._saving import picture
+
+        return picture(figure, form, metadata)
+
+    return write
+
+
+def _gif(movie: Any) -> bytes:
+    from plots.animation import gif
+
+    return gif(movie)
+
+
+def _html(page: Any) -> bytes:
+    text: str = page.html
+    return text.encode()
+
+
+# --------------------------------------------------------------------------- the table
+# The same trace gives the same file, so that matplotlib writes no dates.
+_svg, _pdf = _matplotlib("svg", Date=None), _matplotlib("pdf", CreationDate=None)
+FORMATS: list[Format] = [
+    Format(".svg", "graph", "a picture", "Graphviz", _graphviz("svg"), "render", usual=True),
+    Format(".png", "graph", "a picture", "Graphviz", _graphviz("png"), "render", usual=True),
+    Format(".pdf", "graph", "a picture", "Graphviz", _graphviz("pdf"), "render"),
+    Format(".dot", "graph", "DOT text", "gms-fsm", _dot),
+    Format(".gv", "graph", "DOT text", "gms-fsm", _dot),
+    Format(".mmd", "chart", "Mermaid text", "gms-fsm", _mermaid),
+    Format(".png", "figure", "a figure", "matplotlib", _matplotlib("png"), "plots", usual=True),
+    Format(".svg", "figure", "a figure", "matplotlib", _svg, "plots", usual=True),
+    Format(".pdf", "figure", "a figure", "matplotlib", _pdf, "plots"),
+    Format(".gif", "animation", "an animation", "Pillow", _gif, "plots"),
+    Format(".html", "page", "a replay page", "gms-fsm", _html, "replay", usual=True),
+]
+INSTEAD = ".dot"  # what of a graph is written where there is no Graphviz
+
+
+def register(new: Format) -> None:
+    """Add a format.
+
+    Parameters
+    ----------
+    new : Format
+        What it is and who writes it.
+
+    Raises
+    ------
+    ParameterError
+        If its subject has a format of that ending.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts import LUGRE
+    >>> from plots import statechart
+    >>> size = Format(".size", "graph", "a size", "me", lambda graph: b"%d" % len(graph.body))
+    >>> register(size)
+    >>> chosen("chart.size", "graph").write(statechart(LUGRE))
+    b'3'
+    >>> FORMATS.remove(size)
+    """
+    if any((old.ending, old.subject) == (new.ending, new.subject) for old in FORMATS):
+        raise ParameterError(f"there is a format {new.ending} of the subject {new.subject!r}")
+    FORMATS.append(new)
+
+
+def of(*subjects: Subject) -> list[Format]:
+    """Return the formats of subjects, in the table's order."""
+    return [each for each in FORMATS if each.subject in subjects]
+
+
+def endings(*subjects: Subject, usual: bool = False) -> list[str]:
+    """Return the endings of subjects.
+
+    Parameters
+    ----------
+    *subjects : {"graph", "chart", "figure", "animation", "page"}
+        What is written.
+    usual : bool
+        Only those that are written where nobody chooses.
+
+    Returns
+    -------
+    list of str
+        With their dots.
+
+    Examples
+    --------
+    >>> endings("figure")
+    ['.png', '.svg', '.pdf']
+    """
+    return [each.ending for each in of(*subjects) if each.usual or not usual]
+
+
+def files(stem: str, subject: Subject) -> list[str]:
+    """Return the names of the files that may be written where nobody chooses.
+
+    Parameters
+    ----------
+    stem : str
+        Name without ending.
+    subject : {"graph", "chart", "figure", "animation", "page"}
+        What is written.
+
+    Returns
+    -------
+    list of str
+        Of a graph also the text that is written where there is no Graphviz.
+
+    Examples
+    --------
+    >>> files("chart", "graph")
+    ['chart.svg', 'chart.png', 'chart.dot']
+    """
+    found = endings(subject, usual=True) + ([INSTEAD] if subject in ("graph", "chart") else [])
+    return [stem + ending for ending in found]
+
+
+def listed(*subjects: Subject) -> str:
+    """Return the endings of subjects as a sentence has them.
+
+    Parameters
+    ----------
+    *subjects : {"graph", "chart", "figure", "animation", "page"}
+        What is written.
+
+    Returns
+    -------
+    str
+        With what they hold, if that is not the same for all.
+
+    Examples
+    --------
+    >>> listed("figure")
+    '.png, .svg or .pdf'
+    >>> listed("graph", "chart")
+    '.svg, .png, .pdf for a picture or .dot, .gv for DOT text or .mmd for Mermaid text'
+    """
+    kinds: dict[str, list[str]] = {}
+    for each in of(*subjects):
+        kinds.setdefault(each.kind, []).append(each.ending)
+    if len(kinds) == 1:
+        return either(*kinds.values())
+    return " or ".join(f"{', '.join(found)} for {kind}" for kind, found in kinds.items())
+
+
+def either(words: Sequence[str]) -> str:
+    """Return words as a sentence has them.
+
+    >>> either([".png", ".svg", ".pdf"])
+    '.png, .svg or .pdf'
+    """
+    return " or ".join(filter(None, (", ".join(words[:-1]), words[-1])))
+
+
+def chosen(path: str | Path, *subjects: Subject) -> Format:
+    """Return the format that a path asks for by its ending.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the file; capitals do not matter.
+    *subjects : {"graph", "chart", "figure", "animation", "page"}
+        What is written.
+
+    Returns
+    -------
+    Format
+        A row of `FORMATS`.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such format; those that are there are listed.
+
+    Examples
+    --------
+    >>> chosen("a.SVG", "figure").writer
+    'matplotlib'
+    >>> chosen("a.bmp", "figure")
+    Traceback (most recent call last):
+    gms_fsm.errors.ParameterError: path is 'a.bmp'; it must end in .png, .svg or .pdf
+    """
+    for each in of(*subjects):
+        if Path(path).suffix.lower() == each.ending:
+            return each
+    raise ParameterError(f"path is {str(path)!r}; it must end in {listed(*subjects)}")
+
+
+def save(made: Any, path: str | Path, *subjects: Subject) -> Path:
+    """Write something to a file; the ending chooses the format.
+
+    Parameters
+    ----------
+    made : object
+        A graph, a figure, an animation or a page.
+    path : str or Path
+        The folder has to exist. A file of that name is replaced as a whole or not at all.
+    *subjects : {"graph", "chart", "figure", "animation", "page"}
+        What it is.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such format.
+    OutputError
+        If the folder cannot be written.
+    MissingExtraError
+        If the format needs an extra that is not installed.
+    """
+    write = chosen(path, *subjects).write
+    # The folder is asked first: an animation takes its time.
+    return written_whole(Path(path), lambda file: file.write(write(made)))

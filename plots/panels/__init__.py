@@ -1,0 +1,37 @@
+"""Single panels: each takes an Axes and a Trace, draws, and returns its artists.
+
+They share three arguments. ``window = (t0, t1)`` [s] zooms: the run is sampled anew inside it.
+``elements`` chooses elements, counted from 0 (labels count from 1). ``log`` asks for a logarithmic
+axis where one makes sense. Times of switches and the forces on both sides of them come from the
+transition log, which is complete even where the rows are not.
+
+A panel stands in the module of its family, and in ``__all__`` there.
+"""
+
+from __future__ import annotations
+
+from plots.panels import (
+    _cascades,
+    _differences,
+    _over_time,
+    _portraits,
+    _shown,
+    _states,
+    _stribeck,
+)
+from plots.panels._cascades import *  # noqa: F403
+from plots.panels._differences import *  # noqa: F403
+from plots.panels._over_time import *  # noqa: F403
+from plots.panels._portraits import *  # noqa: F403
+from plots.panels._shown import *  # noqa: F403
+from plots.panels._states import *  # noqa: F403
+from plots.panels._stribeck import *  # noqa: F403
+
+__all__: list[str] = []
+__all__ += _cascades.__all__
+__all__ += _differences.__all__
+__all__ += _over_time.__all__
+__all__ += _portraits.__all__
+__all__ += _shown.__all__
+__all__ += _states.__all__
+__all__ += _stribeck.__all__

@@ -1,0 +1,129 @@
+"""Panels of how far forces are apart: of two runs, or of a run and a measurement."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm.errors import ParameterError
+from gms_fsm.errors import shown as written
+from gms_fsm.traces.trace import Trace
+from plots._matplotlib import Axes
+from plots.panels._axes import Artists, draw_curve, time_axis
+from plots.panels._shown import SMOOTH, Window, checked_window, is_number
+from plots.style import INK
+
+__all__ = ["difference", "residual"]
+
+
+class Forces(Protocol):
+    """Friction over time: a trace or a measurement."""
+
+    @property
+    def t(self) -> NDArray[np.float64]:
+        """Times, s."""
+
+    @property
+    def F(self) -> NDArray[np.float64]:
+        """Friction, N."""
+
+
+def difference(
+    ax: Axes,
+    times: NDArray[np.float64],
+    values: NDArray[np.float64],
+    floor: float = 1e-12,
+    *,
+    log: bool = True,
+) -> Artists:
+    """Draw a difference of forces over time.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where.
+    times : ndarray, shape (m,), s
+        When.
+    values : ndarray, shape (m,), N
+        What.
+    floor : float
+        N; on a logarithmic axis smaller values are drawn here.
+    log : bool
+        Draw its size on a logarithmic axis.
+
+    Returns
+    -------
+    list of Artist
+        The line.
+    """
+    if not is_number(floor) or not 0 < floor < np.inf:
+        raise ParameterError(f"floor is {written(floor)}; it must be a force > 0 N")
+    if np.shape(times) != np.shape(values) or np.ndim(times) != 1 or not np.size(times):
+        raise ParameterError(
+            f"times has shape {np.shape(times)}, the difference {np.shape(values)}; they must be "
+            "equally long flat lists, not empty"
+        )
+    if log:
+        ax.set(yscale="log")
+        values = np.maximum(np.abs(values), floor)
+    ax.set_ylabel("|difference of F| [N]" if log else "difference of F [N]")
+    time_axis(ax, float(times[0]), float(times[-1]))
+    return draw_curve(ax, times, values, color=INK, linewidth=0.8)
+
+
+def residual(
+    ax: Axes,
+    trace: Trace,
+    reference: Forces,
+    floor: float = 1e-12,
+    *,
+    window: Window | None = None,
+    log: bool = True,
+) -> Artists:
+    """Draw how far the friction of a run is from another run's, or from a measurement.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where.
+    trace : Trace
+        The run.
+    reference : Trace or Measured
+        What it is compared with. A trace is compared at even times and at its own transitions, a
+        measurement at its times.
+    floor : float
+        N; on a logarithmic axis smaller values are drawn here.
+    window : (float, float), optional
+        From when to when, s.
+    log : bool
+        Draw its size on a logarithmic axis.
+
+    Returns
+    -------
+    list of Artist
+        The line.
+
+    Raises
+    ------
+    ParameterError
+        If the two have no time in common.
+    """
+    begin, end = checked_window(trace, window)
+    first, last = max(begin, float(reference.t[0])), min(end, float(reference.t[-1]))
+    if not first < last:
+        raise ParameterError(
+            f"reference runs from {reference.t[0]:g} to {reference.t[-1]:g} s; it must overlap "
+            f"{begin:g} to {end:g} s"
+        )
+    if isinstance(reference, Trace):
+        grid = np.union1d(np.linspace(first, last, SMOOTH), reference.transitions.t)
+        times = grid[(grid >= first) & (grid <= last)]
+        other = reference.sample(times).F
+    else:
+        inside = (reference.t >= first) & (reference.t <= last)
+        times, other = reference.t[inside], reference.F[inside]
+    same = np.array_equal(times, trace.t)
+    mine = trace.F if same else trace.sample(times).F
+    return difference(ax, times, mine - other, floor, log=log)

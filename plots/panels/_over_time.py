@@ -1,0 +1,182 @@
+"""Panels over time: velocity, force, deflections, and how near these are to their thresholds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gms_fsm.traces.trace import Trace
+from plots._matplotlib import Axes
+from plots.panels._axes import (
+    Artists,
+    draw_curve,
+    element_look,
+    first_variable,
+    log_axis,
+    time_axis,
+)
+from plots.panels._shown import (
+    Window,
+    checked_elements,
+    checked_window,
+    has_threshold,
+    scaled,
+    shown,
+)
+from plots.style import INK, LINE_GREY
+
+__all__ = ["deflections", "force", "ratio", "velocity"]
+
+
+def velocity(ax: Axes, trace: Trace, *, window: Window | None = None, log: bool = False) -> Artists:
+    """Draw v(t).
+
+    Parameters
+    ----------
+    ax : Axes
+        Where.
+    trace : Trace
+        What.
+    window : (float, float), optional
+        From when to when, s.
+    log : bool
+        Draw |v| on a logarithmic axis.
+
+    Returns
+    -------
+    list of Artist
+        The line.
+    """
+    part = shown(trace, window)
+    factor, unit = scaled(part.v, "m/s")
+    v = factor * (np.abs(part.v) if log else part.v)
+    ax.set_ylabel(f"{'|v|' if log else 'v'} [{unit}]")
+    lines = draw_curve(ax, part.t, v, color=INK)
+    if log:
+        log_axis(ax, v, "y")
+    time_axis(ax, *checked_window(trace, window))
+    return lines
+
+
+def force(
+    ax: Axes,
+    trace: Trace,
+    *,
+    window: Window | None = None,
+    elements: Sequence[int] | None = None,
+) -> Artists:
+    """Draw the friction force F(t); at a transition both one-sided values are drawn.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where.
+    trace : Trace
+        What.
+    window : (float, float), optional
+        From when to when, s.
+    elements : sequence of int, optional
+        Elements whose own forces F_i are drawn too; none when left out.
+
+    Returns
+    -------
+    list of Artist
+        The line of F, then one an element.
+    """
+    chosen = [] if elements is None else checked_elements(trace, elements)
+    part = shown(trace, window)
+    lines = draw_curve(ax, part.t, part.F, color=INK, label="F")
+    for i in chosen:
+        lines += draw_curve(
+            ax, part.t, part.F_elements[:, i], label=f"$F_{{{i + 1}}}$", **element_look(i)
+        )
+    ax.set_ylabel("F [N]")
+    time_axis(ax, *checked_window(trace, window))
+    return lines
+
+
+def deflections(
+    ax: Axes,
+    trace: Trace,
+    *,
+    window: Window | None = None,
+    elements: Sequence[int] | None = None,
+) -> Artists:
+    """Draw z_i(t) of every element, or whatever the chart's first variable is.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where.
+    trace : Trace
+        What.
+    window : (float, float), optional
+        From when to when, s.
+    elements : sequence of int, optional
+        All when left out.
+
+    Returns
+    -------
+    list of Artist
+        One line an element.
+    """
+    chosen = checked_elements(trace, elements)
+    part = shown(trace, window)
+    factor, title = first_variable(trace, part.z[:, chosen])
+    name = trace.model.chart.variables[0]
+    lines: Artists = []
+    for i in chosen:
+        label = f"$z_{{{i + 1}}}$" if name == "z" else f"{name}{i + 1}"
+        lines += draw_curve(ax, part.t, factor * part.z[:, i], label=label, **element_look(i))
+    ax.set_ylabel(title)
+    time_axis(ax, *checked_window(trace, window))
+    return lines
+
+
+def ratio(
+    ax: Axes,
+    trace: Trace,
+    *,
+    window: Window | None = None,
+    elements: Sequence[int] | None = None,
+) -> Artists:
+    """Draw how near each element is to its threshold: z_i / s_i(v), with lines at +1 and -1.
+
+    A chart without edges has no threshold: its z / s(v) is drawn with its unit, without the lines.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where.
+    trace : Trace
+        What.
+    window : (float, float), optional
+        From when to when, s.
+    elements : sequence of int, optional
+        All when left out.
+
+    Returns
+    -------
+    list of Artist
+        One line an element, then the lines at +1 and -1.
+    """
+    chosen = checked_elements(trace, elements)
+    part = shown(trace, window)
+    values, threshold = part.z, has_threshold(trace)
+    if "s" in trace.model.chart.inputs:
+        values = part.z / part.s
+        factor, unit = (1.0, "–") if threshold else scaled(values, "m/N")
+        title = f"{trace.model.chart.variables[0]} / s(v) [{unit}]"
+    else:
+        factor, title = first_variable(trace, values)
+    lines: Artists = []
+    for i in chosen:
+        lines += draw_curve(ax, part.t, factor * values[:, i], label=f"E{i + 1}", **element_look(i))
+    if threshold:
+        lines += [
+            ax.axhline(level, color=LINE_GREY, linewidth=0.8, zorder=1) for level in (1.0, -1.0)
+        ]
+    ax.set_ylabel(title)
+    time_axis(ax, *checked_window(trace, window))
+    return lines

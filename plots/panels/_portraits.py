@@ -1,0 +1,180 @@
+"""Panels of F against v and against x."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm.traces.trace import Trace
+from plots._matplotlib import Axes, BoundaryNorm, LineCollection, ListedColormap, colormaps
+from plots.panels._axes import VECTOR_ROWS, Artists, draw_curve, log_axis
+from plots.panels._shown import Window, checked_elements, scaled, shown
+from plots.style import BLUE, LINE_GREY, VERMILION
+
+__all__ = ["hysteresis", "portrait", "slip_bar"]
+
+
+def _by_slipping(
+    ax: Axes, x: NDArray[np.float64], trace: Trace, chosen: Sequence[int]
+) -> LineCollection:
+    """Draw F against x in pieces, coloured by how many elements have left their default state."""
+    default = trace.model.chart.state_index(trace.model.chart.default_state.name)
+    away = (trace.modes[:, chosen] != default).sum(axis=1)
+    points = np.column_stack([x, trace.F])
+    # A piece holds its colour from row to row; the next one begins where it ends.
+    cuts = np.concatenate([[0], np.flatnonzero(np.diff(away)) + 1, [len(points)]])
+    pieces = [points[a : b + 1] for a, b in pairwise(cuts)]
+    count = len(chosen)
+    # From light green to dark violet: the more elements slip, the darker, in grey too.
+    shades = ListedColormap(colormaps["viridis_r"](np.linspace(0.18, 1.0, count + 1)))
+    lines = LineCollection(
+        pieces,
+        cmap=shades,
+        norm=BoundaryNorm(np.arange(-0.5, count + 1.0), count + 1),
+        array=away[cuts[:-1]],
+        linewidths=1.6,
+        capstyle="round",
+        rasterized=len(points) > VECTOR_ROWS,
+    )
+    if not trace.model.chart.transitions:  # one state: nothing to count
+        lines.set_array(None)
+        lines.set_color(BLUE)
+    ax.add_collection(lines)
+    ax.autoscale_view()
+    return lines
+
+
+def slip_bar(lines: LineCollection, trace: Trace, axes: Axes | Sequence[Axes]) -> None:
+    """Add the colour bar of a portrait; a chart without edges needs none.
+
+    Parameters
+    ----------
+    lines : LineCollection
+        From `portrait` or `hysteresis`.
+    trace : Trace
+        The run.
+    axes : Axes or sequence of Axes
+        Beside which.
+    """
+    chart = trace.model.chart
+    if not chart.transitions:
+        return
+    first = axes if isinstance(axes, Axes) else axes[0]
+    norm = lines.norm
+    assert isinstance(norm, BoundaryNorm)
+    most = norm.N - 2
+    ticks = range(0, most + 1, 1 + most // 10)
+    bar = first.figure.colorbar(lines, ax=axes, ticks=ticks, aspect=30, fraction=0.05)
+    default = chart.default_state.name
+    others = [state.name for state in chart.states if state.name != default]
+    place = f"in {others[0]}" if len(others) == 1 else f"not in {default}"
+    bar.set_label(f"elements {place}")
+    bar.ax.tick_params(length=0)
+    bar.ax.minorticks_off()
+
+
+def portrait(
+    ax: Axes,
+    trace: Trace,
+    *,
+    window: Window | None = None,
+    elements: Sequence[int] | None = None,
+    log: bool = False,
+    bar: bool = True,
+) -> Artists:
+    """Draw F against v, darker where more elements have left their default state.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where.
+    trace : Trace
+        What.
+    window : (float, float), optional
+        From when to when, s.
+    elements : sequence of int, optional
+        Which elements are counted; all when left out.
+    log : bool
+        Draw over |v| on a logarithmic axis.
+    bar : bool
+        Add a colour bar.
+
+    Returns
+    -------
+    list of Artist
+        The collection of lines.
+    """
+    chosen = checked_elements(trace, elements)
+    part = shown(trace, window)
+    factor, unit = scaled(part.v, "m/s")
+    v = factor * part.v
+    if log:
+        v = np.abs(v)
+        v[v == 0] = np.nan
+        log_axis(ax, v, "x")
+    lines = _by_slipping(ax, v, part, chosen)
+    ax.set(xlabel=f"{'|v|' if log else 'v'} [{unit}]", ylabel="F [N]")
+    if bar:
+        slip_bar(lines, trace, ax)
+    return [lines]
+
+
+def hysteresis(
+    ax: Axes,
+    trace: Trace,
+    phases: Sequence[tuple[str, float]] = (),
+    *,
+    window: Window | None = None,
+    elements: Sequence[int] | None = None,
+    slipping: bool = False,
+) -> Artists:
+    """Draw F against x, in one colour, in phases, or by the number of elements slipping.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where; x is shown from where the run starts.
+    trace : Trace
+        What.
+    phases : sequence of (str, float), optional
+        Names and end times [s] of parts drawn in colours of their own; one part when left out.
+    window : (float, float), optional
+        From when to when, s.
+    elements : sequence of int, optional
+        Which elements are counted with `slipping`; all when left out.
+    slipping : bool
+        Colour as in `portrait`, instead of phases.
+
+    Returns
+    -------
+    list of Artist
+        One line a phase, or the collection of lines.
+    """
+    chosen = checked_elements(trace, elements)
+    part = shown(trace, window)
+    x = part.x - trace.x[0]
+    factor, unit = scaled(x, "m")
+    ax.set(xlabel=f"x [{unit}]", ylabel="F [N]")
+    if slipping:
+        return [_by_slipping(ax, factor * x, part, chosen)]
+    looks = ((BLUE, "-"), (VERMILION, "-"), (LINE_GREY, "-"))
+    begin = -np.inf
+    lines: Artists = []
+    for number, (name, end) in enumerate(phases or [("", np.inf)]):
+        now = (part.t >= begin) & (part.t <= end)
+        colour, dash = looks[number % len(looks)]
+        lines += draw_curve(
+            ax,
+            factor * x[now],
+            part.F[now],
+            color=colour,
+            linestyle=dash,
+            label=name,
+            zorder=3 - number % 3,
+            linewidth=1.6 if number < 2 else 0.9,
+        )
+        begin = end
+    return lines

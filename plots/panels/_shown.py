@@ -1,0 +1,205 @@
+"""What of a run is drawn: its rows, a window, elements, and the units that they read well in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm.errors import ParameterError, SignalError
+from gms_fsm.errors import shown as written
+from gms_fsm.traces._parts import OBSERVED
+from gms_fsm.traces.trace import Trace, check_trace
+
+__all__ = ["has_threshold", "shown"]
+
+Window = tuple[float, float]
+
+SCALES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
+SMOOTH = 2000  # points a curve
+MOST_ROWS = 20_000  # a longer run is thinned
+
+
+def has_threshold(trace: Trace) -> bool:
+    """Tell whether s(v) is a threshold of the chart: it is an input, and there are edges.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run.
+
+    Returns
+    -------
+    bool
+        Without it neither |z|/s = 1 nor a margin to it means anything.
+    """
+    return "s" in trace.model.chart.inputs and bool(trace.model.chart.transitions)
+
+
+def shown(trace: Trace, window: Window | None = None) -> Trace:
+    """Return the rows worth drawing.
+
+    Rows that lie far apart get samples between them, so that curves are smooth. Of a very long run
+    the lowest and highest values of every short stretch are kept, and all rows at which a state
+    changes: what is left out could not be seen.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run.
+    window : (float, float), optional
+        From when to when, s; the whole run when left out.
+
+    Returns
+    -------
+    Trace
+        With these rows, and the whole transition log.
+
+    Raises
+    ------
+    ParameterError
+        If the window is not a part of the run.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    >>> run = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.2"), 3.0)
+    >>> part = shown(run, (1.0, 2.5))
+    >>> float(part.t[0]), float(part.t[-1]), len(part) > 1000
+    (1.0, 2.5, True)
+    """
+    begin, end = checked_window(trace, window)
+    times = trace.t if trace.rows is trace.stops else np.union1d(trace.t, trace.stops.t)
+    grid = np.linspace(begin, end, SMOOTH)
+    sampled = False
+    if times.size > 1:
+        right = np.searchsorted(times, grid).clip(1, times.size - 1)
+        # Only where rows are far apart, and at the ends of the window.
+        far = times[right] - times[right - 1] > 1.5 * (grid[1] - grid[0])
+        far[[0, -1]] = True
+        wanted = np.setdiff1d(grid[far], times)
+        if wanted.size:
+            try:
+                rows = trace.sample(wanted).stops  # all rows, both sides of every stop, the samples
+                trace = replace(trace, rows=rows, stops=rows, stored={})
+                sampled = True
+            except SignalError:  # read from a file, driven by a Python function: the rows must do
+                pass
+    low = int(np.searchsorted(trace.t, begin))
+    high = int(np.searchsorted(trace.t, end, side="right"))
+    if not sampled:  # one more row on either side lets curves reach the ends of the window
+        low, high = max(low - 1, 0), high + 1
+    keep = np.arange(len(trace))[low:high]
+    if keep.size < len(trace):
+        trace = _picked(trace, keep, known=not sampled)
+    return trace if len(trace) <= MOST_ROWS else _picked(trace, _telling_rows(trace), known=True)
+
+
+def _picked(trace: Trace, keep: NDArray[np.intp], *, known: bool) -> Trace:
+    """Return the trace with some of its rows; forces that are known are handed on."""
+    rows = trace.rows.at(keep)
+    names = OBSERVED if known else ()
+    stored = {name: getattr(trace, name)[keep] for name in names}
+    return replace(trace, rows=rows, stops=rows, stored=stored)
+
+
+def _telling_rows(trace: Trace) -> NDArray[np.intp]:
+    size = -(-len(trace) // (MOST_ROWS // 5))
+    count = -(-len(trace) // size)
+    start = size * np.arange(count)
+    keep = [start, np.array([len(trace) - 1])]
+    pad = count * size - len(trace)
+    ratio = (trace.z / trace.s).T if "s" in trace.model.chart.inputs else ()
+    for column in (trace.x, trace.v, trace.F, *trace.z.T, *ratio):
+        values = np.nan_to_num(np.pad(column, (0, pad), mode="edge")).reshape(count, size)
+        keep += [start + values.argmin(axis=1), start + values.argmax(axis=1)]
+    switched = np.flatnonzero((np.diff(trace.rows.mode, axis=0) != 0).any(axis=1))
+    micro = np.flatnonzero(trace.microstep > 0)
+    keep += [switched, switched + 1, micro, np.maximum(micro - 1, 0)]
+    return np.unique(np.minimum(np.concatenate(keep), len(trace) - 1))
+
+
+def checked_window(trace: Trace, window: Window | None) -> Window:
+    """Return the window, or the whole run for None.
+
+    Raises
+    ------
+    ParameterError
+        If it is not two times, the earlier one first, that overlap the run; if there is no run.
+    """
+    check_trace(trace)
+    first, last = float(trace.t[0]), float(trace.t[-1])
+    if window is None:
+        return first, last
+    try:
+        begin, end = (float(t) for t in window)
+    except (TypeError, ValueError):
+        begin, end = last, first
+    if not (first <= begin < end <= last):
+        raise ParameterError(
+            f"window is {written(window)}; it must be two times (t0, t1) with t0 < t1 inside the "
+            f"run, {first:g} to {last:g} s"
+        )
+    return begin, end
+
+
+def checked_elements(trace: Trace, elements: Iterable[int] | None) -> list[int]:
+    """Return the chosen elements, or all for None.
+
+    Raises
+    ------
+    ParameterError
+        If one is not there, is named twice, or none is named.
+    """
+    if elements is None:
+        return list(range(trace.n))
+    try:
+        chosen = list(elements)
+    except TypeError:
+        chosen = []
+    whole = all(isinstance(i, (int, np.integer)) and not isinstance(i, bool) for i in chosen)
+    if (
+        not chosen
+        or not whole
+        or len(set(chosen)) < len(chosen)
+        or not (0 <= min(chosen) <= max(chosen) < trace.n)
+    ):
+        raise ParameterError(
+            f"elements is {written(elements)}; it must be a list of different whole numbers from 0 "
+            f"to {trace.n - 1} (labels count from 1)"
+        )
+    return [int(i) for i in chosen]
+
+
+def is_number(value: object) -> bool:
+    return isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+
+
+def scaled(values: NDArray[np.float64], unit: str) -> tuple[float, str]:
+    """Return the factor and the unit in which values read well.
+
+    Parameters
+    ----------
+    values : ndarray
+        In the unit.
+    unit : str
+        For example ``"m/s"``.
+
+    Returns
+    -------
+    (float, str)
+        Factor and prefixed unit.
+
+    Examples
+    --------
+    >>> scaled(np.array([0.0, 2e-4]), "m/s")
+    (1000.0, 'mm/s')
+    """
+    finite = np.abs(values[np.isfinite(values)])
+    largest = float(finite.max()) if finite.size else 0.0
+    for factor, prefix in SCALES:
+        if largest * factor >= 0.1 or largest == 0.0:
+            return factor, prefix + unit
+    return SCALES[-1][0], SCALES[-1][1] + unit

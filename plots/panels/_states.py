@@ -1,0 +1,162 @@
+"""The panel of active states: ribbons, like those of a logic analyser."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from gms_fsm.traces.trace import Trace
+from plots._matplotlib import Axes, RendererBase, Text
+from plots.panels._axes import VECTOR_ROWS, Artists, time_axis
+from plots.panels._shown import Window, checked_elements, checked_window
+from plots.style import HATCHES, INK, STATE_EDGES, STATE_FILLS
+
+__all__ = ["ribbons"]
+
+
+class _SpanName(Text):
+    """A state's name inside its span, drawn only where it fits.
+
+    Whether it does is known when the picture is drawn, and may change when a window is resized.
+    """
+
+    def __init__(self, ax: Axes, begin: float, end: float, height: float, name: str) -> None:
+        super().__init__(
+            (begin + end) / 2,
+            height,
+            name,
+            ha="center",
+            va="center",
+            fontsize=7.5,
+            color=INK,
+            bbox={
+                "boxstyle": "round,pad=0.12",
+                "facecolor": "white",
+                "edgecolor": "none",
+                "alpha": 0.85,
+            },
+        )
+        self.span = (begin, end)
+        self.set_in_layout(False)
+        ax.add_artist(self)
+        self.set_clip_on(True)
+
+    def fits(self, renderer: RendererBase) -> bool:
+        """Return whether the name is narrower than its span."""
+        assert self.axes is not None
+        pixels = self.axes.transData.transform([(t, 0.0) for t in self.span])[:, 0]
+        return bool(self.get_window_extent(renderer).width + 4 < pixels[1] - pixels[0])
+
+    def draw(self, renderer: RendererBase) -> None:
+        """Draw the name if it fits."""
+        if self.fits(renderer):
+            super().draw(renderer)
+
+
+def spans(trace: Trace, i: int, window: Window) -> Iterator[tuple[str, float, float]]:
+    """Yield the states of element i as (name, begin, end) [s], read from the transition log.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run.
+    i : int
+        Element, from 0.
+    window : (float, float)
+        s; spans are cut at its ends.
+
+    Yields
+    ------
+    (str, float, float)
+        States that lasted no time are left out.
+    """
+    log = trace.transitions[trace.transitions.element == i]
+    first = log.source[0] if log.size else trace.model.chart.states[trace.modes[0, i]].name
+    ends = np.clip(np.concatenate([[window[0]], log.t, [window[1]]]), *window)
+    for name, begin, end in zip([first, *log.target], ends[:-1], ends[1:], strict=True):
+        if end > begin:
+            yield str(name), float(begin), float(end)
+
+
+def ribbons(
+    ax: Axes,
+    trace: Trace,
+    *,
+    window: Window | None = None,
+    elements: Sequence[int] | None = None,
+) -> Artists:
+    """Draw the active state of every element as a ribbon, like a logic analyser.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where.
+    trace : Trace
+        What.
+    window : (float, float), optional
+        From when to when, s.
+    elements : sequence of int, optional
+        All when left out.
+
+    Returns
+    -------
+    list of Artist
+        One collection per state and element; then the names, each of which shows where it fits;
+        then a band for each stretch on which a sign is held, such as on v = 0.
+    """
+    chosen = checked_elements(trace, elements)
+    begin, end = checked_window(trace, window)
+    states = [state.name for state in trace.model.chart.states]
+    drawn: Artists = []
+    names: Artists = []
+    for row, i in enumerate(chosen):
+        found = list(spans(trace, i, (begin, end)))
+        for number, state in enumerate(states):
+            mine = [(a, b - a) for name, a, b in found if name == state]
+            drawn.append(
+                ax.broken_barh(
+                    mine,
+                    (row + 0.6, 0.8),
+                    facecolor=STATE_FILLS[number % len(STATE_FILLS)],
+                    edgecolor=STATE_EDGES[number % len(STATE_EDGES)],
+                    hatch=HATCHES[number % len(HATCHES)],
+                    linewidth=0.6,
+                    label=state if row == 0 else None,
+                    rasterized=len(mine) > VECTOR_ROWS // 20,
+                )
+            )
+        # A name never fits into less than a hundredth of the axis.
+        wide = [span for span in found if span[2] - span[1] > 0.01 * (end - begin)]
+        names += [_SpanName(ax, a, b, row + 1.0, name) for name, a, b in wide]
+    ax.set(
+        ylim=(len(chosen) + 0.5, 0.5),
+        yticks=range(1, len(chosen) + 1),
+        yticklabels=[f"E{i + 1}" for i in chosen],
+    )
+    ax.tick_params(axis="y", length=0)
+    time_axis(ax, begin, end)
+    return [*drawn, *names, *_held_bands(ax, trace, (begin, end))]
+
+
+def _held_bands(ax: Axes, trace: Trace, window: Window) -> Artists:
+    """Mark the stretches along a surface; microseconds wide, they show as a line."""
+    drawn: dict[str, Artists] = {}
+    for stretch in trace.sliding:
+        begin, end = max(window[0], float(stretch.t_start)), min(window[1], float(stretch.t_end))
+        if begin <= end:
+            label = f"held on {stretch.surface} = 0"
+            text = "" if label in drawn else label
+            drawn.setdefault(label, []).append(
+                ax.axvspan(
+                    begin,
+                    end,
+                    facecolor="none",
+                    edgecolor="black",
+                    hatch="xxx",
+                    linewidth=0.8,
+                    zorder=3,
+                    label=text,
+                )
+            )
+    return [band for bands in drawn.values() for band in bands]

@@ -1,0 +1,120 @@
+"""The panel of the Stribeck curve, beside the run and what was measured."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gms_fsm.errors import ParameterError
+from gms_fsm.errors import shown as written
+from gms_fsm.traces.trace import Trace
+from plots._matplotlib import Axes
+from plots.panels._axes import Artists, draw_curve
+from plots.panels._shown import Window, scaled, shown
+from plots.style import INK, STATE_FILLS, VERMILION
+
+__all__ = ["stribeck"]
+
+
+def stribeck(
+    ax: Axes,
+    trace: Trace,
+    measured: tuple[ArrayLike, ArrayLike] | None = None,
+    *,
+    window: Window | None = None,
+    log: bool = True,
+) -> Artists:
+    """Draw the Stribeck curve, the run's steady sliding, and measured points.
+
+    Steady sliding are the rows at which no deflection changes by more than a hundredth of v; there
+    the friction of elements whose shares add up to one is ``s(v) + sigma_2 |v|``.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where.
+    trace : Trace
+        Its model's curve, its rows.
+    measured : (array_like, array_like), optional
+        Velocities [m/s] and friction [N], each of shape (m,).
+    window : (float, float), optional
+        From when to when the run counts, s.
+    log : bool
+        Logarithmic axis of |v|.
+
+    Returns
+    -------
+    list of Artist
+        s(v); s(v) + sigma_2 |v| if there is viscous friction; the steady rows; the measured points.
+    """
+    model, part = trace.model, shown(trace, window)
+    if model.stribeck is None:
+        raise ParameterError(
+            f"{model.title}: its chart has no input s, and so no Stribeck curve to draw"
+        )
+    points = None if measured is None else checked_points(measured)
+    speeds = np.abs(part.v)
+    steady = (np.abs(part.dz) < 0.01 * speeds[:, None]).all(axis=1)
+    top = max(
+        [float(np.nanmax(speeds)), 4 * model.stribeck.v_s, *(() if points is None else points[0])]
+    )
+    every = np.concatenate([speeds[speeds > 0], [0.1 * model.stribeck.v_s]])
+    low = max(1e-6 * top, float(np.nanmin(every)))
+    v = np.geomspace(low, top, 400) if log else np.linspace(0.0, top, 2000)
+    factor, unit = scaled(v, "m/s")
+    curve = model.stribeck(v)
+    drawn = draw_curve(ax, factor * v, curve, color=INK, linestyle="--", label="s(v)")
+    if model.sigma_2 > 0:
+        drawn += draw_curve(
+            ax, factor * v, curve + model.sigma_2 * v, color=INK, label=r"s(v) + $\sigma_2$ |v|"
+        )
+    drawn += ax.plot(
+        factor * speeds[steady],
+        np.abs(part.F[steady]),
+        "s",
+        markersize=5,
+        color=STATE_FILLS[0],
+        markeredgewidth=0,
+        label="run, sliding steadily",
+        rasterized=True,
+        zorder=1,
+    )
+    if points is not None:
+        drawn += ax.plot(
+            factor * points[0],
+            points[1],
+            "o",
+            markersize=4.5,
+            color=VERMILION,
+            markerfacecolor="white",
+            label="measured",
+            zorder=4,
+        )
+    ax.set(xlabel=f"|v| [{unit}]", ylabel="|F| [N]")
+    if log:
+        ax.set(xscale="log", xlim=(factor * low, 1.15 * factor * top))
+    return drawn
+
+
+def checked_points(measured: tuple[ArrayLike, ArrayLike]) -> tuple[Any, Any]:
+    """Return the sizes of measured velocities and forces.
+
+    Raises
+    ------
+    ParameterError
+        If they are not two flat lists of finite numbers, equally long.
+    """
+    try:
+        v, F = (np.abs(np.asarray(values, dtype=np.float64)) for values in measured)
+        good = v.ndim == 1 and v.size > 0 and v.shape == F.shape
+        good = good and bool(np.isfinite(v).all() and np.isfinite(F).all())
+    except (TypeError, ValueError):
+        good = False
+    if not good:
+        raise ParameterError(
+            f"measured is {written(measured)}; it must be two equally long flat lists of finite "
+            "numbers: velocities [m/s] and friction [N]"
+        )
+    return v, F
