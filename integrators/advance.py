@@ -16,7 +16,7 @@ from integrators.crossings import (
     first_change,
     nothing_near,
 )
-from integrators.step_size import Control, error_norm, next_factor, retry_factor
+from integrators.step_size import INFINITY, Control, error_norm, next_factor, retry_factor
 from integrators.steps import (
     ERROR_BEFORE,
     T_STOP,
@@ -34,16 +34,7 @@ from integrators.steps import (
     weigh,
 )
 
-__all__ = [
-    "Output",
-    "Plan",
-    "advance",
-    "limit_after",
-    "next_on_grid",
-    "put_row",
-    "raise_floor",
-    "tick_at",
-]
+__all__ = ["Output", "Plan", "advance"]
 
 # Why the kernel came back.
 REACHED, CROSSED, FULL, TOO_SMALL, NOT_FINITE = 0, 1, 2, 3, 4
@@ -156,7 +147,8 @@ def advance(
         One of REACHED, CROSSED, FULL, TOO_SMALL, NOT_FINITE.
     """
     y, f = now.y, now.f
-    clock, cursor = now.clock, out.cursor
+    y_new, f_new = scratch.y_new, scratch.f_new
+    clock, cursor, times = now.clock, out.cursor, out.times
     adaptive = not plan.control.step > 0.0
     watching = len(w.active) > 0
     scaleless = False
@@ -183,13 +175,13 @@ def advance(
         if status != ACCEPTED:
             return status
 
-        wanted = cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] < t_new
+        wanted = cursor[NEXT_TIME] < len(times) and times[cursor[NEXT_TIME]] < t_new
         theta = NO_CHANGE
         near = watching and not nothing_near(motion, now, t_new, scratch, w)
         if near or wanted:
             fit_dense(plan.method, h, y, scratch)
         if near:
-            path = Path(motion, now.mode, interpolate, scratch.dense, t, t_new, scratch.y_new)
+            path = Path(motion, now.mode, interpolate, scratch.dense, t, t_new, y_new)
             theta = first_change(path, w, tick)
         if theta < REDO and theta * h > AT_ONCE * tick and adaptive and not redone:
             # The stages lay behind the crossing and may have jumped what comes before it: the step
@@ -203,13 +195,14 @@ def advance(
             t_new = t + theta * h
         else:
             copy_margins(w, w.end, w.start)
-        _put_wanted(out, scratch.dense, t, h, t_new)
+        if wanted:
+            _put_wanted(out, scratch.dense, t, h, t_new)
         if theta < 1.0:
             interpolate(scratch.dense, theta, y)
         else:
             for j in range(len(y)):
-                y[j] = scratch.y_new[j]
-                f[j] = scratch.f_new[j]
+                y[j] = y_new[j]
+                f[j] = f_new[j]
         clock[T] = t_new
         most_steps -= 1
         if scaleless:
@@ -240,20 +233,20 @@ def _aim(plan: Plan, clock: Vector, cursor: list[int]) -> tuple[float, float]:
 def _judge(plan: Plan, now: Now, h: float, tick: float, scratch: Scratch, rejected: bool) -> int:
     """Tell what becomes of the step of length h just tried, and choose the next one's length."""
     control, method, clock = plan.control, plan.method, now.clock
-    infinity = float("inf")
+    y_new, f_new = scratch.y_new, scratch.f_new
     if control.step > 0.0:
         total = 0.0
-        for j in range(len(now.y)):
-            total += abs(scratch.y_new[j]) + abs(scratch.f_new[j])
-        return ACCEPTED if total < infinity else NOT_FINITE
+        for j in range(len(y_new)):
+            total += abs(y_new[j]) + abs(f_new[j])
+        return ACCEPTED if total < INFINITY else NOT_FINITE
     order = method.error_order
-    weigh(method.E, len(method.B), scratch.f_new, scratch.k, scratch.error)
-    error = error_norm(scratch.error, h, now.y, scratch.y_new, control.rtol, now.floor)
+    weigh(method.E, len(method.B), f_new, scratch.k, scratch.error)
+    error = error_norm(scratch.error, h, now.y, y_new, control.rtol, now.floor)
     if not error <= 1.0:
         clock[H] = h * retry_factor(error, order)
         if clock[H] > tick:
             return REJECTED
-        return TOO_SMALL if error < infinity else NOT_FINITE
+        return TOO_SMALL if error < INFINITY else NOT_FINITE
     factor = next_factor(error, clock[ERROR_BEFORE], order)
     if rejected:
         factor = min(factor, 1.0)

@@ -65,7 +65,7 @@ _OF_A_STEP: tuple[Callable[..., Any], ...] = (
     steps.take_step,
     steps.weigh,
 )
-# The phases of the loop, and what is written of an event: called from one place each.
+# So are the phases of the loop, and what is written of an event: called from one place each.
 _OF_AN_EVENT: tuple[Callable[..., Any], ...] = (
     loop._begin_arc,
     loop._choose_stop,

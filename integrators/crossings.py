@@ -29,7 +29,6 @@ __all__ = [
     "Search",
     "Watched",
     "any_changed",
-    "copy_margins",
     "first_change",
     "listed",
     "nothing_near",

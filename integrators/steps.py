@@ -14,17 +14,13 @@ from integrators.tableaux import Row, Tableau
 __all__ = [
     "Coefficients",
     "Dense",
-    "Flow",
-    "Margins",
     "Motion",
     "Now",
     "Scratch",
     "Vector",
     "coefficients",
-    "fit_dense",
     "interpolate",
     "take_step",
-    "weigh",
 ]
 
 Vector = list[float]
