@@ -80,7 +80,8 @@ def output_folder(path: str | Path, names: Iterable[str] = ()) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(
-            f"cannot make the folder {folder}: {error.strerror or error}; choose another folder"
+            f"cannot make the folder {folder}: {error.strerror or error}",
+            advice="choose another folder",
         ) from None
     remove_leftovers(folder)
     with in_turn(folder):
@@ -89,15 +90,16 @@ def output_folder(path: str | Path, names: Iterable[str] = ()) -> Path:
             _check_place(place)
             if place.exists() and _checksum(place) not in listed.get(place.name, ()):
                 raise OutputError(
-                    f"{place}: is there and gms-fsm has not written it like that; move it away, or "
-                    "choose another folder"
+                    "is there and gms-fsm has not written it like that",
+                    place=str(place),
+                    advice="move it away, or choose another folder",
                 )
     try:
         with _part(folder / LIST, "part"):
             _prepared.add(folder.resolve())
     except OSError as error:
         raise OutputError(
-            f"cannot write into {folder}: {error.strerror or error}; choose another folder"
+            f"cannot write into {folder}: {error.strerror or error}", advice="choose another folder"
         ) from None
     return folder
 
@@ -128,7 +130,9 @@ def no_input(path: str | Path, *inputs: Path) -> None:
             continue
         if same:
             raise OutputError(
-                f"{path}: is read here and would be written over; choose another output"
+                "is read here and would be written over",
+                place=str(path),
+                advice="choose another output",
             )
 
 
@@ -265,7 +269,9 @@ def _write(files: Mapping[Path, Callable[[IO[bytes]], object]]) -> None:
         advice = "make room" if error.errno == errno.ENOSPC else "choose another folder"
         if isinstance(error, FileNotFoundError):
             advice = "make its folder first, or choose another folder"
-        raise OutputError(f"cannot write {path}: {error.strerror or error}; {advice}") from None
+        raise OutputError(
+            f"cannot write {path}: {error.strerror or error}", advice=advice
+        ) from None
 
 
 @contextlib.contextmanager
@@ -315,7 +321,9 @@ def _check_place(path: Path) -> None:
     except OSError:
         return  # nothing there, or nothing that can be looked at: the writing will say so
     if kind is not None:
-        raise OutputError(f"cannot write {path}: a {kind} is there, not a file; give another name")
+        raise OutputError(
+            f"cannot write {path}: a {kind} is there, not a file", advice="give another name"
+        )
 
 
 # The list holds for each name the checksum of the file to come and of the one it replaces, so that

@@ -6,6 +6,11 @@ do. The command line prints that text and exits with code 2; Python callers can 
 
 from __future__ import annotations
 
+import copy
+import copyreg
+import enum
+from typing import Any, Self
+
 LONGEST_SHOWN = 120  # characters of a value in a message
 
 
@@ -55,8 +60,120 @@ def why(error: BaseException) -> str:
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
+class _Nothing(enum.Enum):
+    """Stands for no value: None may be the value that is wrong."""
+
+    NOTHING = enum.auto()
+
+
+NOTHING = _Nothing.NOTHING
+
+
 class GMSError(Exception):
-    """Base of every error this package raises on purpose."""
+    """Base of every error this package raises on purpose; its text is made from its fields.
+
+    Parameters
+    ----------
+    reason : str
+        What is wrong: ``"it must be > 0"``, ``"there is no such file"``.
+    place : str, optional
+        Where: an argument, a file, a file's key or column, an edge of a chart.
+    value : object, optional
+        What stands there.
+    advice : str, optional
+        What to do about it.
+
+    Examples
+    --------
+    >>> print(GMSError("it must be > 0", place="step", value=-1.0, advice="leave it out"))
+    step is -1.0; it must be > 0; leave it out
+    >>> print(GMSError("no such file", place="run.toml"))
+    run.toml: no such file
+    >>> print(GMSError("it must be > 0", place="step", value=-1.0).inside("run.toml"))
+    run.toml: step is -1.0; it must be > 0
+    """
+
+    def __init__(
+        self, reason: str, *, place: str = "", value: object = NOTHING, advice: str = ""
+    ) -> None:
+        self.reason, self.place, self.value, self.advice = reason, place, value, advice
+        self.outer = ""  # what holds the place: files, keys
+        super().__init__(reason)
+
+    def __str__(self) -> str:
+        head = (
+            "" if self.value is NOTHING else f"{self.place or 'the value'} is {shown(self.value)}; "
+        )
+        if not head and self.place:
+            head = f"{self.place}: "
+        text = f"{head}{self.reason}" + (f"; {self.advice}" if self.advice else "")
+        return f"{self.outer}: {text}" if self.outer else text
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({str(self)!r})"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # type: ignore[attr-defined]
+
+    def inside(self, place: object) -> Self:
+        """Return this error with a further place around it, such as a file.
+
+        Parameters
+        ----------
+        place : str or Path
+            What holds the place that the error names.
+
+        Returns
+        -------
+        GMSError
+            Of the same class and fields.
+        """
+        return self.replaced(outer=f"{place}: {self.outer}" if self.outer else str(place))
+
+    def replaced(self, **fields: object) -> Self:
+        """Return this error with other fields.
+
+        Parameters
+        ----------
+        **fields : object
+            New values by name.
+
+        Returns
+        -------
+        GMSError
+            Of the same class.
+
+        Examples
+        --------
+        >>> print(GMSError("it must be > 0", place="alpha", value=0).replaced(place="shares"))
+        shares is 0; it must be > 0
+        """
+        again = copy.copy(self)
+        for name, value in fields.items():
+            setattr(again, name, value)
+        return again
+
+    @classmethod
+    def of(cls, error: GMSError) -> Self:
+        """Return an error of this class with the fields of another.
+
+        Parameters
+        ----------
+        error : GMSError
+            For example what is wrong with a signal that a scenario file gives.
+
+        Returns
+        -------
+        GMSError
+            Of this class.
+
+        Examples
+        --------
+        >>> ScenarioError.of(UnitError("unknown unit", place="column 't'", value="mN"))
+        ScenarioError("column 't' is 'mN'; unknown unit")
+        """
+        made = cls(error.reason, place=error.place, value=error.value, advice=error.advice)
+        return made.replaced(outer=error.outer)
 
 
 class ExpressionError(GMSError, ValueError):
@@ -84,18 +201,15 @@ class ExpressionError(GMSError, ValueError):
     """
 
     def __init__(self, reason: str, text: str, column: int, allowed: str, where: str = "") -> None:
-        self.reason = reason
-        self.text = text
-        self.column = column
-        self.allowed = allowed
-        self.where = where
-        head = f"{where}, column {column}" if where else f"column {column}"
         # A very long text is cut around the column, so that a message stays a message.
         start = max(0, column - 61)
         shown = text[start : start + 120].replace("\n", " ").replace("\t", " ")
         super().__init__(
-            f"{head}: {reason}; allowed: {allowed}\n    {shown}\n    {' ' * (column - 1 - start)}^"
+            reason,
+            place=f"{where}, column {column}" if where else f"column {column}",
+            advice=f"allowed: {allowed}\n    {shown}\n    {' ' * (column - 1 - start)}^",
         )
+        self.text, self.column, self.allowed, self.where = text, column, allowed, where
 
     def at(self, where: str) -> ExpressionError:
         """Return the same error with its owner named."""

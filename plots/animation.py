@@ -112,17 +112,19 @@ def animate(
     check_trace(trace)
     formats.chosen(path, "animation")
     if isinstance(frames, bool) or not isinstance(frames, int) or frames < 2:
-        raise ParameterError(f"frames is {shown(frames)}; it must be a whole number of at least 2")
+        raise ParameterError(
+            "it must be a whole number of at least 2", place="frames", value=frames
+        )
     if not 0 < fps <= FASTEST:
-        raise ParameterError(f"fps is {shown(fps)}; it must be above 0 and at most {FASTEST}")
+        raise ParameterError(f"it must be above 0 and at most {FASTEST}", place="fps", value=fps)
     Sheet(trace.model.chart, notation, "TB", theme)  # refuses wrong options before any work
     first, last = float(trace.t.min()), float(trace.t.max())
     begin = first if t_start is None else t_start
     end = last if t_end is None else t_end
     if not first <= begin < end <= last:
         raise ParameterError(
-            f"t_start is {shown(begin)} s and t_end is {shown(end)} s; they must lie within the "
-            f"run, {first:g} to {last:g} s, in this order"
+            f"t_start is {shown(begin)} s and t_end is {shown(end)} s",
+            advice=f"they must lie within the run, {first:g} to {last:g} s, in this order",
         )
     rows = trace.sample(np.linspace(begin, end, frames))
     chart = LiveChart(rows, elements, notation=notation, theme=theme)

@@ -20,7 +20,7 @@ from itertools import pairwise
 
 import graphviz
 
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.errors import ParameterError
 from plots.style import (
     BLUE,
     BLUE_TINT,
@@ -78,7 +78,7 @@ def block_diagram(elements: int = 4) -> graphviz.Digraph:
     """
     if isinstance(elements, bool) or not isinstance(elements, int) or elements < 1:
         raise ParameterError(
-            f"elements is {shown(elements)}; a model has a whole number of elements, at least 1"
+            "a model has a whole number of elements, at least 1", place="elements", value=elements
         )
     graph = graphviz.Digraph(
         name="block diagram",

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+from gms_fsm._arguments import checked_path
 from gms_fsm._extras import EXTRAS
 from gms_fsm._files import written_whole
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.errors import ParameterError
 
 __all__ = [
     "FORMATS",
@@ -72,13 +73,13 @@ class Format:
     def __post_init__(self) -> None:
         if not isinstance(self.ending, str) or not re.fullmatch(r"\.[a-z0-9]+", self.ending):
             raise ParameterError(
-                f"ending is {shown(self.ending)}; it must be a dot and small letters or digits"
+                "it must be a dot and small letters or digits", place="ending", value=self.ending
             )
         for name, known in (("subject", get_args(Subject)), ("extra", ("", *EXTRAS))):
             value = getattr(self, name)
             if value not in known:
                 raise ParameterError(
-                    f"{name} is {shown(value)}; it must be one of {', '.join(map(repr, known))}"
+                    f"it must be one of {', '.join(map(repr, known))}", place=name, value=value
                 )
 
 
@@ -287,10 +288,11 @@ def chosen(path: str | Path, *subjects: Subject) -> Format:
     Traceback (most recent call last):
     gms_fsm.errors.ParameterError: path is 'a.bmp'; it must end in .png, .svg or .pdf
     """
+    path = checked_path("path", path)
     for each in of(*subjects):
-        if Path(path).suffix.lower() == each.ending:
+        if path.suffix.lower() == each.ending:
             return each
-    raise ParameterError(f"path is {str(path)!r}; it must end in {listed(*subjects)}")
+    raise ParameterError(f"it must end in {listed(*subjects)}", place="path", value=str(path))
 
 
 def save(made: Any, path: str | Path, *subjects: Subject) -> Path:

@@ -17,10 +17,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from gms_fsm._arguments import checked_whole
 from gms_fsm.errors import OutputError, ParameterError, shown
 from gms_fsm.inspection.explain import values_at
 from gms_fsm.language import Condition, clauses, evaluate
-from gms_fsm.traces.trace import Trace
+from gms_fsm.traces.trace import Trace, check_trace
 from plots._labels import FALSE, TRUE, UNKNOWN, Piece, Row, element_id, part_id
 from plots.render import picture
 from plots.statechart import Sheet, chosen
@@ -114,6 +115,7 @@ class LiveChart:
         values: bool = False,
         direction: str = "TB",
     ) -> None:
+        check_trace(trace)
         self.trace = trace
         self.elements = chosen(trace.n if elements is None else elements, trace.n)
         self.values = values
@@ -161,10 +163,10 @@ class LiveChart:
             If the time lies outside the run.
         """
         times = self.trace.t
-        if not times.min() <= t <= times.max():
+        if not isinstance(t, float | int | np.number) or not times.min() <= t <= times.max():
             raise ParameterError(
-                f"t is {shown(t)} s; it must lie within the run, {times.min():g} to "
-                f"{times.max():g} s"
+                f"t is {shown(t)} s",
+                advice=f"it must lie within the run, {times.min():g} to {times.max():g} s",
             )
         # Not a bisection: the rows of Trace.sample come in the order they were asked for.
         before = np.flatnonzero(times <= t)
@@ -193,6 +195,7 @@ class LiveChart:
 
     def _row(self, row: int) -> int:
         rows = len(self.trace)
+        row = checked_whole("row", row)
         if not -rows <= row < rows:
             raise IndexError(f"row {row}: the trace has {rows} rows")
         return row % rows
@@ -310,7 +313,9 @@ def live_statechart(
     '<svg'
     """
     if (row is None) == (t is None):
-        raise ParameterError(f"row is {shown(row)} and t is {shown(t)}; give exactly one of them")
+        raise ParameterError(
+            "give exactly one of them", place=f"row is {shown(row)} and t", value=t
+        )
     chart = LiveChart(
         trace, elements, notation=notation, theme=theme, values=values, direction=direction
     )
@@ -366,8 +371,8 @@ def _paired(rows: Sequence[Row], nodes: Sequence[ElementTree.Element]) -> Texts:
     pieces = [piece for row in rows for piece in row]
     if len(pieces) != len(nodes):
         raise OutputError(
-            f"Graphviz wrote {len(nodes)} texts for {len(pieces)}; this version of Graphviz cannot "
-            "be used for live charts, install another"
+            f"Graphviz wrote {len(nodes)} texts for {len(pieces)}",
+            advice="this version of Graphviz cannot be used for live charts, install another",
         )
     return list(zip(pieces, nodes, strict=True))
 

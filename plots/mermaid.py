@@ -11,6 +11,7 @@ import json
 import re
 from collections.abc import Iterator
 
+from gms_fsm._arguments import checked_kind
 from gms_fsm.charts.chart import Chart, State
 from gms_fsm.language import MATLAB_LIKE, spell
 
@@ -47,6 +48,7 @@ def mermaid(chart: Chart) -> str:
         s1_bristle : during#58; dz = v - sigma_0 * |v| * z / s#59;
     <BLANKLINE>
     """
+    checked_kind("chart", chart, Chart, "a Chart, of a model its .chart")
     ids = {state.name: _id(i, state.name) for i, state in enumerate(chart.states, start=1)}
     title = json.dumps(_printable(chart.name), ensure_ascii=False)
     lines = [f"[*] --> {ids[chart.default_state.name]}"]

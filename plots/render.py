@@ -15,6 +15,7 @@ from pathlib import Path
 
 import graphviz
 
+from gms_fsm._arguments import checked_path
 from gms_fsm._extras import missing
 from gms_fsm._files import written_whole
 from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
@@ -65,10 +66,10 @@ def render(graph: graphviz.Digraph, path: str | Path) -> Path:
     """
     if not hasattr(graph, "source"):
         raise ParameterError(
-            f"graph is {graph!r:.60}; give first the graph, for example from statechart, then the "
-            "path"
+            f"graph is {graph!r:.60}",
+            advice="give first the graph, for example from statechart, then the path",
         )
-    path = Path(path)
+    path = checked_path("path", path)
     chart: tuple[formats.Subject, ...] = ("chart",) if isinstance(graph, ChartGraph) else ()
     try:
         content = formats.chosen(path, "graph", *chart).write(graph)

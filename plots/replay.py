@@ -21,8 +21,8 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
+from gms_fsm._arguments import checked_kind, listed
 from gms_fsm._extras import missing
-from gms_fsm._files import written_whole
 from gms_fsm.errors import ParameterError
 from gms_fsm.language import (
     COMPARISONS,
@@ -33,6 +33,7 @@ from gms_fsm.language import (
     SEVERAL,
 )
 from gms_fsm.traces.trace import Trace, check_trace
+from plots import formats
 from plots._replay_chart import chart_svg
 from plots._replay_run import common_frames, frames_of_run, page_rows, stored_run
 from plots.style import (
@@ -96,7 +97,7 @@ class Replay:
         Parameters
         ----------
         path : str or Path
-            Usually ends in ``.html``.
+            Ends like one of the pages' formats in `plots.formats.FORMATS`, as ``.html``.
 
         Returns
         -------
@@ -105,10 +106,12 @@ class Replay:
 
         Raises
         ------
+        ParameterError
+            If the ending is another one.
         OutputError
             If the folder cannot be written.
         """
-        return written_whole(Path(path), lambda file: file.write(self.html.encode()))
+        return formats.save(self, path, "page")
 
 
 def replay(
@@ -162,7 +165,7 @@ def write_replay(
     Parameters
     ----------
     path : str or Path
-        The file; its folder has to exist.
+        The file; its folder has to exist, and its ending chooses the format, as ``.html``.
     trace, other, title, names
         See `replay`.
 
@@ -174,12 +177,13 @@ def write_replay(
     Raises
     ------
     ParameterError
-        If there are names, but not one a run.
+        If there are names, but not one a run, or the ending is another one.
     MissingExtraError
         If uPlot is not installed.
     OutputError
         If the folder cannot be written.
     """
+    formats.chosen(path, "page")  # before any work
     return replay(trace, other, title=title, names=names).save(path)
 
 
@@ -208,9 +212,13 @@ def replay_html(
     traces = [trace] if other is None else [trace, other]
     for each in traces:
         check_trace(each)
+    checked_kind("title", title, str, "a text")
+    names = [checked_kind("names", each, str, "texts") for each in listed("names", names, "texts")]
     plot_script, plot_style = _uplot()
     if len(names) not in (0, len(traces)):
-        raise ParameterError(f"{len(traces)} run(s) but names = {list(names)!r}; give one each")
+        raise ParameterError(
+            f"{len(traces)} run(s) but names = {list(names)!r}", advice="give one each"
+        )
     pictures = [chart_svg(each.model.chart, each.n) for each in traces]
     charts = list(dict.fromkeys(pictures))
     chosen = [page_rows(each) for each in traces]

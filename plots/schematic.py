@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.errors import ParameterError
 from gms_fsm.traces.trace import Trace, check_trace
 from plots._matplotlib import Artist, Axes, FancyArrowPatch, Figure, Rectangle, rc_context
 from plots.panels._shown import scaled
@@ -76,14 +76,16 @@ def schematic(
         check_trace(trace)
     n = elements if trace is None else trace.n
     if not isinstance(n, (int, np.integer)) or isinstance(n, bool) or not 1 <= n <= MOST:
-        raise ParameterError(f"elements is {shown(n)}; a schematic shows 1 to {MOST} elements")
+        raise ParameterError(f"a schematic shows 1 to {MOST} elements", place="elements", value=n)
     if trace is not None and (
         not isinstance(row, (int, np.integer))
         or isinstance(row, bool)
         or not -len(trace) <= row < len(trace)
     ):
         raise ParameterError(
-            f"row is {shown(row)}; it must be a whole number from {-len(trace)} to {len(trace) - 1}"
+            f"it must be a whole number from {-len(trace)} to {len(trace) - 1}",
+            place="row",
+            value=row,
         )
     drawn: list[Artist] = []
     shift = np.zeros(n)

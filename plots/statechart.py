@@ -16,8 +16,9 @@ from math import ceil, sqrt
 
 import graphviz
 
+from gms_fsm._arguments import checked_kind, listed
 from gms_fsm.charts.chart import Chart, State, Transition
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.errors import ParameterError
 from gms_fsm.language import Both, Condition, Either, clauses
 from gms_fsm.traces.trace import Trace
 from plots._labels import (
@@ -109,13 +110,18 @@ def statechart(
     True
     """
     if not hasattr(chart, "guards"):
-        raise ParameterError(f"chart is {chart!r:.60}; give a Chart, of a model its .chart")
+        raise ParameterError(
+            f"chart is {chart!r:.60}", advice="give a Chart, of a model its .chart"
+        )
+    checked_kind("note", note, str, "a text")
+    if counts is not None:
+        checked_kind("counts", counts, Trace, "a Trace, a run of this chart")
     if counts is not None and counts.model.chart != chart:
         raise ParameterError(
-            f"counts is a run of the chart {counts.model.chart.name!r}; it must be one of the "
-            f"chart that is drawn, {chart.name!r}"
+            f"counts is a run of the chart {counts.model.chart.name!r}",
+            advice=f"it must be one of the chart that is drawn, {chart.name!r}",
         )
-    pointed = tuple(marked)
+    pointed = tuple(listed("marked", marked, "names of states and edges"))
     parts = [*(state.name for state in chart.states), *(edge.name for edge in chart.transitions)]
     for name in pointed:
         one_of("marked", name, parts)
@@ -156,18 +162,21 @@ def chosen(elements: int | Sequence[int], n: int | None = None) -> tuple[int, ..
         numbers = tuple(_whole(number, "elements") for number in elements)
         if not numbers or min(numbers) < 0 or len(set(numbers)) < len(numbers):
             raise ParameterError(
-                f"elements is {shown(elements)}; it must be element numbers counted from 0, at "
-                f"least one and none twice{limit}"
+                f"it must be element numbers counted from 0, at least one and none twice{limit}",
+                place="elements",
+                value=elements,
             )
     else:
         count = _whole(elements, "elements")
         if count < 1:
             raise ParameterError(
-                f"elements is {shown(elements)}; a chart has a whole number of elements, at least 1"
+                "a chart has a whole number of elements, at least 1",
+                place="elements",
+                value=elements,
             )
         numbers = tuple(range(count))
     if n is not None and max(numbers) >= n:
-        raise ParameterError(f"elements is {shown(elements)}; there is no such element{limit}")
+        raise ParameterError(f"there is no such element{limit}", place="elements", value=elements)
     return numbers
 
 
@@ -176,7 +185,7 @@ def _whole(number: object, name: str) -> int:
         return operator.index(number)  # type: ignore[arg-type]  # that is what is tried
     except TypeError:
         raise ParameterError(
-            f"{name} is {shown(number)}; a chart has a whole number of elements, at least 1"
+            "a chart has a whole number of elements, at least 1", place=name, value=number
         ) from None
 
 
@@ -205,7 +214,7 @@ def one_of(name: str, value: str, allowed: Iterable[str]) -> str:
     words = tuple(allowed)
     if value not in words:
         listed = " or ".join(repr(word) for word in words)
-        raise ParameterError(f"{name} is {shown(value)}; it must be {listed}")
+        raise ParameterError(f"it must be {listed}", place=name, value=value)
     return value
 
 

@@ -295,7 +295,9 @@ def test_a_record_that_ends_before_the_run_keeps_its_part(
     )
     (tmp_path / "own.csv").write_text(GOOD)
     answer = gms_fsm("run", tmp_path / "scenario.toml", "-o", tmp_path / "out")
-    one_message(answer, "scenario.toml", "ends at t = 0.59 s", "t_end = 10.0", "partial.npz")
+    one_message(
+        answer, "scenario.toml", "a sampled signal at t = 0.59 s", "t_end = 10.0", "partial.npz"
+    )
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"partial.npz", LIST}
     part = Trace.load(tmp_path / "out" / "partial.npz")
     np.testing.assert_array_equal(part.t, [float(line.split(",")[0]) for line in LINES[1:]])

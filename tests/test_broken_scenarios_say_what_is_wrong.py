@@ -324,7 +324,9 @@ def test_a_measured_signal_that_is_too_short_keeps_its_part(
     (tmp_path / "short.toml").write_text(text)
     (tmp_path / "own.csv").write_text(sine_table(60))
     answer = gms_fsm("run", tmp_path / "short.toml", "-o", tmp_path / "out")
-    one_message(answer, "short.toml", "ends at t = 0.59 s", "t_end = 1.0", "partial.npz")
+    one_message(
+        answer, "short.toml", "a sampled signal at t = 0.59 s", "t_end = 1.0", "partial.npz"
+    )
     assert Trace.load(tmp_path / "out" / "partial.npz").t[-1] == 0.59
 
 

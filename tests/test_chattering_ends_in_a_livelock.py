@@ -25,8 +25,8 @@ def test_the_error_names_the_element_and_says_that_it_chatters(weights, element,
     assert 50 <= len(log) <= 100
     assert 0.0 < log.t[-1] - log.t[0] < 1e-8
     for part in (
-        f"element {element} switched {len(log)} times in ",
-        f"at t = {t}",
+        f"switched {len(log)} times in ",
+        f"element {element} at t = {t}",
         "chattering",
         f"last by '{log.edge[-1]}' from {log.source[-1]} to {log.target[-1]}",
         "leave a gap",

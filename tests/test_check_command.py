@@ -99,7 +99,7 @@ def test_the_list_names_everything_and_says_what_is_wrong(gms_fsm: CommandLine) 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ((), ("it must be one of gms, lugre, broken:overlap",)),
+        ((), ("it must be one of ", "gms, ", "lugre, ", "broken:overlap")),
         (("literal",), ("'literal'", "broken:literal")),
         (("gms",), ("--law signed or --law published",)),
         (("lugre", "--law", "signed"), ("takes no --law",)),

@@ -42,8 +42,8 @@ def test_the_text_has_one_home() -> None:
     texts = {p: p.read_text(encoding="utf-8") for p in sources if p.suffix == ".py"}
     homes = {p.relative_to(ROOT).as_posix() for p, text in texts.items() if "gms-fsm[" in text}
     raised = {p.name for p, text in texts.items() if "MissingExtraError(" in text}
-    assert homes == {"gms_fsm/_extras.py", "plots/replay.py"}
-    assert raised == {"_extras.py", "errors.py", "replay.py"}
+    assert homes == {"gms_fsm/_extras.py"}
+    assert raised == {"_extras.py", "errors.py"}
 
 
 def made() -> Sweep:

@@ -170,12 +170,17 @@ def test_an_unknown_lesson_lists_the_lessons(gms_fsm: CommandLine, asked: str) -
 
 
 @pytest.mark.parametrize(
-    "arguments", [("code", "--law", "foo"), ("chart", "foo"), ("blocks", "--elements", "x")]
+    ("arguments", "said"),
+    [
+        (("code", "--law", "foo"), "error: code gms has no law 'foo'; give --law signed"),
+        (("chart", "foo"), "error: name is 'foo'; it must be one of gms, lugre"),
+        (("blocks", "--elements", "x"), "Invalid value"),
+    ],
 )
-def test_no_prefix_of_another_library(arguments: tuple[str, ...]) -> None:
+def test_no_prefix_of_another_library(arguments: tuple[str, ...], said: str) -> None:
     done = run(*arguments)
     assert done.returncode == 2
-    assert "Invalid value" in done.stderr
+    assert said in done.stderr
     assert "Value error" not in done.stderr
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from pathlib import Path
 
@@ -24,47 +25,35 @@ def run() -> Trace:
     return simulate(stick_slip("signed"), open_loop(), 10.0)
 
 
+def panels_with(argument: str) -> list[Callable[..., object]]:
+    """Return all panels that take an argument, and need no other than Axes and Trace."""
+    found = []
+    for panel in (getattr(panels, name) for name in panels.__all__):
+        taken = inspect.signature(panel).parameters
+        needed = [name for name, each in taken.items() if each.default is each.empty]
+        if needed == ["ax", "trace"] and argument in taken:
+            found.append(panel)
+    return found
+
+
+def test_panels_are_found() -> None:
+    assert {panels.velocity, panels.cascade, panels.stribeck} <= set(panels_with("window"))
+    assert {panels.force, panels.margins} <= set(panels_with("elements"))
+
+
 WINDOWS = [(3.0, 1.0), (1.0, 1.0), (-1.0, 2.0), (1.0, 11.0), (1.0,), (1, 2, 3), 5.0, ("a", 2)]
 WINDOWS += [(np.nan, 2.0)]
 
 
 @pytest.mark.parametrize("window", WINDOWS, ids=str)
-@pytest.mark.parametrize(
-    "panel",
-    [
-        panels.velocity,
-        panels.force,
-        panels.deflections,
-        panels.ratio,
-        panels.ribbons,
-        panels.margins,
-        panels.cascade,
-        panels.portrait,
-        panels.hysteresis,
-        panels.stribeck,
-    ],
-    ids=lambda panel: panel.__name__,
-)
+@pytest.mark.parametrize("panel", panels_with("window"), ids=lambda panel: panel.__name__)
 def test_windows(run: Trace, panel: Callable[..., object], window: object) -> None:
     with pytest.raises(ParameterError, match=r"window is .* t0 < t1 inside the run, 0 to 10 s"):
         panel(Figure().subplots(), run, window=window)
 
 
 @pytest.mark.parametrize("elements", [[], [4], [-1], [0, 0], [1.0], [True], "01", 2], ids=str)
-@pytest.mark.parametrize(
-    "panel",
-    [
-        panels.force,
-        panels.deflections,
-        panels.ratio,
-        panels.ribbons,
-        panels.margins,
-        panels.cascade,
-        panels.portrait,
-        panels.hysteresis,
-    ],
-    ids=lambda panel: panel.__name__,
-)
+@pytest.mark.parametrize("panel", panels_with("elements"), ids=lambda panel: panel.__name__)
 def test_elements(run: Trace, panel: Callable[..., object], elements: object) -> None:
     with pytest.raises(ParameterError, match=r"elements is .* from 0 to 3"):
         panel(Figure().subplots(), run, elements=elements)

@@ -116,7 +116,7 @@ BROKEN: list[tuple[Callable[..., object], dict[str, Any], list[str]]] = [
     (bank, {"stribeck": 1.0}, ["stribeck is 1.0", "must be a Stribeck"]),
     (bank, {"stribeck": None}, ["stribeck is None", "must be a Stribeck"]),
     # shares
-    (shares, {"alpha": (0.5, 0.4)}, ["alpha adds up to 0.9", "add up to 1"]),
+    (shares, {"alpha": (0.5, 0.4)}, ["alpha: the shares add up to 0.9", "add up to 1"]),
     (shares, {"alpha": (1.0, 0.0)}, ["alpha[1] (element 2) is 0.0", "> 0"]),
     (shares, {"alpha": (1.5, -0.5)}, ["alpha[1] (element 2) is -0.5", "> 0"]),
     (shares, {"alpha": (1.0,)}, ["alpha has 1 entries", "2"]),

@@ -63,7 +63,7 @@ def test_a_second_condition_starts_from_the_located_place() -> None:
 def test_never_is_the_end_of_the_run() -> None:
     session = _stuck()
     here = session.until("z1 > 5")
-    assert (here.t, here.located, session.branch.outcome) == (6.0, False, "end")
+    assert (here.t, here.located, session.branch.ended) == (6.0, False, True)
 
 
 def test_a_state_becomes_true_on_the_row_of_its_firing() -> None:

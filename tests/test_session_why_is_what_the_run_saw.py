@@ -24,7 +24,7 @@ def test_every_row_and_element(case: str) -> None:
         for element in range(model.n):
             assert session.why(element) == explain(trace, row, element)
         session.step()
-    assert session.branch.outcome == "end"
+    assert session.branch.ended
 
 
 def test_clauses_are_the_guard_by_hand() -> None:

@@ -356,7 +356,7 @@ def test_a_run_that_fails_is_a_row_and_ends_no_other(engine: str) -> None:
     ]
     words = {
         1: "F_c is -1.0",
-        3: "element 2 switched 100 times at t = 6.66",
+        3: "element 2 at t = 6.66",
         5: "not finite",
         7: "F_s is 1.5, F_c is 9.0",
         8: "k is nan",

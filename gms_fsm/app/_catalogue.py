@@ -40,15 +40,18 @@ def chosen(verb: str, name: str, law: str) -> tuple[Entry, Chart]:
     try:
         found = entry(name)
     except ParameterError as error:
-        raise ParameterError(f"{error} (a chart of your own: {OWN})") from None
+        advice = "; ".join(filter(None, (error.advice, f"for a chart of your own: {OWN}")))
+        raise error.replaced(advice=advice) from None
     options = " or ".join(f"--law {each}" for each in found.laws)
     if law and not options:
         others = [each.name for each in registered().values() if each.laws]
-        raise ParameterError(f"{verb} {name} takes no --law; only {', '.join(others)} does")
+        raise ParameterError(
+            f"{verb} {name} takes no --law", advice=f"only {', '.join(others)} does"
+        )
     if options and not law:
-        raise ParameterError(f"{verb} {name} needs {options}; they differ")
+        raise ParameterError(f"{verb} {name} needs {options}", advice="they differ")
     if law not in found.laws and options:
-        raise ParameterError(f"{verb} {name} has no law {law!r}; give {options}")
+        raise ParameterError(f"{verb} {name} has no law {law!r}", advice=f"give {options}")
     return found, found.chart(law)
 
 

@@ -140,7 +140,8 @@ class GMSTable(Table):
                     sigma_2=sigma_2,
                 )
             except ParameterError as error:
-                raise ValueError(str(error).replace("alpha", "shares")) from None
+                place = "shares" + error.place.removeprefix("alpha")
+                raise error.replaced(place=place) if error.place != place else error from None
         else:
             if not isinstance(self.C, list):
                 raise ValueError("C must be a list, one number [m/s] an element (or give shares)")

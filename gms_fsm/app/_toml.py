@@ -45,27 +45,35 @@ def parsed(path: Path) -> dict[str, Any]:
         with path.open("rb") as file:
             raw = file.read(LARGEST_FILE + 1)
     except FileNotFoundError:
-        raise ScenarioError(f"{path}: no such file; check its name and the folder") from None
+        raise ScenarioError(
+            "no such file", place=str(path), advice="check its name and the folder"
+        ) from None
     except OSError as error:
         raise ScenarioError(
-            f"{path}: cannot be read ({error.strerror}); give a file that can"
+            f"cannot be read ({error.strerror})", place=str(path), advice="give a file that can"
         ) from None
     if len(raw) > LARGEST_FILE:
-        raise ScenarioError(f"{path}: larger than {LARGEST_FILE} bytes; records go in own files")
+        raise ScenarioError(
+            f"larger than {LARGEST_FILE} bytes", place=str(path), advice="records go in own files"
+        )
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise ScenarioError(f"{path}: not UTF-8 text; a scenario is a TOML file") from None
+        raise ScenarioError(
+            "not UTF-8 text", place=str(path), advice="a scenario is a TOML file"
+        ) from None
     if endless := _ENDLESS_KEY.search(text):
         line = text.count("\n", 0, endless.start()) + 1
         raise ScenarioError(
-            f"{path}: line {line}: a key of more than 20 parts; no key lies this deep"
+            f"line {line}: a key of more than 20 parts",
+            place=str(path),
+            advice="no key lies this deep",
         )
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # a number of 5,000 digits is a ValueError
         hint = _with_digits(text)
-        raise ScenarioError(f"{path}: not valid TOML: {cut(str(error))}{hint}") from None
+        raise ScenarioError(f"not valid TOML: {cut(str(error))}{hint}", place=str(path)) from None
 
 
 def _with_digits(text: str) -> str:
@@ -97,26 +105,30 @@ def override(data: dict[str, Any], setting: str) -> None:
     key, equals, text = setting.partition("=")
     parts = [part.strip() for part in key.split(".")]
     if not equals or not all(parts):
-        raise ScenarioError(f"--set {cut(setting)}: give it as key=value, for example run.t_end=10")
+        raise ScenarioError(
+            "give it as key=value, for example run.t_end=10", place=f"--set {cut(setting)}"
+        )
     if "\n" in setting:
         line = setting.partition("\n")[0]
-        raise ScenarioError(f"--set {cut(line)}: one key and one value, on one line")
+        raise ScenarioError("one key and one value, on one line", place=f"--set {cut(line)}")
     if len(parts) > DEEPEST_KEY:
-        raise ScenarioError(f"--set {cut(setting)}: no key lies this deep")
+        raise ScenarioError("no key lies this deep", place=f"--set {cut(setting)}")
     if _ENDLESS_KEY.search(text):
-        raise ScenarioError(f"--set {cut(setting)}: no key lies this deep")
+        raise ScenarioError("no key lies this deep", place=f"--set {cut(setting)}")
     try:
         value = tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         value = text.strip()
         hint = _with_digits(text)
         if hint and (value[0] in "[{" or _HALF_A_NUMBER.fullmatch(value)):
-            raise ScenarioError(f"--set {cut(setting)}: not valid TOML{hint}") from None
+            raise ScenarioError(f"not valid TOML{hint}", place=f"--set {cut(setting)}") from None
     except (ValueError, RecursionError) as error:
-        raise ScenarioError(f"--set {cut(setting)}: {cut(str(error))}") from None
+        raise ScenarioError(f"{cut(str(error))}", place=f"--set {cut(setting)}") from None
     table = data
     for part in parts[:-1]:
         table = table.setdefault(part, {})
         if not isinstance(table, dict):
-            raise ScenarioError(f"--set {cut(setting)}: {shown(part)} is a value, not a table")
+            raise ScenarioError(
+                f"{shown(part)} is a value, not a table", place=f"--set {cut(setting)}"
+            )
     table[parts[-1]] = value

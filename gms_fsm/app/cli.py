@@ -484,15 +484,13 @@ def replay_command(
 ) -> None:
     """Write a run as one web page that is stepped, scrubbed and explained."""
     from gms_fsm.traces.trace import Trace, files_of
-    from plots import formats
-    from plots.replay import replay
+    from plots import write_replay
 
     no_input(output, *files_of(trace), *([] if other is None else files_of(other)))
     second = None if other is None else Trace.load(other)
     names = [] if other is None else [trace.stem, other.stem]
-    formats.chosen(output, "page")
-    page = replay(Trace.load(trace), second, title=title, names=names)
-    typer.echo(str(formats.save(page, output, "page")))
+    page = write_replay(output, Trace.load(trace), second, title=title, names=names)
+    typer.echo(str(page))
 
 
 @app.command("debug")
@@ -572,8 +570,9 @@ def main() -> None:
         if wishes.debug:
             _with_causes(error)
             raise
+        told = "\n".join([str(error), *getattr(error, "__notes__", ())])
         _messages(soft_wrap=True).print(
-            f"[bold red]error:[/] {_escaped(str(error))}", highlight=False, emoji=False
+            f"[bold red]error:[/] {_escaped(told)}", highlight=False, emoji=False
         )
         sys.exit(2)
 

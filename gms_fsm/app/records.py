@@ -114,7 +114,7 @@ def read_record(
     """
     path = Path(path)
     if "time" not in columns:
-        raise RecordError(f"{path}: no column for 'time' is given")
+        raise RecordError("no column for 'time' is given", place=str(path))
     cells, words = _read_cells(path, columns, delimiter)
     values = {
         quantity: column.sign * factor(quantity, column.unit) * cells[quantity]
@@ -124,7 +124,9 @@ def read_record(
     chosen = _chosen(path, values, where, rows)
     if not chosen.any():
         raise RecordError(
-            f"{path}: no row fulfils where = {shown(where)}; choose another condition"
+            f"no row fulfils where = {shown(where)}",
+            place=str(path),
+            advice="choose another condition",
         )
     first, last = np.flatnonzero(chosen)[[0, -1]]
     moving = [value for quantity, value in values.items() if quantity not in LOADS]
@@ -162,25 +164,36 @@ def _lines(path: Path) -> Iterator[str]:
                 number += 1
                 if len(line) > LONGEST_LINE:
                     raise RecordError(
-                        f"{path}: line {number} is longer than {LONGEST_LINE} characters; "
-                        "this is not a table with one row a line"
+                        f"line {number} is longer than {LONGEST_LINE} characters",
+                        place=str(path),
+                        advice="this is not a table with one row a line",
                     )
                 if number > LONGEST_FILE:
-                    raise RecordError(f"{path}: more than {LONGEST_FILE} rows; thin it out first")
+                    raise RecordError(
+                        f"more than {LONGEST_FILE} rows",
+                        place=str(path),
+                        advice="thin it out first",
+                    )
                 if b"\0" in line:
                     raise RecordError(
-                        f"{path}: line {number} holds binary data; give a text table (CSV or TSV)"
+                        f"line {number} holds binary data",
+                        place=str(path),
+                        advice="give a text table (CSV or TSV)",
                     )
                 try:
                     yield line.decode("utf-8-sig" if number == 1 else "utf-8")
                 except UnicodeDecodeError:
                     raise RecordError(
-                        f"{path}: line {number} is not UTF-8 text; save the table as UTF-8 CSV"
+                        f"line {number} is not UTF-8 text",
+                        place=str(path),
+                        advice="save the table as UTF-8 CSV",
                     ) from None
     except FileNotFoundError:
-        raise RecordError(f"{path}: no such file; check its name and the folder") from None
+        raise RecordError(
+            "no such file", place=str(path), advice="check its name and the folder"
+        ) from None
     except OSError as error:
-        raise RecordError(f"{path}: cannot be read ({error.strerror})") from None
+        raise RecordError(f"cannot be read ({error.strerror})", place=str(path)) from None
 
 
 def _read_cells(
@@ -190,7 +203,7 @@ def _read_cells(
     lines = _lines(path)
     head_line = next(lines, "")
     if not head_line.strip():
-        raise RecordError(f"{path}: line 1 is empty; it must name the columns")
+        raise RecordError("line 1 is empty", place=str(path), advice="it must name the columns")
     if delimiter is None:
         delimiter = max("\t;,", key=head_line.count)
     head = [name.strip() for name in next(csv.reader([head_line], delimiter=delimiter))]
@@ -202,8 +215,9 @@ def _read_cells(
             if len(head) == 1:
                 advice = "if these are several columns, say what divides them: delimiter = ..."
             raise RecordError(
-                f"{path}: {what} {shown(column.name)} (for {quantity}); columns: "
-                f"{cut(', '.join(map(repr, head)), 1000)}; {advice}"
+                f"{what} {shown(column.name)} (for {quantity})",
+                place=str(path),
+                advice=f"columns: {cut(', '.join(map(repr, head)), 1000)}; {advice}",
             )
         places[quantity] = head.index(column.name)
     found: dict[str, list[float]] = {quantity: [] for quantity in columns}
@@ -213,12 +227,13 @@ def _read_cells(
         for row in csv.reader(lines, delimiter=delimiter):
             number += 1
             if not any(cell.strip() for cell in row):
-                raise RecordError(f"{path}: row {number} is empty; take it out")
+                raise RecordError(f"row {number} is empty", place=str(path), advice="take it out")
             if len(row) != len(head):
                 raise RecordError(
-                    f"{path}: row {number} has {len(row)} cells, the head line has {len(head)}; "
-                    "give each row as many, or say what divides the columns: delimiter = ... (a "
-                    "decimal comma is not read; write a point)"
+                    f"row {number} has {len(row)} cells, the head line has {len(head)}",
+                    place=str(path),
+                    advice="give each row as many, or say what divides the columns: delimiter = "
+                    "... (a decimal comma is not read; write a point)",
                 )
             for quantity, place in places.items():
                 try:
@@ -229,9 +244,11 @@ def _read_cells(
                     found[quantity].append(math.nan)
                     words[number, quantity] = cut(row[place])
     except csv.Error as error:
-        raise RecordError(f"{path}: row {number + 1} cannot be read ({error})") from None
+        raise RecordError(f"row {number + 1} cannot be read ({error})", place=str(path)) from None
     if number < 3:
-        raise RecordError(f"{path}: {number - 1} row(s) of data; at least 2 are needed")
+        raise RecordError(
+            f"{number - 1} row(s) of data", place=str(path), advice="at least 2 are needed"
+        )
     return {quantity: np.array(values) for quantity, values in found.items()}, words
 
 
@@ -244,15 +261,17 @@ def _chosen(
         condition = parse_condition(convert_numbers(where), QUANTITIES)
     except ExpressionError as error:
         in_place = ExpressionError(error.reason, where, error.column, error.allowed)
-        raise RecordError(f"{path}: record.where = {shown(where)}, {in_place}") from None
+        raise RecordError(f"record.where = {shown(where)}, {in_place}", place=str(path)) from None
     except UnitError as error:
-        raise RecordError(f"{path}: record.where = {shown(where)}: {error}") from None
+        raise RecordError.of(error).inside(f"record.where = {shown(where)}").inside(path) from None
     names = sorted(names_in(condition))
     for name in names:
         if name not in values:
             raise RecordError(
-                f"{path}: where = {shown(where)} uses {name!r}, which has no column; "
-                f"name its column, {name} = {{ column = ..., unit = ... }}, or leave {name} out"
+                f"where = {shown(where)} uses {name!r}, which has no column",
+                place=str(path),
+                advice=f"name its column, {name} = {{ column = ..., unit = ... }}, or leave "
+                f"{name} out",
             )
     table = zip(*(values[name].tolist() for name in names), strict=True)
     try:
@@ -261,8 +280,9 @@ def _chosen(
         )
     except (ArithmeticError, ValueError) as error:
         raise RecordError(
-            f"{path}: where = {shown(where)} cannot be computed in every row ({error}); change it "
-            "so that it can"
+            f"where = {shown(where)} cannot be computed in every row ({error})",
+            place=str(path),
+            advice="change it so that it can",
         ) from None
 
 
@@ -283,31 +303,38 @@ def _check(
     if wrong:
         row, quantity = min(wrong, key=lambda place: place[0])
         raise RecordError(
-            f"{path}: row {row}, column {shown(columns[quantity].name)}: "
-            f"{shown(words[row, quantity])} is not a number (a decimal point is a point); mend it, "
-            "or leave the row out by where = ..., a condition that does not hold there"
+            f"row {row}, column {shown(columns[quantity].name)}: "
+            f"{shown(words[row, quantity])} is not a number (a decimal point is a "
+            "point)",
+            place=str(path),
+            advice="mend it, or leave the row out by where = ..., a condition that does "
+            "not hold there",
         )
     for quantity, value in part.items():
         bad = np.flatnonzero(~np.isfinite(value) & (chosen | (quantity not in LOADS)))
         if bad.size:
             raise RecordError(
-                f"{path}: {_rows(numbers[bad])}, column {shown(columns[quantity].name)}: not a "
-                "finite number; take the rows out, or leave them out by where = ..., a condition "
-                "that does not hold there"
+                f"{_rows(numbers[bad])}, column {shown(columns[quantity].name)}: not a "
+                "finite number",
+                place=str(path),
+                advice="take the rows out, or leave them out by where = ..., a condition that "
+                "does not hold there",
             )
     time = part["time"]
     back = np.flatnonzero(np.diff(time) <= 0)
     if back.size:
         i = int(back[0])
         raise RecordError(
-            f"{path}: time does not increase after {_rows(numbers[back])} (row "
-            f"{numbers[i]}: {float(time[i])!r} s, next: {float(time[i + 1])!r} s); sort the "
-            "rows and take doubles out"
+            f"time does not increase after {_rows(numbers[back])} (row {numbers[i]}: "
+            f"{float(time[i])!r} s, next: {float(time[i + 1])!r} s)",
+            place=str(path),
+            advice="sort the rows and take doubles out",
         )
     if time.size < 5:
         raise RecordError(
-            f"{path}: only {time.size} rows count; at least 5 are needed (which rows count is said "
-            "by where = ...)"
+            f"only {time.size} rows count",
+            place=str(path),
+            advice="at least 5 are needed (which rows count is said by where = ...)",
         )
 
 
@@ -388,12 +415,16 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
     """
     time = record.columns["time"]
     if smoothing is not None and not smoothing >= 0.0:
-        raise RecordError(f"{record.path}: smoothing is {shown(smoothing)} s; it must be >= 0")
+        raise RecordError(
+            f"smoothing is {shown(smoothing)} s", place=str(record.path), advice="it must be >= 0"
+        )
     interval = float(np.median(np.diff(time)))
     if smoothing is not None and smoothing > time[-1] - time[0]:
         raise RecordError(
-            f"{record.path}: smoothing is {shown(smoothing)} s, longer than the record "
-            f"({time[-1] - time[0]:.6g} s); give less"
+            f"smoothing is {shown(smoothing)} s, longer than the record ({time[-1] - time[0]:.6g} "
+            "s)",
+            place=str(record.path),
+            advice="give less",
         )
     if "velocity" in record.columns:
         raw, given = record.columns["velocity"], "velocity"
@@ -403,8 +434,9 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
         tau = 4.0 * interval if smoothing is None else smoothing
     else:
         raise RecordError(
-            f"{record.path}: neither a position nor a velocity column is given; name one of them: "
-            "position = { column = ..., unit = ... }"
+            "neither a position nor a velocity column is given",
+            place=str(record.path),
+            advice="name one of them: position = { column = ..., unit = ... }",
         )
     # The spline is blind to the origin; without its offset the sums keep their digits.
     shift = float(raw[0])
@@ -412,9 +444,10 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
         spline = make_smoothing_spline(time, raw - shift, lam=tau**4 / interval)
     except (ArithmeticError, ValueError) as error:  # LinAlgError is a ValueError
         raise RecordError(
-            f"{record.path}: no smoothing spline fits the {given} column ({cut(str(error))}); "
-            "look for values or times that are far out and leave their rows out by where = ..., or "
-            "set another smoothing = ... (s)"
+            f"no smoothing spline fits the {given} column ({cut(str(error))})",
+            place=str(record.path),
+            advice="look for values or times that are far out and leave their rows out by "
+            "where = ..., or set another smoothing = ... (s)",
         ) from None
     smooth = spline(time) + shift
     if given == "position":
@@ -435,9 +468,10 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
         ]
     if not np.isfinite([velocity, position]).all():
         raise RecordError(
-            f"{record.path}: the {given} column has values too large to make a motion of, up to "
-            f"{float(np.abs(raw).max()):.3g} (SI); look for cells that are far out, and leave "
-            "their rows out by where = ..."
+            f"the {given} column has values too large to make a motion of, up to "
+            f"{float(np.abs(raw).max()):.3g} (SI)",
+            place=str(record.path),
+            advice="look for cells that are far out, and leave their rows out by where = ...",
         )
     return Motion(time, velocity, position, tau, _standstill(velocity), tuple(notes))
 

@@ -147,18 +147,14 @@ def run_scenario(
         )
     except SimulationError as error:
         kept = error.trace.save(folder / "partial.npz")
-        told = str(error).replace(" is kept in .trace", " is kept")
-        watched = [
-            line
-            for line, verdict in zip(
-                monitor_lines(error.trace), error.trace.monitors.values(), strict=True
-            )
-            if not getattr(verdict, "livelock", False)  # it is what has just been told
-        ]
-        error.args = ("\n".join([f"{loaded.path}: {told}; written to {kept}", *watched]),)
-        raise
+        failed = error.replaced(kept=kept).inside(loaded.path)
+        lines = zip(monitor_lines(error.trace), error.trace.monitors.values(), strict=True)
+        for line, verdict in lines:
+            if not getattr(verdict, "livelock", False):  # it is what has just been told
+                failed.add_note(line)
+        raise failed from error.__cause__
     except GMSError as error:
-        raise ScenarioError(f"{loaded.path}: {error}") from None
+        raise ScenarioError.of(error).inside(loaded.path) from None
     except KeyboardInterrupt as error:
         part: Any = getattr(error, "trace", ())  # none before the run has begun
         error.args = ("interrupted before the first row; nothing is written",)

@@ -95,23 +95,27 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
     data = parsed(path)
     if not data:
         raise ScenarioError(
-            f"{path}: the file is empty; a scenario has at least the tables [model], [rig] and "
-            "[run] (the folder scenarios/ has examples, gms-fsm schema prints all keys)"
+            "the file is empty",
+            place=str(path),
+            advice="a scenario has at least the tables [model], [rig] and [run] (the "
+            "folder scenarios/ has examples, gms-fsm schema prints all keys)",
         )
     for setting in overrides:
         override(data, setting)
     try:
         scenario = Scenario.model_validate(data)
     except ValidationError as error:
-        raise ScenarioError(f"{path}: {explained(error, data)}") from None
+        raise ScenarioError(explained(error, data), place=str(path)) from None
     try:
         return _loaded(path, scenario)
     except (RecordError, ScenarioError):
         raise
     except UnitError as error:
-        raise ScenarioError(f"{path}: [record] {error}") from None
+        place = f"[record] {error.place}".rstrip()
+        raise ScenarioError.of(error).replaced(place=place).inside(path) from None
     except GMSError as error:
-        raise ScenarioError(f"{path}: [rig] {error}") from None
+        place = f"[rig] {error.place}".rstrip()
+        raise ScenarioError.of(error).replaced(place=place).inside(path) from None
 
 
 def _loaded(path: Path, scenario: Scenario) -> Loaded:
@@ -147,8 +151,9 @@ def _loaded(path: Path, scenario: Scenario) -> Loaded:
         wanted = max(0.0, (end - start) / scenario.output.every)  # t_end is checked with the rest
         if wanted > 10_000_000:
             raise ScenarioError(
-                f"{path}: output.every = {scenario.output.every} s makes {wanted:.4g} rows; take "
-                "more"
+                f"output.every = {scenario.output.every} s makes {wanted:.4g} rows",
+                place=str(path),
+                advice="take more",
             )
         count = int(wanted)
         arguments["t_eval"] = np.minimum(start + scenario.output.every * np.arange(count + 1), end)
@@ -158,7 +163,7 @@ def _loaded(path: Path, scenario: Scenario) -> Loaded:
         try:
             arguments["monitors"] = tuple(checked(run.monitors, model).values())
         except GMSError as error:
-            raise ScenarioError(f"{path}: run.monitors: {error}") from None
+            raise ScenarioError.of(error).inside("run.monitors").inside(path) from None
     return Loaded(path, scenario, model, rig, arguments, record, motion)
 
 
@@ -170,7 +175,7 @@ def _signal(path: Path, given: SignalField, key: str, quantity: str) -> SignalLi
         try:
             record = read_record(file, columns, given.where, given.delimiter)
         except UnitError as error:
-            raise ScenarioError(f"{path}: {key}: {error}") from None
+            raise ScenarioError.of(error).inside(key).inside(path) from None
         rows = record.chosen
         return Corners(record.columns["time"][rows], record.columns[quantity][rows], held=False)
     try:
@@ -178,7 +183,7 @@ def _signal(path: Path, given: SignalField, key: str, quantity: str) -> SignalLi
             return as_signal([(t, value) for t, value in given])
         return as_signal(given)
     except GMSError as error:
-        raise ScenarioError(f"{path}: {key} = {shown(given)}: {error}") from None
+        raise ScenarioError.of(error).inside(f"{key} = {shown(given)}").inside(path) from None
 
 
 def find_file(scenario: Path, name: str) -> Path:
@@ -211,15 +216,19 @@ def find_file(scenario: Path, name: str) -> Path:
             there = place.is_file()
         except (OSError, ValueError) as error:  # too long, or with a null byte
             raise ScenarioError(
-                f"{scenario}: file = {shown(name)} is not a file name ({cut(str(error))})"
+                f"file = {shown(name)} is not a file name ({cut(str(error))})", place=str(scenario)
             ) from None
         if wanted.is_absolute() or not place.is_relative_to(folder.resolve()):
             raise ScenarioError(
-                f"{scenario}: file = {shown(name)} leads outside of the scenario's folder; put "
-                f"the file beside the scenario, or in the folder named by {DATA_VARIABLE}"
+                f"file = {shown(name)} leads outside of the scenario's folder",
+                place=str(scenario),
+                advice="put the file beside the scenario, or in the folder named by "
+                f"{DATA_VARIABLE}",
             )
         if there:
             return folder / wanted
     looked = " and ".join(str(folder) for folder in folders)
     hint = "" if len(folders) > 1 else f" (a data folder can be named by {DATA_VARIABLE})"
-    raise ScenarioError(f"{scenario}: file = {shown(name)}: no such file in {looked}{hint}")
+    raise ScenarioError(
+        f"file = {shown(name)}: no such file in {looked}{hint}", place=str(scenario)
+    )

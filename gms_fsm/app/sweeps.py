@@ -78,23 +78,26 @@ def axis(text: str) -> Axis:
     parts = form.split(":")
     if not (name and equals) or len(parts) != 3 or (comma and word != "log"):
         raise ParameterError(
-            f"{here}: give it as name=from:to:count, for example F_s=1:2:11, or with ,log behind "
-            "it for even steps of the logarithm"
+            "give it as name=from:to:count, for example F_s=1:2:11, or with ,log "
+            "behind it for even steps of the logarithm",
+            place=here,
         )
     try:
         start, stop, count = float(parts[0]), float(parts[1]), int(parts[2])
     except ValueError:
         raise ParameterError(
-            f"{here}: from and to must be numbers, and count a whole number"
+            "from and to must be numbers, and count a whole number", place=here
         ) from None
     if not (math.isfinite(start) and math.isfinite(stop)):
-        raise ParameterError(f"{here}: from and to must be finite")
+        raise ParameterError("from and to must be finite", place=here)
     if not 2 <= count <= MOST_RUNS:
-        raise ParameterError(f"{here}: count is {count}; it must be between 2 and {MOST_RUNS}")
+        raise ParameterError(
+            f"count is {count}", place=here, advice=f"it must be between 2 and {MOST_RUNS}"
+        )
     if not comma:
         return Axis(name, np.linspace(start, stop, count), "linear")
     if not (start > 0.0 and stop > 0.0):
-        raise ParameterError(f"{here}: with log both from and to must be > 0")
+        raise ParameterError("with log both from and to must be > 0", place=here)
     return Axis(name, np.geomspace(start, stop, count), "logarithmic")
 
 
@@ -160,17 +163,19 @@ def _known(loaded: Loaded) -> tuple[Parameter, ...]:
 
 def _check(axes: Sequence[Axis], known: Sequence[Parameter]) -> None:
     if not axes:
-        raise ParameterError("nothing to vary; give --over name=from:to:count at least once")
+        raise ParameterError(
+            "nothing to vary", advice="give --over name=from:to:count at least once"
+        )
     names = [each.name for each in axes]
     for name in names:
         if name not in [each.name for each in known]:
             units = (f"{each.name} [{each.unit}]".removesuffix(" []") for each in known)
             raise ParameterError(f"--over {cut(name)}: known here are {', '.join(units)}")
         if names.count(name) > 1:
-            raise ParameterError(f"--over {name}: it is given twice; once is enough")
+            raise ParameterError(f"--over {name}: it is given twice", advice="once is enough")
     runs = math.prod(each.values.size for each in axes)
     if runs > MOST_RUNS:
-        raise ParameterError(f"--over makes {runs} runs; make fewer, at most {MOST_RUNS}")
+        raise ParameterError(f"--over makes {runs} runs", advice=f"make fewer, at most {MOST_RUNS}")
 
 
 # --------------------------------------------------------------------------- what is written

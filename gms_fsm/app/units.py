@@ -50,10 +50,12 @@ def factor(quantity: str, unit: str) -> float:
     for other, units in FACTORS.items():
         if plain in units:
             raise UnitError(
-                f"unit {shown(unit)} measures {other}, not {quantity}; use one of "
-                f"{', '.join(known)}"
+                f"unit {shown(unit)} measures {other}, not {quantity}",
+                advice=f"use one of {', '.join(known)}",
             )
-    raise UnitError(f"unknown unit {shown(unit)}; for {quantity} use one of {', '.join(known)}")
+    raise UnitError(
+        f"unknown unit {shown(unit)}", advice=f"for {quantity} use one of {', '.join(known)}"
+    )
 
 
 def convert_numbers(text: str) -> str:

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+from gms_fsm._arguments import checked_kind
 from gms_fsm.charts.parameters import QUANTITIES, Parameter
 from gms_fsm.errors import ChartError, ExpressionError, shown
 from gms_fsm.language import (
@@ -66,8 +67,9 @@ class State:
         """Refuse what is no part of a state, in our words."""
         for name in sorted(given.keys() - {each.name for each in fields(cls)}):
             raise ChartError(
-                f"state {shown(given.get('name', '?'))}: a State takes name, flow, entry and exit, "
-                f"not {name!r}; states do not nest, so write one state for each combination"
+                f"a State takes name, flow, entry and exit, not {name!r}",
+                place=f"state {shown(given.get('name', '?'))}",
+                advice="states do not nest, so write one state for each combination",
             )
         return object.__new__(cls)
 
@@ -203,8 +205,9 @@ class Chart:
             for variable in self.variables:
                 if variable not in state.flow:
                     raise ChartError(
-                        f"{owner}: no flow for {variable!r}; give one, for example "
-                        f"flow={{{variable!r}: '0'}}"
+                        f"no flow for {variable!r}",
+                        place=owner,
+                        advice=f"give one, for example flow={{{variable!r}: '0'}}",
                     )
                 flows[state.name, variable] = _value(
                     state.flow[variable], symbols, f"{owner}, flow of {variable!r}"
@@ -222,13 +225,17 @@ class Chart:
         derivatives = tuple("d" + variable for variable in self.variables)
         if set(self.outputs) != {"F"}:
             raise ChartError(
-                f"{here}: outputs has {_listed(self.outputs)}; it must give exactly 'F', the force"
+                f"outputs has {_listed(self.outputs)}",
+                place=here,
+                advice="it must give exactly 'F', the force",
             )
         if hasattr(self.outputs["F"], "keys"):
             raise ChartError(
-                f"{here}: output 'F' is {shown(self.outputs['F'])}; it is one text for all states. "
-                "Where the law differs by state let a variable carry it, for example a variable f "
-                "with the flow 'k * v' in one state and an entry {'f': 'F_c * sgn(v)'} in another"
+                f"output 'F' is {shown(self.outputs['F'])}",
+                place=here,
+                advice="it is one text for all states. Where the law differs by state let a "
+                "variable carry it, for example a variable f with the flow 'k * v' in "
+                "one state and an entry {'f': 'F_c * sgn(v)'} in another",
             )
         forces = {
             name: _value(text, symbols + derivatives, f"{here}, output {name!r}")
@@ -248,11 +255,15 @@ class Chart:
         ):
             for given in getattr(self, each):
                 if not isinstance(given, wanted):
-                    raise ChartError(f"{here}: {each} has {shown(given)}; write it as {example}")
+                    raise ChartError(
+                        f"{each} has {shown(given)}", place=here, advice=f"write it as {example}"
+                    )
         if not self.states:
-            raise ChartError(f"{here}: it has no states; give at least one")
+            raise ChartError("it has no states", place=here, advice="give at least one")
         if not self.variables:
-            raise ChartError(f"{here}: it has no variables; give at least one, for example ('z',)")
+            raise ChartError(
+                "it has no variables", place=here, advice="give at least one, for example ('z',)"
+            )
         derivatives = ["d" + variable for variable in self.variables]
         groups = (
             ("input", self.inputs),
@@ -268,12 +279,15 @@ class Chart:
                 _check_name(name, kind, here)
                 if name in SUPPLIED and kind != "input":
                     raise ChartError(
-                        f"{here}: {kind} name {name!r} is taken; t, x, v and s can only be inputs"
+                        f"{kind} name {name!r} is taken",
+                        place=here,
+                        advice="t, x, v and s can only be inputs",
                     )
                 if name in owner:
                     raise ChartError(
-                        f"{here}: the name {name!r} is used twice ({owner[name]} and {kind}); "
-                        "every name must be unique"
+                        f"the name {name!r} is used twice ({owner[name]} and {kind})",
+                        place=here,
+                        advice="every name must be unique",
                     )
                 owner[name] = kind
         known = [s.name for s in self.states]
@@ -281,8 +295,9 @@ class Chart:
             for end, state in (("source", edge.source), ("target", edge.target)):
                 if state not in known:
                     raise ChartError(
-                        f"{here}, edge {edge.name!r}: {end} {state!r} is not a state; "
-                        f"states: {_listed(known)}"
+                        f"{end} {state!r} is not a state",
+                        place=f"{here}, edge {edge.name!r}",
+                        advice=f"states: {_listed(known)}",
                     )
 
     def _check_rules(self) -> None:
@@ -290,15 +305,18 @@ class Chart:
             known = {*self.parameter_names} - {each.name}
             for name in sorted(each.others - known):
                 raise ChartError(
-                    f"chart {self.name!r}, parameter {each.name!r}: its rule names {name!r}, which "
-                    f"is no other parameter; there are {_listed(sorted(known))}"
+                    f"chart {self.name!r}, parameter {each.name!r}: its rule names {name!r}, "
+                    "which is no other parameter",
+                    advice=f"there are {_listed(sorted(known))}",
                 )
 
     def _only_variables(self, texts: Mapping[str, str], owner: str) -> None:
         for name in texts:
             if name not in self.variables:
                 raise ChartError(
-                    f"{owner}: {name!r} is not a variable; variables: {_listed(self.variables)}"
+                    f"{name!r} is not a variable",
+                    place=owner,
+                    advice=f"variables: {_listed(self.variables)}",
                 )
 
     def _assignments(self, texts: Mapping[str, str], owner: str) -> dict[str, Value]:
@@ -344,7 +362,7 @@ class Chart:
         >>> LUGRE.unit("sigma_0"), LUGRE.unit("v"), LUGRE.unit("w")
         ('N/m', 'm/s', '')
         """
-        found = self.declared.get(name)
+        found = self.declared.get(checked_kind("name", name, str, "a text"))
         return "" if found is None else found.unit
 
     @property
@@ -373,7 +391,8 @@ class Chart:
         names = [s.name for s in self.states]
         if name not in names:
             raise ChartError(
-                f"chart {self.name!r} has no state {shown(name)}; its states are {_listed(names)}"
+                f"chart {self.name!r} has no state {shown(name)}",
+                advice=f"its states are {_listed(names)}",
             )
         return names.index(name)
 
@@ -405,6 +424,11 @@ class Chart:
         str
             For example ``"|v| <= v_c && |z| < s"``.
         """
+        if not isinstance(edge, str) or edge not in self.guards:
+            raise ChartError(
+                f"chart {self.name!r} has no edge {shown(edge)}",
+                advice=f"its edges are {', '.join(map(repr, self.guards)) or 'none'}",
+            )
         return spell(self.guards[edge], MATLAB_LIKE)
 
 
@@ -412,9 +436,11 @@ def _tuple(given: Any, owner: str) -> tuple[Any, ...]:
     """Return a copy of a sequence, which is no single thing."""
     if isinstance(given, str | State | Transition | Parameter):
         text = shown(given) if isinstance(given, str) else f"{type(given).__name__}(...)"
-        raise ChartError(f"{owner} is {text}, not a tuple; write it with a comma: ({text},)")
+        raise ChartError(
+            f"{owner} is {text}, not a tuple", advice=f"write it with a comma: ({text},)"
+        )
     if not isinstance(given, Iterable):
-        raise ChartError(f"{owner} is {shown(given)}; give a tuple")
+        raise ChartError("give a tuple", place=owner, value=given)
     return tuple(given)
 
 
@@ -425,8 +451,9 @@ def _parameter(given: object, here: str) -> Parameter:
     if isinstance(given, str):
         return Parameter(given)
     raise ChartError(
-        f"{here}: parameters has {shown(given)}; write it as 'k', or as "
-        "Parameter('k', 'N/m', '> 0') with its unit and rule"
+        f"parameters has {shown(given)}",
+        place=here,
+        advice="write it as 'k', or as Parameter('k', 'N/m', '> 0') with its unit and rule",
     )
 
 
@@ -434,7 +461,7 @@ def _texts(given: object, owner: str) -> dict[str, str]:
     """Return a copy of a mapping of names to texts."""
     if not isinstance(given, Mapping):
         raise ChartError(
-            f"{owner} is {shown(given)}; it gives a text for each name, for example {{'z': 'v'}}"
+            "it gives a text for each name, for example {'z': 'v'}", place=owner, value=given
         )
     return dict(given)
 
@@ -442,16 +469,18 @@ def _texts(given: object, owner: str) -> dict[str, str]:
 def _check_name(name: str, kind: str, here: str) -> None:
     if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
         raise ChartError(
-            f"{here}: {kind} name {name!r} is not a name; use letters, digits and _, "
-            "not starting with a digit, and no Python keyword"
+            f"{kind} name {name!r} is not a name",
+            place=here,
+            advice="use letters, digits and _, not starting with a digit, and no Python keyword",
         )
     if unicodedata.normalize("NFKC", name) != name:
-        raise ChartError(f"{here}: {kind} name {name!r} is not in Unicode normal form NFKC")
+        raise ChartError(f"{kind} name {name!r} is not in Unicode normal form NFKC", place=here)
     if name in RESERVED or name.startswith(("_", "on_", "is_", "may_", "to_")):
         raise ChartError(
-            f"{here}: {kind} name {name!r} is reserved; not available are "
-            f"{_listed(sorted(RESERVED))}, and names that start with "
-            "_, on_, is_, may_ or to_"
+            f"{kind} name {name!r} is reserved",
+            place=here,
+            advice=f"not available are {_listed(sorted(RESERVED))}, and names that start "
+            "with _, on_, is_, may_ or to_",
         )
 
 

@@ -31,6 +31,7 @@ __all__ = [
     "SLIP_LAWS",
     "TABLE_I",
     "Law",
+    "check_law",
     "gms_element",
 ]
 
@@ -48,6 +49,28 @@ SLIP_LAWS = {
     "published": "sgn(v) * C * (1 - z / s)",  # (1) verbatim; unstable about z = +s for v < 0
     "signed": "C * (sgn(v) - z / s)",  # s carries the sign of v (Al-Bender et al.)
 }
+
+
+def check_law(law: object) -> None:
+    """Refuse what is no slip law.
+
+    Parameters
+    ----------
+    law : str
+        One of `LAWS`.
+
+    Raises
+    ------
+    ParameterError
+        If it is neither.
+    """
+    if law not in LAWS:
+        raise ParameterError(
+            "it must be 'published' (eq. (1) of the paper as printed) or 'signed' "
+            "(Al-Bender et al. 2005)",
+            place="law",
+            value=law,
+        )
 
 
 def gms_element(law: Law) -> Chart:
@@ -74,11 +97,7 @@ def gms_element(law: Law) -> Chart:
     >>> gms_element("signed").guard_text("arrest")
     '|v| <= v_c && |z| < s'
     """
-    if law not in LAWS:
-        raise ParameterError(
-            f"law is {law!r}; it must be 'published' (eq. (1) of the paper as printed) or "
-            "'signed' (Al-Bender et al. 2005)"
-        )
+    check_law(law)
     return Chart(
         name=f"GMS element, {law} law",
         inputs=("v", "s"),  # s = weight * Stribeck curve, supplied by the model

@@ -28,6 +28,7 @@ __all__ = [
     "FloatArray",
     "Parameter",
     "as_floats",
+    "as_numbers",
     "checked_array",
     "checked_scalar",
     "checked_values",
@@ -120,8 +121,10 @@ def _bound(text: str, rule: str) -> Bound:
         number = math.nan
     if not math.isfinite(number):
         raise ChartError(
-            f"rule {rule!r}: {text!r} is not a bound; a rule is 'finite', or comparisons with a "
-            "number or a parameter, for example '> 0', '>= F_c', '>= 0 and < 1'"
+            f"{text!r} is not a bound",
+            place=f"rule {rule!r}",
+            advice="a rule is 'finite', or comparisons with a number or a parameter, for "
+            "example '> 0', '>= F_c', '>= 0 and < 1'",
         )
     return Bound(op, number, f"{op} {limit}")
 
@@ -172,12 +175,14 @@ class Parameter:
         for name in ("name", "unit", "rule", "meaning", "assumed"):
             given = getattr(self, name)
             if not isinstance(given, str):
-                raise ChartError(f"parameter {shown(self.name)}: {name} is {shown(given)}, no text")
+                raise ChartError(
+                    f"{name} is {shown(given)}, no text", place=f"parameter {shown(self.name)}"
+                )
         try:
             bounds_of(self.rule)
             bounds_of(self.assumed or ANY)
         except ChartError as error:
-            raise ChartError(f"parameter {self.name!r}, {error}") from None
+            raise error.replaced(place=f"parameter {self.name!r}, {error.place}") from None
 
     @property
     def bounds(self) -> tuple[Bound, ...]:
@@ -284,14 +289,14 @@ def checked_scalar(name: str, value: Any, rule: str) -> float:
             raise TypeError
         number = float(value)
     except (TypeError, ValueError):
-        raise ParameterError(f"{name} is {shown(value)}; it must be a number") from None
+        raise ParameterError("it must be a number", place=name, value=value) from None
     except OverflowError:  # a whole number that no float can hold
-        raise ParameterError(f"{name} is too large a number; it must be finite") from None
+        raise ParameterError("too large a number", place=name, advice="it must be finite") from None
     if not math.isfinite(number):
-        raise ParameterError(f"{name} is {number!r}; it must be finite")
+        raise ParameterError("it must be finite", place=name, value=number)
     for bound in bounds_of(rule):
         if not isinstance(bound.limit, str) and not bound.holds(number, bound.limit):
-            raise ParameterError(f"{name} is {number!r}; it must be {bound.text}")
+            raise ParameterError(f"it must be {bound.text}", place=name, value=number)
     return number
 
 
@@ -319,15 +324,10 @@ def checked_array(name: str, values: ArrayLike, n: int | None, rule: str) -> Flo
     ParameterError
         Naming the parameter, the entry, its value and the rule.
     """
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ParameterError(f"{name} is {shown(values)}; it must be a list of numbers") from None
-    except OverflowError:
-        raise ParameterError(f"{name} has too large a number; it must be finite") from None
+    array = as_numbers(name, values)
     if array.ndim != 1 or array.size == 0:
         raise ParameterError(
-            f"{name} has shape {array.shape}; it must be a flat list of numbers, not empty"
+            f"{name} has shape {array.shape}", advice="it must be a flat list of numbers, not empty"
         )
     if n is not None and array.size != n:
         raise ParameterError(f"{name} has {array.size} entries, but there are {n} elements")
@@ -339,6 +339,31 @@ def checked_array(name: str, values: ArrayLike, n: int | None, rule: str) -> Flo
         checked_scalar(f"{name}[{i}] (element {i + 1})", float(array[i]), rule)
     array.setflags(write=False)
     return array
+
+
+def as_numbers(name: str, values: ArrayLike) -> FloatArray:
+    """Return a copy as an array of floats, of any shape; raise a `ParameterError` if it is none.
+
+    Parameters
+    ----------
+    name : str
+        For the message.
+    values : array_like
+        What was given.
+
+    Returns
+    -------
+    ndarray
+        A copy.
+    """
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ParameterError("it must be a list of numbers", place=name, value=values) from None
+    except OverflowError:
+        raise ParameterError(
+            "it has too large a number", place=name, advice="it must be finite"
+        ) from None
 
 
 def checked_values(
@@ -388,7 +413,7 @@ def _checked(parameter: Parameter, value: Any, n: int) -> float | FloatArray:
     if not _is_list(value):
         return checked_scalar(name, value, rule)
     if not parameter.per_element:
-        raise ParameterError(f"{name} is {shown(value)}; it must be a number, one for all elements")
+        raise ParameterError("it must be a number, one for all elements", place=name, value=value)
     return checked_array(name, value, n, rule)
 
 
@@ -409,9 +434,9 @@ def _compare(
         place = f"[{i}] (element {i + 1})" if pair[0].ndim else ""
         least = f"the {other.meaning}" if other.meaning else other.name
         raise ParameterError(
-            f"{one.name}{place} is {float(value[i])!r}, {other.name}{place} is "
-            f"{float(limit[i])!r}; {one.meaning or one.name} must be {_IN_WORDS[bound.op]} "
-            f"{least} ({one.name} {bound.text})"
+            f"{one.name}{place} is {float(value[i])!r}, {other.name}{place} is {float(limit[i])!r}",
+            advice=f"{one.meaning or one.name} must be {_IN_WORDS[bound.op]} {least} ({one.name} "
+            f"{bound.text})",
         )
 
 

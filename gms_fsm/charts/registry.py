@@ -97,20 +97,22 @@ class Entry:
         here = f"entry {shown(self.name)}"
         charts = [self.charts] if isinstance(self.charts, Chart) else list(self.charts.values())
         if not charts:
-            raise ChartError(f"{here}: it has no chart; give one")
+            raise ChartError("it has no chart", place=here, advice="give one")
         first = charts[0]
         object.__setattr__(self, "title", self.title or first.name)
         for other in charts[1:]:
             if (other.inputs, other.parameters) != (first.inputs, first.parameters):
                 raise ChartError(
-                    f"{here}: {first.name!r} and {other.name!r} have other inputs or parameters; "
-                    "give them entries of their own"
+                    f"{first.name!r} and {other.name!r} have other inputs or parameters",
+                    place=here,
+                    advice="give them entries of their own",
                 )
         for name in KEYS:
             if name in first.parameter_names:
                 raise ChartError(
-                    f"{here}: the parameter {name!r} has the name of a key of scenario files; call "
-                    "it otherwise"
+                    f"the parameter {name!r} has the name of a key of scenario files",
+                    place=here,
+                    advice="call it otherwise",
                 )
         self._check_demonstration()
 
@@ -119,18 +121,21 @@ class Entry:
         wanted, names = {*self._any.parameter_names}, {*given.values}
         if wanted != names:
             raise ChartError(
-                f"{here}: missing values: {sorted(wanted - names) or 'none'}, unknown: "
-                f"{sorted(names - wanted) or 'none'}"
+                f"missing values: {sorted(wanted - names) or 'none'}, unknown: "
+                f"{sorted(names - wanted) or 'none'}",
+                place=here,
             )
         if self.curve != (given.stribeck is not None):
             raise ChartError(
-                f"{here}: stribeck is {shown(given.stribeck)}; a chart with the input s takes a "
-                "curve, Stribeck(F_c, F_s, v_s), any other none"
+                f"stribeck is {shown(given.stribeck)}",
+                place=here,
+                advice="a chart with the input s takes a curve, Stribeck(F_c, F_s, v_s), any "
+                "other none",
             )
         try:
             checked_values(self._any.parameters, given.values, given.n)
         except ParameterError as error:
-            raise ChartError(f"{here}: {error}") from None
+            raise ChartError.of(error).inside(here) from None
 
     @property
     def _any(self) -> Chart:
@@ -176,12 +181,16 @@ class Entry:
         """
         if isinstance(self.charts, Chart):
             if law:
-                raise ParameterError(f"{self.name} has one law only; leave law={law!r} out")
+                raise ParameterError(
+                    f"{self.name} has one law only", advice=f"leave law={law!r} out"
+                )
             return self.charts
         if law not in self.charts:
             raise ParameterError(
-                f"law is {shown(law)}; {self.name} has {' and '.join(map(repr, self.laws))}, which "
-                "differ; choose one"
+                f"{self.name} has {' and '.join(map(repr, self.laws))}, which differ",
+                place="law",
+                value=law,
+                advice="choose one",
             )
         return self.charts[law]
 
@@ -211,8 +220,9 @@ def registered() -> Mapping[str, Entry]:
         for each in _entries(f"gms_fsm.charts.{module.name}", place):
             if each.name in found:
                 raise ChartError(
-                    f"{place}: the name {each.name!r} is taken by {found[each.name][1]}; choose "
-                    "another"
+                    f"the name {each.name!r} is taken by {found[each.name][1]}",
+                    place=place,
+                    advice="choose another",
                 )
             found[each.name] = each, place
     entries = sorted((each for each, _ in found.values()), key=lambda each: bool(each.wrong))
@@ -223,12 +233,16 @@ def _entries(module: str, place: str) -> tuple[Entry, ...]:
     try:
         page: Any = importlib.import_module(module)
     except GMSError as error:
-        raise ChartError(f"{place}: {error}") from error
+        raise ChartError.of(error).inside(place) from error
     except Exception as error:
-        raise ChartError(f"{place}: it cannot be imported ({why(error)}); mend it") from error
+        raise ChartError(
+            f"it cannot be imported ({why(error)})", place=place, advice="mend it"
+        ) from error
     entries = getattr(page, "CHARTS", ())
     if not isinstance(entries, tuple) or not all(isinstance(each, Entry) for each in entries):
-        raise ChartError(f"{place}: CHARTS is {shown(entries)}; it must be a tuple of Entry(...)")
+        raise ChartError(
+            f"CHARTS is {shown(entries)}", place=place, advice="it must be a tuple of Entry(...)"
+        )
     return entries
 
 

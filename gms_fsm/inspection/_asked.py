@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gms_fsm._arguments import checked_whole
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError, SessionError, shown
 from gms_fsm.run.settings import SettingOptions, Settings
@@ -24,8 +25,8 @@ def checked_settings(settings: Settings | None, options: SettingOptions) -> Sett
         )
     if not isinstance(options.get("engine", ""), str):
         raise ParameterError(
-            "engine: every branch of a session makes machines of its own; use 'machines' or "
-            "'ifelse'"
+            "engine: every branch of a session makes machines of its own",
+            advice="use 'machines' or 'ifelse'",
         )
     chosen = Settings.of(settings, "a session", **options)
     if chosen.output != "all":
@@ -36,15 +37,20 @@ def checked_settings(settings: Settings | None, options: SettingOptions) -> Sett
 
 
 def check_count(count: int) -> None:
-    """Raise a `SessionError` for a count below 0."""
-    if count < 0:
-        raise SessionError(f"count is {count}; it must be at least 0")
+    """Raise a `SessionError` for what is no count."""
+    checked_whole("count", count, 0, SessionError)
 
 
 def check_branch(number: int, branches: int) -> None:
     """Raise a `SessionError` unless there is a branch of this number."""
-    if not 0 <= number < branches:
-        raise SessionError(f"no branch {number}; there are 0 to {branches - 1}")
+    if not 0 <= checked_whole("branch", number, None, SessionError) < branches:
+        raise SessionError(f"no branch {number}", advice=f"there are 0 to {branches - 1}")
+
+
+def check_row(row: int, rows: int) -> None:
+    """Raise a `SessionError` unless a row of this number has been computed."""
+    if not 0 <= checked_whole("row", row, None, SessionError) < rows:
+        raise SessionError(f"no row {row}", advice=f"0 to {rows - 1} are computed")
 
 
 def check_element(element: int, model: Model) -> None:
@@ -55,8 +61,8 @@ def check_element(element: int, model: Model) -> None:
         if said in [repr(edge.name) for edge in model.chart.transitions]:
             said += f" (an edge is asked for by edge={said})"
         raise SessionError(
-            f"no element {said}; there are 0 to {model.n - 1} (counted from 0 in Python, from 1 in "
-            "text)"
+            f"no element {said}",
+            advice=f"there are 0 to {model.n - 1} (counted from 0 in Python, from 1 in text)",
         )
 
 
@@ -64,5 +70,5 @@ def source_of(edge: str, chart: Chart) -> str:
     """Return the state that an edge leaves; raise a `SessionError` if there is no such edge."""
     sources = {each.name: each.source for each in chart.transitions}
     if edge not in sources:
-        raise SessionError(f"no edge {edge!r}; there are {', '.join(sources) or 'none'}")
+        raise SessionError(f"no edge {edge!r}", advice=f"there are {', '.join(sources) or 'none'}")
     return sources[edge]

@@ -69,7 +69,8 @@ class Branch:
     ) -> None:
         self.run, self.parent, self.fork, self.shared = run, parent, fork, shared
         self.edits, self.begin = edits, begin
-        self.outcome = ""  # "" while it goes on, "end", or the message of what stopped it
+        self.ended = False  # whether the last row is that of t_end
+        self.failure: SimulationError | None = None  # why it cannot go on
         self.cursor = 0
         self.between: Row | None = None  # a located place behind the cursor
         self.offset = fork + 1 + (begin is not None)
@@ -85,16 +86,16 @@ class Branch:
         """Compute at least one more row; return whether there is one."""
         before = len(self)
         with _unbroken():
-            while not self.outcome and len(self) == before:
+            while not (self.ended or self.failure) and len(self) == before:
                 try:
                     if not self.run.advance():
-                        self.outcome = "end"
+                        self.ended = True
                     elif isinstance(self.run.event, Stop):
                         self.stops.add(len(self) - 1)
                     elif isinstance(self.run.event, Firing):
                         self.firings.append(len(self) - 1)
                 except SimulationError as error:
-                    self.outcome = str(error)
+                    self.failure = error.with_traceback(None)
         return len(self) > before
 
     def complete(self) -> None:

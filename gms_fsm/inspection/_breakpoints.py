@@ -52,13 +52,15 @@ def new_breakpoint(
 ) -> Breakpoint:
     """Return a breakpoint; raise a `SessionError` if kind, name or hits do not exist."""
     if kind not in KINDS:
-        raise SessionError(f"breakpoint kind {kind!r}; it must be one of {', '.join(KINDS)}")
+        raise SessionError(
+            f"breakpoint kind {kind!r}", advice=f"it must be one of {', '.join(KINDS)}"
+        )
     edges, states = [e.name for e in chart.transitions], [s.name for s in chart.states]
     known, what = (states, "state") if kind in ("enter", "leave") else (edges, "edge")
     if name not in known:
-        raise SessionError(f"no {what} {name!r}; there are {', '.join(known) or 'none'}")
+        raise SessionError(f"no {what} {name!r}", advice=f"there are {', '.join(known) or 'none'}")
     if hits < 1:
-        raise SessionError(f"hits is {hits}; it must be at least 1")
+        raise SessionError(f"hits is {hits}", advice="it must be at least 1")
     return Breakpoint(kind, name, element, condition, hits)
 
 

@@ -63,7 +63,7 @@ def why_at(branch: Branch, element: int, edge: str) -> Why:
         left, taken, before = fired.source, fired.edge, branch.raw(row - 1)
     asked = left or state
     if source not in ("", asked):
-        raise SessionError(f"{edge} leaves {source}; element {element + 1} is in {state}")
+        raise SessionError(f"{edge} leaves {source}", advice=f"element {element + 1} is in {state}")
     found = explain_state(chart, asked, branch.scope(before).guards(element), taken)
     edges = tuple(each for each in found if edge in ("", each.edge.name))
     return Why(element, place.t, state, left, edges)

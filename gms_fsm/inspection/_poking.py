@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gms_fsm.errors import SessionError, shown
+from gms_fsm.errors import SessionError
 from gms_fsm.inspection._asked import check_element
 from gms_fsm.systems.models import Model, parameter_names
 from gms_fsm.traces.scope import Scope
@@ -44,26 +44,29 @@ class Edits:
         for what, given in (("variables", variables), ("state", state)):
             if given is not None and not isinstance(given, Mapping):
                 raise SessionError(
-                    f"{what} is {shown(given)}; give a mapping, for example "
-                    "variables={'z': {0: 0.1}} or state={0: 'slip'}"
+                    "give a mapping, for example variables={'z': {0: 0.1}} or state={0: 'slip'}",
+                    place=what,
+                    value=given,
                 )
         for name, values in (variables or {}).items():
             if name in parameter_names(model):
                 raise SessionError(
-                    f"{name} is a parameter; for another value make another model and session"
+                    f"{name} is a parameter",
+                    advice="for another value make another model and session",
                 )
             if name not in model.chart.variables:
                 known = ", ".join(model.chart.variables)
-                raise SessionError(f"no variable {name!r}; there are {known}")
+                raise SessionError(f"no variable {name!r}", advice=f"there are {known}")
             if not isinstance(values, Mapping):
                 raise SessionError(
-                    f"{name} is {shown(values)}; give its values by element, for example "
-                    f"{{{name!r}: {{0: 0.1}}}}"
+                    f"give its values by element, for example {{{name!r}: {{0: 0.1}}}}",
+                    place=name,
+                    value=values,
                 )
         own = {name: dict(values) for name, values in (variables or {}).items()}
         edits = cls(own, v, dict(state or {}))
         if not (any(edits.variables.values()) or edits.state or v is not None):
-            raise SessionError("nothing to poke; give variables, v or state")
+            raise SessionError("nothing to poke", advice="give variables, v or state")
         for element in (*(i for values in own.values() for i in values), *edits.state):
             check_element(element, model)
         return edits

@@ -259,7 +259,9 @@ class Prover:
         except GaveUp:
             empty = False
         if empty:
-            raise ParameterError(f"the domain {', '.join(domain)} holds nowhere; loosen it")
+            raise ParameterError(
+                f"the domain {', '.join(domain)} holds nowhere", advice="loosen it"
+            )
 
     def _assumed(self, text: str) -> Any:
         reading = Reading()
@@ -268,11 +270,13 @@ class Prover:
         except ExpressionError as error:
             raise error.at("domain") from None
         except Undecided as reason:
-            raise ParameterError(f"domain {text!r}: {reason}; write it otherwise") from None
+            raise ParameterError(
+                f"domain {text!r}: {reason}", advice="write it otherwise"
+            ) from None
         if reading.denominators:
             raise ParameterError(
-                f"domain {text!r}: it divides; write it without, for example 'z > s' for "
-                "'z / s > 1'"
+                f"domain {text!r}: it divides",
+                advice="write it without, for example 'z > s' for 'z / s > 1'",
             )
         return formula
 

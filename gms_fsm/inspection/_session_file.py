@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm._files import written_whole
-from gms_fsm.errors import SessionError
+from gms_fsm.errors import SessionError, TraceFileError, why
 from gms_fsm.inspection._branch import Branch
 from gms_fsm.inspection._breakpoints import Breakpoint
 from gms_fsm.inspection._poking import Edits
@@ -21,7 +22,7 @@ from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Function
 from gms_fsm.traces._header import Header
 
-__all__ = ["BranchRecord", "SessionRecord", "options_of", "read", "write"]
+__all__ = ["BranchRecord", "SessionRecord", "blamed", "options_of", "read", "write"]
 
 FORMAT = "gms-fsm session 1"
 
@@ -175,3 +176,18 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {name: _plain(each) for name, each in value.items()}
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
+@contextmanager
+def blamed(path: Path) -> Iterator[None]:
+    """Have whatever goes wrong inside said of a file."""
+    try:
+        yield
+    except FileNotFoundError:
+        raise TraceFileError(
+            "no such file", place=str(path), advice="check its name and the folder"
+        ) from None
+    except Exception as error:  # whatever a damaged file provokes, it is the file's fault
+        raise TraceFileError(
+            f"not a session file, or damaged ({why(error)})", place=str(path)
+        ) from None

@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator
 
+import numpy as np
+
 from gms_fsm.errors import SessionError, shown
 from gms_fsm.inspection._asked import check_count
 from gms_fsm.inspection._branch import Branch, Row
@@ -67,6 +69,8 @@ def previous_firing(branch: Branch) -> None:
 def goto(branch: Branch, t: float) -> None:
     """Go to the last row at or before a time; a time before the start is a `SessionError`."""
     start = branch.raw(0).t
+    if not isinstance(t, float | int | np.number):
+        raise SessionError("it must be a number of seconds", place="t", value=t)
     if not t >= start:
         raise SessionError(f"t = {shown(t)} s lies before the start, {start!r} s")
     branch.between = None

@@ -30,8 +30,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from gms_fsm._arguments import listed
 from gms_fsm.charts.chart import Chart
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.errors import ParameterError
 from gms_fsm.inspection._checks import chattering, determinism, livelock, reachability, stability
 from gms_fsm.inspection._findings import CHECKS, Check, Finding, Report, Status
 from gms_fsm.inspection._prover import Prover
@@ -106,10 +107,16 @@ def prove(chart: Chart, domain: Sequence[str] | None = None) -> Report:
     ('stability', ('slip',), {'C': 1.0, 'v': -1.0, 's': 1.0, 'z': 1.0})
     """
     if not hasattr(chart, "guards"):
-        raise ParameterError(f"chart is {shown(chart)}; prove takes a Chart, of a model its .chart")
+        raise ParameterError(
+            "prove takes a Chart, of a model its .chart", place="chart", value=chart
+        )
     if domain is None:
         domain = default_domain(chart)
-    domain = (domain,) if isinstance(domain, str) else tuple(domain)
+    domain = (
+        (domain,)
+        if isinstance(domain, str)
+        else tuple(listed("domain", domain, "a list of conditions"))
+    )
     prover = Prover(chart, domain)
     checks = (determinism, livelock, reachability, chattering, stability)
     return Report(chart, domain, tuple(found for check in checks for found in check(prover)))

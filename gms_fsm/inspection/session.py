@@ -11,9 +11,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Unpack
 
-from gms_fsm.errors import SessionError, TraceFileError, why
+from gms_fsm._arguments import checked_path
+from gms_fsm.errors import SessionError
 from gms_fsm.inspection import _breakpoints, _conditions, _session_file, _walker
-from gms_fsm.inspection._asked import check_branch, check_element, checked_settings
+from gms_fsm.inspection._asked import check_branch, check_element, check_row, checked_settings
 from gms_fsm.inspection._branch import Branch
 from gms_fsm.inspection._breakpoints import KINDS, Breakpoint
 from gms_fsm.inspection._conditions import holds_at
@@ -135,6 +136,7 @@ class Session:
         Here
             The row.
         """
+        check_row(row, len(self.branch))
         return here_at(self.branch, row)
 
     # ------------------------------------------------------------------ walking
@@ -441,7 +443,7 @@ class Session:
         edits = Edits.of(self.model, variables, v, state)
         branch, here = self.branch, self.branch.here
         if not here.t < self.t_end:
-            raise SessionError(f"t = {here.t!r} s is the end of the run; go back first")
+            raise SessionError(f"t = {here.t!r} s is the end of the run", advice="go back first")
         prescribed = self.rig.acceleration is None
         initial = initial_with(edits, branch.scope(here), prescribed=prescribed)
         run = self._run(here.t, initial)
@@ -504,12 +506,14 @@ class Session:
           first different transition at t = 12.4999735 s
           largest difference: z 0.599 m, F 0.375 N
         """
-        b = self.current if b is None else b
-        a = self.branches[b].parent if a is None and 0 <= b < len(self.branches) else a
-        if a is None:
-            raise SessionError(f"branch {b} has no parent; name two branches")
         for number in (a, b):
-            check_branch(number, len(self.branches))
+            if number is not None:
+                check_branch(number, len(self.branches))
+        b = self.current if b is None else b
+        a = self.branches[b].parent if a is None else a
+        if a is None:
+            raise SessionError(f"branch {b} has no parent", advice="name two branches")
+        for number in (a, b):
             self.branches[number].complete()
         return compared((a, b), self.branches[a].trace(), self.branches[b].trace())
 
@@ -546,7 +550,7 @@ class Session:
             self.breakpoints,
             self.watches,
         )
-        return _session_file.write(Path(path), record)
+        return _session_file.write(checked_path("path", path), record)
 
     @classmethod
     def load(cls, path: str | Path) -> Session:
@@ -567,13 +571,9 @@ class Session:
         TraceFileError
             If the file is missing, damaged or something else.
         """
-        path = Path(path)
-        try:
+        path = checked_path("path", path)
+        with _session_file.blamed(path):
             return cls._of(_session_file.read(path))
-        except FileNotFoundError:
-            raise TraceFileError(f"{path}: no such file; check its name and the folder") from None
-        except Exception as error:  # whatever a damaged file provokes, it is the file's fault
-            raise TraceFileError(f"{path}: not a session file, or damaged ({why(error)})") from None
 
     @classmethod
     def _of(cls, record: SessionRecord) -> Session:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -233,15 +233,18 @@ def _turning(call: Call) -> Value:
     return a if b == Number(0.0) else Binary("-", a, b)
 
 
-def substitute(value: Value, sign_names: Mapping[Value, str]) -> tuple[Value, dict[str, Call]]:
+def substitute(
+    value: Value, name_of: Callable[[Value, Call], str | None]
+) -> tuple[Value, dict[str, Call]]:
     """Replace every rough call by a name, to be computed beforehand from a held sign.
 
     Parameters
     ----------
     value : Value
         A flow or a signal.
-    sign_names : mapping of Value to str
-        For its `rough_points` the name that holds the sign; those without one stay as they are.
+    name_of : callable
+        Given the value at whose sign a call turns and the call, its arguments smooth already:
+        its name, another for each call; None where it stays as it is.
 
     Returns
     -------
@@ -260,10 +263,12 @@ def substitute(value: Value, sign_names: Mapping[Value, str]) -> tuple[Value, di
                 return node
             case Binary("**", base, exponent) if whole_power(exponent) is None:
                 return Binary("**", base, smooth(exponent))
-            case Call(function, arguments) if function in ROUGH and _turning(node) in sign_names:
+            case Call(function, arguments) if function in ROUGH:
                 inner = Call(function, tuple(smooth(argument) for argument in arguments))
-                name = f"{function}_{sign_names[_turning(node)]}"
-                calls.setdefault(name, inner)
+                name = name_of(_turning(node), inner)
+                if name is None:
+                    return inner
+                calls[name] = inner
                 return Name(name)
         return rebuilt(node, smooth)
 

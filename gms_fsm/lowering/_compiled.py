@@ -201,9 +201,10 @@ def _compiled_signal(name: str, call: Callable[[float], float]) -> Any:
         lines = (re.sub(r"\x1b\[\d*m", "", line).strip() for line in str(error).splitlines())
         reason = next((u for u in lines if u and not u.startswith("Failed in nopython mode")), "")
         raise SignalError(
-            f"signal {name!r}: numba cannot compile the function ({type(error).__name__}: "
-            f"{reason}); use engine='machines', or give the signal as an expression of t or as "
-            "arrays (times, values)"
+            f"numba cannot compile the function ({type(error).__name__}: {reason})",
+            place=f"signal {name!r}",
+            advice="use engine='machines', or give the signal as an expression of t or as "
+            "arrays (times, values)",
         ) from None
 
 

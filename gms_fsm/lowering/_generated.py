@@ -117,8 +117,9 @@ def standalone(source: str) -> str:
     missing = sorted(used - own - set(dir(builtins)))
     if foreign := [name for name in missing if name not in known]:
         raise ParameterError(
-            f"{', '.join(foreign)}: a Python function, which no text can hold; give the signal as "
-            "a formula or as corners"
+            "a Python function, which no text can hold",
+            place=f"{', '.join(foreign)}",
+            advice="give the signal as a formula or as corners",
         )
     borrowed = [name for name in missing if known[name] is getattr(math, name, None)]
     parts = [f"from math import {', '.join(borrowed)}\n"] if borrowed else []

@@ -193,6 +193,23 @@ class Places(Generic[Name]):
         blocks = {0: "", 1: " + n"}.get(row, f" + {row} * n")
         return f"{len(self.shared)}{blocks} + i"
 
+    def text_names(self, name: Name) -> frozenset[str]:
+        """Return which of ``n`` and ``i`` the text of a place reads.
+
+        Parameters
+        ----------
+        name : str or other key
+            One of `shared` or `own`.
+
+        Returns
+        -------
+        frozenset of str
+            Empty for a shared name.
+        """
+        if name in self.shared:
+            return frozenset()
+        return frozenset({"i"} if name == self.own[0] else {"n", "i"})
+
     def size_text(self, more: int = 0) -> str:
         """Return how many places there are, and some more, as Python text over ``n``."""
         return f"{len(self.shared) + more} + {len(self.own)} * n"

@@ -75,8 +75,8 @@ class Keeper:
     def __init__(self, run: Resumable, path: Path, every: float) -> None:
         if run.buffers.plan.foreign:
             raise ParameterError(
-                "checkpoint: a SciPy solver's history cannot be kept; use method='dp45' or another "
-                "of our own, or leave checkpoint out"
+                "checkpoint: a SciPy solver's history cannot be kept",
+                advice="use method='dp45' or another of our own, or leave checkpoint out",
             )
         self.run, self.path, self.every = run, path, every
         self.identity = _identity(run.start)
@@ -122,19 +122,22 @@ class Keeper:
                     _check(self.run, state, kept)
         except Exception as error:  # numpy and zipfile raise many kinds over damaged files
             raise CheckpointError(
-                f"{self.path}: not a checkpoint, or damaged ({why(error)}); "
-                "remove it to start the run anew"
+                f"not a checkpoint, or damaged ({why(error)})",
+                place=str(self.path),
+                advice="remove it to start the run anew",
             ) from None
         if head[:2] != ours[:2]:
             begun = cut(head[1]) if len(head) == 3 else "an older gms-fsm"
             raise CheckpointError(
-                f"{self.path}: begun by {begun}, and this is {_program()}, which may compute other "
-                "bits; go on with that one, or remove the file to start the run anew"
+                f"begun by {begun}, and this is {_program()}, which may compute other bits",
+                place=str(self.path),
+                advice="go on with that one, or remove the file to start the run anew",
             )
         if head != ours:
             raise CheckpointError(
-                f"{self.path}: belongs to a run with another model, rig, signal or setting; remove "
-                "it, or give this run a file of its own"
+                "belongs to a run with another model, rig, signal or setting",
+                place=str(self.path),
+                advice="remove it, or give this run a file of its own",
             )
         for name, place in places.items():
             place[:] = state[name] if isinstance(place, np.ndarray) else state[name].tolist()
@@ -159,9 +162,9 @@ def _identity(start: Start) -> str:
                 functions[name] = identity(signal.call)
             except SignalError as error:
                 raise ParameterError(
-                    f"checkpoint: {error}, so a run with it as signal {name!r} cannot be resumed; "
-                    "give an expression of t, arrays (times, values) or a Python function over "
-                    "plain values, or leave checkpoint out"
+                    f"checkpoint: {error}, so a run with it as signal {name!r} cannot be resumed",
+                    advice="give an expression of t, arrays (times, values) or a Python function "
+                    "over plain values, or leave checkpoint out",
                 ) from None
     text = start.program.source
     what = head, functions, text, start.output, start.options.times, start.y, start.mode

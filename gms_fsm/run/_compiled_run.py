@@ -118,9 +118,9 @@ class CompiledRun:
             columns.interrupted(before)
             names = " or ".join(map(repr, start.program.callables))
             raise SimulationError(
-                f"signal {names}: the function raised {type(error).__name__}: {error}; the run up "
-                "to there is kept",
+                f"the function raised {type(error).__name__}: {error}",
                 columns.trace(),
+                place=f"signal {names}",
             ) from error
         if event == loop.DONE:
             check_end(columns)

@@ -245,35 +245,39 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
     SimulationError
         With the trace.
     """
-    trace = recorder.trace()
-    chart, kept = recorder.start.model.chart, "the run up to there is kept in .trace"
-    scene = f"t = {error.t!r} s"
+    trace, chart = recorder.trace(), recorder.start.model.chart
     if isinstance(error, NotFinite):
+        values = [float(f"{u:.6g}") for u in error.y]
         return NotFiniteError(
-            f"{_not_finite(error, recorder)} at or just after {scene} "
-            f"(x, v, z ... = {[float(f'{u:.6g}') for u in error.y]}): {error}; look at the signals "
-            f"and parameters there; {kept}",
+            f"{_not_finite(error, recorder)} here or just after (x, v, z ... = {values}): {error}",
             trace,
+            t=error.t,
+            advice="look at the signals and parameters there",
         )
     if isinstance(error, StepTooSmall):
         return StepSizeError(
-            f"the step size fell under the resolution of the clock at {scene}: the flow changes "
-            "too fast there for this method; try a stiff method (method=scipy.integrate.Radau), a "
-            f"larger rtol/atol, or look for a singular parameter; {kept}",
+            "the step size fell under the resolution of the clock: the flow changes too fast for "
+            "this method",
             trace,
+            t=error.t,
+            advice="try a stiff method (method=scipy.integrate.Radau), a larger rtol/atol, or look "
+            "for a singular parameter",
         )
     if isinstance(error, TooManySteps):
+        reason, advice = _slow(recorder)
         return StepLimitError(
-            f"the run has taken max_steps = {recorder.start.options.max_steps} steps and is at "
-            f"{scene}, short of t_end = {recorder.start.t_end!r} s: {_slow(recorder)}; {kept}",
+            f"the run has taken max_steps = {recorder.start.options.max_steps} steps and is short "
+            f"of t_end = {recorder.start.t_end!r} s{reason}",
             trace,
+            t=error.t,
+            advice=advice,
         )
     if not isinstance(error, Livelock):
-        return SimulationError(f"{error} at {scene}; {kept}", trace)
+        return SimulationError(str(error), trace, t=error.t)
     start = recorder.start
     scope = Scope.of(start.model, start.program, error.t, error.y, error.mode)
 
-    def values(i: int) -> str:
+    def told(i: int) -> str:
         s = f", s = {scope.s[i]:.6g}" if "s" in chart.inputs else ""
         return f"{chart.variables[0]} = {scope.z[i]:.6g}{s}, v = {scope.v:.6g}"
 
@@ -283,19 +287,25 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
         last = taken[-1]
         guard = next(edge.guard for edge in chart.transitions if edge.name == last.edge)
         time = float(last.t - taken[0].t)
-        cause = (
-            f"the flows on both sides of guard [{guard}] push back over it (chattering); leave a "
-            "gap between the guards there and back"
+        cause, advice = (
+            (
+                f"the flows on both sides of guard [{guard}] push back over it (chattering)",
+                "leave a gap between the guards there and back",
+            )
             if time > 0.0
-            else f"guard [{guard}] {_way_back(chart, taken)} hold together; make the guards "
-            "exclude each other"
+            else (
+                f"guard [{guard}] {_way_back(chart, taken)} hold together",
+                "make the guards exclude each other",
+            )
         )
         return LivelockError(
-            f"element {error.machine + 1} switched {len(taken)} times "
-            f"{f'in {time:.3g} s ' if time else ''}at {scene}, "
+            f"switched {len(taken)} times{f' in {time:.3g} s' if time else ''}, "
             f"last by {str(last.edge)!r} from {last.source} to {last.target} "
-            f"({values(error.machine)}): {cause}; {kept}",
+            f"({told(error.machine)}): {cause}",
             trace,
+            t=error.t,
+            place=f"element {error.machine + 1}",
+            advice=advice,
         )
     rough = [
         i
@@ -306,26 +316,31 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
     state = chart.states[error.mode[i]]
     edges = ", ".join(f"{edge.name} [{edge.guard}]" for _, edge in chart.leaving(state.name))
     return LivelockError(
-        f"{' and '.join(error.relations)} changed {error.times} times at {scene}: "
-        f"element {i + 1} is in {state.name} ({values(i)}), its flow pushes back on both sides, "
+        f"{' and '.join(error.relations)} changed {error.times} times: "
+        f"the element is in {state.name} ({told(i)}), its flow pushes back on both sides, "
         f"no edge leaves ({edges or 'it has none'}), and no value of the sign between -1 and 1 "
-        f"holds it there; look at the parameters and at the flow of {state.name}; {kept}",
+        f"holds it there",
         trace,
+        t=error.t,
+        place=f"element {i + 1}",
+        advice=f"look at the parameters and at the flow of {state.name}",
     )
 
 
-def _slow(recorder: Recording) -> str:
-    """Say why a run takes many steps."""
+def _slow(recorder: Recording) -> tuple[str, str]:
+    """Say why a run takes many steps, as far as it shows, and what to do."""
     log = recorder.trace().transitions
     most = recorder.start.options.max_steps
     if 10 * len(log) > most:
         element, count = np.unique(log.element, return_counts=True)
         worst = int(element[count.argmax()])
         return (
-            f"element {worst + 1} has switched {int(count.max())} times (chattering); leave a gap "
-            "between its guards there and back, or give a larger max_steps"
+            f": element {worst + 1} has switched {int(count.max())} times (chattering)",
+            "leave a gap between its guards there and back, or give a larger max_steps",
         )
-    return "give a larger max_steps, a larger rtol, or for a stiff run method=scipy.integrate.Radau"
+    return "", (
+        "give a larger max_steps, a larger rtol, or for a stiff run method=scipy.integrate.Radau"
+    )
 
 
 def check_pace(recording: Recording, buffers: hybrid.Buffers) -> None:
@@ -369,12 +384,13 @@ def check_pace(recording: Recording, buffers: hybrid.Buffers) -> None:
     if step * fastest < STABLE:
         return
     raise StepLimitError(
-        f"stiff: the flow has a rate of {fastest:.3g} /s at t = {t!r} s, which holds the steps of "
-        f"this method at {step:.3g} s; to t_end = {start.t_end!r} s it would take "
-        f"{(start.t_end - t) / step:.3g} of them, max_steps is {start.options.max_steps}; use an "
-        'implicit method (method=scipy.integrate.Radau; [run] method = "Radau"), or check C and '
-        "the thresholds; the run up to there is kept in .trace",
+        f"stiff: the flow has a rate of {fastest:.3g} /s, which holds the steps of "
+        f"this method at {step:.3g} s: to t_end = {start.t_end!r} s it would take "
+        f"{(start.t_end - t) / step:.3g} of them, max_steps is {start.options.max_steps}",
         recording.trace(),
+        t=t,
+        advice="use an implicit method (method=scipy.integrate.Radau; "
+        '[run] method = "Radau"), or check C and the thresholds',
     )
 
 
@@ -393,7 +409,9 @@ def meddled(error: Meddling, recorder: Recording) -> CallbackError:
     CallbackError
         With the trace.
     """
-    return CallbackError(f"{error}; the run up to there is kept in .trace", recorder.trace())
+    return CallbackError(
+        error.reason, recorder.trace(), t=error.t, place=error.place, advice=error.advice
+    )
 
 
 def _way_back(chart: Chart, taken: Any) -> str:
@@ -438,7 +456,9 @@ def check_end(recorder: Recording) -> None:
     last, t_end = recorder.start.last, recorder.start.t_end
     if last < t_end:
         raise SignalEndError(
-            f"a sampled signal ends at t = {last!r} s, before t_end = {t_end!r} s; give a longer "
-            f"record or t_end <= {last!r}; the run up to there is kept",
+            f"it ends before t_end = {t_end!r} s",
             recorder.trace(),
+            t=last,
+            place="a sampled signal",
+            advice=f"give a longer record or t_end <= {last!r}",
         )

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 from transitions import Machine, MachineError
 
+from gms_fsm._arguments import checked_kind
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ChartError, ParameterError, shown
 from gms_fsm.language import PYTHON, Condition, names_in, spell
@@ -46,10 +47,11 @@ class Element:
     def __setattr__(self, name: str, value: Any) -> None:
         if name in self._fixed:
             raise ParameterError(
-                f"element {self.index + 1}: {name} is set to {shown(value)}, but parameters of an "
-                "element are read-only: the flow would not follow. Change them between runs "
-                "(with_values(model, ...)), or make the number a variable of the chart with the "
-                "flow '0' and assign it in an action"
+                f"{name} is set to {shown(value)}, but parameters of an element are "
+                "read-only: the flow would not follow. Change them between runs "
+                "(with_values(model, ...)), or make the number a variable of the chart "
+                "with the flow '0' and assign it in an action",
+                place=f"element {self.index + 1}",
             )
         object.__setattr__(self, name, value)
 
@@ -105,8 +107,9 @@ class ElementMachines:
     def __init__(self, model: Model, element: type[Element] = Element) -> None:
         if not hasattr(model, "chart"):
             raise ParameterError(
-                f"model is {shown(model)}; it must be a model, for example GMS(parameters, "
-                "law='signed')"
+                "it must be a model, for example GMS(parameters, law='signed')",
+                place="model",
+                value=model,
             )
         chart = model.chart
         self.model = model
@@ -147,6 +150,7 @@ class ElementMachines:
         ChartError
             If the machine has edges or conditions that are not in the chart.
         """
+        checked_kind("chart", chart, Chart, "a Chart")
         table: list[list[tuple[int, Guard]]] = []
         for state in chart.states:
             rows = []
@@ -155,36 +159,40 @@ class ElementMachines:
                     conditions = [c.func for c in transition.conditions]
                     if conditions != [self.guards[edge.name]] or transition.dest != edge.target:
                         raise ChartError(
-                            f"edge {edge.name!r}: the machine was given conditions {conditions} "
-                            f"or the target {transition.dest!r}, which chart {chart.name!r} does "
-                            "not know; write them in the chart's guard, it is the only truth"
+                            f"the machine was given conditions {conditions} or the target "
+                            f"{transition.dest!r}, which chart {chart.name!r} does not know",
+                            place=f"edge {edge.name!r}",
+                            advice="write them in the chart's guard, it is the only truth",
                         )
                     rows.append((index, self.guards[edge.name]))
             found = [index for index, _ in rows]
             for index, edge in chart.leaving(state.name):
                 if found.count(index) != 1:
                     raise ChartError(
-                        f"the machine has the edge {edge.name!r} {found.count(index)} times, chart "
-                        f"{chart.name!r} has it once; change the chart, it is the only truth"
+                        f"the machine has the edge {edge.name!r} {found.count(index)} times, "
+                        f"chart {chart.name!r} has it once",
+                        advice="change the chart, it is the only truth",
                     )
             table.append(rows)
         known = {edge.name for edge in chart.transitions}
         for trigger in self.machine.get_triggers(*self.machine.states):
             if trigger not in known:
                 raise ChartError(
-                    f"the machine has a trigger {trigger!r} that chart {chart.name!r} does not "
-                    "know; add a Transition to the chart"
+                    f"the machine has a trigger {trigger!r} that chart {chart.name!r} does "
+                    "not know",
+                    advice="add a Transition to the chart",
                 )
         return table
 
 
 def _new_element(kind: type[Element], model: Model, index: int) -> Element:
     if not (isinstance(kind, type) and issubclass(kind, Element)):
-        raise ParameterError(f"element is {kind!r}; it must be a class derived from Element")
+        raise ParameterError("it must be a class derived from Element", place="element", value=kind)
     if kind.__eq__ is not object.__eq__:
         raise ParameterError(
-            f"{kind.__name__} compares by value, so that transitions would take all elements for "
-            "one; use @dataclass(eq=False)"
+            f"{kind.__name__} compares by value, so that transitions would take all "
+            "elements for one",
+            advice="use @dataclass(eq=False)",
         )
     element = kind()
     values = vars(element)  # past __setattr__, as an __init__ may have set these names
@@ -211,6 +219,11 @@ class Engine(Protocol):
 
 class Meddling(Exception):
     """A callback changed what it may only look at; whoever holds the run says it to the user."""
+
+    def __init__(self, reason: str, place: str, t: float) -> None:
+        super().__init__(reason)
+        self.reason, self.place, self.t = reason, place, t
+        self.advice = "write the switch into the chart, as an edge with a guard"
 
 
 class MachineEngine:
@@ -277,30 +290,34 @@ class MachineEngine:
             If a callback changed these values, or a state.
         """
         row, elements = self.chart.transitions[edge], self.machines.elements
-        here = f"element {machine + 1}, edge {row.name!r} at t = {t!r} s"
+        place = f"element {machine + 1}, edge {row.name!r}"
         # The trigger evaluates the guard once more; assignments come after, as in Stateflow, where
         # the whole set was chosen before any of them.
         try:
             fired = getattr(elements[machine], row.name)()
         except MachineError as error:
             raise Meddling(
-                f"{here}: a callback moved a state ({error.value}); {ONLY_LOOK}"
+                f"a callback moved a state ({error.value}); {ONLY_LOOK}", place, t
             ) from error
         if not fired:
             raise Meddling(
-                f"{here}: the edge was enabled, but a callback changed the element's values before "
-                f"it fired; {ONLY_LOOK}"
+                "the edge was enabled, but a callback changed the element's values before "
+                f"it fired; {ONLY_LOOK}",
+                place,
+                t,
             )
         self.states[machine] = row.target
         for i, (element, state) in enumerate(zip(elements, self.states, strict=True)):
             if element.state != state:
                 raise Meddling(
-                    f"{here}: a callback put element {i + 1} into state {shown(element.state)}, "
-                    f"but the chart has it in {state!r}; {ONLY_LOOK}"
+                    f"a callback put element {i + 1} into state {shown(element.state)}, "
+                    f"but the chart has it in {state!r}; {ONLY_LOOK}",
+                    place,
+                    t,
                 )
 
 
-ONLY_LOOK = "callbacks may only look; write the switch into the chart, as an edge with a guard"
+ONLY_LOOK = "callbacks may only look"
 
 
 class IfElse:

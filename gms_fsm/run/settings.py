@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 import integrators
 from gms_fsm.charts.parameters import as_floats, checked_array, checked_scalar
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.errors import ParameterError
 from gms_fsm.lowering.scales import Tolerance
 
 __all__ = ["ENGINES", "EVENTS", "MOST_STEPS", "OUTPUTS", "RunOptions", "SettingOptions", "Settings"]
@@ -136,29 +136,35 @@ class Settings:
         method = self.method
         if not isinstance(self.engine, str) or self.engine not in ENGINES:
             raise ParameterError(
-                f"engine is {shown(self.engine)}; it must be {', '.join(map(repr, ENGINES))}, or "
-                "an ElementMachines"
+                f"it must be {', '.join(map(repr, ENGINES))}, or an ElementMachines",
+                place="engine",
+                value=self.engine,
             )
         if isinstance(method, str):
             if method not in integrators.METHODS:
                 raise ParameterError(
-                    f"method is {shown(method)}; it must be one of "
-                    f"{', '.join(integrators.METHODS)}, or a scipy.integrate.OdeSolver class"
+                    f"it must be one of {', '.join(integrators.METHODS)}, or a "
+                    "scipy.integrate.OdeSolver class",
+                    place="method",
+                    value=method,
                 )
             if self.step is None and not integrators.METHODS[method].adaptive:
                 raise ParameterError(
-                    f"method {method!r} has no error estimate; give step=..., or use 'dp45' or "
-                    "'bs23'"
+                    f"method {method!r} has no error estimate",
+                    advice="give step=..., or use 'dp45' or 'bs23'",
                 )
         elif not (isinstance(method, type) and hasattr(method, "TOO_SMALL_STEP")):
             raise ParameterError(
-                f"method is {shown(method)}; it must be a name ({', '.join(integrators.METHODS)}) "
-                "or a scipy.integrate.OdeSolver class"
+                f"it must be a name ({', '.join(integrators.METHODS)}) or a "
+                "scipy.integrate.OdeSolver class",
+                place="method",
+                value=method,
             )
         elif self.engine == "compiled":
             raise ParameterError(
-                f"engine 'compiled' runs our own methods ({', '.join(integrators.METHODS)}), not "
-                f"{method.__name__}; use engine='machines' for SciPy's solvers"
+                f"engine 'compiled' runs our own methods ({', '.join(integrators.METHODS)}), "
+                f"not {method.__name__}",
+                advice="use engine='machines' for SciPy's solvers",
             )
 
     def _output(self) -> str:
@@ -210,15 +216,16 @@ class Settings:
         """
         if not (settings is None or isinstance(settings, Settings)):
             raise ParameterError(
-                f"settings is {shown(settings)}; it must be a Settings, for example "
-                "Settings(rtol=1e-8)"
+                "it must be a Settings, for example Settings(rtol=1e-8)",
+                place="settings",
+                value=settings,
             )
         fields = [each.name for each in dataclasses.fields(cls)]
         for name in options:
             if name not in fields:
                 near = difflib.get_close_matches(name, fields, 1)
                 hint = f"did you mean {near[0]!r}?" if near else f"it takes {', '.join(fields)}"
-                raise ParameterError(f"{whose} takes no argument {name!r}; {hint}")
+                raise ParameterError(f"{whose} takes no argument {name!r}", advice=hint)
         if settings is None:
             return cls(**options)
         if "t_eval" in options and "output" not in options:
@@ -235,14 +242,14 @@ def _check_choice(name: str, given: object, choices: tuple[str, ...]) -> None:
     if not isinstance(given, str) or given not in choices:
         said = [repr(each) for each in choices]
         raise ParameterError(
-            f"{name} is {shown(given)}; it must be {', '.join(said[:-1])} or {said[-1]}"
+            f"it must be {', '.join(said[:-1])} or {said[-1]}", place=name, value=given
         )
 
 
 def _check_count(max_steps: object) -> None:
     if isinstance(max_steps, bool) or not isinstance(max_steps, int) or max_steps < 1:
         raise ParameterError(
-            f"max_steps is {shown(max_steps)}; it must be an integer, at least 1 step"
+            "it must be an integer, at least 1 step", place="max_steps", value=max_steps
         )
 
 
@@ -251,6 +258,7 @@ def _increasing(t_eval: ArrayLike) -> tuple[float, ...]:
     for i, (one, after) in enumerate(itertools.pairwise(wanted)):
         if after <= one:
             raise ParameterError(
-                f"t_eval[{i}] = {one} is not before t_eval[{i + 1}] = {after}; times must increase"
+                f"t_eval[{i}] = {one} is not before t_eval[{i + 1}] = {after}",
+                advice="times must increase",
             )
     return tuple(wanted)

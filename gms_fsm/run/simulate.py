@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Unpack
 
 import integrators
+from gms_fsm._arguments import checked_kind, checked_path
 from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.lowering.program import equations
 from gms_fsm.run._checkpoint import Keeper
@@ -122,19 +123,29 @@ def simulate(
     """
     if isinstance(engine, ElementMachines):
         if machines is not None:
-            raise ParameterError("engine and machines are both machines of yours; give one of them")
+            raise ParameterError(
+                "engine and machines are both machines of yours", advice="give one of them"
+            )
         machines, engine = engine, "machines"
     given: SettingOptions = {**options} if engine is None else {**options, "engine": engine}  # type: ignore[typeddict-item]
     chosen = Settings.of(settings, "simulate", **given)
+    if progress is not None and not callable(progress):
+        raise ParameterError(
+            "it must be a function of the moment reached", place="progress", value=progress
+        )
+    path = None if checkpoint is None else checked_path("checkpoint", checkpoint)
     if machines is not None:
+        checked_kind("machines", machines, ElementMachines, "an ElementMachines, or left out")
         if machines.model is not model:
             raise ParameterError("machines: these ElementMachines were made for another model")
         if chosen.engine == "ifelse":
-            raise ParameterError("engine 'ifelse' asks no machines; leave machines=... out")
+            raise ParameterError(
+                "engine 'ifelse' asks no machines", advice="leave machines=... out"
+            )
     start = Start.of(model, rig, t_end, chosen, t_start=t_start, initial=initial)
     watching = checked(monitors, model, start.output).values() if monitors else ()
     run = CompiledRun(start, machines) if chosen.engine == "compiled" else Run(start, machines)
-    keeper = None if checkpoint is None else Keeper(run, Path(checkpoint), checkpoint_every)
+    keeper = None if path is None else Keeper(run, path, checkpoint_every)
     try:
         while run.advance():
             if keeper is not None:
@@ -219,7 +230,7 @@ class Run:
             raise explained(error, recorder) from None
         except SignalError as error:
             raise SimulationError(
-                f"{error}; the run up to there is kept", recorder.trace()
+                error.reason, recorder.trace(), place=error.place, advice=error.advice
             ) from None
         except KeyboardInterrupt:  # within a step; the rows before may have taken an hour
             if self.buffers.out.cursor[ROW]:

@@ -108,7 +108,7 @@ class Start:
         ):
             if not hasattr(given, mark):
                 raise ParameterError(
-                    f"{what} is {shown(given)}; it must be a {what}, for example {example}"
+                    f"it must be a {what}, for example {example}", place=what, value=given
                 )
         chosen = Settings() if settings is None else settings
         t_start, t_end = _times(t_start, t_end)
@@ -118,9 +118,9 @@ class Start:
         method = chosen.method
         if not isinstance(method, str) and min(tolerances) == 0.0:
             raise ParameterError(
-                f"method {method.__name__} needs an absolute tolerance, and the chart gives no "
-                "scale for every component; give one, for example atol=1e-9, or by name "
-                "atol={'x': 1e-9}"
+                f"method {method.__name__} needs an absolute tolerance, and the chart "
+                "gives no scale for every component",
+                advice="give one, for example atol=1e-9, or by name atol={'x': 1e-9}",
             )
         options = Options(
             integrators.METHODS[method] if isinstance(method, str) else method,
@@ -183,10 +183,12 @@ def _times(t_start: float, t_end: float) -> tuple[float, float]:
     for name, time in (("t_start", t_start), ("t_end", t_end)):
         if abs(time) > LATEST:
             raise ParameterError(
-                f"{name} is {time!r} s; beyond {LATEST:g} s the clock is too coarse"
+                f"{name} is {time!r} s", advice=f"beyond {LATEST:g} s the clock is too coarse"
             )
     if t_end <= t_start:
-        raise ParameterError(f"t_end is {t_end!r}, t_start is {t_start!r}; t_end must be later")
+        raise ParameterError(
+            f"t_end is {t_end!r}, t_start is {t_start!r}", advice="t_end must be later"
+        )
     return t_start, t_end
 
 
@@ -196,8 +198,8 @@ def _check_resolution(chosen: Settings, t_start: float, t_end: float) -> None:
     for name, length in (("step", chosen.step), ("max_step", chosen.max_step)):
         if length is not None and length <= tick:
             raise ParameterError(
-                f"{name} is {length!r} s, under the resolution of the clock ({tick:.2g} s here); "
-                "give a longer one"
+                f"{name} is {length!r} s, under the resolution of the clock ({tick:.2g} s here)",
+                advice="give a longer one",
             )
 
 
@@ -226,7 +228,7 @@ def _tolerances(
     for name, given in by_name.items():
         if name not in rows:
             raise ParameterError(
-                f"atol has the key {shown(name)}; known are {', '.join(map(repr, rows))}"
+                f"atol has the key {shown(name)}", advice=f"known are {', '.join(map(repr, rows))}"
             )
         if np.ndim(given) == 0:
             rows[name] = [checked_scalar(f"atol[{name!r}]", given, "> 0")] * len(rows[name])
@@ -257,8 +259,8 @@ def _covered(rig: Rig, t_start: float, t_end: float) -> float:
             if not signal.times[0] <= t_start < signal.times[-1]:
                 raise SignalError(
                     f"signal {name!r} covers {float(signal.times[0])!r} to "
-                    f"{float(signal.times[-1])!r} s, but the run starts at {t_start!r} s; "
-                    "choose t_start within the record"
+                    f"{float(signal.times[-1])!r} s, but the run starts at {t_start!r} s",
+                    advice="choose t_start within the record",
                 )
             last = min(last, float(signal.times[-1]))
     return last
@@ -270,12 +272,13 @@ def _initial(model: Model, rig: Rig, initial: Mapping[str, Any]) -> tuple[list[f
     known = ("x", "v", *chart.variables, "states")
     if not isinstance(initial, Mapping):
         raise ParameterError(
-            f"initial is {shown(initial)}; it must be a mapping, for example {{'x': 0}}"
+            "it must be a mapping, for example {'x': 0}", place="initial", value=initial
         )
     for name in initial:
         if name not in known:
             raise ParameterError(
-                f"initial has the key {shown(name)}; known are {', '.join(map(repr, known))}"
+                f"initial has the key {shown(name)}",
+                advice=f"known are {', '.join(map(repr, known))}",
             )
     places = Layout.state(model, rig)
     y: dict[str, Any] = {
@@ -284,17 +287,19 @@ def _initial(model: Model, rig: Rig, initial: Mapping[str, Any]) -> tuple[list[f
     }
     if "v" in initial and "v" not in y:
         raise ParameterError(
-            f"initial has 'v' = {shown(initial['v'])}, but the rig prescribes the velocity; leave "
-            "it out"
+            f"initial has 'v' = {shown(initial['v'])}, but the rig prescribes the velocity",
+            advice="leave it out",
         )
     for name in chart.variables:
         values = checked_array(f"initial[{name!r}]", initial.get(name, [0.0] * n), None, "finite")
         if values.size != n:
             raise ParameterError(
-                f"initial[{name!r}] has {values.size} entries; the model has {n} elements"
+                f"initial[{name!r}] has {values.size} entries", advice=f"the model has {n} elements"
             )
         y[name] = as_floats(values)
     names: Any = initial.get("states", [chart.default_state.name] * n)
     if isinstance(names, str) or np.ndim(names) != 1 or len(names) != n:
-        raise ParameterError(f"initial['states'] is {shown(names)}; it must list {n} state names")
+        raise ParameterError(
+            f"it must list {n} state names", place="initial['states']", value=names
+        )
     return places.joined(y), [chart.state_index(str(name)) for name in names]

@@ -82,8 +82,9 @@ class GMSParameters:
         n = checked_array("k", k, None, RULES["k"]).size
         if not isinstance(stribeck, Stribeck):
             raise ParameterError(
-                f"stribeck is {stribeck!r}; it must be a Stribeck, for example "
-                "Stribeck(1, 1.5, 1e-3)"
+                "it must be a Stribeck, for example Stribeck(1, 1.5, 1e-3)",
+                place="stribeck",
+                value=stribeck,
             )
         object.__setattr__(self, "stribeck", stribeck)
         given = {"k": k, "sigma": sigma, "C": C, "sigma_2": sigma_2, "v_c": v_c}
@@ -149,9 +150,10 @@ class GMSParameters:
         >>> GMSParameters.paper("stick-slip").C.tolist()
         [0.1, 0.05, 0.025, 0.0001]
         """
-        if column not in TABLE_I:
+        if not isinstance(column, str) or column not in TABLE_I:
             raise ParameterError(
-                f"Table I has no column {column!r}; it has {' and '.join(map(repr, TABLE_I))}"
+                f"Table I has no column {column!r}",
+                advice=f"it has {' and '.join(map(repr, TABLE_I))}",
             )
         found = TABLE_I[column]
         numbers: Any = found.values
@@ -214,7 +216,9 @@ class GMSParameters:
         rate = checked_scalar("C", C, RULES["C"])
         total = math.fsum(shares)
         if abs(total - 1.0) > 1e-9:
-            raise ParameterError(f"alpha adds up to {total!r}; the shares must add up to 1")
+            raise ParameterError(
+                f"the shares add up to {total!r}", place="alpha", advice="they must add up to 1"
+            )
         return cls(
             stiffness,
             np.zeros(stiffness.size) if sigma is None else sigma,

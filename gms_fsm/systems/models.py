@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gms_fsm.charts.chart import SUPPLIED, Chart
-from gms_fsm.charts.gms import GMS_ELEMENT, Law, gms_element
+from gms_fsm.charts.gms import GMS_ELEMENT, Law, check_law
 from gms_fsm.charts.lugre import LUGRE
 from gms_fsm.charts.parameters import (
     SIGMA_2,
@@ -110,10 +110,11 @@ class GMS:
     def __post_init__(self) -> None:
         if not isinstance(self.parameters, GMSParameters):
             raise ParameterError(
-                f"parameters is {self.parameters!r}; it must be a GMSParameters, for example "
-                "GMSParameters.paper('stick-slip')"
+                "it must be a GMSParameters, for example GMSParameters.paper('stick-slip')",
+                place="parameters",
+                value=self.parameters,
             )
-        gms_element(self.law)
+        check_law(self.law)
         if self.law == "published" and self.stribeck.F_s == self.stribeck.F_c:
             warnings.warn(
                 f"published law with F_s = F_c = {self.stribeck.F_c!r} N: a slipping element stays "
@@ -193,7 +194,7 @@ class LuGre:
             value = checked_scalar(each.name, getattr(self, each.name), each.rule)
             object.__setattr__(self, each.name, value)
         if not isinstance(self.stribeck, Stribeck):
-            raise ParameterError(f"stribeck is {self.stribeck!r}; it must be a Stribeck")
+            raise ParameterError("it must be a Stribeck", place="stribeck", value=self.stribeck)
 
     title = "LuGre"
     chart = LUGRE
@@ -256,35 +257,41 @@ class ChartModel:
     def __post_init__(self) -> None:
         if not isinstance(self.chart, Chart):
             raise ParameterError(
-                f"chart is {shown(self.chart)}; it must be a gms_fsm.Chart (the transitions "
-                "machine is made from it: ElementMachines(model).machine)"
+                "it must be a gms_fsm.Chart (the transitions machine is made from it: "
+                "ElementMachines(model).machine)",
+                place="chart",
+                value=self.chart,
             )
         if isinstance(self.n, bool) or not isinstance(self.n, int) or self.n < 1:
             raise ParameterError(
-                f"n is {shown(self.n)}; a bank has a whole number of elements, at least one"
+                "a bank has a whole number of elements, at least one", place="n", value=self.n
             )
         curve: Any = self.stribeck
         if not isinstance(curve, Stribeck) and (curve is not None or "s" in self.chart.inputs):
             raise ParameterError(
-                f"chart {self.chart.name!r}: stribeck is {shown(curve)}; for the input s give its "
-                "curve, stribeck=Stribeck(F_c, F_s, v_s), and leave it out for a chart without s"
+                f"stribeck is {shown(curve)}",
+                place=f"chart {self.chart.name!r}",
+                advice="for the input s give its curve, stribeck=Stribeck(F_c, F_s, v_s), and "
+                "leave it out for a chart without s",
             )
         for name in self.chart.inputs:
             if name not in SUPPLIED:
                 raise ParameterError(
-                    f"chart {self.chart.name!r} wants the input {name!r}; "
-                    f"a model supplies {', '.join(SUPPLIED)}"
+                    f"chart {self.chart.name!r} wants the input {name!r}",
+                    advice=f"a model supplies {', '.join(SUPPLIED)}",
                 )
         if not isinstance(self.values, Mapping):
             raise ParameterError(
-                f"values is {shown(self.values)}; it must give a number for each parameter of the "
-                "chart, for example {'k': 1.0}"
+                "it must give a number for each parameter of the chart, for example {'k': 1.0}",
+                place="values",
+                value=self.values,
             )
         wanted, given = set(self.chart.parameter_names), set(self.values)
         if wanted != given:
             raise ParameterError(
-                f"chart {self.chart.name!r} has the parameters {sorted(wanted)}; missing values: "
-                f"{sorted(wanted - given) or 'none'}, unknown: {sorted(given - wanted) or 'none'}"
+                f"chart {self.chart.name!r} has the parameters {sorted(wanted)}",
+                advice=f"missing values: {sorted(wanted - given) or 'none'}, unknown: "
+                f"{sorted(given - wanted) or 'none'}",
             )
         values = checked_values(self.chart.parameters, self.values, self.n)
         object.__setattr__(self, "values", values)

@@ -81,27 +81,40 @@ class Corners:
                 array = np.array(getattr(self, name), dtype=np.float64)
             except (TypeError, ValueError, OverflowError):
                 raise SignalError(
-                    f"signal: the {name} {shown(getattr(self, name))} are not numbers; give "
-                    "numbers that a float can hold"
+                    f"the {name} {shown(getattr(self, name))} are not numbers",
+                    place="signal",
+                    advice="give numbers that a float can hold",
                 ) from None
             if array.ndim != 1:
-                raise SignalError(f"signal: the {name} have shape {array.shape}; give a flat list")
+                raise SignalError(
+                    f"the {name} have shape {array.shape}",
+                    place="signal",
+                    advice="give a flat list",
+                )
             for i in np.flatnonzero(~np.isfinite(array))[:1]:
-                raise SignalError(f"signal: {name}[{i}] is {array[i]}; it must be finite")
+                raise SignalError(
+                    f"{name}[{i}] is {array[i]}", place="signal", advice="it must be finite"
+                )
             array.setflags(write=False)
             object.__setattr__(self, name, array)
         if self.times.size != self.values.size:
             raise SignalError(
-                f"signal: {self.times.size} times but {self.values.size} values; give one each"
+                f"{self.times.size} times but {self.values.size} values",
+                place="signal",
+                advice="give one each",
             )
         if self.times.size < 2:
-            raise SignalError(f"signal: {self.times.size} point(s); give at least 2")
+            raise SignalError(
+                f"{self.times.size} point(s)", place="signal", advice="give at least 2"
+            )
         back = np.flatnonzero(np.diff(self.times) < 0)
         if back.size:
             i = int(back[0])
             raise SignalError(
-                f"signal: time goes backward from times[{i}] = {self.times[i]} to "
-                f"times[{i + 1}] = {self.times[i + 1]}; sort the rows"
+                f"time goes backward from times[{i}] = {self.times[i]} to times[{i + 1}] "
+                f"= {self.times[i + 1]}",
+                place="signal",
+                advice="sort the rows",
             )
 
     @property
@@ -173,20 +186,25 @@ def as_signal(given: SignalLike) -> Signal:
     if isinstance(form, str):
         return Formula(form)
     if isinstance(form, bool):
-        raise SignalError(f"signal: {form!r} is not a signal; give a number, say 1.0")
+        raise SignalError(
+            f"{form!r} is not a signal", place="signal", advice="give a number, say 1.0"
+        )
     if isinstance(form, Real | np.generic):
         try:
             level = float(form)
         except OverflowError:
-            raise SignalError(f"signal: {shown(form)} is too large; it must be finite") from None
+            raise SignalError(
+                f"{shown(form)} is too large", place="signal", advice="it must be finite"
+            ) from None
         return Corners(np.array([-1.0, 0.0]), np.array([level, level]), held=True)
     if callable(form):
         return Function(form)
     pair = form if isinstance(form, tuple) and len(form) == 2 else ()
     if pair and all(isinstance(part, tuple) and len(part) == 2 for part in pair):
         raise SignalError(
-            f"signal: {shown(form)} can be read as two ramp corners and as a record of two "
-            "samples; give a list [(t, value), (t, value)] or arrays (times, values)"
+            f"{shown(form)} can be read as two ramp corners and as a record of two samples",
+            place="signal",
+            advice="give a list [(t, value), (t, value)] or arrays (times, values)",
         )
     if pair:
         return Corners(pair[0], pair[1], held=False)
@@ -198,8 +216,10 @@ def as_signal(given: SignalLike) -> Signal:
         if corners.ndim == 2 and corners.shape[1] == 2:
             return Corners(corners[:, 0], corners[:, 1], held=True)
     raise SignalError(
-        f"signal: {shown(form)} is not a signal; give an expression of t in quotes, a list of "
-        "(t, value) pairs, a pair (times, values), or a function of t"
+        f"{shown(form)} is not a signal",
+        place="signal",
+        advice="give an expression of t in quotes, a list of (t, value) pairs, a pair "
+        "(times, values), or a function of t",
     )
 
 

@@ -42,8 +42,8 @@ def member(file: Any, name: str, most: int | None = None) -> Any:
     most = ROOM + (DENSEST * found.compress_size if most is None else most)
     if found.file_size > most:
         raise TraceFileError(
-            f"{name} unpacks to {found.file_size} bytes; in a file of this length it has at most "
-            f"{most}"
+            f"{name} unpacks to {found.file_size} bytes",
+            advice=f"in a file of this length it has at most {most}",
         )
     with PARSER:
         return file[name]

@@ -85,7 +85,7 @@ def _header(path: Path, line: str) -> Header:
         what = "line 1 must be '# ' and the trace's header"
         if line.startswith("t,element,"):
             what = "this is a log of transitions; give the trace itself, .npz or .csv"
-        raise TraceFileError(f"{path}: {what}")
+        raise TraceFileError(what).inside(path)
     return Header.model_validate_json(line[2:])
 
 
@@ -136,8 +136,9 @@ def _log_of(path: Path, stamp: str) -> str:
         if stamp in ("", _stamp(text)):
             return text
     raise TraceFileError(
-        f"{log}: belongs to another run than {path.name}, or was changed; keep the two together"
-    )
+        f"belongs to another run than {path.name}, or was changed",
+        advice="keep the two together",
+    ).inside(log)
 
 
 def _cell(name: str, value: Any) -> str:
@@ -158,11 +159,11 @@ def _read_columns(file: IO[str], path: Path, line: int) -> dict[str, list[str]]:
     reader = csv.reader(file)
     head = next(reader, None)
     if not head:
-        raise TraceFileError(f"{path}: line {line} must name the columns")
+        raise TraceFileError("it must name the columns", place=f"line {line}").inside(path)
     rows = list(reader)
     for number, row in enumerate(rows, start=line + 1):
         if len(row) != len(head):
             raise TraceFileError(
-                f"{path}: line {number} has {len(row)} cells, the head line has {len(head)}"
-            )
+                f"it has {len(row)} cells, the head line has {len(head)}", place=f"line {number}"
+            ).inside(path)
     return {name: [row[j] for row in rows] for j, name in enumerate(head)}

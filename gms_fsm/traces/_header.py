@@ -180,8 +180,8 @@ def _kind(rig: Rig) -> RigKind:
     # The class itself: one of another's making may have the name of ours.
     if type(rig) not in RIGS:
         raise OutputError(
-            f"the rig is a {type(rig).__qualname__}, a class of your own, which a file cannot "
-            f"hold; it can hold {', '.join(RIGS.values())} of gms_fsm"
+            f"the rig is a {type(rig).__qualname__}, a class of your own, which a file cannot hold",
+            advice=f"it can hold {', '.join(RIGS.values())} of gms_fsm",
         )
     return RIGS[type(rig)]
 
@@ -209,8 +209,8 @@ def _signal(name: str, record: FormulaRecord | CornersRecord | FunctionRecord) -
 def _lost(name: str) -> Callable[[float], float]:
     def missing(_: float) -> float:
         raise SignalError(
-            f"{name!r} was a Python function, which a trace file cannot hold; sample before "
-            "saving, or run with t_eval"
+            f"{name!r} was a Python function, which a trace file cannot hold",
+            advice="sample before saving, or run with t_eval",
         )
 
     return missing

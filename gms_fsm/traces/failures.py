@@ -21,15 +21,41 @@ class SimulationError(GMSError, RuntimeError):
 
     Parameters
     ----------
-    message : str
-        What happened, where, with which values, and what to try.
+    reason : str
+        What happened.
     trace : Trace
         The part of the run before the error.
+    t : float, optional
+        When, s.
+    place : str, optional
+        Where: an element, an edge, a signal.
+    advice : str, optional
+        What to try.
     """
 
-    def __init__(self, message: str, trace: Trace) -> None:
-        super().__init__(message)
-        self.trace = trace
+    def __init__(
+        self,
+        reason: str,
+        trace: Trace,
+        *,
+        t: float | None = None,
+        place: str = "",
+        advice: str = "",
+    ) -> None:
+        super().__init__(reason, place=place, advice=advice)
+        self.trace, self.t = trace, t
+        self.kept = ".trace"  # where the run up to there is: here, or a file
+
+    def __str__(self) -> str:
+        return f"{self.happened}; the run up to there is kept in {self.kept}"
+
+    @property
+    def happened(self) -> str:
+        """The text without a word on where the run is kept, for those who show the run itself."""
+        scene = self.place
+        if self.t is not None:
+            scene = f"{scene} at t = {self.t!r} s" if scene else f"t = {self.t!r} s"
+        return GMSError.__str__(self.replaced(place=scene))
 
 
 class LivelockError(SimulationError):

@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gms_fsm._arguments import checked_path, checked_whole
 from gms_fsm._extras import require
-from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.charts.parameters import FloatArray, as_numbers
 from gms_fsm.errors import (
     OutputError,
     ParameterError,
@@ -70,7 +71,7 @@ def check_trace(trace: object) -> None:
     """
     if not isinstance(trace, Trace):
         raise ParameterError(
-            f"trace is {shown(trace)}; it must be a Trace, from simulate(...) or Trace.load(path)"
+            "it must be a Trace, from simulate(...) or Trace.load(path)", place="trace", value=trace
         )
 
 
@@ -172,8 +173,9 @@ class Trace:
         """
         if name not in self.model.chart.variables:
             raise ParameterError(
-                f"name is {shown(name)}; the chart has the variables "
-                f"{', '.join(self.model.chart.variables)}"
+                f"the chart has the variables {', '.join(self.model.chart.variables)}",
+                place="name",
+                value=name,
             )
         return self._named(name)
 
@@ -254,6 +256,7 @@ class Trace:
         dict of str to float
             By what is zero there, such as ``v``; empty almost everywhere.
         """
+        row = checked_whole("row", row)
         on = np.flatnonzero(self.rows.mode[row, self.program.layout.slides])
         return {self.program.surface_names[k]: self._sigma(self.rows, row, int(k)) for k in on}
 
@@ -300,10 +303,12 @@ class Trace:
         SignalError
             If the trace comes from a file and its signal was a Python function.
         """
-        wanted = np.atleast_1d(np.asarray(times, dtype=np.float64))
+        wanted = np.atleast_1d(as_numbers("times", times))
         table = merged(self.rows, self.stops)
         if wanted.ndim != 1 or wanted.size == 0:
-            raise ParameterError(f"times has shape {wanted.shape}; give a flat, non-empty list")
+            raise ParameterError(
+                f"times has shape {wanted.shape}", advice="give a flat, non-empty list"
+            )
         outside = wanted[~((wanted >= table.t[0]) & (wanted <= table.t[-1]))]
         if outside.size:
             raise ParameterError(
@@ -328,6 +333,7 @@ class Trace:
         Trace
             All rows of this trace, micro-steps included, and the samples.
         """
+        points = checked_whole("points", points, 1)
         even = self.sample(np.linspace(self.t[0], self.t[-1], points)).rows
         inner = ~np.isin(even.t, self.t)
         rows = merged(even.at(inner), self.rows)
@@ -400,9 +406,11 @@ class Trace:
             If the folder cannot be written, the ending is another, or the rig is of a class of
             your own.
         """
-        path = Path(path)
+        path = checked_path("path", path)
         if path.suffix not in (".npz", ".csv"):
-            raise OutputError(f"{path}: a trace is saved as .npz or .csv, not {path.suffix!r}")
+            raise OutputError(
+                f"a trace is saved as .npz or .csv, not {path.suffix!r}", place=str(path)
+            )
         header = Header.of(self.model, self.rig, self.settings, self.monitors)
         if path.suffix == ".csv":
             return _csv.write(path, header, self.columns(), self.transitions)
@@ -429,25 +437,27 @@ class Trace:
         TraceFileError
             If the file is missing, damaged, or not a trace; nothing in it is executed.
         """
-        path = Path(path)
+        path = checked_path("path", path)
         reader = {".npz": _npz.read, ".csv": _csv.read}.get(path.suffix)
         if reader is None:
-            raise TraceFileError(f"{path}: a trace ends in .npz or .csv, not {path.suffix!r}")
+            raise TraceFileError(
+                f"a trace ends in .npz or .csv, not {path.suffix!r}", place=str(path)
+            )
         try:
             parts = checked(reader(path))
         except TraceFileError as error:
-            if str(error).startswith((f"{path}:", f"{_csv.log_path(path)}:")):
-                raise
-            raise TraceFileError(f"{path}: {error}") from None
+            raise (error if error.outer else error.inside(path)) from None
         except FileNotFoundError as error:
             raise TraceFileError(
-                f"{error.filename}: no such file; check its name and the folder"
+                "no such file", place=error.filename, advice="check its name and the folder"
             ) from None
         except Exception as error:
             # A damaged file can fail anywhere inside zipfile, zlib, numpy, csv or pydantic, and
             # each has errors of its own; whatever it is, it is the file's fault.
             raise TraceFileError(
-                f"{path}: damaged or incomplete trace file ({why(error)}); write it again"
+                f"damaged or incomplete trace file ({why(error)})",
+                place=str(path),
+                advice="write it again",
             ) from None
         return cls(
             parts.rows,

@@ -60,8 +60,8 @@ def figure_3(
     """
     if np.shape(force) != chart.t.shape:
         raise ParameterError(
-            f"force has shape {np.shape(force)}; it must have one value a row of the chart run, "
-            f"shape {chart.t.shape}"
+            f"force has shape {np.shape(force)}",
+            advice=f"it must have one value a row of the chart run, shape {chart.t.shape}",
         )
     with rc_context(RC):
         figure = Figure(figsize=(9.0, 6.2), layout="constrained")

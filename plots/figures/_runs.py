@@ -53,11 +53,11 @@ class Measured:
         shapes = [np.shape(values) for values in (self.t, self.x, self.F)]
         if len(shapes[0]) != 1 or len(set(shapes)) > 1 or shapes[0] == (0,):
             raise ParameterError(
-                f"t, x and F of a measurement have the shapes {shapes}; they must be equally long "
-                "flat lists, not empty"
+                f"t, x and F of a measurement have the shapes {shapes}",
+                advice="they must be equally long flat lists, not empty",
             )
         if not (np.diff(self.t) >= 0).all():
-            raise ParameterError("t of a measurement goes backward; times must grow")
+            raise ParameterError("t of a measurement goes backward", advice="times must grow")
 
 
 def overview(

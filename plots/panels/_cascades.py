@@ -57,10 +57,11 @@ def cascade_window(
     check_trace(trace)
     first, last = float(trace.t[0]), float(trace.t[-1])
     if not is_number(within) or not within > 0:
-        raise ParameterError(f"within is {written(within)}; it must be a time > 0 s")
+        raise ParameterError(f"within is {written(within)}", advice="it must be a time > 0 s")
     if around is not None and not (is_number(around) and first <= around <= last):
         raise ParameterError(
-            f"around is {written(around)}; it must be a time in the run, {first:g} to {last:g} s"
+            f"around is {written(around)}",
+            advice=f"it must be a time in the run, {first:g} to {last:g} s",
         )
     log = trace.transitions
     leaving = log.source == trace.model.chart.default_state.name

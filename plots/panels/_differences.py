@@ -59,11 +59,11 @@ def difference(
         The line.
     """
     if not is_number(floor) or not 0 < floor < np.inf:
-        raise ParameterError(f"floor is {written(floor)}; it must be a force > 0 N")
+        raise ParameterError(f"floor is {written(floor)}", advice="it must be a force > 0 N")
     if np.shape(times) != np.shape(values) or np.ndim(times) != 1 or not np.size(times):
         raise ParameterError(
-            f"times has shape {np.shape(times)}, the difference {np.shape(values)}; they must be "
-            "equally long flat lists, not empty"
+            f"times has shape {np.shape(times)}, the difference {np.shape(values)}",
+            advice="they must be equally long flat lists, not empty",
         )
     if log:
         ax.set(yscale="log")
@@ -114,8 +114,8 @@ def residual(
     first, last = max(begin, float(reference.t[0])), min(end, float(reference.t[-1]))
     if not first < last:
         raise ParameterError(
-            f"reference runs from {reference.t[0]:g} to {reference.t[-1]:g} s; it must overlap "
-            f"{begin:g} to {end:g} s"
+            f"reference runs from {reference.t[0]:g} to {reference.t[-1]:g} s",
+            advice=f"it must overlap {begin:g} to {end:g} s",
         )
     if isinstance(reference, Trace):
         grid = np.union1d(np.linspace(first, last, SMOOTH), reference.transitions.t)

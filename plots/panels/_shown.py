@@ -139,8 +139,9 @@ def checked_window(trace: Trace, window: Window | None) -> Window:
         begin, end = last, first
     if not (first <= begin < end <= last):
         raise ParameterError(
-            f"window is {written(window)}; it must be two times (t0, t1) with t0 < t1 inside the "
-            f"run, {first:g} to {last:g} s"
+            f"window is {written(window)}",
+            advice=f"it must be two times (t0, t1) with t0 < t1 inside the run, {first:g} "
+            f"to {last:g} s",
         )
     return begin, end
 
@@ -167,8 +168,9 @@ def checked_elements(trace: Trace, elements: Iterable[int] | None) -> list[int]:
         or not (0 <= min(chosen) <= max(chosen) < trace.n)
     ):
         raise ParameterError(
-            f"elements is {written(elements)}; it must be a list of different whole numbers from 0 "
-            f"to {trace.n - 1} (labels count from 1)"
+            f"elements is {written(elements)}",
+            advice=f"it must be a list of different whole numbers from 0 to {trace.n - 1} "
+            "(labels count from 1)",
         )
     return [int(i) for i in chosen]
 

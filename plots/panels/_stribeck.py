@@ -52,7 +52,7 @@ def stribeck(
     model, part = trace.model, shown(trace, window)
     if model.stribeck is None:
         raise ParameterError(
-            f"{model.title}: its chart has no input s, and so no Stribeck curve to draw"
+            "its chart has no input s, and so no Stribeck curve to draw", place=model.title
         )
     points = None if measured is None else checked_points(measured)
     speeds = np.abs(part.v)
@@ -114,7 +114,8 @@ def checked_points(measured: tuple[ArrayLike, ArrayLike]) -> tuple[Any, Any]:
         good = False
     if not good:
         raise ParameterError(
-            f"measured is {written(measured)}; it must be two equally long flat lists of finite "
-            "numbers: velocities [m/s] and friction [N]"
+            f"measured is {written(measured)}",
+            advice="it must be two equally long flat lists of finite numbers: velocities "
+            "[m/s] and friction [N]",
         )
     return v, F

@@ -67,7 +67,7 @@ class Commands:
         if name not in COMMANDS:
             near = difflib.get_close_matches(name, COMMANDS, 1)
             hint = f"did you mean {near[0]}? " if near else ""
-            raise SessionError(f"no command {name!r}; {hint}help lists them")
+            raise SessionError(f"no command {name!r}", advice=f"{hint}help lists them")
         yield from getattr(self, f"do_{name}")(arg)
 
     def words(self, name: str, before: str) -> Sequence[str]:
@@ -126,7 +126,7 @@ class Commands:
 
     def _path(self, name: str, text: str) -> Path:
         if not text:
-            raise SessionError(f"a file name is missing; {self._usage(name)}")
+            raise SessionError("a file name is missing", advice=f"{self._usage(name)}")
         return Path(text.strip("\"'")).expanduser()
 
     # ------------------------------------------------------------------ help
@@ -137,7 +137,7 @@ class Commands:
             return
         name = ALIASES.get(arg, arg)
         if name not in COMMANDS:
-            raise SessionError(f"no command {arg!r}; help lists them")
+            raise SessionError(f"no command {arg!r}", advice="help lists them")
         each = help_of(name, self.session)
         alias = f"   (short: {each.alias})" if each.alias else ""
         yield f"{each.usage}{alias}\n{each.says}"
@@ -148,8 +148,8 @@ class Commands:
         """Refuse to go forward from the end."""
         branch = self.session.branch
         last = branch.between is None and branch.cursor + 1 == len(branch)
-        if last and not branch.pull() and branch.outcome == "end":
-            raise SessionError("this is the end of the run; go back first")
+        if last and not branch.pull() and branch.ended:
+            raise SessionError("this is the end of the run", advice="go back first")
 
     def here(self) -> Iterator[str]:
         """Say where we are, after a move.
@@ -195,7 +195,7 @@ class Commands:
         try:
             t = float(arg.removesuffix("s"))
         except ValueError:
-            raise SessionError(f"{arg!r} is no time; {self._usage('goto')}") from None
+            raise SessionError(f"{arg!r} is no time", advice=f"{self._usage('goto')}") from None
         try:
             self.session.goto(t)
         except KeyboardInterrupt:
@@ -206,7 +206,7 @@ class Commands:
     def do_until(self, arg: str) -> Iterator[str]:
         """Go to where a condition becomes true."""
         if not arg:
-            raise SessionError(f"a condition is missing; {self._usage('until')}")
+            raise SessionError("a condition is missing", advice=f"{self._usage('until')}")
         condition, session, branch = self._with_states(arg), self.session, self.session.branch
         already = holds(session.parse(condition), session.values())
         self._ahead()
@@ -266,8 +266,8 @@ class Commands:
             edge = _spelt(words.pop(0), self._edges)
             if edge not in self._edges or words:
                 raise SessionError(
-                    f"{' '.join([edge, *words])!r} is no edge; there are "
-                    f"{', '.join(self._edges) or 'none'}; {self._usage('why')}"
+                    f"{' '.join([edge, *words])!r} is no edge",
+                    advice=f"there are {', '.join(self._edges) or 'none'}; {self._usage('why')}",
                 )
         found, branch = self.session.why(i, edge), self.session.branch
         yield str(found)
@@ -297,7 +297,7 @@ class Commands:
     def do_print(self, arg: str) -> Iterator[str]:
         """Show a value."""
         if not arg:
-            raise SessionError(f"an expression is missing; {self._usage('print')}")
+            raise SessionError("an expression is missing", advice=f"{self._usage('print')}")
         yield self._value(arg)
 
     def _value(self, text: str) -> str:
@@ -321,7 +321,7 @@ class Commands:
             try:
                 value = self._value(text)
             except GMSError as error:
-                value = str(error).partition("\n")[0]
+                value = error.reason
             yield f"  watch {number}: {text} = {value}"
         if not self.session.watches:
             yield "nothing is watched"
@@ -339,7 +339,9 @@ class Commands:
     def _element(self, command: str, text: str) -> int:
         number = _whole(text, help_of(command, self.session).usage)
         if not 1 <= number <= self.session.model.n:
-            raise SessionError(f"no element {number}; there are 1 to {self.session.model.n}")
+            raise SessionError(
+                f"no element {number}", advice=f"there are 1 to {self.session.model.n}"
+            )
         return number - 1
 
     # ------------------------------------------------------------------ breakpoints
@@ -354,15 +356,15 @@ class Commands:
             arg,
         )
         if form is None:
-            raise SessionError(f"{arg!r} is no breakpoint; {self._usage('break')}")
+            raise SessionError(f"{arg!r} is no breakpoint", advice=f"{self._usage('break')}")
         kind, name, element, condition, hits = form.groups()
         states, edges = self._states, self._edges
         asked = {None: states + edges, "enter": states, "leave": states}.get(kind, edges)
         name = _spelt(name, asked)
         if name not in states + edges:
             raise SessionError(
-                f"no edge or state {name!r}; edges: {', '.join(edges) or 'none'}; "
-                f"states: {', '.join(states)}"
+                f"no edge or state {name!r}",
+                advice=f"edges: {', '.join(edges) or 'none'}; states: {', '.join(states)}",
             )
         point = self.session.break_on(
             kind or ("enter" if name in states else "fires"),
@@ -400,10 +402,11 @@ class Commands:
             what, i = self._pokeable(name)
             if not what and name in parameter_names(self.session.model):
                 raise SessionError(
-                    f"{name} is a parameter; for another value start a session with another model"
+                    f"{name} is a parameter",
+                    advice="for another value start a session with another model",
                 )
             if not value or not what:
-                raise SessionError(f"{part!r} cannot be poked; {self._usage('poke')}")
+                raise SessionError(f"{part!r} cannot be poked", advice=f"{self._usage('poke')}")
             if what == "state":
                 states[i] = _spelt(value, self._states)
             else:
@@ -422,7 +425,7 @@ class Commands:
         if form[2]:
             return form[1], self._element("poke", form[2])
         if self.session.model.n > 1:
-            raise SessionError(f"{name!r} cannot be poked; for element 1 write {name}1")
+            raise SessionError(f"{name!r} cannot be poked", advice=f"for element 1 write {name}1")
         return form[1], 0
 
     def do_branches(self, arg: str) -> Iterator[str]:
@@ -440,7 +443,7 @@ class Commands:
         """Compare branches."""
         numbers = [_whole(text, "compare A B") for text in arg.split()]
         if len(numbers) not in (0, 2):
-            raise SessionError(f"two branches are needed; {self._usage('compare')}")
+            raise SessionError("two branches are needed", advice=f"{self._usage('compare')}")
         yield str(self.session.compare(*numbers))
 
     def do_plot(self, arg: str) -> Iterator[str]:
@@ -454,7 +457,9 @@ class Commands:
             branch.complete()
             trace = branch.trace()
             if not trace.t[-1] > trace.t[0]:
-                raise SessionError(f"branch {number} failed at once; there is nothing to draw")
+                raise SessionError(
+                    f"branch {number} failed at once", advice="there is nothing to draw"
+                )
             edits = f": {branch.edits}" if branch.edits else ""
             runs[text_of.short(f"branch {number}{edits}", 50)] = trace
         yield f"written to {figures.save(figures.compare_laws(runs), path)}"
@@ -479,14 +484,14 @@ class Commands:
 
 def _whole(text: str, usage: str) -> int:
     if not re.fullmatch(r"\d{1,9}", text):
-        raise SessionError(f"{text!r} is not an integer; usage: {usage}")
+        raise SessionError(f"{text!r} is not an integer", advice=f"usage: {usage}")
     return int(text)
 
 
 def _count(name: str, text: str, default: int = 1) -> int:
     count = _whole(text, COMMANDS[name].usage) if text else default
     if count < 1:
-        raise SessionError(f"{name} {count} goes nowhere; usage: {COMMANDS[name].usage}")
+        raise SessionError(f"{name} {count} goes nowhere", advice=f"usage: {COMMANDS[name].usage}")
     return count
 
 
@@ -501,7 +506,7 @@ def _remove(where: list[Breakpoint] | list[str], name: str, arg: str) -> None:
         return
     number = _whole(arg, COMMANDS[name].usage)
     if not 1 <= number <= len(where):
-        raise SessionError(f"there is no number {number}; there are {len(where)}")
+        raise SessionError(f"there is no number {number}", advice=f"there are {len(where)}")
     del where[number - 1]
 
 

@@ -249,13 +249,15 @@ def scenario_to_debug(path: str | Path, overrides: Sequence[str] = ()) -> Loaded
     match Path(path).suffix.lower():
         case ".py":
             raise ScenarioError(
-                f"{path} is Python; debug takes a scenario (.toml); for a model of your own: "
-                "Debugger(Session(model, rig, t_end)).run(), see docs/howto/debugging.md"
+                f"{path} is Python",
+                advice="debug takes a scenario (.toml); for a model of your own: "
+                "Debugger(Session(model, rig, t_end)).run(), see "
+                "docs/howto/debugging.md",
             )
         case ".npz" | ".csv":
             raise ScenarioError(
-                f"{path} is a trace; `gms-fsm replay {path}` steps through it; debug takes a "
-                "scenario (.toml)"
+                f"{path} is a trace",
+                advice=f"`gms-fsm replay {path}` steps through it; debug takes a scenario (.toml)",
             )
     return load_scenario(path, overrides)
 
@@ -286,5 +288,5 @@ def run_debugger(loaded: Loaded, stdin: TextIO | None = None, stdout: TextIO | N
     try:
         session = Session(loaded.model, loaded.rig, options.pop("t_end"), **options)
     except GMSError as error:
-        raise ScenarioError(f"{loaded.path}: {error}") from None
+        raise ScenarioError.of(error).inside(loaded.path) from None
     return Debugger(session, loaded.title, stdin, stdout).run()

@@ -145,7 +145,7 @@ def ending_lines(ending: str) -> Iterator[str]:
     if ending == "end":
         yield "  end of the run"
     elif ending:
-        yield f"  the run cannot go on: {ending.partition('; the run up to there')[0]}"
+        yield f"  the run cannot go on: {ending}"
         yield "  go back, look, or poke something to go on in another branch"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from gms_fsm.inspection._branch import Branch
 from gms_fsm.inspection.session import Session
 
 __all__ = [
@@ -160,7 +161,7 @@ class BranchView:
     t_computed : float
         s, the last row's.
     outcome : str
-        As in `Branch`: empty, ``"end"``, or why it cannot go on.
+        Empty while it goes on, ``"end"``, or why it cannot go on.
     parent : int or None
         The branch it left.
     t_fork : float or None
@@ -219,7 +220,13 @@ def view(session: Session) -> View:
 def _ending(session: Session) -> str:
     here, branch = session.here, session.branch
     at_last = here.row + 1 == len(branch) and not here.located
-    return branch.outcome if at_last else ""
+    return _outcome(branch) if at_last else ""
+
+
+def _outcome(branch: Branch) -> str:
+    if branch.failure is not None:
+        return branch.failure.happened
+    return "end" if branch.ended else ""
 
 
 def _element(session: Session, i: int) -> ElementView:
@@ -304,7 +311,7 @@ def ribbons(session: Session, parts: int) -> Ribbons:
         t = start + (end - start) * (part + 0.5) / parts
         row = branch.row_at(t)
         # The last row's states are known up to its time only.
-        reached = row + 1 < len(branch) or branch.outcome == "end"
+        reached = row + 1 < len(branch) or branch.ended
         modes.append(branch.raw(row).mode if row >= 0 and reached else None)
     now = min(parts - 1, int(parts * (session.here.t - start) / (end - start)))
     return Ribbons(start, end, tuple(modes), now)
@@ -330,7 +337,7 @@ def branches(session: Session) -> tuple[BranchView, ...]:
             len(branch.log()),
             number == session.current,
             branch.last.t,
-            branch.outcome,
+            _outcome(branch),
             branch.parent,
             None if branch.parent is None else branch.raw(branch.fork + 1).t,
             "" if branch.edits is None else str(branch.edits),

@@ -143,7 +143,9 @@ def numbered(text: str) -> int:
     for number in LESSONS:
         if text == str(number):
             return number
-    raise ParameterError(f"there is no lesson {shown(text)}; these are there:\n{listed()}")
+    raise ParameterError(
+        f"there is no lesson {shown(text)}", advice=f"these are there:\n{listed()}"
+    )
 
 
 def listed() -> str:
@@ -217,5 +219,4 @@ def _replay(number: int, result: Result, folder: Path) -> list[Path]:
     runs = result.replayed
     title = f"Lesson {number}: {LESSONS[number].QUESTION}"
     page = replay(*runs.values(), title=title, names=list(runs))
-    names = formats.files(f"lesson_{number}", "page")
-    return [formats.save(page, folder / name, "page") for name in names]
+    return [page.save(folder / name) for name in formats.files(f"lesson_{number}", "page")]

@@ -22,6 +22,7 @@ from gms_fsm import GMS, GMSParameters, Prescribed, Stribeck, Trace, simulate
 from gms_fsm.charts.parameters import FloatArray
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["QUESTION", "TITLE", "Result", "bank", "figure", "parabola", "run", "small_loop"]
@@ -200,16 +201,7 @@ def figure(result: Result) -> Figure:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    from plots.style import (
-        BLUE,
-        ELEMENT_COLOURS,
-        ELEMENT_DASHES,
-        INK,
-        PALE_GREY,
-        RC,
-        STATE_FILLS,
-        TEXT_GREY,
-    )
+    from plots.style import ELEMENT_COLOURS, ELEMENT_DASHES, PALE_GREY, RC, TEXT_GREY
 
     looks = list(zip(COUNTS, ELEMENT_COLOURS, ELEMENT_DASHES, strict=False))
     with rc_context(RC):
@@ -256,29 +248,36 @@ def figure(result: Result) -> Figure:
         error.set_title("c) error of the first loading")
         for n, colour, e in zip(COUNTS, ELEMENT_COLOURS, result.errors, strict=False):
             error.plot(n, 100 * e / F_c, "o", color=colour, markersize=7, zorder=3)
-        share = 100 * np.abs(result.losses) / smooth_loss(SMALL)
-        places = np.arange(len(COUNTS))
-        loss.bar(places, share, width=0.6, facecolor=STATE_FILLS[0], edgecolor=BLUE)
-        loss.axhline(100, color=INK, linestyle="--", linewidth=0.9)
-        for place, value in zip(places, share, strict=True):
-            loss.annotate(
-                f"{value:.1f} %",
-                (place, value),
-                (0, 3 if value < 90 else -4),
-                textcoords="offset points",
-                ha="center",
-                va="bottom" if value < 90 else "top",
-            )
-        loss.annotate(
-            "smooth curve",
-            (-0.3, 100),
-            (0, -4),
-            textcoords="offset points",
-            va="top",
-            color=TEXT_GREY,
-        )
-        loss.set_xticks(places, [str(n) for n in COUNTS])
-        loss.set(xlabel="elements n", ylabel="energy lost in a loop [%]", ylim=(0, 112))
-        loss.set_title("d) damping of the small loop")
+        _draw_losses(loss, result)
         sheet.suptitle(f"Lesson 5: {QUESTION}", x=0.01, ha="left", fontsize=12)
     return sheet
+
+
+def _draw_losses(ax: Axes, result: Result) -> None:
+    """Draw the energy lost in the small loop over n."""
+    from plots.style import BLUE, INK, STATE_FILLS, TEXT_GREY
+
+    share = 100 * np.abs(result.losses) / smooth_loss(SMALL)
+    places = np.arange(len(COUNTS))
+    ax.bar(places, share, width=0.6, facecolor=STATE_FILLS[0], edgecolor=BLUE)
+    ax.axhline(100, color=INK, linestyle="--", linewidth=0.9)
+    for place, value in zip(places, share, strict=True):
+        ax.annotate(
+            f"{value:.1f} %",
+            (place, value),
+            (0, 3 if value < 90 else -4),
+            textcoords="offset points",
+            ha="center",
+            va="bottom" if value < 90 else "top",
+        )
+    ax.annotate(
+        "smooth curve",
+        (-0.3, 100),
+        (0, -4),
+        textcoords="offset points",
+        va="top",
+        color=TEXT_GREY,
+    )
+    ax.set_xticks(places, [str(n) for n in COUNTS])
+    ax.set(xlabel="elements n", ylabel="energy lost in a loop [%]", ylim=(0, 112))
+    ax.set_title("d) damping of the small loop")

@@ -25,6 +25,7 @@ from gms_fsm.app.paper.claims import differing_numbers, force_difference
 from gms_fsm.charts.parameters import FloatArray
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["QUESTION", "TITLE", "Result", "figure", "predicted", "run"]
@@ -193,7 +194,7 @@ def figure(result: Result) -> Figure:
     from matplotlib.figure import Figure
 
     from plots import panels
-    from plots.style import BLUE, INK, LINE_GREY, RC, TEXT_GREY, VERMILION
+    from plots.style import BLUE, INK, RC, TEXT_GREY, VERMILION
 
     log = result.chart.transitions
     first, arrest = float(log.t[0]), float(log.t[log.edge == "arrest"][0])
@@ -253,27 +254,34 @@ def figure(result: Result) -> Figure:
             fontsize=8,
         )
 
-        times = np.geomspace(0.5 * result.late.min(), 2 * result.late.max(), 20)
-        lateness.loglog(1e3 * times, predicted(times, result.chart), color=LINE_GREY, zorder=1)
-        lateness.loglog(1e3 * result.late, result.left, "o", color=VERMILION, markersize=5)
-        lateness.axhline(PAPERS, color=BLUE, linestyle="--", linewidth=0.9)
-        lateness.annotate(
-            f"the paper's $10^{{-3}}$ N:\n{1e3 * result.late_for_the_papers:.1f} ms late",
-            (1e3 * times[0], PAPERS),
-            (2, 4),
-            textcoords="offset points",
-            color=BLUE,
-            fontsize=8,
-        )
-        lateness.annotate(
-            "line: v late Σ k, dying\nas exp(−C t/s)",
-            (0.97, 0.05),
-            xycoords="axes fraction",
-            ha="right",
-            color=TEXT_GREY,
-            fontsize=8,
-        )
-        lateness.set(xlabel="lateness of the switch [ms]", ylabel=f"difference at {LOOK:g} s [N]")
-        lateness.set_title("d) what a late switch leaves")
+        _draw_lateness(lateness, result)
         sheet.suptitle(f"Lesson 8: {QUESTION}", x=0.01, ha="left", fontsize=12)
     return sheet
+
+
+def _draw_lateness(ax: Axes, result: Result) -> None:
+    """Draw what a switch leaves over how late it is."""
+    from plots.style import BLUE, LINE_GREY, TEXT_GREY, VERMILION
+
+    times = np.geomspace(0.5 * result.late.min(), 2 * result.late.max(), 20)
+    ax.loglog(1e3 * times, predicted(times, result.chart), color=LINE_GREY, zorder=1)
+    ax.loglog(1e3 * result.late, result.left, "o", color=VERMILION, markersize=5)
+    ax.axhline(PAPERS, color=BLUE, linestyle="--", linewidth=0.9)
+    ax.annotate(
+        f"the paper's $10^{{-3}}$ N:\n{1e3 * result.late_for_the_papers:.1f} ms late",
+        (1e3 * times[0], PAPERS),
+        (2, 4),
+        textcoords="offset points",
+        color=BLUE,
+        fontsize=8,
+    )
+    ax.annotate(
+        "line: v late Σ k, dying\nas exp(−C t/s)",
+        (0.97, 0.05),
+        xycoords="axes fraction",
+        ha="right",
+        color=TEXT_GREY,
+        fontsize=8,
+    )
+    ax.set(xlabel="lateness of the switch [ms]", ylabel=f"difference at {LOOK:g} s [N]")
+    ax.set_title("d) what a late switch leaves")

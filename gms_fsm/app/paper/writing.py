@@ -72,8 +72,7 @@ def write(
             traces[name] = run_one(experiment, progress)
         except SimulationError as error:
             kept = error.trace.save(folder / "partial.npz")
-            error.args = (f"{name}: {error}; written to {kept}",)
-            raise
+            raise error.replaced(kept=kept).inside(name) from error.__cause__
         files += _keep(folder, name, traces[name])
     text = claims_text(traces, force, velocity)
     claims = written_whole(folder / "claims.md", lambda file: file.write(text.encode()))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+from gms_fsm._arguments import listed
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.systems.models import Model
 from gms_fsm.traces.monitors._chattering import chattering
@@ -59,18 +60,25 @@ def checked(
     >>> list(checked(["all", "z <= s"], GMS(GMSParameters.paper("stick-slip"), law="signed")))
     ['chattering', 'passivity', 'coverage', 'z <= s']
     """
-    given = [monitors] if isinstance(monitors, str | Monitor) else list(monitors)
+    given = (
+        [monitors]
+        if isinstance(monitors, str | Monitor)
+        else listed("monitors", monitors, "names of monitors, or monitors")
+    )
     found: dict[str, Monitor] = {}
     for each in given:
         for monitor in ALL if each == "all" else (_monitor(each),):
             if monitor.name in found:
-                raise ParameterError(f"monitors has {shown(monitor.name)} twice; give it once")
+                raise ParameterError(
+                    f"monitors has {shown(monitor.name)} twice", advice="give it once"
+                )
             if isinstance(monitor, Invariant):
                 read_invariant(monitor, model)
             if output == "end" and not isinstance(monitor, Chattering):
                 raise ParameterError(
-                    f"the monitor {shown(monitor.name)} looks at the rows of a run, but output is "
-                    "'end'; use output='all'"
+                    f"the monitor {shown(monitor.name)} looks at the rows of a run, but "
+                    "output is 'end'",
+                    advice="use output='all'",
                 )
             found[monitor.name] = monitor
     return found
@@ -81,15 +89,18 @@ def _monitor(given: str | Monitor) -> Monitor:
         return given
     if not isinstance(given, str):
         raise ParameterError(
-            f"monitors has {shown(given)}; a monitor is {', '.join(map(repr, KNOWN))}, an "
-            "invariant's text, or an object of gms_fsm.traces.monitors"
+            f"monitors has {shown(given)}",
+            advice=f"a monitor is {', '.join(map(repr, KNOWN))}, an invariant's text, or "
+            "an object of gms_fsm.traces.monitors",
         )
     word = given.strip()
     if word.isidentifier() and word not in KNOWN:
         near = difflib.get_close_matches(word[:40], KNOWN, n=1)
         raise ParameterError(
-            f"no monitor {shown(word)}; {f'did you mean {near[0]!r}? ' if near else ''}there are "
-            f"{', '.join(map(repr, KNOWN))}, 'all', and invariants such as 'abs(z) <= 2*s'"
+            f"no monitor {shown(word)}",
+            advice=f"{(f'did you mean {near[0]!r}? ' if near else '')}there are "
+            f"{', '.join(map(repr, KNOWN))}, 'all', and invariants such as 'abs(z) "
+            "<= 2*s'",
         )
     return KNOWN.get(word) or Invariant(given)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from gms_fsm.charts.parameters import checked_scalar
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.errors import ParameterError
 
 __all__ = ["ALL", "KNOWN", "Chattering", "Coverage", "Invariant", "Monitor", "Passivity"]
 
@@ -36,7 +36,7 @@ class Chattering:
 
     def __post_init__(self) -> None:
         if not isinstance(self.times, int) or self.times < 2:
-            raise ParameterError(f"times is {shown(self.times)}; it must be a whole number >= 2")
+            raise ParameterError("it must be a whole number >= 2", place="times", value=self.times)
         object.__setattr__(self, "within", checked_scalar("within", self.within, "> 0"))
 
     @property

@@ -1,0 +1,165 @@
+"""What things are called: in the trees of a program's plan, and in its text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from gms_fsm.charts.chart import RESERVED
+from gms_fsm.language import Binary, Name, Node, names_in, product_power
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.rigs import Rig
+
+__all__ = ["DIP", "Names", "computed_names", "names_of"]
+
+DIP = "v dip"  # not an identifier, so no chart can have a name like it
+
+
+@dataclass(frozen=True, eq=False)
+class Names:
+    """What things are called in the text.
+
+    Parameters
+    ----------
+    shared : tuple of str
+        Numbers that all elements share, in the order of the program's arguments.
+    own : tuple of str
+        Numbers with one value per element, in the order of the program's arguments.
+    local : mapping of str to str
+        For a name in the trees its name in the text, where it has another one or is a chart's.
+    rig : mapping of str to Name
+        For the rig's signals and numbers their names in the trees: a chart may have the same ones.
+    taken : frozenset of str
+        All names that may not be used for something else.
+    states, edges : mapping of str to str
+        The constants of the states and of the edges, in the chart's order.
+    """
+
+    shared: tuple[str, ...]
+    own: tuple[str, ...]
+    local: Mapping[str, str]
+    rig: Mapping[str, Name]
+    taken: frozenset[str]
+    states: Mapping[str, str]
+    edges: Mapping[str, str]
+
+    @cached_property
+    def texts(self) -> Mapping[str, str]:
+        """How each name of the trees is spelled in the loop over the elements."""
+        own = {*self.own}
+        return {
+            name: f"{local}[i]" if local in own else local for name, local in self.local.items()
+        }
+
+    @cached_property
+    def plain(self) -> Mapping[str, str]:
+        """How the rig's names are spelled in messages."""
+        return {apart.id: name for name, apart in self.rig.items()}
+
+    def read_by(self, *nodes: Node) -> frozenset[str]:
+        """Return what trees read, as it is called in the text."""
+        return frozenset(
+            self.local.get(name, name) for node in nodes for name in computed_names(node)
+        )
+
+    def is_shared(self, node: Node) -> bool:
+        """Tell whether a tree of the chart has one value for all elements."""
+        return all(
+            name in ("t", "x", "v") or name in self.plain or self.local.get(name) in self.shared
+            for name in names_in(node)
+        )
+
+
+def computed_names(node: Node) -> frozenset[str]:
+    """Return the names that a tree is computed from: ``u**0`` is 1 whatever u is.
+
+    Parameters
+    ----------
+    node : Node
+        A value or a condition.
+
+    Returns
+    -------
+    frozenset of str
+        As `names_in` otherwise.
+
+    Examples
+    --------
+    >>> from gms_fsm.language import parse_value
+    >>> computed_names(parse_value("k + v**0", ["k", "v"]))
+    frozenset({'k'})
+    """
+    match node:
+        case Name(name):
+            return frozenset({name})
+        case Binary("**", base, exponent) if product_power(base, exponent) == 0:
+            return frozenset()
+    return frozenset[str]().union(*(computed_names(part) for part in node.parts))
+
+
+def names_of(model: Model, rig: Rig) -> Names:
+    """Name what the program of a model on a rig reads.
+
+    Parameters
+    ----------
+    model, rig
+        What runs; of their numbers only the shape counts.
+
+    Returns
+    -------
+    Names
+        Without clashes.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Slider
+    >>> names = names_of(GMS(GMSParameters.paper("stick-slip"), law="signed"), Slider(1.0, "t"))
+    >>> names.shared, names.own
+    (('F_c', 'F_s', 'v_s', 'v_dip', 'sigma_2', 'mass', 'v_c'), ('weight', 'k', 'sigma', 'C'))
+    """
+    chart = model.chart
+    shared = [] if model.stribeck is None else ["F_c", "F_s", "v_s", "v_dip"]
+    shared += ["sigma_2", *rig.numbers]
+    own = ["weight"]
+    taken = set(shared) | set(rig.signals) | {f"{name}_signal" for name in rig.signals}
+    # Of the text itself.
+    taken |= {"F_i", "len", "range", "piecewise_linear", "piecewise_slope", "v_dip"}
+    taken |= {"surface", "j", "dS", "nan"}
+    # A chart may have names of the rig's: those of the rig are set apart.
+    apart = {name: Name(f"rig {name}") for name in (*rig.signals, *rig.numbers)}
+    local = {DIP: "v_dip"} | {each.id: name for name, each in apart.items()}
+    # A chart may call its own parameter F_c or mass: it gets a name of its own in the text.
+    chart_names = (*chart.variables, *chart.parameter_names)
+    for name in chart_names:
+        found = name
+        while found in taken or (found != name and found in chart_names):
+            found += "_"
+        taken.add(found)
+        local[name] = found
+    for name in chart.parameter_names:
+        (shared if np.ndim(model.values[name]) == 0 else own).append(local[name])
+    local |= {f"d{name}": f"d{local[name]}" for name in chart.variables}
+    # STICK reads best, but a state called c must not become the parameter C, nor the edge
+    # Home the state home.
+    constants = {*taken, *RESERVED}
+    return Names(
+        shared=tuple(shared),
+        own=tuple(own),
+        local=local,
+        rig=apart,
+        taken=frozenset(taken),
+        states={state.name: _constant(state.name, constants) for state in chart.states},
+        edges={edge.name: _constant(edge.name, constants) for edge in chart.transitions},
+    )
+
+
+def _constant(name: str, taken: set[str]) -> str:
+    """Return a constant for a name, and note it as taken."""
+    constant = name.upper()
+    while constant in taken or not constant.isidentifier():
+        constant += "_"
+    taken.add(constant)
+    return constant

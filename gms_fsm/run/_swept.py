@@ -1,0 +1,334 @@
+"""What a sweep brings: the results of many runs, their table, and their files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm._arguments import checked_path
+from gms_fsm._extras import require
+from gms_fsm._files import written_whole
+from gms_fsm.charts.parameters import QUANTITIES, FloatArray
+from gms_fsm.errors import OutputError, TraceFileError, cut, shown, why
+from gms_fsm.lowering.layout import LOG_NUMBERS
+from gms_fsm.traces._archives import member
+from gms_fsm.traces.rows import column_name
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+__all__ = ["LOG", "LONGEST", "Sweep"]
+
+LOG = np.dtype(
+    [
+        ("run", "i8"),
+        ("t", "f8"),
+        ("element", "i8"),
+        ("edge", "i8"),
+        *((name, "f8") for name in LOG_NUMBERS),
+    ]
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """The results of many runs, one row a run, in the order of the parameters.
+
+    Attributes
+    ----------
+    parameters : mapping of str to ndarray, shape (runs,) or (runs, n)
+        What was varied.
+    outcome : ndarray of str, shape (runs,)
+        ``"ok"``, or the name of the error that ended the run.
+    message : ndarray of str, shape (runs,)
+        The error's text, else empty.
+    t, x, v, F : ndarray, shape (runs,)
+        The end of each run: s, m, m/s, N. NaN for a run that could not start.
+    z : ndarray, shape (runs, n), m
+        Deflections at the end.
+    states : ndarray of str, shape (runs, n)
+        Active states at the end.
+    transitions : numpy.recarray
+        All firings: ``run, t, element, edge, z, v, s, F_before, F_after``; run and element count
+        from 0, ``edge`` is an index into `edges`.
+    edges : tuple of str
+        Names of the chart's edges.
+    times : ndarray, shape (rows,)
+        With ``output="t_eval"`` the times of the rows, else empty.
+    rows : mapping of str to ndarray
+        With ``output="t_eval"``: ``x, v, F`` of shape (runs, rows), ``z`` of shape (runs, rows, n).
+    """
+
+    parameters: Mapping[str, FloatArray]
+    outcome: NDArray[np.str_]
+    message: NDArray[np.str_]
+    t: FloatArray
+    x: FloatArray
+    v: FloatArray
+    F: FloatArray
+    z: FloatArray
+    states: NDArray[np.str_]
+    transitions: Any
+    edges: tuple[str, ...]
+    times: FloatArray
+    rows: Mapping[str, FloatArray]
+
+    def __len__(self) -> int:
+        return int(self.t.size)
+
+    def __repr__(self) -> str:
+        bad = int((self.outcome != "ok").sum())
+        return (
+            f"<Sweep: {len(self)} runs over {', '.join(self.parameters)}; {bad} failed, "
+            f"{len(self.transitions)} transitions>"
+        )
+
+    @property
+    def transition_count(self) -> NDArray[np.int64]:
+        """How often an edge fired in each run, shape (runs,)."""
+        return np.bincount(self.transitions["run"], minlength=len(self))
+
+    def sequence(self, run: int) -> list[tuple[int, str]]:
+        """Return which element took which edge in a run, in order.
+
+        Parameters
+        ----------
+        run : int
+            From 0.
+
+        Returns
+        -------
+        list of (int, str)
+            Elements count from 0.
+        """
+        log = self.transitions[self.transitions["run"] == run]
+        return [(int(i), self.edges[edge]) for i, edge in zip(log.element, log.edge, strict=True)]
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per run, by column.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (runs,)
+            Parameters, outcome, end of the run; columns of elements are numbered from 1. A
+            parameter with the name of a result is called ``parameter_<name>``.
+
+        Examples
+        --------
+        >>> from gms_fsm import GMS, GMSParameters, Prescribed, sweep
+        >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+        >>> result = sweep(model, Prescribed("0.2"), 1.0, {"F_s": [1.5]}, engine="machines")
+        >>> list(result.columns())[:8]
+        ['F_s', 'outcome', 'message', 't', 'x', 'v', 'F', 'z1']
+        """
+        results: dict[str, NDArray[Any]] = {
+            "outcome": self.outcome,
+            "message": self.message,
+            "t": self.t,
+            "x": self.x,
+            "v": self.v,
+            "F": self.F,
+        }
+        results |= _numbered("z", self.z) | _numbered("state", self.states)
+        results |= {"transitions": self.transition_count}
+        parameters = {
+            _apart(column, results): numbers
+            for name, values in self.parameters.items()
+            for column, numbers in _numbered(name, values).items()
+        }
+        return parameters | results
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Return one row per run as a pandas DataFrame (extra ``pandas``).
+
+        Returns
+        -------
+        DataFrame
+            What `columns` gives.
+        """
+        pandas = require("pandas", "pandas")
+        return pandas.DataFrame(self.columns(), index=pandas.RangeIndex(len(self), name="run"))
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the results as an xarray Dataset (extra ``sweep``).
+
+        Returns
+        -------
+        Dataset
+            Dimensions ``run``, ``element`` (from 1) and, with rows, ``time``; units as attributes.
+        """
+        xarray = require("xarray", "sweep")
+        units = {name: QUANTITIES[name].unit for name in ("t", "x", "v", "F", "z")}
+        data: dict[str, Any] = {}
+        for name in ("outcome", "message", "t", "x", "v", "F"):
+            data[f"{name}_end" if name in units else name] = ("run", getattr(self, name))
+        data["z_end"] = (("run", "element"), self.z)
+        data["state_end"] = (("run", "element"), self.states)
+        data["transitions"] = ("run", self.transition_count)
+        for name, values in self.rows.items():
+            data[name] = (("run", "time", "element")[: values.ndim], values)
+        coordinates = {"run": np.arange(len(self)), "element": np.arange(1, self.z.shape[1] + 1)}
+        if self.times.size:
+            coordinates["time"] = self.times
+        taken = {*data, *coordinates}
+        parameters = {
+            _apart(name, taken): (("run", "element")[: values.ndim], values)
+            for name, values in self.parameters.items()
+        }
+        dataset = xarray.Dataset(parameters | data, coordinates)
+        for name, variable in dataset.variables.items():
+            if unit := units.get(str(name).removesuffix("_end")):
+                variable.attrs["units"] = unit
+        return dataset
+
+    def save(self, path: str | Path) -> Path:
+        """Write the sweep to ``.npz`` (everything) or ``.parquet`` (one row a run).
+
+        With Parquet the transitions lie beside it in ``<name>.transitions.parquet``.
+
+        Parameters
+        ----------
+        path : str or Path
+            Where to.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        OutputError
+            If the folder cannot be written or the ending is another.
+        """
+        path = checked_path("path", path)
+        if path.suffix == ".npz":
+            from gms_fsm._version import __version__
+
+            arrays: dict[str, Any] = {"format": np.array(_FORMAT), "program": __version__}
+            arrays |= {f"parameter_{name}": values for name, values in self.parameters.items()}
+            arrays |= {f"rows_{name}": values for name, values in self.rows.items()}
+            arrays |= {name: getattr(self, name) for name in _SAVED}
+            arrays |= {"transitions": np.asarray(self.transitions), "elements": self.z.shape[1]}
+            arrays["edges"] = np.array(self.edges, dtype=np.str_)
+            return written_whole(path, lambda file: np.savez_compressed(file, **arrays))
+        if path.suffix == ".parquet":
+            pandas = require("pandas", "sweep")
+            require("pyarrow", "sweep")
+            log = pandas.DataFrame(
+                {name: self.transitions[name] for name in LOG.names or ()}
+                | {"edge": np.array(self.edges, dtype=object)[self.transitions["edge"]]}
+            )
+            beside = path.with_name(f"{path.stem}.transitions.parquet")
+            written_whole(beside, log.to_parquet)
+            return written_whole(path, self.to_dataframe().to_parquet)
+        raise OutputError(
+            f"a sweep is saved as .npz or .parquet, not {path.suffix!r}", place=str(path)
+        )
+
+    @classmethod
+    def load(cls, path: str | Path) -> Sweep:
+        """Read a sweep written to ``.npz``.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        Sweep
+            With equal arrays.
+
+        Raises
+        ------
+        TraceFileError
+            If the file is missing, damaged, or not a sweep of this format; nothing in it is
+            executed.
+        """
+        path = checked_path("path", path)
+        try:
+            # Opened here: np.load leaves a damaged file open.
+            with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
+                return _read(file)
+        except FileNotFoundError:
+            raise TraceFileError(
+                "there is no such file", place=str(path), advice="check its name and the folder"
+            ) from None
+        except Exception as error:  # numpy and zipfile raise many kinds over damaged files
+            raise TraceFileError(
+                f"not a sweep, or damaged ({why(error)})", place=str(path), advice="run it again"
+            ) from None
+
+
+# --------------------------------------------------------------------------- files
+_FORMAT = "gms-fsm sweep 1"
+_SAVED = ("outcome", "message", "t", "x", "v", "F", "z", "states", "times")
+LONGEST = 1000  # characters of a text
+
+
+def _read(file: Any) -> Sweep:
+    """Read an open archive: no array larger than that of a sweep of so many runs, all checked."""
+    stamp = str(member(file, "format"))
+    if stamp != _FORMAT:
+        program = cut(str(member(file, "program")))
+        raise ValueError(f"format {shown(stamp)} of gms-fsm {program}, not {_FORMAT!r}")
+    t, times, edges = (member(file, name) for name in ("t", "times", "edges"))
+    runs, rows, n = t.size, times.size, int(member(file, "elements", 8))
+    texts = {"outcome": (runs,), "message": (runs,), "states": (runs, n)}
+    floats: dict[str, tuple[int, ...]] = dict.fromkeys(("x", "v", "F"), (runs,))
+    floats["z"] = (runs, n)
+    if rows:
+        floats |= {f"rows_{name}": (runs, rows) for name in ("x", "v", "F")}
+        floats["rows_z"] = (runs, rows, n)
+    own = [name for name in file.files if name.startswith("parameter_")]
+    found = {name: member(file, name, 8 * runs * n) for name in own}
+    floats |= {name: (runs, n)[: array.ndim] for name, array in found.items()}
+    for shapes, width in ((texts, 4 * LONGEST), (floats, 8)):
+        for name in [name for name in shapes if name not in found]:
+            found[name] = member(file, name, width * math.prod(shapes[name]))
+    found |= {"t": t, "times": times, "edges": edges}
+    floats |= {"t": (runs,), "times": (rows,)}
+    texts["edges"] = (len(edges),)
+    for name, array in found.items():
+        shape, kind = (texts[name], "U") if name in texts else (floats[name], "f")
+        if array.shape != shape or array.dtype.kind != kind:
+            raise ValueError(f"{name} is {array.dtype} {array.shape}; a sweep has {kind} {shape}")
+    log = member(file, "transitions")
+    if log.ndim != 1 or log.dtype != LOG:
+        raise ValueError("the transition log has other columns than a sweep has")
+    for name, count in (("run", runs), ("element", n), ("edge", len(edges))):
+        if log.size and not 0 <= log[name].min() <= log[name].max() < count:
+            raise ValueError(f"the transition log: {name} must be within 0 to {count - 1}")
+    if not (own and runs and n and (np.diff(log["run"]) >= 0).all()):
+        raise ValueError("no run, no parameter, or runs not in order")
+    groups = {
+        group: {name.removeprefix(group): found[name] for name in found if name.startswith(group)}
+        for group in ("parameter_", "rows_")
+    }
+    return Sweep(
+        parameters=groups["parameter_"],
+        rows=groups["rows_"],
+        edges=tuple(edges.tolist()),
+        transitions=log.view(np.recarray),
+        **{name: found[name] for name in _SAVED},
+    )
+
+
+def _numbered(name: str, values: NDArray[Any]) -> dict[str, Any]:
+    """Return columns for a DataFrame: name, or name1, name2 ... for the elements."""
+    if values.ndim == 1:
+        return {name: values}
+    return {column_name(name, i): values[:, i] for i in range(values.shape[1])}
+
+
+def _apart(name: str, taken: Collection[str]) -> str:
+    """Return a parameter's column name that is not one of the results'."""
+    return f"parameter_{name}" if name in taken else name

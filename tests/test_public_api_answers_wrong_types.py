@@ -1,0 +1,252 @@
+"""A wrong kind of value at any public entry is answered by an error of ours, or taken.
+
+Every function, constructor and method that is public is found by looking, and called with one
+argument wrong and the others right. What Python itself says of an unknown keyword is its own.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import gms_fsm
+import plots
+from gms_fsm import (
+    GMS,
+    Chart,
+    ChartModel,
+    Element,
+    ElementMachines,
+    GMSError,
+    GMSParameters,
+    LuGre,
+    Parameter,
+    Prescribed,
+    PulledSlider,
+    Session,
+    Settings,
+    Slider,
+    State,
+    Stribeck,
+    Sweep,
+    Trace,
+    Transition,
+    prove,
+    simulate,
+    sweep,
+)
+
+WRONG: tuple[Any, ...] = (None, object(), "x", -1, [], {}, math.nan, lambda: 0)
+PARAMETERS = GMSParameters([2.0], [0.1], [0.1], sigma_2=0.4, stribeck=Stribeck(1, 1.5, 0.1), v_c=1)
+MODEL = GMS(PARAMETERS, law="signed")
+RIG = Prescribed("0.2*sin(t)")
+STATE = State("on", {"z": "v"})
+EDGE = Transition("go", "on", "on", guard="z > 1", actions={"z": "0"})
+CHART = Chart("one", ("v",), ("z",), ("k",), (STATE,), (EDGE,), {"F": "k * z"})
+# What is made by the package alone, and given to users to read.
+RECORDS = {"Finding", "Report", "Sweep", "Trace", "Model", "Rig", "Signal"}
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Something public with arguments that are right."""
+
+    name: str
+    make: Callable[[], Callable[..., Any]]
+    right: dict[str, Any]
+
+
+def _chart_parts() -> dict[str, Any]:
+    return {each.name: getattr(CHART, each.name) for each in fields(CHART) if each.init}
+
+
+@functools.cache
+def _trace() -> Trace:
+    return simulate(MODEL, RIG, 1.0)
+
+
+def _entries(tmp: Path) -> Iterator[Entry]:
+    """Yield every public entry of which the right arguments are known."""
+    run = {"model": MODEL, "rig": RIG, "t_end": 1.0, "t_start": 0.0, "initial": None}
+    run |= {"settings": None}
+    options = {each.name: each.default for each in fields(Settings)}
+    curve = PARAMETERS.stribeck
+    bank = {"sigma_2": 0.4, "stribeck": curve}
+    view = {"elements": None, "notation": "stateflow", "theme": "light", "values": False}
+    view |= {"direction": "TB"}
+    edge = {"name": "go", "source": "on", "target": "on", "guard": "z > 1", "actions": {}}
+    right: dict[str, dict[str, Any]] = {
+        "Chart": _chart_parts(),
+        "ChartModel": {"chart": MODEL.chart, "values": dict(MODEL.values), "n": 1, "title": ""}
+        | bank
+        | {"weights": PARAMETERS.weights},
+        "Element": {},
+        "ElementMachines": {"model": MODEL, "element": Element},
+        "GMS": {"parameters": PARAMETERS, "law": "signed"},
+        "GMSParameters": {"k": [2.0], "sigma": [0.1], "C": [0.1], "v_c": 1.0, "weights": None}
+        | bank,
+        "LuGre": {"sigma_0": 1.0, "sigma_1": 1.0} | bank,
+        "Parameter": {"name": "k", "unit": "N", "rule": "> 0", "meaning": "", "assumed": ""}
+        | {"per_element": True},
+        "Prescribed": {"velocity": "t"},
+        "PulledSlider": {"mass": 1.0, "stiffness": 1.0, "speed": 1.0},
+        "Session": run | options,
+        "Settings": options,
+        "Slider": {"mass": 1.0, "force": "t"},
+        "State": {"name": "on", "flow": {"z": "v"}},
+        "Stribeck": {"F_c": 1.0, "F_s": 1.5, "v_s": 0.1},
+        "Transition": edge,
+        "prove": {"chart": CHART, "domain": None},
+        "simulate": run
+        | options
+        | {"machines": None, "progress": None, "checkpoint": None, "monitors": ()}
+        | {"checkpoint_every": 60.0},
+        "sweep": run
+        | options
+        | {"parameters": {"v_c": [1.0]}, "executor": None, "progress": False},
+        "LiveChart": {"trace": _trace()} | view,
+        "animate": {"trace": _trace(), "path": tmp / "a.gif"},
+        "block_diagram": {"elements": 1},
+        "live_statechart": {"trace": _trace(), "row": 0} | view,
+        "mermaid": {"chart": CHART},
+        "overview": {"trace": _trace(), "title": ""},
+        "render": {"graph": plots.block_diagram(1), "path": tmp / "a.dot"},
+        "replay": {"trace": _trace(), "other": None, "title": "", "names": ()},
+        "statechart": {"chart": CHART, "elements": 1, "notation": "stateflow", "direction": "TB"}
+        | {"theme": "light", "counts": None, "marked": (), "names": False, "note": ""},
+        "write_replay": {"path": tmp / "a.html", "trace": _trace(), "other": None, "title": ""}
+        | {"names": ()},
+    }
+    for home in (gms_fsm, plots):
+        for name in home.__all__:
+            each = getattr(home, name)
+            if name in RECORDS or (inspect.isclass(each) and issubclass(each, BaseException)):
+                continue
+            assert name in right, f"{name} is public; say here what its right arguments are"
+            yield Entry(name, functools.partial(getattr, home, name), right[name])
+    yield from _methods(tmp)
+
+
+def _session() -> Session:
+    return Session(MODEL, RIG, 1.0)
+
+
+@functools.cache
+def _swept() -> Sweep:
+    return sweep(MODEL, RIG, 1.0, {"v_c": [1.0, 2.0]}, progress=False)
+
+
+def _methods(tmp: Path) -> Iterator[Entry]:
+    """Yield every public method, by its signature; right arguments are known by name."""
+    objects: dict[str, Callable[[], Any]] = {
+        "Trace": _trace,
+        "Session": _session,
+        "Sweep": _swept,
+        "Chart": lambda: CHART,
+        "Parameter": lambda: Parameter("k"),
+        "Stribeck": lambda: PARAMETERS.stribeck,
+        "GMSParameters": lambda: PARAMETERS,
+        "GMS": lambda: MODEL,
+        "LuGre": lambda: LuGre(sigma_0=1, sigma_1=1, sigma_2=1, stribeck=PARAMETERS.stribeck),
+        "ChartModel": lambda: ChartModel(CHART, {"k": 1.0}),
+        "Slider": lambda: Slider(1.0, "t"),
+        "PulledSlider": lambda: PulledSlider(1.0, 1.0, 1.0),
+        "Prescribed": lambda: RIG,
+        "Settings": Settings,
+        "ElementMachines": lambda: ElementMachines(MODEL),
+        "Report": lambda: prove(CHART),
+        "LiveChart": lambda: plots.LiveChart(_trace()),
+    }
+    right = RIGHT | {"path": tmp / "file.npz"}
+    for kind, make in objects.items():
+        for name, member in inspect.getmembers(type(make()), callable):
+            if name.startswith("_") or inspect.isclass(member):
+                continue
+            parameters = list(inspect.signature(member).parameters.values())
+            if not inspect.ismethod(member):  # a class method has its class already
+                parameters = parameters[1:]
+            given = {
+                each.name: right.get(f"{kind}.{name}.{each.name}", right.get(each.name))
+                if each.default is inspect.Parameter.empty
+                else each.default
+                for each in parameters
+                if each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)
+            }
+            yield Entry(f"{kind}.{name}", lambda make=make, name=name: getattr(make(), name), given)
+
+
+RIGHT: dict[str, Any] = {
+    "name": "z",
+    "t": 0.5,
+    "v": np.array(0.5),
+    "text": "z > 1",
+    "expression": "z > 1",
+    "condition": "z > 1",
+    "values": {"z": {0: 0.1}},
+    "element": 0,
+    "number": 0,
+    "branch": 0,
+    "edge": "break_away_forward",
+    "state": "stick",
+    "column": "stick-slip",
+    "alpha": [1.0],
+    "k": [2.0],
+    "C": 0.1,
+    "stribeck": PARAMETERS.stribeck,
+    "v_c": 1.0,
+    "weights": [1.0],
+    "settings": None,
+    "whose": "simulate",
+    "monitors": {},
+    "kind": "guard",
+    "row": 0,
+    "points": 5,
+    "times": [0.5],
+    "chart": MODEL.chart,
+    "Session.break_on.kind": "tested",
+    "Session.watch.expression": "z1",
+    "Session.watch.text": "z1",
+    "Chart.guard_text.edge": "go",
+    "Chart.state_index.name": "on",
+}
+
+
+def _faults(entry: Entry) -> Iterator[str]:
+    for name in entry.right:
+        for wrong in WRONG[:-1] if name == "progress" else WRONG:  # any function will do there
+            call = entry.make()
+            given = {**entry.right, name: wrong}
+            try:
+                call(**given)
+            except GMSError:
+                pass
+            except Exception as error:
+                yield f"{entry.name}({name}={wrong!r}): {type(error).__name__}: {str(error)[:150]}"
+
+
+NAMES = [entry.name for entry in _entries(Path())]
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.filterwarnings("ignore")
+def test_wrong_kinds_are_answered(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    entry = next(each for each in _entries(tmp_path) if each.name == name)
+    assert list(_faults(entry)) == []
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if "." not in name])
+def test_what_is_called_right_is_right(name: str, tmp_path: Path) -> None:
+    """Else the wrong ones above would be refused for another reason."""
+    entry = next(each for each in _entries(tmp_path) if each.name == name)
+    entry.make()(**entry.right)
