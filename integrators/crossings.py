@@ -8,7 +8,8 @@ that starts at zero does not fire again.
 
 Before a place is believed to be the first, the step up to it is searched for a change that is
 undone again: an interval counts as quiet only where start, middle and end show each margin to be
-monotone, or farther from a change than its curvature could carry it; else it is halved.
+monotone, or farther from a change than `WARY` times the curvature they show could carry it; else
+it is halved.
 
 Roads not taken: a root finder on the margin stops at a place where the comparison is not yet true
 (margin -5e-17); a bracket by sign fails when the arc starts on the zero; one relation after another
@@ -36,6 +37,8 @@ __all__ = [
 ]
 
 NO_CHANGE = 2.0
+# A margin with a narrow hump between two of the places bends more than they show.
+WARY = 4.0
 DEEPEST = 8  # halvings of a step: windows down to 1/256 of it are searched for
 
 
@@ -304,6 +307,6 @@ def _is_quiet(w: Watched, left: Vector, middle: Vector, right: Vector) -> bool:
         first, second = m - a, b - m
         bend = abs(second - first)
         monotone = bend < min(abs(first), abs(second))  # of opposite signs they bend by more
-        if not monotone and max(a, m, b) + bend >= 0.0 and bend > 0.0:
+        if not monotone and max(a, m, b) + WARY * bend >= 0.0 and bend > 0.0:
             return False
     return True

@@ -138,7 +138,7 @@ def replay(
     Raises
     ------
     ParameterError
-        If there are names, but not one a run.
+        If there are names, but not one per run.
     MissingExtraError
         If uPlot is not installed.
 
@@ -177,7 +177,7 @@ def write_replay(
     Raises
     ------
     ParameterError
-        If there are names, but not one a run, or the ending is another one.
+        If there are names, but not one per run, or the ending is another one.
     MissingExtraError
         If uPlot is not installed.
     OutputError
@@ -205,7 +205,7 @@ def replay_html(
     Raises
     ------
     ParameterError
-        If there are names, but not one a run.
+        If there are names, but not one per run.
     MissingExtraError
         If uPlot is not installed.
     """

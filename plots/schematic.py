@@ -155,13 +155,15 @@ def _element(
     # A dashpot: a rod with its piston from the slider into a cup that is open towards it.
     cup, piston = left + 0.35 * (right - left), left + 0.5 * (right - left)
     mouth = left + 0.65 * (right - left)
-    drawn += ax.plot(
-        [left, cup, cup, mouth, np.nan, cup, cup, mouth, np.nan, piston, right, np.nan, piston,
-         piston],
-        [bottom, bottom, bottom + 0.11, bottom + 0.11, np.nan, bottom, bottom - 0.11,
-         bottom - 0.11, np.nan, bottom, bottom, np.nan, bottom - 0.08, bottom + 0.08],
-        gid=f"damper {i + 1}", **look,
-    )  # fmt: skip
+    strokes = (
+        [(left, bottom), (cup, bottom), (cup, bottom + 0.11), (mouth, bottom + 0.11)],
+        [(cup, bottom), (cup, bottom - 0.11), (mouth, bottom - 0.11)],
+        [(piston, bottom), (right, bottom)],
+        [(piston, bottom - 0.08), (piston, bottom + 0.08)],
+    )
+    # One line with gaps, so that a damper is one part of the picture.
+    points = [point for stroke in strokes for point in (*stroke, (np.nan, np.nan))]
+    drawn += ax.plot(*np.transpose(points[:-1]), gid=f"damper {i + 1}", **look)
     names = _numbers(trace, i)
     middle = (left + right) / 2
     text: dict[str, Any] = {"ha": "center", "fontsize": 8, "color": INK}
@@ -197,10 +199,16 @@ def _contact(
     low, high = WALL - REST - SWING - CONTACT, WALL - REST + SWING + CONTACT
     drawn: list[Artist] = [
         Rectangle(
-            (low, ground - 0.1), high - low, 0.1, facecolor=PAPER, edgecolor=PALE_GREY,
-            hatch="/////", linewidth=0, zorder=0,
-        ),
-    ]  # fmt: skip
+            (low, ground - 0.1),
+            high - low,
+            0.1,
+            facecolor=PAPER,
+            edgecolor=PALE_GREY,
+            hatch="/////",
+            linewidth=0,
+            zorder=0,
+        )
+    ]
     ax.add_patch(drawn[0])  # type: ignore[arg-type]
     drawn += ax.plot([low, high], [ground, ground], color=LINE_GREY, linewidth=0.9, zorder=1)
     chart = None if trace is None else trace.model.chart

@@ -8,7 +8,7 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from hypothesis import Phase, assume, given, settings
+from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -122,7 +122,13 @@ def cases(draw):
 
 
 # No shrinking: the oracle is slow, and the example as drawn says as much.
-@settings(max_examples=50, deadline=None, derandomize=True, phases=[Phase.generate])
+@settings(
+    max_examples=50,
+    deadline=None,
+    derandomize=True,
+    phases=[Phase.generate],
+    suppress_health_check=[HealthCheck.too_slow],  # of the oracle, on a busy machine
+)
 @given(cases())
 def test_same_events_same_deflections(case):
     """The same sequence of (element, edge), times to 1e-6, z to 1e-6."""
@@ -173,3 +179,31 @@ def test_the_oracle_meets_all_edges():
         "break_away_backward",
         "arrest",
     }
+
+
+def test_a_break_away_beside_a_reversal_is_met_in_one_long_step():
+    """While it sticks z is a parabola, so steps are as long as they like; s has a narrow peak."""
+    case = {
+        "law": "signed",
+        "C": [0.17100516],
+        "weights": [0.3288219],
+        "F_c": 0.3345674,
+        "F_s": 0.49560633256551995,
+        "v_s": 0.02461438,
+        "times": [0.0, 1.712764, 3.425528, 4.690292],
+        "speeds": [0.4468584, -0.1231416, 0.1276584, -0.1831416],
+    }
+    events, _ = bank(**case)
+    parameters = GMSParameters(
+        [1.0],
+        [0.1],
+        case["C"],
+        sigma_2=0.1,
+        stribeck=Stribeck(case["F_c"], case["F_s"], case["v_s"]),
+        v_c=V_C,
+        weights=case["weights"],
+    )
+    rig = Prescribed(list(zip(case["times"], case["speeds"], strict=True)))
+    trace = simulate(GMS(parameters, law="signed"), rig, case["times"][-1], rtol=1e-9)
+    assert event_sequence(trace) == [(i, edge) for _, i, edge in events]
+    assert len(events) == 4

@@ -328,7 +328,7 @@ def test_rough_calls_become_names_in_the_order_they_are_computed_and_smooth_ones
     flow = parse_value("C * sgn(v) - max(v, -exp(abs(z)))", ["C", "v", "z"])
     names = dict(zip(rough_points(flow), "abc", strict=True))
     assert [spell(u) for u in names] == ["v", "z", "v - -exp(abs(z))"]
-    smooth, calls = substitute(flow, names)
+    smooth, calls = substitute(flow, lambda u, call: f"{call.function}_{names[u]}")
     assert spell(smooth) == "C * sgn_a - max_c"
     assert [(name, spell(call)) for name, call in calls.items()] == [
         ("sgn_a", "sgn(v)"),

@@ -147,7 +147,7 @@ def test_a_folder_that_cannot_be_written_is_said_before_anything_runs(tmp_path: 
 
 
 def test_a_run_that_fails_leaves_its_part(tmp_path: Path) -> None:
-    with pytest.raises(SimulationError, match=r"written to .*partial\.npz"):
+    with pytest.raises(SimulationError, match=r"kept in .*partial\.npz"):
         write(tmp_path, force="0.1*sqrt(3 - t)")
     assert 2.999 < Trace.load(tmp_path / "partial.npz").t[-1] <= 3.0
 

@@ -44,6 +44,9 @@ from gms_fsm import (
     sweep,
 )
 
+for _module in ("numba", "matplotlib", "z3", "pandas", "xarray"):
+    pytest.importorskip(_module, reason="the walk uses all extras")
+
 WRONG: tuple[Any, ...] = (None, object(), "x", -1, [], {}, math.nan, lambda: 0)
 PARAMETERS = GMSParameters([2.0], [0.1], [0.1], sigma_2=0.4, stribeck=Stribeck(1, 1.5, 0.1), v_c=1)
 MODEL = GMS(PARAMETERS, law="signed")

@@ -8,7 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from gms_fsm.charts.chart import RESERVED
+from gms_fsm.charts.chart import RESERVED, SUPPLIED, Chart
+from gms_fsm.errors import ParameterError
 from gms_fsm.language import Binary, Name, Node, names_in, product_power
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
@@ -16,6 +17,10 @@ from gms_fsm.systems.rigs import Rig
 __all__ = ["DIP", "Names", "computed_names", "names_of"]
 
 DIP = "v dip"  # not an identifier, so no chart can have a name like it
+# Names of the text itself, besides those that no chart may have either.
+TEXT = {"F_i", "len", "range", "piecewise_linear", "piecewise_slope", "v_dip"}
+TEXT |= {"surface", "j", "dS", "nan"}
+MODEL = {"F_c", "F_s", "v_s", "sigma_2"}  # numbers of a model beside its chart's
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,10 +129,9 @@ def names_of(model: Model, rig: Rig) -> Names:
     shared = [] if model.stribeck is None else ["F_c", "F_s", "v_s", "v_dip"]
     shared += ["sigma_2", *rig.numbers]
     own = ["weight"]
+    _check_rig(rig, chart)
     taken = set(shared) | set(rig.signals) | {f"{name}_signal" for name in rig.signals}
-    # Of the text itself.
-    taken |= {"F_i", "len", "range", "piecewise_linear", "piecewise_slope", "v_dip"}
-    taken |= {"surface", "j", "dS", "nan"}
+    taken |= TEXT
     # A chart may have names of the rig's: those of the rig are set apart.
     apart = {name: Name(f"rig {name}") for name in (*rig.signals, *rig.numbers)}
     local = {DIP: "v_dip"} | {each.id: name for name, each in apart.items()}
@@ -154,6 +158,22 @@ def names_of(model: Model, rig: Rig) -> Names:
         states={state.name: _constant(state.name, constants) for state in chart.states},
         edges={edge.name: _constant(edge.name, constants) for edge in chart.transitions},
     )
+
+
+def _check_rig(rig: Rig, chart: Chart) -> None:
+    """Refuse names of a rig that mean something else in the text.
+
+    A chart's names are refused likewise, by the chart; the velocity of a prescribed motion is v.
+    """
+    forbidden = {*RESERVED, *SUPPLIED, *MODEL, *TEXT} | {f"d{name}" for name in chart.variables}
+    velocity = {"v"} if rig.acceleration is None else set()
+    for kind, names in (("number", rig.numbers), ("signal", set(rig.signals) - velocity)):
+        for name in sorted({*names} & forbidden):
+            raise ParameterError(
+                f"the {kind} {name!r} has a name that the generated program uses itself",
+                place=f"rig {rig.title!r}",
+                advice=f"call it something else, for example '{name}_rig'",
+            )
 
 
 def _constant(name: str, taken: set[str]) -> str:

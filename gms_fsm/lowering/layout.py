@@ -21,7 +21,6 @@ from gms_fsm.systems.rigs import Rig
 __all__ = ["LOG_NUMBERS", "LOG_TEXTS", "Layout", "LogRecord", "Places"]
 
 Name = TypeVar("Name", bound=Hashable)
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)

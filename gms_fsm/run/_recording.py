@@ -218,7 +218,7 @@ class Moment:
 
     @property
     def values(self) -> dict[str, Any]:
-        """``x`` [m], ``v`` [m/s] and ``F`` [N]; ``z`` and ``s`` [m], one an element."""
+        """``x`` [m], ``v`` [m/s] and ``F`` [N]; ``z`` and ``s`` [m], one per element."""
         here = scope_of(self._recording)
         return {"x": here.x, "v": here.v, "F": here.F, "z": here.z, "s": here.s}
 

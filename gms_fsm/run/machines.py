@@ -90,7 +90,7 @@ class ElementMachines:
         Add callbacks here: ``machines.machine.on_enter_slip(callback)``. With
         ``send_event=True`` a callback gets the event; ``event.model`` is the `Element`.
     elements : list of Element
-        The model objects, one an element.
+        The model objects, one per element.
 
     Examples
     --------

@@ -58,7 +58,7 @@ def sweep(
         As in `simulate`; every run starts from these.
     parameters : mapping of str to array_like, or DataFrame
         By name, the first axis is the run: shape (runs,) for a number or the same number in all
-        elements, (runs, n) for one an element. Names are the chart's parameters (``k``, ``sigma``,
+        elements, (runs, n) for one per element. Names are the chart's parameters (``k``, ``sigma``,
         ``C``, ``v_c``), ``weights``, ``sigma_2``, ``F_c``, ``F_s``, ``v_s``, and the rig's numbers
         (``mass``, ``stiffness``, ``speed``). In a DataFrame ``k1``, ``k2`` ... are the elements'.
     executor : concurrent.futures.Executor, optional

@@ -60,7 +60,7 @@ class Model(Protocol):
 
     @property
     def values(self) -> Mapping[str, float | FloatArray]:
-        """For each parameter of the chart one number, or one an element, shape (n,)."""
+        """For each parameter of the chart one number, or one per element, shape (n,)."""
 
     @property
     def weights(self) -> FloatArray:

@@ -112,7 +112,7 @@ class InvariantVerdict:
 
 @dataclass(frozen=True)
 class PassivityVerdict:
-    """Of `gms_fsm.traces.monitors.Passivity`; tuples have one entry an element, energies are in J.
+    """Of `gms_fsm.traces.monitors.Passivity`; tuples have one entry per element, energies are in J.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ class ClauseSeen:
     edge, text : str
         The edge, and the clause as the chart shows it.
     true, false : tuple of bool
-        One entry an element.
+        One entry per element.
     """
 
     edge: str

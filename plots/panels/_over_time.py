@@ -82,7 +82,7 @@ def force(
     Returns
     -------
     list of Artist
-        The line of F, then one an element.
+        The line of F, then one per element.
     """
     chosen = [] if elements is None else checked_elements(trace, elements)
     part = shown(trace, window)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from gms_fsm.app.debugger import _text as text_of
 from gms_fsm.app.debugger._help import ALIASES, COMMANDS, help_of, overview
-from gms_fsm.app.debugger._view import branches, chart_states, ribbons, view
+from gms_fsm.app.debugger._view import branches, chart_states, ending, ribbons, view
 from gms_fsm.errors import GMSError, SessionError
 from gms_fsm.inspection.explain import holds
 from gms_fsm.inspection.session import KINDS, Breakpoint, Session
@@ -160,7 +160,7 @@ class Commands:
             The place, the ending if it is the last row, the watches.
         """
         yield str(self.session.here)
-        yield from text_of.ending_lines(view(self.session).ending)
+        yield from text_of.ending_lines(ending(self.session))
         if self.session.watches:
             yield from self.do_watch("")
 
@@ -449,9 +449,11 @@ class Commands:
     def do_plot(self, arg: str) -> Iterator[str]:
         """Draw branches."""
         path = self._path("plot", arg)
-        from plots import figures, formats
+        from plots import formats
 
-        formats.chosen(path, "figure")
+        formats.chosen(path, "figure")  # a mistake is said before matplotlib is asked for
+        from plots import figures
+
         runs = {}
         for number, branch in enumerate(self.session.branches):
             branch.complete()

@@ -16,6 +16,7 @@ __all__ = [
     "View",
     "branches",
     "chart_states",
+    "ending",
     "ribbons",
     "view",
 ]
@@ -212,12 +213,24 @@ def view(session: Session) -> View:
         here.x,
         here.v,
         here.F,
-        _ending(session),
+        ending(session),
         tuple(_element(session, i) for i in range(session.model.n)),
     )
 
 
-def _ending(session: Session) -> str:
+def ending(session: Session) -> str:
+    """Return what there is to say at the last row of a branch.
+
+    Parameters
+    ----------
+    session : Session
+        What is walked.
+
+    Returns
+    -------
+    str
+        ``"end"`` at the end of the run, why it cannot go on at a failure; empty before that.
+    """
     here, branch = session.here, session.branch
     at_last = here.row + 1 == len(branch) and not here.located
     return _outcome(branch) if at_last else ""
