@@ -277,8 +277,8 @@ def _other(a: Any, b: Any) -> Any:
 
 def _changes(patch: pytest.MonkeyPatch) -> dict[str, Callable[[], None]]:
     return {
-        "a function of a step": lambda: patch.setattr(
-            machine, "_OF_A_STEP", (*machine._OF_A_STEP[:-1], _other)
+        "an inlined function": lambda: patch.setattr(
+            machine, "_INLINED", (*machine._INLINED[:-1], _other)
         ),
         "a function of an arc": lambda: patch.setattr(
             machine, "_OF_AN_ARC", (*machine._OF_AN_ARC[1:], _other)
@@ -309,7 +309,9 @@ def test_another_edition_signature_option_or_numba_is_kept_under_another_name(
     from numba.core.registry import cpu_target
 
     def name(signature: Any = "iifVIP", function: Any = _other) -> str:
-        return machine._Kept(function, None, "")._name(signature, cpu_target.target_context)
+        return machine._Kept(function, None, machine._silent)._name(
+            signature, cpu_target.target_context
+        )
 
     def sum_of(a: Any, b: Any) -> Any:
         return a + b

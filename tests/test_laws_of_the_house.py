@@ -70,6 +70,7 @@ def test_the_import_contracts_are_kept() -> None:
 def test_integrators_know_nothing_of_friction(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     assert re.findall(r"(?i)\b(?:slip|stick|friction|stribeck|bristle)\w*", text) == []
+    assert "gms" not in text.lower()  # nor who calls: what a user is told is the caller's
     names = {t.string for t in _tokens(path) if t.type == tokenize.NAME}
     assert "z" not in names
     imported = {

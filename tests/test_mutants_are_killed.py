@@ -40,10 +40,11 @@ from gms_fsm.language import (
 from gms_fsm.language._tree import walk
 from gms_fsm.run.machines import Element, ElementMachines, Guard
 from integrators import advance as kernel
-from integrators.crossings import NO_CHANGE, first_change, nothing_near, watched
-from integrators.hybrid import Buffers, Options, System, buffers
+from integrators.crossings import NO_CHANGE, Path, first_change, nothing_near, watched
+from integrators.hybrid import Buffers, Equations, Options, buffers
 from integrators.sliding import Surfaces
 from integrators.step_size import next_factor
+from integrators.steps import ERROR_BEFORE, T_STOP, Dense, H, Motion, Now, Scratch, T
 from integrators.tableaux import DP45, RK4
 from tests.helpers import pulled_mass, stick_slip
 
@@ -460,12 +461,11 @@ def _first(*margins: Margin, strict: bool = False, resolution: float = 1e-12) ->
     def interpolate(_: None, theta: float, out: list[float]) -> None:
         out[0] = theta
 
-    def search() -> float:
-        return first_change(interpolate, None, fill, 0.0, 1.0, [1.0], [], None, w, resolution)
-
-    place = search()
+    path = Path(Motion(fill, fill, None), [], interpolate, None, 0.0, 1.0, [1.0])
+    place = first_change(path, w, resolution)
     looks.clear()
-    assert search() == place  # whatever the scratch holds of the search before
+    # Whatever the scratch holds of the search before.
+    assert first_change(path, w, resolution) == place
     return place, len(looks)
 
 
@@ -565,7 +565,9 @@ def test_the_cubic_between_two_ends_is_that_of_both_slopes() -> None:
         out[0] = y[0] - 100.0
 
     w.start[0] = 1.0 - 100.0
-    assert nothing_near(fill, 1.0, 3.0, [1.0], [3.0], [27.0], [27.0], [], None, w)
+    now = Now([1.0], y=[1.0], f=[3.0], mode=[], held=[], floor=[])
+    scratch = Scratch([], y_new=[27.0], f_new=[27.0], error=[], dense=Dense([], [], [], [], []))
+    assert nothing_near(Motion(fill, fill, None), now, 3.0, scratch, w)
     assert seen == [(3.0, 27.0), (2.0, 8.0)]
 
 
@@ -597,25 +599,24 @@ class _Run:
             assert margin is not None, "nothing is watched, and margins are asked for"
             out[0] = margin(t, y[0])
 
-        nothing = Surfaces([], [], [])
-        system = System(
-            flow,
-            flow,
-            lambda *_: None,
-            margins,
-            lambda *_: None,
-            None,
-            0,
-            [False],
-            ["g"],
-            nothing,
-            list(knots),
+        equations = Equations(
+            flow=flow,
+            flow_live=flow,
+            arm=lambda *_: None,
+            margins=margins,
+            normal=lambda *_: None,
+            p=None,
+            held=0,
+            strict=[False],
+            relations=["g"],
+            surfaces=Surfaces([], [], []),
+            knots=list(knots),
         )
         method = RK4 if step else DP45
         options = Options(method, step, tolerance, [tolerance], max_step, 0.0, 10**6, True, times)
-        self.b: Buffers = buffers(system, origin, [1.0], [], 100.0, options, capacity)
-        self.system, self.y, self.t = system, [1.0], t
-        self.f = [slope(t, 1.0)]
+        self.b: Buffers = buffers(equations, origin, [1.0], [], 100.0, options, capacity)
+        self.motion, self.y = Motion(flow, margins, None), self.b.now.y
+        self.b.now.clock[T], self.b.now.f[0] = t, slope(t, 1.0)
         if margin is not None:
             w = self.b.relations
             w.watch[0] = 1
@@ -626,29 +627,10 @@ class _Run:
     def to(
         self, t_stop: float, *, h: float = 0.1, before: float = 1.0, steps: int = 1000
     ) -> tuple[int, float, float, float]:
-        b, s = self.b, self.system
-        found = kernel.advance(
-            s.flow,
-            s.margins,
-            b.method,
-            b.control,
-            self.t,
-            self.y,
-            self.f,
-            h,
-            before,
-            t_stop,
-            s.knots,
-            [],
-            [],
-            None,
-            b.relations,
-            b.out,
-            b.work,
-            steps,
-        )
-        self.t = found[1]
-        return found
+        b, clock = self.b, self.b.now.clock
+        clock[T_STOP], clock[H], clock[ERROR_BEFORE] = t_stop, h, before
+        status = kernel.advance(self.motion, b.plan, b.now, b.relations, b.out, b.scratch, steps)
+        return status, clock[T], clock[H], clock[ERROR_BEFORE]
 
     @property
     def rows(self) -> list[float]:

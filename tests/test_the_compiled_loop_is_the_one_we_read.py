@@ -25,7 +25,7 @@ def read(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "machine_code", lambda program, name: program.ieee[name])
     monkeypatch.setattr(module, "store", lambda: None)
     kernel = integrators.compiled
-    monkeypatch.setattr(kernel, "record", lambda arguments, store: loop.record(*arguments))
+    monkeypatch.setattr(kernel, "record", lambda arguments, store, tell: loop.record(*arguments))
     monkeypatch.setattr(kernel, "_compiled_each_row", lambda store: kernel._each_row)
 
 

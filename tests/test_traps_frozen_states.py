@@ -62,7 +62,7 @@ def test_the_flow_sees_one_mode_a_step(case, method):
         modes.append(tuple(mode))
         program.ieee["flow"](t, y, mode, held, p, dy)
 
-    system = integrators.System(
+    equations = integrators.Equations(
         flow=flow,
         flow_live=program.ieee["flow_live"],
         arm=program.ieee["arm"],
@@ -88,13 +88,13 @@ def test_the_flow_sees_one_mode_a_step(case, method):
     )
     arcs = firings = 0
     y = [0.0] * program.layout.y.size
-    for happening in integrators.run(system, switch, 0.0, y, [0] * 4, 21.0, options):
-        if isinstance(happening, integrators.Firing):
+    for event in integrators.run(equations, switch, 0.0, y, [0] * 4, 21.0, options):
+        if isinstance(event, integrators.Firing):
             firings += 1
-        elif isinstance(happening, integrators.Arc):
+        elif isinstance(event, integrators.Arc):
             arcs += 1
-            assert set(modes) <= {happening.mode[:4]}  # behind them stand the surfaces
-        if not isinstance(happening, integrators.Stop):
+            assert set(modes) <= {event.mode[:4]}  # behind them stand the surfaces
+        if not isinstance(event, integrators.Stop):
             modes.clear()
     assert firings > 10
     assert arcs > firings / 4

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gms_fsm import Prescribed, simulate
-from integrators.crossings import NO_CHANGE, first_change, watched
+from integrators.crossings import NO_CHANGE, Path, first_change, watched
+from integrators.steps import Motion
 from tests.helpers import event_sequence, one_element
 
 RESOLUTION = 1e-15
@@ -34,7 +35,8 @@ def located(*functions, t=0.0, h=1.0, strict=None):
     for j in range(r):
         w.watch[j], w.truth[j], w.start[j] = 1, truth[j], low[j]
         w.active.append(j)
-    return first_change(interpolate, None, margins, t, t + h, [1.0], [], None, w, RESOLUTION * h)
+    path = Path(Motion(None, margins, None), [], interpolate, None, t, t + h, [1.0])
+    return first_change(path, w, RESOLUTION * h)
 
 
 def naive(*functions):
