@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping
 from gms_fsm.language import (
     Binary,
     Comparison,
-    Literal,
     Name,
     Negative,
     Node,
     Number,
+    Requirement,
     Split,
     spell,
     split,
@@ -269,7 +269,7 @@ class _Writer:
 
     def witness(self, part: Split) -> list[str]:
         """Write: if this part is false, watch what keeps it false."""
-        if isinstance(part, Literal):
+        if isinstance(part, Requirement):
             # Not the opposite comparison: of NaN neither is true, and it has to be watched.
             return [f"if not {self.spell(part.relation)}:", f"    {self.watch(part.comparison)}"]
         word, parts = part
@@ -278,7 +278,7 @@ class _Writer:
         lines: list[str] = []
         for each in parts:
             other = "el" if lines else ""
-            if isinstance(each, Literal):
+            if isinstance(each, Requirement):
                 first, *rest = self.witness(each)
                 lines += [other + first, *rest]
             else:
@@ -287,11 +287,11 @@ class _Writer:
 
     def truth(self, part: Split) -> str:
         """Spell a split condition; brackets everywhere, as it is only read by machines."""
-        if isinstance(part, Literal):
+        if isinstance(part, Requirement):
             return self.spell(part.relation)
         word, parts = part
         return (" and " if word == "both" else " or ").join(
-            self.truth(q) if isinstance(q, Literal) else f"({self.truth(q)})" for q in parts
+            self.truth(q) if isinstance(q, Requirement) else f"({self.truth(q)})" for q in parts
         )
 
     def margins(self) -> list[str]:

@@ -35,7 +35,7 @@ import numpy as np
 import integrators
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.errors import SignalError
-from gms_fsm.language import Literal, spell
+from gms_fsm.language import Requirement, spell
 from gms_fsm.lowering._generated import ieee, load, load_careful
 from gms_fsm.lowering._plan import Plan, both_sides, plan_of
 from gms_fsm.lowering._python import FUNCTIONS, python
@@ -285,7 +285,7 @@ def _guarded(name: str, call: Callable[[float], float]) -> Callable[[float], flo
 def _relation_names(plan: Plan) -> list[str]:
     """Say each relation in words."""
     return [
-        spell(Literal(relation, True).relation, rename=plan.names.plain) + _of_element(i)
+        spell(Requirement(relation, True).relation, rename=plan.names.plain) + _of_element(i)
         for relation, i in plan.relations
     ]
 

@@ -26,13 +26,13 @@ from gms_fsm.language import (
     Comparison,
     Condition,
     Either,
-    Literal,
     Name,
     Negative,
     Node,
     Not,
     Number,
     Relation,
+    Requirement,
     Split,
     Value,
     clauses,
@@ -253,14 +253,18 @@ near = st.fixed_dictionaries(
 
 
 def _truth(part: Split, point: Mapping[str, float]) -> bool:
-    if isinstance(part, Literal):
+    if isinstance(part, Requirement):
         return bool(evaluate(part.relation, point))
     word, parts = part
     return (all if word == "both" else any)([_truth(each, point) for each in parts])
 
 
-def _literals(part: Split) -> list[Literal]:
-    return [part] if isinstance(part, Literal) else [x for each in part[1] for x in _literals(each)]
+def _requirements(part: Split) -> list[Requirement]:
+    return (
+        [part]
+        if isinstance(part, Requirement)
+        else [x for each in part[1] for x in _requirements(each)]
+    )
 
 
 @settings(max_examples=400, deadline=None)
@@ -270,11 +274,11 @@ def test_split_says_the_same_as_the_condition(
 ) -> None:
     parts = split(condition, holds)
     assert _truth(parts, point) == (evaluate(condition, point) == holds)
-    for literal in _literals(parts):
-        left, right = literal.comparison.left, literal.comparison.right
+    for requirement in _requirements(parts):
+        left, right = requirement.comparison.left, requirement.comparison.right
         margin = float(evaluate(left, point)) - float(evaluate(right, point))
-        true = margin > 0.0 or (margin == 0.0 and not literal.comparison.strict)
-        assert bool(evaluate(literal.relation, point)) == (true == literal.holds)
+        true = margin > 0.0 or (margin == 0.0 and not requirement.comparison.strict)
+        assert bool(evaluate(requirement.relation, point)) == (true == requirement.holds)
 
 
 @pytest.mark.parametrize(
@@ -282,17 +286,17 @@ def test_split_says_the_same_as_the_condition(
 )
 def test_a_relation_and_its_opposite_share_one_comparison(one: str, other: str) -> None:
     first, second = (split(parse_condition(text, NAMES)) for text in (one, other))
-    assert isinstance(first, Literal)
-    assert isinstance(second, Literal)
+    assert isinstance(first, Requirement)
+    assert isinstance(second, Requirement)
     assert first.comparison == second.comparison
     assert (first.holds == second.holds) == one.startswith("not")
 
 
 def test_strict_and_not_strict_are_two_comparisons() -> None:
-    assert split(parse_condition("a < b", NAMES)) == Literal(
+    assert split(parse_condition("a < b", NAMES)) == Requirement(
         Comparison(Name("a"), Name("b"), strict=False), holds=False
     )
-    assert split(parse_condition("a > b", NAMES)) == Literal(
+    assert split(parse_condition("a > b", NAMES)) == Requirement(
         Comparison(Name("a"), Name("b"), strict=True), holds=True
     )
 
@@ -325,12 +329,12 @@ def test_two_absolute_values_split_and_end(point: dict[str, float]) -> None:
     condition = parse_condition("abs(a) <= abs(b)", NAMES)
     parts = split(condition)
     assert _truth(parts, point) == evaluate(condition, point)
-    assert len(_literals(parts)) <= 4
+    assert len(_requirements(parts)) <= 4
 
 
 def test_nested_absolute_values_do_not_multiply() -> None:
     text = "a"
     for _ in range(12):
         text = f"abs({text})"
-    found = _literals(split(parse_condition(f"{text} <= c", NAMES)))
+    found = _requirements(split(parse_condition(f"{text} <= c", NAMES)))
     assert len(found) <= 24, "twice as many with every level: 40 levels never end"

@@ -33,8 +33,8 @@ from gms_fsm.language import (
 from gms_fsm.systems.signals import Formula
 
 NAMES = ("z", "s", "v", "v_c")
-NUMBER_WANTED = "a comparison stands where a number is needed"
-COMPARISON_WANTED = "a number stands where a comparison is needed"
+NUMBER_WANTED = "found a comparison where a number is needed"
+COMPARISON_WANTED = "found a number where a comparison is needed"
 FOREIGN = "is not part of the language"
 GRAMMAR = "numbers, names, + - * / **"
 
@@ -57,7 +57,7 @@ NO_VALUES = [
     ("v % 2", 1, FOREIGN, GRAMMAR),
     ("z + v // 2", 5, FOREIGN, GRAMMAR),
     ("z + v @ s", 5, FOREIGN, GRAMMAR),
-    ("v | z", 3, FOREIGN, "abs(...), in its place"),
+    ("v | z", 3, FOREIGN, "abs(...) instead"),
     ("1 + ~v", 5, FOREIGN, GRAMMAR),
     ("...", 1, FOREIGN, GRAMMAR),
     ("await v", 1, FOREIGN, GRAMMAR),
@@ -86,7 +86,7 @@ NO_VALUES = [
     ("abs()", 1, "abs got 0 arguments", "one argument"),
     ("1 + abs(v, z)", 5, "abs got 2 arguments", "one argument"),
     ("min(v)", 1, "min got 1 argument", "two or more arguments"),
-    ("abs(v, x=1)", 9, FOREIGN, "<= or >=, in its place"),
+    ("abs(v, x=1)", 9, FOREIGN, "<= or >= instead"),
     ("pow(v)", 1, "pow got 1 arguments", "two arguments"),
     ("abs(*v)", 5, FOREIGN, GRAMMAR),
     ("abs(**v)", 1, FOREIGN, GRAMMAR),
@@ -102,7 +102,7 @@ NO_VALUES = [
     ("z\u00a0+\u2003u.real", 5, "attribute", GRAMMAR),
     ("v + \U0001f600", 5, "cannot be read", GRAMMAR),
     ("v + \u20ac + u", 5, "cannot be read", GRAMMAR),
-    ("v \u2212 z", 3, FOREIGN, "-, in its place"),  # a typographer's minus
+    ("v \u2212 z", 3, FOREIGN, "- instead"),  # a typographer's minus
     ("v + \ud800", 5, "cannot be read", GRAMMAR),  # half a surrogate pair
     # what is not even Python
     ("", 1, "empty", GRAMMAR),
@@ -112,7 +112,7 @@ NO_VALUES = [
     ("v \\ z", 3, "unexpected", GRAMMAR),
     ("v + \0", 5, "unexpected", GRAMMAR),
     ("v z", 3, "cannot be read", GRAMMAR),
-    ("v = z", 3, FOREIGN, "<= or >=, in its place"),
+    ("v = z", 3, FOREIGN, "<= or >= instead"),
     ("v)", 2, "cannot be read", GRAMMAR),
     ("1 + v) * (z", 6, "cannot be read", GRAMMAR),
     ("(v", 1, "cannot be read", GRAMMAR),
@@ -147,11 +147,11 @@ NO_CONDITIONS = [
     ("z not in s", 10, "only < <= > >=", "< <= > >="),
     ("z <> s", 3, "cannot be read", GRAMMAR),
     ("z => s", 3, "cannot be read", GRAMMAR),
-    ("z < s && v > 0", 7, FOREIGN, "and, in its place"),
-    ("abs(v) < s \u2228 z > s", 12, FOREIGN, "or, in its place"),
-    ("!(z < s)", 1, FOREIGN, "not, in its place"),
-    ("z \u2265 s", 3, FOREIGN, ">=, in its place"),
-    ("z < s & v", 7, FOREIGN, "and, in its place"),
+    ("z < s && v > 0", 7, FOREIGN, "and instead"),
+    ("abs(v) < s \u2228 z > s", 12, FOREIGN, "or instead"),
+    ("!(z < s)", 1, FOREIGN, "not instead"),
+    ("z \u2265 s", 3, FOREIGN, ">= instead"),
+    ("z < s & v", 7, FOREIGN, "and instead"),
     ("z < s, v > 0", 1, FOREIGN, GRAMMAR),
     ("z < s if v > 0 else z > s", 1, "if ... else", GRAMMAR),
     ("any(z < s)", 1, "", ""),

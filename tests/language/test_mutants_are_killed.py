@@ -22,11 +22,11 @@ from gms_fsm.language import (
     MATLAB_LIKE,
     Binary,
     InState,
-    Literal,
     Name,
     Negative,
     Not,
     Number,
+    Requirement,
     evaluate,
     parse_condition,
     parse_value,
@@ -94,7 +94,7 @@ def test_a_tree_and_its_spelling_cannot_be_changed() -> None:
     parts = list(walk(condition))
     assert len({type(part) for part in parts}) == 10
     comparison = split(parse_condition("a > b", "abc"))
-    assert isinstance(comparison, Literal)
+    assert isinstance(comparison, Requirement)
     for part in (*parts, MATLAB_LIKE, comparison, comparison.comparison):
         with pytest.raises(dataclasses.FrozenInstanceError):
             setattr(part, dataclasses.fields(part)[0].name, None)
@@ -290,9 +290,9 @@ def test_a_state_is_asked_for_by_a_number_from_one_and_by_equality() -> None:
     assert evaluate(InState(1, "slip"), {"state(1)": "arrested"}) is False
 
 
-def _literals(text: str, holds: bool = True) -> Any:
+def _requirements(text: str, holds: bool = True) -> Any:
     def told(part: Any) -> Any:
-        if isinstance(part, Literal):
+        if isinstance(part, Requirement):
             return spell(part.relation)
         return (part[0], *(told(p) for p in part[1]))
 
@@ -301,22 +301,22 @@ def _literals(text: str, holds: bool = True) -> Any:
 
 def test_splitting_knows_both_ways_of_every_comparison() -> None:
     for op, not_op in ((">", "<="), (">=", "<"), ("<", ">="), ("<=", ">")):
-        assert _literals(f"a {op} b") == f"a {op} b"
-        assert _literals(f"a {op} b", holds=False) == f"a {not_op} b"
-        assert _literals(f"not a {op} b") == f"a {not_op} b"
+        assert _requirements(f"a {op} b") == f"a {op} b"
+        assert _requirements(f"a {op} b", holds=False) == f"a {not_op} b"
+        assert _requirements(f"not a {op} b") == f"a {not_op} b"
         mirrored = op.translate(str.maketrans("<>", "><"))
         word = "both" if op[0] == "<" else "either"
-        assert _literals(f"abs(a) {op} b") == (word, f"a {op} b", f"a {mirrored} -b")
-        assert _literals(f"b {mirrored} abs(a)") == (word, f"a {op} b", f"a {mirrored} -b")
-        assert _literals(f"abs(abs(a)) {op} b") == _literals(f"abs(a) {op} b")
+        assert _requirements(f"abs(a) {op} b") == (word, f"a {op} b", f"a {mirrored} -b")
+        assert _requirements(f"b {mirrored} abs(a)") == (word, f"a {op} b", f"a {mirrored} -b")
+        assert _requirements(f"abs(abs(a)) {op} b") == _requirements(f"abs(a) {op} b")
 
 
 def test_splitting_flattens_like_in_like_and_turns_words_under_negation() -> None:
     text = "a > b and (b > c and (c > a or abs(a) > c))"
-    assert _literals(text) == ("both", "a > b", "b > c", ("either", "c > a", "a > c", "a < -c"))
+    assert _requirements(text) == ("both", "a > b", "b > c", ("either", "c > a", "a > c", "a < -c"))
     turned = ("either", "a <= b", "b <= c", ("both", "c <= a", "a <= c", "a >= -c"))
-    assert _literals(text, holds=False) == turned
-    assert _literals(f"not ({text})") == turned
+    assert _requirements(text, holds=False) == turned
+    assert _requirements(f"not ({text})") == turned
 
 
 def test_a_corner_against_zero_turns_where_the_other_side_does() -> None:
