@@ -205,9 +205,9 @@ def test_a_wrong_length_is_not_blamed_on_a_parameter_the_chart_has_not() -> None
         (("k", {"rule": "== 0"}), "'== 0' is not a bound"),
         (("k", {"rule": "> 1e999"}), "is not a bound"),
         (("k", {"rule": "> 0", "assumed": "0 <"}), "rule '0 <'"),
-        (("k", {"rule": 0}), "parameter 'k': rule is 0, no text"),
+        (("k", {"rule": 0}), "parameter 'k': rule is 0, not a text"),
         (("k", {"rule": "> q"}), "chart 'r', parameter 'k': its rule names 'q'.* there are 'h'"),
-        (("k", {"rule": "> k"}), "its rule names 'k', which is no other parameter"),
+        (("k", {"rule": "> k"}), "its rule names 'k', which is not another parameter"),
     ],
 )
 def test_a_rule_that_is_none_is_refused(parameters: tuple[str, dict[str, Any]], words: str) -> None:

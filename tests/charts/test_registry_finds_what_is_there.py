@@ -70,7 +70,7 @@ def test_every_demonstration_runs_alike_on_two_engines(name: str, law: str) -> N
     [
         ("gms", "", r"law is ''; gms has 'signed' and 'published', which differ"),
         ("gms", "al-bender", "law is 'al-bender'; gms has"),
-        ("lugre", "signed", "lugre has one law only; leave law='signed' out"),
+        ("lugre", "signed", "lugre has only one law; leave out law='signed'"),
     ],
 )
 def test_a_law_is_chosen_where_there_are_several_and_only_there(
@@ -95,12 +95,15 @@ def chart(*parameters: Parameter | str, inputs: tuple[str, ...] = ("v",)) -> Cha
     [
         ((LUGRE, Demonstration({"sigma_0": 1.0}, "", stribeck=CURVE)), r"missing .*'sigma_1'"),
         ((LUGRE, Demonstration({"sigma_0": 1.0, "sigma_1": 0.0}, "")), "takes a curve"),
-        ((chart(), Demonstration({}, "", stribeck=CURVE)), "any other none"),
+        ((chart(), Demonstration({}, "", stribeck=CURVE)), "any other chart takes none"),
         ((chart(), Demonstration({"k": 1.0}, "")), r"unknown: \['k'\]"),
         ((chart(Parameter("k", "N/m", "> 0")), Demonstration({"k": 0.0}, "")), "k is 0.0; .* > 0"),
         ((chart("law"), Demonstration({"law": 0.0}, "")), "'law' has the name of a key"),
         (({}, Demonstration({}, "")), "it has no chart"),
-        (({"a": chart("k"), "b": chart()}, Demonstration({"k": 0.0}, "")), "entries of their own"),
+        (
+            ({"a": chart("k"), "b": chart()}, Demonstration({"k": 0.0}, "")),
+            "give each its own entry",
+        ),
     ],
 )
 def test_an_entry_that_does_not_fit_is_refused(arguments: Any, words: str) -> None:
@@ -131,7 +134,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         ("CHARTS = (1,)", r"odd.py: CHARTS is \(1,\); it must be a tuple of Entry"),
         (
             "from gms_fsm.charts.lugre import CHARTS",
-            "odd.py: the name 'lugre' is taken by gms_fsm/charts/lugre.py",
+            "odd.py: the name 'lugre' is already used by gms_fsm/charts/lugre.py",
         ),
     ],
 )
