@@ -83,7 +83,7 @@ def test_the_input_is_no_output(
     Path("link").symlink_to("t.npz")
     os.link("t.npz", "hard")
     before = Path("t.npz").read_bytes()
-    assert "is read here and would be written over" in refused(verb, "t.npz", "-o", output)
+    assert "is an input here and would be overwritten" in refused(verb, "t.npz", "-o", output)
     assert Path("t.npz").read_bytes() == before
 
 
@@ -104,7 +104,7 @@ def test_the_record_of_a_run_is_no_output(refused: Callable[..., str], tmp_path:
     written_whole(out / "trace.csv", lambda file: file.write(record.encode()))
     text = MEASURED.replace('"own.csv"', '"out/trace.csv"')
     Path("mine.toml").write_text(text.replace("figures = []", "figures = []\ncsv = true"))
-    assert "trace.csv: is read here" in refused("run", "mine.toml", "-o", "out")
+    assert "trace.csv: is an input here" in refused("run", "mine.toml", "-o", "out")
     assert Path("out/trace.csv").read_text() == record
     Path("mine.toml").write_text(text)
     assert command("run", "mine.toml", "-o", "out") == 0, "where it is not written it may stay"
@@ -131,7 +131,7 @@ def test_a_run_does_not_write_over_a_file_of_ones_own(
     place.write_text("years of work")
     figures = 'output.figures=["svg"]'
     said = refused("run", scenario, "-o", "mine", "--set", figures)
-    assert f"mine/{name}: is there and gms-fsm has not written it" in said
+    assert f"mine/{name}: already exists and was not written by gms-fsm" in said
     assert place.read_text() == "years of work"
     assert list(place.parent.iterdir()) == [place]
 
@@ -168,7 +168,7 @@ def test_no_command_writes_over_a_file_of_ones_own(
     place = Path("mine") / name
     place.parent.mkdir(parents=True)
     place.write_text("years of work")
-    assert "gms-fsm has not written it" in refused(*arguments, "-o", "mine")
+    assert "was not written by gms-fsm" in refused(*arguments, "-o", "mine")
     assert place.read_text() == "years of work"
 
 
@@ -180,7 +180,7 @@ def test_a_report_is_not_written_over_a_file_of_ones_own(
     Path("mine").mkdir()
     Path("mine/report.txt").write_text("years of work")
     assert command("check", "lugre", "-o", "mine") == 2
-    assert "has not written it" in capsys.readouterr().err
+    assert "was not written by gms-fsm" in capsys.readouterr().err
     assert Path("mine/report.txt").read_text() == "years of work"
 
 
@@ -213,7 +213,7 @@ def test_a_damaged_list_makes_every_file_the_users(text: str, tmp_path: Path) ->
     folder = output_folder(tmp_path / "out")
     written_whole(folder / "a", lambda file: file.write(b"ours"))
     (folder / LIST).write_text(text)
-    with pytest.raises(OutputError, match="has not written it"):
+    with pytest.raises(OutputError, match="was not written by gms-fsm"):
         output_folder(folder, ["a"])
     assert output_folder(folder, ["b"]) == folder
 

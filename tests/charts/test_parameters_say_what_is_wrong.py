@@ -131,8 +131,8 @@ BROKEN: list[tuple[Callable[..., object], dict[str, Any], list[str]]] = [
     (lugre, {"sigma_2": NAN}, ["sigma_2 is nan", "finite"]),
     (lugre, {"stribeck": 3}, ["stribeck is 3", "Stribeck"]),
     # one's own chart
-    (own, {"n": 0}, ["n is 0", "at least one"]),
-    (own, {"n": -1}, ["n is -1", "at least one"]),
+    (own, {"n": 0}, ["n is 0", "at least 1"]),
+    (own, {"n": -1}, ["n is -1", "at least 1"]),
     (own, {"n": 2.5}, ["n is 2.5"]),
     (own, {"n": "two"}, ["n is 'two'"]),
     (own, {"values": {"q": 1.0}}, ["unknown: ['q']"]),
@@ -149,7 +149,7 @@ BROKEN: list[tuple[Callable[..., object], dict[str, Any], list[str]]] = [
     (own, {"sigma_2": -1}, ["sigma_2 is -1.0", ">= 0"]),
     (own, {"weights": (1, -1)}, ["weights[1] (element 2) is -1.0", "> 0"]),
     (own, {"weights": (1,)}, ["weights has 1 entries", "2"]),
-    (own, {"stribeck": None}, ["for the input s", "stribeck is None", "Stribeck(F_c, F_s, v_s)"]),
+    (own, {"stribeck": None}, ["has the input s", "stribeck is None", "Stribeck(F_c, F_s, v_s)"]),
     (own, {"chart": WANTS_U}, ["'u'", "t, x, v, s"]),
     # rules that name other parameters
     (ruled, {"a": 3}, ["a is 3.0; it must be < 2"]),

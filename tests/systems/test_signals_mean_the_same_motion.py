@@ -201,7 +201,7 @@ def test_kinds_are_told_apart() -> None:
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        (None, ["None is not a signal", "expression of t", "(t, value) pairs", "(times, values)"]),
+        (None, ["None is not a signal", "expression in t", "(t, value) pairs", "(times, values)"]),
         (True, ["True is not a signal"]),
         ([], ["[] is not a signal"]),
         ({}, ["{} is not a signal"]),
