@@ -7,7 +7,8 @@ parsed with `ast`, only nodes on an allow-list are accepted, and code is generat
 tree alone. Every reader of a tree is an algebra for `fold`.
 
 Grammar: numbers, declared names, ``pi``, ``+ - * / **``, ``< <= > >=`` (chains are split),
-``and or not``, ``abs exp sqrt sgn min max sin cos tanh``. ``==`` on floats is refused.
+``and or not``, ``abs exp log sqrt sgn min max sin cos tanh
+atan asinh``. ``==`` on floats is refused.
 ``pow(a, b)``, which generated code contains for some powers, is read as ``a**b``.
 
 Nothing in this package knows about friction.

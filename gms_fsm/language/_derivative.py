@@ -70,7 +70,7 @@ class _Slope:
     def power(self, node: Binary, parts: Iterator[Value]) -> Value:
         base, exponent = node.parts
         if self.by in names_in(exponent):
-            raise ArithmeticError("a logarithm is not part of the language")
+            raise ArithmeticError("the derivative holds for a positive base only")
         power = Binary("**", base, _minus(exponent, ONE))
         return _times(_times(exponent, power), next(parts))
 
@@ -97,6 +97,8 @@ def _outer(call: Call) -> Value:
             return ZERO
         case "exp":
             return call
+        case "log":
+            return Binary("/", ONE, u)
         case "sqrt":
             return Binary("/", Number(0.5), call)
         case "sin":
@@ -105,6 +107,10 @@ def _outer(call: Call) -> Value:
             return Negative(Call("sin", (u,)))
         case "tanh":
             return Binary("-", ONE, Binary("*", call, call))
+        case "atan":
+            return Binary("/", ONE, Binary("+", ONE, Binary("*", u, u)))
+        case "asinh":
+            return Binary("/", ONE, Call("sqrt", (Binary("+", ONE, Binary("*", u, u)),)))
     raise ArithmeticError(f"no derivative of {call.function} is known")
 
 

@@ -50,6 +50,7 @@ def sgn(u: float) -> float:
 FUNCTIONS: Mapping[str, Callable[..., float]] = {
     "abs": abs,
     "exp": math.exp,
+    "log": math.log,
     "sqrt": math.sqrt,
     "sgn": sgn,
     "min": min,
@@ -57,6 +58,8 @@ FUNCTIONS: Mapping[str, Callable[..., float]] = {
     "sin": math.sin,
     "cos": math.cos,
     "tanh": math.tanh,
+    "atan": math.atan,
+    "asinh": math.asinh,
 }
 NAMESPACE: Mapping[str, Callable[..., float]] = {**FUNCTIONS, "pow": math.pow}  # of printed code
 CONSTANTS: Mapping[str, float] = {"pi": math.pi}

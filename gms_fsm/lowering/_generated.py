@@ -247,8 +247,12 @@ def _quiet(function: Callable[..., float], replacement: Callable[..., Any]) -> C
 
 _IEEE: Mapping[str, Callable[..., Any]] = {
     "exp": _quiet(math.exp, np.exp),
+    "log": _quiet(math.log, np.log),
     "sqrt": _quiet(math.sqrt, np.sqrt),
     "sin": _quiet(math.sin, np.sin),
     "cos": _quiet(math.cos, np.cos),
+    "tanh": _quiet(math.tanh, np.tanh),
+    "atan": _quiet(math.atan, np.arctan),
+    "asinh": _quiet(math.asinh, np.arcsinh),
     "pow": _quiet(math.pow, np.power),
 }
