@@ -23,7 +23,7 @@ __all__ = ["NOTATIONS", "Writer"]
 
 NOTATIONS = ("stateflow", "math")
 
-MATH = Spelling(" ∧ ", " ∨ ", "!", bars=True, products=False)  # ! brackets what it negates
+MATH = Spelling(" ∧ ", " ∨ ", "!", "⊤", bars=True, products=False)  # ! brackets what it negates
 # What differs between the tokens of the two notations; numbers are tokens of their own, so the
 # minus of 1e-06 is not taken for an operator.
 _TOKEN = re.compile(

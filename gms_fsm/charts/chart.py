@@ -9,109 +9,28 @@ from __future__ import annotations
 import keyword
 import unicodedata
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any
 
 from gms_fsm._arguments import checked_kind
+from gms_fsm.charts._parts import State, Transition, texts_of
+from gms_fsm.charts._reader import Reader
 from gms_fsm.charts.parameters import QUANTITIES, Parameter
-from gms_fsm.errors import ChartError, ExpressionError, shown
-from gms_fsm.language import (
-    CONSTANTS,
-    FUNCTIONS,
-    MATLAB_LIKE,
-    Condition,
-    Value,
-    parse_condition,
-    parse_value,
-    spell,
-)
+from gms_fsm.errors import ChartError, shown
+from gms_fsm.language import CONSTANTS, FUNCTIONS, MATLAB_LIKE, Condition, Value, spell
 
 __all__ = ["Chart", "State", "Transition"]
 
 SUPPLIED = ("t", "x", "v", "s")  # inputs that a model supplies to its chart
-# Names that the generated code and the element objects use themselves.
+# Names of the language and of the element objects; generated code gives way to a chart's names.
 RESERVED = frozenset(
-    {"F", "S", "dy", "edge", "held", "i", "index", "machine", "mode", "n", "out", "own", "p"}
-    | {"shared", "source", "state", "states", "tables", "target", "trigger", "watch", "weight"}
-    | {"y", "pow"}
+    {"F", "age", "after", "index", "machine", "pow", "state", "states", "trigger"}
     | set(CONSTANTS)
     | set(FUNCTIONS)
 )
 
 
-@dataclass(frozen=True)
-class State:
-    """One state of an element: how its variables evolve while it is active.
-
-    Parameters
-    ----------
-    name : str
-        For example ``"stick"``.
-    flow : mapping of str to str
-        For each variable, the text of its time derivative, for example ``{"z": "v"}``.
-    entry, exit : mapping of str to str, optional
-        Assignments ``variable: expression`` performed when the state is entered or left.
-
-    Examples
-    --------
-    >>> State("stick", flow={"z": "v"}).name
-    'stick'
-    """
-
-    name: str
-    flow: Mapping[str, str]
-    entry: Mapping[str, str] = field(default_factory=dict)
-    exit: Mapping[str, str] = field(default_factory=dict)
-
-    def __new__(cls, *parts: Any, **given: Any) -> State:
-        """Refuse unknown arguments with an error of this package."""
-        for name in sorted(given.keys() - {each.name for each in fields(cls)}):
-            raise ChartError(
-                f"a State takes name, flow, entry and exit, not {name!r}",
-                place=f"state {shown(given.get('name', parts[0] if parts else '?'))}",
-                advice="states do not nest, so write one state for each combination",
-            )
-        return object.__new__(cls)
-
-    def __post_init__(self) -> None:
-        for each in ("flow", "entry", "exit"):  # copies: nobody else can change a frozen chart
-            texts = _texts(getattr(self, each), f"state {shown(self.name)}: {each}")
-            object.__setattr__(self, each, texts)
-
-
-@dataclass(frozen=True)
-class Transition:
-    """One guarded edge between two states.
-
-    Parameters
-    ----------
-    name : str
-        The edge's name, unique in its chart, for example ``"arrest"``.
-    source, target : str
-        State names.
-    guard : str
-        The condition under which the edge is taken.
-    actions : mapping of str to str, optional
-        Assignments ``variable: expression`` performed when it is taken.
-
-    Examples
-    --------
-    >>> Transition("arrest", "slip", "stick", guard="abs(v) <= v_c and abs(z) < s").target
-    'stick'
-    """
-
-    name: str
-    source: str
-    target: str
-    guard: str
-    actions: Mapping[str, str] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        texts = _texts(self.actions, f"edge {shown(self.name)}: actions")
-        object.__setattr__(self, "actions", texts)
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Chart:
     """The state chart of one friction element, checked at construction.
 
@@ -121,7 +40,7 @@ class Chart:
         What the chart is called in pictures and messages.
     inputs : sequence of str
         Names supplied from outside the element; models supply ``t`` [s], ``x`` [m], ``v`` [m/s] and
-        ``s``, the element's threshold.
+        ``s``, the element's threshold. A contact binds further ones.
     variables : sequence of str
         The element's own continuous states, for example ``("z",)``.
     parameters : sequence of Parameter or str
@@ -130,11 +49,22 @@ class Chart:
     states : sequence of State
         The first one is the default state.
     transitions : sequence of Transition
-        Among the edges that leave one state, earlier ones have priority.
+        Among the edges that leave one state, earlier ones have priority. Guards may read ``F``, the
+        force of the contact, ``a``, its acceleration, ``age``, the time in the present state [s],
+        and ``after(T)``, short for ``age >= T``.
     outputs : mapping of str to str
-        Must define ``F``, the element's force [N]; may use ``d<variable>`` for a derivative.
+        ``F``, the element's force [N], in all states that give none of their own; may use
+        ``d<variable>`` for a derivative.
     reference : str, optional
         Where the equations are published.
+    let : mapping of str to str, optional
+        Named expressions that all other texts can use; later ones can use earlier ones.
+    velocities : sequence of str
+        What the contact moves by. With several (a planar contact) the forces are ``F``,
+        ``F_<second>`` and so on, the accelerations ``a``, ``a_<second>``.
+    contact_outputs : mapping of str to str, optional
+        The force of a contact, where it is not just the sum of its elements' forces, which is
+        called ``F`` here: ``{"F": "F + sigma_2 * v"}``.
 
     Raises
     ------
@@ -160,23 +90,33 @@ class Chart:
     transitions: tuple[Transition, ...]
     outputs: Mapping[str, str]
     reference: str = ""
+    let: Mapping[str, str] = field(default_factory=dict)
+    velocities: tuple[str, ...] = ("v",)
+    contact_outputs: Mapping[str, str] = field(default_factory=dict)
     guards: Mapping[str, Condition] = field(init=False, repr=False, compare=False)
     flows: Mapping[tuple[str, str], Value] = field(init=False, repr=False, compare=False)
     assignments: Mapping[tuple[str, str], Mapping[str, Value]] = field(
         init=False, repr=False, compare=False
     )
-    forces: Mapping[str, Value] = field(init=False, repr=False, compare=False)
+    # By state and force; None where the state is locked.
+    forces: Mapping[tuple[str, str], Value | None] = field(init=False, repr=False, compare=False)
+    lets: Mapping[str, Value] = field(init=False, repr=False, compare=False)
+    totals: Mapping[str, Value] = field(init=False, repr=False, compare=False)
 
     def __init__(
         self,
         name: str,
-        inputs: Iterable[str],
-        variables: Iterable[str],
-        parameters: Iterable[Parameter | str],
-        states: Iterable[State],
-        transitions: Iterable[Transition],
-        outputs: Mapping[str, str],
+        inputs: Iterable[str] = ("v",),
+        variables: Iterable[str] = (),
+        parameters: Iterable[Parameter | str] = (),
+        states: Iterable[State] = (),
+        transitions: Iterable[Transition] = (),
+        outputs: Mapping[str, str] | None = None,
         reference: str = "",
+        *,
+        let: Mapping[str, str] | None = None,
+        velocities: Iterable[str] = ("v",),
+        contact_outputs: Mapping[str, str] | None = None,
     ) -> None:
         here = f"chart {name!r}"
         given: dict[str, object] = {"name": name, "reference": reference}
@@ -185,66 +125,24 @@ class Chart:
             ("variables", variables),
             ("states", states),
             ("transitions", transitions),
+            ("velocities", velocities),
         ):
             given[each] = _tuple(parts, f"{here}: {each}")
         constants = _tuple(parameters, f"{here}: parameters")
         given["parameters"] = tuple(_parameter(each, here) for each in constants)
-        given["outputs"] = _texts(outputs, f"{here}: outputs")
+        for each, texts in (
+            ("outputs", outputs),
+            ("let", let),
+            ("contact_outputs", contact_outputs),
+        ):
+            given[each] = texts_of({} if texts is None else texts, f"{here}: {each}")
         for each, value in given.items():  # copies: nobody else can change a frozen chart
             object.__setattr__(self, each, value)
         self._check_names()
         self._check_rules()
-        self._read()
-
-    def _read(self) -> None:
-        """Parse the texts into trees."""
-        here, symbols = f"chart {self.name!r}", self._symbols
-        guards, flows, assignments = {}, {}, {}
-        for state in self.states:
-            owner = f"{here}, state {state.name!r}"
-            for variable in self.variables:
-                if variable not in state.flow:
-                    raise ChartError(
-                        f"no flow for {variable!r}",
-                        place=owner,
-                        advice=f"give one, for example flow={{{variable!r}: '0'}}",
-                    )
-                flows[state.name, variable] = _value(
-                    state.flow[variable], symbols, f"{owner}, flow of {variable!r}"
-                )
-            self._only_variables(state.flow, f"{owner}, flow")
-            for kind, texts in (("entry", state.entry), ("exit", state.exit)):
-                assignments[kind, state.name] = self._assignments(texts, f"{owner}, {kind}")
-        for edge in self.transitions:
-            owner = f"{here}, edge {edge.name!r}"
-            try:
-                guards[edge.name] = parse_condition(edge.guard, symbols)
-            except ExpressionError as error:
-                raise error.at(f"{owner}, guard") from None
-            assignments["action", edge.name] = self._assignments(edge.actions, f"{owner}, action")
-        derivatives = tuple("d" + variable for variable in self.variables)
-        if set(self.outputs) != {"F"}:
-            raise ChartError(
-                f"outputs has {_listed(self.outputs)}",
-                place=here,
-                advice="it must give exactly 'F', the force",
-            )
-        if hasattr(self.outputs["F"], "keys"):
-            raise ChartError(
-                f"output 'F' is {shown(self.outputs['F'])}",
-                place=here,
-                advice="it is one text for all states. Where the law differs by state, let a "
-                "variable carry it, for example a variable f with the flow 'k * v' in "
-                "one state and an entry {'f': 'F_c * sgn(v)'} in another",
-            )
-        forces = {
-            name: _value(text, symbols + derivatives, f"{here}, output {name!r}")
-            for name, text in self.outputs.items()
-        }
-        object.__setattr__(self, "guards", guards)
-        object.__setattr__(self, "flows", flows)
-        object.__setattr__(self, "assignments", assignments)
-        object.__setattr__(self, "forces", forces)
+        expanded = tuple(each for edge in self.transitions for each in edge.each())
+        for each, value in {**Reader(self).trees(), "transitions": expanded}.items():
+            object.__setattr__(self, each, value)
 
     # ------------------------------------------------------------------ checks
     def _check_names(self) -> None:
@@ -260,16 +158,17 @@ class Chart:
                     )
         if not self.states:
             raise ChartError("it has no states", place=here, advice="give at least one")
-        if not self.variables:
+        if not self.velocities:
             raise ChartError(
-                "it has no variables", place=here, advice="give at least one, for example ('z',)"
+                "it has no velocity", place=here, advice="give at least one, for example ('v',)"
             )
         derivatives = ["d" + variable for variable in self.variables]
         groups = (
-            ("input", self.inputs),
+            ("input", dict.fromkeys([*self.inputs, *self.velocities])),
             ("variable", self.variables),
             ("derivative", derivatives),
             ("parameter", self.parameter_names),
+            ("let", self.let),
             ("state", [s.name for s in self.states]),
             ("edge", [t.name for t in self.transitions]),
         )
@@ -277,7 +176,7 @@ class Chart:
         for kind, names in groups:
             for name in names:
                 _check_name(name, kind, here)
-                if name in SUPPLIED and kind != "input":
+                if name in SUPPLIED and kind != "input" and (name, kind) != ("s", "let"):
                     raise ChartError(
                         f"{kind} name {name!r} is taken",
                         place=here,
@@ -290,9 +189,11 @@ class Chart:
                         advice="every name must be unique",
                     )
                 owner[name] = kind
+        for name in sorted({*self.force_names} & owner.keys()):
+            raise ChartError(f"{owner[name]} name {name!r} is taken by a force", place=here)
         known = [s.name for s in self.states]
         for edge in self.transitions:
-            for end, state in (("source", edge.source), ("target", edge.target)):
+            for end, state in (*(("source", each) for each in edge.sources), ("target", edge.target)):
                 if state not in known:
                     raise ChartError(
                         f"{end} {state!r} is not a state",
@@ -310,25 +211,21 @@ class Chart:
                     advice=f"there are {_listed(sorted(known))}",
                 )
 
-    def _only_variables(self, texts: Mapping[str, str], owner: str) -> None:
-        for name in texts:
-            if name not in self.variables:
-                raise ChartError(
-                    f"{name!r} is not a variable",
-                    place=owner,
-                    advice=f"variables: {_listed(self.variables)}",
-                )
-
-    def _assignments(self, texts: Mapping[str, str], owner: str) -> dict[str, Value]:
-        self._only_variables(texts, owner)
-        return {
-            name: _value(text, self._symbols, f"{owner} {name!r}") for name, text in texts.items()
-        }
+    # ------------------------------------------------------------------ forces
+    @property
+    def force_names(self) -> tuple[str, ...]:
+        """Name of the force along each velocity: ``F``, then ``F_<velocity>``."""
+        return ("F", *(f"F_{each}" for each in self.velocities[1:]))
 
     @property
-    def _symbols(self) -> tuple[str, ...]:
-        """The names its texts may use."""
-        return self.inputs + self.variables + self.parameter_names
+    def rate_names(self) -> tuple[str, ...]:
+        """Name of the acceleration along each velocity: ``a``, then ``a_<velocity>``."""
+        return ("a", *(f"a_{each}" for each in self.velocities[1:]))
+
+    @property
+    def locks(self) -> bool:
+        """Whether there is a state that locks the contact."""
+        return any(state.locked for state in self.states)
 
     # ------------------------------------------------------------------ queries
     @property
@@ -457,15 +354,6 @@ def _parameter(given: object, here: str) -> Parameter:
     )
 
 
-def _texts(given: object, owner: str) -> dict[str, str]:
-    """Return a copy of a mapping of names to texts."""
-    if not isinstance(given, Mapping):
-        raise ChartError(
-            "it gives a text for each name, for example {'z': 'v'}", place=owner, value=given
-        )
-    return dict(given)
-
-
 def _check_name(name: str, kind: str, here: str) -> None:
     if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
         raise ChartError(
@@ -482,13 +370,6 @@ def _check_name(name: str, kind: str, here: str) -> None:
             advice=f"not available are {_listed(sorted(RESERVED))}, and names that start "
             "with _, on_, is_, may_ or to_",
         )
-
-
-def _value(text: str, symbols: Iterable[str], owner: str) -> Value:
-    try:
-        return parse_value(text, symbols)
-    except ExpressionError as error:
-        raise error.at(owner) from None
 
 
 def _listed(names: Iterable[str]) -> str:

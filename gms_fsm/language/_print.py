@@ -21,6 +21,8 @@ class Spelling:
     ----------
     both, either, negation : str
         The words for and, or and not, with their spaces.
+    true : str
+        The condition that always holds.
     bars : bool
         Write ``abs(u)`` as ``|u|``.
     products : bool
@@ -30,12 +32,13 @@ class Spelling:
     both: str
     either: str
     negation: str
+    true: str
     bars: bool
     products: bool
 
 
-PYTHON = Spelling(" and ", " or ", "not ", bars=False, products=True)
-MATLAB_LIKE = Spelling(" && ", " || ", "!", bars=True, products=False)
+PYTHON = Spelling(" and ", " or ", "not ", "True", bars=False, products=True)
+MATLAB_LIKE = Spelling(" && ", " || ", "!", "true", bars=True, products=False)
 
 # How tightly each operator binds (its precedence).
 LEVELS = {"or": 1, "and": 2, "not": 3, "<": 4, "+": 5, "-": 5, "*": 6, "/": 6, "neg": 7, "**": 8}
@@ -143,7 +146,9 @@ class _Printer:
         operand = next(parts).at(_ATOM if word == "!" else LEVELS["not"])
         return _Printed(word + operand, LEVELS["not"])
 
-    def both(self, _: Both, parts: Iterator[_Printed]) -> _Printed:
+    def both(self, node: Both, parts: Iterator[_Printed]) -> _Printed:
+        if not node.operands:
+            return _Printed(self.spelling.true, _ATOM)
         level = LEVELS["and"]
         return _Printed(self.spelling.both.join(part.at(level + 1) for part in parts), level)
 

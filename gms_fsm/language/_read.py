@@ -339,6 +339,12 @@ class _Reader:
                 return Both(operands) if isinstance(op, ast.And) else Either(operands)
             case ast.UnaryOp(op=ast.Not(), operand=operand):
                 return Not(self.condition(operand, depth))
+            case ast.Constant(value=True):
+                return Both(())
+            case ast.Call(func=ast.Name(id="after"), args=[time], keywords=[]) if (
+                "age" in self.names
+            ):
+                return Relation(">=", Name("age"), self.value(time, depth))
             case ast.Constant() | ast.Name() | ast.BinOp() | ast.UnaryOp() | ast.Call():
                 match node:
                     case ast.Call(func=ast.Name(id=function)):  # after(0.2), for example

@@ -166,7 +166,9 @@ class _Arrays:
     def negation(self, _: Not, parts: Iterator[Any]) -> Any:
         return ~next(parts)
 
-    def both(self, _: Both, parts: Iterator[Any]) -> Any:
+    def both(self, node: Both, parts: Iterator[Any]) -> Any:
+        if not node.operands:
+            return np.True_
         return np.logical_and.reduce(np.broadcast_arrays(*parts))
 
     def either(self, _: Either, parts: Iterator[Any]) -> Any:

@@ -21,7 +21,7 @@ NUMBERS = st.one_of(st.sampled_from(SPECIAL), st.floats(-5.0, 5.0))
 
 
 def _grown(inner: st.SearchStrategy[str]) -> st.SearchStrategy[str]:
-    functions = st.sampled_from(["abs", "exp", "sqrt", "sgn", "sin", "cos", "tanh", "-"])
+    functions = st.sampled_from(["abs", "exp", "log", "sqrt", "sgn", "sin", "tanh", "atan", "asinh", "-"])
     exponents = st.sampled_from(["2", "3", "(-1)", "(-2)", "0", "0.5", "b"])
     return st.one_of(
         st.tuples(inner, st.sampled_from("+-*/"), inner).map(lambda p: f"({' '.join(p)})"),
@@ -61,7 +61,7 @@ def test_place_by_place(text: str, rows: list[tuple[float, float, float]]) -> No
         assert truth == holds(tree, values), (text, values)
 
 
-@pytest.mark.parametrize("function", [math.exp, math.sin, math.cos, math.tanh])
+@pytest.mark.parametrize("function", [math.exp, math.log, math.sin, math.cos, math.tanh, math.atan, math.asinh])
 def test_functions_are_those_of_python_to_the_last_bit(function: Callable[[float], float]) -> None:
     numbers = np.random.default_rng(1).uniform(-20.0, 20.0, 20_000)
     exact = np.array([function(u) for u in numbers.tolist()])

@@ -50,7 +50,7 @@ NAMES = ("a", "b", "c")
 numbers = st.floats(min_value=0.0, allow_nan=False, allow_infinity=False).map(Number)
 simple_numbers = st.sampled_from([0.0, 0.5, 1.0, 2.0, 3.0, 1e-3, 1 / 3, 1e16, 5e-324]).map(Number)
 leaves = st.one_of(st.sampled_from(NAMES).map(Name), simple_numbers, numbers)
-ONE_ARGUMENT = ("abs", "exp", "sqrt", "sgn", "sin", "cos", "tanh")
+ONE_ARGUMENT = ("abs", "exp", "log", "sqrt", "sgn", "sin", "cos", "tanh", "atan", "asinh")
 
 
 def _power(base: Value, whole: int) -> Value:

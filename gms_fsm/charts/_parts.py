@@ -1,0 +1,135 @@
+"""The parts of a chart: states and transitions, as the user writes them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+from gms_fsm.errors import ChartError, shown
+
+__all__ = ["State", "Transition", "texts_of"]
+
+
+@dataclass(frozen=True)
+class State:
+    """One state of a machine: how its variables evolve, and what force it gives, while active.
+
+    Parameters
+    ----------
+    name : str
+        For example ``"stick"``.
+    flow : mapping of str to str, optional
+        For each variable, the text of its time derivative, for example ``{"z": "v"}``. A variable
+        that is left out does not change.
+    entry, exit : mapping of str to str, optional
+        Assignments ``variable: expression`` performed when the state is entered or left. The entry
+        of the default state is performed at the start of a run.
+    outputs : mapping of str to str, optional
+        Forces in this state, in place of the chart's.
+    locked : bool
+        While the state is active, the velocities of the contact are held at 0, and its forces are
+        those that hold them.
+
+    Examples
+    --------
+    >>> State("stick", flow={"z": "v"}).name
+    'stick'
+    >>> State("forward", outputs={"F": "F_c + b * v"}).outputs["F"]
+    'F_c + b * v'
+    """
+
+    name: str
+    flow: Mapping[str, str] = field(default_factory=dict)
+    entry: Mapping[str, str] = field(default_factory=dict)
+    exit: Mapping[str, str] = field(default_factory=dict)
+    outputs: Mapping[str, str] = field(default_factory=dict)
+    locked: bool = False
+
+    def __new__(cls, *parts: Any, **given: Any) -> State:
+        """Refuse unknown arguments with an error of this package."""
+        known = [each.name for each in fields(cls)]
+        for name in sorted(given.keys() - set(known)):
+            raise ChartError(
+                f"a State takes {', '.join(known[:-1])} and {known[-1]}, not {name!r}",
+                place=f"state {shown(given.get('name', parts[0] if parts else '?'))}",
+                advice="states do not nest, so write one state for each combination",
+            )
+        return object.__new__(cls)
+
+    def __post_init__(self) -> None:
+        here = f"state {shown(self.name)}"
+        for each in ("flow", "entry", "exit", "outputs"):
+            # Copies: nobody else can change a frozen chart.
+            object.__setattr__(self, each, texts_of(getattr(self, each), f"{here}: {each}"))
+        if not isinstance(self.locked, bool):
+            raise ChartError(
+                "it must be True or False", place=f"{here}: locked", value=self.locked
+            )
+
+
+@dataclass(frozen=True, init=False)
+class Transition:
+    """One guarded edge between two states.
+
+    Parameters
+    ----------
+    name : str
+        The edge's name, unique in its chart, for example ``"arrest"``.
+    source : str or sequence of str
+        The state it leaves, or several that it leaves alike.
+    target : str
+        The state it enters.
+    guard : str
+        The condition under which the edge is taken; ``"True"`` for always.
+    actions : mapping of str to str, optional
+        Assignments ``variable: expression`` performed when it is taken. An assignment to a velocity
+        is an impulse that keeps the momentum of the bodies.
+
+    Examples
+    --------
+    >>> Transition("arrest", "slip", "stick", guard="abs(v) <= v_c and abs(z) < s").target
+    'stick'
+    """
+
+    name: str
+    source: str
+    target: str
+    guard: str
+    actions: Mapping[str, str]
+    sources: tuple[str, ...] = field(init=False, repr=False)
+
+    def __init__(
+        self,
+        name: str,
+        source: str | Sequence[str],
+        target: str,
+        guard: str,
+        actions: Mapping[str, str] | None = None,
+    ) -> None:
+        sources = (source,) if isinstance(source, str) else tuple(source)
+        if not sources:
+            raise ChartError("it leaves no state", place=f"edge {shown(name)}")
+        given = texts_of({} if actions is None else actions, f"edge {shown(name)}: actions")
+        for each, value in (
+            ("name", name),
+            ("source", sources[0]),
+            ("target", target),
+            ("guard", guard),
+            ("actions", given),
+            ("sources", sources),
+        ):
+            object.__setattr__(self, each, value)
+
+    def each(self) -> tuple[Transition, ...]:
+        """Return one transition per source."""
+        return tuple(replace(self, source=source) for source in self.sources)
+
+
+def texts_of(given: object, owner: str) -> dict[str, str]:
+    """Return a copy of a mapping of names to texts."""
+    if not isinstance(given, Mapping):
+        raise ChartError(
+            "it gives a text for each name, for example {'z': 'v'}", place=owner, value=given
+        )
+    return dict(given)
