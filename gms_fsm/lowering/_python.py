@@ -131,7 +131,7 @@ class _Writer:
 
     def flow_live(self) -> list[str]:
         return self.function(
-            "dy = dy/dt, all states frozen, corners and jumps evaluated live.",
+            "flow_live(t, y, mode, held, p, dy)",
             "dy = dy/dt, all states frozen, corners and jumps evaluated live.",
             self.rates("live"),
             reads.of_flow(self.plan, "live"),

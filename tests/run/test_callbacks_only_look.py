@@ -129,5 +129,7 @@ def test_a_state_forced_between_firings_is_found_at_the_next_one(model: GMS) -> 
     def meddle(_: object) -> None:
         machines.elements[0].state = "slip"
 
-    with pytest.raises(CallbackError, match=r"changed a state .*break_away_forward from state slip"):
+    with pytest.raises(
+        CallbackError, match=r"changed a state .*break_away_forward from state slip"
+    ):
         simulate(model, Prescribed("0.2"), 9.0, engine=machines, progress=meddle)
