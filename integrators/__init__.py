@@ -1,7 +1,7 @@
 """Integrators for systems that flow, and switch at located crossings.
 
-This package knows nothing of what it integrates. `Equations` are a handful of functions over plain
-indexable numbers (lists in Python, arrays when compiled); a loop over them yields what happened.
+This package knows nothing about what it integrates. `Equations` are a handful of functions over
+plain indexable numbers (lists in Python, arrays when compiled); a loop over them yields events.
 """
 
 from integrators.hybrid import (

@@ -144,7 +144,7 @@ def test_its_own_files_are_written_anew_but_changed_ones_are_not(
     capsys.readouterr()
     summary = Path("out/summary.md")
     summary.write_text(summary.read_text() + "\nMy own conclusions.\n")
-    assert "summary.md: is there" in refused("run", scenario, "-o", "out")
+    assert "summary.md: already exists" in refused("run", scenario, "-o", "out")
     assert "My own conclusions" in summary.read_text()
     summary.unlink()
     assert command("run", scenario, "-o", "out") == 0

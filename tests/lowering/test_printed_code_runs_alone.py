@@ -157,5 +157,7 @@ def test_only_what_is_used_is_in_it() -> None:
 
 def test_a_python_function_cannot_be_printed() -> None:
     source = lower(stick_slip("signed"), Prescribed(lambda t: 0.1 * t)).source
-    with pytest.raises(ParameterError, match=r"v_signal: a Python function.*formula or as corners"):
+    with pytest.raises(
+        ParameterError, match=r"v_signal: a Python function.*expression or as corners"
+    ):
         standalone(source)

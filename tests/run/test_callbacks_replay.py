@@ -318,7 +318,7 @@ def test_machines_of_another_model_are_refused() -> None:
 def test_machines_where_there_is_no_use_for_them_are_refused() -> None:
     model = GMS(one_element("signed").parameters, law="signed")
     machines = ElementMachines(model)
-    with pytest.raises(ParameterError, match=r"'ifelse' asks no machines.*leave machines"):
+    with pytest.raises(ParameterError, match=r"'ifelse' uses no machines.*leave machines"):
         simulate(model, open_loop(), 20.0, engine="ifelse", machines=machines)
-    with pytest.raises(ParameterError, match="give one of them"):
+    with pytest.raises(ParameterError, match="give only one of them"):
         simulate(model, open_loop(), 20.0, engine=machines, machines=machines)

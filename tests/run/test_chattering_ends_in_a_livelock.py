@@ -29,7 +29,7 @@ def test_the_error_names_the_element_and_says_that_it_chatters(weights, element,
         f"element {element} at t = {t}",
         "chattering",
         f"last by '{log.edge[-1]}' from {log.source[-1]} to {log.target[-1]}",
-        "leave a gap",
+        "by a gap",
     ):
         assert part in text
     assert "sliding mode" not in text

@@ -276,7 +276,7 @@ def test_another_version_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         goes_on(path, open_loop())
     with monkeypatch.context() as patch:
         patch.setattr("integrators.compiled.edition", lambda: "another loop")
-        with pytest.raises(CheckpointError, match="which may compute other bits"):
+        with pytest.raises(CheckpointError, match="which may compute different bits"):
             goes_on(path, open_loop())
 
 

@@ -632,7 +632,9 @@ def test_an_infinite_force_is_kept_as_it_is() -> None:
 
 def test_a_solver_of_scipy_is_not_compiled() -> None:
     scipy_integrate = pytest.importorskip("scipy.integrate")
-    with pytest.raises(ParameterError, match=r"'compiled' runs our own methods.*RK45.*'machines'"):
+    with pytest.raises(
+        ParameterError, match=r"'compiled' runs the built-in methods.*RK45.*'machines'"
+    ):
         simulate(
             stick_slip("signed"), open_loop(), 1.0, engine="compiled", method=scipy_integrate.RK45
         )

@@ -149,8 +149,14 @@ def test_the_end_can_be_saved_and_sampled(engine: str, tmp_path: Any) -> None:
         ({"output": 3}, ("output is 3", "'all'")),
         ({"output": True}, ("output is True", "'all'")),
         ({"output": "t_eval"}, ("output='t_eval' needs t_eval=",)),
-        ({"output": "end", "t_eval": [0.5]}, ("output is 'end'", "t_eval", "leave one out")),
-        ({"output": "all", "t_eval": [0.5]}, ("output is 'all'", "t_eval", "leave one out")),
+        (
+            {"output": "end", "t_eval": [0.5]},
+            ("output is 'end'", "t_eval", "leave one of them out"),
+        ),
+        (
+            {"output": "all", "t_eval": [0.5]},
+            ("output is 'all'", "t_eval", "leave one of them out"),
+        ),
         ({"output": "t_eval", "t_eval": [0.5, 2.0]}, ("t_eval has 2.0", "t_end = 1.0")),
         ({"output": "t_eval", "t_eval": []}, ("t_eval",)),
     ],

@@ -287,7 +287,7 @@ def test_lugre_has_no_weights() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"output": "all"}, "output is 'all'; a sweep keeps 'end' or 't_eval'"),
+        ({"output": "all"}, "output is 'all'; use 'end' or 't_eval'"),
         ({"output": "t_eval"}, "needs t_eval="),
         ({"t_eval": [0.5], "output": "end"}, "output is 'end', but t_eval"),
         ({"t_evil": [0.5]}, "did you mean 't_eval'?"),

@@ -147,6 +147,6 @@ def test_a_signal_that_cannot_be_sent_is_a_row_that_says_so(cluster: Any) -> Non
     for text in set(lost.message):
         assert text.startswith("the run could not be sent to a worker (TypeError: ")
         assert text.endswith(
-            "give signals as expressions of t or as arrays, or use threads (executor=None)"
+            "give signals as expressions in t or as arrays, or use threads (executor=None)"
         )
     assert set(found.outcome) == {"ok"}, "the cluster is none the worse for it"
