@@ -299,3 +299,17 @@ def renamed(value: Value, new: Mapping[str, Value]) -> Value:
     if isinstance(value, Name):
         return new.get(value.id, value)
     return rebuilt(value, lambda part: renamed(part, new))
+
+
+def renamed_in(condition: Condition, new: Mapping[str, Value]) -> Condition:
+    """Return a condition with some names replaced by values."""
+    match condition:
+        case Relation(op, left, right):
+            return Relation(op, renamed(left, new), renamed(right, new))
+        case Not(operand):
+            return Not(renamed_in(operand, new))
+        case Both(operands):
+            return Both(tuple(renamed_in(each, new) for each in operands))
+        case Either(operands):
+            return Either(tuple(renamed_in(each, new) for each in operands))
+    return condition

@@ -1,4 +1,4 @@
-"""The names used in the trees of a program's plan and in its text."""
+"""The names of a program's text: what each quantity of a system is called there."""
 
 from __future__ import annotations
 
@@ -6,21 +6,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-
-from gms_fsm.charts.chart import RESERVED, SUPPLIED, Chart
-from gms_fsm.errors import ParameterError
 from gms_fsm.language import Binary, Name, Node, names_in, product_power
-from gms_fsm.systems.models import Model
-from gms_fsm.systems.rigs import Rig
+from gms_fsm.lowering._assembly import Assembly, Bank, of
+from gms_fsm.lowering.layout import sizes_of
 
-__all__ = ["DIP", "Names", "computed_names", "names_of"]
+__all__ = ["Names", "computed_names", "names_of"]
 
-DIP = "v dip"  # not an identifier, so no chart can have a name like it
-# Names used by the text itself, in addition to those reserved for every chart.
-TEXT = {"F_i", "len", "range", "piecewise_linear", "piecewise_slope", "v_dip"}
-TEXT |= {"surface", "j", "dS", "nan"}
-MODEL = {"F_c", "F_s", "v_s", "sigma_2"}  # numbers of a model other than its chart's parameters
+# Names that the text uses itself. What a user calls like one of them is called otherwise there.
+TEXT = frozenset(
+    {"dS", "dy", "edge", "held", "i", "j", "len", "machine", "mode", "n", "nan", "out", "own", "p"}
+    | {"piecewise_linear", "piecewise_slope", "range", "shared", "surface", "tables", "watch", "y"}
+    | {"abs", "exp", "log", "sqrt", "sgn", "min", "max", "sin", "cos", "tanh", "atan", "asinh"}
+    | {"pow", "pi", "F_i", "t"}
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,56 +28,38 @@ class Names:
     Parameters
     ----------
     shared : tuple of str
-        Numbers shared by all elements, in the order of the program's arguments.
+        Numbers with one value, by their names in the trees, in the order of the arguments.
     own : tuple of str
-        Numbers with one value per element, in the order of the program's arguments.
+        Numbers with one value per element, likewise.
     local : mapping of str to str
-        For a name in the trees, its name in the text, if that differs or belongs to the chart.
-    rig : mapping of str to Name
-        For the rig's signals and numbers, their names in the trees: a chart may use the same ones.
+        For each name in the trees its name in the text.
     taken : frozenset of str
-        All names that are already in use.
-    states, edges : mapping of str to str
-        Constants for the states and for the edges, in the chart's order.
+        All names in use.
+    states, edges : tuple of (mapping, tuple)
+        For each contact the constants of its states, by name, and of its edges, in order.
+    plain : mapping of str to str
+        For each name in the trees what it is called in messages.
     """
 
     shared: tuple[str, ...]
     own: tuple[str, ...]
     local: Mapping[str, str]
-    rig: Mapping[str, Name]
     taken: frozenset[str]
-    states: Mapping[str, str]
-    edges: Mapping[str, str]
+    states: tuple[Mapping[str, str], ...]
+    edges: tuple[tuple[str, ...], ...]
+    plain: Mapping[str, str]
 
     @cached_property
     def texts(self) -> Mapping[str, str]:
-        """The spelling of each name from the trees inside the loop over the elements."""
+        """The spelling of each name from the trees."""
         own = {*self.own}
         return {
-            name: f"{local}[i]" if local in own else local for name, local in self.local.items()
+            name: f"{local}[i]" if name in own else local for name, local in self.local.items()
         }
-
-    @cached_property
-    def plain(self) -> Mapping[str, str]:
-        """The spelling of the rig's names in messages."""
-        return {apart.id: name for name, apart in self.rig.items()}
-
-    def read_by(self, *nodes: Node) -> frozenset[str]:
-        """Return the names that trees read, as spelled in the text."""
-        return frozenset(
-            self.local.get(name, name) for node in nodes for name in computed_names(node)
-        )
-
-    def is_shared(self, node: Node) -> bool:
-        """Return whether a tree of the chart has the same value for all elements."""
-        return all(
-            name in ("t", "x", "v") or name in self.plain or self.local.get(name) in self.shared
-            for name in names_in(node)
-        )
 
 
 def computed_names(node: Node) -> frozenset[str]:
-    """Return the names that the value of a tree depends on: ``u**0`` is 1 whatever u is.
+    """Return the names whose values a tree is computed from: ``u**0`` is 1 whatever u is.
 
     Parameters
     ----------
@@ -89,7 +69,7 @@ def computed_names(node: Node) -> frozenset[str]:
     Returns
     -------
     frozenset of str
-        The same as `names_in` otherwise.
+        As `names_in`, except for such powers.
 
     Examples
     --------
@@ -105,82 +85,126 @@ def computed_names(node: Node) -> frozenset[str]:
     return frozenset[str]().union(*(computed_names(part) for part in node.parts))
 
 
-def names_of(model: Model, rig: Rig) -> Names:
-    """Choose names for everything that the program of a model on a rig reads.
+def names_of(read: Assembly) -> Names:
+    """Choose the names of a system's program.
 
     Parameters
     ----------
-    model, rig
-        The model and the rig; only the shapes of their numbers matter.
+    read : Assembly
+        The system, read.
 
     Returns
     -------
     Names
-        Free of clashes.
+        Without clashes.
 
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters, Slider
-    >>> names = names_of(GMS(GMSParameters.paper("stick-slip"), law="signed"), Slider(1.0, "t"))
-    >>> names.shared, names.own
-    (('F_c', 'F_s', 'v_s', 'v_dip', 'sigma_2', 'mass', 'v_c'), ('weight', 'k', 'sigma', 'C'))
+    >>> from gms_fsm.lowering._assembly import assembled
+    >>> from gms_fsm.systems.system import system_of
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> names = names_of(assembled(system_of(model, Slider(1.0, "t"))))
+    >>> [names.local[name] for name in (*names.shared, *names.own)]
+    ['F_c', 'F_s', 'v_s', 'v_dip', 'sigma_2', 'mass', 'v_c', 'weight', 'k', 'sigma', 'C']
     """
-    chart = model.chart
-    shared = [] if model.stribeck is None else ["F_c", "F_s", "v_s", "v_dip"]
-    shared += ["sigma_2", *rig.numbers]
-    own = ["weight"]
-    _check_rig(rig, chart)
-    taken = set(shared) | set(rig.signals) | {f"{name}_signal" for name in rig.signals}
-    taken |= TEXT
-    # A chart may use names of the rig: the rig's are kept separate.
-    apart = {name: Name(f"rig {name}") for name in (*rig.signals, *rig.numbers)}
-    local = {DIP: "v_dip"} | {each.id: name for name, each in apart.items()}
-    # A chart may call its own parameter F_c or mass: it gets a different name in the text.
-    chart_names = (*chart.variables, *chart.parameter_names)
-    for name in chart_names:
-        found = name
-        while found in taken or (found != name and found in chart_names):
-            found += "_"
-        taken.add(found)
-        local[name] = found
-    for name in chart.parameter_names:
-        (shared if np.ndim(model.values[name]) == 0 else own).append(local[name])
-    local |= {f"d{name}": f"d{local[name]}" for name in chart.variables}
-    # STICK is the most readable, but a state called c must not become the parameter C, nor the
-    # edge Home the state home.
-    constants = {*taken, *RESERVED}
+    system, choice = read.system, _Choice(len(read.banks) == 1)
+    choice.taken |= {*sizes_of(read.banks)}
+    choice.taken |= {f"{name}_signal" for name in system.signals}
+    local: dict[str, str] = {"t": "t"}
+    plain: dict[str, str] = {}
+    for name in system.names:
+        if name != "t":
+            local[name] = choice.free(name)
+    for body in system.bodies:
+        local[f"{body.name} a"] = choice.free(f"a_{body.name}")
+    for bank in read.banks:
+        for name in model_names(bank, read):
+            local[name] = choice.of(bank, _short(name))
+    for bank in read.banks:
+        for name in every_name(bank, read):
+            if name not in local:
+                local[name] = choice.of(bank, name.split(".", 1)[1])
+        for name in (*bank.variables, *bank.velocities):
+            plain[name] = name.split(".", 1)[-1] if choice.alone else name
+    plain |= {
+        name: name.split(".", 1)[1] for name in local if choice.alone and "." in name
+    }
+    states, edges = [], []
+    for bank in read.banks:
+        states.append({state: choice.constant(bank, state) for state in bank.states})
+    for bank in read.banks:
+        several = [edge.name for edge in bank.edges]
+        edges.append(
+            tuple(
+                choice.constant(
+                    bank,
+                    edge.name
+                    if several.count(edge.name) == 1
+                    else f"{edge.name}_from_{edge.source}",
+                )
+                for edge in bank.edges
+            )
+        )
     return Names(
-        shared=tuple(shared),
-        own=tuple(own),
+        shared=tuple(read.shared),
+        own=tuple(read.own),
         local=local,
-        rig=apart,
-        taken=frozenset(taken),
-        states={state.name: _constant(state.name, constants) for state in chart.states},
-        edges={edge.name: _constant(edge.name, constants) for edge in chart.transitions},
+        taken=frozenset(choice.taken),
+        states=tuple(states),
+        edges=tuple(edges),
+        plain=plain,
     )
 
 
-def _check_rig(rig: Rig, chart: Chart) -> None:
-    """Refuse names of a rig that have another meaning in the text.
-
-    The chart itself refuses its own names in the same way; the velocity of a prescribed motion is
-    v.
-    """
-    forbidden = {*RESERVED, *SUPPLIED, *MODEL, *TEXT} | {f"d{name}" for name in chart.variables}
-    velocity = {"v"} if rig.acceleration is None else set()
-    for kind, names in (("number", rig.numbers), ("signal", set(rig.signals) - velocity)):
-        for name in sorted({*names} & forbidden):
-            raise ParameterError(
-                f"the {kind} {name!r} has a name that the generated program uses itself",
-                place=f"rig {rig.title!r}",
-                advice=f"rename it, for example to '{name}_rig'",
-            )
+_SHORT = {"curve S": "S", "curve v dip": "v_dip", "threshold weight": "weight"}
 
 
-def _constant(name: str, taken: set[str]) -> str:
-    """Return a constant for a name and reserve it."""
-    constant = name.upper()
-    while constant in taken or not constant.isidentifier():
-        constant += "_"
-    taken.add(constant)
-    return constant
+def _short(name: str) -> str:
+    """Return what a number of a model is called: the last word."""
+    inside = name.split(".", 1)[1]
+    return _SHORT.get(inside, inside.split()[-1])
+
+
+def model_names(bank: Bank, read: Assembly) -> list[str]:
+    """Return what a contact has from its model, and its forces; a chart's names give way to them."""
+    every = [*read.shared, *read.own, *read.defined]
+    return [
+        *(name for name in every if name.startswith(f"{bank.name}.") and " " in name),
+        *bank.forces,
+        *bank.rates,
+    ]
+
+
+def every_name(bank: Bank, read: Assembly) -> list[str]:
+    """Return the names of a contact."""
+    every = [*bank.variables, *read.shared, *read.own, *read.defined]
+    rates = [bank.rate(name) for name in bank.variables]
+    return [name for name in (*every, *rates) if name.startswith(f"{bank.name}.")]
+
+
+class _Choice:
+    """Chooses names that are not taken."""
+
+    def __init__(self, alone: bool) -> None:
+        self.alone, self.taken = alone, {*TEXT}
+
+    def free(self, name: str) -> str:
+        """Return a name, with as many _ after it as it needs."""
+        while name in self.taken:
+            name += "_"
+        self.taken.add(name)
+        return name
+
+    def of(self, bank: Bank, name: str) -> str:
+        """Return the name of a contact's quantity; with several contacts it has theirs in it."""
+        return self.free(name if self.alone else f"{bank.name}_{name}")
+
+    def constant(self, bank: Bank, name: str) -> str:
+        """Return a constant for a name."""
+        found = name if self.alone else f"{bank.name}_{name}"
+        found = found.upper()
+        while found in self.taken or not found.isidentifier():
+            found += "_"
+        self.taken.add(found)
+        return found

@@ -1,7 +1,7 @@
 """The plan of a program: what is computed where, and from what, before any text is written.
 
-`plan_of` derives it from the chart, the shape of the model and the rig; it contains no parameter
-values. Printers write it as text (`gms_fsm.lowering._python`) and make no further decisions.
+`plan_of` makes it from a system that has been read; it contains no numbers of the user's. Printers
+(`gms_fsm.lowering._python`) only write it down and make no further decisions.
 """
 
 from __future__ import annotations
@@ -9,11 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from gms_fsm.charts.chart import Chart
 from gms_fsm.language import (
+    Binary,
     Call,
     Comparison,
-    Condition,
     Name,
     Negative,
     Number,
@@ -21,21 +20,18 @@ from gms_fsm.language import (
     comparisons,
     derivative,
     names_in,
-    parse_value,
-    renamed,
     rough_points,
     split,
     substitute,
     turning_inside,
 )
 from gms_fsm.language._functions import ROUGH
-from gms_fsm.lowering._names import DIP, Names, names_of
-from gms_fsm.lowering.layout import Layout, Places
-from gms_fsm.systems.models import Model
-from gms_fsm.systems.rigs import Rig
-from gms_fsm.systems.signals import Corners, Formula, Signal
+from gms_fsm.lowering._assembly import ONE, Assembly, Bank, Definition, of
+from gms_fsm.lowering._names import Names, names_of
+from gms_fsm.lowering.layout import Block, Layout, Places, sizes_of
+from gms_fsm.systems.signals import Corners, Formula, Function
 
-__all__ = ["Edge", "Flow", "Gradient", "Input", "Plan", "RoughCall", "StateFlow"]
+__all__ = ["BankPlan", "Computed", "Gradient", "Plan", "RoughCall", "StateFlow"]
 __all__ += ["both_sides", "plan_of"]
 
 
@@ -46,11 +42,11 @@ class RoughCall:
     Parameters
     ----------
     name : str
-        The name of its value.
+        Name of its value.
     call : Call
-        The call; its arguments may refer to other rough calls.
+        The call; its arguments may name other rough calls.
     turning : Value
-        The value whose sign selects the branch.
+        The value whose sign decides.
     """
 
     name: str
@@ -59,127 +55,88 @@ class RoughCall:
 
 
 @dataclass(frozen=True)
+class Computed:
+    """A value without rough calls, and the calls to be computed before it, in order.
+
+    Parameters
+    ----------
+    tree : Value
+        Names stand for its rough calls.
+    calls : tuple of RoughCall
+        Those.
+    """
+
+    tree: Value
+    calls: tuple[RoughCall, ...] = ()
+
+
+@dataclass(frozen=True)
 class StateFlow:
-    """The computations for an element in one state.
+    """The rates and the forces of an element in one state.
 
     Parameters
     ----------
     state : str
-        The state.
-    calls : tuple of RoughCall
-        The element's own calls, in order of computation.
-    rates : mapping of str to Value
-        The rate of each variable, without rough calls.
-    force : Value or None
-        F_i if it depends on the state, without rough calls.
+        Its name.
+    rates : mapping of str to Computed
+        By variable.
+    forces : mapping of str to Computed
+        By force; empty where the state is locked, and where they are the same in all states.
+    locked : bool
+        Whether it locks the contact.
     """
 
     state: str
-    calls: tuple[RoughCall, ...]
-    rates: Mapping[str, Value]
-    force: Value | None
+    rates: Mapping[str, Computed]
+    forces: Mapping[str, Computed]
+    locked: bool
 
 
-@dataclass(frozen=True)
-class Flow:
-    """The computation of all rates and forces.
+@dataclass(frozen=True, eq=False)
+class BankPlan:
+    """What is computed for a contact.
 
     Parameters
     ----------
-    calls : tuple of RoughCall
-        Those shared by all elements, in order of computation.
+    bank : Bank
+        The contact.
     states : tuple of StateFlow
         One for each state.
-    force : Value or None
-        F_i if it is the same text in all states; None also if no force is needed.
-    acceleration : Value or None
-        dv/dt, without rough calls; None if v is prescribed or dv/dt is not needed.
+    common : mapping of str to Value
+        Forces of an element that are the same text in all states.
+    totals : mapping of str to Computed
+        Forces of the contact that are not just the sum.
+    moves : bool
+        Whether its force acts on a free body.
     """
 
-    calls: tuple[RoughCall, ...]
+    bank: Bank
     states: tuple[StateFlow, ...]
-    force: Value | None
-    acceleration: Value | None
-
-    @property
-    def by_state(self) -> bool:
-        """Whether the force is computed separately for each state."""
-        return any(each.force is not None for each in self.states)
-
-
-@dataclass(frozen=True)
-class Edge:
-    """An edge of the chart.
-
-    Parameters
-    ----------
-    name, source, target : str
-        As in the chart.
-    guard : Condition
-        The condition for taking the edge.
-    steps : tuple of (str, Value)
-        The assignments to variables, in order of computation.
-    """
-
-    name: str
-    source: str
-    target: str
-    guard: Condition
-    steps: tuple[tuple[str, Value], ...]
+    common: Mapping[str, Value]
+    totals: Mapping[str, Computed]
+    moves: bool
 
 
 @dataclass(frozen=True)
 class Gradient:
-    """The derivatives of a surface's defining value, where they are not identically zero.
+    """The nonzero derivatives of the value that is zero on a surface.
 
     Parameters
     ----------
     surface : Value
-        The value that is zero on the surface.
+        The value.
     by_state : mapping of str to Value
-        With respect to x and to the chart's variables.
-    by_v, by_s, by_t : Value or None
-        With respect to velocity, threshold and time.
+        With respect to components of the state vector.
+    by_t : Value or None
+        With respect to the time.
     by_signal : mapping of str to Value
-        With respect to the rig's signals.
+        With respect to signals that are tables.
     """
 
     surface: Value
     by_state: Mapping[str, Value]
-    by_v: Value | None
-    by_s: Value | None
     by_t: Value | None
     by_signal: Mapping[str, Value]
-
-    @property
-    def by_speed(self) -> bool:
-        """Whether the value depends on the velocity in any way."""
-        return self.by_v is not None or self.by_s is not None
-
-
-@dataclass(frozen=True)
-class Input:
-    """A signal: a formula, a table of corners, or a Python function.
-
-    Parameters
-    ----------
-    name : str
-        As in the rig.
-    calls : tuple of RoughCall
-        Those in the formula, in order of computation.
-    formula : Value or None
-        Without rough calls.
-    slope : Value or None
-        Derivative of the formula with respect to t, if it has one.
-    tabled : bool
-        Whether it is a table of corners.
-    """
-
-    name: str
-    calls: tuple[RoughCall, ...] = ()
-    formula: Value | None = None
-    slope: Value | None = None
-    tabled: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,171 +146,148 @@ class Plan:
     Parameters
     ----------
     title : str
-        Chart and rig, for the heading.
+        Names the charts and the system.
+    read : Assembly
+        The system, read.
     names : Names
-        The names used in the text.
+        The names in the text.
     layout : Layout
         The layout of all arrays.
     tables : Places
-        Places of the times and the values of each table of corners.
-    curve : Value or None
-        The Stribeck curve S(v).
-    curve_slope : Value or None
-        Its derivative with respect to v.
-    threshold : bool
-        Whether the chart uses s.
-    inputs : tuple of Input
-        The signals, in the rig's order.
-    edges : tuple of Edge
-        In the chart's order.
+        The places of the times and values of each table of corners.
+    definitions : mapping of str to Computed
+        Of the quantities computed from others, without signals that are not formulas; in order.
+    banks : tuple of BankPlan
+        The contacts.
+    accelerations : mapping of str to Computed
+        By free body: (force - the forces of its contacts) / inertia.
+    flow : mapping of str to Computed
+        Rates of the further states.
     held : Places
-        The values whose signs are frozen.
+        The values whose signs are held.
     surfaces : Places
-        Those of them on which the motion can slide.
+        Those among them on which the motion can slide.
     relations : Places
         The comparisons that may be watched.
     always : tuple of Comparison
         Those watched in every state.
-    rough : mapping of str to tuple of Value
-        By state, the values whose signs select corners and jumps there.
-    flow : Flow
-        For the rates dy/dt.
-    observed : Flow
-        For the observed quantities.
+    rough : tuple of mapping of str to tuple of Value
+        For each contact, by state, the values whose signs decide corners and jumps.
     gradients : tuple of Gradient
-        One for each entry of `surfaces`, in the same order.
+        One for each value on whose surface the motion can slide, in the order of `surfaces`.
     """
 
     title: str
+    read: Assembly
     names: Names
     layout: Layout
     tables: Places[tuple[str, str]]
-    curve: Value | None
-    curve_slope: Value | None
-    threshold: bool
-    inputs: tuple[Input, ...]
-    edges: tuple[Edge, ...]
+    definitions: Mapping[str, Computed]
+    banks: tuple[BankPlan, ...]
+    accelerations: Mapping[str, Computed]
+    flow: Mapping[str, Computed]
     held: Places[Value]
     surfaces: Places[Value]
     relations: Places[Comparison]
     always: tuple[Comparison, ...]
-    rough: Mapping[str, tuple[Value, ...]]
-    flow: Flow
-    observed: Flow
+    rough: tuple[Mapping[str, tuple[Value, ...]], ...]
     gradients: tuple[Gradient, ...]
 
-    @property
-    def prescribed(self) -> bool:
-        """Whether the velocity is prescribed."""
-        return "v" not in self.layout.y.shared
 
-    @property
-    def variables(self) -> tuple[str, ...]:
-        """The chart's variables."""
-        return self.layout.y.own
-
-    def leaving(self, state: str) -> tuple[Edge, ...]:
-        """Return the edges that leave a state, highest priority first."""
-        return tuple(edge for edge in self.edges if edge.source == state)
-
-
-def plan_of(model: Model, rig: Rig) -> Plan:
-    """Plan the program of a model on a rig.
+def plan_of(read: Assembly) -> Plan:
+    """Plan the program of a system.
 
     Parameters
     ----------
-    model, rig
-        The model and the rig; only the shapes of their numbers matter.
+    read : Assembly
+        From `assembled`; of its numbers only the shapes matter.
 
     Returns
     -------
     Plan
-        Input for a printer.
+        For a printer.
 
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters, Prescribed
-    >>> plan = plan_of(GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.1*t"))
-    >>> plan.held.shared, [edge.name for edge in plan.leaving("slip")]
-    ((Name(id='v'),), ['arrest'])
+    >>> from gms_fsm.lowering._assembly import assembled
+    >>> from gms_fsm.systems.system import system_of
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> plan = plan_of(assembled(system_of(model, Prescribed("0.1*t"))))
+    >>> plan.held.shared, [edge.name for edge in plan.banks[0].bank.edges]
+    ((Name(id='v'),), ['break_away_forward', 'break_away_backward', 'arrest'])
     """
-    chart = model.chart
-    curve = None
-    if model.stribeck is not None:
-        curve = parse_value(model.stribeck.text, ["F_c", "F_s", "v_s", "v"])
-    names = names_of(model, rig)
-    acceleration = _acceleration(rig, names)
-    forces = {state.name: _force(chart, state.name) for state in chart.states}
-    rig_rough = _rig_rough(rig, acceleration)
-    rough = {state: _rough(chart, state, force) for state, force in forces.items()}
-    found = [*rig_rough, *(u for each in rough.values() for u in each)]
-    held = _parted(found, names, model.n)
+    names = names_of(read)
+    accelerations = {body.name: _acceleration(read, body.name) for body in read.free}
+    outer = _outer_rough(read, accelerations)
+    rough = tuple(_rough(read, bank) for bank in read.banks)
+    found = [*outer, *(u for each in rough for row in each.values() for u in row)]
+    held = _parted(dict.fromkeys(found), read)
     surfaces = Places(
-        tuple(u for u in held.shared if _can_be_slid_on(u, chart, rig, names)),
-        tuple(u for u in held.own if _can_be_slid_on(u, chart, rig, names)),
-        model.n,
+        tuple(u for u in held.shared if _can_be_slid_on(u, read)),
+        tuple(
+            Block(tuple(u for u in block.names if _can_be_slid_on(u, read)), block.n, block.size)
+            for block in held.blocks
+        ),
     )
-    always = [relation for u in rig_rough for relation in both_sides(u)]
-    always += _landmarks() if "s" in chart.inputs else []
+    landmarks = [r for bank in read.banks if bank.threshold for r in _landmarks(bank)]
+    always = [relation for u in outer for relation in both_sides(u)] + landmarks
     smoothing = _Smoothing(held, names)
+    charts = " and ".join(dict.fromkeys(bank.chart.name for bank in read.banks))
     return Plan(
-        title=f"{chart.name}, {rig.title}",
+        title=f"{charts}, {read.system.name}",
+        read=read,
         names=names,
-        layout=Layout.of(model, rig, surfaces.size),
-        tables=_tables(rig.signals, model.n),
-        curve=curve,
-        curve_slope=None if curve is None else derivative(curve, "v"),
-        threshold="s" in chart.inputs,
-        inputs=tuple(_input(name, each, smoothing) for name, each in rig.signals.items()),
-        edges=_edges(chart),
+        layout=Layout.of(read, surfaces.size),
+        tables=Places(
+            tuple(
+                (name, column)
+                for name, signal in read.system.signals.items()
+                if isinstance(signal, Corners)
+                for column in ("times", "values")
+            ),
+            (),
+        ),
+        definitions={
+            each.name: smoothing(each.tree) for each in read.definitions if each.tree is not None
+        },
+        banks=tuple(_bank(read, bank, smoothing) for bank in read.banks),
+        accelerations={name: smoothing(tree) for name, tree in accelerations.items()},
+        flow={name: smoothing(tree) for name, tree in read.flow.items()},
         held=held,
         surfaces=surfaces,
-        relations=_relations(chart, held, names),
+        relations=_relations(read, held, landmarks),
         always=tuple(dict.fromkeys(always)),
         rough=rough,
-        flow=_flow(chart, forces if acceleration is not None else {}, acceleration, smoothing),
-        observed=_flow(chart, forces, None, smoothing),
-        gradients=tuple(_gradient(u, chart, rig, names) for u in (*surfaces.shared, *surfaces.own)),
+        gradients=tuple(_gradient(u, read) for u in (*surfaces.shared, *surfaces.own)),
     )
-
-
-def _labels(held: Places[Value], names: Names) -> dict[Value, str]:
-    """Return, for each frozen sign, the label used to name its rough calls."""
-    labels: dict[Value, str] = {}
-    for number, u in enumerate([*held.shared, *held.own]):
-        label = u.id if isinstance(u, Name) and u.id.isidentifier() else str(number)
-        while label in labels.values() or any(
-            f"{function}_{label}" in names.taken for function in ROUGH
-        ):
-            label += "_"
-        labels[u] = label
-    return labels
 
 
 # --------------------------------------------------------------------------- corners and jumps
 class _Smoothing:
-    """Replaces the rough calls in values by names."""
+    """Removes rough calls from values."""
 
     def __init__(self, held: Places[Value], names: Names) -> None:
-        self.held, self.labels, self.taken = held, _labels(held, names), names.taken
+        self.taken, self.labels = names.taken, _labels(held, names)
         self.turning = {
             f"{function}_{label}": u for u, label in self.labels.items() for function in ROUGH
         }
         self.named: dict[Call, str] = {}
 
-    def __call__(self, value: Value) -> tuple[Value, tuple[RoughCall, ...]]:
+    def __call__(self, value: Value) -> Computed:
         """Return a value with its rough calls replaced by names, and these calls in order."""
         smooth, calls = substitute(value, self.name_of)
-        return smooth, tuple(
-            RoughCall(name, call, self.turning[name]) for name, call in calls.items()
+        return Computed(
+            smooth,
+            tuple(RoughCall(name, call, self.turning[name]) for name, call in calls.items()),
         )
 
     def name_of(self, turning: Value, call: Call) -> str | None:
-        """Return the name of a rough call, or None if its sign is not frozen."""
+        """Return the name of a rough call, None if its sign is not held."""
         if turning not in self.labels:
             return None
         if call not in self.named:
-            # max(v, 2) and max(v - 2, 0) turn at the same place, but are not the same.
+            # max(v, 2) and max(v - 2, 0) turn at the same place but are not equal.
             first = name = f"{call.function}_{self.labels[turning]}"
             number = 2
             while name in self.named.values() or (
@@ -364,168 +298,190 @@ class _Smoothing:
         return self.named[call]
 
 
-def _acceleration(rig: Rig, names: Names) -> Value | None:
-    if rig.acceleration is None:
-        return None
-    return renamed(parse_value(rig.acceleration, ["t", "x", "v", "F", *names.rig]), names.rig)
+def _labels(held: Places[Value], names: Names) -> dict[Value, str]:
+    """Return the label of each held sign, used in the names of its rough calls."""
+    labels: dict[Value, str] = {}
+    for number, u in enumerate([*held.shared, *held.own]):
+        label = names.local[u.id] if isinstance(u, Name) else str(number)
+        while label in labels.values() or any(
+            f"{function}_{label}" in names.taken for function in ROUGH
+        ):
+            label += "_"
+        labels[u] = label
+    return labels
 
 
-def _force(chart: Chart, state: str) -> Value:
-    """Return the force in a state, with the rates in its rough calls replaced by the flows."""
-    rates = {f"d{name}": chart.flows[state, name] for name in chart.variables}
-    return turning_inside(chart.forces["F"], rates)
+def _acceleration(read: Assembly, body: str) -> Value:
+    """Return the acceleration of a free body over the forces of its contacts."""
+    tree = read.forces[body]
+    for bank in read.banks:
+        for force, row in zip(bank.forces, bank.jacobian, strict=True):
+            if body in row:
+                tree = Binary("-", tree, times(row[body], Name(force)))
+    return Binary("/", tree, read.inertias[body])
 
 
-def _rig_rough(rig: Rig, acceleration: Value | None) -> tuple[Value, ...]:
-    """Return the values at whose zeros the rig or a signal has a corner or a jump."""
-    found: list[Value] = []
-    for signal in rig.signals.values():
-        if isinstance(signal, Formula):
-            found += rough_points(signal.tree)
-    if acceleration is not None:
-        # A sign of F itself is evaluated live: F is known only together with the flow.
-        found += [u for u in rough_points(acceleration) if "F" not in names_in(u)]
-    return tuple(found)
+def times(coefficient: Value, value: Value) -> Value:
+    """Return a product; 1 is left out."""
+    return value if coefficient == ONE else Binary("*", coefficient, value)
 
 
-def _rough(chart: Chart, state: str, force: Value) -> tuple[Value, ...]:
-    """Return the values at whose zeros a flow or the force has a corner or a jump."""
-    trees = [*(chart.flows[state, name] for name in chart.variables), force]
-    return tuple(dict.fromkeys(u for tree in trees for u in rough_points(tree)))
+def _outer_rough(read: Assembly, accelerations: Mapping[str, Value]) -> tuple[Value, ...]:
+    """Return where the bodies, a signal or another shared quantity has a corner or a jump."""
+    late = {name for bank in read.banks for name in bank.forces}
+    trees = [each.tree for each in read.definitions if each.bank is None and each.tree is not None]
+    trees += [*accelerations.values(), *read.flow.values()]
+    trees += [tree for bank in read.banks for tree in bank.totals.values()]
+    # A sign of a force itself stays live: it is known only with the flow.
+    return tuple(
+        u for tree in trees for u in rough_points(tree) if not names_in(u) & late
+    )
 
 
-def _parted(found: Iterable[Value], names: Names, n: int) -> Places[Value]:
-    """Split values into those shared by all elements and those of one element."""
-    shared = {u: names.is_shared(u) for u in found}
+def _rough(read: Assembly, bank: Bank) -> Mapping[str, tuple[Value, ...]]:
+    """Return by state where a flow or a force has a corner or a jump: the driver stops there."""
+    found = {}
+    for state in bank.states:
+        trees = [bank.flows[state, name] for name in bank.variables]
+        trees += [tree for name in bank.forces if (tree := _force(bank, state, name)) is not None]
+        needed = read.closure(name for tree in trees for name in names_in(tree))
+        inside = [
+            each.tree
+            for each in read.definitions
+            if each.bank == bank.index and each.name in needed and each.tree is not None
+        ]
+        found[state] = tuple(
+            dict.fromkeys(u for tree in (*inside, *trees) for u in rough_points(tree))
+        )
+    return found
+
+
+def _force(bank: Bank, state: str, force: str) -> Value | None:
+    """Return an element's force in a state; inside its rough calls, the rates become the flows."""
+    tree = bank.outputs[state, force]
+    rates = {bank.rate(name): bank.flows[state, name] for name in bank.variables}
+    return None if tree is None else turning_inside(tree, rates)
+
+
+def _parted(found: Iterable[Value], read: Assembly) -> Places[Value]:
+    """Split values into those with one value and those with one per element of a contact."""
+    owners = {u: read.bank_of(u) for u in found}
+    sizes = sizes_of(read.banks)
     return Places(
-        tuple(u for u in shared if shared[u]), tuple(u for u in shared if not shared[u]), n
+        tuple(u for u in owners if owners[u] is None),
+        tuple(
+            Block(tuple(u for u in owners if owners[u] == bank.index), bank.n, size)
+            for bank, size in zip(read.banks, sizes, strict=True)
+        ),
     )
 
 
-def _can_be_slid_on(u: Value, chart: Chart, rig: Rig, names: Names) -> bool:
-    """Return whether u depends on the state, and only in ways that have a derivative."""
-    read, prescribed = names_in(u), rig.acceleration is None
-    if "s" in read:
-        read |= {"v"}
-    states = {"x", *chart.variables, *([] if prescribed else ["v"])}
-    signals = {name for name in rig.signals if names.rig[name].id in read}
-    if prescribed and "v" in read:
-        signals |= {"v"}
+def _can_be_slid_on(u: Value, read: Assembly) -> bool:
+    """Tell whether u depends on the state, through quantities that have a derivative."""
+    expanded = read.expanded(u)
+    moving = _moving(expanded, read)
+    signals = read.system.signals
     return (
-        bool(read & states)
-        and all(derivative(u, name) is not None for name in read)
-        and all(_has_slope(rig.signals[name]) for name in signals)
+        not any(isinstance(signals.get(name), Function) for name in names_in(expanded))
+        and bool({*moving} - {"t", *signals})
+        and all(derivative(expanded, name) is not None for name in moving)
     )
 
 
-def _has_slope(signal: Signal) -> bool:
-    if isinstance(signal, Formula):
-        return derivative(signal.tree, "t") is not None
-    return isinstance(signal, Corners)
+def _moving(expanded: Value, read: Assembly) -> tuple[str, ...]:
+    """Return the names in an expanded value that change while the motion flows."""
+    system, order = read.system, dict[str, None]()
+    for body in system.bodies:
+        order[body.x] = order[body.v] = None
+    order |= dict.fromkeys(system.flow)
+    order |= dict.fromkeys(name for bank in read.banks for name in bank.variables)
+    order |= {name: None for name in system.signals if isinstance(system.signals[name], Corners)}
+    order["t"] = None
+    return tuple(name for name in order if name in names_in(expanded))
 
 
 # --------------------------------------------------------------------------- comparisons
 def both_sides(u: Value) -> tuple[Comparison, Comparison]:
-    """Return the comparisons of a value with zero: strictly above it, and at or above it."""
+    """Return the comparisons of a value with zero: u > 0 and u >= 0."""
     zero = Number(0.0)
     return Comparison(u, zero, strict=True), Comparison(u, zero, strict=False)
 
 
-def _landmarks() -> list[Comparison]:
-    """Return the speeds where s(v) starts to change fast: a large step could jump over the dip."""
-    v, dip = Name("v"), Name(DIP)
-    # Mirror images of each other, so that a mirrored run stops at mirrored points.
+def _landmarks(bank: Bank) -> list[Comparison]:
+    """Return where s(v) starts to change fast: a large step would miss the whole dip."""
+    v, dip = Name(bank.velocities[0]), Name(of(bank.name, "curve v dip"))
+    # Mirror images of each other, so that a mirrored run stops at mirrored places.
     return [Comparison(v, dip, strict=True), Comparison(Negative(dip), v, strict=True)]
 
 
-def _relations(chart: Chart, held: Places[Value], names: Names) -> Places[Comparison]:
+def _relations(
+    read: Assembly, held: Places[Value], landmarks: list[Comparison]
+) -> Places[Comparison]:
     """Lay out all comparisons that may be watched."""
     wanted: list[Comparison] = []
-    for edge in chart.transitions:
-        wanted += comparisons(split(chart.guards[edge.name]))
+    for bank in read.banks:
+        for edge in bank.edges:
+            wanted += comparisons(split(edge.guard))
     for u in (*held.shared, *held.own):
         wanted += both_sides(u)
-    if "s" in chart.inputs:
-        wanted += _landmarks()
-    found = dict.fromkeys(wanted)
-    shared = {r: names.is_shared(r.left) and names.is_shared(r.right) for r in found}
+    found = dict.fromkeys([*wanted, *landmarks])
+    owners = {r: read.bank_of(Binary("-", r.left, r.right)) for r in found}
+    sizes = sizes_of(read.banks)
     return Places(
-        tuple(r for r in found if shared[r]), tuple(r for r in found if not shared[r]), held.n
+        tuple(r for r in found if owners[r] is None),
+        tuple(
+            Block(tuple(r for r in found if owners[r] == bank.index), bank.n, size)
+            for bank, size in zip(read.banks, sizes, strict=True)
+        ),
     )
 
 
 # --------------------------------------------------------------------------- what is computed
-def _tables(signals: Mapping[str, Signal], n: int) -> Places[tuple[str, str]]:
-    tabled = [name for name, signal in signals.items() if isinstance(signal, Corners)]
-    return Places(tuple((name, column) for name in tabled for column in ("times", "values")), (), n)
-
-
-def _input(name: str, signal: Signal, smoothing: _Smoothing) -> Input:
-    if isinstance(signal, Formula):
-        smooth, calls = smoothing(signal.tree)
-        return Input(name, calls, smooth, derivative(signal.tree, "t"))
-    return Input(name, tabled=isinstance(signal, Corners))
-
-
-def _edges(chart: Chart) -> tuple[Edge, ...]:
-    return tuple(
-        Edge(
-            name=edge.name,
-            source=edge.source,
-            target=edge.target,
-            guard=chart.guards[edge.name],
-            # Stateflow's order: exit of the source, action of the edge, entry of the target.
-            steps=(
-                *chart.assignments["exit", edge.source].items(),
-                *chart.assignments["action", edge.name].items(),
-                *chart.assignments["entry", edge.target].items(),
-            ),
-        )
-        for edge in chart.transitions
+def _bank(read: Assembly, bank: Bank, smoothing: _Smoothing) -> BankPlan:
+    """Plan the rates and the forces of a contact."""
+    forces = {
+        (state, name): _force(bank, state, name) for state in bank.states for name in bank.forces
+    }
+    # With corners in it, or in what it is made from, a force is computed state by state.
+    common = {}
+    for name in bank.forces:
+        texts = [bank.outputs[state, name] for state in bank.states]
+        first = texts[0]
+        same = first is not None and all(each == first for each in texts)
+        if same and not any(rough_points(forces[state, name] or ONE) for state in bank.states):
+            assert first is not None
+            common[name] = first
+    states = []
+    for state in bank.chart.states:
+        kept = {}
+        for name in bank.forces:
+            tree = forces[state.name, name]
+            if tree is not None and name not in common:
+                kept[name] = smoothing(tree)
+        rates = {name: smoothing(bank.flows[state.name, name]) for name in bank.variables}
+        states.append(StateFlow(state.name, rates, kept, state.locked))
+    free = {body.name for body in read.free}
+    return BankPlan(
+        bank,
+        tuple(states),
+        common,
+        {name: smoothing(tree) for name, tree in bank.totals.items()},
+        any(free & {*row} for row in bank.jacobian),
     )
 
 
-def _flow(
-    chart: Chart, forces: Mapping[str, Value], acceleration: Value | None, smoothing: _Smoothing
-) -> Flow:
-    """Plan the rates, and the forces if there are any."""
-    # With corners in it, the force differs from state to state.
-    by_state = any(rough_points(force) for force in forces.values())
-    shared: dict[str, RoughCall] = {}
-    states = []
-    for state in chart.states:
-        own: dict[str, RoughCall] = {}
-        trees = {name: chart.flows[state.name, name] for name in chart.variables}
-        smooth = {}
-        for name, tree in (trees | ({"F": forces[state.name]} if by_state else {})).items():
-            smooth[name], calls = smoothing(tree)
-            for call in calls:
-                kept = shared if call.turning in smoothing.held.shared else own
-                kept.setdefault(call.name, call)
-        force = smooth.pop("F", None)
-        states.append(StateFlow(state.name, tuple(own.values()), smooth, force))
-    if acceleration is not None:
-        acceleration, calls = smoothing(acceleration)
-        shared |= {call.name: call for call in calls}
-    common = chart.forces["F"] if forces and not by_state else None
-    return Flow(tuple(shared.values()), tuple(states), common, acceleration)
-
-
-def _gradient(u: Value, chart: Chart, rig: Rig, names: Names) -> Gradient:
-    read = names_in(u)
-    signals = {name: names.rig[name].id for name in rig.signals if names.rig[name].id in read}
+def _gradient(u: Value, read: Assembly) -> Gradient:
+    expanded, signals = read.expanded(u), read.system.signals
+    slopes = {name: derivative(expanded, name) for name in _moving(expanded, read)}
+    known = {name: slope for name, slope in slopes.items() if slope is not None}
     return Gradient(
         surface=u,
-        by_state={name: _known(u, name) for name in ("x", *chart.variables) if name in read},
-        by_v=_known(u, "v") if "v" in read else None,
-        by_s=_known(u, "s") if "s" in read else None,
-        by_t=_known(u, "t") if "t" in read else None,
-        by_signal={name: _known(u, apart) for name, apart in signals.items()},
+        by_state={name: each for name, each in known.items() if name not in ("t", *signals)},
+        by_t=known.get("t"),
+        by_signal={name: each for name, each in known.items() if name in signals},
     )
 
 
-def _known(value: Value, name: str) -> Value:
-    """Return a derivative that is known to exist: surfaces without one cannot be slid on."""
-    found = derivative(value, name)
-    assert found is not None
-    return found
+def formula(definition: Definition) -> bool:
+    """Tell whether a definition is computed from a tree."""
+    return definition.signal is None or isinstance(definition.signal, Formula)

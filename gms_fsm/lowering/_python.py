@@ -1,29 +1,20 @@
-"""Printing of a program's plan as Python text: if-else code to read and step through."""
+"""Prints the plan of a program as Python text: if-else that one can read and step through."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from gms_fsm.language import (
-    Binary,
-    Comparison,
-    Name,
-    Negative,
-    Node,
-    Number,
-    Requirement,
-    Split,
-    spell,
-    split,
-)
-from gms_fsm.lowering import _reads as reads
-from gms_fsm.lowering._plan import Edge, Flow, Gradient, Input, Plan, RoughCall, both_sides
-from gms_fsm.lowering._reads import Reads, Signs
+from gms_fsm.language import Comparison, Name, Negative, Number, Requirement, Split, names_in, split
+from gms_fsm.lowering._assembly import Bank, Edge, of
+from gms_fsm.lowering._lines import TABLES, Line, Signs, Writer, indented, reads_of
+from gms_fsm.lowering._locks import Locks
+from gms_fsm.lowering._names import computed_names
+from gms_fsm.lowering._plan import BankPlan, Gradient, Plan, both_sides
 from integrators import LIVE
 
 __all__ = ["FUNCTIONS", "python"]
 
-FUNCTIONS = ("flow", "flow_live", "switch", "act", "observe", "normal", "arm", "margins")
+FUNCTIONS = ("flow", "flow_live", "switch", "act", "observe", "normal", "arm", "margins", "tick")
 
 
 def python(plan: Plan) -> str:
@@ -32,382 +23,608 @@ def python(plan: Plan) -> str:
     Parameters
     ----------
     plan : Plan
-        The plan of the program.
+        Of the program.
 
     Returns
     -------
     str
-        The functions listed in `FUNCTIONS`, after the constants for states and edges.
+        The constants for states and edges, then the functions named in `FUNCTIONS`.
 
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters, Prescribed
+    >>> from gms_fsm.lowering._assembly import assembled
     >>> from gms_fsm.lowering._plan import plan_of
+    >>> from gms_fsm.systems.system import system_of
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
-    >>> print(python(plan_of(model, Prescribed("0.1*t"))).splitlines()[3])
+    >>> plan = plan_of(assembled(system_of(model, Prescribed("0.1*t"))))
+    >>> print(python(plan).splitlines()[3])
     STICK, SLIP = 0, 1  # states
     """
-    writer = _Writer(plan)
+    printer = _Printer(plan)
     lines = [
         f"# {_one_line(plan.title)}",
-        "# Generated from the chart; parameters are arguments, so one text serves all values.",
+        "# Generated from the chart; parameters are arguments: one text for every set of them.",
         "",
-        f"{_numbered(plan.names.states.values())}  # states",
     ]
-    if plan.edges:
-        lines.append(f"{_numbered(plan.names.edges.values())}  # edges")
+    for bank, states in zip(plan.banks, plan.names.states, strict=True):
+        whose = "" if len(plan.banks) == 1 else f" of {bank.bank.name}"
+        lines.append(f"{_numbered(states.values())}  # states{whose}")
+    if any(plan.names.edges):
+        lines.append(f"{_numbered(edge for each in plan.names.edges for edge in each)}  # edges")
     for function in (
-        writer.switch(),
-        writer.act(),
-        writer.flow(),
-        writer.flow_live(),
-        writer.observe(),
-        writer.normal(),
-        writer.arm(),
-        writer.margins(),
+        printer.switch(),
+        printer.act(),
+        printer.flow("held"),
+        printer.flow("live"),
+        printer.observe(),
+        printer.normal(),
+        printer.arm(),
+        printer.margins(),
+        printer.tick(),
     ):
         lines += ["", "", *function]
     return "\n".join(lines) + "\n"
 
 
-class _Writer:
-    """Writes the functions of a plan as lines."""
+class _Printer(Writer):
+    """Prints the functions of a plan."""
 
     def __init__(self, plan: Plan) -> None:
-        self.plan, self.names, self.layout = plan, plan.names, plan.layout
+        super().__init__(plan)
+        self.locks = Locks(self)
+        self.locking = any(bank.chart.locks for bank in self.read.banks)
+
+    # ------------------------------------------------------------------ forces
+    def forces(
+        self, signs: Signs, *, wanted: bool, rates: bool = False, observed: bool = False
+    ) -> list[Line]:
+        """Write the rates and the forces of all contacts, and the accelerations.
+
+        Parameters
+        ----------
+        signs : {"held", "live", "given"}
+            Where signs come from.
+        wanted : bool
+            Whether forces are wanted at all.
+        rates : bool
+            Store the rates into dy.
+        observed : bool
+            Store what is observed of the elements into out.
+        """
+        lines: list[Line] = []
+        for bank in self.plan.banks:
+            lines += self.bank_forces(bank, signs, wanted, rates=rates, observed=observed)
+        if wanted and (rates or self.locking):
+            for body in self.read.free:
+                value = self.plan.accelerations[body.name]
+                if self.locking:
+                    lines += self.computed(self.local(f"{body.name} a"), value, signs)
+        if wanted and self.locking:
+            lines += self.driven_accelerations()
+            lines += self.locks.forces()
+        return lines
+
+    def bank_forces(
+        self, plan: BankPlan, signs: Signs, wanted: bool, *, rates: bool, observed: bool
+    ) -> list[Line]:
+        """Write the loop over the elements of a contact, and its force."""
+        bank, y, seen = plan.bank, self.layout.y, self.layout.observed
+        forces = wanted and (plan.moves or observed or not rates or self.locking)
+        used = {name for tree in plan.common.values() for name in names_in(tree)} | {
+            name
+            for each in plan.states
+            for value in each.forces.values()
+            for name in self.names_of(value)
+        }
+        needed = {
+            name
+            for name in bank.variables
+            if rates or observed or (forces and bank.rate(name) in used)
+        }
+        # Only a contact with several velocities has several forces.
+        several = {force: f"F_i{'' if q == 0 else f'_{q}'}" for q, force in enumerate(bank.forces)}
+        branches: dict[str, list[Line]] = {}
+        for each in plan.states:
+            branch: list[Line] = []
+            for name in bank.variables:
+                if name in needed:
+                    branch += self.computed(self.local(bank.rate(name)), each.rates[name], signs)
+            for force in bank.forces if forces else ():
+                if force in plan.common:
+                    continue
+                if each.locked:
+                    branch.append(Line(f"{several[force]} = 0.0"))
+                else:
+                    branch += self.computed(several[force], each.forces[force], signs, "  # (3)")
+            branches[each.state] = branch
+        after: list[Line] = []
+        for force in bank.forces if forces else ():
+            total = self.local(force)
+            if force not in plan.common:
+                after.append(Line(f"{total} += {several[force]}"))
+            elif observed:
+                after.append(self.put(several[force], plan.common[force], "  # (3)"))
+                after.append(Line(f"{total} += {several[force]}"))
+            else:
+                tree = plan.common[force]
+                after.append(Line(f"{total} += {self.spell(tree)}  # (3)", computed_names(tree)))
+        if observed:
+            after += self.elements_seen(plan, several)
+        if rates:
+            after += [self.store("dy", y, v, self.local(bank.rate(v))) for v in bank.variables]
+        lines = [Line(f"{self.local(force)} = 0.0") for force in bank.forces if forces]
+        lines += self.loop(bank.index, signs, (), branches, after)
+        del seen
+        for force, value in plan.totals.items() if forces else ():
+            lines += self.computed(self.local(force), value, signs, "  # (4)")
+        return lines
+
+    @staticmethod
+    def names_of(value: object) -> frozenset[str]:
+        """Return what a computed value reads, in its rough calls too."""
+        found = computed_names(value.tree)  # type: ignore[attr-defined]
+        return found.union(*(computed_names(call.call) for call in value.calls))  # type: ignore[attr-defined]
+
+    def elements_seen(self, plan: BankPlan, several: Mapping[str, str]) -> list[Line]:
+        """Store what is observed of an element."""
+        bank, seen = plan.bank, self.layout.observed
+        s = of(bank.name, "s")
+        if bank.threshold:
+            place, sizes = self.at("out", seen, s)
+            lines = [Line(f"{place} = {self.local(bank.threshold)}", sizes | {bank.threshold})]
+        elif s in self.read.owner:  # a chart's own
+            place, sizes = self.at("out", seen, s)
+            lines = [Line(f"{place} = {self.local(s)}", sizes | {s})]
+        else:
+            lines = [self.store("out", seen, s, "nan")]
+        lines += [
+            self.store("out", seen, f"{force}_elements", several[force]) for force in bank.forces
+        ]
+        return lines + [
+            self.store("out", seen, bank.rate(v), self.local(bank.rate(v))) for v in bank.variables
+        ]
+
+    def driven_accelerations(self) -> list[Line]:
+        """Write the accelerations of driven bodies that locks refer to."""
+        wanted = {name for row in self.locks.rows for name in row.row}
+        lines = []
+        for body in self.read.system.bodies:
+            if body.driven and body.name in wanted:
+                lines.append(self.rate_in_time(self.local(f"{body.name} a"), body.v))
+        return lines
+
+    def rate_in_time(self, target: str, name: str) -> Line:
+        """Write the rate of a quantity that depends on time only."""
+        from gms_fsm.lowering._plan import _gradient
+
+        gradient = _gradient(Name(name), self.read)
+        terms, reads = self.time_terms(gradient)
+        return Line(f"{target} = {' + '.join(terms) or '0.0'}", reads)
 
     # ------------------------------------------------------------------ the functions
+    def late_names(self, trees: Iterable[frozenset[str]]) -> bool:
+        """Tell whether forces or accelerations are read."""
+        return any(names & self.late for names in trees)
+
+    def rates_of_contacts(self) -> list[Line]:
+        """Write the accelerations that guards may read."""
+        lines = []
+        for bank in self.read.banks:
+            for name, row in zip(bank.rates, bank.jacobian, strict=True):
+                tree = self.locks.relative(row, {each: f"{each} a" for each in row})
+                lines.append(self.put(self.local(name), tree))
+        return lines
+
+    def before_guards(self, names: Iterable[frozenset[str]]) -> list[Line]:
+        """Write the forces, and the accelerations, where guards or actions read them."""
+        read = frozenset[str]().union(*names)
+        if not read & self.late:
+            return []
+        lines = self.forces("live", wanted=True)
+        rates = {name for bank in self.read.banks for name in bank.rates}
+        if read & rates:
+            if not self.locking:
+                for body in self.read.free:
+                    value = self.plan.accelerations[body.name]
+                    lines += self.computed(self.local(f"{body.name} a"), value, "live")
+                for body in self.read.system.bodies:
+                    if body.driven:
+                        lines.append(self.rate_in_time(self.local(f"{body.name} a"), body.v))
+            wanted = [
+                (name, row)
+                for bank in self.read.banks
+                for name, row in zip(bank.rates, bank.jacobian, strict=True)
+                if name in read
+            ]
+            for name, row in wanted:
+                tree = self.locks.relative(row, {each: f"{each} a" for each in row})
+                lines.append(self.put(self.local(name), tree))
+        return lines
+
     def switch(self) -> list[str]:
-        branches = {}
-        for state in self.names.states:
-            lines: list[str] = []
-            for edge in self.plan.leaving(state):
-                word = "elif" if lines else "if"
-                constant = self.names.edges[edge.name]
-                lines += [
-                    f"{word} {self.spell(edge.guard)}:",
-                    f"    edge = {constant}  # {state} -> {edge.target}",
-                ]
-            branches[state] = lines
-        inner = self.by_state(branches) if self.plan.edges else []
-        found = reads.of_switch(self.plan)
+        lines = self.before_guards(
+            computed_names(edge.guard) for bank in self.read.banks for edge in bank.edges
+        )
+        for bank in self.read.banks:
+            branches: dict[str, list[Line]] = {}
+            for state in bank.states:
+                rows: list[Line] = []
+                for edge, constant in self.leaving(bank, state):
+                    word = "elif" if rows else "if"
+                    rows += [
+                        Line(f"{word} {self.spell(edge.guard)}:", computed_names(edge.guard)),
+                        Line(f"    edge = {constant}  # {state} -> {edge.target}"),
+                    ]
+                branches[state] = rows
+            place, sizes = self.machine(bank.index)
+            after = [Line(f"out[{place}] = edge", sizes)]
+            lines += self.loop(
+                bank.index, "live", [Line("edge = -1")], branches if bank.edges else None, after
+            )
         return self.function(
             "switch(t, y, mode, p, out)",
             "out[i] = the first edge of element i whose guard holds, or -1.",
-            self.elements(found, ["edge = -1", *inner, "out[i] = edge"]),
-            found,
+            lines,
+            "live",
         )
+
+    def leaving(self, bank: Bank, state: str) -> list[tuple[Edge, str]]:
+        """Return the edges that leave a state, highest priority first, with their constants."""
+        constants = self.names.edges[bank.index]
+        return [
+            (edge, constant)
+            for edge, constant in zip(bank.edges, constants, strict=True)
+            if edge.source == state
+        ]
 
     def act(self) -> list[str]:
-        found = reads.of_act(self.plan)
-        lines: list[str] = []
-        for edge in self.plan.edges:
-            word = "elif" if lines else "if"
-            lines += [
-                f"{word} edge == {self.names.edges[edge.name]}:",
-                *_indented(self.taken(edge)),
-            ]
-        body = [*self.element_values(found), *lines] or ["pass  # the chart has no edges"]
+        steps = [
+            computed_names(value)
+            for bank in self.read.banks
+            for edge in bank.edges
+            for _, value in edge.steps
+        ]
+        lines, several = self.before_guards(steps), len(self.read.banks) > 1
+        for bank in self.read.banks:
+            inner: list[Line] = []
+            for edge, constant in zip(bank.edges, self.names.edges[bank.index], strict=True):
+                word = "elif" if inner else "if"
+                taken = self.taken(bank, edge)
+                inner += [Line(f"{word} edge == {constant}:"), *indented(taken)]
+            first = self.element(bank.index, self.own(bank.index, reads_of(inner)), "live")
+            body = self.outward(bank.index, [*first, *inner])
+            if several and inner:
+                before = self.sizes[: bank.index]
+                sizes = frozenset(f"#{size}" for size in before)
+                shift = "".join(f" - {size}" for size in before)
+                last = self.names.edges[bank.index][-1]
+                word = "if" if bank is next(b for b in self.read.banks if b.edges) else "elif"
+                lines.append(Line(f"{word} edge <= {last}:"))
+                body = [Line(f"i = machine{shift}", sizes), *body]
+                body = indented(body)
+            lines += body
+        if not any(bank.edges for bank in self.read.banks):
+            lines = [Line("pass  # the chart has no edge")]
+        machine = "machine" if several else "i"
         return self.function(
-            "act(edge, i, t, y, mode, p)", "Take an edge of element i.", body, found
+            f"act(edge, {machine}, t, y, mode, p)",
+            f"Take an edge of {'a machine' if several else 'element i'}.",
+            lines,
+            "live",
         )
 
-    def taken(self, edge: Edge) -> list[str]:
-        """Write the effect of taking an edge."""
-        lines = []
-        for variable, value in edge.steps:
-            local, place = self.names.local[variable], self.layout.y.text(variable)
-            lines += [f"{local} = {self.spell(value)}", f"y[{place}] = {local}"]
-        return [*lines, f"mode[i] = {self.names.states[edge.target]}"]
+    def taken(self, bank: Bank, edge: Edge) -> list[Line]:
+        """Write what happens when an edge is taken."""
+        lines: list[Line] = []
+        locked = {state.name for state in bank.chart.states if state.locked}
+        targets: dict[int, str] = {}
+        for name, value in edge.steps:
+            if name in bank.variables:
+                # What is computed from variables is computed again from what they are now.
+                tree = self.fresh(value, bank)
+                lines.append(self.put(self.local(name), tree))
+                place, sizes = self.at("y", self.layout.y, name)
+                lines.append(Line(f"{place} = {self.local(name)}", sizes))
+            else:
+                targets[bank.velocities.index(name)] = name
+                lines += self.locks.impulse(
+                    bank.index, {bank.velocities.index(name): self.spell(value)}
+                )
+                lines[-1] = Line(lines[-1].text, lines[-1].reads | computed_names(value))
+                lines += self.velocities_again()
+        place, sizes = self.mode(bank.index)
+        constant = self.names.states[bank.index][edge.target]
+        lines.append(Line(f"{place} = {constant}", sizes))
+        if edge.target in locked:
+            lines += self.locks.impulse(bank.index, dict.fromkeys(range(len(bank.velocities)), "0.0"))
+        return lines
 
-    def flow(self) -> list[str]:
+    def fresh(self, value: object, bank: Bank) -> object:
+        """Return a value with what is computed from variables expanded."""
+        inside = {
+            each.name
+            for each in self.read.definitions
+            if each.bank == bank.index and self.read.closure([each.name]) & {*bank.variables}
+        }
+        if not names_in(value) & inside:  # type: ignore[arg-type]
+            return value
+        return self.read.expanded(value)  # type: ignore[arg-type]
+
+    def velocities_again(self) -> list[Line]:
+        """Write the relative velocities anew, after an impulse."""
+        return [
+            self.put(self.local(name), self.plan.definitions[name].tree)
+            for bank in self.read.banks
+            for name in bank.velocities
+            if name in self.plan.definitions
+        ]
+
+    def flow(self, signs: Signs) -> list[str]:
+        y = self.layout.y
+        free = {body.name for body in self.read.free}
+        lines = self.forces(signs, wanted=bool(free), rates=True)
+        for body in self.read.system.bodies:
+            lines.append(Line(f"dy[{y.text(body.x)}] = {self.local(body.v)}", frozenset({body.v})))
+            if body.name in free:
+                place = f"dy[{y.text(body.v)}]"
+                if self.locking:
+                    lines.append(Line(f"{place} = {self.local(f'{body.name} a')}"))
+                else:
+                    lines += self.computed(place, self.plan.accelerations[body.name], signs)
+        for name, value in self.plan.flow.items():
+            lines += self.computed(f"dy[{y.text(name)}]", value, signs)
+        for each in self.read.system.sampled:
+            lines += [Line(f"dy[{y.text(name)}] = 0.0") for name in each.updates]
+        if signs == "live":
+            return self.function(
+                "flow_live(t, y, mode, held, p, dy)",
+                "dy = dy/dt, all states frozen, corners and jumps evaluated live.",
+                lines,
+                signs,
+            )
         return self.function(
             "flow(t, y, mode, held, p, dy)",
-            "dy = dy/dt, all states and all signs frozen.",
-            self.rates("held"),
-            reads.of_flow(self.plan, "held"),
-            signs="held",
+            "dy = dy/dt, all states frozen and all signs held.",
+            lines,
+            signs,
         )
-
-    def flow_live(self) -> list[str]:
-        return self.function(
-            "flow_live(t, y, mode, held, p, dy)",
-            "dy = dy/dt, all states frozen, corners and jumps evaluated live.",
-            self.rates("live"),
-            reads.of_flow(self.plan, "live"),
-        )
-
-    def rates(self, signs: Signs) -> list[str]:
-        """Write the body of the flow."""
-        flow, place = self.plan.flow, self.layout.y.text
-        inner = self.by_state(self.flow_branches(flow, signs))
-        if flow.by_state:
-            inner.append("F += F_i")
-        elif flow.force is not None:
-            inner.append(f"F += {self.spell(flow.force)}  # (3)")
-        inner += [f"dy[{place(v)}] = {self.names.local[f'd{v}']}" for v in self.plan.variables]
-        ends = [f"dy[{place('x')}] = v"]
-        if flow.acceleration is not None:
-            ends.insert(0, "F += sigma_2 * v  # (4)")
-            ends.append(f"dy[{place('v')}] = {self.spell(flow.acceleration)}")
-        return [
-            *self.rough_lines(flow.calls, signs),
-            *([] if self.plan.prescribed else ["F = 0.0"]),
-            *self.elements(reads.of_flow(self.plan, signs), inner),
-            *ends,
-        ]
-
-    def flow_branches(self, flow: Flow, signs: Signs) -> dict[str, list[str]]:
-        """Write the rates for each state, and the force if it depends on the state."""
-        branches = {}
-        for each in flow.states:
-            lines = self.rough_lines(each.calls, signs)
-            for variable, rate in each.rates.items():
-                lines.append(f"{self.names.local[f'd{variable}']} = {self.spell(rate)}")
-            if each.force is not None:
-                lines.append(f"F_i = {self.spell(each.force)}  # (3)")
-            branches[each.state] = lines
-        return branches
 
     def observe(self) -> list[str]:
-        flow, place = self.plan.observed, self.layout.observed.text
-        without = "nan" if self.plan.curve is None else "weight[i] * S"
-        found = reads.of_observe(self.plan)
-        inner = [
-            *self.by_state(self.flow_branches(flow, "given")),
-            *([] if flow.force is None else [f"F_i = {self.spell(flow.force)}  # (3)"]),
-            "F += F_i",
-            f"out[{place('s')}] = {'s' if self.plan.threshold else without}",
-            f"out[{place('F_elements')}] = F_i",
-            *(
-                f"out[{place(f'd{variable}')}] = {self.names.local[f'd{variable}']}"
-                for variable in self.plan.variables
-            ),
-        ]
-        body = [
-            *self.rough_lines(flow.calls, "given"),
-            "F = 0.0",
-            *self.elements(found, inner),
-            f"out[{place('v')}] = v",
-            f"out[{place('F')}] = F + sigma_2 * v  # (4)",
-        ]
+        seen = self.layout.observed
+        lines = self.forces("given", wanted=True, observed=True)
+        for bank in self.read.banks:
+            for name, velocity in zip(bank.chart.velocities, bank.velocities, strict=True):
+                place = f"out[{seen.text(of(bank.name, name))}]"
+                lines.append(Line(f"{place} = {self.local(velocity)}", frozenset({velocity})))
+            for force in bank.forces:
+                lines.append(Line(f"out[{seen.text(force)}] = {self.local(force)}"))
+            if bank.position in seen.shared:
+                place = f"out[{seen.text(bank.position)}]"
+                text = f"{place} = {self.local(bank.position)}"
+                lines.append(Line(text, frozenset({bank.position})))
+            if bank.chart.locks:
+                lines += self.locks_seen(bank)
         return self.function(
             "observe(t, y, mode, held, p, out)",
-            f"out = v, F, then for all elements s, F_i and the rates; sign {LIVE} means live.",
-            body,
-            found,
+            f"out = v, F, then for all elements s, F_i and the rates; a sign {LIVE} is taken live.",
+            lines,
+            "given",
         )
+
+    def locks_seen(self, bank: Bank) -> list[Line]:
+        """Store the force of a locked element, and whether others carry it."""
+        seen, lines = self.layout.observed, []
+        locked = [state.name for state in bank.chart.states if state.locked]
+        mode, sizes = self.mode(bank.index)
+        mode = mode.replace("i]", "0]")
+        states = " or ".join(f"{mode} == {self.names.states[bank.index][each]}" for each in locked)
+        for q, force in enumerate(bank.forces):
+            r = self.locks.number(bank.index, q)
+            place, more = self.at("out", seen, f"{force}_elements")
+            place = place.replace("i]", "0]")
+            lines += [
+                Line(f"out[{seen.text(f'{force} shared')}] = 0.0"),
+                Line(f"if {states}:", sizes),
+                Line(f"    {place} = {self.local(force)}", more),
+                Line(f"    out[{seen.text(f'{force} shared')}] = 1.0 - l_{r}"),
+            ]
+        return lines
 
     def normal(self) -> list[str]:
-        lines: list[str] = []
+        lines: list[Line] = []
         for each in self.plan.gradients:
             word, inner = "elif" if lines else "if", self.gradient(each)
-            asked, element = self.plan.surfaces.asking_text(each.surface, "surface")
-            lines.append(f"{word} {asked}:  # {self.spell(each.surface)}")
-            if element:
-                first = self.element_values(reads.of_gradient(self.plan, each))
-                inner = [f"i = {element}", *first, *inner]
-            lines += _indented(inner)
-        clear = [f"for j in range({self.layout.y.size_text(1)}):", "    out[j] = 0.0"]
+            surfaces, note = self.plan.surfaces, f"  # {self.spell(each.surface)}"
+            sizes = frozenset(f"#{size}" for size in surfaces.sizes(each.surface))
+            if each.surface in surfaces.shared:
+                place = surfaces.text(each.surface)
+                lines.append(Line(f"{word} surface == {place}:{note}"))
+            else:
+                end, start = (surfaces.start_text(each.surface, k) for k in (1, 0))
+                bank = self.read.bank_of(each.surface)
+                assert bank is not None
+                size = frozenset({f"#{self.sizes[bank]}"})
+                lines.append(Line(f"{word} surface < {end}:{note}", sizes | size))
+                first = self.element(bank, self.own(bank, reads_of(inner)), "live")
+                inner = [Line(f"i = surface - ({start})"), *self.outward(bank, [*first, *inner])]
+            lines += indented(inner or [Line("pass")])
+        if lines:
+            y = self.layout.y
+            every = frozenset(f"#{block.size}" for block in y.blocks if block.names)
+            text = f"for j in range({self.size_text(1)}):"
+            lines = [Line(text, every), Line("    out[j] = 0.0"), *lines]
         return self.function(
             "normal(surface, t, y, mode, p, out)",
-            "out = the gradient of a surface's value over y, then its rate in t.",
-            [*clear, *lines] if lines else ["pass"],
-            reads.of_normal(self.plan),
+            "out = the gradient over y of what is zero on a surface, then its rate in t.",
+            lines,
+            "live",
         )
 
-    def gradient(self, gradient: Gradient) -> list[str]:
-        """Write the gradient of a value over y, and its rate in t."""
-        place = self.layout.y.text
-        lines = [
-            f"out[{place(name)}] = {self.spell(value)}" for name, value in gradient.by_state.items()
-        ]
-        by_v = [] if gradient.by_v is None else [self.spell(gradient.by_v)]
-        if gradient.by_s is not None:
-            assert self.plan.curve_slope is not None  # charts with s have a curve
-            lines.append(f"dS = {spell(self.plan.curve_slope)}")
-            by_v.append(f"({self.spell(gradient.by_s)}) * weight[i] * dS")
-        rates = [] if gradient.by_t is None else [self.spell(gradient.by_t)]
-        slopes = {each.name: self.signal_slope(each) for each in self.plan.inputs}
-        if by_v and not self.plan.prescribed:
-            lines.append(f"out[{place('v')}] = {' + '.join(by_v)}")
-        elif by_v:
-            rates.append(f"({' + '.join(by_v)}) * {slopes['v']}")
-        rates += [
-            f"({self.spell(value)}) * {slopes[name]}" for name, value in gradient.by_signal.items()
-        ]
-        behind = self.layout.y.size_text()
-        return lines + ([f"out[{behind}] = {' + '.join(rates)}"] if rates else [])
+    def size_text(self, more: int = 0) -> str:
+        """Spell the size of the state vector, and some more."""
+        y = self.layout.y
+        terms = [str(len(y.shared) + more)]
+        terms += [f"{len(block.names)} * {block.size}" for block in y.blocks if block.names]
+        return " + ".join(terms)
 
+    def gradient(self, gradient: Gradient) -> list[Line]:
+        """Write the gradient of a value over y, and its rate in t."""
+        lines = []
+        for name, value in gradient.by_state.items():
+            place, sizes = self.at("out", self.layout.y, name)
+            text = f"{place} = {self.spell(value)}"
+            lines.append(Line(text, sizes | computed_names(value)))
+        terms, reads = self.time_terms(gradient)
+        if terms:
+            every = frozenset(f"#{b.size}" for b in self.layout.y.blocks if b.names)
+            lines.append(Line(f"out[{self.size_text()}] = {' + '.join(terms)}", reads | every))
+        return lines
+
+    def time_terms(self, gradient: Gradient) -> tuple[list[str], frozenset[str]]:
+        """Spell the terms of a rate in time, and say what they read."""
+        terms, reads = [], frozenset[str]()
+        if gradient.by_t is not None:
+            terms.append(self.spell(gradient.by_t))
+            reads |= computed_names(gradient.by_t)
+        for name, value in gradient.by_signal.items():
+            terms.append(f"({self.spell(value)}) * piecewise_slope(t, {self.table(name)})")
+            reads |= computed_names(value) | {TABLES}
+        return terms, reads
+
+    # ------------------------------------------------------------------ comparisons
     def arm(self) -> list[str]:
         held = self.plan.held
-        body = [self.watch(relation) for relation in self.plan.always]
-        body += [f"held[{held.text(u)}] = sgn({self.spell(u)})" for u in held.shared]
-        branches = {}
-        for state in self.names.states:
-            lines = []
-            for u in self.plan.rough[state]:
-                if u in held.own:
-                    lines.append(f"held[{held.text(u)}] = sgn({self.spell(u)})")
-                lines += [self.watch(relation) for relation in both_sides(u)]
-            for edge in self.plan.leaving(state):
-                lines.append(f"# {edge.name}: {self.spell(edge.guard)}")
-                lines += self.witness(split(edge.guard))
-            branches[state] = lines
-        found = reads.of_arm(self.plan)
-        if any(branches.values()):
-            body += self.elements(found, self.by_state(branches))
+        watched = [*self.plan.always]
+        for bank in self.read.banks:
+            for edge in bank.edges:
+                watched += _comparisons(split(edge.guard))
+        lines = self.before_guards(
+            computed_names(side) for each in watched for side in (each.left, each.right)
+        )
+        lines += [self.watch(relation) for relation in self.plan.always]
+        lines += [self.hold(u) for u in held.shared]
+        for bank, rough in zip(self.read.banks, self.plan.rough, strict=True):
+            branches = {}
+            for state in bank.states:
+                rows: list[Line] = []
+                for u in rough[state]:
+                    if u in held.own:
+                        rows.append(self.hold(u))
+                    rows += [self.watch(relation) for relation in both_sides(u)]
+                for edge, _ in self.leaving(bank, state):
+                    rows.append(Line(f"# {edge.name}: {self.spell(edge.guard)}"))
+                    rows += self.witness(split(edge.guard))
+                branches[state] = rows
+            if any(branches.values()):
+                lines += self.loop(bank.index, "live", (), branches)
         return self.function(
             "arm(t, y, mode, p, held, watch)",
-            "Freeze the signs and mark the comparisons that keep every false guard false.",
-            body or ["pass"],
-            found,
+            "Hold the signs and mark the comparisons that keep every false guard false.",
+            lines,
+            "live",
         )
 
-    def watch(self, relation: Comparison) -> str:
-        return f"watch[{self.plan.relations.text(relation)}] = 1"
+    def hold(self, u: object) -> Line:
+        """Hold the sign of a value."""
+        held = self.plan.held
+        sizes = frozenset(f"#{size}" for size in held.sizes(u))  # type: ignore[arg-type]
+        text = f"held[{held.text(u)}] = sgn({self.spell(u)})"  # type: ignore[arg-type]
+        return Line(text, sizes | computed_names(u))  # type: ignore[arg-type]
 
-    def witness(self, part: Split) -> list[str]:
-        """Write: if this part is false, watch the comparison that keeps it false."""
+    def watch(self, relation: Comparison) -> Line:
+        relations = self.plan.relations
+        sizes = frozenset(f"#{size}" for size in relations.sizes(relation))
+        return Line(f"watch[{relations.text(relation)}] = 1", sizes)
+
+    def witness(self, part: Split) -> list[Line]:
+        """Write: if this part is false, watch what keeps it false."""
         if isinstance(part, Requirement):
-            # Not the opposite comparison: for NaN neither is true, but it must be watched.
-            return [f"if not {self.spell(part.relation)}:", f"    {self.watch(part.comparison)}"]
+            # Not the opposite comparison: of NaN neither is true, and it has to be watched.
+            reads = computed_names(part.relation)
+            return [
+                Line(f"if not {self.spell(part.relation)}:", reads),
+                *indented([self.watch(part.comparison)]),
+            ]
         word, parts = part
         if word == "either":
             return [line for each in parts for line in self.witness(each)]
-        lines: list[str] = []
+        lines: list[Line] = []
         for each in parts:
             other = "el" if lines else ""
             if isinstance(each, Requirement):
                 first, *rest = self.witness(each)
-                lines += [other + first, *rest]
+                lines += [Line(other + first.text, first.reads), *rest]
             else:
-                lines += [f"{other}if not ({self.truth(each)}):", *_indented(self.witness(each))]
+                reads = frozenset(
+                    name
+                    for r in _comparisons(each)
+                    for side in (r.left, r.right)
+                    for name in computed_names(side)
+                )
+                inner = self.witness(each) or [Line("pass")]
+                lines += [Line(f"{other}if not ({self.truth(each)}):", reads), *indented(inner)]
         return lines
 
     def truth(self, part: Split) -> str:
-        """Spell a split condition, fully parenthesized, since only machines read it."""
+        """Spell a split condition; brackets everywhere, as it is only read by machines."""
         if isinstance(part, Requirement):
             return self.spell(part.relation)
         word, parts = part
+        if not parts:
+            return "True" if word == "both" else "False"
         return (" and " if word == "both" else " or ").join(
             self.truth(q) if isinstance(q, Requirement) else f"({self.truth(q)})" for q in parts
         )
 
     def margins(self) -> list[str]:
-        relations, found = self.plan.relations, reads.of_margins(self.plan)
-        body = [line for each in relations.shared for line in self.margin(each)]
-        own = [line for each in relations.own for line in self.margin(each)]
+        relations = self.plan.relations
+        lines = self.before_guards(
+            computed_names(side)
+            for each in (*relations.shared, *relations.own)
+            for side in (each.left, each.right)
+        )
+        for each in relations.shared:
+            lines += self.margin(each)
+        for bank, block in zip(self.read.banks, relations.blocks, strict=True):
+            rows = [line for each in block.names for line in self.margin(each)]
+            if rows:
+                lines += self.loop(bank.index, "live", rows)
         return self.function(
             "margins(t, y, mode, p, watch, out)",
-            "For each watched comparison, left - right.",
-            body + (self.elements(found, own) if own else []) or ["pass"],
-            found,
+            "For each watched comparison left - right.",
+            lines,
+            "live",
         )
 
-    def margin(self, comparison: Comparison) -> list[str]:
-        index = self.plan.relations.text(comparison)
-        margin = self.spell(comparison.left)
+    def margin(self, comparison: Comparison) -> list[Line]:
+        relations = self.plan.relations
+        index = relations.text(comparison)
+        sizes = frozenset(f"#{size}" for size in relations.sizes(comparison))
+        margin, reads = self.spell(comparison.left), computed_names(comparison.left)
         if comparison.right != Number(0.0):
             right = self.spell(comparison.right)
             simple = isinstance(comparison.right, Name | Number | Negative)
             margin = f"{margin} - {right if simple else f'({right})'}"
-        return [f"if watch[{index}]:", f"    out[{index}] = {margin}"]
-
-    # ------------------------------------------------------------------ building blocks
-    def spell(self, node: Node) -> str:
-        return spell(node, rename=self.names.texts)
-
-    def function(
-        self, signature: str, doc: str, body: list[str], found: Reads, *, signs: Signs = "live"
-    ) -> list[str]:
-        """Assemble a function: signature, the values its body reads, the body."""
-        head = reads.head_of(self.plan, found, signs)
-        lines = ["shared, own, tables = p"] if head.arguments else []
-        lines += [f"{name} = shared[{j}]" for name, j in head.shared]
-        lines += [f"{name} = own[{j}]" for name, j in head.own]
-        if head.size:
-            lines.append("n = len(own[0])")  # mode also has the surfaces' flags, after the elements
-        for signal in head.inputs:
-            lines += self.signal_lines(signal, signs)
-        if head.x:
-            lines.append(f"x = y[{self.layout.y.text('x')}]")
-        if head.v:
-            lines.append(f"v = y[{self.layout.y.text('v')}]")
-        if head.curve and self.plan.curve is not None:
-            lines.append(f"S = {spell(self.plan.curve)}  # (2)")
-        return [f"def {signature}:", f'    """{doc}"""', *_indented([*lines, *body])]
-
-    def elements(self, found: Reads, lines: list[str]) -> list[str]:
-        """Write a loop over the elements."""
-        return ["for i in range(n):", *_indented([*self.element_values(found), *lines])]
-
-    def element_values(self, found: Reads) -> list[str]:
-        """Assign the element's variables and threshold, as far as they are read."""
+            reads |= computed_names(comparison.right)
         return [
-            "s = weight[i] * S"
-            if name == "s"
-            else f"{self.names.local[name]} = y[{self.layout.y.text(name)}]"
-            for name in reads.of_element(self.plan, found)
+            Line(f"if watch[{index}]:", sizes),
+            Line(f"    out[{index}] = {margin}", sizes | reads),
         ]
 
-    def by_state(self, branches: Mapping[str, list[str]]) -> list[str]:
-        """Write an if-else over the element's state."""
-        filled = [(self.names.states[state], body or ["pass"]) for state, body in branches.items()]
-        if len(filled) == 1:
-            return next(iter(branches.values()))
-        lines = []
-        for number, (constant, body) in enumerate(filled):
-            word = "if" if number == 0 else "elif"
-            last = number == len(filled) - 1
-            head = f"else:  # {constant}" if last else f"{word} mode[i] == {constant}:"
-            lines += [head, *_indented(body)]
-        return lines
-
-    def signal_lines(self, signal: Input, signs: Signs) -> list[str]:
-        if signal.formula is not None:
-            value = f"{signal.name} = {spell(signal.formula)}"
-            return [*self.rough_lines(signal.calls, signs), value]
-        if signal.tabled:
-            return [f"{signal.name} = piecewise_linear(t, {self.table(signal)})"]
-        return [f"{signal.name} = {signal.name}_signal(t)"]
-
-    def signal_slope(self, signal: Input) -> str:
-        """Spell the rate of a signal."""
-        if signal.tabled:
-            return f"piecewise_slope(t, {self.table(signal)})"
-        return "" if signal.slope is None else f"({spell(signal.slope)})"
-
-    def table(self, signal: Input) -> str:
-        """Spell the table of a signal: its times and values."""
-        places = (self.plan.tables.text((signal.name, column)) for column in ("times", "values"))
-        return ", ".join(f"tables[{place}]" for place in places)
-
-    def rough_lines(self, calls: Iterable[RoughCall], signs: Signs) -> list[str]:
-        """Assign rough calls."""
-        return [f"{each.name} = {self.rough_call(each, signs)}" for each in calls]
-
-    def rough_call(self, rough: RoughCall, signs: Signs) -> str:
-        """Spell a rough call, whose sign is frozen, live or given."""
-        call, live = rough.call, self.spell(rough.call)
-        if signs == "live":
-            return live
-        sign = f"held[{self.plan.held.text(rough.turning)}]"
-        first = self.spell(call.arguments[0])
-        match call.function:
-            case "sgn":
-                value = sign
-            case "abs":
-                value = self.spell(Binary("*", Name(sign), call.arguments[0]))
-            case "min":
-                value = f"{first} if {sign} <= 0.0 else {self.spell(call.arguments[1])}"
-            case _:
-                value = f"{first} if {sign} >= 0.0 else {self.spell(call.arguments[1])}"
-        return f"{live} if {sign} == {LIVE} else {value}" if signs == "given" else value
+    def tick(self) -> list[str]:
+        return self.function(
+            "tick(sampler, t, y, mode, p)",
+            "Take the updates of a sampled controller.",
+            [],
+            "live",
+        )
 
 
-def _indented(lines: Iterable[str]) -> list[str]:
-    return ["    " + line for line in lines]
+def _comparisons(part: Split) -> list[Comparison]:
+    if isinstance(part, Requirement):
+        return [part.comparison]
+    return [each for inner in part[1] for each in _comparisons(inner)]
 
 
 def _numbered(constants: Iterable[str]) -> str:
@@ -417,5 +634,5 @@ def _numbered(constants: Iterable[str]) -> str:
 
 
 def _one_line(text: str) -> str:
-    """Return text as one printable line, for use in a comment."""
+    """Return text fit for a comment: a line break would end it."""
     return "".join(c if c.isprintable() else " " for c in text)

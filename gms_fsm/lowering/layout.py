@@ -1,10 +1,15 @@
 """The layout of the state vector y, of a run's observed quantities, of the modes and of the log.
 
 No other module computes such a position, neither as a number nor as text: it looks it up by name.
+Names are those of the trees (`gms_fsm.lowering._assembly`): what belongs to a contact is called
+``contact.name``.
 
-y            ``x, [v,]`` then each variable of the chart, one per element
-observed     ``v, F`` then ``s``, ``F_elements`` and the rate of each variable, one per element
-modes        the active state of each element, then for each surface whether the motion slides on it
+y            position and, unless it is driven, velocity of each body; further states; sampled
+             values; then for each contact each variable of its chart, one per element
+observed     velocity and force of each contact; then for each contact ``s``, ``F_elements`` and the
+             rate of each variable, one per element
+modes        the active state of each element, contact by contact, then for each surface whether the
+             motion slides on it
 log          the fields of `LogRecord`
 """
 
@@ -15,32 +20,48 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from gms_fsm.systems.models import Model
-from gms_fsm.systems.rigs import Rig
+from gms_fsm.lowering._assembly import Assembly, Bank, of
 
-__all__ = ["LOG_NUMBERS", "LOG_TEXTS", "Layout", "LogRecord", "Places"]
+__all__ = ["LOG_NUMBERS", "LOG_TEXTS", "BankPlaces", "Block", "Layout", "LogRecord", "Places"]
 
 Name = TypeVar("Name", bound=Hashable)
 
 
 @dataclass(frozen=True)
-class Places(Generic[Name]):
-    """The layout of an array: shared names first, then each own name with one place per element.
+class Block(Generic[Name]):
+    """Names with one place per element each.
 
-    In generated text, the number of elements is called ``n`` and the element ``i``.
+    Parameters
+    ----------
+    names : tuple
+        One after the other.
+    n : int
+        Number of elements.
+    size : str
+        What their number is called in generated text.
+    """
+
+    names: tuple[Name, ...]
+    n: int
+    size: str = "n"
+
+
+@dataclass(frozen=True)
+class Places(Generic[Name]):
+    """The layout of an array: shared names first, then blocks of names with a place per element.
+
+    In generated text the element is called ``i``.
 
     Parameters
     ----------
     shared : tuple
         Names with one place each.
-    own : tuple
+    blocks : tuple of Block
         Names with one place per element each.
-    n : int
-        Number of elements.
 
     Examples
     --------
-    >>> y = Places(("x", "v"), ("z", "w"), n=3)
+    >>> y = Places(("x", "v"), (Block(("z", "w"), 3),))
     >>> y.size, y.index("v"), y.index("w", 2), y.block("z")
     (8, 1, 7, slice(2, 5, None))
     >>> y.text("v"), y.text("z"), y.text("w"), y.size_text()
@@ -50,26 +71,31 @@ class Places(Generic[Name]):
     """
 
     shared: tuple[Name, ...]
-    own: tuple[Name, ...]
-    n: int
+    blocks: tuple[Block[Name], ...]
+
+    @cached_property
+    def own(self) -> tuple[Name, ...]:
+        """The names with one place per element."""
+        return tuple(name for block in self.blocks for name in block.names)
 
     @cached_property
     def size(self) -> int:
         """The number of places."""
-        return len(self.shared) + len(self.own) * self.n
+        return len(self.shared) + sum(len(block.names) * block.n for block in self.blocks)
 
     def __iter__(self) -> Iterator[tuple[Name, int | None]]:
-        """Yield the name and element (None if shared) of each place, in order."""
+        """Yield for each place, in order, its name and its element (None if shared)."""
         yield from ((name, None) for name in self.shared)
-        yield from ((name, i) for name in self.own for i in range(self.n))
+        for block in self.blocks:
+            yield from ((name, i) for name in block.names for i in range(block.n))
 
     def index(self, name: Name, element: int = 0) -> int:
-        """Return the place of a shared name, or of an own name for one element.
+        """Return the place of a shared name, or of an own name of one element.
 
         Parameters
         ----------
         name : str or other key
-            An entry of `shared` or `own`.
+            One of `shared` or `own`.
         element : int
             Counted from 0; ignored for a shared name.
 
@@ -78,16 +104,19 @@ class Places(Generic[Name]):
         int
             The place.
         """
-        start = self._starts[name]
+        start, _ = self._spans[name]
         return start if start < len(self.shared) else start + element
 
     @cached_property
-    def _starts(self) -> Mapping[Name, int]:
-        """The first place of each name."""
-        starts = {name: place for place, name in enumerate(self.shared)}
-        for row, name in enumerate(self.own):
-            starts[name] = len(self.shared) + row * self.n
-        return starts
+    def _spans(self) -> Mapping[Name, tuple[int, int]]:
+        """First place and number of places of each name."""
+        spans = {name: (place, 1) for place, name in enumerate(self.shared)}
+        start = len(self.shared)
+        for block in self.blocks:
+            for name in block.names:
+                spans[name] = start, block.n
+                start += block.n
+        return spans
 
     def block(self, name: Name) -> slice:
         """Return the places of an own name, one per element.
@@ -95,35 +124,35 @@ class Places(Generic[Name]):
         Parameters
         ----------
         name : str or other key
-            An entry of `own`.
+            One of `own`.
 
         Returns
         -------
         slice
-            Of length n.
+            One place per element.
         """
-        start = self.index(name)
-        return slice(start, start + self.n)
+        start, count = self._spans[name]
+        return slice(start, start + count)
 
     def where(self, name: Name) -> int | slice:
-        """Return an index that selects everything stored under a name.
+        """Return the subscript for an array that selects everything under a name.
 
         Parameters
         ----------
         name : str or other key
-            An entry of `shared` or `own`.
+            One of `shared` or `own`.
 
         Returns
         -------
         int or slice
-            Like `index` for a shared name, like `block` for an own one.
+            As `index` for a shared name, as `block` for an own one.
         """
         return self._all[name]
 
     @cached_property
     def _all(self) -> Mapping[Name, int | slice]:
-        """The index for each name."""
-        shared = {name: self._starts[name] for name in self.shared}
+        """The subscript of each name."""
+        shared: dict[Name, int | slice] = {name: self._spans[name][0] for name in self.shared}
         return shared | {name: self.block(name) for name in self.own}
 
     def all_of(self, name: Name) -> range:
@@ -132,18 +161,18 @@ class Places(Generic[Name]):
         Parameters
         ----------
         name : str or other key
-            An entry of `shared` or `own`.
+            One of `shared` or `own`.
 
         Returns
         -------
         range
             In order.
         """
-        start = self.index(name)
-        return range(start, start + (1 if name in self.shared else self.n))
+        start, count = self._spans[name]
+        return range(start, start + count)
 
     def named(self, values: Any) -> dict[Name, Any]:
-        """Return the values of an array by name.
+        """Return the values by name.
 
         Parameters
         ----------
@@ -153,17 +182,17 @@ class Places(Generic[Name]):
         Returns
         -------
         dict
-            For a shared name its entry; for an own name its part of `values`, one per element.
+            For a shared name its entry, for an own name its part of `values`, one per element.
         """
         return {name: values[where] for name, where in self._all.items()}
 
     def joined(self, values: Mapping[Name, Any]) -> list[Any]:
-        """Return values in the order of the places; the inverse of `named`.
+        """Return entries in the order of the places; the inverse of `named`.
 
         Parameters
         ----------
         values : mapping
-            For a shared name its entry; for an own name a sequence with one entry per element.
+            For a shared name its entry, for an own name a sequence with one entry per element.
 
         Returns
         -------
@@ -174,168 +203,217 @@ class Places(Generic[Name]):
 
     # ------------------------------------------------------------------ as text
     def text(self, name: Name) -> str:
-        """Return a place as Python text in terms of ``n`` and ``i``.
+        """Return a place as Python text over ``i`` and the sizes.
 
         Parameters
         ----------
         name : str or other key
-            An entry of `shared` or `own`.
+            One of `shared` or `own`.
 
         Returns
         -------
         str
-            For example ``"1"`` or ``"2 + n + i"``.
+            Such as ``"1"`` or ``"2 + n + i"``.
         """
         if name in self.shared:
             return str(self.shared.index(name))
-        row = self.own.index(name)
-        blocks = {0: "", 1: " + n"}.get(row, f" + {row} * n")
-        return f"{len(self.shared)}{blocks} + i"
+        return f"{self.start_text(name)} + i"
 
-    def text_names(self, name: Name) -> frozenset[str]:
-        """Return which of ``n`` and ``i`` the text of a place uses.
+    def start_text(self, name: Name, after: int = 0) -> str:
+        """Return the first place of a name as Python text over the sizes.
 
         Parameters
         ----------
         name : str or other key
-            An entry of `shared` or `own`.
+            One of `shared` or `own`.
+        after : int
+            Of the names after it in its block instead, this many on.
+
+        Returns
+        -------
+        str
+            Such as ``"2 + n"``.
+        """
+        if name in self.shared:
+            return str(self.shared.index(name) + after)
+        terms = [str(len(self.shared))]
+        for block in self.blocks:
+            rows = block.names.index(name) + after if name in block.names else len(block.names)
+            if rows:
+                terms.append(block.size if rows == 1 else f"{rows} * {block.size}")
+            if name in block.names:
+                break
+        return " + ".join(terms)
+
+    def sizes(self, name: Name) -> frozenset[str]:
+        """Return which sizes the text of a place reads.
+
+        Parameters
+        ----------
+        name : str or other key
+            One of `shared` or `own`.
 
         Returns
         -------
         frozenset of str
             Empty for a shared name.
         """
+        found = set[str]()
         if name in self.shared:
             return frozenset()
-        return frozenset({"i"} if name == self.own[0] else {"n", "i"})
+        for block in self.blocks:
+            if name in block.names:
+                return frozenset(found | ({block.size} if block.names.index(name) else set()))
+            if block.names:
+                found.add(block.size)
+        raise KeyError(name)
 
     def size_text(self, more: int = 0) -> str:
-        """Return the number of places plus `more`, as Python text in terms of ``n``."""
-        return f"{len(self.shared) + more} + {len(self.own)} * n"
+        """Return how many places there are, and some more, as Python text over the sizes."""
+        terms = [str(len(self.shared) + more)]
+        terms += [f"{len(block.names)} * {block.size}" for block in self.blocks]
+        return " + ".join(terms)
 
-    def asking_text(self, name: Name, place: str) -> tuple[str, str]:
-        """Return texts that test whether a place belongs to a name, names being tested in order.
 
-        Parameters
-        ----------
-        name : str or other key
-            An entry of `shared` or `own`; all names before it have already been tested.
-        place : str
-            Text of the place.
+@dataclass(frozen=True)
+class BankPlaces:
+    """Where the quantities of one contact are.
 
-        Returns
-        -------
-        (str, str)
-            A test for whether the place belongs to this name, and its element (empty if shared).
-        """
-        if name in self.shared:
-            return f"{place} == {self.shared.index(name)}", ""
-        behind = f"{place} - {len(self.shared)}" if self.shared else place
-        row = self.own.index(name)
-        return f"{behind} < {row + 1} * n", f"{behind} - {row} * n"
+    Parameters
+    ----------
+    name : str
+        The contact's.
+    n : int
+        Number of elements.
+    first : int
+        Machine number of its first element.
+    variables : tuple of str
+        The chart's, without the contact's name.
+    """
+
+    name: str
+    n: int
+    first: int
+    variables: tuple[str, ...]
+
+    def of(self, name: str) -> str:
+        """Return what a name of the contact is called in the layout."""
+        return of(self.name, name)
+
+    @property
+    def elements(self) -> slice:
+        """The places of its elements' states among the modes."""
+        return slice(self.first, self.first + self.n)
 
 
 @dataclass(frozen=True)
 class Layout:
-    """The places of a model on a rig.
+    """The layout of a system.
 
     Parameters
     ----------
     y : Places
-        Layout of the state vector: ``x``, ``v`` unless prescribed, and the chart's variables.
+        State vector.
     observed : Places
-        Layout of the observed quantities: ``v, F``; ``s``, ``F_elements``, and ``d`` before each
-        variable.
+        Observed quantities.
+    banks : tuple of BankPlaces
+        The contacts.
     surfaces : int
         Number of surfaces on which the motion can slide.
 
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters, Prescribed
+    >>> from gms_fsm.lowering._assembly import assembled
+    >>> from gms_fsm.systems.system import system_of
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
-    >>> layout = Layout.of(model, Prescribed("0.1*t"), surfaces=0)
-    >>> layout.y.index("z", 3), layout.observed.block("s"), layout.modes
+    >>> layout = Layout.of(assembled(system_of(model, Prescribed("0.1*t"))), surfaces=0)
+    >>> layout.y.index("friction.z", 3), layout.observed.block("friction.s"), layout.modes
     (4, slice(2, 6, None), 4)
     """
 
     y: Places[str]
     observed: Places[str]
+    banks: tuple[BankPlaces, ...]
     surfaces: int
 
     @classmethod
-    def of(cls, model: Model, rig: Rig, surfaces: int) -> Layout:
-        """Return the layout for a model on a rig.
+    def of(cls, read: Assembly, surfaces: int) -> Layout:
+        """Return the layout of a system.
 
         Parameters
         ----------
-        model, rig
-            The model and the rig.
+        read : Assembly
+            The system, read.
         surfaces : int
             Number of surfaces on which the motion can slide.
 
         Returns
         -------
         Layout
-            The layout of this run.
+            For its runs.
         """
-        variables = model.chart.variables
-        rates = tuple(f"d{name}" for name in variables)
+        system, banks, first = read.system, [], 0
+        for bank in read.banks:
+            variables = bank.chart.variables
+            banks.append(BankPlaces(bank.name, bank.n, first, variables))
+            first += bank.n
+        moved = (
+            name
+            for body in system.bodies
+            for name in ((body.x,) if body.driven else (body.x, body.v))
+        )
+        updated = (name for each in system.sampled for name in each.updates)
+        sizes = sizes_of(read.banks)
+        blocks = tuple(
+            Block(bank.variables, bank.n, size) for bank, size in zip(read.banks, sizes, strict=True)
+        )
+        seen = tuple(
+            Block(
+                (
+                    of(bank.name, "s"),
+                    *(f"{force}_elements" for force in bank.forces),
+                    *(bank.rate(name) for name in bank.variables),
+                ),
+                bank.n,
+                size,
+            )
+            for bank, size in zip(read.banks, sizes, strict=True)
+        )
         return cls(
-            cls.state(model, rig),
-            Places(("v", "F"), ("s", "F_elements", *rates), model.n),
+            Places((*moved, *system.flow, *updated), blocks),
+            Places(tuple(name for bank in read.banks for name in observed_of(bank)), seen),
+            tuple(banks),
             surfaces,
         )
 
-    @staticmethod
-    def state(model: Model, rig: Rig) -> Places[str]:
-        """Return the layout of the state vector alone, which needs no generated program.
-
-        Parameters
-        ----------
-        model, rig
-            The model and the rig.
-
-        Returns
-        -------
-        Places
-            See `Layout.y`.
-        """
-        moved = ("x",) if rig.acceleration is None else ("x", "v")
-        return Places(moved, model.chart.variables, model.n)
-
-    @property
+    @cached_property
     def n(self) -> int:
-        """Number of elements."""
-        return self.y.n
+        """Number of elements of all contacts."""
+        return sum(bank.n for bank in self.banks)
 
-    @property
-    def variable(self) -> str:
-        """The chart's first variable, the deflection, shown by the log and `Trace.z`."""
-        return self.y.own[0]
-
-    @property
-    def rate(self) -> str:
-        """Name of its rate among the observed quantities."""
-        return f"d{self.variable}"
+    def bank(self, machine: int) -> BankPlaces:
+        """Return the contact of a machine, which are counted over all contacts."""
+        return next(bank for bank in self.banks if machine < bank.first + bank.n)
 
     # ------------------------------------------------------------------ modes
     @cached_property
     def modes(self) -> int:
-        """The number of modes of a row."""
+        """Number of modes per row."""
         return self.n + self.surfaces
 
     @cached_property
     def elements(self) -> slice:
-        """Places of the elements' states among the modes."""
+        """The places of the elements' states among the modes."""
         return slice(0, self.n)
 
     @cached_property
     def slides(self) -> slice:
-        """Places of the surfaces' flags among the modes."""
+        """The places of the surfaces' flags among the modes."""
         return slice(self.n, None)
 
     def not_sliding(self, states: Sequence[int]) -> tuple[int, ...]:
-        """Return the modes of elements in the given states, with no surface sliding.
+        """Return the modes of elements in these states, sliding on no surface.
 
         Parameters
         ----------
@@ -348,6 +426,21 @@ class Layout:
             The modes of a row.
         """
         return (*states, *[0] * self.surfaces)
+
+
+def sizes_of(banks: Sequence[Bank]) -> tuple[str, ...]:
+    """Return what the number of elements of each contact is called in generated text."""
+    return ("n",) if len(banks) == 1 else tuple(f"n_{bank.name}" for bank in banks)
+
+
+def observed_of(bank: Bank) -> tuple[str, ...]:
+    """Return the names of a contact that are observed with one value."""
+    names = [*(of(bank.name, name) for name in bank.chart.velocities), *bank.forces]
+    if bank.position == of(bank.name, "x"):
+        names.append(bank.position)
+    if bank.chart.locks:
+        names += [f"{force} shared" for force in bank.forces]
+    return tuple(names)
 
 
 class LogRecord(NamedTuple):

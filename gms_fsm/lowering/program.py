@@ -35,8 +35,9 @@ import numpy as np
 import integrators
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.errors import SignalError
-from gms_fsm.language import Requirement, spell
+from gms_fsm.language import Binary, Requirement, Value, spell
 from gms_fsm.lowering._generated import ieee, load, load_careful
+from gms_fsm.lowering._assembly import assembled
 from gms_fsm.lowering._plan import Plan, both_sides, plan_of
 from gms_fsm.lowering._python import FUNCTIONS, python
 from gms_fsm.lowering.layout import Layout
@@ -50,6 +51,7 @@ from gms_fsm.systems.signals import (
     piecewise_linear,
     piecewise_slope,
 )
+from gms_fsm.systems.system import System, system_of
 from integrators import LIVE
 
 __all__ = ["Arguments", "Program", "arguments", "equations", "lower"]
@@ -110,15 +112,15 @@ class Program:
         return [LIVE] * self.held
 
 
-def lower(model: Model, rig: Rig) -> Program:
-    """Generate the program of a model on a rig.
+def lower(system: System | Model, rig: Rig | None = None) -> Program:
+    """Generate the program of a system, or of a model on a rig.
 
     Parameters
     ----------
-    model : Model
-        The friction model.
-    rig : Rig
-        The rig it is mounted on.
+    system : System or Model
+        What runs.
+    rig : Rig, optional
+        The rig that a model is mounted on.
 
     Returns
     -------
@@ -132,34 +134,53 @@ def lower(model: Model, rig: Rig) -> Program:
     >>> "if z >= s and v > v_c:" in program.source
     True
     """
-    signals = rig.signals.values()
+    if not isinstance(system, System):
+        assert rig is not None
+        system = system_of(system, rig)
+    signals = system.signals.values()
+    contacts = [
+        (
+            contact.name,
+            repr(contact.chart),
+            contact.n,
+            contact.v,
+            tuple(contact.inputs.items()),
+            tuple(np.ndim(contact.values[name]) for name in contact.chart.parameter_names),
+            contact.model is None,
+            contact.model is None or contact.model.stribeck is None,
+        )
+        for contact in system.contacts
+    ]
     shape = (
-        repr(model.chart),
-        model.stribeck is None,
-        model.n,
-        tuple(np.ndim(model.values[name]) for name in model.chart.parameter_names),
-        rig.title,
-        rig.acceleration,
-        tuple(rig.numbers),
-        tuple(rig.signals),
-        tuple(_spelling(s) for s in signals),
+        system.name,
+        repr(system.bodies),
+        tuple(contacts),
+        tuple(system.numbers),
+        tuple(system.signals),
+        tuple(map(_spelling, signals)),
+        tuple(system.flow.items()),
+        repr(system.sampled),
+        # A ratio that is 1 or 0 is left out of no text; a zero inertia is refused while reading.
+        tuple(name for name, value in system.numbers.items() if value == 0.0),
     )
     corners = [s for s in signals if isinstance(s, Corners)]
     return dataclasses.replace(
-        _lowered(_Shape(shape, model, rig)),
-        p=arguments(model, rig),
+        _lowered(_Shape(shape, system)),
+        p=arguments(system),
         knots=sorted({float(t) for s in corners for t in s.times}),
         jumps=sorted({float(t) for s in corners for t in s.jumps}),
     )
 
 
-def _spelling(signal: Signal) -> str | int | None:
+def _spelling(signal: Signal | str) -> str | int | None:
     """Return the part of a signal that the text depends on, in hashable form.
 
-    Callables are identified by `id`, which stays valid because the cache keeps the rig alive:
+    Callables are identified by `id`, which stays valid because the cache keeps the system alive:
     callables that compare equal need not return the same, and some cannot be hashed.
     """
     match signal:
+        case str():
+            return f"numbers {signal}"
         case Formula(text=text):
             return text
         case Function(call=call):
@@ -169,21 +190,20 @@ def _spelling(signal: Signal) -> str | int | None:
 
 @dataclass(frozen=True)
 class _Shape:
-    """Everything that the text depends on, with a model and a rig of that shape."""
+    """Everything that the text depends on, with a system of that shape."""
 
     key: tuple[Any, ...]
-    model: Model = field(compare=False)
-    rig: Rig = field(compare=False)
+    system: System = field(compare=False)
 
 
 @functools.lru_cache(maxsize=64)
 def _lowered(shape: _Shape) -> Program:
-    """Generate the text for all models and rigs of one shape, without their numbers."""
-    model, rig = shape.model, shape.rig
-    plan = plan_of(model, rig)
+    """Generate the text for all systems of one shape, without their numbers."""
+    system = shape.system
+    plan = plan_of(assembled(system))
     source = python(plan)
     callables = {
-        name: signal.call for name, signal in rig.signals.items() if isinstance(signal, Function)
+        name: signal.call for name, signal in system.signals.items() if isinstance(signal, Function)
     }
     names: dict[str, Any] = {
         "piecewise_linear": piecewise_linear,
@@ -209,32 +229,28 @@ def _lowered(shape: _Shape) -> Program:
     )
 
 
-def arguments(model: Model, rig: Rig) -> Arguments:
-    """Return the numbers of a model and a rig in the form that their program's functions take.
+def arguments(system: System) -> Arguments:
+    """Return the numbers of a system in the form that its program's functions take.
 
     Parameters
     ----------
-    model, rig
-        The model and the rig.
+    system : System
+        What runs.
 
     Returns
     -------
     tuple of lists
         See `Program`.
     """
-    curve, values = model.stribeck, [model.values[name] for name in model.chart.parameter_names]
-    shared = [] if curve is None else [curve.F_c, curve.F_s, curve.v_s, curve.dip]
-    shared += [model.sigma_2, *rig.numbers.values()]
-    shared += [float(value) for value in values if np.ndim(value) == 0]
-    own = [as_floats(model.weights)]
-    own += [as_floats(np.asarray(value)) for value in values if np.ndim(value) > 0]
+    read = assembled(system)
     tables = [
         as_floats(column)
-        for s in rig.signals.values()
+        for s in system.signals.values()
         if isinstance(s, Corners)
         for column in (s.times, s.values)
     ]
-    return shared, own, tables
+    own = [as_floats(values) for _, values in read.own.values()]
+    return list(read.shared.values()), own, tables
 
 
 def equations(program: Program) -> integrators.Equations:
@@ -283,21 +299,29 @@ def _guarded(name: str, call: Callable[[float], float]) -> Callable[[float], flo
 
 # --------------------------------------------------------------------------- from the plan
 def _relation_names(plan: Plan) -> list[str]:
-    """Describe each relation in words."""
+    """Return each relation in words."""
     return [
-        spell(Requirement(relation, True).relation, rename=plan.names.plain) + _of_element(i)
+        spell(Requirement(relation, True).relation, rename=plan.names.plain)
+        + _of_element(plan, Binary("-", relation.left, relation.right), i)
         for relation, i in plan.relations
     ]
 
 
 def _surface_names(plan: Plan) -> list[str]:
-    """Describe the value that is zero on each surface."""
-    return [spell(u, rename=plan.names.plain) + _of_element(i) for u, i in plan.surfaces]
+    """Return the value that is zero on each surface, in words."""
+    return [
+        spell(u, rename=plan.names.plain) + _of_element(plan, u, i) for u, i in plan.surfaces
+    ]
 
 
-def _of_element(element: int | None) -> str:
-    """Name an element, counted from 1 in texts; empty for values shared by all."""
-    return "" if element is None else f" of element {element + 1}"
+def _of_element(plan: Plan, tree: Value, element: int | None) -> str:
+    """Name an element, counted from 1 in texts; nothing where there is only one value."""
+    if element is None:
+        return ""
+    bank = plan.read.bank_of(tree)
+    assert bank is not None
+    whose = "" if len(plan.banks) == 1 else f" of {plan.banks[bank].bank.name}"
+    return f" of element {element + 1}{whose}"
 
 
 def _surface_table(plan: Plan) -> integrators.Surfaces:

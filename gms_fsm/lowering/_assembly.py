@@ -1,0 +1,518 @@
+"""A system with all its texts read, and every quantity under a name of its own.
+
+In the trees made here a name of the system stands for itself; what belongs to a contact is called
+``contact.name``, so that charts may use the same names. A quantity computed from others (a signal,
+the velocity of a driven body, a relative velocity, an input, a named expression of a chart) is a
+`Definition`; definitions stand in an order in which they can be computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from gms_fsm.charts.chart import Chart
+from gms_fsm.errors import ExpressionError, ParameterError, shown
+from gms_fsm.language import (
+    Binary,
+    Condition,
+    Name,
+    Negative,
+    Number,
+    Value,
+    derivative,
+    names_in,
+    parse_value,
+    renamed,
+)
+from gms_fsm.language._normal import renamed_in
+from gms_fsm.systems.signals import Corners, Formula, Function, Signal
+from gms_fsm.systems.system import Body, Contact, System, is_zero
+
+__all__ = ["Assembly", "Bank", "Definition", "Edge", "assembled", "of"]
+
+ZERO, ONE = Number(0.0), Number(1.0)
+
+
+def of(contact: str, name: str) -> str:
+    """Return what a name of a contact is called in the trees."""
+    return f"{contact}.{name}"
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A quantity computed from others.
+
+    Parameters
+    ----------
+    name : str
+        In the trees.
+    tree : Value or None
+        What it is; None for a signal that is a table or a Python function.
+    bank : int or None
+        The contact whose elements have one value each; None if there is one value.
+    signal : Signal or None
+        The signal, where it is one.
+    """
+
+    name: str
+    tree: Value | None
+    bank: int | None = None
+    signal: Signal | None = None
+
+
+@dataclass(frozen=True)
+class Edge:
+    """An edge of a chart.
+
+    Parameters
+    ----------
+    name, source, target : str
+        As in the chart.
+    guard : Condition
+        When it is taken.
+    steps : tuple of (str, Value)
+        Assignments to variables and velocities, in the order of computation.
+    """
+
+    name: str
+    source: str
+    target: str
+    guard: Condition
+    steps: tuple[tuple[str, Value], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Bank:
+    """A contact whose chart is read over the names of the system.
+
+    Parameters
+    ----------
+    index : int
+        Among the contacts.
+    contact : Contact
+        What it is.
+    variables : tuple of str
+        The chart's, one value per element each.
+    velocities, forces, rates : tuple of str
+        For each velocity of the chart its name, that of the force, that of the acceleration.
+    position : str
+        Name of the relative position.
+    threshold : str
+        Name of the elements' thresholds; empty where the model has no curve.
+    jacobian : tuple of mapping of str to Value
+        For each velocity its coefficients, by body.
+    flows : mapping of (str, str) to Value
+        By state and variable.
+    outputs : mapping of (str, str) to Value or None
+        By state and force, of an element; None in a locked state.
+    totals : mapping of str to Value
+        By force: that of the contact over the sum, where it is not the sum itself.
+    edges : tuple of Edge
+        In the chart's order.
+    start : tuple of (str, Value)
+        The assignments at the start of a run.
+    """
+
+    index: int
+    contact: Contact
+    variables: tuple[str, ...]
+    velocities: tuple[str, ...]
+    forces: tuple[str, ...]
+    rates: tuple[str, ...]
+    position: str
+    threshold: str
+    jacobian: tuple[Mapping[str, Value], ...]
+    flows: Mapping[tuple[str, str], Value]
+    outputs: Mapping[tuple[str, str], Value | None]
+    totals: Mapping[str, Value]
+    edges: tuple[Edge, ...]
+    start: tuple[tuple[str, Value], ...]
+
+    @property
+    def name(self) -> str:
+        """The contact's."""
+        return self.contact.name
+
+    @property
+    def n(self) -> int:
+        """Number of elements."""
+        return self.contact.n
+
+    @property
+    def chart(self) -> Chart:
+        """The contact's."""
+        return self.contact.chart
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the chart's states."""
+        return tuple(state.name for state in self.chart.states)
+
+    @property
+    def weight(self) -> str:
+        """Name of the weights, of which every bank has one per element."""
+        return of(self.name, "threshold weight")
+
+    def rate(self, variable: str) -> str:
+        """Return what the rate of a variable is called."""
+        contact, name = variable.rsplit(".", 1)
+        return of(contact, f"d{name}")
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """A system, read.
+
+    Parameters
+    ----------
+    system : System
+        What was read.
+    definitions : tuple of Definition
+        Each after those it needs.
+    banks : tuple of Bank
+        The contacts.
+    forces, inertias : mapping of str to Value
+        By free body.
+    flow : mapping of str to Value
+        Rates of the further states.
+    shared : mapping of str to float
+        Numbers with one value, by name.
+    own : mapping of str to (int, ndarray)
+        Numbers with one value per element, by name: the bank, and the values.
+    """
+
+    system: System
+    definitions: tuple[Definition, ...]
+    banks: tuple[Bank, ...]
+    forces: Mapping[str, Value]
+    inertias: Mapping[str, Value]
+    flow: Mapping[str, Value]
+    shared: Mapping[str, float]
+    own: Mapping[str, tuple[int, np.ndarray]]
+
+    @cached_property
+    def free(self) -> tuple[Body, ...]:
+        """The bodies that are not driven."""
+        return tuple(body for body in self.system.bodies if not body.driven)
+
+    @cached_property
+    def defined(self) -> Mapping[str, Definition]:
+        """Definitions by name."""
+        return {each.name: each for each in self.definitions}
+
+    @cached_property
+    def owner(self) -> Mapping[str, int]:
+        """For each name with one value per element its bank."""
+        found = {name: bank for name, (bank, _) in self.own.items()}
+        for bank in self.banks:
+            found |= {name: bank.index for name in bank.variables}
+            found |= {bank.rate(name): bank.index for name in bank.variables}
+        return found | {
+            each.name: each.bank for each in self.definitions if each.bank is not None
+        }
+
+    def bank_of(self, tree: Value | Condition) -> int | None:
+        """Return the bank whose elements have one value of a tree each; None if there is one."""
+        return next((self.owner[name] for name in names_in(tree) if name in self.owner), None)
+
+    def closure(self, names: Iterable[str]) -> frozenset[str]:
+        """Return names, and those that their definitions are computed from."""
+        found, waiting = set[str](), [*names]
+        while waiting:
+            name = waiting.pop()
+            if name not in found:
+                found.add(name)
+                definition = self.defined.get(name)
+                if definition is not None and definition.tree is not None:
+                    waiting += names_in(definition.tree)
+        return frozenset(found)
+
+    def expanded(self, tree: Value) -> Value:
+        """Return a tree over states, numbers, t and signals that are not formulas."""
+        inside = {
+            name: self.expanded(definition.tree)
+            for name in names_in(tree)
+            if (definition := self.defined.get(name)) is not None and definition.tree is not None
+        }
+        return renamed(tree, inside) if inside else tree
+
+
+def assembled(system: System) -> Assembly:
+    """Read all texts of a system.
+
+    Parameters
+    ----------
+    system : System
+        What runs.
+
+    Returns
+    -------
+    Assembly
+        With every quantity under a name of its own.
+
+    Raises
+    ------
+    ExpressionError, ParameterError
+        If a text cannot be read, a velocity is not linear, an inertia is zero, or locks that
+        always hold depend on each other.
+    """
+    return _Reader(system).read()
+
+
+class _Reader:
+    def __init__(self, system: System) -> None:
+        self.system, self.here = system, f"system {system.name!r}"
+        self.definitions: list[Definition] = []
+        self.shared: dict[str, float] = {}
+        self.own: dict[str, tuple[int, np.ndarray]] = {}
+
+    def value(self, text: str | float, names: Iterable[str], owner: str) -> Value:
+        try:
+            return parse_value(text if isinstance(text, str) else repr(float(text)), names)
+        except ExpressionError as error:
+            raise error.at(f"{self.here}, {owner}") from None
+
+    def read(self) -> Assembly:
+        system, numbers = self.system, self.system.numbers
+        for contact in system.contacts:
+            self.model_numbers(contact)
+        self.shared |= numbers
+        for name, signal in system.signals.items():
+            if isinstance(signal, str):
+                tree = self.value(signal, ["t", *numbers], f"signal {name!r}")
+                self.definitions.append(Definition(name, tree))
+            else:
+                formula = signal.tree if isinstance(signal, Formula) else None
+                self.definitions.append(Definition(name, formula, signal=signal))
+        given = ["t", *system.signals, *numbers]
+        forces, inertias = {}, {}
+        for body in system.bodies:
+            owner = f"body {body.name!r}"
+            if body.velocity is None:
+                assert body.inertia is not None
+                forces[body.name] = self.value(body.force, system.names, f"{owner}, force")
+                tree = self.value(body.inertia, system.names, f"{owner}, inertia")
+                if is_zero(tree, numbers):
+                    raise ParameterError(
+                        f"the inertia {body.inertia!r} is zero, or not finite",
+                        place=f"{self.here}, {owner}",
+                        advice="every free body needs one",
+                    )
+                inertias[body.name] = tree
+            elif not (body.velocity == body.v and body.v in system.signals):
+                tree = self.value(body.velocity, given, f"{owner}, velocity")
+                self.definitions.append(Definition(body.v, tree))
+        flow = {
+            name: self.value(text, system.names, f"flow of {name!r}")
+            for name, text in system.flow.items()
+        }
+        banks = tuple(self.bank(i, contact) for i, contact in enumerate(system.contacts))
+        return Assembly(
+            system,
+            tuple(self.definitions),
+            banks,
+            forces,
+            inertias,
+            flow,
+            self.shared,
+            self.own,
+        )
+
+    def model_numbers(self, contact: Contact) -> None:
+        """Note what a model brings besides its chart's parameters."""
+        model = contact.model
+        if model is None:
+            return
+        if (curve := model.stribeck) is not None:
+            for name, value in (
+                ("F_c", curve.F_c),
+                ("F_s", curve.F_s),
+                ("v_s", curve.v_s),
+                ("v dip", curve.dip),
+            ):
+                self.shared[of(contact.name, f"curve {name}")] = value
+        self.shared[of(contact.name, "model sigma_2")] = model.sigma_2
+
+    def bank(self, index: int, contact: Contact) -> Bank:
+        chart, model, c = contact.chart, contact.model, contact.name
+        owner = f"contact {c!r}"
+        weights = np.ones(contact.n) if model is None else model.weights
+        self.own[of(c, "threshold weight")] = (index, np.asarray(weights, dtype=np.float64))
+        names: dict[str, Value] = {"t": Name("t")}
+        for name, value in contact.values.items():
+            if np.ndim(value) == 0:
+                self.shared[of(c, name)] = float(value)
+            else:
+                self.own[of(c, name)] = (index, np.asarray(value, dtype=np.float64))
+            names[name] = Name(of(c, name))
+        # Velocities and the position, those of a body where they are just that.
+        jacobian, moved = [], {body.v: body for body in self.system.bodies}
+        velocities = []
+        for text, name in zip(contact.v, chart.velocities, strict=True):
+            tree = self.value(text, [*moved, *self.system.numbers], f"{owner}, v")
+            row = self.coefficients(tree, moved, text, owner)
+            jacobian.append(row)
+            names[name] = self.defined(of(c, name), tree)
+            velocities.append(names[name].id)
+            if len(velocities) == 1:
+                where = renamed(tree, {v: Name(body.x) for v, body in moved.items()})
+                names["x"] = self.defined(of(c, "x"), where)
+        for name in chart.inputs:
+            if name not in names and not (name == "s" and model is not None):
+                names[name] = self.input(contact, name, owner)
+        for name in contact.inputs:
+            if name not in chart.inputs:
+                raise ParameterError(
+                    f"inputs has {shown(name)}, which its chart does not read",
+                    place=f"{self.here}, {owner}",
+                    advice=f"the chart's inputs are {', '.join(chart.inputs) or 'none'}",
+                )
+        threshold = ""
+        if model is not None and model.stribeck is not None:
+            threshold = self.curve(contact, index, names)
+        for name in chart.variables:
+            names[name], names[f"d{name}"] = Name(of(c, name)), Name(of(c, f"d{name}"))
+        self.lets(contact, index, names)
+        for name in (*chart.force_names, *chart.rate_names):
+            names.setdefault(name, Name(of(c, name)))
+
+        def steps(*keys: tuple[str, str]) -> tuple[tuple[str, Value], ...]:
+            return tuple(
+                (names[name].id, renamed(tree, names))  # type: ignore[union-attr]
+                for key in keys
+                for name, tree in chart.assignments[key].items()
+            )
+
+        totals = {
+            of(c, name): renamed(tree, names | {name: Name(of(c, name))})
+            for name, tree in chart.totals.items()
+        }
+        if model is not None:
+            force = of(c, "F")
+            viscous = Binary("*", Name(of(c, "model sigma_2")), Name(velocities[0]))
+            totals[force] = Binary("+", totals.get(force, Name(force)), viscous)  # (4)
+        return Bank(
+            index=index,
+            contact=contact,
+            variables=tuple(of(c, name) for name in chart.variables),
+            velocities=tuple(velocities),
+            forces=tuple(of(c, name) for name in chart.force_names),
+            rates=tuple(of(c, name) for name in chart.rate_names),
+            position=names["x"].id,
+            threshold=threshold,
+            jacobian=tuple(jacobian),
+            flows={
+                (state, of(c, name)): renamed(tree, names)
+                for (state, name), tree in chart.flows.items()
+            },
+            outputs={
+                (state, of(c, name)): None if tree is None else renamed(tree, names)
+                for (state, name), tree in chart.forces.items()
+            },
+            totals=totals,
+            edges=tuple(
+                Edge(
+                    edge.name,
+                    edge.source,
+                    edge.target,
+                    renamed_in(chart.guards[edge.name], names),
+                    # Stateflow's order: exit of the source, action of the edge, entry of the target.
+                    steps(("exit", edge.source), ("action", edge.name), ("entry", edge.target)),
+                )
+                for edge in chart.transitions
+            ),
+            start=steps(("entry", chart.default_state.name)),
+        )
+
+    def coefficients(
+        self, tree: Value, moved: Mapping[str, Body], text: str, owner: str
+    ) -> Mapping[str, Value]:
+        """Return the coefficients of a velocity that is linear in the bodies' velocities."""
+        row: dict[str, Value] = {}
+        rest = renamed(tree, dict.fromkeys(moved, ZERO))
+        constant = derivative_free(rest)
+        for v, body in moved.items():
+            slope = derivative(tree, v)
+            if slope is None or names_in(slope) & {*moved}:
+                constant = False
+            elif slope != ZERO:
+                row[body.name] = slope
+        if not constant or not row:
+            raise ParameterError(
+                f"v = {text!r} is not linear in the velocities {', '.join(moved)}",
+                place=f"{self.here}, {owner}",
+                advice="write it for example as 'v_1 - ratio * v_2'",
+            )
+        return row
+
+    def defined(self, name: str, tree: Value) -> Name:
+        """Return the name of a value: its own, or that of what it is just equal to."""
+        if isinstance(tree, Name):
+            return tree
+        self.definitions.append(Definition(name, tree))
+        return Name(name)
+
+    def input(self, contact: Contact, name: str, owner: str) -> Value:
+        """Bind an input of a chart."""
+        if name not in contact.inputs and name not in self.system.names:
+            raise ParameterError(
+                f"its chart reads the input {name!r}, which is not bound",
+                place=f"{self.here}, {owner}",
+                advice=f"give inputs={{{name!r}: ...}} over {', '.join(self.system.names)}",
+            )
+        text = contact.inputs.get(name, name)
+        tree = self.value(text, self.system.names, f"{owner}, input {name!r}")
+        return tree if isinstance(tree, Number) else self.defined(of(contact.name, name), tree)
+
+    def curve(self, contact: Contact, index: int, names: dict[str, Value]) -> str:
+        """Define the Stribeck curve of a model, and the thresholds; return what these are called."""
+        c = contact.name
+        assert contact.model is not None
+        assert contact.model.stribeck is not None
+        tree = parse_value(contact.model.stribeck.text, ["F_c", "F_s", "v_s", "v"])
+        numbers: dict[str, Value] = {
+            name: Name(of(c, f"curve {name}")) for name in ("F_c", "F_s", "v_s")
+        }
+        curve = of(c, "curve S")
+        self.definitions.append(Definition(curve, renamed(tree, numbers | {"v": names["v"]})))
+        threshold = of(c, "s")
+        weighted = Binary("*", Name(of(c, "threshold weight")), Name(curve))
+        self.definitions.append(Definition(threshold, weighted, index))
+        names["s"] = Name(threshold)
+        return threshold
+
+    def lets(self, contact: Contact, index: int, names: dict[str, Value]) -> None:
+        """Define the named expressions of a chart."""
+        chart, c = contact.chart, contact.name
+        own = {name for name in names if names_in(names[name]) & {*self.own}}
+        own |= {*chart.variables, "s"} & {*names}
+        for name, tree in chart.lets.items():
+            per_element = bool(names_in(tree) & own)
+            if per_element:
+                own.add(name)
+            self.definitions.append(
+                Definition(of(c, name), renamed(tree, names), index if per_element else None)
+            )
+            names[name] = Name(of(c, name))
+
+
+def derivative_free(rest: Value) -> bool:
+    """Tell whether a linear form without its velocities is zero."""
+    match rest:
+        case Number(value):
+            return value == 0.0
+        case Name():
+            return False
+        case Negative(operand):
+            return derivative_free(operand)
+        case Binary("+" | "-", a, b):
+            return derivative_free(a) and derivative_free(b)
+        case Binary("*", a, b):
+            return derivative_free(a) or derivative_free(b)
+        case Binary("/", a, _):
+            return derivative_free(a)
+    return False

@@ -1,0 +1,275 @@
+"""Lines of generated text that know what they read.
+
+A function is put together from its body outwards: what the body reads is computed before it, and so
+on, until only arguments are left. Nothing is computed that nobody reads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Literal, NamedTuple
+
+from gms_fsm.language import Binary, Name, Node, Value, spell
+from gms_fsm.lowering._names import computed_names
+from gms_fsm.lowering._plan import Computed, Plan, RoughCall
+from gms_fsm.lowering.layout import Places
+from integrators import LIVE
+
+__all__ = ["Line", "Signs", "Writer", "indented", "reads_of"]
+
+# Where a rough call takes its sign from: held ones, those seen now, or given ones, some of which
+# may be marked as live.
+Signs = Literal["held", "live", "given"]
+TABLES = "the tables"  # what a signal that is a table reads
+
+
+class Line(NamedTuple):
+    """A line of text, and the names from the trees that it reads."""
+
+    text: str
+    reads: frozenset[str] = frozenset()
+
+
+def reads_of(lines: Iterable[Line]) -> frozenset[str]:
+    """Return what lines read."""
+    return frozenset[str]().union(*(line.reads for line in lines))
+
+
+def indented(lines: Iterable[Line]) -> list[Line]:
+    """Return lines one level deeper."""
+    return [Line("    " + line.text, line.reads) for line in lines]
+
+
+class Writer:
+    """Writes values, loops over elements and functions of a plan.
+
+    Parameters
+    ----------
+    plan : Plan
+        Of the program.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan, self.read = plan, plan.read
+        self.names, self.layout = plan.names, plan.layout
+        self.sizes = [block.size for block in plan.layout.y.blocks]
+        # What is computed with the forces, never at the head of a function.
+        self.late = {
+            name for bank in plan.read.banks for name in (*bank.forces, *bank.rates)
+        } | {f"{body.name} a" for body in plan.read.system.bodies}
+
+    # ------------------------------------------------------------------ values
+    def spell(self, node: Node) -> str:
+        """Spell a tree with the names of the text."""
+        return spell(node, rename=self.names.texts)
+
+    def local(self, name: str) -> str:
+        """Return the name in the text."""
+        return self.names.local[name]
+
+    def put(self, target: str, tree: Value, note: str = "") -> Line:
+        """Write an assignment to a name or a place of the text."""
+        return Line(f"{target} = {self.spell(tree)}{note}", computed_names(tree))
+
+    def at(self, array: str, places: Places[str], name: str) -> tuple[str, frozenset[str]]:
+        """Spell a place of an array, and say which sizes it reads."""
+        sizes = frozenset(f"#{size}" for size in places.sizes(name))
+        return f"{array}[{places.text(name)}]", sizes
+
+    def store(self, array: str, places: Places[str], name: str, text: str) -> Line:
+        """Write an assignment to a place of an array."""
+        place, sizes = self.at(array, places, name)
+        return Line(f"{place} = {text}", sizes)
+
+    # ------------------------------------------------------------------ corners and jumps
+    def computed(self, target: str, value: Computed, signs: Signs, note: str = "") -> list[Line]:
+        """Write an assignment of a value, after its rough calls."""
+        return [*self.calls(value.calls, signs), self.put(target, value.tree, note)]
+
+    def calls(self, calls: Iterable[RoughCall], signs: Signs) -> list[Line]:
+        """Assign rough calls, each once."""
+        return [self.call(each, signs) for each in dict.fromkeys(calls)]
+
+    def call(self, rough: RoughCall, signs: Signs) -> Line:
+        """Assign a rough call, whose sign is held, live or given."""
+        call, live = rough.call, self.spell(rough.call)
+        if signs == "live":
+            return Line(f"{rough.name} = {live}", computed_names(call))
+        held = self.plan.held
+        sizes = frozenset(f"#{size}" for size in held.sizes(rough.turning))
+        sign = f"held[{held.text(rough.turning)}]"
+        first = self.spell(call.arguments[0])
+        match call.function:
+            case "sgn":
+                value = sign
+            case "abs":
+                value = self.spell(Binary("*", Name(sign), call.arguments[0]))
+            case "min":
+                value = f"{first} if {sign} <= 0.0 else {self.spell(call.arguments[1])}"
+            case _:
+                value = f"{first} if {sign} >= 0.0 else {self.spell(call.arguments[1])}"
+        if signs == "given":
+            value = f"{live} if {sign} == {LIVE} else {value}"
+        elif call.function == "sgn":
+            return Line(f"{rough.name} = {value}", sizes)
+        return Line(f"{rough.name} = {value}", sizes | computed_names(call))
+
+    # ------------------------------------------------------------------ what elements read first
+    def element(self, bank: int, reads: frozenset[str], signs: Signs) -> list[Line]:
+        """Assign what lines read of an element: its variables, and what is computed from them."""
+        needed = self.closure(reads)
+        owner, y = self.read.owner, self.layout.y
+        lines = []
+        for name in self.read.banks[bank].variables:
+            if name in needed:
+                place, sizes = self.at("y", y, name)
+                lines.append(Line(f"{self.local(name)} = {place}", sizes))
+        for name, value in self.plan.definitions.items():
+            if name in needed and owner.get(name) == bank:
+                lines += self.computed(self.local(name), value, signs)
+        return lines
+
+    def closure(self, reads: frozenset[str]) -> frozenset[str]:
+        """Return names, and those that they are computed from."""
+        found, waiting = set[str](), [*reads]
+        while waiting:
+            name = waiting.pop()
+            if name not in found:
+                found.add(name)
+                if (value := self.plan.definitions.get(name)) is not None:
+                    waiting += computed_names(value.tree)
+                    waiting += (n for call in value.calls for n in computed_names(call.call))
+        return frozenset(found)
+
+    def loop(
+        self,
+        bank: int,
+        signs: Signs,
+        before: Sequence[Line] = (),
+        branches: Mapping[str, list[Line]] | None = None,
+        after: Sequence[Line] = (),
+    ) -> list[Line]:
+        """Write a loop over the elements of a contact: lines, an if-else over states, lines.
+
+        What is computed from the variables is computed where it is read: before the if-else if it
+        is read outside or in more than one branch, else in its branch.
+        """
+        rows = {} if branches is None else dict(branches)
+        wanted = [self.own(bank, reads_of(lines)) for lines in rows.values()]
+        outside = self.own(bank, reads_of([*before, *after]))
+        first = outside | {
+            name for each in wanted for name in each if sum(name in other for other in wanted) > 1
+        }
+        if len(rows) == 1:
+            first = first.union(*wanted)
+        variables = {*self.read.banks[bank].variables}
+        first |= frozenset(name for each in wanted for name in each if name in variables)
+        for (state, lines), each in zip(rows.items(), wanted, strict=True):
+            if inside := each - first:
+                made = self.element(bank, inside, signs)
+                seen = {self.local(name) for name in self.closure(inside) & first}
+                rows[state] = [line for line in made if line.text.split(" =")[0] not in seen] + lines
+        body = [*before, *(self.by_state(bank, rows) if rows else []), *after]
+        body = [*self.element(bank, first, signs), *body]
+        if not body:
+            return []
+        text = f"for i in range({self.sizes[bank]}):"
+        return self.outward(bank, [Line(text, frozenset({f"#{self.sizes[bank]}"})), *indented(body)])
+
+    def own(self, bank: int, reads: frozenset[str]) -> frozenset[str]:
+        """Return what is read of an element that is assigned first."""
+        parameters = {*self.read.own}
+        rates = {*map(self.read.banks[bank].rate, self.read.banks[bank].variables)}
+        owner = self.read.owner
+        return frozenset(
+            name
+            for name in self.closure(reads)
+            if owner.get(name) == bank and name not in parameters and name not in rates
+        )
+
+    def outward(self, bank: int, lines: list[Line]) -> list[Line]:
+        """Forget what lines read of an element; its parameters stay, as arrays."""
+        inside = {
+            name
+            for name, owner in self.read.owner.items()
+            if owner == bank and name not in self.read.own
+        }
+        return [Line(line.text, line.reads - inside) for line in lines]
+
+    def by_state(self, bank: int, branches: Mapping[str, list[Line]]) -> list[Line]:
+        """Write an if-else over the element's state."""
+        states = self.names.states[bank]
+        filled = [(states[state], body or [Line("pass")]) for state, body in branches.items()]
+        if not any(branches.values()):
+            return []
+        if len(filled) == 1:
+            return next(iter(branches.values()))
+        mode, sizes = self.mode(bank)
+        lines = []
+        for number, (constant, body) in enumerate(filled):
+            word = "if" if number == 0 else "elif"
+            last = number == len(filled) - 1
+            head = f"else:  # {constant}" if last else f"{word} {mode} == {constant}:"
+            lines += [Line(head, sizes), *indented(body)]
+        return lines
+
+    def mode(self, bank: int) -> tuple[str, frozenset[str]]:
+        """Spell the mode of element i of a contact, and say which sizes it reads."""
+        place, sizes = self.machine(bank)
+        return f"mode[{place}]", sizes
+
+    def machine(self, bank: int) -> tuple[str, frozenset[str]]:
+        """Spell the number of element i among all machines, and say which sizes it reads."""
+        before = self.sizes[:bank]
+        text = " + ".join([*before, "i"])
+        return text, frozenset(f"#{size}" for size in before)
+
+    # ------------------------------------------------------------------ functions
+    def function(self, signature: str, doc: str, body: list[Line], signs: Signs) -> list[str]:
+        """Assemble a function: signature, the values its body reads, then the body."""
+        lines = [*self.head(reads_of(body), signs), *body] or [Line("pass")]
+        return [f"def {signature}:", f'    """{doc}"""', *(f"    {line.text}" for line in lines)]
+
+    def head(self, reads: frozenset[str], signs: Signs) -> list[Line]:
+        """Write what is read before a body: numbers, states, and what is computed from them."""
+        needed = self.closure(reads) - self.late
+        values: list[Line] = []
+        for name in self.read.defined:
+            if name in needed and name not in self.read.owner:
+                values += self.defined(name, signs)
+        needed = (needed | self.closure(reads_of(values))) - self.late
+        shared = [(name, j) for j, name in enumerate(self.names.shared) if name in needed]
+        own = [(name, j) for j, name in enumerate(self.names.own) if name in needed]
+        sizes = [size for size in self.sizes if f"#{size}" in needed]
+        lines = []
+        if shared or own or sizes or TABLES in needed:
+            lines.append(Line("shared, own, tables = p"))
+        lines += [Line(f"{self.local(name)} = shared[{j}]") for name, j in shared]
+        lines += [Line(f"{self.local(name)} = own[{j}]") for name, j in own]
+        for size in sizes:
+            # After the elements' modes come those of the surfaces: len(mode) says nothing.
+            weight = self.read.banks[self.sizes.index(size)].weight
+            lines.append(Line(f"{size} = len(own[{self.names.own.index(weight)}])"))
+        y = self.layout.y
+        lines += [
+            Line(f"{self.local(name)} = y[{y.text(name)}]") for name in y.shared if name in needed
+        ]
+        return lines + values
+
+    def defined(self, name: str, signs: Signs) -> list[Line]:
+        """Assign a shared quantity that is computed from others."""
+        target = self.local(name)
+        value = self.plan.definitions.get(name)
+        if value is not None:
+            note = "  # (2)" if name.endswith(".curve S") else ""
+            return self.computed(target, value, signs, note)
+        if (name, "times") in self.plan.tables.shared:
+            return [
+                Line(f"{target} = piecewise_linear(t, {self.table(name)})", frozenset({TABLES}))
+            ]
+        return [Line(f"{target} = {name}_signal(t)")]
+
+    def table(self, name: str) -> str:
+        """Spell the corners of a signal: their times and values."""
+        places = (self.plan.tables.text((name, column)) for column in ("times", "values"))
+        return ", ".join(f"tables[{place}]" for place in places)

@@ -1,0 +1,554 @@
+"""Systems: bodies that move, contacts between them, and what drives both.
+
+Bodies and controllers are smooth. Whatever switches is a contact: machines of one chart on one
+relative velocity, which is linear in the bodies' velocities.
+"""
+
+from __future__ import annotations
+
+import keyword
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.parameters import FloatArray, checked_scalar, checked_values
+from gms_fsm.errors import ExpressionError, ParameterError, shown
+from gms_fsm.language import (
+    CONSTANTS,
+    FUNCTIONS,
+    Number,
+    Value,
+    derivative,
+    evaluate,
+    names_in,
+    parse_value,
+    renamed,
+    spell,
+)
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.rigs import Rig
+from gms_fsm.systems.signals import Signal, SignalLike, as_signal
+
+__all__ = ["Body", "Contact", "Sampled", "System", "system_of"]
+
+Text = str | float  # an expression, or just a number
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body with one degree of freedom: free, or moved with a given velocity.
+
+    ``inertia * dv/dt = force`` minus what its contacts take from it.
+
+    Parameters
+    ----------
+    name : str
+        Unique in its system.
+    inertia : str or float
+        kg (or kg m^2, with angles); None for a body whose velocity is given.
+    force : str or float
+        N, over ``t``, the names of bodies, further states, signals and numbers.
+    velocity : str or float, optional
+        m/s, over ``t``, signals and numbers: the body moves like this whatever acts on it.
+    x, v : str
+        What its position and its velocity are called in texts.
+
+    Examples
+    --------
+    >>> Body("load", inertia=1.0, force="K * (x_m - x_l)", x="x_l", v="v_l").v
+    'v_l'
+    """
+
+    name: str
+    inertia: Text | None = field(default=None, kw_only=True)
+    force: Text = field(default="0", kw_only=True)
+    velocity: Text | None = field(default=None, kw_only=True)
+    x: str = field(default="x", kw_only=True)
+    v: str = field(default="v", kw_only=True)
+
+    def __post_init__(self) -> None:
+        here = f"body {shown(self.name)}"
+        if (self.inertia is None) == (self.velocity is None):
+            raise ParameterError(
+                "it has neither an inertia nor a velocity"
+                if self.inertia is None
+                else "it has an inertia and a velocity",
+                place=here,
+                advice="give inertia=... to a free body, velocity=... to a driven one",
+            )
+
+    @property
+    def driven(self) -> bool:
+        """Whether its velocity is given."""
+        return self.velocity is not None
+
+
+@dataclass(frozen=True, init=False, eq=False)
+class Contact:
+    """Machines of one chart on one relative velocity.
+
+    The contact takes its force F from each body, times that body's coefficient in `v`: its power is
+    F v, whatever the gearing.
+
+    Parameters
+    ----------
+    name : str
+        Unique in its system.
+    chart : Chart or Model
+        A chart; or a friction model (`GMS`, `LuGre`, `ChartModel`), which brings its numbers.
+    values : mapping, optional
+        For each parameter of the chart a number, or one per element.
+    v : str or sequence of str
+        The relative velocity, linear in the bodies' velocities, such as ``"w_m - 3 * w_l"``; one
+        for each velocity of the chart.
+    n : int
+        Number of elements.
+    inputs : mapping of str to str or float
+        For an input of the chart what it is, over the names of the system; those of the same name
+        need not be given.
+    period : float, optional
+        s: the machines are asked at these ticks only, and what the chart gives out is held between
+        them. Without a period the contact is continuous.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters
+    >>> Contact("bearing", GMS(GMSParameters.paper("stick-slip"), law="signed"), v="v_l").n
+    4
+    """
+
+    name: str
+    chart: Chart
+    values: Mapping[str, float | FloatArray]
+    v: tuple[str, ...]
+    n: int
+    inputs: Mapping[str, Text]
+    period: float | None
+    model: Model | None
+
+    def __init__(
+        self,
+        name: str,
+        chart: Chart | Model,
+        values: Mapping[str, Any] | None = None,
+        *,
+        v: str | Iterable[str] = "v",
+        n: int = 1,
+        inputs: Mapping[str, Text] | None = None,
+        period: float | None = None,
+    ) -> None:
+        here = f"contact {shown(name)}"
+        model = None
+        if isinstance(chart, Chart):
+            values = checked_numbers(chart, {} if values is None else values, n, here)
+        elif hasattr(chart, "chart") and hasattr(chart, "weights"):
+            model = chart
+            if values is not None or n != 1:
+                raise ParameterError(
+                    "a model brings its values and its number of elements", place=here
+                )
+            chart, values, n = model.chart, model.values, model.n
+        else:
+            raise ParameterError(
+                "it must be a Chart, or a model such as GMS(parameters, law='signed')",
+                place=f"{here}: chart",
+                value=chart,
+            )
+        if chart.locks and n != 1:
+            raise ParameterError(
+                f"n is {n}, and the chart has a locked state",
+                place=here,
+                advice="elements that lock the same motion cannot share the force; use n = 1",
+            )
+        velocities = (v,) if isinstance(v, str) else tuple(v)
+        if len(velocities) != len(chart.velocities):
+            raise ParameterError(
+                f"v gives {len(velocities)} velocities, chart {chart.name!r} has "
+                f"{', '.join(chart.velocities)}",
+                place=here,
+            )
+        if period is not None:
+            period = checked_scalar(f"{here}: period", period, "> 0")
+        for each, value in {
+            "name": name,
+            "chart": chart,
+            "values": values,
+            "v": velocities,
+            "n": n,
+            "inputs": dict(inputs or {}),
+            "period": period,
+            "model": model,
+        }.items():
+            object.__setattr__(self, each, value)
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """A sampled controller: values that change at exact ticks only.
+
+    Parameters
+    ----------
+    name : str
+        Unique in its system.
+    period : float
+        s.
+    updates : mapping of str to str
+        For each value its text over the names of the system and ``period``; they run in this order
+        and see the results before them.
+    initial : mapping of str to float, optional
+        Values before the first tick; 0 where not given.
+    offset : float
+        s: the first tick is at t_start + offset.
+
+    Examples
+    --------
+    >>> Sampled("pid", period=1e-3, updates={"u": "k_p * (r - x)"}).period
+    0.001
+    """
+
+    name: str
+    period: float = field(kw_only=True)
+    updates: Mapping[str, str] = field(kw_only=True)
+    initial: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    offset: float = field(default=0.0, kw_only=True)
+
+    def __post_init__(self) -> None:
+        here = f"sampled {shown(self.name)}"
+        put = object.__setattr__
+        put(self, "period", checked_scalar(f"{here}: period", self.period, "> 0"))
+        put(self, "offset", checked_scalar(f"{here}: offset", self.offset, ">= 0"))
+        put(self, "updates", dict(self.updates))
+        if not self.updates:
+            raise ParameterError("it updates nothing", place=here)
+        for name in self.initial:
+            if name not in self.updates:
+                raise ParameterError(
+                    f"initial has {shown(name)}, which is not updated",
+                    place=here,
+                    advice=f"its values are {', '.join(self.updates)}",
+                )
+        put(
+            self,
+            "initial",
+            {
+                name: checked_scalar(f"{here}: initial[{name!r}]", self.initial.get(name, 0.0))
+                for name in self.updates
+            },
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Bodies, the contacts between them, and what drives both.
+
+    Parameters
+    ----------
+    name : str
+        What it is called in pictures and messages.
+    bodies : sequence of Body
+        At least one.
+    contacts : sequence of Contact
+        Whatever switches.
+    signals : mapping of str to signal, optional
+        Functions of time, as those of a rig; texts may use the numbers.
+    numbers : mapping of str to float, optional
+        Constants.
+    flow : mapping of str to str, optional
+        Further smooth states, each with its time derivative: a current, an integrator.
+    sampled : sequence of Sampled, optional
+        Controllers with ticks.
+
+    Raises
+    ------
+    ParameterError, ExpressionError
+        If names clash, a text cannot be read, a velocity is not linear, or an inertia is zero.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts.gms import gms_element
+    >>> from gms_fsm import GMS, GMSParameters
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> system = System("pulled mass", bodies=(Body("mass", inertia="m", force="K*(V*t - x)"),),
+    ...                 contacts=(Contact("pad", model),), numbers={"m": 1.0, "K": 2.0, "V": 0.1})
+    >>> system.contact("pad").n
+    4
+    """
+
+    name: str
+    bodies: tuple[Body, ...] = field(kw_only=True)
+    contacts: tuple[Contact, ...] = field(kw_only=True)
+    signals: Mapping[str, Signal | str] = field(default_factory=dict, kw_only=True)
+    numbers: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    flow: Mapping[str, str] = field(default_factory=dict, kw_only=True)
+    sampled: tuple[Sampled, ...] = field(default=(), kw_only=True)
+
+    def __post_init__(self) -> None:
+        put, here = object.__setattr__, f"system {shown(self.name)}"
+        for each, kind in (("bodies", Body), ("contacts", Contact), ("sampled", Sampled)):
+            given = getattr(self, each)
+            parts = (given,) if isinstance(given, kind) else tuple(given)
+            for part in parts:
+                if not isinstance(part, kind):
+                    raise ParameterError(
+                        f"it must be a {kind.__name__}", place=f"{here}: {each}", value=part
+                    )
+            put(self, each, parts)
+        if not self.bodies:
+            raise ParameterError("it has no bodies", place=here, advice="give at least one")
+        if not self.contacts:
+            raise ParameterError("it has no contacts", place=here, advice="give at least one")
+        numbers = {
+            name: checked_scalar(f"{here}: {name}", value, "finite")
+            for name, value in self.numbers.items()
+        }
+        put(self, "numbers", numbers)
+        put(self, "flow", dict(self.flow))
+        self._check_names(here)
+        signals = {
+            name: self._signal(name, given, here) for name, given in self.signals.items()
+        }
+        put(self, "signals", signals)
+
+    def _signal(self, name: str, given: Any, here: str) -> Signal | str:
+        """Return a signal; one whose text names numbers stays a text."""
+        if isinstance(given, str):
+            owner = f"{here}, signal {name!r}"
+            tree = self._read(given, ["t", *self.numbers], owner)
+            if names_in(tree) - {"t"}:
+                return given
+        return as_signal(given)
+
+    @staticmethod
+    def _read(text: Text, names: Iterable[str], owner: str) -> Value:
+        try:
+            return parse_value(text if isinstance(text, str) else repr(float(text)), names)
+        except ExpressionError as error:
+            raise error.at(owner) from None
+
+    def _check_names(self, here: str) -> None:
+        groups: list[tuple[str, Iterable[str]]] = [("time", ["t"])]
+        for body in self.bodies:
+            alias = body.velocity == body.v and body.v in self.signals
+            groups.append((f"body {body.name!r}", [body.x] if alias else [body.x, body.v]))
+        groups += [("signal", self.signals), ("number", self.numbers), ("flow", self.flow)]
+        groups += [(f"sampled {each.name!r}", each.updates) for each in self.sampled]
+        owner: dict[str, str] = {}
+        for kind, names in groups:
+            for name in names:
+                _check_name(name, f"{here}, {kind}")
+                if name in owner:
+                    raise ParameterError(
+                        f"the name {name!r} is used twice ({owner[name]} and {kind})",
+                        place=here,
+                        advice="every name must be unique; a body's names are x=... and v=...",
+                    )
+                owner[name] = kind
+        parts = [*self.bodies, *self.contacts, *self.sampled]
+        for kind, each in (("body", self.bodies), ("contact", self.contacts)):
+            del each
+            del kind
+        seen: set[str] = set()
+        for part in parts:
+            _check_name(part.name, f"{here}, {type(part).__name__.lower()}")
+            if part.name in seen:
+                raise ParameterError(f"the name {part.name!r} is used twice", place=here)
+            seen.add(part.name)
+
+    # ------------------------------------------------------------------ queries
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All names that its texts can use."""
+        moved = (name for body in self.bodies for name in (body.x, body.v))
+        updated = (name for each in self.sampled for name in each.updates)
+        every = ("t", *moved, *self.flow, *updated, *self.signals, *self.numbers)
+        return tuple(dict.fromkeys(every))
+
+    def body(self, name: str) -> Body:
+        """Return a body by name.
+
+        Parameters
+        ----------
+        name : str
+            One of its bodies' names.
+
+        Returns
+        -------
+        Body
+            That one.
+
+        Raises
+        ------
+        ParameterError
+            If there is none.
+        """
+        return _found(self.bodies, name, "body", self.name)
+
+    def contact(self, name: str) -> Contact:
+        """Return a contact by name.
+
+        Parameters
+        ----------
+        name : str
+            One of its contacts' names.
+
+        Returns
+        -------
+        Contact
+            That one.
+
+        Raises
+        ------
+        ParameterError
+            If there is none.
+        """
+        return _found(self.contacts, name, "contact", self.name)
+
+
+def _found(parts: tuple[Any, ...], name: str, kind: str, system: str) -> Any:
+    for each in parts:
+        if each.name == name:
+            return each
+    known = ", ".join(repr(each.name) for each in parts)
+    raise ParameterError(
+        f"system {system!r} has no {kind} {shown(name)}", advice=f"there are {known}"
+    )
+
+
+def _check_name(name: object, place: str) -> None:
+    if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
+        raise ParameterError(
+            f"{shown(name)} is not a name",
+            place=place,
+            advice="use letters, digits and _, not starting with a digit, and no Python keyword",
+        )
+    if name in FUNCTIONS or name in CONSTANTS or name == "pow":
+        raise ParameterError(f"the name {name!r} is a word of the language", place=place)
+
+
+def checked_numbers(
+    chart: Chart, values: Mapping[str, Any], n: int, here: str
+) -> Mapping[str, float | FloatArray]:
+    """Return the numbers of a chart, checked against its parameters.
+
+    Parameters
+    ----------
+    chart : Chart
+        Whose parameters.
+    values : mapping
+        A number, or one per element, for each.
+    n : int
+        Number of elements.
+    here : str
+        For messages.
+
+    Returns
+    -------
+    mapping
+        Complete.
+
+    Raises
+    ------
+    ParameterError
+        If one is missing, unknown, or breaks its rule.
+    """
+    if isinstance(n, bool) or not isinstance(n, int) or n < 1:
+        raise ParameterError(
+            "a bank has an integer number of elements, at least one", place=f"{here}: n", value=n
+        )
+    if not isinstance(values, Mapping):
+        raise ParameterError(
+            "it must give a number for each parameter of the chart, for example {'k': 1.0}",
+            place=f"{here}: values",
+            value=values,
+        )
+    wanted, given = set(chart.parameter_names), set(values)
+    if wanted != given:
+        raise ParameterError(
+            f"chart {chart.name!r} has the parameters {sorted(wanted)}",
+            place=here,
+            advice=f"missing values: {sorted(wanted - given) or 'none'}, unknown: "
+            f"{sorted(given - wanted) or 'none'}",
+        )
+    return checked_values(chart.parameters, values, n)
+
+
+# --------------------------------------------------------------------------- from a model on a rig
+def system_of(model: Model, rig: Rig) -> System:
+    """Return a model on a rig as a system: one body, called body, and one contact, called friction.
+
+    Parameters
+    ----------
+    model, rig
+        What runs.
+
+    Returns
+    -------
+    System
+        With the rig's signals and numbers.
+
+    Raises
+    ------
+    ParameterError
+        If the rig's acceleration is not linear in F.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, PulledSlider
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> system_of(model, PulledSlider(1.0, 2.0, 0.1)).bodies[0].force
+    'stiffness * (speed * t - x)'
+    """
+    if rig.acceleration is None:
+        body = Body("body", velocity="v")
+    else:
+        names = ["t", "x", "v", "F", *rig.signals, *rig.numbers]
+        force, inertia = _balance(parse_value(rig.acceleration, names), rig)
+        body = Body("body", inertia=spell(inertia), force=spell(force))
+    return System(
+        rig.title,
+        bodies=(body,),
+        contacts=(Contact("friction", model),),
+        signals=dict(rig.signals),
+        numbers=rig.numbers,
+    )
+
+
+def _balance(acceleration: Value, rig: Rig) -> tuple[Value, Value]:
+    """Split an acceleration into (force - F) / inertia."""
+    from gms_fsm.language import Binary, Name, Negative
+
+    F = Name("F")
+    match acceleration:
+        case Binary("/", Binary("-", force, right), inertia) if right == F and not (
+            {"F"} & (names_in(force) | names_in(inertia))
+        ):
+            return force, inertia
+    slope = derivative(acceleration, "F")
+    if slope is None or "F" in names_in(slope) or slope == Number(0.0):
+        raise ParameterError(
+            f"the acceleration is {rig.acceleration!r}",
+            place=f"rig {rig.title!r}",
+            advice="it must be linear in F, for example '(F_a - F) / mass'",
+        )
+    inertia = Negative(Binary("/", Number(1.0), slope))
+    return Binary("*", renamed(acceleration, {"F": Number(0.0)}), inertia), inertia
+
+
+def is_zero(tree: Value, numbers: Mapping[str, float]) -> bool:
+    """Tell whether a value is zero, or not finite, whatever the state is."""
+    if names_in(tree) - {*numbers}:
+        return False
+    try:
+        value = float(evaluate(tree, numbers))
+    except (ArithmeticError, ValueError):
+        return True
+    return value == 0.0 or not math.isfinite(value)
+
+
+def broadcast(value: float | FloatArray, n: int) -> list[float]:
+    """Return a number for each element."""
+    return [float(each) for each in np.broadcast_to(value, n)]
