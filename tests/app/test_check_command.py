@@ -115,7 +115,7 @@ def test_a_wrong_name_is_one_message(
 @pytest.mark.parametrize(
     ("domain", "words"),
     [
-        (("s > 0", "s < 0"), "holds nowhere"),
+        (("s > 0", "s < 0"), "is empty"),
         (("s > q",), "unknown name 'q'"),
         (("exp(s) > 1",), "exp is not encoded"),
     ],

@@ -202,7 +202,7 @@ def test_after_a_firing_why_says_how_to_ask_for_the_new_state() -> None:
     made = own(2)
     assert "element 1: static -> rising by break_away" in made.reply("next")
     said = made.reply("why").splitlines()
-    assert said[1] == "it has just left static; values are those before that"
+    assert said[1] == "it has just left static; the values are those before"
     assert said[2] == "break_away fired here: every clause was true."
     assert said[-1] == "step, then why: the edges that leave rising"
     new = made.reply("why let_go")  # asked for by name, it is there at once

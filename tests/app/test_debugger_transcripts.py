@@ -57,7 +57,7 @@ row 52, t = 20.140677 s, micro-step 1: v = -0.140931 m/s, F = -1.2408 N
   element 2: stick -> slip by break_away_backward
 (t=20.1407 s) why 2
 element 2 is in slip at t = 20.140677 s
-it has just left stick; values are those before that
+it has just left stick; the values are those before
 break_away_forward did not fire: z >= s is false by 0.8 m and v > v_c is false
   by 0.141 m/s.
 break_away_backward fired here: every clause was true.

@@ -46,7 +46,7 @@ def test_what_they_say_is_printed_and_written(
     trace = Trace.load(tmp_path / "out" / "trace.npz")
     assert list(trace.monitors) == MONITORS
     lines = monitor_lines(trace)
-    assert lines[0].startswith("monitor abs(z) <= 0.01*s (not ok): broken first at t = ")
+    assert lines[0].startswith("monitor abs(z) <= 0.01*s (not ok): first broken at t = ")
     assert lines[1].startswith("monitor passivity (ok): ")
     assert lines[2].startswith("monitor coverage (not ok): ")
     summary = (tmp_path / "out" / "summary.md").read_text()

@@ -113,7 +113,7 @@ def test_monitors_are_left_out_and_that_is_said(
     over = ("--over", "F_s=1:2:2", "--engine", "ifelse", "--set", 'run.monitors=["all"]')
     done = gms_fsm("sweep", path, *over, "-o", tmp_path / "out")
     assert done.code == 0
-    assert "note: a sweep watches nothing: run.monitors is left out" in done.err
+    assert "note: a sweep has no monitors: run.monitors is ignored" in done.err
 
 
 def test_the_files_lie_beside_those_of_a_run(

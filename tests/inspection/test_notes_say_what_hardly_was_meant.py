@@ -54,13 +54,13 @@ def test_a_stiffness_in_newtons_per_millimetre():
 def test_arrests_within_a_tick_of_the_clock(output):
     """v_c / |dv/dt| is under the clock's resolution: the window is passed within a tick."""
     (note,) = notes(bank(v_c=1e-22), "1e-5*sin(t)", **output)
-    assert note.startswith("arrest could not be seen ")
+    assert note.startswith("arrest could not be detected ")
     assert "first at t = 3.14159" in note
 
 
 def test_a_velocity_that_jumps_over_the_window():
     (note,) = notes(bank(), [(0.0, 1e-5), (5.0, 1e-5), (5.0, -1e-5), (10.0, -1e-5)])
-    assert note.startswith("arrest could not be seen ")
+    assert note.startswith("arrest could not be detected ")
     assert "first at t = 5 s" in note
 
 

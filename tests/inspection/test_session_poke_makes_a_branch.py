@@ -188,7 +188,7 @@ def test_no_such_branch(branch: int) -> None:
     [
         ({"variables": "z"}, "variables is 'z'; give a mapping"),
         ({"state": "slip"}, "state is 'slip'; give a mapping"),
-        ({"variables": {"F_s": {0: 2.0}}}, "F_s is a parameter; for another value make another"),
+        ({"variables": {"F_s": {0: 2.0}}}, "F_s is a parameter; to change it, make another"),
     ],
 )
 def test_what_cannot_be_poked_is_said(poked: dict[str, Any], words: str) -> None:

@@ -52,10 +52,10 @@ def test_a_failed_run_says_when_and_where_the_run_is_kept() -> None:
     error = _failed()
     assert error.t == error.trace.t[-1]
     assert str(error) == (
-        f"t = {error.t!r} s: {error.reason}; {error.advice}; the run up to there is kept in .trace"
+        f"t = {error.t!r} s: {error.reason}; {error.advice}; the run so far is kept in .trace"
     )
     assert str(error.replaced(kept="partial.npz")).endswith("is kept in partial.npz")
-    assert error.happened == str(error).removesuffix("; the run up to there is kept in .trace")
+    assert error.happened == str(error).removesuffix("; the run so far is kept in .trace")
 
 
 @pytest.mark.parametrize("error", _made(), ids=lambda error: type(error).__name__)

@@ -137,7 +137,7 @@ def test_integrators_load_nothing_of_ours() -> None:
     assert loaded & {"gms_fsm", "plots", "transitions"} == set()
 
 
-CORE = [p for p in _sources("gms_fsm") if p.name != "cli.py" and p.parent.name != "paper"]
+CORE = [p for p in _sources("gms_fsm") if p.parent.name != "paper"]
 
 
 @pytest.mark.parametrize("path", CORE, ids=lambda p: p.name)

@@ -143,7 +143,7 @@ def test_a_variable_that_is_not_there(trace: Trace) -> None:
 def test_an_edge_is_no_element() -> None:
     session = Session(MODEL, RIG, 3.0)
     wrong: Any = "arrest"
-    said = r"no element 'arrest' \(an edge is asked for by edge='arrest'\); there are 0 to 3"
+    said = r"no element 'arrest' \(to name an edge, use edge='arrest'\); there are 0 to 3"
     _refused(SessionError, said, lambda: session.why(wrong))
     for wrong in (0.5, True, "nobody", None):
         said = f"no element {wrong!r}; there are 0 to 3"

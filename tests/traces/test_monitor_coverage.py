@@ -70,7 +70,7 @@ def test_a_motion_one_way_does_not() -> None:
         "|z| < s of arrest true",
     )
     assert "never: edge break_away_backward, edge arrest, " in found.text
-    assert "a longer run, a motion both ways" in found.text
+    assert "a longer run, motion in both directions" in found.text
 
 
 def test_nothing_is_asked_in_a_state_that_is_never_reached() -> None:

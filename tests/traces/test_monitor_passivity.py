@@ -210,7 +210,7 @@ def test_the_published_law_makes_energy_in_fig_4() -> None:
     assert found.deficit[2:] == (0.0, 0.0)
     assert not found.ok
     for part in (
-        "element 1 (element 2 too) had made 2.15852 J out of nothing by t = 75 s",
+        "element 1 (element 2 too) had created 2.15852 J by t = 75 s",
         "mostly in slip, where dz = sgn(v) * C * (1 - z / s)",
         "try law='signed'",
     ):
@@ -223,7 +223,7 @@ def test_the_signed_law_makes_none_in_fig_4() -> None:
     )
     assert found.ok
     assert found.deficit == (0.0,) * 4
-    assert "no element gave more than it had taken" in found.text
+    assert "no element gave back more energy than it had taken" in found.text
     # Between two times it does: the springs wind up before each arrest.
     assert found.made[0] == pytest.approx(6.58e-4, rel=0.01)
 
@@ -314,7 +314,7 @@ def test_the_tolerance_covers_the_error_of_the_sums(law: str, options: dict[str,
 def test_few_rows_are_said_to_be_few() -> None:
     model, rig = stick_slip("published"), Prescribed(FIG4_SINE)
     few = passivity(simulate(model, rig, 100.0, t_eval=[0.0, 50.0, 100.0], monitors="passivity"))
-    assert "the rows lie far apart for these sums" in few.text
+    assert "the rows are too far apart for these sums" in few.text
     assert max(few.tolerance) > 0.01
     all_of_them = passivity(simulate(model, rig, 100.0, monitors="passivity"))
     assert "far apart" not in all_of_them.text

@@ -224,7 +224,7 @@ def test_the_first_break_in_stick_is_located(times: list[float] | None) -> None:
     assert found.values == {"z": pytest.approx(0.1)}
     assert found.t_last == trace.t[-1]
     assert 0 < found.broken < found.rows
-    for part in ("first at t = 0.5 s", "element 1 in stick", "(z = 0.1)", "goto 0.5"):
+    for part in ("first broken at t = 0.5 s", "element 1 in stick", "(z = 0.1)", "goto 0.5"):
         assert part in found.text
 
 
@@ -386,8 +386,8 @@ def test_all_means_these_three() -> None:
         ("pasivity", "did you mean 'passivity'?"),
         (["chattering", Chattering(5)], "'chattering' twice"),
         (["z <= s", "z <= s"], "'z <= s' twice"),
-        ([3], "monitors has 3"),
-        (["everything"], "no monitor 'everything'"),
+        ([3], "monitors contains 3"),
+        (["everything"], "unknown monitor 'everything'"),
     ],
 )
 def test_what_is_no_monitor_is_refused(monitors: Any, said: str) -> None:
