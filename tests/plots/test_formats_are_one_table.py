@@ -24,7 +24,7 @@ from gms_fsm.errors import MissingExtraError, ParameterError
 from plots import formats
 from plots.formats import FORMATS, Format, Subject, register
 from tests.helpers import ROOT, stick_slip
-from tests.scenario_files import OPEN_LOOP, CommandLine, command_line, one_message
+from tests.scenario_files import OPEN_LOOP, CommandLine, one_message
 
 SUBJECTS: tuple[Subject, ...] = ("graph", "chart", "figure", "animation", "page")
 
@@ -32,14 +32,6 @@ SUBJECTS: tuple[Subject, ...] = ("graph", "chart", "figure", "animation", "page"
 @pytest.fixture(autouse=True)
 def _own_table(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(formats, "FORMATS", list(FORMATS))
-
-
-@pytest.fixture
-def gms_fsm(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> CommandLine:
-    monkeypatch.chdir(tmp_path)
-    return command_line(monkeypatch, capsys)
 
 
 @pytest.fixture(scope="module")
