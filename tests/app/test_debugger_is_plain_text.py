@@ -155,8 +155,10 @@ def _piped(script: str, **environment: str) -> subprocess.CompletedProcess[bytes
     )
 
 
-@pytest.mark.parametrize("environment", [{}, {"PYTHONIOENCODING": "ascii"}, {"NO_COLOR": "1"}])
-@pytest.mark.parametrize("end", ["", "quit\n", "q"])
+@pytest.mark.parametrize(
+    ("environment", "end"),
+    [({}, ""), ({"PYTHONIOENCODING": "ascii"}, "quit\n"), ({"NO_COLOR": "1"}, "q")],
+)
 def test_a_pipe_gets_plain_text_and_exit_code_0(environment: dict[str, str], end: str) -> None:
     done = _piped(f"goto 25\nwhy 1\n{end}", **environment)
     assert done.returncode == 0, done.stderr

@@ -352,7 +352,7 @@ def test_three_threads_that_save_to_one_path_never_show_a_damaged_file(
     traces[0].save(path)
     known = {trace.F.tobytes() + trace.transitions.t.tobytes() for trace in traces}
     wrong: list[object] = []
-    end = time.monotonic() + 4.0
+    end = time.monotonic() + 1.5
 
     def write(trace: Trace) -> None:
         while time.monotonic() < end and not wrong:

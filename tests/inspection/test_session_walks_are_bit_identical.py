@@ -84,7 +84,7 @@ def _poked(session: Session, z: float, state: str | None) -> dict[str, Any]:
     return {"t_start": here.t, "initial": initial}
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     models(),
     st.sampled_from(RIGS),

@@ -24,7 +24,7 @@ BYTES_A_FIRING = 1000
 PERIOD, EACH_PERIOD = 20.0, 16  # of the sine [s]; four elements, four transitions each
 compiled = pytest.param(
     "compiled",
-    20_000,
+    6_000,
     marks=pytest.mark.skipif(not importlib.util.find_spec("numba"), reason="needs extra fast"),
 )
 

@@ -28,7 +28,7 @@ from gms_fsm import (
 from gms_fsm.charts import gms_element
 from gms_fsm.errors import ChartError, GMSError, ParameterError
 from gms_fsm.traces.failures import LivelockError, NotFiniteError, SimulationError, StepSizeError
-from tests.helpers import FunctionBelt, open_loop, pulled_mass, stick_slip
+from tests.helpers import FASTEST, FunctionBelt, open_loop, pulled_mass, stick_slip
 
 CURVE = Stribeck(1.0, 1.5, 1e-3)
 
@@ -379,7 +379,11 @@ def test_a_heavy_run_near_the_edge_of_the_parameters_fails_in_words_or_ends() ->
         )
         try:
             trace = simulate(
-                GMS(parameters, law="signed"), Slider(1e-3, "sin(50*t)"), 0.05, max_step=1e-2
+                GMS(parameters, law="signed"),
+                Slider(1e-3, "sin(50*t)"),
+                0.05,
+                max_step=1e-2,
+                engine=FASTEST,
             )
         except SimulationError as error:
             trace = error.trace
