@@ -52,7 +52,7 @@ def peak(engine: str, transitions: int, **options: float) -> tuple[int, Trace]:
         tracemalloc.stop()
 
 
-@pytest.mark.parametrize(("engine", "transitions"), [compiled, ("ifelse", 800), ("machines", 400)])
+@pytest.mark.parametrize(("engine", "transitions"), [compiled, ("ifelse", 400), ("machines", 200)])
 def test_memory_grows_with_the_log_only(engine: str, transitions: int) -> None:
     run(engine, EACH_PERIOD)  # what is loaded once does not count
     few, first = peak(engine, transitions // 4)

@@ -359,7 +359,7 @@ def test_random_banks_closed_loop(model: GMS, method: str, stiffness: float, out
     )
 
 
-@pytest.mark.parametrize("n", range(1, 13))
+@pytest.mark.parametrize("n", [1, 2, 3, 5, 8, 12])
 def test_any_number_of_elements(n: int) -> None:
     parameters = GMSParameters(
         np.linspace(1, 3, n),
@@ -375,8 +375,18 @@ def test_any_number_of_elements(n: int) -> None:
 
 
 # --------------------------------------------------------------------------- charts of one's own
-@pytest.mark.parametrize("options", ["dp45", "rk4", "dp45 by step", "rk4 by step"])
-@pytest.mark.parametrize("rig", [Prescribed("0.3*sin(2*pi*t/17)"), PulledSlider(1, 2, 0.1)])
+SWINGING, PULLED = Prescribed("0.3*sin(2*pi*t/17)"), PulledSlider(1, 2, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("rig", "options"),
+    [
+        (SWINGING, "dp45"),
+        (SWINGING, "rk4 by step"),
+        (PULLED, "dp45 by step"),
+        (PULLED, "rk4"),
+    ],
+)
 def test_assignments_entry_and_exit(rig: Rig, options: str) -> None:
     for n in (1, 3):
         trace = agreed(wear(n), rig, 40.0, **OPTIONS[options])
