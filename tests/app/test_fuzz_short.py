@@ -1,7 +1,7 @@
 """Whatever the bytes of a text, a scenario file or a trace file, only documented errors answer.
 
 A few hundred inputs each; `make soak` tries them for minutes, with limits on time and memory. The
-inputs that once broke something stand in tests/app/test_fuzz_findings_stay_mended.py.
+inputs that once broke something stand in the test_hostile_* files.
 """
 
 from __future__ import annotations

@@ -40,6 +40,7 @@ from gms_fsm.language import (
     names_in,
     parse_condition,
     parse_value,
+    sgn,
     spell,
     split,
 )
@@ -334,3 +335,7 @@ def test_nested_absolute_values_do_not_multiply() -> None:
         text = f"abs({text})"
     found = _literals(split(parse_condition(f"{text} <= c", NAMES)))
     assert len(found) <= 24, "twice as many with every level: 40 levels never end"
+
+
+def test_the_sign_of_what_is_no_number_is_zero() -> None:
+    assert [sgn(u) for u in (math.nan, 0.0, -0.0, 5e-324, -5e-324)] == [0.0, 0.0, 0.0, 1.0, -1.0]
