@@ -2,6 +2,7 @@
 #   make help    this list
 #   make paper   the paper's two experiments -> folder paper/
 #   make test    all tests
+#   make quick   those that are not slow, in less than a minute
 #   make coverage  all tests, and what of the three packages they run
 #   make lint    formatting, style, types, import contracts
 #   make core    the tests with only the required dependencies
@@ -20,7 +21,7 @@ RUN := $(VENV)/bin
 SOAK_MINUTES ?= 10
 PIP := $(RUN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: help paper test coverage lint core lowest bench soak gallery docs wheel clean
+.PHONY: help paper test quick coverage lint core lowest bench soak gallery docs wheel clean
 .DEFAULT_GOAL := test
 
 $(VENV)/bin/python:
@@ -64,6 +65,9 @@ paper: $(VENV)/all.stamp
 
 test: $(VENV)/dev.stamp
 	$(RUN)/python -m pytest -n auto
+
+quick: $(VENV)/dev.stamp
+	$(RUN)/python -m pytest -n auto -m "not slow"
 
 coverage: $(VENV)/dev.stamp
 	$(RUN)/python -m pytest -n auto --cov --cov-report=term

@@ -11,6 +11,8 @@ from gms_fsm import Prescribed, simulate
 from tests.helpers import stick_slip
 from tests.scenario_files import Answer, CommandLine
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("matplotlib", reason="figures and films need the extra 'plots'")
 pytest.importorskip("pygraphviz", reason="charts need Graphviz, extra 'render'")
 

@@ -118,6 +118,7 @@ def test_help_names_it(gms_fsm: CommandLine) -> None:
     assert "--debug" in gms_fsm("--help").out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("debug", [False, True])
 def test_in_a_shell(debug: bool, tmp_path: Path) -> None:
     done = subprocess.run(

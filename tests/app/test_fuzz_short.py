@@ -33,6 +33,7 @@ def test_trace_files(data: bytes) -> None:
     fuzz.one_trace_file(data)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", fuzz.BODIES)
 def test_the_bodies_reach_both_sides(name: str) -> None:
     """Long random inputs, as `make soak` makes them: some are accepted, most are refused."""

@@ -31,6 +31,7 @@ def test_without_a_number_they_are_listed(gms_fsm: CommandLine) -> None:
         assert lesson.QUESTION in line
 
 
+@pytest.mark.slow
 def test_one_is_run_and_written(gms_fsm: CommandLine) -> None:
     pytest.importorskip("matplotlib", reason="pictures need the extra 'plots'")
     pytest.importorskip("uplot", reason="the replay page needs the extra 'replay'")

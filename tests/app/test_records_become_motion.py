@@ -347,6 +347,7 @@ def test_without_noise_or_dwells_there_is_none() -> None:
     assert steady.standstill == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("per_cycle", [100, 1000, 5000, 50_000])
 def test_a_slow_turn_is_no_noise(per_cycle: int) -> None:
     """A clean sine never stands still, however densely it is sampled."""

@@ -21,6 +21,8 @@ import pytest
 from gms_fsm import Sweep, Trace
 from tests.helpers import ROOT
 
+pytestmark = pytest.mark.slow
+
 PAGE = '''
 """Springs that yield: elastic up to a force, then plastic. The numbers are chosen by us."""
 

@@ -60,6 +60,7 @@ def test_the_scenario_here_is_the_one_of_the_page() -> None:
     assert SCENARIO in blocks
 
 
+@pytest.mark.slow
 def test_table_and_scenario_become_picture_and_summary(
     gms_fsm: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

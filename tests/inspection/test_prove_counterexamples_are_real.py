@@ -22,6 +22,8 @@ from hypothesis import strategies as st
 from gms_fsm import Chart, Finding, Report, State, Transition, prove
 from gms_fsm.language import Value, evaluate, parse_value
 
+pytestmark = pytest.mark.slow
+
 STEP = 2.0**-20  # s
 PASSES = 20
 NAMES = ("z", "v", "s", "v_c")

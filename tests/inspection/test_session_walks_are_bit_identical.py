@@ -18,6 +18,8 @@ from gms_fsm.systems.rigs import Rig
 from gms_fsm.traces.failures import SimulationError
 from tests.helpers import pulled_mass, same_bits
 
+pytestmark = pytest.mark.slow
+
 T_END = 6.0
 OPTIONS: list[dict[str, Any]] = [
     {},

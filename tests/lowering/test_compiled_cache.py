@@ -28,6 +28,8 @@ from integrators import compiled as machine
 from integrators import loop, step_size
 from tests.helpers import ROOT, open_loop, stick_slip
 
+pytestmark = pytest.mark.slow
+
 numba = pytest.importorskip("numba", reason="needs the extra fast")
 
 NOTE = "gms-fsm: compiling the engine, once on this machine"

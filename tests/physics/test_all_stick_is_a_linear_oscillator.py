@@ -11,6 +11,8 @@ from scipy.linalg import expm
 from gms_fsm import Slider, simulate
 from tests.helpers import FASTEST, FIG3_FORCE, non_drifting
 
+pytestmark = pytest.mark.slow
+
 K, D, m = 111.1, 12.1 + 4.0, 1.0
 w = 4 * np.pi
 # State (x, v, 1, t, sin wt, cos wt), t counted from the start of a piece: x'' = row @ state.

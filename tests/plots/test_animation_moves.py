@@ -24,6 +24,8 @@ from plots.animation import animate
 from plots.style import CHART_THEMES
 from tests.helpers import one_element, open_loop, stick_slip
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(autouse=True)
 def _graphviz() -> None:

@@ -21,6 +21,8 @@ from plots import figures, panels
 from plots.schematic import schematic_figure
 from tests.helpers import FIG4_SINE, ROOT, non_drifting, open_loop, pulled_mass, stick_slip
 
+pytestmark = pytest.mark.slow
+
 
 def lugre() -> Trace:
     model = LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4, stribeck=Stribeck(1, 1.5, 1e-3))

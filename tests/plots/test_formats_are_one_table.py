@@ -116,6 +116,7 @@ def test_a_new_format_of_pages(gms_fsm: CommandLine, trace: Trace) -> None:
     one_message(gms_fsm("replay", "t.npz", "-o", "a.txt"), "it must end in", ".html", ".new")
 
 
+@pytest.mark.slow
 def test_a_usual_format_is_written_where_nobody_chooses(gms_fsm: CommandLine, trace: Trace) -> None:
     pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
     register(new("figure", usual=True))

@@ -49,6 +49,8 @@ if MISSING:
 from axe_playwright_python.sync_playwright import Axe  # noqa: E402  # after the skip
 from playwright.sync_api import Browser, Page, expect, sync_playwright  # noqa: E402
 
+pytestmark = pytest.mark.slow
+
 ARGUMENTS = [
     "--no-sandbox",
     "--headless",

@@ -20,6 +20,8 @@ import pytest
 from gms_fsm import Trace, simulate
 from tests.helpers import ROOT, open_loop, stick_slip
 
+pytestmark = pytest.mark.slow
+
 BYTES_A_FIRING = 1000
 PERIOD, EACH_PERIOD = 20.0, 16  # of the sine [s]; four elements, four transitions each
 compiled = pytest.param(

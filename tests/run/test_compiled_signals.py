@@ -24,6 +24,8 @@ from gms_fsm.systems.rigs import Rig
 from gms_fsm.traces.failures import NotFiniteError, SimulationError
 from tests.helpers import event_sequence, non_drifting, same_bits, stick_slip
 
+pytestmark = pytest.mark.slow
+
 numba = pytest.importorskip("numba", reason="needs the extra fast")
 
 Signal = Callable[[float], float]

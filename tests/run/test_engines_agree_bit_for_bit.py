@@ -41,6 +41,7 @@ OPTIONS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "options"),
     [
@@ -74,6 +75,7 @@ def test_fig_3(law, slipping):
     assert (len(both(model, rig, 30.0).transitions) > 0) == slipping
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"method": "bs23"}, FIXED, FIXED | {"events": "step"}])
 def test_pulled_mass(options):
     """Stick-slip in closed loop."""
@@ -107,6 +109,7 @@ def models(draw):
     return GMS(parameters, law=draw(st.sampled_from(["signed", "published"])))
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(models(), st.floats(0.05, 1.0), st.floats(0.5, 5.0))
 def test_random_parameters_open_loop(model, amplitude, period):
@@ -114,6 +117,7 @@ def test_random_parameters_open_loop(model, amplitude, period):
     both(model, Prescribed(f"{amplitude!r}*sin(2*pi*t/{period!r})"), 1.6 * period, rtol=1e-5)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(models().filter(lambda m: m.law == "signed"), st.floats(0.5, 5.0))
 def test_random_parameters_closed_loop(model, stiffness):

@@ -57,6 +57,7 @@ def test_fast_switching_that_goes_somewhere_is_none(engine):
     assert len(trace.transitions) == 1000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_switching_by_the_clock_is_none(engine):
     """Guards of t alone, while nothing moves at all."""

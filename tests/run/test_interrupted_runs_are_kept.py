@@ -24,6 +24,8 @@ from gms_fsm.run._recording import Recorder, _Columns
 from tests.helpers import ROOT, pulled_mass, stick_slip
 from tests.scenario_files import OPEN_LOOP
 
+pytestmark = pytest.mark.slow
+
 ENGINES = [
     "machines",
     "ifelse",

@@ -36,7 +36,10 @@ from tests.helpers import ROOT, pulled_mass, same_bits, stick_slip
 from tests.scenario_files import OPEN_LOOP
 
 PARTS = re.compile(r"\..+\.[0-9a-f]{16}\.gms-fsm-(part|rest)")
-pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and SIGKILL")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and SIGKILL"),
+]
 
 
 # --------------------------------------------------------------------------- who writes what
