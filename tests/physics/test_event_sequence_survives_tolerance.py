@@ -9,6 +9,7 @@ from tests.helpers import FASTEST, event_sequence, pulled_mass
 SHARES = np.random.default_rng(20251203).uniform(0.8, 1.2, size=(25, 4))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shares", SHARES, ids=range(len(SHARES)))
 def test_sequence_and_times(shares):
     """k within 20 % of (40, 30, 20, 10) N/m, w = 1/(4 k), 60 s."""
