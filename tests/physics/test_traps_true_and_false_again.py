@@ -126,6 +126,7 @@ WINDOWS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"rtol": 1e-10, "atol": 1e-13}, {"method": "bs23"}])
 @pytest.mark.parametrize("window", WINDOWS)
 def test_a_break_away_that_a_long_step_steps_over(window, options):

@@ -98,6 +98,7 @@ def _both(case: str, **options: Any) -> tuple[Trace, list[Call]]:
     return other, calls
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", OPTIONS)
 @pytest.mark.parametrize("case", CASES)
 def test_every_callback_sees_what_it_would_have_seen(case: str, options: str) -> None:

@@ -2,7 +2,7 @@
 
 Writers write two known things in turns, again and again, and are killed with SIGKILL at a random
 moment; then every file is the one thing or the other, to the last bit. What a kill leaves besides
-is named ``.<file>.<random>.gms-fsm-part`` and is gone after the next run. About 25 kills here, 200
+is named ``.<file>.<random>.gms-fsm-part`` and is gone after the next run. A dozen kills here, 200
 in tests/soak.py.
 """
 
@@ -36,7 +36,10 @@ from tests.helpers import ROOT, pulled_mass, same_bits, stick_slip
 from tests.scenario_files import OPEN_LOOP
 
 PARTS = re.compile(r"\..+\.[0-9a-f]{16}\.gms-fsm-(part|rest)")
-pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and SIGKILL")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and SIGKILL"),
+]
 
 
 # --------------------------------------------------------------------------- who writes what
@@ -190,6 +193,9 @@ WRITERS = {
 }
 
 
+SHARES = (0.03, 0.47), (0.21, 0.83)  # of a writer's span, for one writer and the next
+
+
 # --------------------------------------------------------------------------- the killed
 # Forking the process of the tests, with its threads, is asking for trouble; so one process is
 # started for it, which loads everything and then forks a writer for each line it reads.
@@ -273,8 +279,10 @@ def _one_nursery() -> Iterator[None]:
     end_nursery()
 
 
-@pytest.mark.parametrize("share", [0.03, 0.21, 0.47, 0.83])
-@pytest.mark.parametrize("name", WRITERS)
+@pytest.mark.parametrize(
+    ("name", "share"),
+    [(name, share) for i, name in enumerate(WRITERS) for share in SHARES[i % 2]],
+)
 def test_killed_at_some_moment(name: str, share: float, tmp_path: Path) -> None:
     if name == "run":
         pytest.importorskip("matplotlib", reason="a run draws figures: needs the extra plots")
