@@ -444,7 +444,7 @@ def _compile_record(
     run = numba.njit(inline="always", **_OPTIONS)(loop.record)  # otherwise it is compiled twice
 
     def record(
-        at: Any, machines: Any, b: Any, log: Any, first: Any, most_steps: Any, pause: Any
+        at: Any, machines: Any, b: Any, log: Any, recorded: Any, most_steps: Any, pause: Any
     ) -> Any:
         functions = Functions(
             at_flow(at.flow), at_arm(at.arm), at_margins(at.margins), at_normal(at.normal), at.p
@@ -452,7 +452,7 @@ def _compile_record(
         switch = Machines(
             at_switch(machines.ask), at_act(machines.act), at_observe(machines.observe)
         )
-        return run(functions, switch, b, log, first, most_steps, pause)
+        return run(functions, switch, b, log, recorded, most_steps, pause)
 
     record.__qualname__ = "record"  # the name in the cache
     start = time.perf_counter()

@@ -56,6 +56,7 @@ __all__ = [
     "Log",
     "Machines",
     "Memory",
+    "Recorded",
     "Switch",
     "record",
     "run_to_event",
@@ -123,6 +124,13 @@ class Buffers(NamedTuple):
     scratch: Scratch
 
 
+class Recorded(NamedTuple):
+    """Where the numbers are that a log stores for each machine."""
+
+    own: list[int]  # place in y of its own variable, -1 if it has none
+    seen: list[list[int]]  # three places among what is observed; the third is read after, too
+
+
 class Log(NamedTuple):
     """Columns that `record` fills: one entry per firing, and both sides of every stop."""
 
@@ -130,7 +138,7 @@ class Log(NamedTuple):
     t: Vector
     machine: list[int]
     edge: list[int]
-    numbers: list[Vector]  # [own variable, seen 0, own seen, seen 1 before, seen 1 after]
+    numbers: list[Vector]  # [own variable, the three of `Recorded.seen`, the third after]
     seen: Vector  # scratch space for `observe`
     rows_microstep: list[int]  # alongside the rows of Output
     rows_mode: list[list[int]]  # of each machine, then for each surface whether it slides
@@ -466,7 +474,7 @@ def record(
     machines: Machines,
     b: Buffers,
     log: Log,
-    first: int,
+    recorded: Recorded,
     most_steps: int,
     pause: bool,
 ) -> int:
@@ -475,15 +483,13 @@ def record(
     Parameters
     ----------
     functions, machines
-        The system. ``observe(t, y, mode, signs, p, seen)`` fills the observed values of a state;
-        the log stores seen[0], seen[1] on both sides of a firing and, for machine i, seen[2 + i]
-        and y[first + i].
+        The system. ``observe(t, y, mode, signs, p, seen)`` fills the observed values of a state.
     b : Buffers
         The state of the run, changed in place.
     log : Log
         Filled; if it has room in ``stops_t``, stops are stored too.
-    first : int
-        Index in y where the machines' own variables start.
+    recorded : Recorded
+        Where the numbers are that the log stores.
     most_steps : int
         Return after about this many steps or events.
     pause : bool
@@ -517,13 +523,13 @@ def record(
         elif event == FIRING:
             if seen_at != t:
                 look(observe, on, t, now.y, now.mode, log.seen)
-            _put_firing(now, counts, log, first)
+            _put_firing(now, counts, log, recorded)
             if pause:
                 return FIRING
         elif event == FIRED:
             look(observe, on, t, now.y, now.mode, log.seen)
             seen_at = t
-            log.numbers[log.counts[FIRINGS]][4] = log.seen[1]
+            log.numbers[log.counts[FIRINGS]][4] = log.seen[recorded.seen[counts[MACHINE]][2]]
             log.counts[FIRINGS] += 1
         elif event == SLID:
             seen_at = float("nan")
@@ -545,17 +551,18 @@ def _is_full(out: Output, log: Log) -> bool:
     return 0 < len(log.stops_t) <= log.counts[STOPS]
 
 
-def _put_firing(now: Now, counts: list[int], log: Log, first: int) -> None:
+def _put_firing(now: Now, counts: list[int], log: Log, recorded: Recorded) -> None:
     """Write the values known before a firing."""
     i, row = counts[MACHINE], log.counts[FIRINGS]
     numbers = log.numbers[row]
     log.t[row] = now.clock[T]
     log.machine[row] = i
     log.edge[row] = counts[EDGE]
-    numbers[0] = now.y[first + i]
-    numbers[1] = log.seen[0]
-    numbers[2] = log.seen[2 + i]
-    numbers[3] = log.seen[1]
+    own, seen = recorded.own[i], recorded.seen[i]
+    numbers[0] = now.y[own] if own >= 0 else float("nan")
+    numbers[1] = log.seen[seen[0]]
+    numbers[2] = log.seen[seen[1]]
+    numbers[3] = log.seen[seen[2]]
 
 
 def _put_stop(

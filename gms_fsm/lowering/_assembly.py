@@ -115,6 +115,8 @@ class Bank:
         In the chart's order.
     start : tuple of (str, Value)
         The assignments at the start of a run.
+    means : mapping of str to Value
+        For each name of the chart what it stands for.
     """
 
     index: int
@@ -131,6 +133,7 @@ class Bank:
     totals: Mapping[str, Value]
     edges: tuple[Edge, ...]
     start: tuple[tuple[str, Value], ...]
+    means: Mapping[str, Value]
 
     @property
     def name(self) -> str:
@@ -426,6 +429,7 @@ class _Reader:
                 for edge in chart.transitions
             ),
             start=steps(("entry", chart.default_state.name)),
+            means=names,
         )
 
     def coefficients(

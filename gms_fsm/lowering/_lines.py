@@ -242,14 +242,16 @@ class Writer:
         own = [(name, j) for j, name in enumerate(self.names.own) if name in needed]
         sizes = [size for size in self.sizes if f"#{size}" in needed]
         lines = []
-        if shared or own or sizes or TABLES in needed:
+        if shared or own or (sizes and len(self.sizes) == 1) or TABLES in needed:
             lines.append(Line("shared, own, tables = p"))
         lines += [Line(f"{self.local(name)} = shared[{j}]") for name, j in shared]
         lines += [Line(f"{self.local(name)} = own[{j}]") for name, j in own]
         for size in sizes:
-            # After the elements' modes come those of the surfaces: len(mode) says nothing.
-            weight = self.read.banks[self.sizes.index(size)].weight
-            lines.append(Line(f"{size} = len(own[{self.names.own.index(weight)}])"))
+            bank = self.read.banks[self.sizes.index(size)]
+            # After the elements' modes come those of the surfaces: len(mode) says nothing. With
+            # several contacts the shorter rows of `own` are padded in machine code.
+            alone = f"len(own[{self.names.own.index(bank.weight)}])"
+            lines.append(Line(f"{size} = {alone if len(self.sizes) == 1 else bank.n}"))
         y = self.layout.y
         lines += [
             Line(f"{self.local(name)} = y[{y.text(name)}]") for name in y.shared if name in needed

@@ -14,7 +14,7 @@ from integrators import LIVE
 
 __all__ = ["FUNCTIONS", "python"]
 
-FUNCTIONS = ("flow", "flow_live", "switch", "act", "observe", "normal", "arm", "margins", "tick")
+FUNCTIONS = ("flow", "flow_live", "switch", "act", "observe", "normal", "arm", "margins", "values")
 
 
 def python(plan: Plan) -> str:
@@ -61,7 +61,7 @@ def python(plan: Plan) -> str:
         printer.normal(),
         printer.arm(),
         printer.margins(),
-        printer.tick(),
+        printer.values(),
     ):
         lines += ["", "", *function]
     return "\n".join(lines) + "\n"
@@ -612,11 +612,31 @@ class _Printer(Writer):
             Line(f"    out[{index}] = {margin}", sizes | reads),
         ]
 
-    def tick(self) -> list[str]:
+    def values(self) -> list[str]:
+        shown, late = self.layout.shown, []
+        for name in shown.shared:
+            late.append(frozenset({name}) if name in self.late else frozenset())
+        lines = self.before_guards(late)
+        for bank in self.read.banks:
+            start = of(bank.name, "")
+            for name in shown.shared:
+                if name.startswith(start):
+                    tree = bank.means[name.removeprefix(start)]
+                    lines.append(self.put(f"out[{shown.text(name)}]", tree))
+            rows = []
+            for name in shown.blocks[bank.index].names:
+                place, sizes = self.at("out", shown, name)
+                means = bank.means.get(name.removeprefix(start))
+                if means is None or name not in self.read.owner:
+                    rows.append(Line(f"{place} = nan", sizes))
+                else:
+                    line = self.put(place, means)
+                    rows.append(Line(line.text, line.reads | sizes))
+            lines += self.loop(bank.index, "live", rows)
         return self.function(
-            "tick(sampler, t, y, mode, p)",
-            "Take the updates of a sampled controller.",
-            [],
+            "values(t, y, mode, p, out)",
+            "out = what guards can read besides variables and parameters.",
+            lines,
             "live",
         )
 

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Generic, NamedTuple, TypeVar
 
+from gms_fsm.language import names_in
 from gms_fsm.lowering._assembly import Assembly, Bank, of
 
 __all__ = ["LOG_NUMBERS", "LOG_TEXTS", "BankPlaces", "Block", "Layout", "LogRecord", "Places"]
@@ -289,16 +290,28 @@ class BankPlaces:
         Machine number of its first element.
     variables : tuple of str
         The chart's, without the contact's name.
+    velocity : str
+        What the chart calls its velocity, the first one.
     """
 
     name: str
     n: int
     first: int
     variables: tuple[str, ...]
+    velocity: str
 
     def of(self, name: str) -> str:
         """Return what a name of the contact is called in the layout."""
         return of(self.name, name)
+
+    def plain(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the values of the contact by their names without the contact's."""
+        start = self.of("")
+        return {
+            name.removeprefix(start): value
+            for name, value in values.items()
+            if name.startswith(start)
+        }
 
     @property
     def elements(self) -> slice:
@@ -316,10 +329,15 @@ class Layout:
         State vector.
     observed : Places
         Observed quantities.
+    shown : Places
+        What guards, and the machines' elements, can read besides variables and parameters.
     banks : tuple of BankPlaces
         The contacts.
     surfaces : int
         Number of surfaces on which the motion can slide.
+    keys : mapping of str to str
+        For what a user may call a component of the state vector its name there: ``load.x`` for the
+        position of the body load, and where there is one contact ``z`` for its variable z.
 
     Examples
     --------
@@ -334,8 +352,10 @@ class Layout:
 
     y: Places[str]
     observed: Places[str]
+    shown: Places[str]
     banks: tuple[BankPlaces, ...]
     surfaces: int
+    keys: Mapping[str, str]
 
     @classmethod
     def of(cls, read: Assembly, surfaces: int) -> Layout:
@@ -356,7 +376,8 @@ class Layout:
         system, banks, first = read.system, [], 0
         for bank in read.banks:
             variables = bank.chart.variables
-            banks.append(BankPlaces(bank.name, bank.n, first, variables))
+            velocity = bank.chart.velocities[0]
+            banks.append(BankPlaces(bank.name, bank.n, first, variables, velocity))
             first += bank.n
         moved = (
             name
@@ -380,12 +401,30 @@ class Layout:
             )
             for bank, size in zip(read.banks, sizes, strict=True)
         )
+        y = Places((*moved, *system.flow, *updated), blocks)
+        keys = {name: name for name, _ in y}
+        for body in system.bodies:
+            keys |= {f"{body.name}.x": body.x, f"{body.name}.v": body.v}
+        if len(banks) == 1:
+            keys |= {name: of(banks[0].name, name) for name in banks[0].variables}
         return cls(
-            Places((*moved, *system.flow, *updated), blocks),
+            y,
             Places(tuple(name for bank in read.banks for name in observed_of(bank)), seen),
+            shown_of(read),
             tuple(banks),
             surfaces,
+            {key: name for key, name in keys.items() if name in y.shared or name in y.own},
         )
+
+    def label(self, name: str) -> str:
+        """Return what a component of the state vector is called for the user."""
+        return name.split(".", 1)[-1] if len(self.banks) == 1 else name
+
+    @property
+    def only(self) -> BankPlaces:
+        """The contact, of a system that has just one."""
+        (bank,) = self.banks
+        return bank
 
     @cached_property
     def n(self) -> int:
@@ -395,6 +434,26 @@ class Layout:
     def bank(self, machine: int) -> BankPlaces:
         """Return the contact of a machine, which are counted over all contacts."""
         return next(bank for bank in self.banks if machine < bank.first + bank.n)
+
+    def recorded(self) -> tuple[list[int], list[list[int]]]:
+        """Return where the numbers of `LogRecord` are for each machine: in y, and observed.
+
+        Returns
+        -------
+        list of int
+            Place in y of its first variable; -1 if its chart has none.
+        list of list of int
+            Places of v, s and F among the observed quantities.
+        """
+        own: list[int] = []
+        seen: list[list[int]] = []
+        for bank in self.banks:
+            v, F = (self.observed.shared.index(bank.of(name)) for name in (bank.velocity, "F"))
+            for i in range(bank.n):
+                first = bank.variables[:1]
+                own += [self.y.index(bank.of(name), i) for name in first] or [-1]
+                seen.append([v, self.observed.index(bank.of("s"), i), F])
+        return own, seen
 
     # ------------------------------------------------------------------ modes
     @cached_property
@@ -441,6 +500,23 @@ def observed_of(bank: Bank) -> tuple[str, ...]:
     if bank.chart.locks:
         names += [f"{force} shared" for force in bank.forces]
     return tuple(names)
+
+
+def shown_of(read: Assembly) -> Places[str]:
+    """Lay out what guards, and the machines' elements, can read."""
+    shared: list[str] = []
+    blocks: list[Block[str]] = []
+    for bank, size in zip(read.banks, sizes_of(read.banks), strict=True):
+        guards = frozenset[str]().union(*(names_in(edge.guard) for edge in bank.edges))
+        late = [name for name in (*bank.forces, *bank.rates) if name in guards]
+        names = ["x", *bank.chart.velocities, *bank.chart.inputs]
+        lets = [of(bank.name, name) for name in bank.chart.let]
+        shared += [of(bank.name, name) for name in dict.fromkeys(names) if name not in ("t", "s")]
+        shared += [*late, *(name for name in lets if name not in read.owner)]
+        own = [name for name in lets if name in read.owner]
+        threshold = of(bank.name, "s")
+        blocks.append(Block(tuple(dict.fromkeys([threshold, *own])), bank.n, size))
+    return Places(tuple(shared), tuple(blocks))
 
 
 class LogRecord(NamedTuple):

@@ -25,15 +25,18 @@ from gms_fsm.language import (
     Value,
     comparisons,
     derivative,
+    evaluate,
     names_in,
     renamed,
     spell,
     split,
 )
+from gms_fsm.lowering._assembly import assembled, of
 from gms_fsm.lowering._generated import load
 from gms_fsm.systems.models import Model
+from gms_fsm.systems.system import Contact, System
 
-__all__ = ["Scales", "Setting", "Tolerance", "scales_of"]
+__all__ = ["Scales", "Setting", "SystemScales", "Tolerance", "scales_of", "scales_of_system"]
 
 T = TypeVar("T")
 Tolerance: TypeAlias = float | Mapping[str, ArrayLike] | None  # absolute, as given
@@ -92,13 +95,13 @@ class Scales:
         return {name: [SHARE * rtol * u for u in row] for name, row in scales.items()}
 
 
-def scales_of(model: Model) -> Scales:
-    """Return the scales of a model.
+def scales_of(model: Model | Contact) -> Scales:
+    """Return the scales of a model, or of a contact.
 
     Parameters
     ----------
-    model : Model
-        Any model.
+    model : Model or Contact
+        Any of them.
 
     Returns
     -------
@@ -109,20 +112,25 @@ def scales_of(model: Model) -> Scales:
 
 
 @functools.lru_cache(maxsize=64)
-def _scales_of(key: _Same[Model]) -> Scales:
+def _scales_of(key: _Same[Model | Contact]) -> Scales:
     model = key.it
+    if isinstance(model, Contact) and model.model is not None:
+        return scales_of(model.model)
     chart = model.chart
     sizes = _sizes(_Same(chart))
-    curve = model.stribeck if "s" in chart.inputs else None
+    curve, weights = None, np.ones(1)
+    if not isinstance(model, Contact) and "s" in chart.inputs:
+        curve, weights = model.stribeck, model.weights
     numbers = [as_floats(np.broadcast_to(value, model.n)) for value in model.values.values()]
-    thresholds = [0.0] * model.n if curve is None else as_floats(model.weights * curve.F_c)
+    thresholds = [0.0] * model.n if curve is None else as_floats(weights * curve.F_c)
     found: dict[str, list[float]] = {name: [] for name in ("x", "v", *chart.variables)}
     lengths: list[float] = []
     for values in zip(thresholds, *numbers, strict=True):
         for name, row in found.items():
             reaches = [_quotient(height, slope, values) for height, slope in sizes.reach[name]]
-            if curve is not None and name in sizes.stiffness:
-                reaches.append(_divided(curve.F_c, _number(sizes.stiffness[name], values)))
+            if curve is not None:
+                slopes = sizes.stiffness.get(name, ())
+                reaches += [_divided(curve.F_c, _number(slope, values)) for slope in slopes]
             row.append(min((u for u in reaches if u > 0.0), default=0.0))
         for name, follows in sizes.follows.items():
             most = max(abs(_number(rate, values)) for rate in follows)
@@ -143,6 +151,68 @@ def _scales_of(key: _Same[Model]) -> Scales:
     return Scales(least_x, least_v, variables, slowest, time)
 
 
+@dataclass(frozen=True)
+class SystemScales:
+    """Scales of a system's components; 0 for one without a scale.
+
+    Parameters
+    ----------
+    sizes : mapping of str to list of float
+        By name in the layout; one per element for variables.
+    time : float
+        s: relaxation time of the fastest flow; 0 if there is none.
+    """
+
+    sizes: Mapping[str, list[float]]
+    time: float
+
+    def tolerances(self, rtol: float) -> dict[str, list[float]]:
+        """Return the default absolute tolerances by name, as `Scales.tolerances` does."""
+        return {name: [SHARE * rtol * u for u in row] for name, row in self.sizes.items()}
+
+
+def scales_of_system(system: System) -> SystemScales:
+    """Return the scales of a system.
+
+    Parameters
+    ----------
+    system : System
+        What runs.
+
+    Returns
+    -------
+    SystemScales
+        Those of its contacts; a body's are the smallest of the contacts it takes part in.
+    """
+    read = assembled(system)
+    sizes: dict[str, list[float]] = {}
+    times: list[float] = []
+    moved: dict[str, tuple[list[float], list[float]]] = {b.name: ([], []) for b in system.bodies}
+    for bank in read.banks:
+        scales = scales_of(bank.contact)
+        times.append(scales.time)
+        for name in bank.chart.variables:
+            sizes[of(bank.name, name)] = [*scales.variables[name]]
+        for body, coefficient in bank.jacobian[0].items():
+            ratio = _constant(coefficient, system)
+            moved[body][0].append(_divided(scales.x, ratio))
+            moved[body][1].append(_divided(scales.v, ratio))
+    for body in system.bodies:
+        for name, found in zip((body.x, body.v), moved[body.name], strict=True):
+            sizes[name] = [min((u for u in found if u > 0.0), default=0.0)]
+    for name in (*system.flow, *(name for each in system.sampled for name in each.updates)):
+        sizes[name] = [0.0]
+    return SystemScales(sizes, min((u for u in times if u > 0.0), default=0.0))
+
+
+def _constant(tree: Value, system: System) -> float:
+    """Return the value of a coefficient; 0 if it cannot be computed."""
+    try:
+        return float(evaluate(tree, system.numbers))
+    except (ArithmeticError, ValueError, KeyError):
+        return 0.0
+
+
 # --------------------------------------------------------------------------- derived from a chart
 Numbers = Callable[..., float]  # of the threshold s and the parameters
 
@@ -152,7 +222,7 @@ class _Sizes:
     """Functions of a chart's parameters, all evaluated at rest in the origin."""
 
     reach: Mapping[str, Sequence[tuple[Numbers, Numbers]]]  # margins of guards, and their slopes
-    stiffness: Mapping[str, Numbers]  # slopes of the force
+    stiffness: Mapping[str, Sequence[Numbers]]  # slopes of the forces
     follows: Mapping[str, Sequence[Numbers]]  # slope of a variable with respect to x, by state
     paces: Sequence[Numbers]  # relaxation rates of the variables and of v
 
@@ -175,7 +245,12 @@ def _sizes(key: _Same[Chart]) -> _Sizes:
     chart = key.it
     states = ("x", "v", *chart.variables)
     rates = [f"d{name}" for name in chart.variables]
-    rest: dict[str, Value] = dict.fromkeys(("t", *states, *rates), Number(0.0))
+    others = [name for name in (*chart.inputs, *chart.velocities) if name != "s"]
+    zero_at_rest = ("t", *states, *rates, *others)
+    rest: dict[str, Value] = dict.fromkeys(zero_at_rest, Number(0.0))
+    lets: dict[str, Value] = {}
+    for name, tree in chart.lets.items():
+        lets[name] = renamed(tree, lets)
     arguments = ", ".join(("s", *chart.parameter_names))
 
     def function(tree: Value, *, moving: bool = False) -> Numbers:
@@ -186,10 +261,15 @@ def _sizes(key: _Same[Chart]) -> _Sizes:
         return made
 
     guards = chart.guards.values()
+    late = {*chart.force_names, *chart.rate_names} - {*chart.parameter_names}
+    pairs = dict.fromkeys(c for guard in guards for c in comparisons(split(guard)))
     margins = [
-        Binary("-", each.left, each.right)
-        for each in dict.fromkeys(c for guard in guards for c in comparisons(split(guard)))
+        margin
+        for each in pairs
+        if not names_in(margin := renamed(Binary("-", each.left, each.right), lets)) & late
     ]
+    forces = dict.fromkeys(renamed(tree, lets) for tree in chart.forces.values() if tree)
+    flows = {key: renamed(tree, lets) for key, tree in chart.flows.items()}
     reach = {
         name: [
             (function(margin), function(slope))
@@ -199,21 +279,24 @@ def _sizes(key: _Same[Chart]) -> _Sizes:
         for name in states
     }
     stiffness = {
-        name: function(slope)
+        name: [
+            function(slope)
+            for force in forces
+            if (slope := derivative(force, name)) is not None
+        ]
         for name in chart.variables
-        if (slope := derivative(chart.forces["F"], name)) is not None
     }
     follows = {
         name: [
             function(rate)
             for state in chart.states
-            if (rate := derivative(chart.flows[state.name, name], "v")) is not None
+            if (rate := derivative(flows[state.name, name], "v")) is not None
         ]
         for name in chart.variables
     }
     paces = [
         function(rate, moving=True)
-        for (_, name), flow in chart.flows.items()
+        for (_, name), flow in flows.items()
         if (rate := derivative(flow, name)) is not None
     ]
     return _Sizes(reach, stiffness, {name: row for name, row in follows.items() if row}, paces)

@@ -102,13 +102,12 @@ class CompiledRun:
         columns = self.columns
         columns.make_room()
         b, start, before = columns.buffers, columns.start, columns.latest
-        layout = start.program.layout
         try:
             flow, arm, margins, normal, *machines = self.code
             functions = Functions(flow, arm, margins, normal, columns.p)
-            first, pause = layout.y.index(layout.variable), self.engine is not None
+            switch, pause = loop.Machines(*machines), self.engine is not None
             event = record(
-                (functions, loop.Machines(*machines), b, columns.log, first, STEPS_AT_ONCE, pause),
+                (functions, switch, b, columns.log, columns.recorded, STEPS_AT_ONCE, pause),
                 compiled.store(),
                 compiled.tell,
             )
@@ -175,6 +174,7 @@ class Columns:
         ints: Any = functools.partial(np.zeros, dtype=np.int64)
         out = b.out._replace(rows_t=floats(rows), rows_y=floats((rows, size)))
         self.buffers: hybrid.Buffers = b._replace(out=out)
+        ints_of: Any = functools.partial(np.array, dtype=np.int64)
         self.log = loop.Log(
             counts=ints(2),
             t=floats(256),
@@ -189,6 +189,7 @@ class Columns:
             stops_y=floats((stops, size)),
             stops_mode=ints((stops, modes)),
         )
+        self.recorded = loop.Recorded(*(ints_of(each) for each in layout.recorded()))
         if stops:
             self.log.stops_t[0], self.log.stops_y[0] = start.t_start, self.buffers.now.y
             self.log.stops_mode[0] = list(layout.not_sliding(start.mode))

@@ -232,7 +232,7 @@ class MachineEngine:
         self.machines, self.program = machines, program
         self.chart = machines.model.chart
         self.table = machines.table(self.chart)
-        self.seen, self.live = [0.0] * program.layout.observed.size, program.live
+        self.shown = [0.0] * program.layout.shown.size
         self.values = GuardValues(program.layout)
         # Bypasses __setattr__ of the elements, which would cost time.
         self.seen_by = [vars(element) for element in machines.elements]
@@ -257,8 +257,8 @@ class MachineEngine:
     def show(self, t: float, y: list[float], mode: list[int]) -> None:
         """Show the present values to every element."""
         program = self.program
-        program.ieee["observe"](t, y, mode, self.live, program.p, self.seen)
-        self.values.put(t, y, self.seen, self.seen_by)
+        program.ieee["values"](t, y, mode, program.p, self.shown)
+        self.values.put(t, y, self.shown, self.seen_by)
 
     def ask(
         self, t: float, y: list[float], mode: list[int], p: Arguments, edges: list[int]

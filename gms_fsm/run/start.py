@@ -15,11 +15,12 @@ from gms_fsm.errors import ParameterError, SignalError, shown
 from gms_fsm.lowering._pulses import waking_times
 from gms_fsm.lowering.layout import Layout
 from gms_fsm.lowering.program import Program, arguments, lower
-from gms_fsm.lowering.scales import Setting, Tolerance, scales_of
+from gms_fsm.lowering.scales import Setting, Tolerance, scales_of_system
 from gms_fsm.run.settings import Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Corners, Formula
+from gms_fsm.systems.system import System, system_of
 from integrators import Options
 
 __all__ = ["Start"]
@@ -29,28 +30,31 @@ LATEST = 1e9  # s; one tick of a double is then 1e-7 s
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A model on a rig, ready to run.
+    """A system ready to run.
 
     Parameters
     ----------
+    system : System
+        What runs.
     model, rig
-        The model and the rig.
+        What it was made from; None for a system of the user's.
     program : Program
-        Their generated text.
+        Its generated program.
     t_start, t_end, last : float
-        s; `last` is earlier than t_end where a sampled signal ends.
+        s; `last` is earlier than t_end if a sampled signal ends earlier.
     y : list of float, shape (m,)
         Initial state.
     mode : list of int, shape (n,)
         Initial states of the elements.
     options : integrators.Options
-        How to integrate.
+        Options of the integration.
     settings : mapping
         As recorded in the trace.
     chosen : Settings
         As given.
     """
 
+    system: System
     model: Model
     rig: Rig
     program: Program
@@ -65,15 +69,15 @@ class Start:
 
     @property
     def output(self) -> str:
-        """What to record: ``"all"``, ``"t_eval"`` or ``"end"``."""
-        assert self.chosen.output is not None  # set by Settings
+        """Rows to keep: ``"all"``, ``"t_eval"`` or ``"end"``."""
+        assert self.chosen.output is not None  # Settings fills it in
         return self.chosen.output
 
     @classmethod
     def of(
         cls,
-        model: Model,
-        rig: Rig,
+        model: Model | System,
+        rig: Rig | None,
         t_end: float,
         settings: Settings | None = None,
         *,
@@ -88,38 +92,45 @@ class Start:
         model, rig, t_end, t_start, initial
             See `gms_fsm.simulate`.
         settings : Settings, optional
-            How to integrate; the defaults if omitted.
+            Method, tolerances and output; the defaults if omitted.
         rows_at_once : int
             Maximum number of steps in an arc.
 
         Returns
         -------
         Start
-            Ready to run.
+            Complete.
 
         Raises
         ------
         ParameterError, SignalError
-            If an argument violates its rule.
+            If an argument breaks its rule.
         """
-        for what, given, mark, example in (
-            ("model", model, "chart", "GMS(parameters, law='signed')"),
-            ("rig", rig, "signals", "Prescribed('0.1*sin(t)')"),
-        ):
-            if not hasattr(given, mark):
-                raise ParameterError(
-                    f"it must be a {what}, for example {example}", place=what, value=given
-                )
+        if isinstance(model, System):
+            system = model
+        else:
+            for what, given, mark, example in (
+                ("model", model, "chart", "GMS(parameters, law='signed')"),
+                ("rig", rig, "signals", "Prescribed('0.1*sin(t)')"),
+            ):
+                if not hasattr(given, mark):
+                    raise ParameterError(
+                        f"it must be a {what}, for example {example}", place=what, value=given
+                    )
+            assert rig is not None
+            system = system_of(model, rig)
         chosen = Settings() if settings is None else settings
         t_start, t_end = _times(t_start, t_end)
         _check_resolution(chosen, t_start, t_end)
-        scales = scales_of(model)
-        tolerances, used = _tolerances(model, rig, chosen.atol, scales.tolerances(chosen.rtol))
+        program = lower(system)
+        scales = scales_of_system(system)
+        default = scales.tolerances(chosen.rtol)
+        tolerances, used = _tolerances(program.layout, chosen.atol, default)
         method = chosen.method
         if not isinstance(method, str) and min(tolerances) == 0.0:
             raise ParameterError(
                 f"method {method.__name__} needs an absolute tolerance, and the chart "
-                "gives no scale for some component",
+                "gives no scale for every component",
                 advice="give one, for example atol=1e-9, or by name atol={'x': 1e-9}",
             )
         options = Options(
@@ -134,9 +145,9 @@ class Start:
             [] if chosen.output == "end" else _wanted(chosen, t_start, t_end),
             rows_at_once,
         )
-        last = _covered(rig, t_start, t_end)
-        program = _watchful(lower(model, rig), rig, t_start, last)
-        y, mode = _initial(model, rig, {} if initial is None else initial)
+        last = _covered(system, t_start, t_end)
+        program = _watchful(program, system, t_start, last)
+        y, mode = _initial(system, program, t_start, {} if initial is None else initial)
         kept: dict[str, Setting] = {
             "method": chosen.method_name,
             "step": chosen.step,
@@ -149,7 +160,10 @@ class Start:
             "t_start": t_start,
             "t_end": t_end,
         }
-        return cls(model, rig, program, t_start, t_end, last, y, mode, options, kept, chosen)
+        made_of: Any = (None, None) if isinstance(model, System) else (model, rig)
+        return cls(
+            system, *made_of, program, t_start, t_end, last, y, mode, options, kept, chosen
+        )
 
     def with_numbers(self, model: Model, rig: Rig) -> Start:
         """Return the same start with different numbers; signals and initial values stay.
@@ -164,14 +178,16 @@ class Start:
         Start
             With the tolerances of the new model.
         """
-        scales = scales_of(model)
+        system = system_of(model, rig)
+        scales = scales_of_system(system)
         default = scales.tolerances(self.options.rtol)
-        tolerances, used = _tolerances(model, rig, self.chosen.atol, default)
+        tolerances, used = _tolerances(self.program.layout, self.chosen.atol, default)
         return replace(
             self,
+            system=system,
             model=model,
             rig=rig,
-            program=replace(self.program, p=arguments(model, rig)),
+            program=replace(self.program, p=arguments(system)),
             options=replace(self.options, atol=tolerances, time_scale=scales.time),
             settings={**self.settings, "atol": used},
         )
@@ -217,44 +233,52 @@ def _wanted(chosen: Settings, t_start: float, t_end: float) -> list[float] | Non
 
 
 def _tolerances(
-    model: Model, rig: Rig, atol: Tolerance, default: Mapping[str, list[float]]
+    layout: Layout, atol: Tolerance, default: Mapping[str, list[float]]
 ) -> tuple[list[float], float | dict[str, float | list[float]]]:
     """Return the absolute tolerance of each component, and how to record them in the settings."""
-    places = Layout.state(model, rig)
+    places = layout.y
     if atol is not None and not isinstance(atol, Mapping):
         return [atol] * places.size, atol
     rows = {name: default[name] for name in (*places.shared, *places.own)}
     by_name: Mapping[str, Any] = {} if atol is None else atol
-    for name, given in by_name.items():
-        if name not in rows:
-            raise ParameterError(
-                f"atol has the key {shown(name)}", advice=f"known are {', '.join(map(repr, rows))}"
-            )
+    for key, given in by_name.items():
+        name = _component(layout, key, "atol")
         if np.ndim(given) == 0:
-            rows[name] = [checked_scalar(f"atol[{name!r}]", given, "> 0")] * len(rows[name])
+            rows[name] = [checked_scalar(f"atol[{key!r}]", given, "> 0")] * len(rows[name])
         else:
-            rows[name] = as_floats(checked_array(f"atol[{name!r}]", given, len(rows[name]), "> 0"))
-    used: dict[str, float | list[float]] = {
+            rows[name] = as_floats(checked_array(f"atol[{key!r}]", given, len(rows[name]), "> 0"))
+    found: dict[str, float | list[float]] = {
         name: row if name in places.own else row[0] for name, row in rows.items()
     }
-    return places.joined(used), used
+    used = {layout.label(name): row for name, row in found.items()}
+    return places.joined(found), used
 
 
-def _watchful(program: Program, rig: Rig, t_start: float, t_end: float) -> Program:
+def _component(layout: Layout, key: object, owner: str) -> str:
+    """Return the name in the layout of what a user calls a component."""
+    if not isinstance(key, str) or key not in layout.keys:
+        known = [layout.label(name) for name in (*layout.y.shared, *layout.y.own)]
+        raise ParameterError(
+            f"{owner} has the key {shown(key)}", advice=f"known are {', '.join(map(repr, known))}"
+        )
+    return layout.keys[key]
+
+
+def _watchful(program: Program, system: System, t_start: float, t_end: float) -> Program:
     """Return the program with the times at which its formulas start to change as knots."""
     times = {
         time
-        for signal in rig.signals.values()
+        for signal in system.signals.values()
         if isinstance(signal, Formula)
         for time in waking_times(signal.tree, t_start, t_end)
     }
     return replace(program, knots=sorted({*program.knots, *times})) if times else program
 
 
-def _covered(rig: Rig, t_start: float, t_end: float) -> float:
+def _covered(system: System, t_start: float, t_end: float) -> float:
     """Return the last time covered by all sampled signals."""
     last = t_end
-    for name, signal in rig.signals.items():
+    for name, signal in system.signals.items():
         if isinstance(signal, Corners) and not signal.held:
             if not signal.times[0] <= t_start < signal.times[-1]:
                 raise SignalError(
@@ -266,40 +290,73 @@ def _covered(rig: Rig, t_start: float, t_end: float) -> float:
     return last
 
 
-def _initial(model: Model, rig: Rig, initial: Mapping[str, Any]) -> tuple[list[float], list[int]]:
+def _initial(
+    system: System, program: Program, t_start: float, initial: Mapping[str, Any]
+) -> tuple[list[float], list[int]]:
     """Build the state vector and the modes."""
-    chart, n = model.chart, model.n
-    known = ("x", "v", *chart.variables, "states")
+    layout = program.layout
     if not isinstance(initial, Mapping):
         raise ParameterError(
             "it must be a mapping, for example {'x': 0}", place="initial", value=initial
         )
-    for name in initial:
-        if name not in known:
-            raise ParameterError(
-                f"initial has the key {shown(name)}",
-                advice=f"known are {', '.join(map(repr, known))}",
+    names: dict[str, Any] = {}
+    given: dict[str, Any] = {}
+    for key, value in initial.items():
+        contact = key.removesuffix("states").removesuffix(".") if isinstance(key, str) else ""
+        if key == "states" and len(layout.banks) == 1:
+            names[layout.banks[0].name] = value
+        elif isinstance(key, str) and key == f"{contact}.states":
+            names[system.contact(contact).name] = value
+        elif key in layout.keys:
+            given[layout.keys[key]] = value
+        else:
+            reason, advice = _unknown_initial(system, layout, key, value)
+            raise ParameterError(reason, advice=advice)
+    y: dict[str, Any] = {name: 0.0 for name in layout.y.shared}
+    for each in system.sampled:
+        y |= each.initial
+    for name in layout.y.shared:
+        if name in given:
+            y[name] = checked_scalar(f"initial[{name!r}]", given[name], "finite")
+    for bank in layout.banks:
+        for variable in bank.variables:
+            name, label = bank.of(variable), layout.label(bank.of(variable))
+            values = checked_array(
+                f"initial[{label!r}]", given.get(name, [0.0] * bank.n), None, "finite"
             )
-    places = Layout.state(model, rig)
-    y: dict[str, Any] = {
-        name: checked_scalar(f"initial[{name!r}]", initial.get(name, 0.0), "finite")
-        for name in places.shared
-    }
-    if "v" in initial and "v" not in y:
-        raise ParameterError(
-            f"initial has 'v' = {shown(initial['v'])}, but the rig prescribes the velocity",
-            advice="leave it out",
-        )
-    for name in chart.variables:
-        values = checked_array(f"initial[{name!r}]", initial.get(name, [0.0] * n), None, "finite")
-        if values.size != n:
+            if values.size != bank.n:
+                raise ParameterError(
+                    f"initial[{label!r}] has {values.size} entries",
+                    advice=f"the model has {bank.n} elements",
+                )
+            y[name] = as_floats(values)
+    state, mode = layout.y.joined(y), list[int]()
+    for bank, contact in zip(layout.banks, system.contacts, strict=True):
+        chart = contact.chart
+        default = [chart.default_state.name] * bank.n
+        wanted = names.get(bank.name, default)
+        if isinstance(wanted, str) or np.ndim(wanted) != 1 or len(wanted) != bank.n:
+            label = "states" if len(layout.banks) == 1 else f"{bank.name}.states"
             raise ParameterError(
-                f"initial[{name!r}] has {values.size} entries", advice=f"the model has {n} elements"
+                f"it must list {bank.n} state names", place=f"initial[{label!r}]", value=wanted
             )
-        y[name] = as_floats(values)
-    names: Any = initial.get("states", [chart.default_state.name] * n)
-    if isinstance(names, str) or np.ndim(names) != 1 or len(names) != n:
-        raise ParameterError(
-            f"it must list {n} state names", place="initial['states']", value=names
-        )
-    return places.joined(y), [chart.state_index(str(name)) for name in names]
+        mode += [chart.state_index(str(name)) for name in wanted]
+    return state, mode
+
+
+def _unknown_initial(
+    system: System, layout: Layout, key: object, value: object
+) -> tuple[str, str]:
+    """Say what is wrong with a key of the initial values, and what to do."""
+    for body in system.bodies:
+        if body.driven and key in (body.v, f"{body.name}.v"):
+            whose = "the rig prescribes the velocity" if body.velocity == "v" else (
+                f"the velocity of {body.name} is given"
+            )
+            return f"initial has {key!r} = {shown(value)}, but {whose}", "leave it out"
+    known = [layout.label(name) for name in (*layout.y.shared, *layout.y.own)]
+    states = ["states"] if len(layout.banks) == 1 else [f"{b.name}.states" for b in layout.banks]
+    return (
+        f"initial has the key {shown(key)}",
+        f"known are {', '.join(map(repr, [*known, *states]))}",
+    )

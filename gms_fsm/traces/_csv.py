@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from gms_fsm._files import in_turn, leftovers, written_together
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import TraceFileError
-from gms_fsm.lowering.layout import LOG_NUMBERS, LOG_TEXTS, Layout, Places
+from gms_fsm.lowering.layout import LOG_NUMBERS, LOG_TEXTS, Layout
+from gms_fsm.lowering.program import lower
 from gms_fsm.systems.models import Model
 from gms_fsm.traces._header import Header
 from gms_fsm.traces._log import log_from
@@ -69,7 +70,7 @@ def read(path: Path) -> Parts:
             table = _read_columns(file, path, 2)
         log = _read_columns(io.StringIO(_log_of(path, header.log)), log_path(path), 1)
     model, rig = header.to_model(), header.to_rig()
-    rows = _rows(table, model, Layout.state(model, rig))
+    rows = _rows(table, model, lower(model, rig).layout)
     observed = {
         "v": _numbers(table, "v"),
         "F": _numbers(table, "F"),
@@ -89,8 +90,12 @@ def _header(path: Path, line: str) -> Header:
     return Header.model_validate_json(line[2:])
 
 
-def _rows(table: Mapping[str, list[str]], model: Model, places: Places[str]) -> Rows:
-    y = [_numbers(table, name if i is None else column_name(name, i)) for name, i in places]
+def _rows(table: Mapping[str, list[str]], model: Model, layout: Layout) -> Rows:
+    start = layout.only.of("")
+    y = [
+        _numbers(table, name if i is None else column_name(name.removeprefix(start), i))
+        for name, i in layout.y
+    ]
     states = [state.name for state in model.chart.states]
     mode = [[states.index(c) for c in table[column_name("state", i)]] for i in range(model.n)]
     slid = sum(name.startswith("slides") and name[6:].isdigit() for name in table)

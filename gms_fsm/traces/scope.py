@@ -171,7 +171,7 @@ class Scope:
             With numbers as values.
         """
         layout = program.layout
-        seen = layout.observed.named(observe(program, t, y, mode))
+        seen = layout.only.plain(layout.observed.named(observe(program, t, y, mode)))
         return cls(model, layout, t, y, seen, mode)
 
     @classmethod
@@ -237,7 +237,7 @@ class Scope:
     @property
     def z(self) -> Any:
         """The chart's first variable, one per element."""
-        return self.each(self.layout.variable)
+        return self.each(self.layout.only.variables[0])
 
     @property
     def s(self) -> Any:
@@ -271,8 +271,9 @@ class Scope:
         sequence of float, or ndarray, shape (n, rows)
             One per element.
         """
-        if name in self.layout.y.own:
-            return self.y[self.layout.y.block(name)]
+        bank = self.layout.only
+        if name in bank.variables:
+            return self.y[self.layout.y.block(bank.of(name))]
         return self.seen[name]
 
     # ------------------------------------------------------------------ by name
@@ -290,7 +291,7 @@ class Scope:
             Values by name.
         """
         values = {"t": self.t, "x": self.x, "v": self.v, "s": self.s[element]}
-        for name in self.layout.y.own:
+        for name in self.layout.only.variables:
             values[name] = self.each(name)[element]
         return values | parameter_values(self.model, element)
 
@@ -307,7 +308,7 @@ class Scope:
         if self.model.stribeck is not None:
             values["s"] = self.curve
         if self.model.n == 1:
-            values |= {name: self.each(name)[0] for name in self.layout.y.own}
+            values |= {name: self.each(name)[0] for name in self.layout.only.variables}
             values["state(0)"] = self.states[0]  # the value of `state`
         return values
 
@@ -325,7 +326,7 @@ class Scope:
             Values by name. State names are under ``state(1)``, those of each element under
             ``state(0)``.
         """
-        own = {name: self.each(name) for name in (*self.layout.y.own, *_curve(self.model))}
+        own = {name: self.each(name) for name in (*self.layout.only.variables, *_curve(self.model))}
         for name, value in self.model.values.items():
             own[name] = value if np.ndim(value) == 0 else np.asarray(value)[:, np.newaxis]
         # A name defined by the chart takes precedence over a numbered one.
@@ -339,7 +340,7 @@ class Scope:
 
     def _single(self) -> dict[str, Any]:
         """Return the quantities of single elements under their numbered names."""
-        quantities = {name: self.each(name) for name in (*self.layout.y.own, "s", FORCE)}
+        quantities = {name: self.each(name) for name in (*self.layout.only.variables, "s", FORCE)}
         names = _numbered(self.model).items()
         return {name: quantities[quantity][i] for name, (quantity, i) in names}
 
@@ -359,15 +360,22 @@ class GuardValues:
     """
 
     def __init__(self, layout: Layout) -> None:
-        y, seen = layout.y, layout.observed
-        self._x, self._v = y.index("x"), seen.index("v")
-        self._own = [
-            (seen.index("s", i), [(name, y.index(name, i)) for name in y.own])
-            for i in range(layout.n)
-        ]
+        y, shown = layout.y, layout.shown
+        self._places: list[list[tuple[str, int]]] = []  # for each element, among those shown
+        self._variables: list[list[tuple[str, int]]] = []  # and in the state vector
+        for bank in layout.banks:
+            start = bank.of("")
+            names = [name for name in (*shown.shared, *shown.own) if name.startswith(start)]
+            for i in range(bank.n):
+                self._places.append(
+                    [(name.removeprefix(start), shown.index(name, i)) for name in names]
+                )
+                self._variables.append(
+                    [(name, y.index(bank.of(name), i)) for name in bank.variables]
+                )
 
     def put(
-        self, t: float, y: Sequence[float], seen: Sequence[float], into: Sequence[dict[str, Any]]
+        self, t: float, y: Sequence[float], shown: Sequence[float], into: Sequence[dict[str, Any]]
     ) -> None:
         """Store the current values in one mapping per element.
 
@@ -375,13 +383,15 @@ class GuardValues:
         ----------
         t : float
             Time, s.
-        y, seen : sequence of float
-            State vector, and the quantities observed of it, by place.
+        y, shown : sequence of float
+            State vector, and what is shown of it, by place.
         into : sequence of dict, length n
             Modified in place.
         """
-        x, v = y[self._x], seen[self._v]
-        for values, (threshold, variables) in zip(into, self._own, strict=True):
-            values["t"], values["x"], values["v"], values["s"] = t, x, v, seen[threshold]
+        rows = zip(into, self._places, self._variables, strict=True)
+        for values, places, variables in rows:
+            values["t"] = t
+            for name, place in places:
+                values[name] = shown[place]
             for name, place in variables:
                 values[name] = y[place]

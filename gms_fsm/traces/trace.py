@@ -151,7 +151,8 @@ class Trace:
     @property
     def z(self) -> FloatArray:
         """First variable (the deflection) of every element, shape (rows, n), m."""
-        return self._named(self.program.layout.variable)
+        bank = self.program.layout.only
+        return self._named(bank.of(bank.variables[0]))
 
     def variable(self, name: str) -> FloatArray:
         """Return a variable of the chart, shape (rows, n).
@@ -177,7 +178,7 @@ class Trace:
                 place="name",
                 value=name,
             )
-        return self._named(name)
+        return self._named(self.program.layout.only.of(name))
 
     def _named(self, name: str) -> FloatArray:
         column: FloatArray = self.rows.y[:, self.program.layout.y.where(name)]
@@ -275,9 +276,11 @@ class Trace:
             return self.stored
         compiled, layout = self.settings.get("engine") == "compiled", self.program.layout
         table = observed_rows(self.program, self.rows, compiled=compiled)
-        seen = layout.observed.named(table.T)
+        bank = layout.only
+        seen = bank.plain(layout.observed.named(table.T))
         # As in files, dz is the rate of the first variable, whatever its name.
-        return {name: seen[layout.rate if name == "dz" else name].T for name in OBSERVED}
+        rate = f"d{bank.variables[0]}"
+        return {name: seen[rate if name == "dz" else name].T for name in OBSERVED}
 
     # ------------------------------------------------------------------ sampling
     def sample(self, times: ArrayLike) -> Trace:
