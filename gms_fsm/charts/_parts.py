@@ -63,9 +63,7 @@ class State:
             # Copies: nobody else can change a frozen chart.
             object.__setattr__(self, each, texts_of(getattr(self, each), f"{here}: {each}"))
         if not isinstance(self.locked, bool):
-            raise ChartError(
-                "it must be True or False", place=f"{here}: locked", value=self.locked
-            )
+            raise ChartError("it must be True or False", place=f"{here}: locked", value=self.locked)
 
 
 @dataclass(frozen=True, init=False)

@@ -34,7 +34,9 @@ class Reader:
         )
         # A chart's own name goes before that of an acceleration.
         declared = {*self.known, *chart.let}
-        self.late = [each for each in (*chart.force_names, *chart.rate_names) if each not in declared]
+        self.late = [
+            each for each in (*chart.force_names, *chart.rate_names) if each not in declared
+        ]
         self.ages = False
 
     def trees(self) -> dict[str, Any]:
@@ -108,8 +110,10 @@ class Reader:
                 advice=f"give one, here or in the chart's outputs, for example {{{force!r}: '0'}}",
             )
         rates = [f"d{variable}" for variable in self.chart.variables]
-        owner = f"{owner}, output {force!r}" if force in state.outputs else (
-            f"{self.here}, output {force!r}"
+        owner = (
+            f"{owner}, output {force!r}"
+            if force in state.outputs
+            else (f"{self.here}, output {force!r}")
         )
         return self.value(text, [*self.known_now, *rates], owner)
 

@@ -193,7 +193,10 @@ class Chart:
             raise ChartError(f"{owner[name]} name {name!r} is taken by a force", place=here)
         known = [s.name for s in self.states]
         for edge in self.transitions:
-            for end, state in (*(("source", each) for each in edge.sources), ("target", edge.target)):
+            for end, state in (
+                *(("source", each) for each in edge.sources),
+                ("target", edge.target),
+            ):
                 if state not in known:
                     raise ChartError(
                         f"{end} {state!r} is not a state",

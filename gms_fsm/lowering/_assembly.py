@@ -29,7 +29,7 @@ from gms_fsm.language import (
     renamed,
 )
 from gms_fsm.language._normal import renamed_in
-from gms_fsm.systems.signals import Corners, Formula, Function, Signal
+from gms_fsm.systems.signals import Formula, Signal
 from gms_fsm.systems.system import Body, Contact, System, is_zero
 
 __all__ = ["Assembly", "Bank", "Definition", "Edge", "assembled", "of"]
@@ -212,11 +212,9 @@ class Assembly:
         """For each name with one value per element its bank."""
         found = {name: bank for name, (bank, _) in self.own.items()}
         for bank in self.banks:
-            found |= {name: bank.index for name in bank.variables}
+            found |= dict.fromkeys(bank.variables, bank.index)
             found |= {bank.rate(name): bank.index for name in bank.variables}
-        return found | {
-            each.name: each.bank for each in self.definitions if each.bank is not None
-        }
+        return found | {each.name: each.bank for each in self.definitions if each.bank is not None}
 
     def bank_of(self, tree: Value | Condition) -> int | None:
         """Return the bank whose elements have one value of a tree each; None if there is one."""
@@ -346,6 +344,7 @@ class _Reader:
         weights = np.ones(contact.n) if model is None else model.weights
         self.own[of(c, "threshold weight")] = (index, np.asarray(weights, dtype=np.float64))
         names: dict[str, Value] = {"t": Name("t")}
+        own_names: dict[str, str] = {}  # of what an action can set
         for name, value in contact.values.items():
             if np.ndim(value) == 0:
                 self.shared[of(c, name)] = float(value)
@@ -359,11 +358,13 @@ class _Reader:
             tree = self.value(text, [*moved, *self.system.numbers], f"{owner}, v")
             row = self.coefficients(tree, moved, text, owner)
             jacobian.append(row)
-            names[name] = self.defined(of(c, name), tree)
-            velocities.append(names[name].id)
+            known = self.defined(of(c, name), tree)
+            names[name], own_names[name] = known, known.id
+            velocities.append(known.id)
             if len(velocities) == 1:
                 where = renamed(tree, {v: Name(body.x) for v, body in moved.items()})
-                names["x"] = self.defined(of(c, "x"), where)
+                position = self.defined(of(c, "x"), where)
+                names["x"] = position
         for name in chart.inputs:
             if name not in names and not (name == "s" and model is not None):
                 names[name] = self.input(contact, name, owner)
@@ -379,13 +380,14 @@ class _Reader:
             threshold = self.curve(contact, index, names)
         for name in chart.variables:
             names[name], names[f"d{name}"] = Name(of(c, name)), Name(of(c, f"d{name}"))
+            own_names[name] = of(c, name)
         self.lets(contact, index, names)
         for name in (*chart.force_names, *chart.rate_names):
             names.setdefault(name, Name(of(c, name)))
 
         def steps(*keys: tuple[str, str]) -> tuple[tuple[str, Value], ...]:
             return tuple(
-                (names[name].id, renamed(tree, names))  # type: ignore[union-attr]
+                (own_names[name], renamed(tree, names))
                 for key in keys
                 for name, tree in chart.assignments[key].items()
             )
@@ -405,7 +407,7 @@ class _Reader:
             velocities=tuple(velocities),
             forces=tuple(of(c, name) for name in chart.force_names),
             rates=tuple(of(c, name) for name in chart.rate_names),
-            position=names["x"].id,
+            position=position.id,
             threshold=threshold,
             jacobian=tuple(jacobian),
             flows={
@@ -423,7 +425,7 @@ class _Reader:
                     edge.source,
                     edge.target,
                     renamed_in(chart.guards[edge.name], names),
-                    # Stateflow's order: exit of the source, action of the edge, entry of the target.
+                    # Stateflow's order: exit of the source, action, entry of the target.
                     steps(("exit", edge.source), ("action", edge.name), ("entry", edge.target)),
                 )
                 for edge in chart.transitions
@@ -473,7 +475,7 @@ class _Reader:
         return tree if isinstance(tree, Number) else self.defined(of(contact.name, name), tree)
 
     def curve(self, contact: Contact, index: int, names: dict[str, Value]) -> str:
-        """Define the Stribeck curve of a model, and the thresholds; return what these are called."""
+        """Define the Stribeck curve of a model and the thresholds; return their name."""
         c = contact.name
         assert contact.model is not None
         assert contact.model.stribeck is not None

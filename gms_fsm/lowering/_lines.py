@@ -54,9 +54,9 @@ class Writer:
         self.names, self.layout = plan.names, plan.layout
         self.sizes = [block.size for block in plan.layout.y.blocks]
         # What is computed with the forces, never at the head of a function.
-        self.late = {
-            name for bank in plan.read.banks for name in (*bank.forces, *bank.rates)
-        } | {f"{body.name} a" for body in plan.read.system.bodies}
+        self.late = {name for bank in plan.read.banks for name in (*bank.forces, *bank.rates)} | {
+            f"{body.name} a" for body in plan.read.system.bodies
+        }
 
     # ------------------------------------------------------------------ values
     def spell(self, node: Node) -> str:
@@ -168,13 +168,17 @@ class Writer:
             if inside := each - first:
                 made = self.element(bank, inside, signs)
                 seen = {self.local(name) for name in self.closure(inside) & first}
-                rows[state] = [line for line in made if line.text.split(" =")[0] not in seen] + lines
+                rows[state] = [
+                    line for line in made if line.text.split(" =")[0] not in seen
+                ] + lines
         body = [*before, *(self.by_state(bank, rows) if rows else []), *after]
         body = [*self.element(bank, first, signs), *body]
         if not body:
             return []
         text = f"for i in range({self.sizes[bank]}):"
-        return self.outward(bank, [Line(text, frozenset({f"#{self.sizes[bank]}"})), *indented(body)])
+        return self.outward(
+            bank, [Line(text, frozenset({f"#{self.sizes[bank]}"})), *indented(body)]
+        )
 
     def own(self, bank: int, reads: frozenset[str]) -> frozenset[str]:
         """Return what is read of an element that is assigned first."""

@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from gms_fsm.charts.chart import Chart
 from gms_fsm.language import Binary, Name, Negative, Number, Value
 from gms_fsm.lowering._lines import Line, Writer, indented
 from gms_fsm.lowering._names import computed_names
@@ -67,9 +68,7 @@ class Locks:
     def number(self, bank: int, velocity: int = 0) -> int:
         """Return the row of a contact's velocity."""
         return next(
-            r
-            for r, each in enumerate(self.rows)
-            if (each.bank, each.velocity) == (bank, velocity)
+            r for r, each in enumerate(self.rows) if (each.bank, each.velocity) == (bank, velocity)
         )
 
     def free(self, row: Mapping[str, Value]) -> dict[str, Value]:
@@ -134,9 +133,7 @@ class Locks:
                         for k in range(s)
                         if (r, k) in lower and (s, k) in lower
                     )
-                    lines.append(
-                        Line(f"L_{r}_{s} = l_{r} * l_{s} * ({text}{less}) / D_{s}", reads)
-                    )
+                    lines.append(Line(f"L_{r}_{s} = l_{r} * l_{s} * ({text}{less}) / D_{s}", reads))
         for r in rows:
             value = right[r]
             less = "".join(f" - L_{r}_{k} * w_{k}" for k in range(r) if (r, k) in lower)
@@ -201,15 +198,15 @@ class Locks:
         """Write the forces of locked contacts, and the accelerations with them."""
         names = {name: f"{name} a" for name in self.bodies}
         lines = self.flags()
-        lines += self.solve(
-            {r: self.relative(each.row, names) for r, each in enumerate(self.rows)}
-        )
+        lines += self.solve({r: self.relative(each.row, names) for r, each in enumerate(self.rows)})
         for r, each in enumerate(self.rows):
             force = self.writer.local(self.read.banks[each.bank].forces[each.velocity])
             inside = [Line(f"{force} = {force} + hold_{r}")]
             for body, coefficient in self.free(each.row).items():
                 a = self.writer.local(names[body])
-                share = "" if coefficient == Number(1.0) else f"({self.writer.spell(coefficient)}) * "
+                share = (
+                    "" if coefficient == Number(1.0) else f"({self.writer.spell(coefficient)}) * "
+                )
                 inertia = self.inertia(body)
                 reads = computed_names(coefficient) | computed_names(inertia)
                 inside.append(
@@ -246,7 +243,9 @@ class Locks:
             for body, coefficient in self.free(each.row).items():
                 v = self.writer.local(names[body])
                 moved[body] = None
-                share = "" if coefficient == Number(1.0) else f"({self.writer.spell(coefficient)}) * "
+                share = (
+                    "" if coefficient == Number(1.0) else f"({self.writer.spell(coefficient)}) * "
+                )
                 inertia = self.inertia(body)
                 reads = computed_names(coefficient) | computed_names(inertia) | {names[body]}
                 inside.append(
@@ -266,8 +265,7 @@ class Locks:
         return body.v
 
 
-def _sets_velocity(chart: object) -> bool:
+def _sets_velocity(chart: Chart) -> bool:
     """Tell whether an action of a chart sets a velocity."""
-    assignments = chart.assignments  # type: ignore[attr-defined]
-    velocities = {*chart.velocities}  # type: ignore[attr-defined]
-    return any(velocities & {*steps} for steps in assignments.values())
+    velocities = {*chart.velocities}
+    return any(velocities & {*steps} for steps in chart.assignments.values())

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from gms_fsm.language import Binary, Name, Node, names_in, product_power
-from gms_fsm.lowering._assembly import Assembly, Bank, of
+from gms_fsm.language import Binary, Name, Node, product_power
+from gms_fsm.lowering._assembly import Assembly, Bank
 from gms_fsm.lowering.layout import sizes_of
 
 __all__ = ["Names", "computed_names", "names_of"]
@@ -53,9 +53,7 @@ class Names:
     def texts(self) -> Mapping[str, str]:
         """The spelling of each name from the trees."""
         own = {*self.own}
-        return {
-            name: f"{local}[i]" if name in own else local for name, local in self.local.items()
-        }
+        return {name: f"{local}[i]" if name in own else local for name, local in self.local.items()}
 
 
 def computed_names(node: Node) -> frozenset[str]:
@@ -127,9 +125,7 @@ def names_of(read: Assembly) -> Names:
                 local[name] = choice.of(bank, name.split(".", 1)[1])
         for name in (*bank.variables, *bank.velocities):
             plain[name] = name.split(".", 1)[-1] if choice.alone else name
-    plain |= {
-        name: name.split(".", 1)[1] for name in local if choice.alone and "." in name
-    }
+    plain |= {name: name.split(".", 1)[1] for name in local if choice.alone and "." in name}
     states, edges = [], []
     for bank in read.banks:
         states.append({state: choice.constant(bank, state) for state in bank.states})
@@ -167,7 +163,7 @@ def _short(name: str) -> str:
 
 
 def model_names(bank: Bank, read: Assembly) -> list[str]:
-    """Return what a contact has from its model, and its forces; a chart's names give way to them."""
+    """Return what a contact has from its model, and its forces; a chart's names give way."""
     every = [*read.shared, *read.own, *read.defined]
     return [
         *(name for name in every if name.startswith(f"{bank.name}.") and " " in name),

@@ -26,13 +26,13 @@ from gms_fsm.language import (
     turning_inside,
 )
 from gms_fsm.language._functions import ROUGH
-from gms_fsm.lowering._assembly import ONE, Assembly, Bank, Definition, of
+from gms_fsm.lowering._assembly import ONE, Assembly, Bank, of
 from gms_fsm.lowering._names import Names, names_of
 from gms_fsm.lowering.layout import Block, Layout, Places, sizes_of
-from gms_fsm.systems.signals import Corners, Formula, Function
+from gms_fsm.systems.signals import Corners, Function
 
 __all__ = ["BankPlan", "Computed", "Gradient", "Plan", "RoughCall", "StateFlow"]
-__all__ += ["both_sides", "plan_of"]
+__all__ += ["both_sides", "gradient_of", "plan_of", "times"]
 
 
 @dataclass(frozen=True)
@@ -259,7 +259,7 @@ def plan_of(read: Assembly) -> Plan:
         relations=_relations(read, held, landmarks),
         always=tuple(dict.fromkeys(always)),
         rough=rough,
-        gradients=tuple(_gradient(u, read) for u in (*surfaces.shared, *surfaces.own)),
+        gradients=tuple(gradient_of(u, read) for u in (*surfaces.shared, *surfaces.own)),
     )
 
 
@@ -333,9 +333,7 @@ def _outer_rough(read: Assembly, accelerations: Mapping[str, Value]) -> tuple[Va
     trees += [*accelerations.values(), *read.flow.values()]
     trees += [tree for bank in read.banks for tree in bank.totals.values()]
     # A sign of a force itself stays live: it is known only with the flow.
-    return tuple(
-        u for tree in trees for u in rough_points(tree) if not names_in(u) & late
-    )
+    return tuple(u for tree in trees for u in rough_points(tree) if not names_in(u) & late)
 
 
 def _rough(read: Assembly, bank: Bank) -> Mapping[str, tuple[Value, ...]]:
@@ -470,7 +468,7 @@ def _bank(read: Assembly, bank: Bank, smoothing: _Smoothing) -> BankPlan:
     )
 
 
-def _gradient(u: Value, read: Assembly) -> Gradient:
+def gradient_of(u: Value, read: Assembly) -> Gradient:
     expanded, signals = read.expanded(u), read.system.signals
     slopes = {name: derivative(expanded, name) for name in _moving(expanded, read)}
     known = {name: slope for name, slope in slopes.items() if slope is not None}
@@ -480,8 +478,3 @@ def _gradient(u: Value, read: Assembly) -> Gradient:
         by_t=known.get("t"),
         by_signal={name: each for name, each in known.items() if name in signals},
     )
-
-
-def formula(definition: Definition) -> bool:
-    """Tell whether a definition is computed from a tree."""
-    return definition.signal is None or isinstance(definition.signal, Formula)

@@ -4,12 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from gms_fsm.language import Comparison, Name, Negative, Number, Requirement, Split, names_in, split
+from gms_fsm.language import (
+    Comparison,
+    Name,
+    Negative,
+    Number,
+    Requirement,
+    Split,
+    Value,
+    names_in,
+    split,
+)
 from gms_fsm.lowering._assembly import Bank, Edge, of
 from gms_fsm.lowering._lines import TABLES, Line, Signs, Writer, indented, reads_of
 from gms_fsm.lowering._locks import Locks
 from gms_fsm.lowering._names import computed_names
-from gms_fsm.lowering._plan import BankPlan, Gradient, Plan, both_sides
+from gms_fsm.lowering._plan import BankPlan, Computed, Gradient, Plan, both_sides, gradient_of
 from integrators import LIVE
 
 __all__ = ["FUNCTIONS", "python"]
@@ -161,10 +171,10 @@ class _Printer(Writer):
         return lines
 
     @staticmethod
-    def names_of(value: object) -> frozenset[str]:
+    def names_of(value: Computed) -> frozenset[str]:
         """Return what a computed value reads, in its rough calls too."""
-        found = computed_names(value.tree)  # type: ignore[attr-defined]
-        return found.union(*(computed_names(call.call) for call in value.calls))  # type: ignore[attr-defined]
+        found = computed_names(value.tree)
+        return found.union(*(computed_names(call.call) for call in value.calls))
 
     def elements_seen(self, plan: BankPlan, several: Mapping[str, str]) -> list[Line]:
         """Store what is observed of an element."""
@@ -196,26 +206,11 @@ class _Printer(Writer):
 
     def rate_in_time(self, target: str, name: str) -> Line:
         """Write the rate of a quantity that depends on time only."""
-        from gms_fsm.lowering._plan import _gradient
-
-        gradient = _gradient(Name(name), self.read)
+        gradient = gradient_of(Name(name), self.read)
         terms, reads = self.time_terms(gradient)
         return Line(f"{target} = {' + '.join(terms) or '0.0'}", reads)
 
     # ------------------------------------------------------------------ the functions
-    def late_names(self, trees: Iterable[frozenset[str]]) -> bool:
-        """Tell whether forces or accelerations are read."""
-        return any(names & self.late for names in trees)
-
-    def rates_of_contacts(self) -> list[Line]:
-        """Write the accelerations that guards may read."""
-        lines = []
-        for bank in self.read.banks:
-            for name, row in zip(bank.rates, bank.jacobian, strict=True):
-                tree = self.locks.relative(row, {each: f"{each} a" for each in row})
-                lines.append(self.put(self.local(name), tree))
-        return lines
-
     def before_guards(self, names: Iterable[frozenset[str]]) -> list[Line]:
         """Write the forces, and the accelerations, where guards or actions read them."""
         read = frozenset[str]().union(*names)
@@ -337,19 +332,21 @@ class _Printer(Writer):
         constant = self.names.states[bank.index][edge.target]
         lines.append(Line(f"{place} = {constant}", sizes))
         if edge.target in locked:
-            lines += self.locks.impulse(bank.index, dict.fromkeys(range(len(bank.velocities)), "0.0"))
+            lines += self.locks.impulse(
+                bank.index, dict.fromkeys(range(len(bank.velocities)), "0.0")
+            )
         return lines
 
-    def fresh(self, value: object, bank: Bank) -> object:
+    def fresh(self, value: Value, bank: Bank) -> Value:
         """Return a value with what is computed from variables expanded."""
         inside = {
             each.name
             for each in self.read.definitions
             if each.bank == bank.index and self.read.closure([each.name]) & {*bank.variables}
         }
-        if not names_in(value) & inside:  # type: ignore[arg-type]
+        if not names_in(value) & inside:
             return value
-        return self.read.expanded(value)  # type: ignore[arg-type]
+        return self.read.expanded(value)
 
     def velocities_again(self) -> list[Line]:
         """Write the relative velocities anew, after an impulse."""
@@ -525,12 +522,12 @@ class _Printer(Writer):
             "live",
         )
 
-    def hold(self, u: object) -> Line:
+    def hold(self, u: Value) -> Line:
         """Hold the sign of a value."""
         held = self.plan.held
-        sizes = frozenset(f"#{size}" for size in held.sizes(u))  # type: ignore[arg-type]
-        text = f"held[{held.text(u)}] = sgn({self.spell(u)})"  # type: ignore[arg-type]
-        return Line(text, sizes | computed_names(u))  # type: ignore[arg-type]
+        sizes = frozenset(f"#{size}" for size in held.sizes(u))
+        text = f"held[{held.text(u)}] = sgn({self.spell(u)})"
+        return Line(text, sizes | computed_names(u))
 
     def watch(self, relation: Comparison) -> Line:
         relations = self.plan.relations

@@ -387,7 +387,8 @@ class Layout:
         updated = (name for each in system.sampled for name in each.updates)
         sizes = sizes_of(read.banks)
         blocks = tuple(
-            Block(bank.variables, bank.n, size) for bank, size in zip(read.banks, sizes, strict=True)
+            Block(bank.variables, bank.n, size)
+            for bank, size in zip(read.banks, sizes, strict=True)
         )
         seen = tuple(
             Block(

@@ -36,8 +36,8 @@ import integrators
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.errors import SignalError
 from gms_fsm.language import Binary, Requirement, Value, spell
-from gms_fsm.lowering._generated import ieee, load, load_careful
 from gms_fsm.lowering._assembly import assembled
+from gms_fsm.lowering._generated import ieee, load, load_careful
 from gms_fsm.lowering._plan import Plan, both_sides, plan_of
 from gms_fsm.lowering._python import FUNCTIONS, python
 from gms_fsm.lowering.layout import Layout
@@ -309,9 +309,7 @@ def _relation_names(plan: Plan) -> list[str]:
 
 def _surface_names(plan: Plan) -> list[str]:
     """Return the value that is zero on each surface, in words."""
-    return [
-        spell(u, rename=plan.names.plain) + _of_element(plan, u, i) for u, i in plan.surfaces
-    ]
+    return [spell(u, rename=plan.names.plain) + _of_element(plan, u, i) for u, i in plan.surfaces]
 
 
 def _of_element(plan: Plan, tree: Value, element: int | None) -> str:

@@ -197,10 +197,10 @@ def scales_of_system(system: System) -> SystemScales:
             ratio = _constant(coefficient, system)
             moved[body][0].append(_divided(scales.x, ratio))
             moved[body][1].append(_divided(scales.v, ratio))
-    for body in system.bodies:
-        for name, found in zip((body.x, body.v), moved[body.name], strict=True):
+    for each in system.bodies:
+        for name, found in zip((each.x, each.v), moved[each.name], strict=True):
             sizes[name] = [min((u for u in found if u > 0.0), default=0.0)]
-    for name in (*system.flow, *(name for each in system.sampled for name in each.updates)):
+    for name in (*system.flow, *(u for sampler in system.sampled for u in sampler.updates)):
         sizes[name] = [0.0]
     return SystemScales(sizes, min((u for u in times if u > 0.0), default=0.0))
 
@@ -280,9 +280,7 @@ def _sizes(key: _Same[Chart]) -> _Sizes:
     }
     stiffness = {
         name: [
-            function(slope)
-            for force in forces
-            if (slope := derivative(force, name)) is not None
+            function(slope) for force in forces if (slope := derivative(force, name)) is not None
         ]
         for name in chart.variables
     }

@@ -147,7 +147,7 @@ class Start:
         )
         last = _covered(system, t_start, t_end)
         program = _watchful(program, system, t_start, last)
-        y, mode = _initial(system, program, t_start, {} if initial is None else initial)
+        y, mode = _initial(system, program, {} if initial is None else initial)
         kept: dict[str, Setting] = {
             "method": chosen.method_name,
             "step": chosen.step,
@@ -160,9 +160,20 @@ class Start:
             "t_start": t_start,
             "t_end": t_end,
         }
-        made_of: Any = (None, None) if isinstance(model, System) else (model, rig)
+        origin: tuple[Any, Any] = (None, None) if isinstance(model, System) else (model, rig)
         return cls(
-            system, *made_of, program, t_start, t_end, last, y, mode, options, kept, chosen
+            system=system,
+            model=origin[0],
+            rig=origin[1],
+            program=program,
+            t_start=t_start,
+            t_end=t_end,
+            last=last,
+            y=y,
+            mode=mode,
+            options=options,
+            settings=kept,
+            chosen=chosen,
         )
 
     def with_numbers(self, model: Model, rig: Rig) -> Start:
@@ -291,7 +302,7 @@ def _covered(system: System, t_start: float, t_end: float) -> float:
 
 
 def _initial(
-    system: System, program: Program, t_start: float, initial: Mapping[str, Any]
+    system: System, program: Program, initial: Mapping[str, Any]
 ) -> tuple[list[float], list[int]]:
     """Build the state vector and the modes."""
     layout = program.layout
@@ -312,7 +323,7 @@ def _initial(
         else:
             reason, advice = _unknown_initial(system, layout, key, value)
             raise ParameterError(reason, advice=advice)
-    y: dict[str, Any] = {name: 0.0 for name in layout.y.shared}
+    y: dict[str, Any] = dict.fromkeys(layout.y.shared, 0.0)
     for each in system.sampled:
         y |= each.initial
     for name in layout.y.shared:
@@ -331,8 +342,8 @@ def _initial(
                 )
             y[name] = as_floats(values)
     state, mode = layout.y.joined(y), list[int]()
-    for bank, contact in zip(layout.banks, system.contacts, strict=True):
-        chart = contact.chart
+    for bank, part in zip(layout.banks, system.contacts, strict=True):
+        chart = part.chart
         default = [chart.default_state.name] * bank.n
         wanted = names.get(bank.name, default)
         if isinstance(wanted, str) or np.ndim(wanted) != 1 or len(wanted) != bank.n:
@@ -344,14 +355,14 @@ def _initial(
     return state, mode
 
 
-def _unknown_initial(
-    system: System, layout: Layout, key: object, value: object
-) -> tuple[str, str]:
+def _unknown_initial(system: System, layout: Layout, key: object, value: object) -> tuple[str, str]:
     """Say what is wrong with a key of the initial values, and what to do."""
     for body in system.bodies:
         if body.driven and key in (body.v, f"{body.name}.v"):
-            whose = "the rig prescribes the velocity" if body.velocity == "v" else (
-                f"the velocity of {body.name} is given"
+            whose = (
+                "the rig prescribes the velocity"
+                if body.velocity == "v"
+                else (f"the velocity of {body.name} is given")
             )
             return f"initial has {key!r} = {shown(value)}, but {whose}", "leave it out"
     known = [layout.label(name) for name in (*layout.y.shared, *layout.y.own)]

@@ -10,7 +10,7 @@ import keyword
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from gms_fsm.errors import ExpressionError, ParameterError, shown
 from gms_fsm.language import (
     CONSTANTS,
     FUNCTIONS,
+    Binary,
+    Name,
+    Negative,
     Number,
     Value,
     derivative,
@@ -31,11 +34,11 @@ from gms_fsm.language import (
 )
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
-from gms_fsm.systems.signals import Signal, SignalLike, as_signal
+from gms_fsm.systems.signals import Signal, as_signal
 
 __all__ = ["Body", "Contact", "Sampled", "System", "system_of"]
 
-Text = str | float  # an expression, or just a number
+Text: TypeAlias = str | float  # an expression, or just a number
 
 
 @dataclass(frozen=True)
@@ -235,7 +238,9 @@ class Sampled:
             self,
             "initial",
             {
-                name: checked_scalar(f"{here}: initial[{name!r}]", self.initial.get(name, 0.0))
+                name: checked_scalar(
+                    f"{here}: initial[{name!r}]", self.initial.get(name, 0.0), "finite"
+                )
                 for name in self.updates
             },
         )
@@ -308,9 +313,7 @@ class System:
         put(self, "numbers", numbers)
         put(self, "flow", dict(self.flow))
         self._check_names(here)
-        signals = {
-            name: self._signal(name, given, here) for name, given in self.signals.items()
-        }
+        signals = {name: self._signal(name, given, here) for name, given in self.signals.items()}
         put(self, "signals", signals)
 
     def _signal(self, name: str, given: Any, here: str) -> Signal | str:
@@ -347,10 +350,7 @@ class System:
                         advice="every name must be unique; a body's names are x=... and v=...",
                     )
                 owner[name] = kind
-        parts = [*self.bodies, *self.contacts, *self.sampled]
-        for kind, each in (("body", self.bodies), ("contact", self.contacts)):
-            del each
-            del kind
+        parts: list[Body | Contact | Sampled] = [*self.bodies, *self.contacts, *self.sampled]
         seen: set[str] = set()
         for part in parts:
             _check_name(part.name, f"{here}, {type(part).__name__.lower()}")
@@ -385,7 +385,7 @@ class System:
         ParameterError
             If there is none.
         """
-        return _found(self.bodies, name, "body", self.name)
+        return _found(self.bodies, name, f"system {self.name!r} has no body")
 
     def contact(self, name: str) -> Contact:
         """Return a contact by name.
@@ -405,17 +405,18 @@ class System:
         ParameterError
             If there is none.
         """
-        return _found(self.contacts, name, "contact", self.name)
+        return _found(self.contacts, name, f"system {self.name!r} has no contact")
 
 
-def _found(parts: tuple[Any, ...], name: str, kind: str, system: str) -> Any:
+Part = TypeVar("Part", "Body", "Contact")
+
+
+def _found(parts: tuple[Part, ...], name: str, reason: str) -> Part:
     for each in parts:
         if each.name == name:
             return each
     known = ", ".join(repr(each.name) for each in parts)
-    raise ParameterError(
-        f"system {system!r} has no {kind} {shown(name)}", advice=f"there are {known}"
-    )
+    raise ParameterError(f"{reason} {shown(name)}", advice=f"there are {known}")
 
 
 def _check_name(name: object, place: str) -> None:
@@ -519,8 +520,6 @@ def system_of(model: Model, rig: Rig) -> System:
 
 def _balance(acceleration: Value, rig: Rig) -> tuple[Value, Value]:
     """Split an acceleration into (force - F) / inertia."""
-    from gms_fsm.language import Binary, Name, Negative
-
     F = Name("F")
     match acceleration:
         case Binary("/", Binary("-", force, right), inertia) if right == F and not (

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from gms_fsm.charts._reader import AGE
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.stribeck import Stribeck
@@ -25,6 +26,16 @@ class _Record(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, ser_json_inf_nan="constants")
 
 
+class TransitionRecord(_Record):
+    """One edge of a chart."""
+
+    name: str
+    source: str
+    target: str
+    guard: str
+    actions: dict[str, str] = {}
+
+
 class ChartRecord(_Record):
     """The texts of a chart."""
 
@@ -33,16 +44,42 @@ class ChartRecord(_Record):
     variables: tuple[str, ...]
     parameters: tuple[Parameter | str, ...]
     states: tuple[State, ...]
-    transitions: tuple[Transition, ...]
+    transitions: tuple[TransitionRecord, ...]
     outputs: dict[str, str]
     reference: str
+    let: dict[str, str] = {}
+    velocities: tuple[str, ...] = ("v",)
+    contact_outputs: dict[str, str] = {}
 
     @classmethod
     def of(cls, chart: Chart) -> ChartRecord:
         """Describe a chart; a parameter without unit and rule is stored as its name only."""
         fields = {name: getattr(chart, name) for name in cls.model_fields}
         plain = [each.name if each == Parameter(each.name) else each for each in chart.parameters]
-        return cls(**{**fields, "parameters": plain})
+        edges = [
+            {name: getattr(edge, name) for name in TransitionRecord.model_fields}
+            for edge in chart.transitions
+        ]
+        # The age is there because a text reads it.
+        variables = [name for name in chart.variables if name != AGE]
+        return cls(**{**fields, "variables": variables, "parameters": plain, "transitions": edges})
+
+    def to_chart(self) -> Chart:
+        """Return an equal chart; an edge with several sources has become several edges."""
+        edges: dict[str, list[TransitionRecord]] = {}
+        for edge in self.transitions:
+            edges.setdefault(edge.name, []).append(edge)
+        given = [
+            Transition(
+                same[0].name,
+                [each.source for each in same],
+                same[0].target,
+                same[0].guard,
+                same[0].actions,
+            )
+            for same in edges.values()
+        ]
+        return Chart(**{**vars(self), "transitions": given})
 
 
 class ModelRecord(_Record):
@@ -151,7 +188,7 @@ class Header(_Record):
         """Return an equivalent model."""
         record = self.model
         return ChartModel(
-            Chart(**vars(record.chart)),
+            record.chart.to_chart(),
             {
                 name: np.array(value) if isinstance(value, list) else value
                 for name, value in record.values.items()

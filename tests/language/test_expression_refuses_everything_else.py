@@ -43,8 +43,8 @@ NO_VALUES = [
     ("z.real", 1, "attribute", GRAMMAR),
     ("v + z.real", 5, "attribute", GRAMMAR),
     ("__import__('os').system('ls')", 1, FOREIGN, GRAMMAR),
-    ("__import__('os')", 1, "unknown function '__import__'", "abs, exp, sqrt"),
-    ("v + log(z)", 5, "unknown function 'log'", "abs, exp, sqrt"),
+    ("__import__('os')", 1, "unknown function '__import__'", "abs, exp, log, sqrt"),
+    ("v + cosh(z)", 5, "unknown function 'cosh'", "abs, exp, log, sqrt"),
     ("abs(v)(z)", 1, FOREIGN, GRAMMAR),
     ("2(v)", 1, FOREIGN, GRAMMAR),
     ("lambda: 1", 1, "lambda", GRAMMAR),
@@ -127,8 +127,8 @@ NO_VALUES = [
 
 NO_CONDITIONS = [
     ("z", 1, COMPARISON_WANTED, "v > v_c"),
-    ("after(0.2)", 1, "unknown function 'after'", "abs, exp, sqrt"),
-    ("z < s and after(0.2)", 11, "unknown function 'after'", "abs, exp, sqrt"),
+    ("after(0.2)", 1, "unknown function 'after'", "abs, exp, log, sqrt"),
+    ("z < s and after(0.2)", 11, "unknown function 'after'", "abs, exp, log, sqrt"),
     ("abs(z)", 1, COMPARISON_WANTED, "v > v_c"),
     ("pow(z, 2)", 1, COMPARISON_WANTED, "v > v_c"),
     ("z + 1", 1, COMPARISON_WANTED, "v > v_c"),

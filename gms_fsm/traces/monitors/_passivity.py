@@ -12,7 +12,7 @@ import numpy as np
 from gms_fsm.charts import GMS_ELEMENT
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import SignalError
-from gms_fsm.language import MATLAB_LIKE, Binary, Name, spell
+from gms_fsm.language import MATLAB_LIKE, Binary, Name, Value, spell
 from gms_fsm.systems.models import Model
 from gms_fsm.traces._between import slopes
 from gms_fsm.traces.monitors._kinds import Passivity
@@ -26,9 +26,11 @@ __all__ = ["passivity"]
 def passivity(monitor: Passivity, trace: Trace) -> PassivityVerdict:
     spring = _spring(trace.model)
     if spring is None:
-        force = spell(trace.model.chart.forces["F"], MATLAB_LIKE)
+        forces = {spell(tree, MATLAB_LIKE): None for tree in _forces(trace.model) if tree}
         return PassivityVerdict(
-            True, f"not applicable: F = {force} is not a spring force k * z [+ sigma * dz]", False
+            True,
+            f"not applicable: F = {' or '.join(forces)} is not a spring force k * z [+ sigma * dz]",
+            False,
         )
     k, sigma = spring
     t, z = trace.t, trace.z
@@ -77,10 +79,19 @@ def passivity(monitor: Passivity, trace: Trace) -> PassivityVerdict:
     return replace(verdict, text="; ".join(parts))
 
 
+def _forces(model: Model) -> list[Value | None]:
+    """Return the different forces of an element over its states; None for that of a locked one."""
+    states = model.chart.states
+    return list(dict.fromkeys(model.chart.forces[state.name, "F"] for state in states))
+
+
 def _spring(model: Model) -> tuple[FloatArray, FloatArray] | None:
     """Return stiffness and damping of each element, shape (n,), if its force has no other terms."""
-    z, values = model.chart.variables[0], model.values
-    match model.chart.forces["F"]:
+    forces, values = _forces(model), model.values
+    if len(forces) != 1 or not model.chart.variables:
+        return None
+    z = model.chart.variables[0]
+    match forces[0]:
         case Binary("+", Binary("*", Name(k), Name(bristle)), Binary("*", Name(sigma), Name(rate))):
             known = rate == f"d{z}" and sigma in values
         case Binary("*", Name(k), Name(bristle)):
