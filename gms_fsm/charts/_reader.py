@@ -42,6 +42,8 @@ class Reader:
     def trees(self) -> dict[str, Any]:
         """Return what the chart keeps, by its name."""
         chart, here = self.chart, self.here
+        self.only_forces(chart.outputs, f"{here}: outputs")
+        self.only_forces(chart.contact_outputs, f"{here}: contact_outputs")
         for name, text in chart.let.items():
             self.lets[name] = self.value(text, self.known_now, f"{here}, let {name!r}")
         flows: dict[tuple[str, str], Value] = {}
@@ -63,8 +65,6 @@ class Reader:
             owner = f"{here}, edge {edge.name!r}"
             guards[edge.name] = self.guard(edge.guard, f"{owner}, guard")
             assignments["action", edge.name] = self.assignments(edge.actions, f"{owner}, action")
-        self.only_forces(chart.outputs, f"{here}: outputs")
-        self.only_forces(chart.contact_outputs, f"{here}: contact_outputs")
         totals = {
             force: self.total(chart.contact_outputs[force], force)
             for force in chart.force_names
@@ -102,8 +102,8 @@ class Reader:
                     advice=f"leave it out: {force} is what holds the contact",
                 )
             return None
-        text = state.outputs.get(force, self.chart.outputs.get(force))
-        if text is None:
+        texts = {**self.chart.outputs, **state.outputs}
+        if force not in texts:
             raise ChartError(
                 f"no output {force!r}",
                 place=owner,
@@ -115,7 +115,7 @@ class Reader:
             if force in state.outputs
             else (f"{self.here}, output {force!r}")
         )
-        return self.value(text, [*self.known_now, *rates], owner)
+        return self.value(texts[force], [*self.known_now, *rates], owner)
 
     def total(self, text: str, force: str) -> Value:
         """Read the force of a contact over the sum of its elements' forces."""

@@ -506,6 +506,11 @@ def system_of(model: Model, rig: Rig) -> System:
     if rig.acceleration is None:
         body = Body("body", velocity="v")
     else:
+        for name in ({*rig.signals} | {*rig.numbers}) & {"F"}:
+            raise ParameterError(
+                f"the name {name!r} is used twice, for the friction force too",
+                place=f"rig {rig.title!r}",
+            )
         names = ["t", "x", "v", "F", *rig.signals, *rig.numbers]
         force, inertia = _balance(parse_value(rig.acceleration, names), rig)
         body = Body("body", inertia=spell(inertia), force=spell(force))

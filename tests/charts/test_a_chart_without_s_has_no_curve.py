@@ -33,6 +33,7 @@ from gms_fsm.lowering.program import arguments, lower
 from gms_fsm.run.simulate import Moment
 from gms_fsm.run.sweep import Sweep, sweep
 from gms_fsm.systems.models import parameter_names, with_values
+from gms_fsm.systems.system import system_of
 from tests.helpers import same_bits
 
 CHART = Chart(
@@ -76,7 +77,7 @@ def test_a_curve_of_the_users_is_kept() -> None:
 
 def test_no_number_of_it_is_in_the_program(model: ChartModel) -> None:
     program = lower(model, PulledSlider(1.0, 2.0, 0.1))
-    shared, own, _ = arguments(model, PulledSlider(1.0, 2.0, 0.1))
+    shared, own, _ = arguments(system_of(model, PulledSlider(1.0, 2.0, 0.1)))
     assert shared == [0.0, 1.0, 2.0, 0.1, 0.1]  # sigma_2, mass, stiffness, speed, F_c
     assert own == [[1.0, 1.0], [1.0, 2.0]]
     for word in ("F_s", "v_s", "exp", " S ", "weight"):

@@ -77,28 +77,43 @@ def test_a_state_with_an_unknown_part_is_refused() -> None:
         State("stick", flow={"z": "v"}, during="z = 0")  # type: ignore[call-arg]
 
 
+def test_parts_that_make_no_sense_are_refused_at_once() -> None:
+    with pytest.raises(ChartError, match="state 'slip': locked is 1; it must be True or False"):
+        State("slip", locked=1)  # type: ignore[arg-type]
+    with pytest.raises(ChartError, match="edge 'go': it leaves no state"):
+        Transition("go", (), "slip", guard="v > 0")
+    with pytest.raises(ExpressionError, match=r"contact_outputs 'F', column 5: unknown name 'k'"):
+        chart(contact_outputs={"F": "F + k * z"})
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
         (edge(source="glue"), ["edge 'go'", "source 'glue' is not a state", "'stick', 'slip'"]),
         (edge(target="glue"), ["edge 'go'", "target 'glue' is not a state", "'stick', 'slip'"]),
-        (state(flow={}), ["state 'slip'", "no flow for 'z'", "give one"]),
         (state(flow={"z": "v", "w": "1"}), ["state 'slip'", "'w' is not a variable", "'z'"]),
         (state(entry={"w": "1"}), ["state 'slip', entry", "'w' is not a variable"]),
         (state(exit={"k": "1"}), ["state 'slip', exit", "'k' is not a variable"]),
-        (edge(actions={"v": "0"}), ["edge 'go', action", "'v' is not a variable"]),
+        (edge(actions={"s": "0"}), ["edge 'go', action", "'s' is not a variable"]),
         ({"states": (), "transitions": ()}, ["it has no states", "give at least one"]),
-        ({"variables": ()}, ["it has no variables", "give at least one"]),
-        ({"outputs": {}}, ["outputs has none", "exactly 'F'"]),
-        ({"outputs": {"G": "k"}}, ["outputs has 'G'", "exactly 'F'"]),
-        ({"outputs": {"F": {"stick": "k * z"}}}, ["one text for all states", "a variable f"]),
+        ({"velocities": ()}, ["it has no velocity", "give at least one"]),
+        ({"outputs": {}}, ["state 'stick': no output 'F'", "give one"]),
+        ({"outputs": {"G": "k"}}, ["outputs: it has 'G'", "its forces are 'F'"]),
+        ({"outputs": {"F": {"stick": "k * z"}}}, ["one text for all states", "State("]),
+        (state(outputs={"G": "k"}), ["state 'slip', outputs: it has 'G'"]),
+        (state(locked=True, outputs={"F": "k"}), ["state 'slip': it is locked", "leave it out"]),
+        (state(flow={"z": "F"}), ["flow of 'z': it reads 'F'", "algebraic loop"]),
+        (state(outputs={"F": "a"}), ["output 'F': it reads 'a'", "algebraic loop"]),
+        ({"let": {"u": "k * z"}, "contact_outputs": {"F": "F + u"}}, ["'u', which reads 'k'"]),
+        (edge(source=("stick", "glue")), ["edge 'go'", "source 'glue' is not a state"]),
+        ({"let": {"k": "1"}}, ["'k' is used twice", "parameter and let"]),
+        ({"velocities": ("v", "w"), "parameters": ("k", "C", "v_c", "F_w")}, ["'F_w' is taken"]),
         ({"states": (STICK, "slip")}, ["states has 'slip'", "write it as State("]),
         ({"transitions": (GO, None)}, ["transitions has None", "write it as Transition("]),
         (
             {"parameters": ("k", "C", Parameter("v_c", "m/s", "< v_max"))},
             ["parameter 'v_c'", "names 'v_max'", "'C', 'k'"],
         ),
-        ({"outputs": {"F": "k", "G": "k"}}, ["outputs has 'F', 'G'", "exactly 'F'"]),
         # one name, one meaning
         ({"parameters": ("k", "C", "v_c", "k")}, ["'k' is used twice", "parameter"]),
         ({"parameters": ("k", "C", "v_c", "z")}, ["'z' is used twice", "variable and parameter"]),
@@ -181,7 +196,7 @@ def test_the_words_of_the_language_are_reserved() -> None:
         (state(flow={"z": "v > 0"}), "state 'slip', flow of 'z'", "v > 0", 1, "numbers"),
         (state(flow={"z": "2 * vv"}), "state 'slip', flow of 'z'", "2 * vv", 5, "v, s, z"),
         (state(entry={"z": "1 +* v"}), "state 'slip', entry 'z'", "1 +* v", 4, "numbers"),
-        (state(exit={"z": "F"}), "state 'slip', exit 'z'", "F", 1, "v, s, z"),
+        (state(exit={"z": "G"}), "state 'slip', exit 'z'", "G", 1, "v, s, z"),
         (edge(actions={"z": "s s"}), "edge 'go', action 'z'", "s s", 3, "numbers"),
         ({"outputs": {"F": "k * zz"}}, "output 'F'", "k * zz", 5, "v, s, z, k, C, v_c, dz"),
         ({"outputs": {"F": "z > 1"}}, "output 'F'", "z > 1", 1, "numbers"),
@@ -230,7 +245,7 @@ def test_sequences_become_tuples_and_texts_cannot_be_changed_afterwards() -> Non
     flow["z"], outputs["F"] = "-v", "0"
     # What is drawn and printed (the texts) has to stay what is computed (the trees).
     assert built.states[0].flow["z"] == spell(built.flows["stick", "z"])
-    assert built.outputs["F"] == spell(built.forces["F"])
+    assert built.outputs["F"] == spell(built.forces["slip", "F"])
 
 
 def test_a_name_is_as_unicode_as_python_allows() -> None:
@@ -239,7 +254,7 @@ def test_a_name_is_as_unicode_as_python_allows() -> None:
         outputs={"F": "\u03c3 * z"},
         name="\u0413\u041c\u0421",
     )
-    assert spell(built.forces["F"]) == "\u03c3 * z"
+    assert spell(built.forces["stick", "F"]) == "\u03c3 * z"
 
 
 def test_messages_have_no_line_breaks_except_before_the_shown_text() -> None:

@@ -15,8 +15,10 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import ChartModel, Prescribed, Slider
-from gms_fsm.lowering.layout import LOG_NUMBERS, LOG_TEXTS, Layout, LogRecord, Places
+from gms_fsm.lowering._assembly import assembled
+from gms_fsm.lowering.layout import LOG_NUMBERS, LOG_TEXTS, Block, Layout, LogRecord, Places
 from gms_fsm.lowering.program import lower
+from gms_fsm.systems.system import system_of
 from tests.helpers import ROOT, pulled_mass, stick_slip
 
 HOME = Path("gms_fsm/lowering/layout.py")
@@ -194,7 +196,7 @@ def two_variables(n: int) -> ChartModel:
 @pytest.mark.parametrize("n", [1, 2, 5])
 @pytest.mark.parametrize("rig", [Prescribed("0.1"), Slider(1.0, "1")])
 def test_every_place_has_one_name(rig: Prescribed | Slider, n: int) -> None:
-    layout = Layout.of(two_variables(n), rig, surfaces=3)
+    layout = Layout.of(assembled(system_of(two_variables(n), rig)), surfaces=3)
     for places in (layout.y, layout.observed):
         numbers = [places.index(name, i or 0) for name, i in places]
         assert numbers == list(range(places.size))
@@ -209,24 +211,38 @@ def test_every_place_has_one_name(rig: Prescribed | Slider, n: int) -> None:
 
 @pytest.mark.parametrize("n", [1, 2, 5])
 @pytest.mark.parametrize("shared", [(), ("x",), ("x", "v")])
-def test_texts_name_the_same_places(shared: tuple[str, ...], n: int) -> None:
-    places = Places(shared, ("z", "w", "u"), n)
+@pytest.mark.parametrize("others", [None, 1, 4])
+def test_texts_name_the_same_places(shared: tuple[str, ...], n: int, others: int | None) -> None:
+    blocks = [Block(("z", "w", "u"), n)]
+    if others is not None:
+        blocks = [
+            Block(("a",), others, "m"),
+            Block[str]((), 2, "k"),
+            *blocks,
+            Block(("b",), 3, "l"),
+        ]
+    places = Places(shared, tuple(blocks))
+    sizes = {block.size: block.n for block in blocks}
     for place, (name, i) in enumerate(places):
-        assert eval(places.text(name), {"n": n, "i": i}) == place
-        asked = [places.asking_text(each, "k") for each in (*shared, *places.own)]
-        whose = [eval(whether, {"n": n, "k": place}) for whether, _ in asked].index(True)
-        assert (*shared, *places.own)[whose] == name
-        assert i is None or eval(asked[whose][1], {"n": n, "k": place}) == i
-    assert eval(places.size_text(), {"n": n}) == places.size
-    assert eval(places.size_text(2), {"n": n}) == places.size + 2
+        assert eval(places.text(name), {**sizes, "i": i}) == place
+        used = {size: sizes[size] for size in places.sizes(name)}
+        assert eval(places.text(name), {**used, "i": i}) == place
+        if i is not None:
+            first, end = (eval(places.start_text(name, k), dict(sizes)) for k in (0, 1))
+            assert first + i == place
+            assert first <= place < end
+    assert eval(places.size_text(), dict(sizes)) == places.size
+    assert eval(places.size_text(2), dict(sizes)) == places.size + 2
 
 
 def test_machine_code_finds_what_it_writes_into_the_log() -> None:
-    """Of a firing `integrators.loop.record` keeps y[first + i], seen[0], seen[2 + i], seen[1]."""
-    model, rig = stick_slip("signed"), pulled_mass()[1]
-    layout = lower(model, rig).layout
-    assert [layout.observed.index(name) for name in ("v", "F", "s")] == [0, 1, 2]
-    assert layout.observed.index("s", 3) == 2 + 3
-    assert layout.y.index(layout.variable, 3) == layout.y.index(layout.variable) + 3
+    """`integrators.loop.record` is told where the numbers of a firing are."""
+    layout = lower(stick_slip("signed"), pulled_mass()[1]).layout
+    own, seen = layout.recorded()
+    names = list(layout.y)
+    assert [names[place] for place in own] == [("friction.z", i) for i in range(4)]
+    observed = [name for name, _ in layout.observed]
+    assert [observed[place] for place in seen[3]] == ["friction.v", "friction.s", "friction.F"]
+    assert seen[3][1] == layout.observed.index("friction.s", 3)
     assert LOG_NUMBERS == ("z", "v", "s", "F_before", "F_after")
     assert LogRecord._fields == ("t", "element", *LOG_TEXTS, *LOG_NUMBERS)

@@ -13,8 +13,10 @@ from gms_fsm.systems.signals import Signal, as_signal
 
 MODEL = GMS(GMSParameters.paper("stick-slip"), law="signed")
 FREE = ["q", "mass", "k", "C", "sigma", "v_c", "z", "STICK", "stick", "arrest", "max_0", "t0"]
-USED = ["n", "i", "y", "p", "out", "mode", "edge", "held", "weight", "own", "shared", "tables"]
-USED += ["s", "x", "t", "F", "F_c", "v_s", "sigma_2", "S", "dS", "dz", "dy", "F_i", "j", "exp"]
+# Names that the generated text uses itself, or that belong to the model.
+FREE += ["n", "i", "y", "p", "out", "mode", "edge", "held", "weight", "own", "shared", "tables"]
+FREE += ["s", "F_c", "v_s", "sigma_2", "S", "dS", "dz", "dy", "F_i", "j", "friction", "a", "a_body"]
+USED = ["x", "v", "t", "F", "exp", "pi"]
 
 
 @dataclass
@@ -46,7 +48,7 @@ def test_a_free_name_changes_nothing(name: str, rig) -> None:  # type: ignore[no
 
 @pytest.mark.parametrize("rig", [by_number, by_signal])
 @pytest.mark.parametrize("name", USED)
-def test_a_name_of_the_program_is_refused(name: str, rig) -> None:  # type: ignore[no-untyped-def]
+def test_a_name_with_a_meaning_is_refused(name: str, rig) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(ParameterError) as caught:
         simulate(MODEL, rig(name), 3.0)
     assert repr(name) in str(caught.value)
