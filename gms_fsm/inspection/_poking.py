@@ -102,7 +102,7 @@ def initial_with(edits: Edits, here: Scope, *, prescribed: bool) -> dict[str, An
         In the form accepted by `gms_fsm.simulate`.
     """
     initial: dict[str, Any] = {"x": here.x}
-    for name in here.layout.only.variables:
+    for name in here.places.variables:
         values = edits.variables.get(name, {})
         initial[name] = [values.get(i, old) for i, old in enumerate(here.each(name))]
     initial["states"] = [edits.state.get(i, name) for i, name in enumerate(here.states)]

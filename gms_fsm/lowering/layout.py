@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Generic, NamedTuple, TypeVar
 
+from gms_fsm.errors import ParameterError, shown
 from gms_fsm.language import names_in
 from gms_fsm.lowering._assembly import Assembly, Bank, of
 
@@ -292,6 +293,10 @@ class BankPlaces:
         The chart's, without the contact's name.
     velocity : str
         What the chart calls its velocity, the first one.
+    first_edge : int
+        Number of its first edge, which are counted over all contacts.
+    position : str
+        Name of its relative position: in the state vector, or among what is observed.
     """
 
     name: str
@@ -299,6 +304,8 @@ class BankPlaces:
     first: int
     variables: tuple[str, ...]
     velocity: str
+    first_edge: int
+    position: str
 
     def of(self, name: str) -> str:
         """Return what a name of the contact is called in the layout."""
@@ -373,12 +380,14 @@ class Layout:
         Layout
             For its runs.
         """
-        system, banks, first = read.system, [], 0
+        system, banks, first, edges = read.system, [], 0, 0
         for bank in read.banks:
             variables = bank.chart.variables
             velocity = bank.chart.velocities[0]
-            banks.append(BankPlaces(bank.name, bank.n, first, variables, velocity))
+            position = bank.position
+            banks.append(BankPlaces(bank.name, bank.n, first, variables, velocity, edges, position))
             first += bank.n
+            edges += len(bank.edges)
         moved = (
             name
             for body in system.bodies
@@ -421,12 +430,6 @@ class Layout:
         """Return what a component of the state vector is called for the user."""
         return name.split(".", 1)[-1] if len(self.banks) == 1 else name
 
-    @property
-    def only(self) -> BankPlaces:
-        """The contact, of a system that has just one."""
-        (bank,) = self.banks
-        return bank
-
     @cached_property
     def n(self) -> int:
         """Number of elements of all contacts."""
@@ -435,6 +438,37 @@ class Layout:
     def bank(self, machine: int) -> BankPlaces:
         """Return the contact of a machine, which are counted over all contacts."""
         return next(bank for bank in self.banks if machine < bank.first + bank.n)
+
+    def contact(self, name: str = "") -> BankPlaces:
+        """Return a contact by name; without a name the only one.
+
+        Parameters
+        ----------
+        name : str
+            The contact's.
+
+        Returns
+        -------
+        BankPlaces
+            Its places.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such contact, or several and no name.
+        """
+        if not name and len(self.banks) == 1:
+            return self.banks[0]
+        for bank in self.banks:
+            if bank.name == name:
+                return bank
+        known = ", ".join(repr(bank.name) for bank in self.banks)
+        if not name:
+            raise ParameterError(
+                f"the system has the contacts {known}",
+                advice=f"say which one: .contact({self.banks[0].name!r})",
+            )
+        raise ParameterError(f"there is no contact {shown(name)}", advice=f"there are {known}")
 
     def recorded(self) -> tuple[list[int], list[list[int]]]:
         """Return where the numbers of `LogRecord` are for each machine: in y, and observed.

@@ -16,6 +16,7 @@ import numpy as np
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import FloatArray, checked_scalar, checked_values
+from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ExpressionError, ParameterError, shown
 from gms_fsm.language import (
     CONSTANTS,
@@ -36,7 +37,7 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Signal, as_signal
 
-__all__ = ["Body", "Contact", "Sampled", "System", "system_of"]
+__all__ = ["Body", "Contact", "Mounting", "Sampled", "System", "system_of"]
 
 Text: TypeAlias = str | float  # an expression, or just a number
 
@@ -187,6 +188,27 @@ class Contact:
             "model": model,
         }.items():
             object.__setattr__(self, each, value)
+
+    # What a `Model` has, so that everything that reads models reads contacts too.
+    @property
+    def title(self) -> str:
+        """Name and chart."""
+        return f"{self.name}: {self.chart.name if self.model is None else self.model.title}"
+
+    @property
+    def weights(self) -> FloatArray:
+        """Threshold weights, shape (n,), m/N."""
+        return np.ones(self.n) if self.model is None else self.model.weights
+
+    @property
+    def stribeck(self) -> Stribeck | None:
+        """The Stribeck curve of its model, if it has one."""
+        return None if self.model is None else self.model.stribeck
+
+    @property
+    def sigma_2(self) -> float:
+        """Viscous friction of its model, Ns/m."""
+        return 0.0 if self.model is None else self.model.sigma_2
 
 
 @dataclass(frozen=True)
@@ -475,6 +497,43 @@ def checked_numbers(
             f"{sorted(given - wanted) or 'none'}",
         )
     return checked_values(chart.parameters, values, n)
+
+
+@dataclass(frozen=True)
+class Mounting:
+    """What moves the contacts of a system, as a `Rig` for everything that reads rigs.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    """
+
+    system: System
+
+    @property
+    def title(self) -> str:
+        """The system's name."""
+        return self.system.name
+
+    @property
+    def signals(self) -> Mapping[str, Signal]:
+        """The system's signals that are functions of time alone."""
+        every = self.system.signals.items()
+        return {name: signal for name, signal in every if not isinstance(signal, str)}
+
+    @property
+    def numbers(self) -> Mapping[str, float]:
+        """The system's."""
+        return self.system.numbers
+
+    @property
+    def acceleration(self) -> str | None:
+        """The balance of the first free body; None if all bodies are driven."""
+        for body in self.system.bodies:
+            if not body.driven:
+                return f"({body.force} - F) / ({body.inertia})"
+        return None
 
 
 # --------------------------------------------------------------------------- from a model on a rig

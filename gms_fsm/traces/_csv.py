@@ -91,7 +91,7 @@ def _header(path: Path, line: str) -> Header:
 
 
 def _rows(table: Mapping[str, list[str]], model: Model, layout: Layout) -> Rows:
-    start = layout.only.of("")
+    start = layout.contact().of("")
     y = [
         _numbers(table, name if i is None else column_name(name.removeprefix(start), i))
         for name, i in layout.y

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.lowering._observing import observe
-from gms_fsm.lowering.layout import Layout
+from gms_fsm.lowering.layout import BankPlaces, Layout
 from gms_fsm.lowering.program import Program
 from gms_fsm.systems.models import Model
 from gms_fsm.traces.trace import Trace
@@ -124,6 +124,8 @@ class Scope:
         The state vector.
     seen : mapping of str to float, sequence of float, or ndarrays of shape (rows,) or (n, rows)
         ``v, F``; ``s`` and ``F_elements``, one per element; during a run also the rates.
+    places : BankPlaces
+        Where the quantities of the contact are.
     mode : sequence of int, or ndarray, shape (modes, rows)
         Modes of the elements and the surfaces.
 
@@ -145,10 +147,17 @@ class Scope:
     y: Any
     seen: Mapping[str, Any]
     mode: Any
+    places: BankPlaces
 
     @classmethod
     def of(
-        cls, model: Model, program: Program, t: float, y: list[float], mode: Sequence[int]
+        cls,
+        model: Model,
+        program: Program,
+        t: float,
+        y: list[float],
+        mode: Sequence[int],
+        contact: str = "",
     ) -> Scope:
         """Return the scope of the present state of a run.
 
@@ -171,8 +180,9 @@ class Scope:
             With numbers as values.
         """
         layout = program.layout
-        seen = layout.only.plain(layout.observed.named(observe(program, t, y, mode)))
-        return cls(model, layout, t, y, seen, mode)
+        places = layout.contact(contact)
+        seen = places.plain(layout.observed.named(observe(program, t, y, mode)))
+        return cls(model, layout, t, y, seen, mode, places)
 
     @classmethod
     def at(cls, trace: Trace, row: int) -> Scope:
@@ -193,12 +203,13 @@ class Scope:
         seen = {
             "v": float(trace.v[row]),
             "F": float(trace.F[row]),
+            "x": float(trace.x[row]),
             "s": trace.s[row].tolist(),
             FORCE: trace.F_elements[row].tolist(),
         }
         rows, layout = trace.rows, trace.program.layout
         y, mode = rows.y[row].tolist(), rows.mode[row].tolist()
-        return cls(trace.model, layout, float(rows.t[row]), y, seen, mode)
+        return cls(trace.model, layout, float(rows.t[row]), y, seen, mode, trace.places)
 
     @classmethod
     def over(cls, trace: Trace) -> Scope:
@@ -214,20 +225,23 @@ class Scope:
         Scope
             With arrays as values, whose last axis is the row.
         """
-        seen = {"v": trace.v, "F": trace.F, "s": trace.s.T, FORCE: trace.F_elements.T}
+        seen = {"v": trace.v, "F": trace.F, "x": trace.x, "s": trace.s.T, FORCE: trace.F_elements.T}
         rows, layout = trace.rows, trace.program.layout
-        return cls(trace.model, layout, rows.t, rows.y.T, seen, rows.mode.T)
+        return cls(trace.model, layout, rows.t, rows.y.T, seen, rows.mode.T, trace.places)
 
     # ------------------------------------------------------------------ single quantities
     @property
     def x(self) -> Any:
         """Position, m."""
-        return self.y[self.layout.y.index("x")]
+        position = self.places.position
+        if position in self.layout.y.shared:
+            return self.y[self.layout.y.index(position)]
+        return self.seen["x"]
 
     @property
     def v(self) -> Any:
         """Velocity, m/s."""
-        return self.seen["v"]
+        return self.seen[self.places.velocity]
 
     @property
     def F(self) -> Any:
@@ -237,7 +251,7 @@ class Scope:
     @property
     def z(self) -> Any:
         """The chart's first variable, one per element."""
-        return self.each(self.layout.only.variables[0])
+        return self.each(self.places.variables[0])
 
     @property
     def s(self) -> Any:
@@ -253,7 +267,7 @@ class Scope:
     def states(self) -> Any:
         """Names of the active states, one per element."""
         names = [state.name for state in self.model.chart.states]
-        active = self.mode[self.layout.elements]
+        active = self.mode[self.places.elements]
         if isinstance(active, np.ndarray):
             return np.array(names)[active]
         return [names[mode] for mode in active]
@@ -271,7 +285,7 @@ class Scope:
         sequence of float, or ndarray, shape (n, rows)
             One per element.
         """
-        bank = self.layout.only
+        bank = self.places
         if name in bank.variables:
             return self.y[self.layout.y.block(bank.of(name))]
         return self.seen[name]
@@ -291,7 +305,7 @@ class Scope:
             Values by name.
         """
         values = {"t": self.t, "x": self.x, "v": self.v, "s": self.s[element]}
-        for name in self.layout.only.variables:
+        for name in self.places.variables:
             values[name] = self.each(name)[element]
         return values | parameter_values(self.model, element)
 
@@ -308,7 +322,7 @@ class Scope:
         if self.model.stribeck is not None:
             values["s"] = self.curve
         if self.model.n == 1:
-            values |= {name: self.each(name)[0] for name in self.layout.only.variables}
+            values |= {name: self.each(name)[0] for name in self.places.variables}
             values["state(0)"] = self.states[0]  # the value of `state`
         return values
 
@@ -326,7 +340,7 @@ class Scope:
             Values by name. State names are under ``state(1)``, those of each element under
             ``state(0)``.
         """
-        own = {name: self.each(name) for name in (*self.layout.only.variables, *_curve(self.model))}
+        own = {name: self.each(name) for name in (*self.places.variables, *_curve(self.model))}
         for name, value in self.model.values.items():
             own[name] = value if np.ndim(value) == 0 else np.asarray(value)[:, np.newaxis]
         # A name defined by the chart takes precedence over a numbered one.
@@ -340,7 +354,7 @@ class Scope:
 
     def _single(self) -> dict[str, Any]:
         """Return the quantities of single elements under their numbered names."""
-        quantities = {name: self.each(name) for name in (*self.layout.only.variables, "s", FORCE)}
+        quantities = {name: self.each(name) for name in (*self.places.variables, "s", FORCE)}
         names = _numbered(self.model).items()
         return {name: quantities[quantity][i] for name, (quantity, i) in names}
 

@@ -27,11 +27,13 @@ from gms_fsm.errors import (
     shown,
     why,
 )
-from gms_fsm.lowering._observing import sigmas
+from gms_fsm.lowering._observing import armed, rate, sigmas
+from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.lowering.program import Program, lower
 from gms_fsm.lowering.scales import Setting
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
+from gms_fsm.systems.system import System, system_of
 from gms_fsm.traces import _csv, _npz
 from gms_fsm.traces._between import interpolated
 from gms_fsm.traces._header import Header
@@ -43,7 +45,7 @@ from gms_fsm.traces.verdicts import Verdict
 if TYPE_CHECKING:
     import pandas
 
-__all__ = ["Trace", "check_trace", "dwell_times", "files_of"]
+__all__ = ["BodyTrace", "Trace", "check_trace", "dwell_times", "files_of"]
 
 _SLIDING = np.dtype(
     [
@@ -117,6 +119,8 @@ class Trace:
     settings: Mapping[str, Setting]
     stored: Mapping[str, FloatArray] = field(default_factory=dict, repr=False)
     monitors: Mapping[str, Verdict] = field(default_factory=dict, repr=False)
+    system: System | None = field(default=None, repr=False)  # where it is not a model on a rig
+    which: str = field(default="", repr=False)  # the contact, of a system with several
 
     def __repr__(self) -> str:
         return (
@@ -138,10 +142,116 @@ class Trace:
         """Micro-step of each row, shape (rows,)."""
         return self.rows.microstep
 
+    # ------------------------------------------------------------------ systems
+    @cached_property
+    def places(self) -> BankPlaces:
+        """Where the quantities of the contact are: the only one, or the one chosen."""
+        return self.program.layout.contact(self.which)
+
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """Names of the contacts."""
+        return tuple(bank.name for bank in self.program.layout.banks)
+
+    def contact(self, name: str) -> Trace:
+        """Return the run as one contact sees it: its v, F, z, s, states and transitions.
+
+        Parameters
+        ----------
+        name : str
+            The contact's.
+
+        Returns
+        -------
+        Trace
+            The same rows; everything that shows a run of one model shows it.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such contact.
+        """
+        bank = self.program.layout.contact(name)
+        if self.system is None:
+            return self
+        log = self.transitions
+        mine = log[log.contact == bank.name] if "contact" in log.dtype.names else log
+        model: Any = self.system.contact(bank.name)
+        chosen = replace(self, model=model, transitions=mine, which=bank.name)
+        # What the rows were computed to stays.
+        kept = {key: vars(self)[key] for key in ("program", "_seen") if key in vars(self)}
+        vars(chosen).update(kept)
+        return chosen
+
+    def body(self, name: str) -> BodyTrace:
+        """Return the motion of a body.
+
+        Parameters
+        ----------
+        name : str
+            The body's.
+
+        Returns
+        -------
+        BodyTrace
+            Its position and velocity at the rows.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such body.
+        """
+        system = system_of(self.model, self.rig) if self.system is None else self.system
+        body = system.body(name)
+        velocity = self._named(body.v) if not body.driven else self._velocity(body.v)
+        return BodyTrace(name, self._named(body.x), velocity)
+
+    def _velocity(self, name: str) -> FloatArray:
+        """Return the velocity of a driven body: that of its rows' dy/dt."""
+        place = self.program.layout.y.shared.index(
+            next(b.x for b in self._system.bodies if b.v == name)
+        )
+        modes = self.rows.mode.tolist()
+        rows = zip(self.t.tolist(), self.rows.y.tolist(), modes, strict=True)
+        held = [armed(self.program, t, y, mode) for t, y, mode in rows]
+        rows = zip(self.t.tolist(), self.rows.y.tolist(), modes, held, strict=True)
+        return np.array([rate(self.program, *row)[place] for row in rows])
+
+    @property
+    def _system(self) -> System:
+        return system_of(self.model, self.rig) if self.system is None else self.system
+
+    def value(self, name: str) -> FloatArray:
+        """Return a further state or a sampled value of the system, shape (rows,).
+
+        Parameters
+        ----------
+        name : str
+            As in the system's ``flow`` or in the updates of a `Sampled`.
+
+        Returns
+        -------
+        ndarray, shape (rows,)
+            Its values.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such state.
+        """
+        if name not in self.program.layout.y.shared:
+            known = ", ".join(map(repr, self.program.layout.y.shared))
+            raise ParameterError(f"there is no state {shown(name)}", advice=f"there are {known}")
+        return self._named(name)
+
+    # ------------------------------------------------------------------ of one contact
     @property
     def x(self) -> FloatArray:
         """Position, shape (rows,), m."""
-        return self._named("x")
+        position = self.places.position
+        if position in self.program.layout.y.shared:
+            return self._named(position)
+        return self._seen[position]
 
     @property
     def n(self) -> int:
@@ -151,7 +261,9 @@ class Trace:
     @property
     def z(self) -> FloatArray:
         """First variable (the deflection) of every element, shape (rows, n), m."""
-        bank = self.program.layout.only
+        bank = self.places
+        if not bank.variables:
+            return np.empty((len(self.rows), bank.n)) * np.nan
         return self._named(bank.of(bank.variables[0]))
 
     def variable(self, name: str) -> FloatArray:
@@ -178,7 +290,7 @@ class Trace:
                 place="name",
                 value=name,
             )
-        return self._named(self.program.layout.only.of(name))
+        return self._named(self.places.of(name))
 
     def _named(self, name: str) -> FloatArray:
         column: FloatArray = self.rows.y[:, self.program.layout.y.where(name)]
@@ -192,32 +304,34 @@ class Trace:
     @property
     def modes(self) -> NDArray[np.int64]:
         """Index of the active state of every element, shape (rows, n)."""
-        return self.rows.mode[:, self.program.layout.elements]
+        return self.rows.mode[:, self.places.elements]
 
     @property
     def v(self) -> FloatArray:
         """Velocity, shape (rows,), m/s."""
-        return self._observed["v"]
+        return self._seen[self.places.of(self.places.velocity)]
 
     @property
     def s(self) -> FloatArray:
         """Thresholds, shape (rows, n), m; NaN where the model has no Stribeck curve."""
-        return self._observed["s"]
+        return self._seen[self.places.of("s")]
 
     @property
     def F(self) -> FloatArray:
         """Friction force, shape (rows,), N."""
-        return self._observed["F"]
+        return self._seen[self.places.of("F")]
 
     @property
     def F_elements(self) -> FloatArray:
         """Force of each element, shape (rows, n), N."""
-        return self._observed["F_elements"]
+        return self._seen[self.places.of("F_elements")]
 
     @property
     def dz(self) -> FloatArray:
         """Rate of the first variable in the states of the row, shape (rows, n), m/s."""
-        return self._observed["dz"]
+        if not self.places.variables:
+            return np.empty((len(self.rows), self.places.n)) * np.nan
+        return self._seen[self.places.of(f"d{self.places.variables[0]}")]
 
     @property
     def sliding(self) -> Any:
@@ -268,19 +382,23 @@ class Trace:
     @cached_property
     def program(self) -> Program:
         """The generated program of the run."""
-        return lower(self.model, self.rig)
+        return lower(self.model, self.rig) if self.system is None else lower(self.system)
+
+    @property
+    def _observed(self) -> Mapping[str, FloatArray]:
+        """What files of one model on a rig store."""
+        return {name: getattr(self, name) for name in OBSERVED}
 
     @cached_property
-    def _observed(self) -> Mapping[str, FloatArray]:
-        if self.stored:
-            return self.stored
+    def _seen(self) -> Mapping[str, FloatArray]:
+        """What was observed, by its name in the layout."""
         compiled, layout = self.settings.get("engine") == "compiled", self.program.layout
+        if self.stored:
+            bank = layout.contact()
+            names = {"v": bank.velocity, "dz": f"d{(*bank.variables, '')[0]}"}
+            return {bank.of(names.get(name, name)): u for name, u in self.stored.items()}
         table = observed_rows(self.program, self.rows, compiled=compiled)
-        bank = layout.only
-        seen = bank.plain(layout.observed.named(table.T))
-        # As in files, dz is the rate of the first variable, whatever its name.
-        rate = f"d{bank.variables[0]}"
-        return {name: seen[rate if name == "dz" else name].T for name in OBSERVED}
+        return {name: column.T for name, column in layout.observed.named(table.T).items()}
 
     # ------------------------------------------------------------------ sampling
     def sample(self, times: ArrayLike) -> Trace:
@@ -529,6 +647,23 @@ class Trace:
         return _csv.log_text(self.transitions)
 
 
+@dataclass(frozen=True, eq=False)
+class BodyTrace:
+    """The motion of a body.
+
+    Parameters
+    ----------
+    name : str
+        The body's.
+    x, v : ndarray, shape (rows,)
+        Position [m] and velocity [m/s].
+    """
+
+    name: str
+    x: FloatArray
+    v: FloatArray
+
+
 def dwell_times(trace: Trace) -> FloatArray:
     """Return the time each element spent in each state.
 
@@ -555,7 +690,7 @@ def dwell_times(trace: Trace) -> FloatArray:
     begin, end = trace.stops.t[0], trace.stops.t[-1]
     begin, end = min(begin, trace.t[0]), max(end, trace.t[-1])
     first = trace.stops if trace.stops.t[0] <= trace.t[0] else trace.rows
-    elements = trace.program.layout.elements
+    elements = trace.places.elements
     for i in range(trace.n):
         since, state = begin, int(first.mode[0, elements][i])
         for record in trace.transitions[trace.transitions.element == i]:

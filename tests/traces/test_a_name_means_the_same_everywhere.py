@@ -28,7 +28,9 @@ from gms_fsm import (
 )
 from gms_fsm.inspection.explain import values_at
 from gms_fsm.language import names_in, parse_value
+from gms_fsm.lowering._assembly import assembled
 from gms_fsm.lowering.layout import Layout
+from gms_fsm.systems.system import system_of
 from gms_fsm.traces.monitors import examine
 from gms_fsm.traces.scope import Scope, invariant_names, watch_names
 from tests.helpers import pulled_mass, stick_slip
@@ -189,5 +191,4 @@ def test_a_layout_needs_no_program() -> None:
     """Names alone decide it; the program only adds how many surfaces there are."""
     for model, rig in CASES.values():
         layout = simulate(model, rig, 0.1).program.layout
-        assert layout == Layout.of(model, rig, layout.surfaces)
-        assert layout.y == Layout.state(model, rig)
+        assert layout == Layout.of(assembled(system_of(model, rig)), layout.surfaces)
