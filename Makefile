@@ -84,7 +84,7 @@ LOWEST_TESTS := callbacks_* command_line* overrides_* scenarios_run compiled_* e
 
 lowest: .venv-lowest/stamp
 	.venv-lowest/bin/uv pip freeze --python .venv-lowest/bin/python
-	.venv-lowest/bin/python -m pytest -n auto $(foreach name,$(LOWEST_TESTS),$(wildcard tests/test_$(name).py)) gms_fsm integrators plots
+	.venv-lowest/bin/python -m pytest -n auto $(foreach name,$(LOWEST_TESTS),$(wildcard tests/*/test_$(name).py)) gms_fsm integrators plots
 
 bench: $(VENV)/bench.stamp
 	$(RUN)/python benchmarks/compare.py

@@ -127,7 +127,7 @@ def kernel(case: Case) -> Callable[[], Outcome]:
             pass
         log, count = columns.log, columns.log.counts[0]
         edge = [EDGES[i] for i in np.asarray(log.edge[:count]).tolist()]
-        z = columns.buffers.y[-model.n :]
+        z = columns.buffers.now.y[-model.n :]
         return Outcome(log.t[:count].copy(), log.machine[:count].copy(), edge, z[None].copy())
 
     return run

@@ -1,13 +1,15 @@
 """Integrators for systems that flow, and switch at located crossings.
 
-This package knows nothing of what it integrates. A system is a handful of functions over plain
-indexable numbers (lists in Python, arrays when compiled); a loop over it yields what happened.
+This package knows nothing of what it integrates. `Equations` are a handful of functions over plain
+indexable numbers (lists in Python, arrays when compiled); a loop over them yields what happened.
 """
 
 from integrators.hybrid import (
     MOST_SWITCHES,
     ROWS_AT_ONCE,
     Arc,
+    Equations,
+    Event,
     Firing,
     HybridError,
     Livelock,
@@ -17,11 +19,10 @@ from integrators.hybrid import (
     StepTooSmall,
     Stop,
     Switch,
-    System,
     TooManySteps,
     run,
 )
-from integrators.sliding import LIVE, Held, Sliding, Surfaces, look, room_to_slide, slope_on
+from integrators.sliding import LIVE, Functions, Held, Surfaces, look, room_to_slide, slope_on
 from integrators.tableaux import BS23, DP45, EULER, HEUN, METHODS, RK4, Tableau
 
 __all__ = [
@@ -35,19 +36,20 @@ __all__ = [
     "RK4",
     "ROWS_AT_ONCE",
     "Arc",
+    "Equations",
+    "Event",
     "Firing",
+    "Functions",
     "Held",
     "HybridError",
     "Livelock",
     "NotFinite",
     "Options",
     "Slide",
-    "Sliding",
     "StepTooSmall",
     "Stop",
     "Surfaces",
     "Switch",
-    "System",
     "Tableau",
     "TooManySteps",
     "look",

@@ -6,21 +6,27 @@ outer loop's work, between two calls.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from integrators.crossings import (
     NO_CHANGE,
-    Margins,
+    Path,
     Watched,
     copy_margins,
     first_change,
     nothing_near,
 )
-from integrators.step_size import error_norm, next_factor, retry_factor
+from integrators.step_size import INFINITY, Control, error_norm, next_factor, retry_factor
 from integrators.steps import (
+    ERROR_BEFORE,
+    T_STOP,
     Coefficients,
     Dense,
-    Flow,
+    H,
+    Motion,
+    Now,
+    Scratch,
+    T,
     Vector,
     fit_dense,
     interpolate,
@@ -28,10 +34,12 @@ from integrators.steps import (
     weigh,
 )
 
-__all__ = ["Control", "Output", "Work", "advance"]
+__all__ = ["Output", "Plan", "advance"]
 
 # Why the kernel came back.
 REACHED, CROSSED, FULL, TOO_SMALL, NOT_FINITE = 0, 1, 2, 3, 4
+# What becomes of a step; else TOO_SMALL or NOT_FINITE.
+ACCEPTED, REJECTED = 5, 6
 REDO = 0.9  # a crossing before this fraction of an adaptive step has the step done again
 SMALLEST = 1e-280  # an absolute tolerance: smaller numbers lose their digits
 AT_ONCE = 1e3  # ticks; a crossing that is nearer comes at once
@@ -41,15 +49,18 @@ TICK = 4.0 * 2.0**-52
 ROW, NEXT_TIME, NEXT_KNOT, STEPS = 0, 1, 2, 3
 
 
-class Control(NamedTuple):
-    """How steps are chosen."""
+class Plan(NamedTuple):
+    """What a run keeps to."""
 
-    step: float  # fixed grid if > 0, else adaptive
-    origin: float  # where the grid starts
-    rtol: float
-    atol: Vector  # shape (m,); 0 for a component without a scale of its own
-    max_step: float
-    time_scale: float  # of the system, for starting steps; 0 if it has none
+    method: Coefficients
+    control: Control
+    t_end: float
+    located: bool  # stop at crossings; else ask once at the end of each step
+    foreign: bool  # the caller takes the steps (the loop asks for them)
+    jumps: Vector  # times at which the flow jumps, increasing
+    before_jumps: Vector  # one clock tick before each
+    knots: Vector  # times that steps may not jump over
+    max_steps: int  # tried, in the whole run
 
 
 class Output(NamedTuple):
@@ -60,17 +71,6 @@ class Output(NamedTuple):
     rows_t: Vector  # shape (capacity,)
     rows_y: list[Vector]  # shape (capacity, m)
     cursor: list[int]  # [rows written, next wanted time, next knot, steps tried]
-
-
-class Work(NamedTuple):
-    """Scratch of one run."""
-
-    k: list[Vector]  # shape (stages, m)
-    y_new: Vector
-    f_new: Vector
-    error: Vector
-    floor: Vector  # absolute tolerances; without a scale they grow with the component
-    dense: Dense
 
 
 def put_row(out: Output, t: float, y: Vector) -> None:
@@ -88,172 +88,186 @@ def tick_at(t: float) -> float:
     return TICK * abs(t)
 
 
-def raise_floor(control: Control, floor: Vector, y: Vector) -> None:
+def raise_floor(control: Control, now: Now) -> None:
     """Let the tolerances of components without a scale follow the largest value they have had."""
-    for j in range(len(y)):
+    for j in range(len(now.y)):
         if control.atol[j] == 0.0:
-            floor[j] = max(floor[j], control.rtol * abs(y[j]), SMALLEST)
+            now.floor[j] = max(now.floor[j], control.rtol * abs(now.y[j]), SMALLEST)
+
+
+def next_on_grid(control: Control, t: float) -> float:
+    """Return the next place of the fixed grid, with no sliver before it."""
+    index = int((t - control.origin) / control.step) + 1
+    t_new = control.origin + index * control.step
+    while t_new - t <= tick_at(t_new):
+        index += 1
+        t_new = control.origin + index * control.step
+    return t_new
+
+
+def limit_after(plan: Plan, clock: Vector, cursor: list[int]) -> float:
+    """Return how far the next step may go: to the next stop or knot."""
+    knots, t, limit = plan.knots, clock[T], clock[T_STOP]
+    while cursor[NEXT_KNOT] < len(knots) and knots[cursor[NEXT_KNOT]] <= t:
+        cursor[NEXT_KNOT] += 1
+    if cursor[NEXT_KNOT] < len(knots):
+        limit = min(limit, knots[cursor[NEXT_KNOT]])
+    return limit
 
 
 def advance(
-    flow: Flow,
-    margins: Margins,
-    method: Coefficients,
-    control: Control,
-    t: float,
-    y: Vector,
-    f: Vector,
-    h: float,
-    error_before: float,
-    t_stop: float,
-    knots: Vector,
-    mode: list[int],
-    held: Vector,
-    p: Any,
+    motion: Motion,
+    plan: Plan,
+    now: Now,
     w: Watched,
     out: Output,
-    work: Work,
+    scratch: Scratch,
     most_steps: int,
-) -> tuple[int, float, float, float]:
-    """Integrate y in place from t until t_stop, a crossing, a full buffer or most_steps steps.
+) -> int:
+    """Integrate in place until the next stop, a crossing, a full buffer or most_steps steps.
 
     Parameters
     ----------
-    flow, margins : callable
-        The system.
-    method, control
+    motion : Motion
+        What flows, and what is watched.
+    plan : Plan
         The method and how steps are chosen.
-    t : float
-        Start.
-    y, f : list of float, shape (m,)
-        State and slope at t; on return those at the time returned (f is not valid after a
-        crossing).
-    h, error_before : float
-        The controller's memory.
-    t_stop : float
-        Where the outer loop wants to be asked.
-    knots : list of float
-        Times that a step may end on but not jump over.
-    mode, held, p
-        Frozen, handed on to the system.
+    now : Now
+        Where the run is. The slope is not valid after a crossing.
     w : Watched
-        Relations; ``w.start`` holds the margins at t.
-    out, work
+        Relations; ``w.start`` holds the margins of the start.
+    out, scratch
         Buffers.
     most_steps : int
         How many steps at most.
 
     Returns
     -------
-    (status, t, h, error_before)
-        One of REACHED, CROSSED, FULL, TOO_SMALL, NOT_FINITE, and the new values.
+    int
+        One of REACHED, CROSSED, FULL, TOO_SMALL, NOT_FINITE.
     """
-    fixed = control.step > 0.0
+    y, f = now.y, now.f
+    y_new, f_new = scratch.y_new, scratch.f_new
+    clock, cursor, times = now.clock, out.cursor, out.times
+    adaptive = not plan.control.step > 0.0
     watching = len(w.active) > 0
-    order = method.error_order
-    cursor = out.cursor
-    infinity = float("inf")
     scaleless = False
     for j in range(len(y)):
-        scaleless = scaleless or control.atol[j] == 0.0
+        scaleless = scaleless or plan.control.atol[j] == 0.0
     rejected = False
     redone = False
     while True:
-        if t >= t_stop:
-            return REACHED, t, h, error_before
+        t = clock[T]
+        if t >= clock[T_STOP]:
+            return REACHED
         if most_steps <= 0 or (out.every_step and cursor[ROW] >= len(out.rows_t)):
-            return FULL, t, h, error_before
-
-        # Where to: the grid or the controller's step, but not past a stop, and no sliver before it.
-        if fixed:
-            index = int((t - control.origin) / control.step) + 1
-            t_new = control.origin + index * control.step
-            while t_new - t <= tick_at(t_new):
-                index += 1
-                t_new = control.origin + index * control.step
-        else:
-            t_new = t + min(h, control.max_step)
-        limit = t_stop
-        while cursor[NEXT_KNOT] < len(knots) and knots[cursor[NEXT_KNOT]] <= t:
-            cursor[NEXT_KNOT] += 1
-        if cursor[NEXT_KNOT] < len(knots):
-            limit = min(limit, knots[cursor[NEXT_KNOT]])
-        tick = TICK * max(abs(t), abs(t_new))
-        if t_new + tick >= limit:
-            t_new = limit
+            return FULL
+        t_new, tick = _aim(plan, clock, cursor)
         if not t_new > t:
-            return TOO_SMALL, t, h, error_before
-        h_now = t_new - t
+            return TOO_SMALL
+        h = t_new - t
         cursor[STEPS] += 1
+        take_step(motion, plan.method, now, t_new, scratch)
+        status = _judge(plan, now, h, tick, scratch, rejected)
+        rejected = status == REJECTED
+        if rejected:
+            continue
+        if status != ACCEPTED:
+            return status
 
-        take_step(flow, method, t, y, f, t_new, mode, held, p, work.k, work.y_new, work.f_new)
-        if fixed:
-            total = 0.0
-            for j in range(len(y)):
-                total += abs(work.y_new[j]) + abs(work.f_new[j])
-            if not total < infinity:
-                return NOT_FINITE, t, h, error_before
-        else:
-            weigh(method.E, len(method.B), work.f_new, work.k, work.error)
-            error = error_norm(work.error, h_now, y, work.y_new, control.rtol, work.floor)
-            if not error <= 1.0:
-                h = h_now * retry_factor(error, order)
-                rejected = True
-                if h <= tick:
-                    status = TOO_SMALL if error < infinity else NOT_FINITE
-                    return status, t, h, error_before
-                continue
-            factor = next_factor(error, error_before, order)
-            if rejected:
-                factor = min(factor, 1.0)
-            # A step cut short by a stop says little of the step after it.
-            h = max(h, h_now * factor) if h_now < h and not rejected else h_now * factor
-            error_before = max(error, 1e-4)
-            rejected = False
-
-        wanted = cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] < t_new
+        wanted = cursor[NEXT_TIME] < len(times) and times[cursor[NEXT_TIME]] < t_new
         theta = NO_CHANGE
-        near = watching and not nothing_near(
-            margins, t, t_new, y, f, work.y_new, work.f_new, mode, p, w
-        )
+        near = watching and not nothing_near(motion, now, t_new, scratch, w)
         if near or wanted:
-            fit_dense(method, h_now, y, work.k, work.y_new, work.f_new, work.dense)
+            fit_dense(plan.method, h, y, scratch)
         if near:
-            theta = first_change(
-                interpolate, work.dense, margins, t, t_new, work.y_new, mode, p, w, tick
-            )
-        if theta < REDO and theta * h_now > AT_ONCE * tick and not fixed and not redone:
+            path = Path(motion, now.mode, interpolate, scratch.dense, t, t_new, y_new)
+            theta = first_change(path, w, tick)
+        if theta < REDO and theta * h > AT_ONCE * tick and adaptive and not redone:
             # The stages lay behind the crossing and may have jumped what comes before it: the step
             # up to the crossing is done for its own sake. Not where it is next to none: rounding
             # may then take the crossing back, and a run would creep on by ticks.
-            h = theta * h_now
+            clock[H] = theta * h
             redone = True
             continue
         redone = False
         if theta < 1.0:
-            t_new = t + theta * h_now
+            t_new = t + theta * h
         else:
             copy_margins(w, w.end, w.start)
-        # Rows at wanted times are right-continuous: a time that falls on a stop is written
-        # after it, when the states have switched.
-        while cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] < t_new:
-            time = out.times[cursor[NEXT_TIME]]
-            row = cursor[ROW]
-            interpolate(work.dense, (time - t) / h_now, out.rows_y[row])
-            out.rows_t[row] = time
-            cursor[ROW] = row + 1
-            cursor[NEXT_TIME] += 1
+        if wanted:
+            _put_wanted(out, scratch.dense, t, h, t_new)
         if theta < 1.0:
-            interpolate(work.dense, theta, y)
+            interpolate(scratch.dense, theta, y)
         else:
             for j in range(len(y)):
-                y[j] = work.y_new[j]
-                f[j] = work.f_new[j]
-        t = t_new
+                y[j] = y_new[j]
+                f[j] = f_new[j]
+        clock[T] = t_new
         most_steps -= 1
         if scaleless:
-            raise_floor(control, work.floor, y)
+            raise_floor(plan.control, now)
         if out.every_step:
-            put_row(out, t, y)
+            put_row(out, t_new, y)
         if theta != NO_CHANGE:
-            return CROSSED, t, h, error_before
+            return CROSSED
+
+
+def _aim(plan: Plan, clock: Vector, cursor: list[int]) -> tuple[float, float]:
+    """Return where the next step is to end, and the difference of times that counts there.
+
+    On the grid or where the controller says, but not past a stop, and with no sliver before it.
+    """
+    t, control = clock[T], plan.control
+    if control.step > 0.0:
+        t_new = next_on_grid(control, t)
+    else:
+        t_new = t + min(clock[H], control.max_step)
+    limit = limit_after(plan, clock, cursor)
+    tick = TICK * max(abs(t), abs(t_new))
+    if t_new + tick >= limit:
+        t_new = limit
+    return t_new, tick
+
+
+def _judge(plan: Plan, now: Now, h: float, tick: float, scratch: Scratch, rejected: bool) -> int:
+    """Tell what becomes of the step of length h just tried, and choose the next one's length."""
+    control, method, clock = plan.control, plan.method, now.clock
+    y_new, f_new = scratch.y_new, scratch.f_new
+    if control.step > 0.0:
+        total = 0.0
+        for j in range(len(y_new)):
+            total += abs(y_new[j]) + abs(f_new[j])
+        return ACCEPTED if total < INFINITY else NOT_FINITE
+    order = method.error_order
+    weigh(method.E, len(method.B), f_new, scratch.k, scratch.error)
+    error = error_norm(scratch.error, h, now.y, y_new, control.rtol, now.floor)
+    if not error <= 1.0:
+        clock[H] = h * retry_factor(error, order)
+        if clock[H] > tick:
+            return REJECTED
+        return TOO_SMALL if error < INFINITY else NOT_FINITE
+    factor = next_factor(error, clock[ERROR_BEFORE], order)
+    if rejected:
+        factor = min(factor, 1.0)
+    # A step cut short by a stop says little of the step after it.
+    cut_short = h < clock[H] and not rejected
+    clock[H] = max(clock[H], h * factor) if cut_short else h * factor
+    clock[ERROR_BEFORE] = max(error, 1e-4)
+    return ACCEPTED
+
+
+def _put_wanted(out: Output, dense: Dense, t: float, h: float, t_new: float) -> None:
+    """Write the rows wanted before t_new, from the step of length h that began at t.
+
+    They are right-continuous: a time that falls on a stop is written after it, when the states have
+    switched.
+    """
+    cursor = out.cursor
+    while cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] < t_new:
+        time = out.times[cursor[NEXT_TIME]]
+        row = cursor[ROW]
+        interpolate(dense, (time - t) / h, out.rows_y[row])
+        out.rows_t[row] = time
+        cursor[ROW] = row + 1
+        cursor[NEXT_TIME] += 1

@@ -21,6 +21,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from integrators import advance, crossings, loop, sliding, step_size, steps
+from integrators.loop import Machines
+from integrators.sliding import Functions
 
 __all__ = [
     "SIGNATURES",
@@ -37,26 +39,60 @@ __all__ = [
 # Every function that `record` reaches. Those of a step are inlined: a call hands on ten arrays,
 # which takes as long as their work does.
 _OF_A_STEP: tuple[Callable[..., Any], ...] = (
-    advance.put_row, advance.tick_at, advance.raise_floor, crossings.any_changed,
-    crossings.copy_margins, crossings.first_change,
-    crossings.nothing_near, crossings._bracket, crossings._is_quiet, crossings._search,
-    step_size.error_norm, step_size.next_factor, step_size.retry_factor,
-    sliding.flow_on, sliding.margins_on,
-    steps.fit_dense, steps.interpolate, steps.take_step, steps.weigh,
-)  # fmt: skip
+    advance._aim,
+    advance._judge,
+    advance._put_wanted,
+    advance.limit_after,
+    advance.next_on_grid,
+    advance.put_row,
+    advance.raise_floor,
+    advance.tick_at,
+    crossings._bracket,
+    crossings._is_quiet,
+    crossings._probe,
+    crossings._search,
+    crossings.any_changed,
+    crossings.copy_margins,
+    crossings.first_change,
+    crossings.nothing_near,
+    sliding.flow_on,
+    sliding.margins_on,
+    step_size.error_norm,
+    step_size.next_factor,
+    step_size.retry_factor,
+    steps.fit_dense,
+    steps.interpolate,
+    steps.take_step,
+    steps.weigh,
+)
+# So are the phases of the loop, and what is written of an event: called from one place each.
+_OF_AN_EVENT: tuple[Callable[..., Any], ...] = (
+    loop._begin_arc,
+    loop._choose_stop,
+    loop._end_arc,
+    loop._finish,
+    loop._fired,
+    loop._flowed,
+    loop._is_full,
+    loop._jump,
+    loop._pick,
+    loop._put_firing,
+    loop._put_stop,
+    loop._start,
+    loop._steps_ahead,
+)
 _OF_AN_ARC: tuple[Callable[..., Any], ...] = (
     advance.advance,
-    loop.active_relations,
-    loop.go_on,
-    loop._begin_arc,
+    crossings.listed,
     loop._count_anew,
-    loop._listed,
+    loop._list,
     loop._look_at_clock,
     loop._no_progress,
     loop._often_changed,
     loop._put_modes,
     loop._rearm,
     loop._undefined,
+    loop.run_to_event,
     sliding._sign,
     sliding._solve,
     sliding.look,
@@ -64,6 +100,7 @@ _OF_AN_ARC: tuple[Callable[..., Any], ...] = (
     sliding.slope_on,
     step_size.starting_step,
 )
+_INLINED = (*_OF_A_STEP, *_OF_AN_EVENT)
 _ARRAYS: Mapping[Any, tuple[type[Any], int]] = {
     list[float]: (np.float64, 1),
     tuple[float, ...]: (np.float64, 1),
@@ -181,7 +218,7 @@ def edition() -> str:
     >>> len(edition())
     16
     """
-    functions: list[Callable[..., Any]] = [loop.record, *_OF_A_STEP, *_OF_AN_ARC]
+    functions: list[Callable[..., Any]] = [loop.record, *_INLINED, *_OF_AN_ARC]
     modules = (steps, step_size, crossings, advance, sliding, loop)
     constants = [
         (name, value if isinstance(value, int | float) else getattr(value, "_fields", None))
@@ -199,8 +236,10 @@ class _Kept:
 
     cache_path = None
 
-    def __init__(self, function: Callable[..., Any], store: Store | None, notice: str) -> None:
-        self.function, self.store, self.notice = function, store, notice
+    def __init__(
+        self, function: Callable[..., Any], store: Store | None, on_miss: Callable[[], None]
+    ) -> None:
+        self.function, self.store, self.on_miss = function, store, on_miss
         self.missed = False
 
     def load_overload(self, signature: Any, target: Any) -> Any:
@@ -215,8 +254,7 @@ class _Kept:
             except Exception:  # kept by a numba that differs from this one in more than its number
                 pass
         self.missed = True
-        if self.notice:
-            print(self.notice, file=sys.stderr)
+        self.on_miss()
         return None
 
     def save_overload(self, signature: Any, result: Any) -> None:
@@ -237,8 +275,15 @@ class _Kept:
         return f"{function.__qualname__}-{digest(function, text=text)}"
 
 
+def _silent() -> None:
+    """Do nothing."""
+
+
 def _machine_code(
-    signature: Any, function: Callable[..., Any], store: Store | None, notice: str = ""
+    signature: Any,
+    function: Callable[..., Any],
+    store: Store | None,
+    on_miss: Callable[[], None] = _silent,
 ) -> Any:
     """Compile a function, or load what was kept of it in a store."""
     import numba
@@ -252,7 +297,7 @@ def _machine_code(
         gc.disable()  # compiling makes objects by the million and no garbage worth looking for
         try:
             dispatcher = numba.njit(nogil=True, **_OPTIONS)(function)
-            dispatcher._cache = _Kept(function, store, notice)
+            dispatcher._cache = _Kept(function, store, on_miss)
             dispatcher.compile(signature)
             dispatcher.disable_compile()
             return dispatcher
@@ -318,28 +363,29 @@ def compiled(name: str, function: Callable[..., None], store: Store | None) -> A
     return _machine_code(_signature(SIGNATURES[name]), function, store)
 
 
-def record(arguments: tuple[Any, ...], store: Store | None) -> int:
+def record(arguments: tuple[Any, ...], store: Store | None, tell: Callable[[str], None]) -> int:
     """Call `integrators.loop.record` as machine code; it releases the GIL.
 
     Parameters
     ----------
     arguments : tuple
-        Its arguments: compiled functions, arrays and numbers.
+        Its arguments: named tuples of compiled functions, of arrays and numbers.
     store : Store, optional
         Where to keep the machine code.
+    tell : callable
+        Called with a text before the loop is compiled, which takes a while, and after it.
 
     Returns
     -------
     int
         What it returns.
     """
-    machine_code: Callable[..., int] = _record(arguments, store)
-    count = len(_OF_A_SYSTEM)
-    return machine_code(*map(_address, arguments[:count]), *arguments[count:])
-
-
-# What `record` calls of a system, by its place among the arguments.
-_OF_A_SYSTEM = ("flow", "arm", "margins", "normal", "switch", "act", "observe")
+    functions, machines, *others = arguments
+    addresses: list[Any] = [_address(function) for function in (*functions[:4], *machines)]
+    flow, arm, margins, normal, *switch = addresses
+    at = Functions(flow, arm, margins, normal, functions.p), Machines(*switch)
+    machine_code: Callable[..., int] = _record((*at, *others), store, tell)
+    return machine_code(*at, *others)
 
 
 @functools.lru_cache(maxsize=1024)
@@ -375,90 +421,49 @@ def _function_at(signature: Any) -> Any:
 _compiled_record: list[Any] = []
 
 
-def _record(arguments: tuple[Any, ...], store: Store | None) -> Any:
+def _record(arguments: tuple[Any, ...], store: Store | None, tell: Callable[[str], None]) -> Any:
     if _compiled_record:
         return _compiled_record[0]
     with _lock:
         if not _compiled_record:
-            _compiled_record.append(_compile_record(arguments, store))
+            _compiled_record.append(_compile_record(arguments, store, tell))
         return _compiled_record[0]
 
 
-def _compile_record(arguments: tuple[Any, ...], store: Store | None) -> Any:
+def _compile_record(
+    arguments: tuple[Any, ...], store: Store | None, tell: Callable[[str], None]
+) -> Any:
     import numba
 
-    for helper in (*_OF_A_STEP, *_OF_AN_ARC, loop.record):
-        usable_inside(helper, inlined=helper in _OF_A_STEP)
+    for helper in (*_INLINED, *_OF_AN_ARC):
+        usable_inside(helper, inlined=helper in _INLINED)
+    names = ("flow", "arm", "margins", "normal", "switch", "act", "observe")
     at_flow, at_arm, at_margins, at_normal, at_switch, at_act, at_observe = (
-        _function_at(_signature(SIGNATURES[name])) for name in _OF_A_SYSTEM
+        _function_at(_signature(SIGNATURES[name])) for name in names
     )
-    run = loop.record
+    run = numba.njit(inline="always", **_OPTIONS)(loop.record)  # else it is compiled twice
 
     def record(
-        flow: Any,
-        arm: Any,
-        margins: Any,
-        normal: Any,
-        switch: Any,
-        act: Any,
-        observe: Any,
-        method: Any,
-        control: Any,
-        plan: Any,
-        memory: Any,
-        y: Any,
-        mode: Any,
-        held: Any,
-        p: Any,
-        relations: Any,
-        surfaces: Any,
-        sliding: Any,
-        out: Any,
-        work: Any,
-        log: Any,
-        first: Any,
-        most_steps: Any,
-        pause: Any,
+        at: Any, machines: Any, b: Any, log: Any, first: Any, most_steps: Any, pause: Any
     ) -> Any:
-        return run(
-            at_flow(flow),
-            at_arm(arm),
-            at_margins(margins),
-            at_normal(normal),
-            at_switch(switch),
-            at_act(act),
-            at_observe(observe),
-            method,
-            control,
-            plan,
-            memory,
-            y,
-            mode,
-            held,
-            p,
-            relations,
-            surfaces,
-            sliding,
-            out,
-            work,
-            log,
-            first,
-            most_steps,
-            pause,
+        functions = Functions(
+            at_flow(at.flow), at_arm(at.arm), at_margins(at.margins), at_normal(at.normal), at.p
         )
+        switch = Machines(
+            at_switch(machines.ask), at_act(machines.act), at_observe(machines.observe)
+        )
+        return run(functions, switch, b, log, first, most_steps, pause)
 
     record.__qualname__ = "record"  # under which it is kept
-    addresses = [numba.types.int64] * len(_OF_A_SYSTEM)
-    others = [numba.typeof(argument) for argument in arguments[len(_OF_A_SYSTEM) :]]
     start = time.perf_counter()
     result = _machine_code(
-        numba.types.int64(*addresses, *others),
+        numba.types.int64(*map(numba.typeof, arguments)),
         record,
         store,
-        "gms-fsm: compiling the engine, once on this machine ...",
+        lambda: tell("compiling the engine, once on this machine ..."),
     )
     if result._cache.missed:
-        print(f"gms-fsm: compiled in {time.perf_counter() - start:.1f} s", file=sys.stderr)
+        tell(f"compiled in {time.perf_counter() - start:.1f} s")
     return result
 
 
@@ -479,7 +484,7 @@ def _compiled_each_row(store: Store | None) -> Any:
 
 
 def for_each_row(
-    observe: Any, t: Any, y: Any, mode: Any, live: Any, p: Any, table: Any, store: Store | None
+    observe: Any, rows: tuple[Any, Any, Any], live: Any, p: Any, table: Any, store: Store | None
 ) -> None:
     """Call a compiled ``observe`` for many rows.
 
@@ -487,8 +492,8 @@ def for_each_row(
     ----------
     observe : callable
         From `compiled`.
-    t, y, mode : ndarray, shapes (rows,), (rows, m), (rows, n)
-        The rows.
+    rows : tuple of ndarray, shapes (rows,), (rows, m), (rows, n)
+        Times, states and modes.
     live : ndarray, shape (signs,)
         `integrators.sliding.LIVE` for each sign.
     p : tuple of ndarray
@@ -498,4 +503,4 @@ def for_each_row(
     store : Store, optional
         Where to keep the machine code.
     """
-    _compiled_each_row(store)(observe, t, y, mode, live, p, table)
+    _compiled_each_row(store)(observe, *rows, live, p, table)

@@ -1,7 +1,7 @@
-"""The outer loop for Python: a generator over `integrators.loop.go_on`.
+"""The outer loop for Python: a generator over `integrators.loop.run_to_event`.
 
-It yields what happened (`Arc`, `Stop`, `Firing`) and raises when it cannot go on, so whoever
-listens keeps everything up to there.
+It yields what happened (`Arc`, `Stop`, `Slide`, `Firing`) and raises when it cannot go on, so
+whoever listens keeps everything up to there.
 """
 
 from __future__ import annotations
@@ -9,29 +9,33 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 from integrators import advance as kernel
 from integrators import loop
-from integrators.advance import Control, Output, Work
-from integrators.crossings import Margins, Watched, watched
-from integrators.loop import MOST_SWITCHES, Memory, Plan
+from integrators.advance import Output, Plan
+from integrators.crossings import listed, watched
+from integrators.loop import MOST_SWITCHES, Buffers, Memory, Switch
 from integrators.sliding import (
     MOST_SLIDING,
+    Functions,
     Held,
-    Sliding,
     Surfaces,
     flow_on,
     margins_on,
     room_to_slide,
 )
-from integrators.steps import Coefficients, Dense, Flow, Vector, coefficients
+from integrators.step_size import Control
+from integrators.steps import Dense, Flow, Margins, Motion, Now, Scratch, T, Vector, coefficients
 from integrators.tableaux import EULER, Tableau
 
 __all__ = [
     "MOST_SWITCHES",
     "ROWS_AT_ONCE",
     "Arc",
+    "Buffers",
+    "Equations",
+    "Event",
     "Firing",
     "HybridError",
     "Livelock",
@@ -41,10 +45,9 @@ __all__ = [
     "StepTooSmall",
     "Stop",
     "Switch",
-    "System",
     "TooManySteps",
     "buffers",
-    "happenings",
+    "events",
     "run",
     "state_of",
     "take_rows",
@@ -55,7 +58,7 @@ ROWS_AT_ONCE = 512  # a buffer
 
 # --------------------------------------------------------------------------- what goes in
 @dataclass(frozen=True, eq=False)
-class System:
+class Equations:
     """What flows, and what is watched meanwhile.
 
     Parameters
@@ -85,6 +88,8 @@ class System:
         Times that steps may not jump over.
     jumps : list of float
         Times at which the flow jumps: the step size starts anew.
+    seen : int
+        How many numbers `integrators.loop.record` is to observe.
     """
 
     flow: Flow
@@ -99,16 +104,12 @@ class System:
     surfaces: Surfaces
     knots: list[float] = field(default_factory=list)
     jumps: list[float] = field(default_factory=list)
+    seen: int = 0
 
-
-class Switch(Protocol):
-    """The machines, as the loop sees them."""
-
-    def ask(self, t: float, y: Vector, mode: list[int], p: Any, edges: list[int]) -> None:
-        """Fill the first enabled edge of each machine, or -1."""
-
-    def act(self, edge: int, machine: int, t: float, y: Vector, mode: list[int], p: Any) -> None:
-        """Take an edge: update mode, and y if the edge assigns something."""
+    def functions(self, located: bool) -> Functions:
+        """Return the functions for a run that stops at crossings, or for one that does not."""
+        flow = self.flow if located else self.flow_live
+        return Functions(flow, self.arm, self.margins, self.normal, self.p)
 
 
 @dataclass(frozen=True)
@@ -194,6 +195,9 @@ class Firing:
     mode: tuple[int, ...]
 
 
+Event = Arc | Stop | Slide | Firing
+
+
 class HybridError(Exception):
     """The run cannot go on; carries the scene."""
 
@@ -236,19 +240,19 @@ class TooManySteps(HybridError):
 
 # --------------------------------------------------------------------------- the loop
 def run(
-    system: System,
+    equations: Equations,
     switch: Switch,
     t: float,
     y: Vector,
     mode: list[int],
     t_end: float,
     options: Options,
-) -> Iterator[Arc | Stop | Slide | Firing]:
+) -> Iterator[Event]:
     """Integrate from t to t_end and yield arcs, stops and firings in order.
 
     Parameters
     ----------
-    system : System
+    equations : Equations
         What flows.
     switch : Switch
         The machines; asked at the start and after every stop.
@@ -271,19 +275,17 @@ def run(
     Livelock, StepTooSmall, NotFinite, TooManySteps
         When it cannot go on; all before has been yielded.
     """
-    return happenings(system, switch, buffers(system, t, y, mode, t_end, options), options)
+    return events(equations, switch, buffers(equations, t, y, mode, t_end, options), options)
 
 
-def happenings(
-    system: System, switch: Switch, b: Buffers, options: Options
-) -> Iterator[Arc | Stop | Slide | Firing]:
+def events(equations: Equations, switch: Switch, b: Buffers, options: Options) -> Iterator[Event]:
     """Go on from where some buffers are; see `run`.
 
-    Between two happenings the buffers hold all there is to know of the run (`state_of`).
+    Between two events the buffers hold all there is to know of the run (`state_of`).
 
     Parameters
     ----------
-    system, switch, options
+    equations, switch, options
         As in `run`.
     b : Buffers
         From `buffers`, perhaps with a state put back.
@@ -293,134 +295,73 @@ def happenings(
     Arc, Stop, Slide or Firing
         As `run`.
     """
-    flow = system.flow if options.located else system.flow_live
-    s = b.sliding
-    on = Held(
-        flow,
-        system.margins,
-        system.normal,
-        system.p,
-        b.held,
-        b.surfaces.sign,
-        s.which,
-        s.sigma,
-        s.table,
-    )
+    functions = equations.functions(options.located)
+    on = Held(functions, b.now.held, b.sliding)
     solver = None
     if b.plan.foreign:
         from integrators.scipy_arcs import SciPyStepper
 
         solver = SciPyStepper(on, b, options)
-    now, counts, cursor, y = b.memory.now, b.memory.counts, b.out.cursor, b.y
+    plainly = Motion(functions.flow, functions.margins, functions.p)
+    along = Motion(flow_on, margins_on, on)
+    counts, cursor, y = b.memory.counts, b.out.cursor, b.now.y
     before: tuple[Vector, tuple[int, ...]] = [], ()
-    plainly: tuple[Flow, Margins, Any] = flow, system.margins, system.p
-    along: tuple[Flow, Margins, Any] = flow_on, margins_on, on
     while True:
-        ride, seen, q = along if s.which[-1] else plainly
+        motion = along if b.sliding.which[-1] else plainly
         try:
-            happening = loop.go_on(
-                flow,
-                system.arm,
-                system.margins,
-                system.normal,
-                switch.ask,
-                switch.act,
-                b.method,
-                b.control,
-                b.plan,
-                b.memory,
-                y,
-                b.mode,
-                b.held,
-                system.p,
-                b.relations,
-                b.surfaces,
-                b.sliding,
-                b.out,
-                b.work,
-                ride,
-                seen,
-                q,
-                options.rows_at_once,
-            )
-            if solver is not None and happening == loop.ADVANCE:
+            event = loop.run_to_event(functions, switch, motion, b, options.rows_at_once)
+            if solver is not None and event == loop.ADVANCE:
                 solver.advance(options.rows_at_once if options.located else 1)
         except Exception:
             if cursor[kernel.ROW]:
                 yield take_rows(b)
             raise
-        t, mode = now[loop.T], modes_of(b)
-        if happening == loop.ROWS:
+        t, mode = b.now.clock[T], modes_of(b)
+        if event == loop.ROWS:
             if cursor[kernel.ROW]:
                 yield take_rows(b)
-        elif happening == loop.FIRING:
+        elif event == loop.FIRING:
             before = list(y), mode
-        elif happening == loop.FIRED:
+        elif event == loop.FIRED:
             machine, edge = counts[loop.MACHINE], counts[loop.EDGE]
             yield Firing(t, counts[loop.MICROSTEP], machine, edge, *before, list(y), mode)
-        elif happening == loop.SLID:
+        elif event == loop.SLID:
             yield Slide(t, counts[loop.MICROSTEP], list(y), mode)
-        elif happening in (loop.STOPPED, loop.DONE):
+        elif event in (loop.STOPPED, loop.DONE):
             yield Stop(t, list(y), mode)
-            if happening == loop.DONE:
+            if event == loop.DONE:
                 return
-        elif happening != loop.ADVANCE:
-            raise failure(happening, b, system.relations)
-
-
-@dataclass(frozen=True, eq=False)
-class Buffers:
-    """All that one run needs besides the system's functions."""
-
-    method: Coefficients
-    control: Control
-    plan: Plan
-    memory: Memory
-    y: Vector
-    mode: list[int]
-    held: Vector
-    relations: Watched
-    surfaces: Surfaces
-    sliding: Sliding
-    out: Output
-    work: Work
+        elif event != loop.ADVANCE:
+            raise failure(event, b, equations.relations)
 
 
 def buffers(
-    system: System,
+    equations: Equations,
     t: float,
     y: Vector,
     mode: list[int],
     t_end: float,
     options: Options,
     capacity: int | None = None,
-    seen: int = 0,
 ) -> Buffers:
     """Make the buffers of a run, as lists.
 
     Parameters
     ----------
-    system, t, y, mode, t_end, options
+    equations, t, y, mode, t_end, options
         As in `run`.
     capacity : int, optional
         Room for rows.
-    seen : int
-        How many numbers `integrators.loop.record` is to observe.
 
     Returns
     -------
     Buffers
-        Ready for the first call of `integrators.loop.go_on`.
+        Ready for the first call of `integrators.loop.run_to_event`.
     """
-    size, n = len(y), len(mode)
-    surfaces = system.surfaces
-    most_sliding = min(len(surfaces.sign), MOST_SLIDING)
-    # Behind the system's relations those that end a slide: sigma <= 1 and sigma >= -1.
-    strict = system.strict + [False] * (2 * most_sliding)
-    r = len(strict)
-    # A SciPy solver needs no coefficients, but the loop's signature does.
-    tableau = options.method if isinstance(options.method, Tableau) else EULER
-    jumps = [s for s in system.jumps if options.located and t < s <= t_end]
+    size, n, surfaces = len(y), len(mode), equations.surfaces
+    # Behind the relations of the equations those that end a slide: sigma <= 1 and sigma >= -1.
+    strict = equations.strict + [False] * (2 * min(len(surfaces.sign), MOST_SLIDING))
+    plan = _plan(equations, t, t_end, options)
     times = options.times
     if capacity is None:
         capacity = ROWS_AT_ONCE if times is None else len(times)
@@ -429,40 +370,24 @@ def buffers(
         return [0.0] * size
 
     return Buffers(
-        method=coefficients(tableau),
-        control=Control(
-            step=options.step or 0.0,
-            origin=t,
-            rtol=options.rtol,
-            atol=options.atol,
-            max_step=options.max_step,
-            time_scale=options.time_scale,
-        ),
-        plan=Plan(
-            t_end=t_end,
-            located=options.located,
-            foreign=tableau is not options.method,
-            jumps=jumps,
-            before_jumps=[math.nextafter(s, -math.inf) for s in jumps],
-            knots=system.knots if options.located else [],
-            max_steps=options.max_steps,
+        plan=plan,
+        now=Now(
+            clock=beginning(t, t_end),
+            y=list(y),
+            f=vector(),
+            mode=list(mode),
+            held=[0.0] * equations.held,
+            floor=list(options.atol),
         ),
         memory=Memory(
-            now=beginning(t, t_end),
             counts=[0] * loop.PLACES,
             edges=[-1] * n,
             switches=[0] * n,
-            changes=[0] * r,
-            room=[0] * r,
-            f=vector(),
+            changes=[0] * len(strict),
             anchor=list(y),
         ),
-        y=list(y),
-        mode=list(mode),
-        held=[0.0] * system.held,
         relations=watched(strict, size),
-        surfaces=surfaces,
-        sliding=room_to_slide(surfaces, size, system.held, r, seen),
+        sliding=room_to_slide(surfaces, size, equations.held, len(strict), equations.seen),
         out=Output(
             times=times or [],
             every_step=times is None,
@@ -470,14 +395,38 @@ def buffers(
             rows_y=[vector() for _ in range(capacity)],
             cursor=[0, 0, 0, 0],
         ),
-        work=Work(
-            k=[vector() for _ in tableau.B],
+        scratch=Scratch(
+            k=[vector() for _ in plan.method.B],
             y_new=vector(),
             f_new=vector(),
             error=vector(),
-            floor=list(options.atol),
             dense=Dense(vector(), vector(), vector(), vector(), vector()),
         ),
+    )
+
+
+def _plan(equations: Equations, t: float, t_end: float, options: Options) -> Plan:
+    # A SciPy solver needs no coefficients, but the loop's signature does.
+    tableau = options.method if isinstance(options.method, Tableau) else EULER
+    jumps = [s for s in equations.jumps if options.located and t < s <= t_end]
+    control = Control(
+        step=options.step or 0.0,
+        origin=t,
+        rtol=options.rtol,
+        atol=options.atol,
+        max_step=options.max_step,
+        time_scale=options.time_scale,
+    )
+    return Plan(
+        method=coefficients(tableau),
+        control=control,
+        t_end=t_end,
+        located=options.located,
+        foreign=tableau is not options.method,
+        jumps=jumps,
+        before_jumps=[math.nextafter(s, -math.inf) for s in jumps],
+        knots=equations.knots if options.located else [],
+        max_steps=options.max_steps,
     )
 
 
@@ -487,7 +436,7 @@ def state_of(b: Buffers) -> dict[str, Any]:
     Parameters
     ----------
     b : Buffers
-        Of a run between two happenings.
+        Of a run between two events.
 
     Returns
     -------
@@ -496,15 +445,13 @@ def state_of(b: Buffers) -> dict[str, Any]:
     """
     w, s = b.relations, b.sliding
     return {
+        **b.now._asdict(),
         **b.memory._asdict(),
-        "y": b.y,
-        "mode": b.mode,
-        "held": b.held,
         "watch": w.watch,
+        "room": w.room,
         "truth": w.truth,
         "start": w.start,
         "cursor": b.out.cursor,
-        "floor": b.work.floor,
         "slid": s.flags,
         "arrived": s.arrived,
         "which": s.which,
@@ -524,21 +471,21 @@ def modes_of(b: Buffers) -> tuple[int, ...]:
     tuple of int
         What rows are kept with.
     """
-    return (*b.mode, *b.sliding.flags)
+    return (*b.now.mode, *b.sliding.flags)
 
 
 def beginning(t: float, t_end: float) -> Vector:
-    """Return `Memory.now` of a run that has not begun."""
+    """Return `Now.clock` of a run that has not begun."""
     return [t, 0.0, 1.0, t_end, t, -math.inf]
 
 
-def failure(happening: int, b: Buffers, relations: list[str]) -> HybridError:
-    """Return the error for a happening that ends a run.
+def failure(event: int, b: Buffers, relations: list[str]) -> HybridError:
+    """Return the error for an event that ends a run.
 
     Parameters
     ----------
-    happening : int
-        What `integrators.loop.go_on` returned.
+    event : int
+        What `integrators.loop.run_to_event` returned.
     b : Buffers
         Of the run.
     relations : list of str
@@ -550,24 +497,24 @@ def failure(happening: int, b: Buffers, relations: list[str]) -> HybridError:
         To be raised.
     """
     memory = b.memory
-    t, counts = memory.now[loop.T], memory.counts
-    scene = t, b.y, modes_of(b)
-    if happening == kernel.TOO_SMALL:
+    counts = memory.counts
+    scene = b.now.clock[T], b.now.y, modes_of(b)
+    if event == kernel.TOO_SMALL:
         return StepTooSmall("step size under the clock's resolution", *scene)
-    if happening == loop.TOO_MANY_STEPS:
+    if event == loop.TOO_MANY_STEPS:
         return TooManySteps(f"{b.plan.max_steps} steps are used up", *scene)
-    if happening == loop.MACHINE_LIVELOCK:
+    if event == loop.MACHINE_LIVELOCK:
         machine = counts[loop.MACHINE]
         return Livelock(*scene, machine, memory.switches[machine], [])
-    if happening == loop.RELATION_LIVELOCK:
+    if event == loop.RELATION_LIVELOCK:
         # A relation in a guard may have changed once more than its machine has switched.
-        machine = max(range(len(b.mode)), key=lambda i: memory.switches[i])
+        machine = max(range(len(b.now.mode)), key=lambda i: memory.switches[i])
         if memory.switches[machine] >= MOST_SWITCHES // 2:
             return Livelock(*scene, machine, memory.switches[machine], [])
         names = [*relations, *["the pull onto a surface"] * (len(memory.changes) - len(relations))]
         often = [name for r, name in enumerate(names) if memory.changes[r] >= MOST_SWITCHES]
         return Livelock(*scene, None, MOST_SWITCHES, often)
-    w = loop.active_relations(b.relations, memory)
+    w = listed(b.relations, counts[loop.ACTIVE])
     undefined = [
         name for r, name in enumerate(relations) if r in w.active and w.start[r] != w.start[r]
     ]

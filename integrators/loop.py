@@ -1,15 +1,15 @@
-"""The outer loop as a function that goes on until something happens, then comes back.
+"""The outer loop as a function that runs until something happens, then comes back.
 
 Ask every machine for an enabled edge, fire, ask again until all is quiet; then freeze the states
 and let the kernel advance to the next stop. All memory lies in arrays, so that the loop can come
-back at every happening and be called again: Python's generator (`integrators.hybrid`) hands each
-happening to its listener, the compiled engine (`record`) writes it into columns.
+back at every event and be called again: Python's generator (`integrators.hybrid`) hands each event
+to its listener, the compiled engine (`record`) writes it into columns.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from integrators.advance import (
     CROSSED,
@@ -20,27 +20,46 @@ from integrators.advance import (
     ROW,
     STEPS,
     TOO_SMALL,
-    Control,
     Output,
-    Work,
+    Plan,
     advance,
     put_row,
     raise_floor,
 )
-from integrators.crossings import Margins, Watched
+from integrators.crossings import Watched, listed
 from integrators.sliding import (
+    Functions,
     Held,
     Sliding,
-    Surfaces,
     flow_on,
     look,
     margins_on,
     seize,
 )
 from integrators.step_size import error_norm, starting_step
-from integrators.steps import Coefficients, Flow, Vector
+from integrators.steps import (
+    ANCHOR,
+    ERROR_BEFORE,
+    SWITCHED,
+    T_STOP,
+    H,
+    Motion,
+    Now,
+    Scratch,
+    T,
+    Vector,
+)
 
-__all__ = ["MOST_SWITCHES", "Log", "Memory", "Plan", "go_on", "record"]
+__all__ = [
+    "MOST_SWITCHES",
+    "Buffers",
+    "Log",
+    "Machines",
+    "Memory",
+    "Switch",
+    "record",
+    "run_to_event",
+]
 
 MOST_SWITCHES = 100  # of one machine, or of one relation, without progress
 # Switches make no progress where they follow each other by less than this part of the time itself
@@ -52,8 +71,7 @@ STATE_STANDS = 0.1
 # What happened (TOO_SMALL and NOT_FINITE are the kernel's).
 ROWS, FIRING, FIRED, STOPPED, DONE, SLID = 10, 11, 12, 13, 14, 15
 MACHINE_LIVELOCK, RELATION_LIVELOCK, ADVANCE, TOO_MANY_STEPS = 16, 17, 18, 19
-# Places in Memory.now.
-T, H, ERROR_BEFORE, T_STOP, ANCHOR, SWITCHED = 0, 1, 2, 3, 4, 5
+NOTHING = -1  # yet
 # Places in Memory.counts.
 PLACES = 11
 PHASE, MICROSTEP, MACHINE, EDGE, FIRED_ONE, FRESH, STATUS, JUMP, ACTIVE, TAKEN, NEW_ARC = range(
@@ -61,31 +79,48 @@ PHASE, MICROSTEP, MACHINE, EDGE, FIRED_ONE, FRESH, STATUS, JUMP, ACTIVE, TAKEN, 
 )
 # Phases.
 START, ASK, PICK, FIRE, SETTLED, BEGIN, ARC, AFTER, JUMPING, FINISH, END = range(11)
+# Places in Log.counts.
+FIRINGS, STOPS = 0, 1
 
 
-class Plan(NamedTuple):
-    """What the outer loop keeps to."""
+class Switch(Protocol):
+    """The machines, as the loop sees them."""
 
-    t_end: float
-    located: bool  # stop at crossings; else ask once at the end of each step
-    foreign: bool  # the caller takes the steps (ADVANCE asks for them)
-    jumps: Vector  # times at which the flow jumps, increasing
-    before_jumps: Vector  # one clock tick before each
-    knots: Vector  # times that steps may not jump over
-    max_steps: int  # tried, in the whole run
+    def ask(self, t: float, y: Vector, mode: list[int], p: Any, edges: list[int]) -> None:
+        """Fill the first enabled edge of each machine, or -1."""
+
+    def act(self, edge: int, machine: int, t: float, y: Vector, mode: list[int], p: Any) -> None:
+        """Take an edge: update mode, and y if the edge assigns something."""
+
+
+class Machines(NamedTuple):
+    """A `Switch` of two functions, and what a firing is seen by."""
+
+    ask: Callable[..., Any]
+    act: Callable[..., Any]
+    observe: Callable[..., Any]  # observe(t, y, mode, signs, p, seen)
 
 
 class Memory(NamedTuple):
-    """What the outer loop remembers between two calls."""
+    """What the loop remembers between two calls."""
 
-    now: Vector  # [time, step, controller's error, next stop, since when switches count, last]
     counts: list[int]  # see the places above
     edges: list[int]  # the enabled edge of each machine, or -1
-    switches: list[int]  # firings of each machine since then
+    switches: list[int]  # firings of each machine since the time Now.clock[ANCHOR]
     changes: list[int]  # changes of each relation since then
-    room: list[int]  # indices of the watched relations
-    f: Vector  # slope
-    anchor: Vector  # the state since when switches count
+    anchor: Vector  # the state then
+
+
+class Buffers(NamedTuple):
+    """All that one run needs besides the system's functions; changed in place."""
+
+    plan: Plan
+    now: Now
+    memory: Memory
+    relations: Watched
+    sliding: Sliding
+    out: Output
+    scratch: Scratch
 
 
 class Log(NamedTuple):
@@ -105,48 +140,22 @@ class Log(NamedTuple):
     stops_mode: list[list[int]]
 
 
-def go_on(
-    flow: Flow,
-    arm: Callable[..., Any],
-    margins: Margins,
-    normal: Callable[..., Any],
-    ask: Callable[..., Any],
-    act: Callable[..., Any],
-    method: Coefficients,
-    control: Control,
-    plan: Plan,
-    memory: Memory,
-    y: Vector,
-    mode: list[int],
-    held: Vector,
-    p: Any,
-    relations: Watched,
-    surfaces: Surfaces,
-    sliding: Sliding,
-    out: Output,
-    work: Work,
-    ride: Flow,
-    seen: Margins,
-    on: Any,
-    most_steps: int,
+def run_to_event(
+    functions: Functions, switch: Switch, motion: Motion, b: Buffers, most_steps: int
 ) -> int:
     """Run until something happens.
 
     Parameters
     ----------
-    flow, arm, margins, normal : callable
+    functions : Functions
         The system.
-    ask : callable
-        ``ask(t, y, mode, p, edges)`` fills each machine's first enabled edge, or -1.
-    act : callable
-        ``act(edge, machine, t, y, mode, p)`` takes an edge.
-    method, control, plan
-        How to integrate.
-    memory, y, mode, held, p, relations, surfaces, sliding, out, work
-        The state of the run, changed in place.
-    ride, seen, on
-        How to flow, what is watched, and their parameters: `flow_on`, `margins_on` and a `Held`.
-        While nothing is slid on, `flow`, `margins` and `p` do the same in less time.
+    switch : Switch
+        Its machines.
+    motion : Motion
+        How to flow and what is watched: `flow_on`, `margins_on` and a `Held`. While nothing is slid
+        on, those of the system itself do the same in less time.
+    b : Buffers
+        The run, changed in place.
     most_steps : int
         Come back after so many steps at most.
 
@@ -158,204 +167,125 @@ def go_on(
         SLID (onto a surface or off it), ADVANCE (a foreign solver is to go on), DONE; or the error
         TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK, RELATION_LIVELOCK, TOO_MANY_STEPS.
     """
-    now, counts, cursor = memory.now, memory.counts, out.cursor
-    w = active_relations(relations, memory)
-    held_on = Held(
-        flow, margins, normal, p, held, surfaces.sign, sliding.which, sliding.sigma, sliding.table
-    )
+    plan, now, memory = b.plan, b.now, b.memory
+    relations, sliding, scratch = b.relations, b.sliding, b.scratch
+    clock, counts, p = now.clock, memory.counts, functions.p
+    out, cursor = b.out, b.out.cursor
     while True:
         if cursor[ROW] > counts[TAKEN]:
             return ROWS
-        phase = counts[PHASE]
-        t = now[T]
-
+        phase, event = counts[PHASE], NOTHING
         if phase == ASK:
-            ask(t, y, mode, p, memory.edges)
+            switch.ask(clock[T], now.y, now.mode, p, memory.edges)
             counts[MACHINE] = -1
             counts[FIRED_ONE] = 0
             counts[PHASE] = PICK
-
         elif phase == PICK:
-            i = counts[MACHINE] + 1
-            while i < len(mode) and memory.edges[i] < 0:
-                i += 1
-            if i < len(mode):
-                counts[MACHINE] = i
-                counts[EDGE] = memory.edges[i]
-                counts[PHASE] = FIRE
-                return FIRING
-            counts[PHASE] = ASK if counts[FIRED_ONE] == 1 and plan.located else SETTLED
-
+            event = _pick(plan, counts, memory.edges)
         elif phase == FIRE:
-            i = counts[MACHINE]
-            counts[MICROSTEP] += 1
-            counts[FIRED_ONE] = 1
-            counts[FRESH] = 1
-            counts[PHASE] = PICK
-            act(counts[EDGE], i, t, y, mode, p)
-            _look_at_clock(memory, t, y)
-            memory.switches[i] += 1
-            if memory.switches[i] >= MOST_SWITCHES and _no_progress(memory, control, work, t, y):
-                counts[PHASE] = AFTER
-                counts[STATUS] = MACHINE_LIVELOCK
-            return FIRED
-
+            switch.act(counts[EDGE], counts[MACHINE], clock[T], now.y, now.mode, p)
+            event = _fired(plan, now, memory, scratch)
         elif phase == SETTLED:
-            if t >= plan.t_end:
-                counts[PHASE] = FINISH
-                continue
-            # A step that ends on a jump would see the value behind it: stop one clock tick before.
-            while counts[JUMP] < len(plan.jumps) and plan.jumps[counts[JUMP]] <= t:
-                counts[JUMP] += 1
-            now[T_STOP] = plan.t_end
-            if counts[JUMP] < len(plan.jumps):
-                now[T_STOP] = min(now[T_STOP], plan.before_jumps[counts[JUMP]])
-            counts[STATUS] = FULL
-            slid = False
-            if plan.located:
-                w, slid = _rearm(
-                    arm, margins, t, y, mode, held, p, relations, surfaces, sliding, held_on, memory
-                )
-                if _undefined(w):
-                    counts[PHASE] = AFTER
-                    counts[STATUS] = NOT_FINITE
-                    continue
-            counts[PHASE] = BEGIN
-            if slid:  # y lies on the surface now: whoever compares with it has to be asked again
-                counts[PHASE] = ASK
-                return SLID
-
+            _choose_stop(plan, clock, counts)
+            if plan.located and counts[PHASE] == BEGIN:
+                event = _rearm(functions, now, relations, sliding, counts)
         elif phase == BEGIN:
-            if plan.located or counts[FRESH] == 1:
-                counts[NEW_ARC] = 1
-                if not plan.foreign:
-                    _begin_arc(
-                        ride, method, control, t, y, mode, held, on, memory, work, plan.located
-                    )
-                counts[FRESH] = 0
-            counts[PHASE] = ARC
-            if plan.foreign:
-                return ADVANCE
-
+            event = _begin_arc(motion, plan, now, scratch, counts)
         elif phase == ARC:
-            counts[MICROSTEP] = 0
-            if cursor[STEPS] >= plan.max_steps:
-                return TOO_MANY_STEPS
-            if not plan.foreign:
-                steps = min(most_steps, plan.max_steps - cursor[STEPS]) if plan.located else 1
-                counts[STATUS], now[T], now[H], now[ERROR_BEFORE] = advance(
-                    ride,
-                    seen,
-                    method,
-                    control,
-                    t,
-                    y,
-                    memory.f,
-                    now[H],
-                    now[ERROR_BEFORE],
-                    now[T_STOP],
-                    plan.knots,
-                    mode,
-                    held,
-                    on,
-                    w,
-                    out,
-                    work,
-                    steps,
-                )
-            if counts[STATUS] != FULL or not plan.located:
-                counts[PHASE] = AFTER
-            else:
-                return ADVANCE if plan.foreign else ROWS
-
+            steps = _steps_ahead(plan, cursor, most_steps)
+            if steps > 0 and not plan.foreign:
+                w = listed(relations, counts[ACTIVE])
+                counts[STATUS] = advance(motion, plan, now, w, out, scratch, steps)
+            event = _flowed(plan, counts, steps)
         elif phase == AFTER:
-            status = counts[STATUS]
-            if status in (TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK):
-                return status
-            counts[PHASE] = ASK
-            if status == REACHED and t < plan.t_end:
-                counts[PHASE] = JUMPING
-                return STOPPED
-            if status == FULL and not plan.located:
-                return ROWS  # perhaps none, but a caller may want to breathe
-            if status == CROSSED:
-                if _often_changed(
-                    seen, t, y, mode, w, surfaces, sliding, on, memory, control, work
-                ):
-                    return RELATION_LIVELOCK
-                return STOPPED
-
+            often = False
+            if counts[STATUS] == CROSSED:
+                w = listed(relations, counts[ACTIVE])
+                often = _often_changed(motion, plan, now, w, sliding, memory, scratch)
+            event = _end_arc(plan, clock, counts, often)
         elif phase == JUMPING:
-            now[T] = plan.jumps[counts[JUMP]]
-            counts[PHASE] = ASK
-            if out.every_step:
-                put_row(out, now[T], y)
-            return STOPPED
-
+            event = _jump(plan, now, counts, out)
         elif phase == START:
-            counts[PHASE] = ASK
-            counts[FRESH] = 1
-            raise_floor(control, work.floor, y)
-            if out.every_step:
-                put_row(out, t, y)
-
+            _start(plan, now, counts, out)
         elif phase == FINISH:
-            counts[PHASE] = END
-            while cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] <= t:
-                put_row(out, out.times[cursor[NEXT_TIME]], y)
-                cursor[NEXT_TIME] += 1
-
+            _finish(now, counts, out)
         else:
             return DONE
+        if event != NOTHING:
+            return event
 
 
-def active_relations(relations: Watched, memory: Memory) -> Watched:
-    """Return the relations with the active ones listed."""
-    return Watched(
-        relations.watch,
-        memory.room[: memory.counts[ACTIVE]],
-        relations.truth,
-        relations.changed,
-        relations.strict,
-        relations.start,
-        relations.end,
-        relations.low,
-        relations.high,
-        relations.probe,
-        relations.rights,
-        relations.places,
-        relations.depths,
-        relations.y_probe,
-    )
+# --------------------------------------------------------------------------- one helper per phase
+# They are handed what they need, not all the buffers: a call hands on every array by itself.
+def _start(plan: Plan, now: Now, counts: list[int], out: Output) -> None:
+    counts[PHASE] = ASK
+    counts[FRESH] = 1
+    raise_floor(plan.control, now)
+    if out.every_step:
+        put_row(out, now.clock[T], now.y)
+
+
+def _pick(plan: Plan, counts: list[int], edges: list[int]) -> int:
+    """Find the next machine with an enabled edge."""
+    i = counts[MACHINE] + 1
+    while i < len(edges) and edges[i] < 0:
+        i += 1
+    if i < len(edges):
+        counts[MACHINE] = i
+        counts[EDGE] = edges[i]
+        counts[PHASE] = FIRE
+        return FIRING
+    counts[PHASE] = ASK if counts[FIRED_ONE] == 1 and plan.located else SETTLED
+    return NOTHING
+
+
+def _fired(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> int:
+    """Count the edge just taken."""
+    counts, i = memory.counts, memory.counts[MACHINE]
+    counts[MICROSTEP] += 1
+    counts[FIRED_ONE] = 1
+    counts[FRESH] = 1
+    counts[PHASE] = PICK
+    _look_at_clock(now, memory)
+    memory.switches[i] += 1
+    if memory.switches[i] >= MOST_SWITCHES and _no_progress(plan, now, memory, scratch):
+        counts[PHASE] = AFTER
+        counts[STATUS] = MACHINE_LIVELOCK
+    return FIRED
+
+
+def _choose_stop(plan: Plan, clock: Vector, counts: list[int]) -> None:
+    """All machines are quiet: on to the next jump, or to the end."""
+    t, jumps = clock[T], plan.jumps
+    if t >= plan.t_end:
+        counts[PHASE] = FINISH
+        return
+    # A step that ends on a jump would see the value behind it: stop one clock tick before.
+    while counts[JUMP] < len(jumps) and jumps[counts[JUMP]] <= t:
+        counts[JUMP] += 1
+    clock[T_STOP] = plan.t_end
+    if counts[JUMP] < len(jumps):
+        clock[T_STOP] = min(clock[T_STOP], plan.before_jumps[counts[JUMP]])
+    counts[STATUS] = FULL
+    counts[PHASE] = BEGIN
 
 
 def _rearm(
-    arm: Callable[..., Any],
-    margins: Margins,
-    t: float,
-    y: Vector,
-    mode: list[int],
-    held: Vector,
-    p: Any,
-    relations: Watched,
-    surfaces: Surfaces,
-    sliding: Sliding,
-    on: Held,
-    memory: Memory,
-) -> tuple[Watched, bool]:
-    """Hold signs, choose what to watch and to slide on, remember the truth of what is watched.
-
-    Returns what is watched, and whether other surfaces are slid on than before.
-    """
-    watch = relations.watch
-    for a in range(memory.counts[ACTIVE]):
-        watch[memory.room[a]] = 0
-    arm(t, y, mode, p, held, watch)
-    w = _listed(relations, memory)
-    margins(t, y, mode, p, watch, w.start)
+    functions: Functions, now: Now, relations: Watched, sliding: Sliding, counts: list[int]
+) -> int:
+    """Hold signs, choose what to watch and to slide on, remember the truth of what is watched."""
+    surfaces, watch, p = sliding.surfaces, relations.watch, functions.p
+    t, y = now.clock[T], now.y
+    mode, held = now.mode, now.held
+    for a in range(counts[ACTIVE]):
+        watch[relations.room[a]] = 0
+    functions.arm(t, y, mode, p, held, watch)
+    w = _list(relations, counts)
+    functions.margins(t, y, mode, p, watch, w.start)
     slid = False
     if len(surfaces.sign) > 0:
-        slid = seize(on, surfaces, sliding, t, y, mode, w)
+        on = Held(functions, held, sliding)
+        slid = seize(on, now, w)
         count = sliding.which[-1]
         if count > 0:
             first = len(watch) - 2 * len(sliding.sigma)
@@ -363,7 +293,7 @@ def _rearm(
                 k = sliding.which[c]
                 watch[surfaces.above[k]] = watch[surfaces.at_least[k]] = 0
                 watch[first + 2 * c] = watch[first + 2 * c + 1] = 1
-            w = _listed(relations, memory)
+            w = _list(relations, counts)
             margins_on(t, y, mode, on, watch, w.start)
     for r in w.active:
         g = w.start[r]
@@ -372,57 +302,24 @@ def _rearm(
         sign = held[surfaces.sign[k]]
         if watch[surfaces.above[k]] and sign != 0.0:
             w.truth[surfaces.above[k]] = w.truth[surfaces.at_least[k]] = sign > 0.0
-    return w, slid
+    if _undefined(w):
+        counts[PHASE] = AFTER
+        counts[STATUS] = NOT_FINITE
+    elif slid:  # y lies on the surface now: whoever compares with it has to be asked again
+        counts[PHASE] = ASK
+        return SLID
+    return NOTHING
 
 
-def _listed(relations: Watched, memory: Memory) -> Watched:
+def _list(relations: Watched, counts: list[int]) -> Watched:
     """List the flagged relations."""
     active = 0
     for r in range(len(relations.watch)):
         if relations.watch[r]:
-            memory.room[active] = r
+            relations.room[active] = r
             active += 1
-    memory.counts[ACTIVE] = active
-    return active_relations(relations, memory)
-
-
-def _begin_arc(
-    ride: Flow,
-    method: Coefficients,
-    control: Control,
-    t: float,
-    y: Vector,
-    mode: list[int],
-    held: Vector,
-    on: Any,
-    memory: Memory,
-    work: Work,
-    located: bool,
-) -> None:
-    """Fill the slope and choose the first step of an arc."""
-    now = memory.now
-    ride(t, y, mode, held, on, memory.f)
-    # Without location the solver knows of no switch: it keeps its step.
-    if control.step <= 0.0 and (located or now[H] <= 0.0):
-        now[ERROR_BEFORE] = 1.0
-        # Where the system has a scale, how far there is to go does not count: the kernel cuts.
-        scale = control.time_scale if control.time_scale > 0.0 else now[T_STOP] - t
-        now[H] = starting_step(
-            ride,
-            t,
-            y,
-            memory.f,
-            mode,
-            held,
-            on,
-            method.error_order,
-            control.rtol,
-            work.floor,
-            scale,
-            control.max_step,
-            work.y_new,
-            work.f_new,
-        )
+    counts[ACTIVE] = active
+    return listed(relations, active)
 
 
 def _undefined(w: Watched) -> bool:
@@ -433,60 +330,126 @@ def _undefined(w: Watched) -> bool:
     return undefined
 
 
-def _look_at_clock(memory: Memory, t: float, y: Vector) -> None:
+def _begin_arc(motion: Motion, plan: Plan, now: Now, scratch: Scratch, counts: list[int]) -> int:
+    """Behind a switch or a jump fill the slope and choose the first step."""
+    control, clock = plan.control, now.clock
+    counts[PHASE] = ARC
+    if plan.located or counts[FRESH] == 1:
+        counts[NEW_ARC] = 1
+        counts[FRESH] = 0
+        if not plan.foreign:
+            motion.flow(clock[T], now.y, now.mode, now.held, motion.p, now.f)
+            # Without location the solver knows of no switch: it keeps its step.
+            if control.step <= 0.0 and (plan.located or clock[H] <= 0.0):
+                clock[ERROR_BEFORE] = 1.0
+                clock[H] = starting_step(motion, plan.method.error_order, control, now, scratch)
+    return ADVANCE if plan.foreign else NOTHING
+
+
+def _steps_ahead(plan: Plan, cursor: list[int], most_steps: int) -> int:
+    """Return how many steps may be taken at once."""
+    left = plan.max_steps - cursor[STEPS]
+    return min(most_steps, left) if plan.located else min(1, left)
+
+
+def _flowed(plan: Plan, counts: list[int], steps: int) -> int:
+    """Tell whether the arc goes on; a foreign solver has taken its steps before."""
+    counts[MICROSTEP] = 0
+    if steps <= 0:
+        return TOO_MANY_STEPS
+    if counts[STATUS] != FULL or not plan.located:
+        counts[PHASE] = AFTER
+        return NOTHING
+    return ADVANCE if plan.foreign else ROWS
+
+
+def _end_arc(plan: Plan, clock: Vector, counts: list[int], often: bool) -> int:
+    """Tell why the arc has ended."""
+    status = counts[STATUS]
+    if status in (TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK):
+        return status
+    counts[PHASE] = ASK
+    if status == REACHED and clock[T] < plan.t_end:
+        counts[PHASE] = JUMPING
+        return STOPPED
+    if status == FULL and not plan.located:
+        return ROWS  # perhaps none, but a caller may want to breathe
+    if status == CROSSED:
+        return RELATION_LIVELOCK if often else STOPPED
+    return NOTHING
+
+
+def _jump(plan: Plan, now: Now, counts: list[int], out: Output) -> int:
+    """Go over a jump of the flow."""
+    now.clock[T] = plan.jumps[counts[JUMP]]
+    counts[PHASE] = ASK
+    if out.every_step:
+        put_row(out, now.clock[T], now.y)
+    return STOPPED
+
+
+def _finish(now: Now, counts: list[int], out: Output) -> None:
+    """Write the rows wanted at the end itself."""
+    counts[PHASE] = END
+    t, cursor = now.clock[T], out.cursor
+    while cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] <= t:
+        put_row(out, out.times[cursor[NEXT_TIME]], now.y)
+        cursor[NEXT_TIME] += 1
+
+
+# --------------------------------------------------------------------------- progress
+def _look_at_clock(now: Now, memory: Memory) -> None:
     """Count anew where time has gone on since the last switch."""
-    if t - memory.now[SWITCHED] > CLOCK_CRAWLS * abs(t):
-        _count_anew(memory, t, y)
-    memory.now[SWITCHED] = t
+    t = now.clock[T]
+    if t - now.clock[SWITCHED] > CLOCK_CRAWLS * abs(t):
+        _count_anew(now, memory)
+    now.clock[SWITCHED] = t
 
 
-def _count_anew(memory: Memory, t: float, y: Vector) -> None:
-    memory.now[ANCHOR] = t
-    for j in range(len(y)):
-        memory.anchor[j] = y[j]
+def _count_anew(now: Now, memory: Memory) -> None:
+    now.clock[ANCHOR] = now.clock[T]
+    for j in range(len(now.y)):
+        memory.anchor[j] = now.y[j]
     for i in range(len(memory.switches)):
         memory.switches[i] = 0
     for r in range(len(memory.changes)):
         memory.changes[r] = 0
 
 
-def _no_progress(memory: Memory, control: Control, work: Work, t: float, y: Vector) -> bool:
+def _no_progress(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> bool:
     """Tell whether the switches counted led nowhere; if they led on, count anew from here."""
-    elapsed = t - memory.now[ANCHOR]
+    y, anchor, moved = now.y, memory.anchor, scratch.error
+    t, elapsed = now.clock[T], now.clock[T] - now.clock[ANCHOR]
     stands = elapsed <= MOST_SWITCHES * CLOCK_STANDS * abs(t)
     if not stands and elapsed <= MOST_SWITCHES * CLOCK_CRAWLS * abs(t):
-        moved = work.error
         for j in range(len(y)):
-            moved[j] = y[j] - memory.anchor[j]
-        distance = error_norm(moved, 1.0, y, memory.anchor, control.rtol, work.floor)
+            moved[j] = y[j] - anchor[j]
+        distance = error_norm(moved, 1.0, y, anchor, plan.control.rtol, now.floor)
         stands = distance <= MOST_SWITCHES * STATE_STANDS
     if not stands:
-        _count_anew(memory, t, y)
+        _count_anew(now, memory)
     return stands
 
 
 def _often_changed(
-    seen: Margins,
-    t: float,
-    y: Vector,
-    mode: list[int],
+    motion: Motion,
+    plan: Plan,
+    now: Now,
     w: Watched,
-    surfaces: Surfaces,
     sliding: Sliding,
-    on: Any,
     memory: Memory,
-    control: Control,
-    work: Work,
+    scratch: Scratch,
 ) -> bool:
     """Count the relations that have just changed; tell whether one has too often."""
-    _look_at_clock(memory, t, y)
-    seen(t, y, mode, on, w.watch, w.probe)
+    changes, probe, surfaces = memory.changes, w.search.probe, sliding.surfaces
+    _look_at_clock(now, memory)
+    motion.margins(now.clock[T], now.y, now.mode, motion.p, w.watch, probe)
     often = False
     for r in w.active:
-        g = w.probe[r]
+        g = probe[r]
         if (g > 0.0 or (g == 0.0 and not w.strict[r])) != w.truth[r]:
-            memory.changes[r] += 1
-            often = often or memory.changes[r] >= MOST_SWITCHES
+            changes[r] += 1
+            often = often or changes[r] >= MOST_SWITCHES
             w.changed[r] = 1
         else:
             w.changed[r] = 0
@@ -494,148 +457,131 @@ def _often_changed(
         above, at_least = surfaces.above[k], surfaces.at_least[k]
         if w.watch[above] and (w.changed[above] or w.changed[at_least]):
             sliding.arrived[k] = 1
-    return often and _no_progress(memory, control, work, t, y)
+    return often and _no_progress(plan, now, memory, scratch)
 
 
+# --------------------------------------------------------------------------- into columns
 def record(
-    flow: Flow,
-    arm: Callable[..., Any],
-    margins: Margins,
-    normal: Callable[..., Any],
-    ask: Callable[..., Any],
-    act: Callable[..., Any],
-    observe: Callable[..., Any],
-    method: Coefficients,
-    control: Control,
-    plan: Plan,
-    memory: Memory,
-    y: Vector,
-    mode: list[int],
-    held: Vector,
-    p: Any,
-    relations: Watched,
-    surfaces: Surfaces,
-    sliding: Sliding,
-    out: Output,
-    work: Work,
+    functions: Functions,
+    machines: Machines,
+    b: Buffers,
     log: Log,
     first: int,
     most_steps: int,
     pause: bool,
 ) -> int:
-    """Go on, writing all that happens into columns, until they are full or the run has ended.
+    """Run on, writing all that happens into columns, until they are full or the run has ended.
 
     Parameters
     ----------
-    observe : callable
-        ``observe(t, y, mode, signs, p, seen)``; the log keeps seen[0], seen[1] on both sides of a
-        firing and, of machine i, seen[2 + i] and y[first + i].
+    functions, machines
+        The system. ``observe(t, y, mode, signs, p, seen)`` fills what is seen of a state; the log
+        keeps seen[0], seen[1] on both sides of a firing and, of machine i, seen[2 + i] and
+        y[first + i].
+    b : Buffers
+        The run, changed in place.
     log : Log
         Filled; with room in ``stops_t`` stops are kept too.
     first : int
         Where the machines' own variables start in y.
     most_steps : int
-        Come back after about so many steps or happenings.
+        Come back after about so many steps or events.
     pause : bool
         Come back before each firing too.
-
-    Others as in `go_on`.
 
     Returns
     -------
     int
-        ROWS when a column is full or the steps are used up, FIRING, DONE or an error as `go_on`.
+        ROWS when a column is full or the steps are used up, FIRING, DONE or an error as
+        `run_to_event`.
     """
-    cursor, counts, entries = out.cursor, memory.counts, log.counts
-    keep_stops = len(log.stops_t) > 0
+    observe, now = machines.observe, b.now
+    counts, cursor = b.memory.counts, b.out.cursor
     seen_at = float("nan")  # the time log.seen is of
-    on = Held(
-        flow, margins, normal, p, held, surfaces.sign, sliding.which, sliding.sigma, sliding.table
-    )
+    on = Held(functions, now.held, b.sliding)
+    motion = Motion(flow_on, margins_on, on)
     left = most_steps
     while True:
         left -= 1
-        if left < 0 or (out.every_step and cursor[ROW] + 1 >= len(out.rows_t)):
+        if left < 0 or _is_full(b.out, log):
             return ROWS
-        if entries[0] >= len(log.t) or (keep_stops and entries[1] >= len(log.stops_t)):
-            return ROWS
-        happening = go_on(
-            flow,
-            arm,
-            margins,
-            normal,
-            ask,
-            act,
-            method,
-            control,
-            plan,
-            memory,
-            y,
-            mode,
-            held,
-            p,
-            relations,
-            surfaces,
-            sliding,
-            out,
-            work,
-            flow_on,
-            margins_on,
-            on,
-            most_steps,
-        )
-        t = memory.now[T]
-        if happening == ROWS:
+        event = run_to_event(functions, machines, motion, b, most_steps)
+        t = now.clock[T]
+        if event == ROWS:
             for row in range(counts[TAKEN], cursor[ROW]):
                 log.rows_microstep[row] = 0
-                _put_modes(mode, sliding, log.rows_mode[row])
+                _put_modes(now.mode, b.sliding.flags, log.rows_mode[row])
             counts[TAKEN] = cursor[ROW]
             if counts[PHASE] == ARC:
                 return ROWS
-        elif happening == FIRING:
+        elif event == FIRING:
             if seen_at != t:
-                look(observe, arm, on, sliding, t, y, mode, log.seen)
-            i = counts[MACHINE]
-            row = entries[0]
-            log.t[row] = t
-            log.machine[row] = i
-            log.edge[row] = counts[EDGE]
-            log.numbers[row][0] = y[first + i]
-            log.numbers[row][1] = log.seen[0]
-            log.numbers[row][2] = log.seen[2 + i]
-            log.numbers[row][3] = log.seen[1]
+                look(observe, on, t, now.y, now.mode, log.seen)
+            _put_firing(now, counts, log, first)
             if pause:
                 return FIRING
-        elif happening == FIRED:
-            look(observe, arm, on, sliding, t, y, mode, log.seen)
+        elif event == FIRED:
+            look(observe, on, t, now.y, now.mode, log.seen)
             seen_at = t
-            log.numbers[entries[0]][4] = log.seen[1]
-            entries[0] += 1
-        elif happening == SLID:
+            log.numbers[log.counts[FIRINGS]][4] = log.seen[1]
+            log.counts[FIRINGS] += 1
+        elif event == SLID:
             seen_at = float("nan")
-        elif happening not in (STOPPED, DONE):
-            return happening
-        if out.every_step and happening in (FIRED, SLID):
-            row = cursor[ROW]
-            put_row(out, t, y)
-            log.rows_microstep[row] = counts[MICROSTEP]
-            _put_modes(mode, sliding, log.rows_mode[row])
-            counts[TAKEN] = cursor[ROW]
-        if keep_stops and happening in (FIRED, SLID, STOPPED, DONE):
-            row = entries[1]
-            log.stops_t[row] = t
-            log.stops_microstep[row] = counts[MICROSTEP] if happening in (FIRED, SLID) else 0
-            for j in range(len(y)):
-                log.stops_y[row][j] = y[j]
-            _put_modes(mode, sliding, log.stops_mode[row])
-            entries[1] += 1
-        if happening == DONE:
+        elif event not in (STOPPED, DONE):
+            return event
+        if event not in (ROWS, FIRING):
+            switched = event in (FIRED, SLID)
+            _put_stop(now, counts, b.out, b.sliding.flags, log, switched)
+        if event == DONE:
             return DONE
 
 
-def _put_modes(mode: list[int], sliding: Sliding, place: list[int]) -> None:
+def _is_full(out: Output, log: Log) -> bool:
+    """Tell whether a column has no room for what may come next."""
+    if out.every_step and out.cursor[ROW] + 1 >= len(out.rows_t):
+        return True
+    if log.counts[FIRINGS] >= len(log.t):
+        return True
+    return 0 < len(log.stops_t) <= log.counts[STOPS]
+
+
+def _put_firing(now: Now, counts: list[int], log: Log, first: int) -> None:
+    """Write what is known before a firing."""
+    i, row = counts[MACHINE], log.counts[FIRINGS]
+    numbers = log.numbers[row]
+    log.t[row] = now.clock[T]
+    log.machine[row] = i
+    log.edge[row] = counts[EDGE]
+    numbers[0] = now.y[first + i]
+    numbers[1] = log.seen[0]
+    numbers[2] = log.seen[2 + i]
+    numbers[3] = log.seen[1]
+
+
+def _put_stop(
+    now: Now, counts: list[int], out: Output, flags: list[int], log: Log, switched: bool
+) -> None:
+    """Write the state and the modes from here on."""
+    t = now.clock[T]
+    if out.every_step and switched:
+        row = out.cursor[ROW]
+        put_row(out, t, now.y)
+        log.rows_microstep[row] = counts[MICROSTEP]
+        _put_modes(now.mode, flags, log.rows_mode[row])
+        counts[TAKEN] = out.cursor[ROW]
+    if len(log.stops_t) > 0:
+        row = log.counts[STOPS]
+        log.stops_t[row] = t
+        log.stops_microstep[row] = counts[MICROSTEP] if switched else 0
+        for j in range(len(now.y)):
+            log.stops_y[row][j] = now.y[j]
+        _put_modes(now.mode, flags, log.stops_mode[row])
+        log.counts[STOPS] += 1
+
+
+def _put_modes(mode: list[int], flags: list[int], place: list[int]) -> None:
     n = len(mode)
     for i in range(n):
         place[i] = mode[i]
-    for k in range(len(sliding.flags)):
-        place[n + k] = sliding.flags[k]
+    for k in range(len(flags)):
+        place[n + k] = flags[k]

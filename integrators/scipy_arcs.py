@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import OdeSolver
+from scipy.integrate import DenseOutput, OdeSolver
 
 from integrators.advance import (
     AT_ONCE,
     CROSSED,
     FULL,
-    NEXT_KNOT,
     NEXT_TIME,
     NOT_FINITE,
     REACHED,
@@ -25,12 +24,15 @@ from integrators.advance import (
     ROW,
     STEPS,
     TOO_SMALL,
+    limit_after,
+    next_on_grid,
     put_row,
     tick_at,
 )
-from integrators.crossings import NO_CHANGE, copy_margins, first_change
-from integrators.loop import NEW_ARC, STATUS, T_STOP, T, active_relations
+from integrators.crossings import NO_CHANGE, Path, copy_margins, first_change, listed
+from integrators.loop import ACTIVE, NEW_ARC, STATUS
 from integrators.sliding import Held, flow_on, margins_on
+from integrators.steps import T_STOP, Motion, T
 
 if TYPE_CHECKING:
     from integrators.hybrid import Buffers, Options
@@ -57,34 +59,25 @@ class SciPyStepper:
 
     def advance(self, most_steps: int) -> None:
         """Step until the next stop, a crossing, a full buffer or most_steps steps."""
-        memory = self.buffers.memory
-        if memory.counts[NEW_ARC]:  # after a stop the old solver's step and history mean nothing
+        counts = self.buffers.memory.counts
+        if counts[NEW_ARC]:  # after a stop the old solver's step and history mean nothing
             self.solver = None
-            memory.counts[NEW_ARC] = 0
-        memory.counts[STATUS], memory.now[T] = self._advance(memory.now[T], most_steps)
+            counts[NEW_ARC] = 0
+        counts[STATUS] = self._advance(most_steps)
 
-    def _limit(self, t: float) -> float:
-        b = self.buffers
-        cursor, knots, limit = b.out.cursor, b.plan.knots, b.memory.now[T_STOP]
-        while cursor[NEXT_KNOT] < len(knots) and knots[cursor[NEXT_KNOT]] <= t:
-            cursor[NEXT_KNOT] += 1
-        if cursor[NEXT_KNOT] < len(knots):
-            limit = min(limit, knots[cursor[NEXT_KNOT]])
-        if self.options.step:
-            index = int((t - b.control.origin) / self.options.step) + 1
-            while (grid := b.control.origin + index * self.options.step) - t <= tick_at(grid):
-                index += 1
-            limit = min(limit, b.control.origin + index * self.options.step)
-        return limit
+    def _limit(self) -> float:
+        plan, clock = self.buffers.plan, self.buffers.now.clock
+        limit = limit_after(plan, clock, self.buffers.out.cursor)
+        return min(limit, next_on_grid(plan.control, clock[T])) if self.options.step else limit
 
-    def _solver_to(self, limit: float, t: float) -> Any:
+    def _solver_to(self, limit: float) -> Any:
         if self.solver is not None and self.solver.t_bound == limit:
             return self.solver
-        b = self.buffers
+        now = self.buffers.now
 
         def slope(time: float, state: NDArray[np.float64]) -> NDArray[np.float64]:
             dy = [0.0] * len(state)
-            flow_on(float(time), state.tolist(), b.mode, b.held, self.on, dy)
+            flow_on(float(time), state.tolist(), now.mode, now.held, self.on, dy)
             result = np.array(dy)
             if not np.isfinite(result).all():
                 raise FloatingPointError(f"the flow is not finite at t = {float(time)!r}")
@@ -93,47 +86,41 @@ class SciPyStepper:
         solver: Any = self.options.method
         return solver(
             slope,
-            t,
-            np.array(b.y),
+            now.clock[T],
+            np.array(now.y),
             limit,
             rtol=self.options.rtol,
-            atol=np.array(b.work.floor),
+            atol=np.array(now.floor),
             max_step=self.options.max_step if math.isfinite(self.options.max_step) else np.inf,
         )
 
-    def _advance(self, t: float, most_steps: int) -> tuple[int, float]:
-        b = self.buffers
-        out, y, w = b.out, b.y, active_relations(b.relations, b.memory)
-        cursor, t_stop = out.cursor, b.memory.now[T_STOP]
+    def _advance(self, most_steps: int) -> int:
+        b, now, out = self.buffers, self.buffers.now, self.buffers.out
+        clock, y = now.clock, now.y
+        cursor, w = out.cursor, listed(b.relations, b.memory.counts[ACTIVE])
+        motion = Motion(flow_on, margins_on, self.on)
         redone, ahead = False, math.inf
         while True:
-            if t >= t_stop:
-                return REACHED, t
+            t = clock[T]
+            if t >= clock[T_STOP]:
+                return REACHED
             if most_steps <= 0 or (out.every_step and cursor[ROW] >= len(out.rows_t)):
-                return FULL, t
+                return FULL
             cursor[STEPS] += 1
             try:
-                solver = self._solver_to(min(self._limit(t), ahead), t)
+                solver = self._solver_to(min(self._limit(), ahead))
                 solver.step()
             except (ArithmeticError, np.linalg.LinAlgError):
-                return NOT_FINITE, t
+                return NOT_FINITE
             if solver.status == "failed":
-                return TOO_SMALL, t
+                return TOO_SMALL
             self.solver = solver
-            t_old, t_new, dense = t, float(solver.t), solver.dense_output()
-            y_new = solver.y.tolist()
+            t_new, dense, y_new = float(solver.t), solver.dense_output(), solver.y.tolist()
             tick = tick_at(max(abs(t), abs(t_new)))
-
-            def interpolate(
-                dense: Any, theta: float, place: Vector, t0: float = t_old, t1: float = t_new
-            ) -> None:
-                place[:] = dense(t0 + theta * (t1 - t0)).tolist()
-
             theta = NO_CHANGE
             if w.active:
-                theta = first_change(
-                    interpolate, dense, margins_on, t, t_new, y_new, b.mode, self.on, w, tick
-                )
+                path = Path(motion, now.mode, _interpolate, dense, t, t_new, y_new)
+                theta = first_change(path, w, tick)
             if theta < REDO and not redone and theta * (t_new - t) > AT_ONCE * tick:
                 # As in the kernel: the solver's stages lay behind the crossing.
                 self.solver, redone = None, True
@@ -145,17 +132,20 @@ class SciPyStepper:
             else:
                 copy_margins(w, w.end, w.start)
             while cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] < t_new:
-                put_row(
-                    out, out.times[cursor[NEXT_TIME]], dense(out.times[cursor[NEXT_TIME]]).tolist()
-                )
+                time = out.times[cursor[NEXT_TIME]]
+                put_row(out, time, dense(time).tolist())
                 cursor[NEXT_TIME] += 1
             if theta < 1.0:
-                interpolate(dense, theta, y)
+                _interpolate(dense, theta, y)
             else:
                 y[:] = y_new
-            t = t_new
+            clock[T] = t_new
             most_steps -= 1
             if out.every_step:
-                put_row(out, t, y)
+                put_row(out, t_new, y)
             if theta != NO_CHANGE:
-                return CROSSED, t
+                return CROSSED
+
+
+def _interpolate(dense: DenseOutput, theta: float, place: Vector) -> None:
+    place[:] = dense(dense.t_old + theta * (dense.t - dense.t_old)).tolist()

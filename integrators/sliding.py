@@ -17,12 +17,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from integrators.crossings import Margins, Watched
-from integrators.steps import Flow, Vector
+from integrators.crossings import Watched
+from integrators.steps import Flow, Margins, Now, T, Vector
 
 __all__ = [
     "LIVE",
     "MOST_SLIDING",
+    "Functions",
     "Held",
     "Sliding",
     "Surfaces",
@@ -44,6 +45,16 @@ RATES, GAINS, UPPER, LOWER, SEEN_UPPER, SEEN_LOWER, SLOPE = range(7)
 NORMAL, COLUMN, MATRIX = range(3)
 
 
+class Functions(NamedTuple):
+    """The functions of a system, and their parameters."""
+
+    flow: Flow
+    arm: Callable[..., Any]  # arm(t, y, mode, p, held, watch): signs to hold, relations to watch
+    margins: Margins
+    normal: Callable[..., Any]  # normal(surface, t, y, mode, p, out): gradient over y, rate in t
+    p: Any
+
+
 class Surfaces(NamedTuple):
     """The surfaces that can be slid on."""
 
@@ -55,6 +66,7 @@ class Surfaces(NamedTuple):
 class Sliding(NamedTuple):
     """Which surfaces are slid on, and scratch for it."""
 
+    surfaces: Surfaces
     which: list[int]  # those slid on; in the last place how many, shape (MOST_SLIDING + 1,)
     sigma: Vector  # in place of their signs, shape (MOST_SLIDING,)
     table: list[Vector]  # scratch, see the rows above
@@ -65,17 +77,11 @@ class Sliding(NamedTuple):
 
 
 class Held(NamedTuple):
-    """A system and the surfaces it slides on, in place of its parameters."""
+    """A system on the surfaces it slides on: what `flow_on` and `margins_on` take as parameters."""
 
-    flow: Flow
-    margins: Margins
-    normal: Callable[..., Any]  # normal(surface, t, y, mode, p, out): gradient over y, rate in t
-    p: Any
+    functions: Functions
     held: Vector
-    sign: list[int]
-    which: list[int]
-    sigma: Vector
-    table: list[Vector]
+    sliding: Sliding
 
 
 def room_to_slide(
@@ -111,6 +117,7 @@ def room_to_slide(
     on = [k for k, flag in enumerate(flags) if flag]
     width = max(size + 1, most + 1, seen) if most else 0
     return Sliding(
+        surfaces=surfaces,
         which=on + [0] * (most - len(on)) + [len(on)],
         sigma=[0.0] * most,
         table=[[0.0] * width for _ in range(3 * most + 7)],
@@ -134,7 +141,9 @@ def slope_on(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None
     dy : list of float, shape (m,)
         Filled.
     """
-    held, p, sign, which, sigma, table = on.held, on.p, on.sign, on.which, on.sigma, on.table
+    flow, normal, p = on.functions.flow, on.functions.normal, on.functions.p
+    held, sign = on.held, on.sliding.surfaces.sign
+    which, sigma, table = on.sliding.which, on.sliding.sigma, on.sliding.table
     most = len(sigma)
     count = which[most]
     size = len(y)
@@ -148,15 +157,15 @@ def slope_on(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None
         for j in range(size):
             dy[j] = 0.0
     else:
-        on.flow(t, y, mode, held, p, dy)
+        flow(t, y, mode, held, p, dy)
         for j in range(size):
             dy[j] = (1.0 - count) * dy[j]
     for c in range(count):
         k = sign[which[c]]
         held[k] = 1.0
-        on.flow(t, y, mode, held, p, upper)
+        flow(t, y, mode, held, p, upper)
         held[k] = -1.0
-        on.flow(t, y, mode, held, p, lower)
+        flow(t, y, mode, held, p, lower)
         held[k] = 0.0
         column = table[COLUMN * most + c]
         for j in range(size):
@@ -164,7 +173,7 @@ def slope_on(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None
             column[j] = 0.5 * (upper[j] - lower[j])
     for r in range(count):
         g, row = table[NORMAL * most + r], table[MATRIX * most + r]
-        on.normal(which[r], t, y, mode, p, g)
+        normal(which[r], t, y, mode, p, g)
         rate = g[size]
         for j in range(size):
             rate += g[j] * dy[j]
@@ -233,8 +242,8 @@ def flow_on(t: float, y: Vector, mode: list[int], held: Vector, on: Held, dy: Ve
     on : Held
         The system, as the parameters.
     """
-    if on.which[-1] == 0:
-        on.flow(t, y, mode, held, on.p, dy)
+    if on.sliding.which[-1] == 0:
+        on.functions.flow(t, y, mode, held, on.functions.p, dy)
     else:
         slope_on(on, t, y, mode, dy)
 
@@ -251,27 +260,20 @@ def margins_on(
     on : Held
         The system, as the parameters.
     """
-    on.margins(t, y, mode, on.p, watch, out)
-    count, most = on.which[-1], len(on.sigma)
+    on.functions.margins(t, y, mode, on.functions.p, watch, out)
+    which, sigma, table = on.sliding.which, on.sliding.sigma, on.sliding.table
+    count, most = which[-1], len(sigma)
     if count == 0:
         return
-    slope_on(on, t, y, mode, on.table[3 * most + SLOPE])
+    slope_on(on, t, y, mode, table[3 * most + SLOPE])
     first = len(watch) - 2 * most
     for c in range(count):
-        out[first + 2 * c] = 1.0 - on.sigma[c]
-        out[first + 2 * c + 1] = 1.0 + on.sigma[c]
+        out[first + 2 * c] = 1.0 - sigma[c]
+        out[first + 2 * c + 1] = 1.0 + sigma[c]
 
 
 # --------------------------------------------------------------------------- getting on and off
-def seize(
-    on: Held,
-    surfaces: Surfaces,
-    sliding: Sliding,
-    t: float,
-    y: Vector,
-    mode: list[int],
-    w: Watched,
-) -> bool:
+def seize(on: Held, now: Now, w: Watched) -> bool:
     """Choose the surfaces to slide on from here, and put y onto them.
 
     Those are candidates that were slid on, have just been reached, or are met exactly. One that
@@ -281,11 +283,9 @@ def seize(
     Parameters
     ----------
     on : Held
-        The system; the signs held of candidates are set.
-    surfaces, sliding, t, mode
-        What can be slid on, what is; handed on.
-    y : list of float, shape (m,)
-        Moved onto the surfaces, which it has left by rounding only.
+        The system, and what it slides on; the signs held of candidates are set.
+    now : Now
+        Where the run is; y is moved onto the surfaces, which it has left by rounding only.
     w : Watched
         Armed, ``w.start`` filled with margins.
 
@@ -294,7 +294,9 @@ def seize(
     bool
         Whether other surfaces are slid on than before.
     """
-    held, which, sigma, table = on.held, on.which, on.sigma, on.table
+    t, y, mode = now.clock[T], now.y, now.mode
+    held, sliding, surfaces = on.held, on.sliding, on.sliding.surfaces
+    which, sigma, table = sliding.which, sliding.sigma, sliding.table
     most, size = len(sigma), len(y)
     rates, gains = table[3 * most + RATES], table[3 * most + GAINS]
     count = 0
@@ -329,7 +331,7 @@ def seize(
         for c in range(count, candidates):
             # On a surface that another one keeps it on, such as a mere corner at v = 0 beside
             # sgn(v), it goes to neither side.
-            on.normal(which[c], t, y, mode, on.p, g)
+            on.functions.normal(which[c], t, y, mode, on.functions.p, g)
             rate = g[size]
             for j in range(size):
                 rate += g[j] * dy[j]
@@ -367,14 +369,7 @@ def _sign(u: float) -> float:
 
 # --------------------------------------------------------------------------- seeing
 def look(
-    observe: Callable[..., Any],
-    arm: Callable[..., Any],
-    on: Held,
-    sliding: Sliding,
-    t: float,
-    y: Vector,
-    mode: list[int],
-    out: Vector,
+    observe: Callable[..., Any], on: Held, t: float, y: Vector, mode: list[int], out: Vector
 ) -> None:
     """Observe a state: with live signs, but on surfaces with their sigmas.
 
@@ -382,36 +377,38 @@ def look(
     ----------
     observe : callable
         ``observe(t, y, mode, signs, p, out)``; a sign that is `LIVE` it takes as it sees it.
-    arm : callable
-        ``arm(t, y, mode, p, held, watch)`` fills the signs held beside those slid on.
-    on, sliding, t, y, mode
-        The system, and what it slides on.
+    on : Held
+        The system, and what it slides on; the signs held beside those slid on are filled.
+    t, y, mode
+        Handed on.
     out : list of float
         Filled.
     """
-    most, live, sign, which = len(on.sigma), sliding.live, on.sign, on.which
+    p, sliding = on.functions.p, on.sliding
+    live, sign, which = sliding.live, sliding.surfaces.sign, sliding.which
+    sigma, table, most = sliding.sigma, sliding.table, len(sliding.sigma)
     count = which[most]
     if count == 0:
-        observe(t, y, mode, live, on.p, out)
+        observe(t, y, mode, live, p, out)
         return
-    arm(t, y, mode, on.p, on.held, sliding.watch)
-    slope_on(on, t, y, mode, on.table[3 * most + SLOPE])
-    upper, lower = on.table[3 * most + SEEN_UPPER], on.table[3 * most + SEEN_LOWER]
+    on.functions.arm(t, y, mode, p, on.held, sliding.watch)
+    slope_on(on, t, y, mode, table[3 * most + SLOPE])
+    upper, lower = table[3 * most + SEEN_UPPER], table[3 * most + SEEN_LOWER]
     for c in range(count):
         live[sign[which[c]]] = 0.0
     if count == 1:
         for j in range(len(out)):
             out[j] = 0.0
     else:
-        observe(t, y, mode, live, on.p, out)
+        observe(t, y, mode, live, p, out)
         for j in range(len(out)):
             out[j] = (1.0 - count) * out[j]
     for c in range(count):
-        k, share = sign[which[c]], min(max(on.sigma[c], -1.0), 1.0)
+        k, share = sign[which[c]], min(max(sigma[c], -1.0), 1.0)
         live[k] = 1.0
-        observe(t, y, mode, live, on.p, upper)
+        observe(t, y, mode, live, p, upper)
         live[k] = -1.0
-        observe(t, y, mode, live, on.p, lower)
+        observe(t, y, mode, live, p, lower)
         live[k] = 0.0
         for j in range(len(out)):
             a, b = upper[j], lower[j]

@@ -8,16 +8,27 @@ step) and Hairer & Wanner II, IV.2 (PI control).
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
-from integrators.steps import Flow, Vector
+from integrators.steps import T_STOP, Motion, Now, Scratch, T, Vector
 
-__all__ = ["error_norm", "next_factor", "retry_factor", "starting_step"]
+__all__ = ["Control", "error_norm", "next_factor", "retry_factor", "starting_step"]
 
 SAFETY = 0.9
 LEAST, MOST = 0.2, 10.0  # a step shrinks or grows by no more than this
 INFINITY = float("inf")
 NO_TOLERANCE = 1e100
+
+
+class Control(NamedTuple):
+    """How steps are chosen."""
+
+    step: float  # fixed grid if > 0, else adaptive
+    origin: float  # where the grid starts
+    rtol: float
+    atol: Vector  # shape (m,); 0 for a component without a scale of its own
+    max_step: float
+    time_scale: float  # of the system, for starting steps; 0 if it has none
 
 
 def error_norm(
@@ -115,20 +126,7 @@ def retry_factor(error: float, order: int) -> float:
 
 
 def starting_step(
-    flow: Flow,
-    t: float,
-    y: Vector,
-    f: Vector,
-    mode: list[int],
-    held: Vector,
-    p: Any,
-    order: int,
-    rtol: float,
-    atol: Vector,
-    time_scale: float,
-    longest: float,
-    y_try: Vector,
-    f_try: Vector,
+    motion: Motion, order: int, control: Control, now: Now, scratch: Scratch
 ) -> float:
     """Return the usual starting step, from the size of y, y' and y''.
 
@@ -136,26 +134,28 @@ def starting_step(
 
     Parameters
     ----------
-    flow, t, y, f, mode, held, p
-        The system at the start.
+    motion : Motion
+        What flows.
     order : int
         Exponent of the step's error.
-    rtol : float
-        Relative tolerance.
-    atol : list of float, shape (m,)
-        Absolute tolerances.
-    time_scale : float
-        Of the system, s, > 0.
-    longest : float
-        Upper bound, s.
-    y_try, f_try : list of float
-        Scratch.
+    control : Control
+        Tolerances, the longest step, and the system's time scale.
+    now : Now
+        Time, state and slope at the start, and the next stop.
+    scratch : Scratch
+        A state and a slope are tried there.
 
     Returns
     -------
     float
         A step, > 0.
     """
+    t = now.clock[T]
+    # Where the system has a scale, how far there is to go does not count: the kernel cuts.
+    time_scale = control.time_scale if control.time_scale > 0.0 else now.clock[T_STOP] - t
+    y, f = now.y, now.f
+    y_try, f_try = scratch.y_new, scratch.f_new
+    rtol, atol, longest = control.rtol, now.floor, control.max_step
     d0 = error_norm(y, 1.0, y, y, rtol, atol)
     d1 = error_norm(f, 1.0, y, y, rtol, atol)
     h = min(time_scale, longest)
@@ -167,7 +167,7 @@ def starting_step(
         h = 1e-6 * h
     for j in range(len(y)):
         y_try[j] = y[j] + h * f[j]
-    flow(t + h, y_try, mode, held, p, f_try)
+    motion.flow(t + h, y_try, now.mode, now.held, motion.p, f_try)
     for j in range(len(y)):
         f_try[j] = (f_try[j] - f[j]) / h
     d2 = error_norm(f_try, 1.0, y, y, rtol, atol)

@@ -11,10 +11,24 @@ from typing import Any, NamedTuple
 
 from integrators.tableaux import Row, Tableau
 
-__all__ = ["Coefficients", "Dense", "Vector", "coefficients", "interpolate", "take_step"]
+__all__ = [
+    "Coefficients",
+    "Dense",
+    "Motion",
+    "Now",
+    "Scratch",
+    "Vector",
+    "coefficients",
+    "interpolate",
+    "take_step",
+]
 
 Vector = list[float]
 Flow = Callable[..., Any]  # flow(t, y, mode, held, p, dy) -> None, fills dy
+Margins = Callable[..., Any]  # margins(t, y, mode, p, watch, out) -> None, fills watched entries
+# Places in Now.clock: the time, the next step, the controller's error, the next stop; since when
+# switches are counted, and when the last one was.
+T, H, ERROR_BEFORE, T_STOP, ANCHOR, SWITCHED = range(6)
 
 
 class Coefficients(NamedTuple):
@@ -38,6 +52,35 @@ class Dense(NamedTuple):
     bump: Vector
 
 
+class Motion(NamedTuple):
+    """What flows on an arc and what is watched meanwhile, with the parameters of both."""
+
+    flow: Flow
+    margins: Margins
+    p: Any
+
+
+class Now(NamedTuple):
+    """Where a run is; changed in place."""
+
+    clock: Vector  # see the places above
+    y: Vector  # state, shape (m,)
+    f: Vector  # slope, shape (m,)
+    mode: list[int]  # of each machine, shape (n,); frozen within a step
+    held: Vector  # signs; frozen within a step
+    floor: Vector  # absolute tolerances, shape (m,); without a scale they grow with the component
+
+
+class Scratch(NamedTuple):
+    """The step that is tried."""
+
+    k: list[Vector]  # slopes of the stages, shape (stages, m)
+    y_new: Vector
+    f_new: Vector
+    error: Vector
+    dense: Dense
+
+
 def coefficients(tableau: Tableau) -> Coefficients:
     """Return a tableau as the kernel takes it.
 
@@ -55,45 +98,34 @@ def coefficients(tableau: Tableau) -> Coefficients:
 
 
 def take_step(
-    flow: Flow,
-    method: Coefficients,
-    t: float,
-    y: Vector,
-    f: Vector,
-    t_new: float,
-    mode: list[int],
-    held: Vector,
-    p: Any,
-    k: list[Vector],
-    y_new: Vector,
-    f_new: Vector,
+    motion: Motion, method: Coefficients, now: Now, t_new: float, scratch: Scratch
 ) -> None:
-    """Step from (t, y) with slope f to t_new; fill the stages k, y_new and its slope f_new.
+    """Step from where a run is to t_new.
 
     Parameters
     ----------
-    flow : callable
+    motion : Motion
         ``flow(t, y, mode, held, p, dy)`` fills dy.
     method : Coefficients
         The tableau.
-    t, t_new : float
-        Start and end.
-    y, f : list of float, shape (m,)
-        State and slope at t.
-    mode, held, p
-        Handed on to flow, frozen within the step.
-    k : list of list of float, shape (stages, m)
-        Filled with the stages' slopes.
-    y_new, f_new : list of float, shape (m,)
-        Filled.
+    now : Now
+        Time, state and slope at the start.
+    t_new : float
+        End.
+    scratch : Scratch
+        The stages' slopes, the state at t_new and its slope are filled.
     """
+    flow, p = motion.flow, motion.p
+    t, y = now.clock[T], now.y
+    mode, held = now.mode, now.held
+    k, y_new = scratch.k, scratch.y_new
     h = t_new - t
     size = len(y)
     A = method.A
     B = method.B
     C = method.C
     stages = len(B)
-    first = k[0]
+    first, f = k[0], now.f
     for j in range(size):
         first[j] = f[j]
     for i in range(1, stages + 1):
@@ -123,22 +155,15 @@ def take_step(
                     y_new[j] = y[j] + h * y_new[j]
         if i < stages:
             flow(t + C[i] * h, y_new, mode, held, p, k[i])
-    flow(t_new, y_new, mode, held, p, f_new)
+    flow(t_new, y_new, mode, held, p, scratch.f_new)
 
 
-def fit_dense(
-    method: Coefficients,
-    h: float,
-    y: Vector,
-    k: list[Vector],
-    y_new: Vector,
-    f_new: Vector,
-    dense: Dense,
-) -> None:
-    """Fill the polynomial of the step just taken."""
+def fit_dense(method: Coefficients, h: float, y: Vector, scratch: Scratch) -> None:
+    """Fill the polynomial of the step of length h just taken from y."""
+    k, y_new, f_new = scratch.k, scratch.y_new, scratch.f_new
     D = method.D
     stages = len(method.B)
-    start, rises, bends, twists, bumps = dense
+    start, rises, bends, twists, bumps = scratch.dense
     first = k[0]
     for j in range(len(y)):
         rise = y_new[j] - y[j]

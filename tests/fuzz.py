@@ -54,13 +54,12 @@ from gms_fsm.run.simulate import Run
 from gms_fsm.run.start import Start
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.trace import dwell_times
-from tests.helpers import pulled_mass, stick_slip
+from tests.helpers import ROOT, pulled_mass, stick_slip
 from tests.scenario_files import MEASURED, OPEN_LOOP, sine_table
 
 Option = TypeVar("Option")
 
 LONGEST_MESSAGE = 4000  # characters; longer is no message
-ROOT = Path(__file__).resolve().parents[1]
 
 
 class Choices:

@@ -29,26 +29,30 @@ OPERATORS = (
     + ["NumberReplacer", "ZeroIterationForLoop"]
 )
 PHYSICS = [
-    "traps_boundary_values",
-    "traps_velocity_window",
-    "traps_true_and_false_again",
-    "traps_frozen_states",
-    "traps_sign_discontinuity",
-    "constant_velocity_closed_forms",
+    "physics/test_traps_boundary_values",
+    "physics/test_traps_velocity_window",
+    "physics/test_traps_true_and_false_again",
+    "physics/test_traps_frozen_states",
+    "physics/test_traps_sign_discontinuity",
+    "physics/test_constant_velocity_closed_forms",
 ]
 NEAR = {  # module: its tests, the quickest to notice first
     "gms_fsm/charts/chart.py": [
-        "mutants_are_killed",
-        "chart_refuses_contradictions",
-        "gms_chart_is_the_papers",
+        "language/test_mutants_are_killed",
+        "charts/test_chart_refuses_contradictions",
+        "charts/test_gms_chart_is_the_papers",
     ],
     "gms_fsm/run/machines.py": [
-        "mutants_are_killed",
-        "callbacks_run_once_per_firing",
-        "gms_chart_is_the_papers",
+        "language/test_mutants_are_killed",
+        "run/test_callbacks_run_once_per_firing",
+        "charts/test_gms_chart_is_the_papers",
     ],
-    "integrators/advance.py": ["mutants_are_killed", *PHYSICS, "convergence_orders"],
-    "integrators/crossings.py": ["mutants_are_killed", *PHYSICS],
+    "integrators/advance.py": [
+        "language/test_mutants_are_killed",
+        *PHYSICS,
+        "integrators/test_convergence_orders",
+    ],
+    "integrators/crossings.py": ["language/test_mutants_are_killed", *PHYSICS],
 }
 LANGUAGE = [
     "tree",
@@ -63,12 +67,12 @@ LANGUAGE = [
 ]
 NEAR |= {
     f"gms_fsm/language/_{name}.py": [
-        "mutants_are_killed",
-        "fold_reads_each_part_once_and_only_when_taken",
-        "derivatives_are_slopes",
-        "expression_refuses_everything_else",
-        "expression_evaluates_like_python",
-        "gms_chart_is_the_papers",
+        "language/test_mutants_are_killed",
+        "language/test_fold_reads_each_part_once_and_only_when_taken",
+        "language/test_derivatives_are_slopes",
+        "language/test_expression_refuses_everything_else",
+        "language/test_expression_evaluates_like_python",
+        "charts/test_gms_chart_is_the_papers",
     ]
     for name in LANGUAGE
 }
@@ -128,7 +132,7 @@ def measure(module, sample, seed, budget):
     every = mutants(source)
     chosen = list(every)
     random.Random(f"{seed} {module}").shuffle(chosen)  # a smaller sample is the beginning of this
-    tests = [f"tests/test_{name}.py" for name in NEAR[module]] + [module]  # its examples
+    tests = [f"tests/{name}.py" for name in NEAR[module]] + [module]  # its examples
     options = ["-x", "-q", "--no-header", "-p", "no:cacheprovider", "--hypothesis-seed=0"]
     options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # of what is imported here
     rounds = [options + tests[:1], options + tests[1:]]

@@ -8,15 +8,14 @@ import re
 import shutil
 import sys
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 from unittest import mock
 
 from gms_fsm.app.cli import main
 from gms_fsm.app.debugger import run_debugger
 from gms_fsm.app.scenario import load_scenario
+from tests.helpers import ROOT
 
-ROOT = Path(__file__).parents[1]
 FENCE = re.compile(
     r"(?:^<!-- file: (?P<file>\S+) -->\n)?^```(?P<kind>[^\n`]*)\n(?P<body>.*?)^```$",
     re.DOTALL | re.MULTILINE,

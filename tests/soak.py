@@ -1,9 +1,9 @@
 """Hard use for minutes and hours: ``python -m tests.soak --minutes 10``, or ``make soak``.
 
 The three fuzz bodies for so many minutes each, 200 kills at random moments, a run of a million
-transitions, new random runs of tests/test_hard_random_runs.py and of tests/trials.py. Each part
-runs in processes of its own, under a limit of memory and with a watch on time; what is found is
-printed with the line that repeats it, and the exit code is 1.
+transitions, new random runs of tests/physics/test_hard_random_runs.py and of tests/trials.py. Each
+part runs in processes of its own, under a limit of memory and with a watch on time; what is found
+is printed with the line that repeats it, and the exit code is 1.
 """
 
 from __future__ import annotations
@@ -154,7 +154,7 @@ def _index(watch: Path) -> int:
 
 def killing(seed: int, kills: int) -> bool:
     """Kill writers at random moments; return whether every file was whole."""
-    from tests.test_killed_runs_leave_whole_files import WRITERS, end_nursery, kill_and_look
+    from tests.run.test_killed_runs_leave_whole_files import WRITERS, end_nursery, kill_and_look
 
     moments, began, amid = random.Random(seed), time.monotonic(), 0
     with tempfile.TemporaryDirectory() as folder:
@@ -179,7 +179,7 @@ def killing(seed: int, kills: int) -> bool:
 
 def million(transitions: int) -> bool:
     """Run many transitions in a child; return whether its memory stayed within bounds."""
-    from tests.test_a_million_transitions import BYTES_A_FIRING, in_a_child
+    from tests.run.test_a_million_transitions import BYTES_A_FIRING, in_a_child
 
     few, many = in_a_child("compiled", 1000), in_a_child("compiled", transitions)
     each = (many.peak - few.peak) / (many.transitions - few.transitions)
@@ -204,7 +204,7 @@ def random_runs(seed: int, examples: int) -> bool:
                 "-m",
                 "pytest",
                 "-q",
-                "tests/test_hard_random_runs.py",
+                "tests/physics/test_hard_random_runs.py",
                 f"--hypothesis-seed={seed}",
             ],
             cwd=ROOT,

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Annotated, Any, Literal
 
 import scipy.integrate
-from pydantic import AfterValidator, Discriminator, Field, PositiveFloat, Tag, model_validator
-from pydantic_core import PydanticKnownError
+from pydantic import (
+    AfterValidator,
+    Discriminator,
+    Field,
+    GetCoreSchemaHandler,
+    PositiveFloat,
+    Tag,
+    model_validator,
+)
+from pydantic_core import CoreSchema, PydanticKnownError
+from pydantic_core.core_schema import literal_schema
 
 from gms_fsm.app._model_tables import BY_CHART, BY_KIND, LIST, ONE, ModelTable, Table
 from gms_fsm.app.records import Column
-from gms_fsm.run.settings import MOST_STEPS
+from gms_fsm.run.settings import ENGINES, EVENTS, Settings
 from gms_fsm.systems.rigs import PulledSlider
+from integrators import METHODS
 
 __all__ = [
     "FORMS",
@@ -131,25 +142,47 @@ class PulledTable(Table):
 
 
 # --------------------------------------------------------------------------- the run
+class OneOf:
+    """Allows these texts only, in a file and in its schema.
+
+    Parameters
+    ----------
+    *choices : str
+        What a key may say.
+    """
+
+    def __init__(self, *choices: str) -> None:
+        self.choices = choices
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Return what pydantic checks."""
+        return literal_schema(list(self.choices))
+
+
+_DEFAULT = Settings()
+
+
 class RunTable(Table):
-    """How to integrate; see `gms_fsm.simulate`."""
+    """How to integrate; keys and defaults are those of `gms_fsm.Settings`."""
 
     t_end: float | None = Field(None, description="s; the record's end when left out")
     t_start: float | None = Field(None, description="s; 0, or the record's start")
-    method: Literal[
-        "dp45", "bs23", "rk4", "heun", "euler", "RK45", "DOP853", "Radau", "BDF", "LSODA"
-    ] = "dp45"
-    step: float | None = Field(None, gt=0, description="fixed step, s")
-    rtol: float = Field(1e-6, gt=0)
+    method: Annotated[str, OneOf(*METHODS, *SCIPY_METHODS)] = _DEFAULT.method_name
+    step: float | None = Field(_DEFAULT.step, gt=0, description="fixed step, s")
+    rtol: float = Field(_DEFAULT.rtol, gt=0)
     atol: PositiveFloat | dict[str, PositiveFloat | list[PositiveFloat]] | None = Field(
         None,
         description="absolute tolerance of all components, or by name { x, v, z }; from the "
         "model's own scales where left out",
     )
-    max_step: float | None = Field(None, gt=0, description="s")
-    max_steps: int = Field(MOST_STEPS, ge=1, description="a run that needs more is an error")
-    events: Literal["located", "step"] = "located"
-    engine: Literal["machines", "ifelse", "compiled"] = "machines"
+    max_step: float | None = Field(None, gt=0, description="s; no limit when left out")
+    max_steps: int = Field(
+        _DEFAULT.max_steps, ge=1, description="a run that needs more is an error"
+    )
+    events: Annotated[str, OneOf(*EVENTS)] = _DEFAULT.events
+    engine: Annotated[str, OneOf(*ENGINES)] = _DEFAULT.engine
     monitors: list[str] = Field(
         [],
         description='what to watch for: "chattering", "passivity", "coverage", "all" of these, '
@@ -157,20 +190,11 @@ class RunTable(Table):
     )
 
     def options(self) -> dict[str, Any]:
-        """Return the options for `simulate`."""
-        scipy_method = self.method in SCIPY_METHODS
-        options: dict[str, Any] = {
-            "method": getattr(scipy.integrate, self.method) if scipy_method else self.method,
-            "step": self.step,
-            "rtol": self.rtol,
-            "atol": self.atol,
-            "max_steps": self.max_steps,
-            "events": self.events,
-            "engine": self.engine,
-        }
-        if self.max_step is not None:
-            options["max_step"] = self.max_step
-        return options
+        """Return what is given of the settings, by name."""
+        given = self.model_dump(include={each.name for each in fields(_DEFAULT)}, exclude_none=True)
+        if self.method in SCIPY_METHODS:
+            given["method"] = getattr(scipy.integrate, self.method)
+        return given
 
 
 class InitialTable(Table):

@@ -90,9 +90,9 @@ class Branch:
                 try:
                     if not self.run.advance():
                         self.ended = True
-                    elif isinstance(self.run.happening, Stop):
+                    elif isinstance(self.run.event, Stop):
                         self.stops.add(len(self) - 1)
-                    elif isinstance(self.run.happening, Firing):
+                    elif isinstance(self.run.event, Firing):
                         self.firings.append(len(self) - 1)
                 except SimulationError as error:
                     self.failure = error.with_traceback(None)

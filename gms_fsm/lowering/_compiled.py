@@ -7,6 +7,7 @@ import importlib.util
 import math
 import os
 import re
+import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -24,7 +25,7 @@ from gms_fsm.lowering._store import Store
 from gms_fsm.lowering.program import Arguments, Program
 from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
 
-__all__ = ["check_numba", "machine_code", "observe_rows", "packed", "store"]
+__all__ = ["check_numba", "machine_code", "observe_rows", "packed", "store", "tell"]
 
 Packed = tuple[FloatArray, FloatArray, FloatArray]
 _lock = threading.RLock()  # a sweep asks from several threads
@@ -177,6 +178,17 @@ def store() -> Store | None:
     return Store.at((Path(given) if given else user_cache_path("gms-fsm")) / "machine-code")
 
 
+def tell(text: str) -> None:
+    """Say what takes so long.
+
+    Parameters
+    ----------
+    text : str
+        What machine code is made of, or how long that took.
+    """
+    print(f"gms-fsm: {text}", file=sys.stderr)
+
+
 def _compiled_signal(name: str, call: Callable[[float], float]) -> Any:
     import numba
 
@@ -218,9 +230,7 @@ def observe_rows(
     table = np.empty((t.size, program.layout.observed.size))
     compiled.for_each_row(
         machine_code(program, "observe"),
-        np.ascontiguousarray(t),
-        np.ascontiguousarray(y),
-        np.ascontiguousarray(mode),
+        (np.ascontiguousarray(t), np.ascontiguousarray(y), np.ascontiguousarray(mode)),
         np.array(program.live),
         packed(program.p),
         table,

@@ -13,7 +13,7 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.lowering.program import Program
-from integrators import Held, Sliding, look, room_to_slide, slope_on
+from integrators import Functions, Held, look, room_to_slide, slope_on
 
 __all__ = ["armed", "observe", "rate", "sigmas"]
 
@@ -41,9 +41,8 @@ def observe(program: Program, t: float, y: list[float], mode: Sequence[int]) -> 
     if not any(mode[program.layout.slides]):
         program.ieee["observe"](t, y, mode, program.live, program.p, out)
     else:
-        on, sliding = _sliding(program, mode, [0.0] * program.held)
-        functions = program.ieee["observe"], program.ieee["arm"]
-        look(*functions, on, sliding, t, y, list(mode), out)
+        on = _sliding(program, mode, [0.0] * program.held)
+        look(program.ieee["observe"], on, t, y, list(mode), out)
     return out
 
 
@@ -62,10 +61,10 @@ def sigmas(program: Program, t: float, y: list[float], mode: Sequence[int]) -> l
     """
     found = [math.nan] * program.layout.surfaces
     if any(mode[program.layout.slides]):
-        on, _ = _sliding(program, mode, armed(program, t, y, mode))
+        on = _sliding(program, mode, armed(program, t, y, mode))
         slope_on(on, t, y, list(mode), [0.0] * program.layout.y.size)
-        for c in range(on.which[-1]):
-            found[on.which[c]] = min(max(on.sigma[c], -1.0), 1.0)
+        for c in range(on.sliding.which[-1]):
+            found[on.sliding.which[c]] = min(max(on.sliding.sigma[c], -1.0), 1.0)
     return found
 
 
@@ -108,13 +107,15 @@ def rate(
     if not any(mode[program.layout.slides]):
         program.ieee["flow"](t, y, mode, held, program.p, dy)
     else:
-        slope_on(_sliding(program, mode, held)[0], t, y, list(mode), dy)
+        slope_on(_sliding(program, mode, held), t, y, list(mode), dy)
     return np.array(dy)
 
 
-def _sliding(program: Program, mode: Sequence[int], held: list[float]) -> tuple[Held, Sliding]:
+def _sliding(program: Program, mode: Sequence[int], held: list[float]) -> Held:
     """Return the program on the surfaces that a row is on."""
-    s = room_to_slide(
+    names = ("flow", "arm", "margins", "normal")
+    flow, arm, margins, normal = (program.ieee[name] for name in names)
+    sliding = room_to_slide(
         program.surfaces,
         program.layout.y.size,
         program.held,
@@ -122,16 +123,4 @@ def _sliding(program: Program, mode: Sequence[int], held: list[float]) -> tuple[
         program.layout.observed.size,
         mode[program.layout.slides],
     )
-    functions = program.ieee
-    on = Held(
-        functions["flow"],
-        functions["margins"],
-        functions["normal"],
-        program.p,
-        held,
-        program.surfaces.sign,
-        s.which,
-        s.sigma,
-        s.table,
-    )
-    return on, s
+    return Held(Functions(flow, arm, margins, normal, program.p), held, sliding)

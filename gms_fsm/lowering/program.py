@@ -52,7 +52,7 @@ from gms_fsm.systems.signals import (
 )
 from integrators import LIVE
 
-__all__ = ["Arguments", "Program", "arguments", "lower", "system"]
+__all__ = ["Arguments", "Program", "arguments", "equations", "lower"]
 
 Arguments = tuple[list[float], list[list[float]], list[list[float]]]
 
@@ -237,7 +237,7 @@ def arguments(model: Model, rig: Rig) -> Arguments:
     return shared, own, tables
 
 
-def system(program: Program) -> integrators.System:
+def equations(program: Program) -> integrators.Equations:
     """Return a program as the integrators take it.
 
     Parameters
@@ -247,11 +247,11 @@ def system(program: Program) -> integrators.System:
 
     Returns
     -------
-    integrators.System
+    integrators.Equations
         Its functions and numbers.
     """
     functions = program.ieee
-    return integrators.System(
+    return integrators.Equations(
         flow=functions["flow"],
         flow_live=functions["flow_live"],
         arm=functions["arm"],
@@ -264,6 +264,7 @@ def system(program: Program) -> integrators.System:
         surfaces=program.surfaces,
         knots=program.knots,
         jumps=program.jumps,
+        seen=program.layout.observed.size,
     )
 
 

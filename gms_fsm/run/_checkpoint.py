@@ -26,6 +26,7 @@ from gms_fsm.traces._archives import member
 from gms_fsm.traces._header import Header
 from integrators import hybrid, loop
 from integrators.advance import NEXT_KNOT, NEXT_TIME, ROW
+from integrators.steps import T
 
 __all__ = ["Keeper"]
 
@@ -178,14 +179,14 @@ def _check(run: Resumable, state: Mapping[str, Any], kept: Mapping[str, Any]) ->
         _expect(name, state[name], np.asarray(place), rows=False)
     for name, column in run.kept().items():
         _expect(name, kept[name], np.asarray(column), rows=name not in ("counts", "seen"))
-    states, edges, n = len(chart.states), len(chart.transitions), len(b.mode)
+    states, edges, n = len(chart.states), len(chart.transitions), len(b.now.mode)
     layout = start.program.layout
     counts, cursor = state["counts"], state["cursor"]
     # Compiled rows lie in the columns that were kept, others in the buffer.
     capacity = max(len(kept["rows_t"]), len(b.out.rows_t))
     machine = 0 if counts[loop.PHASE] == loop.FIRE else -1
     within = {
-        "time": (state["now"][loop.T], start.t_start, start.t_end),
+        "time": (state["clock"][T], start.t_start, start.t_end),
         "mode": (state["mode"], 0, states - 1),
         "edges": (state["edges"], -1, edges - 1),
         "room": (state["room"], 0, len(b.relations.watch) - 1),

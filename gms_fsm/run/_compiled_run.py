@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 from collections.abc import Mapping
 from typing import Any
@@ -11,7 +10,7 @@ import numpy as np
 
 from gms_fsm.lowering import _compiled as compiled
 from gms_fsm.lowering.layout import LOG_NUMBERS, LOG_TEXTS
-from gms_fsm.lowering.program import system
+from gms_fsm.lowering.program import equations
 from gms_fsm.run._recording import PATIENCE, Recording, check_end, check_pace, explained, meddled
 from gms_fsm.run.machines import ElementMachines, MachineEngine, Meddling
 from gms_fsm.run.start import Start
@@ -23,6 +22,9 @@ from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
 from integrators import hybrid, loop
 from integrators.advance import ROW, STEPS
+from integrators.loop import FIRINGS, STOPS
+from integrators.sliding import Functions
+from integrators.steps import T
 
 __all__ = ["CompiledRun"]
 
@@ -45,7 +47,7 @@ class CompiledRun:
         program = start.program
         flow = "flow" if start.options.located else "flow_live"
         names = (flow, "arm", "margins", "normal", "switch", "act", "observe")
-        self.functions = [compiled.machine_code(program, name) for name in names]
+        self.code = [compiled.machine_code(program, name) for name in names]
         self.columns = Columns(start)
         self.recorder: Recording = self.columns
         self.engine: MachineEngine | None = None
@@ -102,28 +104,13 @@ class CompiledRun:
         b, start, before = columns.buffers, columns.start, columns.latest
         layout = start.program.layout
         try:
-            happening = record(
-                (
-                    *self.functions,
-                    b.method,
-                    b.control,
-                    b.plan,
-                    b.memory,
-                    b.y,
-                    b.mode,
-                    b.held,
-                    columns.p,
-                    b.relations,
-                    b.surfaces,
-                    b.sliding,
-                    b.out,
-                    b.work,
-                    columns.log,
-                    layout.y.index(layout.variable),
-                    STEPS_AT_ONCE,
-                    self.engine is not None,
-                ),
+            flow, arm, margins, normal, *machines = self.code
+            functions = Functions(flow, arm, margins, normal, columns.p)
+            first, pause = layout.y.index(layout.variable), self.engine is not None
+            event = record(
+                (functions, loop.Machines(*machines), b, columns.log, first, STEPS_AT_ONCE, pause),
                 compiled.store(),
+                compiled.tell,
             )
         except Exception as error:
             if not start.program.callables:
@@ -135,16 +122,16 @@ class CompiledRun:
                 columns.trace(),
                 place=f"signal {names}",
             ) from error
-        if happening == loop.DONE:
+        if event == loop.DONE:
             check_end(columns)
             return False
-        if happening == loop.ROWS:
+        if event == loop.ROWS:
             if b.out.cursor[STEPS] >= PATIENCE:
                 check_pace(columns, columns.as_lists())
-        elif happening == loop.FIRING:
+        elif event == loop.FIRING:
             self._replay(self.engine)
         else:
-            failed = hybrid.failure(happening, columns.as_lists(), start.program.relations)
+            failed = hybrid.failure(event, columns.as_lists(), start.program.relations)
             raise explained(failed, columns) from None
         return True
 
@@ -177,39 +164,17 @@ class Columns:
 
         self.start = start
         self.p = compiled.packed(start.program.p) if p is None else p
-        layout = start.program.layout
+        layout, options = start.program.layout, start.options
         size, modes = layout.y.size, layout.modes
-        b = hybrid.buffers(
-            system(start.program),
-            start.t_start,
-            start.y,
-            start.mode,
-            start.last,
-            start.options,
-            capacity=0,
-            seen=layout.observed.size,
-        )
+        made = equations(start.program)
+        b = arrays(hybrid.buffers(made, start.t_start, start.y, start.mode, start.last, options, 0))
         few = max(16, min(1024, 4_000_000 // size))  # rows to begin with
         rows = {"all": few, "t_eval": len(start.options.times or ()), "end": 0}[start.output]
         stops = few if start.output == "t_eval" else 0
-        array: Any = np.array  # the buffers' fields say list; compiled code takes arrays
-        floats: Any = np.empty
+        floats: Any = np.empty  # the columns' fields say list; compiled code takes arrays
         ints: Any = functools.partial(np.zeros, dtype=np.int64)
-        self.buffers = dataclasses.replace(
-            b,
-            method=arrays(b.method),
-            control=arrays(b.control),
-            plan=arrays(b.plan),
-            memory=arrays(b.memory),
-            relations=arrays(b.relations),
-            surfaces=arrays(b.surfaces),
-            sliding=arrays(b.sliding),
-            work=arrays(b.work),
-            out=arrays(b.out)._replace(rows_t=floats(rows), rows_y=floats((rows, size))),
-            y=array(b.y),
-            mode=array(b.mode, dtype=np.int64),
-            held=array(b.held),
-        )
+        out = b.out._replace(rows_t=floats(rows), rows_y=floats((rows, size)))
+        self.buffers: hybrid.Buffers = b._replace(out=out)
         self.log = loop.Log(
             counts=ints(2),
             t=floats(256),
@@ -225,7 +190,7 @@ class Columns:
             stops_mode=ints((stops, modes)),
         )
         if stops:
-            self.log.stops_t[0], self.log.stops_y[0] = start.t_start, self.buffers.y
+            self.log.stops_t[0], self.log.stops_y[0] = start.t_start, self.buffers.now.y
             self.log.stops_mode[0] = list(layout.not_sliding(start.mode))
             self.log.counts[STOPS] = 1
 
@@ -239,8 +204,8 @@ class Columns:
         """Empty the columns and go back to the start."""
         start, log = self.start, self.log
         b: Any = self.buffers  # arrays
-        memory, sliding = b.memory, b.sliding
-        memory.now[:] = hybrid.beginning(start.t_start, start.last)
+        now, memory, sliding = b.now, b.memory, b.sliding
+        now.clock[:] = hybrid.beginning(start.t_start, start.last)
         for counts in (
             memory.counts,
             memory.switches,
@@ -252,11 +217,11 @@ class Columns:
             sliding.arrived,
         ):
             counts[:] = 0
-        b.y[:], b.mode[:], memory.anchor[:] = start.y, start.mode, start.y
+        now.y[:], now.mode[:], memory.anchor[:] = start.y, start.mode, start.y
         sliding.live[:] = start.program.live
-        b.control.atol[:] = b.work.floor[:] = start.options.atol
-        control = b.control._replace(time_scale=start.options.time_scale)
-        self.buffers = dataclasses.replace(self.buffers, control=control)
+        b.plan.control.atol[:] = now.floor[:] = start.options.atol
+        control = b.plan.control._replace(time_scale=start.options.time_scale)
+        self.buffers = b._replace(plan=b.plan._replace(control=control))
         log.counts[:] = [0, min(1, len(log.stops_t))]
 
     def state(self) -> dict[str, Any]:
@@ -268,15 +233,14 @@ class Columns:
         """Take over what `state` returned."""
         self.log = loop.Log(**{name: state[name] for name in self.log._fields})
         out = self.buffers.out._replace(rows_t=state["rows_t"], rows_y=state["rows_y"])
-        self.buffers = dataclasses.replace(self.buffers, out=out)
+        self.buffers = self.buffers._replace(out=out)
 
     def make_room(self) -> None:
         """Double the columns that are full."""
         out, log = self.buffers.out, self.log
         if out.every_step and out.cursor[ROW] + 1 >= len(out.rows_t):
-            self.buffers = dataclasses.replace(
-                self.buffers, out=out._replace(rows_t=_twice(out.rows_t), rows_y=_twice(out.rows_y))
-            )
+            out = out._replace(rows_t=_twice(out.rows_t), rows_y=_twice(out.rows_y))
+            self.buffers = self.buffers._replace(out=out)
             log = log._replace(
                 rows_microstep=_twice(log.rows_microstep), rows_mode=_twice(log.rows_mode)
             )
@@ -298,25 +262,24 @@ class Columns:
         log: Any = self.log
         fresh = slice(int(b.memory.counts[loop.TAKEN]), int(b.out.cursor[ROW]))
         t, y, mode = before
-        modes = [*b.mode.tolist(), *b.sliding.flags.tolist()]
+        modes = [*b.now.mode.tolist(), *b.sliding.flags.tolist()]
         log.rows_microstep[fresh], log.rows_mode[fresh] = 0, modes
-        b.memory.now[loop.T], b.y[:], b.mode[:] = t, y, mode[: len(b.mode)]
+        b.now.clock[T], b.now.y[:], b.now.mode[:] = t, y, mode[: len(b.now.mode)]
 
     @property
     def latest(self) -> tuple[float, list[float], tuple[int, ...]]:
         """Time, state and modes reached."""
         b: Any = self.buffers
-        modes = (*b.mode.tolist(), *b.sliding.flags.tolist())
-        return float(b.memory.now[loop.T]), b.y.tolist(), modes
+        modes = (*b.now.mode.tolist(), *b.sliding.flags.tolist())
+        return float(b.now.clock[T]), b.now.y.tolist(), modes
 
     def as_lists(self) -> hybrid.Buffers:
         """Return the buffers with time, state and modes as Python's own numbers, for messages."""
         b: Any = self.buffers
-        memory = b.memory._replace(now=b.memory.now.tolist(), counts=b.memory.counts.tolist())
+        lists = {name: getattr(b.now, name).tolist() for name in ("clock", "y", "mode")}
+        memory = b.memory._replace(counts=b.memory.counts.tolist())
         sliding = b.sliding._replace(flags=b.sliding.flags.tolist())
-        return dataclasses.replace(
-            self.buffers, memory=memory, sliding=sliding, y=b.y.tolist(), mode=b.mode.tolist()
-        )
+        return self.buffers._replace(now=b.now._replace(**lists), memory=memory, sliding=sliding)
 
     def transitions(self) -> Any:
         """Return the transition log."""
@@ -352,9 +315,6 @@ class Columns:
                 log.stops_mode,
             )
         return Trace(rows, stops, self.transitions(), start.model, start.rig, start.settings)
-
-
-FIRINGS, STOPS = 0, 1  # places in Log.counts
 
 
 def _twice(column: Any) -> Any:

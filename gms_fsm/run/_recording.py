@@ -41,7 +41,7 @@ from integrators import (
     hybrid,
 )
 from integrators.advance import STEPS
-from integrators.loop import H
+from integrators.steps import H
 
 __all__ = [
     "PATIENCE",
@@ -119,10 +119,10 @@ class Recorder:
         if start.output == "t_eval":
             self.stops.add(start.t_start, 0, list(start.y), mode)
 
-    def take(self, happening: Arc | Firing | Slide | integrators.Stop) -> None:
-        """Keep one happening."""
+    def take(self, event: integrators.Event) -> None:
+        """Keep one event."""
         output = self.start.output
-        match happening:
+        match event:
             case Arc(t=times, y=states, mode=mode):
                 self.rows.t.extend(times)
                 self.rows.microstep.extend([0] * len(times))
@@ -131,12 +131,12 @@ class Recorder:
                 self.latest = (times[-1], states[-1], mode)
             case Firing() | Slide():
                 # First the log: no row may show a firing that it has not.
-                if isinstance(happening, Firing):
-                    self.log.append(self._record(happening))
+                if isinstance(event, Firing):
+                    self.log.append(self._record(event))
                 if output != "end":
                     side = self.stops if output == "t_eval" else self.rows
-                    side.add(happening.t, happening.microstep, happening.y, happening.mode)
-                self.latest = (happening.t, happening.y, happening.mode)
+                    side.add(event.t, event.microstep, event.y, event.mode)
+                self.latest = (event.t, event.y, event.mode)
             case integrators.Stop(t=t, y=y, mode=mode):
                 if output == "t_eval":
                     self.stops.add(t, 0, y, mode)
@@ -364,7 +364,7 @@ def check_pace(recording: Recording, buffers: hybrid.Buffers) -> None:
     start = recording.start
     t, y, mode = recording.latest
     options = start.options
-    step, left = buffers.memory.now[H], options.max_steps - buffers.out.cursor[STEPS]
+    step, left = buffers.now.clock[H], options.max_steps - buffers.out.cursor[STEPS]
     if options.step or not isinstance(options.method, integrators.Tableau):
         return
     if start.last - t <= step * left:
@@ -372,7 +372,7 @@ def check_pace(recording: Recording, buffers: hybrid.Buffers) -> None:
     program = start.program
     held = armed(program, t, y, mode)
     slope = rate(program, t, y, mode, held)
-    size = np.maximum(np.abs(y), np.array(buffers.work.floor) / options.rtol)
+    size = np.maximum(np.abs(y), np.array(buffers.now.floor) / options.rtol)
     direction, fastest = np.ones(len(y)), 0.0
     for _ in range(POWERS):
         moved = (np.array(y) + 1e-6 * size * direction).tolist()

@@ -9,7 +9,7 @@ from typing import Any, Unpack
 import integrators
 from gms_fsm._arguments import checked_kind, checked_path
 from gms_fsm.errors import ParameterError, SignalError
-from gms_fsm.lowering.program import system
+from gms_fsm.lowering.program import equations
 from gms_fsm.run._checkpoint import Keeper
 from gms_fsm.run._compiled_run import CompiledRun
 from gms_fsm.run._recording import (
@@ -29,9 +29,9 @@ from gms_fsm.systems.rigs import Rig
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.monitors import Monitor, checked, watched
 from gms_fsm.traces.trace import Trace
-from integrators import Arc, Firing, HybridError, Slide, hybrid
+from integrators import Arc, HybridError, hybrid
 from integrators.advance import ROW, STEPS
-from integrators.loop import T
+from integrators.steps import T
 
 __all__ = ["Moment", "Run", "simulate"]
 
@@ -192,12 +192,10 @@ class Run:
             machines = ElementMachines(start.model) if machines is None else machines
             switch = self.engine = MachineEngine(machines, start.program, start.mode)
         self.recorder, self.next_look = Recorder(start), PATIENCE
-        self.happening: Arc | Firing | Slide | integrators.Stop | None = None  # the latest
-        made = system(start.program)
-        self.buffers = hybrid.buffers(
-            made, start.t_start, start.y, start.mode, start.last, start.options
-        )
-        self.happenings = hybrid.happenings(made, switch, self.buffers, start.options)
+        self.event: integrators.Event | None = None  # the latest
+        made, options = equations(start.program), start.options
+        self.buffers = hybrid.buffers(made, start.t_start, start.y, start.mode, start.last, options)
+        self.events = hybrid.events(made, switch, self.buffers, options)
 
     def kept(self) -> dict[str, Any]:
         """Return what the recorder holds, for a checkpoint."""
@@ -205,10 +203,11 @@ class Run:
 
     def go_on_from(self, kept: dict[str, Any]) -> None:
         """Take over what `kept` returned; the buffers are filled already."""
-        b = self.buffers
-        self.recorder.put_back(kept, (b.memory.now[T], list(b.y), hybrid.modes_of(b)))
+        now = self.buffers.now
+        t, y = now.clock[T], list(now.y)
+        self.recorder.put_back(kept, (t, y, hybrid.modes_of(self.buffers)))
         if self.engine is not None:
-            self.engine.go_on_from(b.memory.now[T], list(b.y), b.mode)
+            self.engine.go_on_from(t, list(y), now.mode)
 
     def advance(self) -> bool:
         """Let the next thing happen.
@@ -225,7 +224,7 @@ class Run:
         """
         recorder = self.recorder
         try:
-            happening = next(self.happenings, None)
+            event = next(self.events, None)
         except HybridError as error:
             recorder.latest = error.t, error.y, error.mode
             raise explained(error, recorder) from None
@@ -239,12 +238,12 @@ class Run:
             raise
         except Meddling as error:
             raise meddled(error, recorder) from error.__cause__
-        if happening is None:
+        if event is None:
             check_end(recorder)
             return False
-        self.happening = happening
-        recorder.take(happening)
-        if isinstance(happening, Arc) and self.buffers.out.cursor[STEPS] >= self.next_look:
+        self.event = event
+        recorder.take(event)
+        if isinstance(event, Arc) and self.buffers.out.cursor[STEPS] >= self.next_look:
             self.next_look = self.buffers.out.cursor[STEPS] + PATIENCE
             check_pace(recorder, self.buffers)
         return True

@@ -1,0 +1,177 @@
+"""What the debugger says is plain text of 80 columns; colour only where a terminal wants it."""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+
+from gms_fsm import GMS, Chart, ChartModel, GMSParameters, Prescribed, State, Stribeck, Transition
+from gms_fsm.app.debugger import COMMANDS, Debugger, run_debugger
+from gms_fsm.app.scenario import load_scenario
+from gms_fsm.inspection.session import Session
+from tests.app.test_debugger_transcripts import FIG_4, PULLED, SCENARIOS, talk
+from tests.helpers import ROOT
+
+EVERYTHING = (
+    "help",
+    *(f"help {name}" for name in COMMANDS),
+    *["where", "list", "why", "next", "where", "list", "why 2", "goto 25", "where", "log 50"],
+    "watch z1 / s1 + z2 / s2 + z3 / s3 + z4 / s4 + t + x + v + F + s + z1 * z2 * z3",
+    "b valid break_away_backward element 2 if z1 < 0.1 and z2 < 0.2 and z3 < 0.3 or v < 0",
+    "breaks",
+    "until state(1) == stick and state(2) == stick and v > 0 and z1 > 0.01",
+    "c",
+    "goto 24",
+    "poke z1=-0.123456789 z2=0.123456789 z3=0.2 z4=0.1 state1=slip state2=slip",
+    *["run", "branches", "compare 0 1"],
+    "print unknown_name_that_is_rather_long + another_one > 3 ",
+    "nonsense " + "very long " * 20,
+    "poke " + "z1=0 " * 30 + "q",
+    "load " + "x" * 200,
+    "until " + "(" * 90,
+    "goto 1e9",
+    "where",
+)
+
+
+class Terminal(io.StringIO):
+    """A text file that says it is a terminal."""
+
+    encoding = "utf-8"  # type: ignore[assignment]
+
+    def isatty(self) -> bool:
+        return True
+
+
+def _bank(n: int) -> Session:
+    k = [1.0 + 0.1 * i for i in range(n)]
+    parameters = GMSParameters(
+        k, [0.1] * n, [0.1] * n, sigma_2=0.1, stribeck=Stribeck(1.0, 1.5, 1e-3), v_c=1e-6
+    )
+    return Session(GMS(parameters, law="published"), Prescribed("0.15*sin(2*pi*t/25)"), 100.0)
+
+
+def _wordy() -> Session:
+    """Long names, long guards, many edges."""
+    states = tuple(State(f"a_state_with_a_long_name_{i}", {"z": "v"}) for i in range(3))
+    edges = tuple(
+        Transition(
+            f"an_edge_with_a_name_that_does_not_end_{i}_{j}",
+            states[i].name,
+            states[j].name,
+            guard=" and ".join(f"z * {10 + i + j + m} > s + k * v**2" for m in range(6)),
+        )
+        for i in range(3)
+        for j in range(3)
+        if i != j
+    )
+    name = "a chart with a name of many words " * 3
+    chart = Chart(name, ("v", "s"), ("z",), ("k",), states, edges, {"F": "k * z"})
+    model = ChartModel(chart, {"k": 1.0}, n=12, stribeck=Stribeck(1.0, 1.5, 1e-3))
+    return Session(model, Prescribed("0.15*sin(2*pi*t/25)"), 100.0)
+
+
+@pytest.mark.parametrize("scenario", [FIG_4, PULLED])
+def test_nothing_is_wider_than_80_columns(scenario: str) -> None:
+    prompts = re.compile(r"^\(t=[^)]*\) ")
+    for line in talk(scenario, *EVERYTHING).splitlines():
+        if not prompts.match(line):  # the echo of a long command is the user's own
+            assert len(line) <= 80, line
+        assert line.isascii()
+        assert "\x1b" not in line
+
+
+@pytest.mark.parametrize("session", [_bank(12), _bank(1), _wordy()], ids=["12", "1", "wordy"])
+def test_nor_with_twelve_elements_or_long_names(session: Session) -> None:
+    made = Debugger(session, "A title that is quite long " * 5, io.StringIO(), io.StringIO())
+    for command in EVERYTHING:
+        for line in made.reply(command).splitlines():
+            assert len(line) <= 80, (command, line)
+    made.run()
+    head = made.stdout.getvalue().splitlines()  # type: ignore[attr-defined]
+    assert all(len(line) <= 80 for line in head[:-1])
+
+
+def test_twelve_elements_are_twelve_lines_of_words() -> None:
+    made = Debugger(_bank(12), "", io.StringIO(), io.StringIO())
+    made.onecmd("goto 30")
+    lines = made.reply("where").splitlines()
+    for i in range(1, 13):
+        found = [line for line in lines if re.match(rf"[> ] +{i}  (stick|slip) ", line)]
+        assert len(found) == 1
+        assert re.search(r"1:[yn*]+", found[0])
+
+
+def _on_a_terminal(monkeypatch: pytest.MonkeyPatch, **environment: str) -> str:
+    for name in ("NO_COLOR", "TERM"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    out = Terminal()
+    loaded = load_scenario(SCENARIOS / f"{FIG_4}.toml")
+    run_debugger(loaded, io.StringIO("goto 25\nwhy 1\nwhere\nlist\nquit\n"), out)
+    return out.getvalue()
+
+
+def test_a_terminal_gets_colour_that_says_nothing_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = _on_a_terminal(monkeypatch, TERM="xterm")
+    assert "\x1b[31mfalse\x1b[0m" in text
+    bare = re.sub(r"\x1b\[[0-9;]*m", "", text)
+    assert "\x1b" not in bare  # colours only: nothing is redrawn, the cursor never moves
+    assert all(len(line) <= 80 for line in bare.splitlines())
+    plain = talk(FIG_4, "goto 25", "why 1", "where", "list", "quit")
+    for drawn, mark in zip("✗✓░█─▓═│║┌┐└┘╔╗╚╝", "ny.#-#=||++++++++", strict=True):
+        bare = bare.replace(drawn, mark)
+    assert bare.replace("=", "-").replace("#", "-") == plain.replace("=", "-").replace("#", "-")
+
+
+@pytest.mark.parametrize("environment", [{"NO_COLOR": "1"}, {"TERM": "dumb"}])
+def test_no_colour_where_it_is_not_wanted(
+    environment: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = _on_a_terminal(monkeypatch, **environment)
+    assert text == talk(FIG_4, "goto 25", "why 1", "where", "list", "quit")
+    assert text.isascii()
+
+
+def _piped(script: str, **environment: str) -> subprocess.CompletedProcess[bytes]:
+    code = (
+        "import sys; from gms_fsm.app.debugger import run_debugger; "
+        "from gms_fsm.app.scenario import load_scenario; "
+        f"sys.exit(run_debugger(load_scenario('scenarios/{FIG_4}.toml')))"
+    )
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        input=script.encode(),
+        capture_output=True,
+        check=False,
+        cwd=ROOT,
+        env={**os.environ, **environment},
+    )
+
+
+@pytest.mark.parametrize("environment", [{}, {"PYTHONIOENCODING": "ascii"}, {"NO_COLOR": "1"}])
+@pytest.mark.parametrize("end", ["", "quit\n", "q"])
+def test_a_pipe_gets_plain_text_and_exit_code_0(environment: dict[str, str], end: str) -> None:
+    done = _piped(f"goto 25\nwhy 1\n{end}", **environment)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == b""
+    text = done.stdout.decode("ascii").replace("\r\n", "\n")
+    assert "(t=25.0000 s) why 1\n" in text
+    assert "arrest does not fire: |z| < s is false by 0.776 m.\n" in text
+    assert text == talk(FIG_4, "goto 25", "why 1", *([end.strip()] if end else []))
+
+
+def test_a_character_the_pipe_cannot_carry_does_not_break_it() -> None:
+    done = _piped("frage nach ß und →\nprint t\n", PYTHONIOENCODING="ascii:surrogateescape")
+    assert done.returncode == 0, done.stderr
+    assert b"error: no command" in done.stdout
+
+
+def test_nothing_at_all_is_fine() -> None:
+    assert _piped("").returncode == 0

@@ -1,0 +1,40 @@
+"""Whatever the bytes of a text, a scenario file or a trace file, only documented errors answer.
+
+A few hundred inputs each; `make soak` tries them for minutes, with limits on time and memory. The
+inputs that once broke something stand in tests/app/test_fuzz_findings_stay_mended.py.
+"""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests import fuzz
+
+
+@settings(max_examples=300, deadline=None, derandomize=True)
+@given(st.binary(max_size=200))
+def test_expressions(data: bytes) -> None:
+    fuzz.one_expression(data)
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(st.binary(max_size=200))
+def test_scenario_files(data: bytes) -> None:
+    fuzz.one_scenario(data)
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(st.binary(max_size=200))
+def test_trace_files(data: bytes) -> None:
+    fuzz.one_trace_file(data)
+
+
+@pytest.mark.parametrize("name", fuzz.BODIES)
+def test_the_bodies_reach_both_sides(name: str) -> None:
+    """Long random inputs, as `make soak` makes them: some are accepted, most are refused."""
+    answers = [fuzz.BODIES[name](random.Random(f"{i}").randbytes(128)) for i in range(150)]
+    assert 3 <= sum(answers) <= 120

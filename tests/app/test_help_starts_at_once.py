@@ -1,0 +1,56 @@
+"""Help needs none of the libraries that compute, read scenario files or draw.
+
+By the names of modules and not by time: `gms-fsm --help` takes as long as what it imports.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from tests.helpers import ROOT
+
+HEAVY = {"numpy", "scipy", "transitions", "matplotlib", "pydantic", "graphviz", "numba", "plots"}
+CODE = """
+import contextlib, io, json, sys
+sys.argv[1:] = json.loads(sys.argv[1])
+from gms_fsm.app.cli import main
+said = io.StringIO()
+with contextlib.suppress(SystemExit), contextlib.redirect_stdout(said):
+    main()
+print(json.dumps([said.getvalue(), sorted({name.partition(".")[0] for name in sys.modules})]))
+"""
+
+
+def loaded(*arguments: str) -> tuple[str, set[str]]:
+    """Return what a command prints, and the packages that it has imported."""
+    done = subprocess.run(
+        [sys.executable, "-c", CODE, json.dumps(arguments)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    said, names = json.loads(done.stdout)
+    return said, set(names)
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"]])
+def test_help_imports_nothing_heavy(arguments: list[str]) -> None:
+    said, names = loaded(*arguments)
+    assert said
+    assert names & HEAVY == set()
+
+
+def test_help_lists_every_verb() -> None:
+    said, _ = loaded("--help")
+    for verb in ("paper", "run", "chart", "check", "animate", "replay", "debug", "lesson", "code"):
+        assert f" {verb} " in said
+
+
+def test_what_a_verb_imports_is_seen() -> None:
+    _, names = loaded("code", "--law", "signed")
+    assert "numpy" in names

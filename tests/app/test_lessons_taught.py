@@ -1,0 +1,109 @@
+"""`gms-fsm lesson` lists eight lessons, and writes text, picture and replay page of one."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import types
+from pathlib import Path
+
+import pytest
+
+from gms_fsm._files import LIST
+from gms_fsm.app import lessons
+from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
+from tests.helpers import ROOT
+
+
+def command(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", "from gms_fsm.app.cli import main; main()", "lesson", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        check=False,
+        env={**os.environ, "COLUMNS": "200", "PYTHONPATH": str(ROOT)},
+    )
+
+
+def test_there_are_eight_each_a_plain_module() -> None:
+    assert list(lessons.LESSONS) == [1, 2, 3, 4, 5, 6, 7, 8]
+    for number, lesson in lessons.LESSONS.items():
+        assert isinstance(lesson, types.ModuleType)
+        assert lesson.__name__.startswith(f"gms_fsm.app.lessons.l{number}_")
+        assert (lesson.__doc__ or "").startswith(f"Lesson {number}: ")
+    assert len({lesson.QUESTION for lesson in lessons.LESSONS.values()}) == 8
+
+
+def test_without_a_number_they_are_listed() -> None:
+    done = command()
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert [line[0] for line in lines] == list("12345678")
+    for line, lesson in zip(lines, lessons.LESSONS.values(), strict=True):
+        assert lesson.QUESTION in line
+
+
+def test_one_is_run_and_written(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="pictures need the extra 'plots'")
+    pytest.importorskip("uplot", reason="the replay page needs the extra 'replay'")
+    pytest.importorskip("pygraphviz", reason="the page's chart needs Graphviz, extra 'render'")
+    done = command("7", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    folder = tmp_path / "out"
+    text = (folder / "lesson_7.txt").read_text()
+    assert len(text.splitlines()) == 5
+    assert done.stdout.startswith(text)
+    assert (folder / "lesson_7.png").read_bytes().startswith(b"\x89PNG")
+    assert "<svg" in (folder / "lesson_7.svg").read_text()
+    page = (folder / "lesson_7.html").read_text()
+    assert "Lesson 7" in page
+    for name in lessons.lesson(7).run().replayed:
+        assert f"{name}: GMS" in page
+    for path in set(folder.iterdir()) - {folder / LIST}:
+        assert path.name in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["9"], "no lesson '9'"),
+        (["0"], "no lesson '0'"),
+        (["one"], "no lesson 'one'"),
+        (["7", "-o", "file/out"], "choose another folder"),
+    ],
+)
+def test_a_mistake_is_one_message(arguments: list[str], said: str, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    done = command(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr + done.stdout
+    assert list(tmp_path.iterdir()) == [tmp_path / "file"]
+
+
+def test_what_is_wrong_is_said_before_anything_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lessons.l7_frictional_lag, "run", lambda: pytest.fail("it was run"))
+    with pytest.raises(ParameterError, match="8  Chart or if-else"):
+        lessons.teach(9, tmp_path)
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(OutputError):
+        lessons.teach(7, tmp_path / "file" / "out")
+
+
+def test_without_the_extras_there_is_the_text_and_a_note(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def missing(*_: object) -> list[Path]:
+        raise MissingExtraError("needs an extra")
+
+    monkeypatch.setattr(lessons, "_draw", missing)
+    monkeypatch.setattr(lessons, "_replay", missing)
+    with pytest.warns(UserWarning, match="was written: needs an extra") as noted:
+        taught = lessons.teach(7, tmp_path)
+    assert len(noted) == 2
+    assert [path.name for path in taught.files] == ["lesson_7.txt"]
+    assert taught.files[0].read_text().splitlines() == list(taught.lines)

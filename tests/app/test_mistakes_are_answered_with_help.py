@@ -1,0 +1,289 @@
+"""A mistake at the command line or in a call is answered with what helps, and with nothing else.
+
+The key that was meant, the formats there are, the lessons there are, the number as it should be
+written; no other library's prefix, no empty line of a progress bar, no number in numpy's spelling.
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import graphviz
+import numpy as np
+import pytest
+from rich.console import Console
+
+from gms_fsm import Prescribed, Session, Trace, simulate
+from gms_fsm.app.lessons import LESSONS
+from gms_fsm.app.live import LiveView
+from gms_fsm.app.scenario import load_scenario
+from gms_fsm.charts import LUGRE, gms_element
+from gms_fsm.errors import OutputError, ParameterError, ScenarioError, shown
+from gms_fsm.run.simulate import Moment
+from plots import block_diagram, mermaid, render, statechart
+from plots.formats import of
+from tests.app.test_command_line import run
+from tests.helpers import pulled_mass, stick_slip
+from tests.scenario_files import OPEN_LOOP, CommandLine, command_line
+
+
+@pytest.fixture
+def gms_fsm(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> CommandLine:
+    monkeypatch.chdir(tmp_path)
+    return command_line(monkeypatch, capsys)
+
+
+@pytest.fixture
+def scenario(tmp_path: Path) -> Path:
+    path = tmp_path / "open.toml"
+    path.write_text(OPEN_LOOP)
+    return path
+
+
+# --------------------------------------------------------------------------- formats
+FORMATS = {each.ending: each for each in of("graph", "chart")}
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_a_chart_takes_every_format(suffix: str, tmp_path: Path) -> None:
+    if FORMATS[suffix].extra == "render":
+        pytest.importorskip("pygraphviz", reason="pictures need Graphviz, extra 'render'")
+    assert render(statechart(LUGRE), tmp_path / f"chart{suffix}").suffix == suffix
+    assert (tmp_path / f"chart{suffix}").stat().st_size > 100
+
+
+def test_mermaid_text_is_the_charts(tmp_path: Path) -> None:
+    chart = gms_element("signed")
+    written = render(statechart(chart, 4, names=True), tmp_path / "chart.MMD")
+    assert written.read_text(encoding="utf-8") == mermaid(chart)
+
+
+def test_the_formats_are_named_from_one_table(tmp_path: Path, gms_fsm: CommandLine) -> None:
+    with pytest.raises(ParameterError) as caught:
+        render(statechart(LUGRE), tmp_path / "x.tex")
+    for suffix, each in FORMATS.items():
+        assert suffix in str(caught.value)
+        assert each.kind in str(caught.value)
+    done = gms_fsm("chart", "lugre", "-o", "x.tex")
+    assert done.code == 2
+    assert ".mmd for Mermaid text" in done.message
+    assert all(suffix in gms_fsm("chart", "--help").out for suffix in FORMATS)
+
+
+@pytest.mark.parametrize(
+    "graph", [block_diagram(2), graphviz.Digraph("own")], ids=["blocks", "own"]
+)
+def test_only_a_chart_is_mermaid_text(graph: graphviz.Digraph, tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=r"must end in \.svg.*\.gv for DOT text$"):
+        render(graph, tmp_path / "x.mmd")
+
+
+# --------------------------------------------------------------------------- scenarios
+@pytest.mark.parametrize("text", ["", "\n", "# nothing yet\n"])
+def test_an_empty_file_is_called_empty(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "empty.toml"
+    path.write_text(text)
+    with pytest.raises(ScenarioError, match=r"empty\.toml: the file is empty; .*\[model\]"):
+        load_scenario(path)
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"),
+    [
+        ("t_end=3", "run.t_end"),
+        ("tend=3", "run.t_end"),
+        ("law=signed", "model.law"),
+        ("model.velocity=1", "rig.velocity"),
+        ("run.csv=true", "output.csv"),
+        ("run.tend=3", "t_end"),
+    ],
+)
+def test_the_key_of_another_table_is_named(scenario: Path, given: str, meant: str) -> None:
+    with pytest.raises(ScenarioError, match=f"unknown key; did you mean '{meant}'[?] valid here: "):
+        load_scenario(scenario, [given])
+
+
+def test_a_key_of_a_table_that_is_not_there_is_not_meant(scenario: Path) -> None:
+    with pytest.raises(ScenarioError, match="unknown key; valid here: "):
+        load_scenario(scenario, ["smoothing=3"])  # of [record]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "advice"),
+    [
+        ("[100.0, 50.0]", "[.25, 50.0]", "line 6: write 0.25, not .25"),
+        ("[100.0, 50.0]", "[100.0, -.5e-3]", "line 6: write -0.5e-3, not -.5e-3"),
+        ("[100.0, 50.0]", "[100., 50.0]", "line 6: write 100.0, not 100."),
+        ("t_end = 1.0", "t_end = 1. # s", "write 1.0, not 1."),
+        ("t_end = 1.0", "t_end = 1.e3", "write 1.0e3, not 1.e3"),
+        ("t_end = 1.0", "t_end = +.1", r"write \+0.1, not \+.1"),
+    ],
+)
+def test_a_number_without_a_digit_on_one_side(
+    scenario: Path, old: str, new: str, advice: str
+) -> None:
+    assert old in OPEN_LOOP
+    scenario.write_text(OPEN_LOOP.replace(old, new))
+    with pytest.raises(ScenarioError, match=rf"not valid TOML: .*{advice}$"):
+        load_scenario(scenario)
+
+
+@pytest.mark.parametrize(
+    "value", ["title = '.5' x", 'title = "1. a', "title = 1.2.3", "title = # .5"]
+)
+def test_other_mistakes_get_no_such_advice(scenario: Path, value: str) -> None:
+    scenario.write_text(value)
+    with pytest.raises(ScenarioError, match="not valid TOML") as caught:
+        load_scenario(scenario)
+    assert "write" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("given", "advice"),
+    [
+        ("model.k=[.25, 1]", "write 0.25, not .25"),
+        ("model.v_c=.25", "write 0.25, not .25"),
+        ("run.t_end=3.", "write 3.0, not 3."),
+    ],
+)
+def test_such_a_number_on_the_command_line(scenario: Path, given: str, advice: str) -> None:
+    with pytest.raises(ScenarioError, match=f"--set {given[:7]}.*{advice}"):
+        load_scenario(scenario, [given])
+
+
+def test_a_formula_may_have_one(scenario: Path) -> None:
+    assert load_scenario(scenario, ["rig.velocity=.5*sin(t)"]).rig.signals["v"]
+
+
+# --------------------------------------------------------------------------- the command line
+@pytest.mark.parametrize("asked", ["hysteresis", "99", "0", "1.0", "-1"])
+def test_an_unknown_lesson_lists_the_lessons(gms_fsm: CommandLine, asked: str) -> None:
+    done = gms_fsm("lesson", "--", asked)
+    assert done.code == 2
+    assert done.message.startswith(f"there is no lesson '{asked}'; these are there:")
+    for number, each in LESSONS.items():
+        assert f"{number}  {each.TITLE}: {each.QUESTION}" in done.message
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("code", "--law", "foo"), "error: code gms has no law 'foo'; give --law signed"),
+        (("chart", "foo"), "error: name is 'foo'; it must be one of gms, lugre"),
+        (("blocks", "--elements", "x"), "Invalid value"),
+    ],
+)
+def test_no_prefix_of_another_library(arguments: tuple[str, ...], said: str) -> None:
+    done = run(*arguments)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Value error" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("paper", "--force", "sin(", "-o", "p"),
+        ("paper", "--velocity", "1 +", "-o", "p"),
+        ("animate", "run.npz", "--frames", "1"),
+        ("animate", "run.npz", "-o", "film.avi"),
+        ("animate", "run.npz", "--start", "9"),
+    ],
+)
+def test_no_bar_before_an_error(arguments: tuple[str, ...], tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
+    simulate(stick_slip("signed"), Prescribed("0.2"), 1.0).save(tmp_path / "run.npz")
+    done = run(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: "), done.stderr
+    assert done.stdout == ""
+
+
+def test_no_bar_of_a_run_that_does_not_begin() -> None:
+    screen = io.StringIO()
+    console = Console(file=screen, force_terminal=True, width=80)
+    with pytest.raises(OutputError), LiveView(console, 0.0, 1.0, detail=False):
+        raise OutputError("cannot make the folder")
+    assert screen.getvalue() == ""
+    model, rig = pulled_mass()
+    with LiveView(console, 0.0, 1.0, detail=False) as view:
+        simulate(model, rig, 1.0, progress=view)
+    assert "t = 1.00 s" in screen.getvalue()
+
+
+# --------------------------------------------------------------------------- values in messages
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (np.float64(20.0), "20.0"),
+        (np.int64(3), "3"),
+        (np.bool_(True), "True"),
+        (np.str_("a"), "'a'"),
+        ((np.float64(1.0), 2), "(1.0, 2)"),
+        ([np.float32(0.5), (np.float64(1.0),)], "[0.5, (1.0,)]"),
+        ({np.str_("k"): np.float64(1.0)}, "{'k': 1.0}"),
+        (np.array(2.0), "2.0"),
+        (np.array([1.0]), "array([1.])"),
+    ],
+    ids=repr,
+)
+def test_numbers_are_shown_as_plain_numbers(value: object, text: str) -> None:
+    assert shown(value) == text
+
+
+def test_messages_of_calls_show_plain_numbers() -> None:
+    model = stick_slip("signed")
+    trace = simulate(model, Prescribed("0.2"), 3.0)
+    late: Any = np.float64(20.0)
+    with pytest.raises(
+        ParameterError, match=r"^time 20\.0 s lies outside the run, 0\.0 to 3\.0 s$"
+    ):
+        trace.sample([late])
+    for said, call in _calls(trace, late).items():
+        with pytest.raises(ValueError, match=said) as caught:
+            call()
+        assert "np." not in str(caught.value)
+
+
+def _calls(trace: Trace, late: Any) -> dict[str, Any]:
+    session = Session(trace.model, trace.rig, 3.0)
+    calls: dict[str, Any] = {
+        "frames|t_start is 20.0": lambda: _animate(trace, late),
+        "t = -20.0 s lies before": lambda: session.goto(-late),
+        "name is 20.0": lambda: trace.variable(late),
+        "elements is 20.0": lambda: statechart(LUGRE, late),
+    }
+    try:
+        import matplotlib as _  # noqa: F401
+    except ImportError:
+        del calls["frames|t_start is 20.0"]
+        return calls
+    from plots import figures, panels
+
+    calls[r"window is \(20.0, 1\)"] = lambda: figures.overview(trace, window=(late, 1))
+    calls["around is 20.0"] = lambda: panels.cascade_window(trace, late)
+    return calls
+
+
+def _animate(trace: Trace, late: Any) -> None:
+    import plots
+
+    plots.animate(trace, "film.gif", t_start=late)
+
+
+def test_a_moment_knows_where_the_slider_is() -> None:
+    model, rig = pulled_mass()
+    moments: list[tuple[float, Any]] = []
+
+    def note(moment: Moment) -> None:
+        moments.append((moment.t, moment.values["x"]))
+
+    trace = simulate(model, rig, 10.0, progress=note)
+    assert moments
+    for t, x in moments:
+        assert x in trace.x[trace.t == t].tolist()
+    assert moments[-1][1] > 0.0

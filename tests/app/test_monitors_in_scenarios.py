@@ -1,0 +1,125 @@
+"""A scenario asks for monitors; gms-fsm run prints and writes what they say, and exits with 0."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from gms_fsm import Trace
+from gms_fsm.app.debugger import run_debugger
+from gms_fsm.app.report import monitor_lines, run_scenario
+from gms_fsm.app.scenario import load_scenario
+from gms_fsm.traces.failures import LivelockError
+from gms_fsm.traces.monitors import Invariant
+from tests.scenario_files import (
+    OPEN_LOOP,
+    CommandLine,
+    changed,
+    command_line,
+    nothing_written,
+    one_message,
+)
+from tests.traces.test_monitors_see_what_happens import SLOWING, memoryless
+
+MONITORS = ["abs(z) <= 0.01*s", "passivity", "coverage", "chattering"]
+
+
+@pytest.fixture
+def gms_fsm(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> CommandLine:
+    return command_line(monkeypatch, capsys)
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    file = tmp_path / "given.toml"
+    file.write_text(changed(OPEN_LOOP, "t_end = 1.0", f"t_end = 1.0\nmonitors = {MONITORS}"))
+    return file
+
+
+def test_what_they_say_is_printed_and_written(
+    gms_fsm: CommandLine, path: Path, tmp_path: Path
+) -> None:
+    done = gms_fsm("run", path, "-o", tmp_path / "out")
+    assert done.code == 0
+    trace = Trace.load(tmp_path / "out" / "trace.npz")
+    assert list(trace.monitors) == MONITORS
+    lines = monitor_lines(trace)
+    assert lines[0].startswith("monitor abs(z) <= 0.01*s (not ok): broken first at t = ")
+    assert lines[1].startswith("monitor passivity (ok): ")
+    assert lines[2].startswith("monitor coverage (not ok): ")
+    summary = (tmp_path / "out" / "summary.md").read_text()
+    assert "\n## Monitors\n\n- monitor abs(z)" in summary
+    for line in lines:
+        assert f"{line}\n" in done.out
+        assert f"- {line}\n" in summary
+
+
+def test_without_monitors_nothing_is_said(gms_fsm: CommandLine, path: Path, tmp_path: Path) -> None:
+    done = gms_fsm("run", path, "-o", tmp_path / "out", "--set", "run.monitors=[]")
+    assert done.code == 0
+    assert "monitor " not in done.out
+    assert "onitor" not in (tmp_path / "out" / "summary.md").read_text()
+
+
+def test_the_arguments_of_simulate_hold_them(path: Path) -> None:
+    given = load_scenario(path).arguments["monitors"]
+    assert given[0] == Invariant("abs(z) <= 0.01*s")
+    assert len(given) == 4
+    assert "monitors" not in load_scenario(path, ["run.monitors=[]"]).arguments
+    assert len(load_scenario(path, ["run.monitors=['all']"]).arguments["monitors"]) == 3
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ("['pasivity']", ("run.monitors", "'pasivity'", "did you mean 'passivity'?")),
+        ("['z <= q']", ("run.monitors", "invariant, column 6", "'q'", "z1, z2")),
+        ("['state == slide']", ("run.monitors", "unknown state", "stick, slip")),
+        ("['coverage', 'coverage']", ("run.monitors", "'coverage' twice")),
+        ("[3]", ("run.monitors.0 = 3", "string")),
+        ("coverage", ("run.monitors = 'coverage'", "list")),
+        ("[\"__import__('os')\"]", ("run.monitors", "column 1")),
+    ],
+)
+def test_a_wrong_one_is_one_message(
+    value: str, said: tuple[str, ...], gms_fsm: CommandLine, path: Path, tmp_path: Path
+) -> None:
+    one_message(
+        gms_fsm("run", path, "-o", tmp_path / "out", "--set", f"run.monitors={value}"), *said
+    )
+    nothing_written(tmp_path, {"given.toml"})
+
+
+def test_a_run_that_fails_tells_them_too(gms_fsm: CommandLine, path: Path, tmp_path: Path) -> None:
+    done = gms_fsm("run", path, "-o", tmp_path / "out", "--set", "rig.velocity=0.1*sqrt(0.5 - t)")
+    one_message(done, "not finite", "partial.npz", "monitor passivity (ok)", "monitor coverage")
+    assert list(Trace.load(tmp_path / "out" / "partial.npz").monitors) == MONITORS
+
+
+def test_a_livelock_is_told_once(path: Path, tmp_path: Path) -> None:
+    """The scenario's own models have none: a chart takes their place."""
+    loaded = load_scenario(path, ["run.monitors=['all']"])
+    loaded = replace(loaded, model=memoryless([0.5]), rig=SLOWING)
+    loaded.arguments["t_end"] = 10.0
+    with pytest.raises(LivelockError) as caught:
+        run_scenario(loaded, tmp_path / "out")
+    assert str(caught.value).count("chattering") == 1
+    assert any("monitor coverage" in note for note in caught.value.__notes__)
+    kept = Trace.load(tmp_path / "out" / "partial.npz").monitors["chattering"]
+    assert not kept.ok
+
+
+def test_rows_far_apart_are_no_obstacle(path: Path, tmp_path: Path) -> None:
+    trace, _ = run_scenario(load_scenario(path, ["output.every=0.5"]), tmp_path / "out")
+    assert len(trace) == 3
+    assert list(trace.monitors) == MONITORS
+
+
+def test_the_debugger_opens_such_a_scenario(path: Path, tmp_path: Path) -> None:
+    commands, said = tmp_path / "commands", tmp_path / "said"
+    commands.write_text("run\nquit\n")
+    with commands.open() as stdin, said.open("w") as stdout:
+        run_debugger(load_scenario(path), stdin, stdout)
+    assert "at its end" in said.read_text()

@@ -1,0 +1,331 @@
+"""What --set says replaces the file's value, the schema knows every key, nothing is executed."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gms_fsm import Prescribed
+from gms_fsm.app.scenario import Scenario, load_scenario
+from gms_fsm.charts.registry import registered
+from gms_fsm.errors import ScenarioError
+from gms_fsm.systems.signals import Corners, Formula
+from tests.helpers import ROOT
+from tests.scenario_files import (
+    MEASURED,
+    OPEN_LOOP,
+    CommandLine,
+    changed,
+    command_line,
+    nothing_written,
+    one_message,
+)
+
+
+@pytest.fixture
+def gms_fsm(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> CommandLine:
+    return command_line(monkeypatch, capsys)
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    file = tmp_path / "given.toml"
+    file.write_text(OPEN_LOOP)
+    return file
+
+
+# --------------------------------------------------------------------------- --set
+@pytest.mark.parametrize(
+    ("override", "place", "value"),
+    [
+        ("run.t_end=2.5", "run.t_end", 2.5),
+        ("run.t_end=3", "run.t_end", 3.0),
+        ("run.t_end = 3", "run.t_end", 3.0),
+        ("run.rtol=1e-9", "run.rtol", 1e-9),
+        ("model.law=published", "model.law", "published"),
+        ('model.law="published"', "model.law", "published"),
+        ("model.law='published'", "model.law", "published"),
+        ("model.k=[1.0, 2.0]", "model.k", [1.0, 2.0]),
+        ("model.sigma=[1,2]", "model.sigma", [1.0, 2.0]),
+        ("model.stribeck.F_s=2.0", "model.stribeck.F_s", 2.0),
+        ("initial.z=[0.1, -0.1]", "initial.z", [0.1, -0.1]),
+        ("initial.states=['slip', 'stick']", "initial.states", ["slip", "stick"]),
+        ("output={ every = 0.1 }", "output.every", 0.1),
+        ("output.csv=true", "output.csv", True),
+        ('output.figures=["pdf"]', "output.figures", ["pdf"]),
+        ("rig.velocity=0.2*sin(t)", "rig.velocity", "0.2*sin(t)"),
+        ("rig.velocity=[[0, 0], [1, 2]]", "rig.velocity", [[0.0, 0.0], [1.0, 2.0]]),
+        ("rig.velocity=0.5", "rig.velocity", 0.5),
+        ("title=a = b", "title", "a = b"),
+        ("title=", "title", ""),
+        ("title=[bold] :warning:", "title", "[bold] :warning:"),
+    ],
+)
+def test_a_key_is_set(override: str, place: str, value: object, path: Path) -> None:
+    found: Any = load_scenario(path, [override]).scenario
+    for part in place.split("."):
+        found = getattr(found, part)
+    assert found == value
+
+
+def test_the_rest_stays_as_written(path: Path) -> None:
+    plain, other = load_scenario(path), load_scenario(path, ["run.t_end=2.0"])
+    assert other.arguments == {**plain.arguments, "t_end": 2.0}
+    assert other.scenario.model == plain.scenario.model
+    assert other.scenario.rig == plain.scenario.rig
+    assert path.read_text() == OPEN_LOOP
+
+
+def test_the_last_of_two_counts_and_many_work_together(path: Path) -> None:
+    loaded = load_scenario(path, ["run.t_end=2", "model.law=published", "run.t_end=3"])
+    assert loaded.arguments["t_end"] == 3.0
+    assert "published" in loaded.model.title
+
+
+def test_an_override_can_mend_a_file(path: Path) -> None:
+    path.write_text(changed(OPEN_LOOP, "t_end = 1.0", ""))
+    with pytest.raises(ScenarioError, match=r"run\.t_end is missing"):
+        load_scenario(path)
+    assert load_scenario(path, ["run.t_end=1.0"]).arguments["t_end"] == 1.0
+
+
+def test_the_run_obeys(gms_fsm: CommandLine, path: Path, tmp_path: Path) -> None:
+    done = gms_fsm(
+        "run",
+        path,
+        "-o",
+        tmp_path / "out",
+        "--set",
+        "model.law=published",
+        "--set",
+        "run.t_end=0.25",
+        "--set",
+        "title=Mine",
+    )
+    assert done.code == 0, done.err
+    summary = (tmp_path / "out" / "summary.md").read_text()
+    assert summary.startswith("# Mine\n")
+    assert "published law" in summary
+    assert "t_end = 0.25" in summary
+
+
+@pytest.mark.parametrize(
+    ("override", "said"),
+    [
+        ("model.lwa=published", ("model.lwa", "'published'", "did you mean 'law'?")),
+        ("modell.law=published", ("modell", "did you mean 'model'?")),
+        ("model.law=singed", ("model.law", "'singed'", "'signed' or 'published'")),
+        ("run.t_end=soon", ("run.t_end", "'soon'", "number")),
+        ("run.t_end=", ("run.t_end", "''", "number")),
+        ("model.k=[1.0", ("model.k", "'[1.0'", "list")),
+        ("model.k=[1.0, 2.0, 3.0]", ("[model]", "3 elements")),
+        ("run.t_end", ("--set run.t_end", "key=value")),
+        ("=3", ("--set =3", "key=value")),
+        (".t_end=3", ("--set .t_end=3", "key=value")),
+        ("run..t_end=3", ("--set run..t_end=3", "key=value")),
+        ("run.t_end.x=3", ("--set run.t_end.x=3", "'t_end'", "not a table")),
+        ("title.x=3", ("--set title.x=3", "'title'", "not a table")),
+        ("record.file=own.csv", ("record.time", "missing")),
+        ("run.t_end=2\nrun.rtol = 1e-3", ("--set run.t_end=2",)),
+        ("run.t_end=1" + "0" * 5000, ("run.t_end",)),
+        ("model.k=" + "[" * 5000, ("model.k",)),
+        (".".join(["a"] * 5000) + "=1", ("a.a.a",)),
+    ],
+    ids=lambda given: given[:30] if isinstance(given, str) else "",
+)
+def test_a_wrong_override_is_one_message(
+    override: str, said: tuple[str, ...], gms_fsm: CommandLine, path: Path, tmp_path: Path
+) -> None:
+    one_message(gms_fsm("run", path, "-o", tmp_path / "out", "--set", override), *said)
+    nothing_written(tmp_path, {"given.toml"})
+
+
+# --------------------------------------------------------------------------- schema
+@pytest.fixture
+def schema(gms_fsm: CommandLine) -> dict[str, Any]:
+    done = gms_fsm("schema")
+    assert done.code == 0
+    assert done.err == ""
+    text: dict[str, Any] = json.loads(done.out)
+    return text
+
+
+def _keys(model: Any) -> set[str]:
+    return set(model.model_fields)
+
+
+def test_the_schema_is_that_of_the_reader(schema: dict[str, Any]) -> None:
+    assert schema == Scenario.model_json_schema()
+    assert set(schema["properties"]) == _keys(Scenario)
+    assert set(schema["required"]) == {"model", "rig"}
+
+
+def test_the_schema_names_every_key_and_no_other(schema: dict[str, Any]) -> None:
+    tables = schema["$defs"]
+    named = {key for table in tables.values() for key in table["properties"]}
+    for key in (
+        "kind",
+        "law",
+        "preset",
+        "k",
+        "sigma",
+        "C",
+        "sigma_2",
+        "v_c",
+        "stribeck",
+        "weights",
+        "shares",
+        "F_c",
+        "F_s",
+        "v_s",
+        "sigma_0",
+        "sigma_1",
+        "velocity",
+        "force",
+        "mass",
+        "stiffness",
+        "speed",
+        "file",
+        "time",
+        "position",
+        "normal",
+        "where",
+        "smoothing",
+        "delimiter",
+        "column",
+        "unit",
+        "sign",
+        "value",
+        "t_end",
+        "t_start",
+        "method",
+        "step",
+        "rtol",
+        "atol",
+        "max_step",
+        "events",
+        "engine",
+        "z",
+        "states",
+        "v",
+        "x",
+        "every",
+        "figures",
+        "csv",
+        "monitors",
+    ):
+        assert key in named, key
+    for name, table in tables.items():
+        assert table["additionalProperties"] is False, name
+    assert schema["additionalProperties"] is False
+
+
+def test_every_reference_of_the_schema_leads_somewhere(schema: dict[str, Any]) -> None:
+    def references(part: Any) -> list[str]:
+        if isinstance(part, dict):
+            own = [part["$ref"]] if isinstance(part.get("$ref"), str) else []
+            mapped = list(part.get("discriminator", {}).get("mapping", {}).values())
+            return own + mapped + [r for value in part.values() for r in references(value)]
+        if isinstance(part, list):
+            return [r for value in part for r in references(value)]
+        return []
+
+    found = references(schema)
+    assert found
+    for reference in found:
+        assert reference.removeprefix("#/$defs/") in schema["$defs"], reference
+
+
+def test_the_schema_says_what_must_be_chosen(schema: dict[str, Any]) -> None:
+    gms = schema["$defs"]["GMSTable"]
+    assert set(gms["required"]) == {"kind", "law"}
+    assert gms["properties"]["law"]["enum"] == ["signed", "published"]
+    rigs = schema["properties"]["rig"]["discriminator"]["mapping"]
+    assert set(rigs) == {"prescribed", "record", "slider", "pulled"}
+    by_kind, by_chart = schema["properties"]["model"]["oneOf"]
+    assert set(by_kind["discriminator"]["mapping"]) == {"GMS", "LuGre"}
+    assert set(by_chart["discriminator"]["mapping"]) == set(registered())
+
+
+def test_a_chart_s_keys_are_its_parameters_with_units_and_rules(schema: dict[str, Any]) -> None:
+    by_chart = schema["properties"]["model"]["oneOf"][1]["discriminator"]["mapping"]
+    for name, entry in registered().items():
+        table = schema["$defs"][by_chart[name].removeprefix("#/$defs/")]
+        keys = table["properties"]
+        own = {each.name for each in entry.parameters}
+        shared = {"chart", "n", "sigma_2"} | ({"stribeck", "weights"} if entry.curve else set())
+        assert set(keys) == own | shared | ({"law"} if entry.laws else set())
+        wanted = {"chart", *own, *(["law"] if entry.laws else [])}
+        assert set(table["required"]) == wanted | ({"stribeck"} if entry.curve else set())
+        for each in entry.parameters:
+            said = keys[each.name]["description"]
+            assert each.unit
+            assert f", {each.unit}" in said
+            assert (each.rule in said) == (each.rule != "finite")
+            assert ("array" in str(keys[each.name])) == each.per_element
+
+
+def test_every_shipped_scenario_uses_keys_of_the_schema(schema: dict[str, Any]) -> None:
+    def check(table: dict[str, Any], properties: dict[str, Any], known: set[str]) -> None:
+        for key, value in table.items():
+            assert key in known, key
+            if isinstance(value, dict):
+                check(value, {}, named)
+
+    named = {key for table in schema["$defs"].values() for key in table["properties"]}
+    files = sorted((ROOT / "scenarios").glob("*.toml"))
+    assert files
+    for file in files:
+        data = tomllib.loads(file.read_text(encoding="utf-8"))
+        check(data, schema["properties"], set(schema["properties"]))
+
+
+# --------------------------------------------------------------------------- nothing is executed
+PROGRAMS = [
+    "__import__('os').mkdir('pwned')",
+    "open('pwned', 'w')",
+    "(lambda: open('pwned', 'w'))()",
+    "[open(p, 'w') for p in ('pwned',)]",
+    "t.__class__.__base__.__subclasses__()",
+    "exec(t)",
+    "f'{open(1)}'",
+]
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+@pytest.mark.parametrize("key", ["rig.velocity", "record.where"])
+def test_a_program_in_a_scenario_is_refused_and_never_run(
+    program: str, key: str, gms_fsm: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = OPEN_LOOP if key == "rig.velocity" else MEASURED
+    (tmp_path / "given.toml").write_text(text)
+    (tmp_path / "own.csv").write_text("t,x,F\n" + "".join(f"{i},{i},{i}\n" for i in range(9)))
+    one_message(gms_fsm("run", "given.toml", "--set", f'{key}="{program}"'), "column ")
+    nothing_written(tmp_path, {"given.toml", "own.csv"})
+
+
+@pytest.mark.parametrize(
+    "program",
+    ["import os\nos.mkdir('pwned')\n", "!!python/object/apply:os.mkdir ['pwned']\n", "#!/bin/sh\n"],
+)
+def test_a_scenario_is_toml_and_nothing_else(
+    program: str, gms_fsm: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "given.py").write_text(program)
+    one_message(gms_fsm("run", "given.py"), "given.py")
+    nothing_written(tmp_path, {"given.py"})
+
+
+def test_a_signal_is_an_expression_or_corners_never_a_function(path: Path) -> None:
+    formula = load_scenario(path).rig
+    assert isinstance(formula, Prescribed)
+    assert isinstance(formula.signals["v"], Formula)
+    ramps = load_scenario(path, ["rig.velocity=[[0, 0], [1, 2]]"]).rig
+    assert isinstance(ramps.signals["v"], Corners)
+    assert ramps.signals["v"].held

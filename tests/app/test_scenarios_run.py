@@ -1,0 +1,184 @@
+"""Every shipped scenario runs to its end, writes its report, and its trace reads back equal."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gms_fsm import Trace
+from gms_fsm._files import LIST
+from gms_fsm.app.report import compare, measured_force, plain, run_scenario
+from gms_fsm.app.scenario import Loaded, load_scenario
+from tests.helpers import ROOT, same_bits
+
+RECORD = "reciprocating_friction.tsv"
+SHIPPED = sorted((ROOT / "scenarios").glob("*.toml"))
+OPEN = [path for path in SHIPPED if path.stem != "tribometer"]
+TRANSITIONS = {"paper_fig3_non_drifting": 0, "pulled_mass": 72, "stribeck_sweep": 4}
+
+
+def data_folder() -> Path:
+    """Return where the public record lies, or skip."""
+    named = os.environ.get("GMS_FSM_DATA")
+    for folder in ([Path(named)] if named else []) + [ROOT.parent / "shared" / "data"]:
+        if (folder / RECORD).is_file():
+            return folder
+    pytest.skip(f"{RECORD} is neither in GMS_FSM_DATA nor in ../shared/data")
+
+
+@pytest.fixture(autouse=True)
+def _figures() -> None:
+    pytest.importorskip("matplotlib", reason="the figures need the extra 'plots'")
+
+
+def check_report(loaded: Loaded, trace: Trace, files: list[Path], folder: Path) -> str:
+    """Assert what every report has; return the summary."""
+    assert {*files, folder / LIST} == set(folder.iterdir())
+    assert files[0] == folder / "summary.md"
+    names = {path.name for path in files}
+    assert {"summary.md", "trace.npz", "transitions.csv", "overview.png", "overview.svg"} <= names
+    assert (folder / "overview.png").read_bytes().startswith(b"\x89PNG")
+    assert b"</svg>" in (folder / "overview.svg").read_bytes()[-20:]
+    read_back = Trace.load(folder / "trace.npz")
+    same_bits(read_back, trace)
+    for name in ("s", "dz"):
+        np.testing.assert_array_equal(getattr(read_back, name), getattr(trace, name))
+    assert read_back.settings == trace.settings
+    log = (folder / "transitions.csv").read_text(encoding="utf-8")
+    assert log == trace.transitions_csv()
+    assert log.count("\n") == len(trace.transitions) + 1
+    summary = (folder / "summary.md").read_text(encoding="utf-8")
+    assert summary.startswith(f"# {loaded.title}\n")
+    assert f"{trace.model.title}" in summary
+    assert "law" in trace.model.title
+    assert "weights = [" in summary
+    assert f"{len(trace.transitions)} transitions" in summary
+    assert "| element | stick [s] | slip [s] | break_away_forward |" in summary
+    assert plain(loaded.scenario.notes.strip()) in summary
+    return summary
+
+
+def test_there_are_six() -> None:
+    assert len(SHIPPED) == 6
+    assert len(OPEN) == 5
+
+
+@pytest.mark.parametrize("path", OPEN, ids=lambda path: path.stem)
+def test_a_shipped_scenario_runs(path: Path, tmp_path: Path) -> None:
+    loaded = load_scenario(path)
+    trace, files = run_scenario(loaded, tmp_path / "out")
+    check_report(loaded, trace, files, tmp_path / "out")
+    assert trace.t[-1] == loaded.arguments["t_end"]
+    assert loaded.title != path.stem
+    if path.stem in TRANSITIONS:
+        assert len(trace.transitions) == TRANSITIONS[path.stem]
+
+
+def test_a_second_run_replaces_the_first_by_the_same(tmp_path: Path) -> None:
+    path = ROOT / "scenarios" / "nested_reversals.toml"
+    contents = []
+    for _ in range(2):
+        run_scenario(load_scenario(path), tmp_path / "out")
+        contents.append({file.name: file.read_bytes() for file in (tmp_path / "out").iterdir()})
+    assert contents[0].keys() == contents[1].keys()
+    for name in ("summary.md", "transitions.csv"):
+        assert contents[0][name] == contents[1][name]
+
+
+@pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
+def test_figures_and_csv_come_as_asked_for(ending: str, tmp_path: Path) -> None:
+    path = ROOT / "scenarios" / "stribeck_sweep.toml"
+    wanted = [f'output.figures=["{ending}"]', "output.csv=true", "output.every=0.5"]
+    trace, files = run_scenario(load_scenario(path, wanted), tmp_path)
+    names = {file.name for file in files}
+    assert {f"overview.{ending}", "trace.csv"} <= names
+    assert {Path(name).suffix for name in names} == {".md", ".npz", ".csv", f".{ending}"}
+    assert trace.t.tolist() == [0.5 * i for i in range(93)]
+    read_back = Trace.load(tmp_path / "trace.csv")
+    same_bits(read_back, trace)
+
+
+def test_without_figures_nothing_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that a run without matplotlib need not warn of a figure that nobody wants."""
+    drawn: list[object] = []
+    monkeypatch.setattr("plots.figures.overview", lambda *given, **_: drawn.append(given))
+    loaded = load_scenario(ROOT / "scenarios" / "stribeck_sweep.toml", ["output.figures=[]"])
+    _, files = run_scenario(loaded, tmp_path)
+    assert {file.name for file in files} == {"summary.md", "trace.npz", "transitions.csv"}
+    assert not drawn
+
+
+# --------------------------------------------------------------------------- the tribometer
+@pytest.fixture(scope="module")
+def tribometer(tmp_path_factory: pytest.TempPathFactory) -> tuple[Loaded, Trace, list[Path]]:
+    pytest.importorskip("matplotlib", reason="the figures need the extra 'plots'")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("GMS_FSM_DATA", str(data_folder()))
+        loaded = load_scenario(ROOT / "scenarios" / "tribometer.toml")
+    trace, files = run_scenario(loaded, tmp_path_factory.mktemp("tribometer") / "out")
+    return loaded, trace, files
+
+
+def test_the_tribometer_runs_end_to_end(tribometer: tuple[Loaded, Trace, list[Path]]) -> None:
+    loaded, trace, files = tribometer
+    check_report(loaded, trace, files, files[0].parent)
+    assert loaded.record is not None
+    assert loaded.motion is not None
+    np.testing.assert_array_equal(trace.t, loaded.motion.time)
+    assert len(trace.transitions) > 700  # 50 cycles of four elements, both ways
+
+
+def test_the_tribometer_explains_the_measurement(
+    tribometer: tuple[Loaded, Trace, list[Path]],
+) -> None:
+    loaded, trace, files = tribometer
+    assert loaded.record is not None
+    record = loaded.record
+    assert (record.columns["normal"][record.chosen] > 4.5).all()
+    found = compare(trace, record)
+    assert found is not None
+    assert found.r2 >= 0.95
+    assert found.r2 == pytest.approx(0.995, abs=0.002)
+    assert found.rows == record.chosen.sum() > 40_000
+    force = record.columns["force"][record.chosen]
+    error = force - trace.F[record.chosen]
+    assert found.r2 == pytest.approx(1 - np.mean(error**2) / force.var(), rel=1e-9)
+    summary = files[0].read_text(encoding="utf-8")
+    assert f"R² = {found.r2:.4f}" in summary
+    assert plain("where = 'normal > 4.5 N'") in summary
+    assert "time constant 0.02 s" in summary
+
+
+def test_the_tribometer_says_what_its_record_cannot_tell(
+    tribometer: tuple[Loaded, Trace, list[Path]],
+) -> None:
+    summary = tribometer[2][0].read_text(encoding="utf-8")
+    doubts = summary.partition("### What this record cannot tell")[2]
+    for said in ("Stribeck", "F_s, v_s and sigma_2", "C:", "sigma_i"):
+        assert said in doubts, said
+    assert "velocity noise" not in doubts  # the scenario's v_c lies above it
+
+
+def test_the_tribometer_shows_its_loops(tribometer: tuple[Loaded, Trace, list[Path]]) -> None:
+    """The overview has the measured loops and the model's in one panel."""
+    pytest.importorskip("matplotlib", reason="the figure needs the extra 'plots'")
+    loaded, trace, files = tribometer
+    (picture,) = [path for path in files if path.name == "overview.png"]
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    from plots import figures
+
+    assert loaded.record is not None
+    assert loaded.motion is not None
+    times, force = measured_force(loaded.record)
+    measured = figures.Measured(times, loaded.motion.position[loaded.record.chosen], force)
+    (panel,) = [
+        ax for ax in figures.overview(trace, measured).axes if ax.get_title("left") == "hysteresis"
+    ]
+    model, data = panel.lines
+    assert len(data.get_xdata()) == times.size
+    for line in (model, data):  # 228 um to and fro, +-2.3 N, one on the other
+        assert np.ptp(line.get_xdata()) == pytest.approx(0.24, abs=0.01)
+        assert np.ptp(line.get_ydata()) == pytest.approx(4.8, abs=0.4)

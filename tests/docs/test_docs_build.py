@@ -1,0 +1,119 @@
+"""The site is built without a warning, and whoever reads it asks nobody but it."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urldefrag
+
+import pytest
+
+from tests.helpers import ROOT
+
+for module in (
+    "furo",
+    "ipykernel",
+    "jupytext",
+    "latex2mathml",
+    "myst_parser",
+    "nbclient",
+    "sphinx",
+):
+    pytest.importorskip(module, reason="building the site needs the extra 'docs'")
+pytest.importorskip("ipywidgets", reason="building the site needs the extra 'docs'")
+
+LOADS = {  # what a browser fetches by itself
+    ("script", "src"),
+    ("img", "src"),
+    ("img", "srcset"),
+    ("iframe", "src"),
+    ("source", "src"),
+    ("video", "src"),
+    ("audio", "src"),
+    ("embed", "src"),
+    ("object", "data"),
+    ("link", "href"),
+    ("image", "href"),
+    ("use", "href"),
+}
+
+
+class Links(HTMLParser):
+    """Collects what a page loads, where its links lead, and its anchors."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.loads: list[str] = []
+        self.links: list[str] = []
+        self.anchors: set[str] = set()
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: Any) -> None:
+        for name, value in attrs:
+            if (tag, name.removeprefix("xlink:")) in LOADS:
+                self.loads.append(value)
+            elif tag == "a" and name == "href":
+                self.links.append(value)
+            elif name == "id":
+                self.anchors.add(value)
+
+
+def outside(address: str) -> bool:
+    """Whether an address leaves the site."""
+    return re.match(r"(?:[a-z]+:)?//", address) is not None
+
+
+def test_built_strictly_and_asks_nobody(tmp_path: Path) -> None:
+    site = tmp_path / "site"
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "sphinx",
+            "--quiet",
+            "--fail-on-warning",
+            "--keep-going",
+            "-d",
+            str(tmp_path / "doctrees"),
+            "docs",
+            str(site),
+        ],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONWARNINGS": "default"},
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "WARNING" not in done.stderr
+    pages = {path: Links(path.read_text(encoding="utf-8")) for path in site.rglob("*.html")}
+    assert len(pages) > 45
+    for number in range(1, 9):
+        lesson = (site / f"lessons/lesson_{number}.html").read_text(encoding="utf-8")
+        assert "Traceback" not in lesson
+        assert f"lesson_{number}_1.png" in lesson
+        assert (site / f"lessons/lesson_{number}_replay.html").is_file()
+        assert f"lesson_{number}.ipynb" in lesson
+    for page, found in pages.items():
+        for address in found.loads:
+            assert not outside(address), f"{page.relative_to(site)} loads {address[:200]}"
+        for link in found.links:
+            if not outside(link) and not link.startswith(("mailto:", "javascript:")):
+                _leads_somewhere(page, link, pages)
+    for style in site.rglob("*.css"):
+        text = style.read_text(encoding="utf-8")
+        loaded = re.findall(r"(?:url\(|@import\s+)[\"']?([^\"')\s;]+)", text)
+        assert not [address for address in loaded if outside(address)], style.name
+
+
+def _leads_somewhere(page: Path, link: str, pages: dict[Path, Links]) -> None:
+    file, anchor = urldefrag(link)
+    target = (page.parent / unquote(file.partition("?")[0])).resolve() if file else page
+    assert target.is_file(), f"{page.name} links to {link}"
+    if anchor and target in pages:
+        assert unquote(anchor) in pages[target].anchors, f"{page.name} links to {link}"

@@ -1,0 +1,110 @@
+"""docs/errors.md has every error, each with an example that the code really says, and what to do.
+
+There is one hierarchy with one root, and the classes of it are also what Python would have raised.
+tests/docs/test_docs_are_true.py runs the page's blocks and compares what they print; here is
+checked that there is one for every class, and that none of the extras is needed to run them.
+"""
+
+from __future__ import annotations
+
+import builtins
+import inspect
+import re
+from pathlib import Path
+
+import pytest
+
+from gms_fsm import errors
+from gms_fsm.errors import GMSError
+from gms_fsm.traces import failures
+from gms_fsm.traces.failures import SimulationError
+from tests.helpers import ROOT
+from tests.page_blocks import Page, agrees, blocks_of
+
+PAGE = (ROOT / "docs" / "errors.md").read_text(encoding="utf-8")
+SECTIONS = dict(re.findall(r"^## (\w+)\n(.*?)(?=^## |\Z)", PAGE, re.MULTILINE | re.DOTALL))
+
+
+def _all(kind: type[GMSError]) -> list[type[GMSError]]:
+    return [found for each in kind.__subclasses__() for found in (each, *_all(each))]
+
+
+HOMES = (errors.__name__, failures.__name__)
+KINDS = [kind for kind in _all(GMSError) if kind.__module__ in HOMES]
+
+
+@pytest.fixture(scope="module")
+def printed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Run the page; return what each section's blocks print, as shown."""
+    found: dict[str, str] = {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path_factory.mktemp("page"))
+        patch.setenv("COLUMNS", "200")
+        patch.setattr("warnings.showwarning", None)
+        page, said = Page("docs/errors.md"), ""
+        for block in blocks_of(PAGE):
+            if block.file:
+                Path(block.file).write_text(block.body, encoding="utf-8")
+            elif block.kind == "python":
+                said = page.python(block)
+            elif block.kind == "console":
+                ((_, shown, said, _),) = page.console(block)
+                assert agrees(shown, said), said
+                found[_section(block.line)] = shown
+            elif block.kind == "text":
+                assert agrees(block.body, said), f"line {block.line}: {said}"
+                found[_section(block.line)] = block.body
+    return found
+
+
+def _section(line: int) -> str:
+    before = PAGE.splitlines()[:line]
+    return [text for text in before if text.startswith("#")][-1].lstrip("# ")
+
+
+def test_every_error_has_one_root() -> None:
+    """Whatever class stands in the module, and whatever exception elsewhere in the package."""
+    own = [
+        kind for home in (errors, failures) for _, kind in inspect.getmembers(home, inspect.isclass)
+    ]
+    own = [kind for kind in own if kind.__module__ in HOMES and issubclass(kind, BaseException)]
+    assert len(own) > 10
+    assert all(issubclass(kind, GMSError) for kind in own)
+    root = Path(errors.__file__).parent
+    for path in sorted(root.rglob("*.py")):
+        named = re.findall(r"^class (\w+(?:Error|Exception))\(", path.read_text(), re.MULTILINE)
+        assert path.name in ("errors.py", "failures.py") or named == [], path
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+def test_an_error_is_also_what_python_would_have_raised(kind: type[GMSError]) -> None:
+    usual = [base for base in kind.__mro__ if base.__module__ == builtins.__name__]
+    assert usual[0] is not Exception
+
+
+def test_the_page_has_every_error_and_no_other() -> None:
+    named = [name for name in SECTIONS if name.endswith("Error")]
+    assert sorted(named) == sorted(kind.__name__ for kind in KINDS)
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+def test_a_section_says_when_shows_what_and_says_what_to_do(
+    kind: type[GMSError], printed: dict[str, str]
+) -> None:
+    section = SECTIONS[kind.__name__]
+    assert len(section.partition("```")[0].split()) > 5  # when it is raised
+    shown = printed[kind.__name__]
+    if kind is SimulationError:  # the root of others; its example shows the trace that is kept
+        assert ".trace" in section
+        assert "*Do:*" not in section
+        return
+    at_the_command_line = "$ gms-fsm" in section
+    assert shown.startswith("error: " if at_the_command_line else f"{kind.__name__}: ")
+    assert len(shown.split()) > 6
+    assert "\n*Do:* " in section
+
+
+def test_every_docstring_says_what_went_wrong() -> None:
+    for kind in KINDS:
+        assert kind.__doc__
+        assert kind.__doc__.partition("\n")[0].endswith(".")

@@ -1,0 +1,95 @@
+"""A run whose sizes do not fit its model, or whose arrests the clock could not see, gets a note."""
+
+import numpy as np
+import pytest
+
+from gms_fsm import GMS, GMSParameters, Prescribed, Stribeck, simulate
+from gms_fsm.app.report import run_scenario
+from gms_fsm.app.scenario import load_scenario
+from gms_fsm.inspection.notes import notes_on
+from tests.helpers import ROOT, open_loop, pulled_mass, stick_slip
+from tests.scenario_files import command_line
+
+
+def bank(k: float = 1.0, v_c: float = 1e-6) -> GMS:
+    """Return two elements with thresholds of some micrometres at k = 1."""
+    p = GMSParameters.from_shares(
+        [0.5, 0.5], [k * 4e5, k * 2e5], C=20.0, v_c=v_c, stribeck=Stribeck(2.0, 2.4, 1e-3)
+    )
+    return GMS(p, law="signed")
+
+
+def notes(model: GMS, velocity: object, t_end: float = 10.0, **options: object) -> tuple[str, ...]:
+    return notes_on(simulate(model, Prescribed(velocity), t_end, **options))  # type: ignore[arg-type]
+
+
+def test_a_motion_that_fits_has_none():
+    assert notes(bank(), "1e-5*sin(t)") == ()
+    model, rig = pulled_mass()
+    assert notes_on(simulate(model, rig, 20.0)) == ()
+    assert notes_on(simulate(stick_slip("signed"), open_loop(), 20.0)) == ()
+
+
+def test_a_stroke_in_metres_over_thresholds_in_micrometres():
+    (note,) = notes(bank(), "0.5*cos(t)")
+    assert note.startswith("the stroke of 1 m is 2e+05 times the largest threshold")
+    assert "unit of the motion" in note
+
+
+def test_a_v_c_above_every_speed():
+    (note,) = notes(bank(v_c=1e-2), "1e-3*sin(t)")
+    assert note.startswith(
+        "no transition: the speed stays below v_c (largest |v| 0.000999 m/s, v_c"
+    )
+
+
+def test_a_stiffness_in_newtons_per_millimetre():
+    """The thresholds are then millimetres, and a stroke of micrometres comes nowhere near."""
+    (note,) = notes(bank(k=1e-3), "4e-6*sin(t)")
+    assert note.startswith("no transition: no element comes near its threshold")
+    assert "units of k (N/m)" in note
+
+
+@pytest.mark.parametrize("output", [{}, {"t_eval": np.linspace(0.0, 10.0, 11)}])
+def test_arrests_within_a_tick_of_the_clock(output):
+    """v_c / |dv/dt| is under the clock's resolution: the window is passed within a tick."""
+    (note,) = notes(bank(v_c=1e-22), "1e-5*sin(t)", **output)
+    assert note.startswith("arrest could not be seen ")
+    assert "first at t = 3.14159" in note
+
+
+def test_a_velocity_that_jumps_over_the_window():
+    (note,) = notes(bank(), [(0.0, 1e-5), (5.0, 1e-5), (5.0, -1e-5), (10.0, -1e-5)])
+    assert note.startswith("arrest could not be seen ")
+    assert "first at t = 5 s" in note
+
+
+def test_a_run_that_sees_them_has_no_such_note():
+    ramp = [(0.0, 1e-5), (5.0, 1e-5), (5.1, -1e-5), (10.0, -1e-5)]
+    assert notes(bank(), ramp) == ()
+
+
+def test_the_command_line_says_them(tmp_path, monkeypatch, capsys):
+    path = ROOT / "scenarios" / "pulled_mass.toml"
+    done = command_line(monkeypatch, capsys)(
+        "run",
+        path,
+        "-o",
+        tmp_path / "out",
+        "--set",
+        "model.v_c=10.0",
+        "--set",
+        "run.t_end=2.0",
+        "--set",
+        "output.figures=[]",
+    )
+    assert done.code == 0
+    assert "note: no transition: the speed stays below v_c" in done.out
+
+
+def test_the_summary_shows_them(tmp_path):
+    path = ROOT / "scenarios" / "pulled_mass.toml"
+    loaded = load_scenario(path, ["model.v_c=10.0", "run.t_end=2.0", "output.figures=[]"])
+    run_scenario(loaded, tmp_path / "out")
+    summary = (tmp_path / "out" / "summary.md").read_text()
+    assert "- note: no transition: the speed stays below v_c" in summary

@@ -1,0 +1,232 @@
+"""Places have names: only `gms_fsm.lowering.layout` computes where something stands.
+
+The state vector, what a run observes, modes and log are subscripted by what the layout returns,
+never by arithmetic on the number of elements, a first place or a position. Found on the syntax
+tree.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from gms_fsm import ChartModel, Prescribed, Slider
+from gms_fsm.lowering.layout import LOG_NUMBERS, LOG_TEXTS, Layout, LogRecord, Places
+from gms_fsm.lowering.program import lower
+from tests.helpers import ROOT, pulled_mass, stick_slip
+
+HOME = Path("gms_fsm/lowering/layout.py")
+SOURCES = [
+    path.relative_to(ROOT)
+    for package in ("gms_fsm", "plots")
+    for path in sorted((ROOT / package).rglob("*.py"))
+]
+SIZES, POSITIONS = {"n", "first"}, {"i", "j"}  # what places are computed from
+LAID_OUT = {"y", "dy", "y_before", "seen", "observed", "mode"}  # arrays with named places
+# The same in generated text.
+PRINTED = re.compile(r"\* n\b|\+ [ni]\b|\b(y|dy|out|mode)\[\d")
+
+# Not about the layout: the code as it stands, by file, and why.
+ALLOWED = {
+    "gms_fsm/app/lessons/l3_missed_window.py": {
+        # The first firings of a log, as many as there are elements.
+        "once.transitions.t[:MODEL.n]",
+        "located.transitions.t[:MODEL.n]",
+    },
+    "gms_fsm/app/records.py": {"kept[:first]"},  # rows of a measured record
+    "gms_fsm/lowering/_pulses.py": {"rests[first:last]"},  # samples of a signal
+    "plots/schematic.py": {  # lengths on paper
+        "ROW * n + 0.15",
+        "ROW * n + 0.3",
+        "0.4 + 0.82 * (ROW * n + 0.3)",
+        "0.5 * ROW * n + 0.3",
+        "0.5 * ROW * n - 0.3",
+        "ROW * n - 0.1",
+    },
+}
+
+
+def _words(node: ast.AST) -> set[str]:
+    """Return the names in code; of ``model.n`` only ``n``."""
+    owners = {id(sub.value) for sub in ast.walk(node) if isinstance(sub, ast.Attribute)}
+    return {
+        sub.id if isinstance(sub, ast.Name) else sub.attr.lstrip("_")
+        for sub in ast.walk(node)
+        if isinstance(sub, ast.Name | ast.Attribute) and id(sub) not in owners
+    }
+
+
+def _sums(node: ast.AST, *kinds: type[ast.operator]) -> list[ast.BinOp]:
+    return [b for b in ast.walk(node) if isinstance(b, ast.BinOp) and isinstance(b.op, kinds)]
+
+
+def _is_place(index: ast.expr) -> bool:
+    """Tell whether an index is computed from sizes."""
+    bounds = [b for s in ast.walk(index) if isinstance(s, ast.Slice) for b in (s.lower, s.upper)]
+    behind = [b for b in _sums(index, ast.Add) if isinstance(b.left, ast.Constant)]  # 2 + i
+    return bool(
+        any(_words(each) & SIZES for each in _sums(index, ast.Add, ast.Sub))
+        or any(_words(each) & (SIZES | POSITIONS) for each in (*_sums(index, ast.Mult), *behind))
+        or any(isinstance(b, ast.Name | ast.Attribute) and _words(b) & SIZES for b in bounds if b)
+    )
+
+
+def _is_number(index: ast.expr) -> bool:
+    """Tell whether an index is a number, or the position of an element and some more."""
+    if isinstance(index, ast.Tuple):  # rows first, then places
+        return any(_is_number(each) for each in index.elts[1:])
+    if isinstance(index, ast.Constant):
+        return isinstance(index.value, int)
+    return any(_words(each) & POSITIONS for each in _sums(index, ast.Add, ast.Sub))
+
+
+def _adds_blocks(node: ast.BinOp) -> bool:
+    """Tell whether a sum has a multiple of n in it, or is one of sizes alone."""
+    sides = (node.left, node.right)
+    multiples = [
+        side for side in sides for product in _sums(side, ast.Mult) if "n" in _words(product)
+    ]
+    return bool(multiples) or all(
+        isinstance(side, ast.Name | ast.Attribute) and _words(side) & SIZES for side in sides
+    )
+
+
+def _found(text: str, *, printed: bool = True) -> Iterator[str]:
+    """Yield the code of every place that is computed in a source text."""
+    tree = ast.parse(text)
+    documents = {
+        id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)
+    }  # docstrings may explain
+    for node in ast.walk(tree):
+        match node:
+            case ast.Subscript(slice=index) if _is_place(index):
+                yield ast.unparse(node)
+            case ast.Subscript(value=ast.Name(name), slice=index) if name in LAID_OUT:
+                if _is_number(index):
+                    yield ast.unparse(node)
+            case ast.Subscript(value=ast.Attribute(attr=name), slice=ast.Tuple() as index) if (
+                name in LAID_OUT and _is_number(index)
+            ):
+                yield ast.unparse(node)
+            case ast.BinOp(op=ast.Add() | ast.Sub()) if _adds_blocks(node):
+                yield ast.unparse(node)
+            case ast.Constant(value=str(words)) if printed and id(node) not in documents:
+                if PRINTED.search(words):
+                    yield words
+
+
+OLD = {
+    "variable of an element": "y[first + j * n + i]",
+    "block of a variable": "y[first : first + n]",
+    "block by a start": "start = self._first + names.index(name) * self.n",
+    "columns of a table": "table[:, 2 + n : 2 + 2 * n]",
+    "threshold of an element": "seen[2 + i]",
+    "threshold under another name": "before[2 + i]",
+    "force": "seen[1]",
+    "position": "y[0]",
+    "positions": "self.rows.y[:, 0]",
+    "rates": "seen[2 + 2 * model.n :]",
+    "rate of an element": "rates[j * model.n + i]",
+    "states of the elements": "rows.mode[:, : self.n]",
+    "flags of the surfaces": "mode[program.n :]",
+    "element's place from a pair": "(variable, program.first + j * n)",
+    "from the end": "first = -n * len(variables); y[first:][:n]",
+    "length of the state": "(1 if prescribed else 2) + n * len(variables)",
+    "length of what is observed": "2 + model.n * (2 + len(variables))",
+    "columns of rates": "slice(first, first + trace.n)",
+    "next to a place": "y[i + 1]",
+    "printed block": 'f"{base} + {row} * n + i"',
+    "printed element": 'f"y[{base} + i]"',
+    "printed velocity": 'line = "v = y[1]"',
+}
+FINE = (
+    "y[places.index('z', i)]",
+    "y[layout.y.block('z')]",
+    "mode[i]",
+    "times[i + 1]",
+    "rows.y[row - 1]",
+    "rows.y[0]",
+    "first.t_last - first.t_first",
+    "cells[i : i + 3]",
+    "values[f'{name}{i + 1}']",
+    "'''Blocks of n: first + j * n + i.'''",
+    "range(n)",
+    "n * [0.0]",
+)
+
+
+@pytest.mark.parametrize("case", OLD)
+def test_the_search_finds_what_it_looks_for(case: str) -> None:
+    assert list(_found(OLD[case])) != []
+
+
+@pytest.mark.parametrize("code", FINE)
+def test_the_search_leaves_the_rest_alone(code: str) -> None:
+    assert list(_found(code)) == []
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=str)
+def test_no_place_is_computed_outside_the_layout(path: Path) -> None:
+    found = set(_found((ROOT / path).read_text(encoding="utf-8"), printed="lowering" in path.parts))
+    if path == HOME:
+        assert found != set()
+    else:
+        assert found == ALLOWED.get(path.as_posix(), set())
+
+
+def test_all_files_that_may_are_there() -> None:
+    assert {Path(name) for name in ALLOWED} <= set(SOURCES)
+
+
+# --------------------------------------------------------------------------- the layout itself
+def two_variables(n: int) -> ChartModel:
+    from gms_fsm import Chart, State
+
+    flow = {"z": "v", "w": "-w"}
+    chart = Chart("two", ("v",), ("z", "w"), (), (State("only", flow),), (), {"F": "z + w"})
+    return ChartModel(chart, {}, n=n)
+
+
+@pytest.mark.parametrize("n", [1, 2, 5])
+@pytest.mark.parametrize("rig", [Prescribed("0.1"), Slider(1.0, "1")])
+def test_every_place_has_one_name(rig: Prescribed | Slider, n: int) -> None:
+    layout = Layout.of(two_variables(n), rig, surfaces=3)
+    for places in (layout.y, layout.observed):
+        numbers = [places.index(name, i or 0) for name, i in places]
+        assert numbers == list(range(places.size))
+        assert places.joined(places.named(numbers)) == numbers
+        for name in (*places.shared, *places.own):
+            assert list(places.all_of(name)) == [k for k, (u, _) in enumerate(places) if u == name]
+    modes = list(range(layout.modes))
+    assert modes[layout.elements] + modes[layout.slides] == modes
+    assert len(modes[layout.slides]) == 3
+    assert layout.not_sliding([7] * n) == (*[7] * n, 0, 0, 0)
+
+
+@pytest.mark.parametrize("n", [1, 2, 5])
+@pytest.mark.parametrize("shared", [(), ("x",), ("x", "v")])
+def test_texts_name_the_same_places(shared: tuple[str, ...], n: int) -> None:
+    places = Places(shared, ("z", "w", "u"), n)
+    for place, (name, i) in enumerate(places):
+        assert eval(places.text(name), {"n": n, "i": i}) == place
+        asked = [places.asking_text(each, "k") for each in (*shared, *places.own)]
+        whose = [eval(whether, {"n": n, "k": place}) for whether, _ in asked].index(True)
+        assert (*shared, *places.own)[whose] == name
+        assert i is None or eval(asked[whose][1], {"n": n, "k": place}) == i
+    assert eval(places.size_text(), {"n": n}) == places.size
+    assert eval(places.size_text(2), {"n": n}) == places.size + 2
+
+
+def test_machine_code_finds_what_it_writes_into_the_log() -> None:
+    """Of a firing `integrators.loop.record` keeps y[first + i], seen[0], seen[2 + i], seen[1]."""
+    model, rig = stick_slip("signed"), pulled_mass()[1]
+    layout = lower(model, rig).layout
+    assert [layout.observed.index(name) for name in ("v", "F", "s")] == [0, 1, 2]
+    assert layout.observed.index("s", 3) == 2 + 3
+    assert layout.y.index(layout.variable, 3) == layout.y.index(layout.variable) + 3
+    assert LOG_NUMBERS == ("z", "v", "s", "F_before", "F_after")
+    assert LogRecord._fields == ("t", "element", *LOG_TEXTS, *LOG_NUMBERS)

@@ -1,0 +1,232 @@
+"""By default every component has a tolerance from the model's own scales, and from nothing else.
+
+The cases ended wrong, without a word, with one absolute tolerance for all components.
+"""
+
+import numpy as np
+import pytest
+
+from gms_fsm import (
+    GMS,
+    Chart,
+    ChartModel,
+    GMSParameters,
+    LuGre,
+    Prescribed,
+    PulledSlider,
+    Slider,
+    State,
+    Stribeck,
+    Transition,
+    simulate,
+    sweep,
+)
+from gms_fsm.charts import gms_element
+from gms_fsm.errors import ParameterError
+from gms_fsm.lowering.scales import scales_of
+from tests.helpers import ROOT, pulled_mass
+
+CARRIAGE = GMS(
+    GMSParameters(
+        [4e6],
+        [3e3],
+        [1e-5],
+        sigma_2=250,
+        stribeck=Stribeck(8, 9.5, 5e-4),
+        v_c=7.3e-7,
+        weights=[1 / 4e6],
+    ),
+    law="signed",
+)
+
+
+@pytest.mark.parametrize("engine", ["machines", "ifelse", "compiled"])
+def test_a_carriage_on_micrometres_creeps_and_does_not_break_away(engine):
+    """k = 4e6 N/m, thresholds of 2 um: atol = 1e-9 made a break-away at 3.826 s."""
+    if engine == "compiled":
+        pytest.importorskip("numba", reason="needs the extra fast")
+    times = np.linspace(0.0, 8.0, 8001)
+    trace = simulate(CARRIAGE, PulledSlider(40, 1600, 1.8e-3), 8.0, engine=engine, t_eval=times)
+    assert len(trace.transitions) == 0
+    assert trace.v[-1] == pytest.approx(7.19712e-7, rel=5e-5)
+    assert trace.v.max() == pytest.approx(1.19883e-6, rel=1e-4)
+
+
+def test_the_scales_of_a_bank_are_its_thresholds_its_stiffness_and_its_velocities():
+    p = GMSParameters(
+        [40.0, 10.0],
+        [0.0, 0.0],
+        [0.02, 0.01],
+        sigma_2=0.4,
+        stribeck=Stribeck(2.0, 3.0, 0.05),
+        v_c=1e-7,
+        weights=[0.01, 0.5],
+    )
+    scales = scales_of(GMS(p, law="signed"))
+    assert scales.variables["z"] == pytest.approx((0.02, 0.2))  # w F_c; F_c / k
+    assert scales.x == pytest.approx(0.02)
+    assert scales.v == pytest.approx(1e2 * 1e-7)
+    assert scales.time == pytest.approx(0.02 / 0.02)  # s / C of the faster element
+
+
+def test_without_guards_the_scale_is_the_deflection_that_carries_the_friction():
+    lugre = LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4, stribeck=Stribeck(1, 1.5, 1e-3))
+    assert scales_of(lugre).variables["z"] == pytest.approx((1e-3,))
+    assert scales_of(lugre).v == 1e-3
+
+
+@pytest.mark.parametrize(
+    ("guard", "scale"),
+    [
+        ("z >= 0.02", 0.02),
+        ("3 * abs(z) - 0.06 > 0", 0.02),
+        ("k * z > 5", 0.05),
+        ("z > 0", 0.0),
+        ("z > 0 or z < -0.5", 0.5),
+        ("t > 3", 0.0),
+    ],
+)
+def test_charts_of_ones_own_have_the_scales_of_their_guards(guard, scale):
+    """How far from 0 a comparison turns, by its slope; one that turns at 0 has none."""
+    chart = Chart(
+        "own",
+        inputs=("t", "v"),
+        variables=("z",),
+        parameters=("k",),
+        states=(State("a", flow={"z": "2 * v"}), State("b", flow={"z": "0"})),
+        transitions=(Transition("go", "a", "b", guard=guard),),
+        outputs={"F": "k * z"},
+    )
+    scales = scales_of(ChartModel(chart, {"k": 100.0}))
+    assert scales.variables["z"] == pytest.approx((scale,))
+    assert scales.x == pytest.approx(scale / 2.0)  # x follows z at half its pace
+
+
+@pytest.mark.parametrize("length", [1.0, 1e-6, 1e6])
+def test_a_component_without_a_scale_is_measured_by_its_own_size(length):
+    """A spring and a mass: v and x by their largest values, whatever the unit."""
+    spring = Chart(
+        "spring",
+        inputs=("x",),
+        variables=("z",),
+        parameters=("k",),
+        states=(State("on", flow={"z": "0"}),),
+        transitions=(),
+        outputs={"F": "k * x"},
+    )
+    model = ChartModel(spring, {"k": 4.0})
+    trace = simulate(model, Slider(1.0, "0"), 10.0, initial={"x": length})
+    assert trace.settings["atol"] == {"x": 0.0, "v": 0.0, "z": [0.0]}
+    assert np.abs(trace.x - length * np.cos(2.0 * trace.t)).max() < 3e-5 * length
+    assert len(trace) < 500
+
+
+def test_the_default_depends_on_model_and_rtol_only():
+    model = pulled_mass()[0]
+    one = simulate(model, PulledSlider(1.0, 2.0, 0.1), 1.0).settings["atol"]
+    other = simulate(model, PulledSlider(7.0, 0.2, 3.0), 2.0, t_start=1.5).settings["atol"]
+    finer = simulate(model, PulledSlider(1.0, 2.0, 0.1), 1.0, rtol=1e-8).settings["atol"]
+    assert one == other
+    assert finer["z"] == pytest.approx([u / 100 for u in one["z"]])
+
+
+def test_a_tolerance_may_be_a_number_or_given_by_name():
+    model, rig = pulled_mass()[0], PulledSlider(1.0, 2.0, 0.1)
+    default = simulate(model, rig, 0.5).settings["atol"]
+    assert simulate(model, rig, 0.5, atol=1e-7).settings["atol"] == 1e-7
+    used = simulate(model, rig, 0.5, atol={"v": 1e-8, "z": [1e-9, 2e-9, 3e-9, 4e-9]}).settings
+    assert used["atol"] == {"x": default["x"], "v": 1e-8, "z": [1e-9, 2e-9, 3e-9, 4e-9]}
+
+
+@pytest.mark.parametrize(
+    ("atol", "says"),
+    [
+        (0.0, "atol is 0.0; it must be > 0"),
+        ({"w": 1e-9}, "atol has the key 'w'; known are 'x', 'v', 'z'"),
+        ({"z": [1e-9, 1e-9]}, r"atol\['z'\] has 2 entries, but there are 4 elements"),
+        ({"v": -1.0}, r"atol\['v'\] is -1.0; it must be > 0"),
+        ("fine", "atol is 'fine'; it must be a number"),
+    ],
+)
+def test_what_is_no_tolerance_is_refused(atol, says):
+    with pytest.raises(ParameterError, match=says):
+        simulate(pulled_mass()[0], PulledSlider(1.0, 2.0, 0.1), 1.0, atol=atol)
+
+
+def test_a_foreign_solver_asks_for_a_tolerance_where_there_is_no_scale():
+    """SciPy's own error norm divides by it."""
+    from scipy.integrate import RK45
+
+    chart = Chart(
+        "idle",
+        inputs=("v",),
+        variables=("z",),
+        parameters=(),
+        states=(State("on", flow={"z": "0"}),),
+        transitions=(),
+        outputs={"F": "v"},
+    )
+    with pytest.raises(ParameterError, match="needs an absolute tolerance"):
+        simulate(ChartModel(chart, {}), Slider(1.0, "1"), 1.0, method=RK45)
+    trace = simulate(ChartModel(chart, {}), Slider(1.0, "1"), 1.0, method=RK45, atol=1e-9)
+    assert trace.v[-1] == pytest.approx(1.0 - np.exp(-1.0), abs=1e-6)
+
+
+@pytest.mark.parametrize("engine", ["ifelse", "compiled"])
+def test_each_run_of_a_sweep_has_the_tolerances_of_its_own_model(engine):
+    """Its buffers serve one run after the other."""
+    pytest.importorskip("numba", reason="needs the extra fast")
+    p = pulled_mass()[0].parameters
+    weights = np.array([1e-6 * p.weights, p.weights])
+    C = np.array([1e-6 * p.C, p.C])
+    many = sweep(
+        pulled_mass()[0],
+        Prescribed("1e-3*sin(t)"),
+        6.0,
+        {"weights": weights, "C": C},
+        engine=engine,
+    )
+    for row in range(2):
+        model = GMS(
+            GMSParameters(
+                p.k,
+                p.sigma,
+                C[row],
+                sigma_2=p.sigma_2,
+                stribeck=p.stribeck,
+                v_c=p.v_c,
+                weights=weights[row],
+            ),
+            law="signed",
+        )
+        alone = simulate(model, Prescribed("1e-3*sin(t)"), 6.0, engine="ifelse")
+        assert many.x[row] == alone.x[-1]
+        assert many.z[row].tolist() == alone.z[-1].tolist()
+
+
+def test_a_scenario_takes_both_forms(tmp_path):
+
+    from gms_fsm.app.scenario import load_scenario
+
+    path = ROOT / "scenarios" / "pulled_mass.toml"
+    assert load_scenario(path).arguments["atol"] is None
+    assert load_scenario(path, ["run.atol=1e-8"]).arguments["atol"] == 1e-8
+    named = load_scenario(path, ["run.atol={ v = 1e-9, z = [1e-9, 1e-9, 1e-9, 1e-9] }"])
+    assert named.arguments["atol"] == {"v": 1e-9, "z": [1e-9] * 4}
+
+
+def test_the_element_chart_alone_has_the_same_scales():
+    values = {"k": 40.0, "sigma": 0.4, "C": 0.02, "v_c": 1e-6}
+    own = ChartModel(
+        gms_element("signed"), values, stribeck=Stribeck(1, 1.5, 0.05), weights=[0.00625]
+    )
+    p = GMSParameters(
+        [40.0],
+        [0.4],
+        [0.02],
+        sigma_2=0.0,
+        stribeck=Stribeck(1, 1.5, 0.05),
+        v_c=1e-6,
+        weights=[0.00625],
+    )
+    assert scales_of(own) == scales_of(GMS(p, law="signed"))

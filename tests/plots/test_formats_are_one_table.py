@@ -1,0 +1,215 @@
+"""One table says which files pictures are written to; one new row works wherever files are named.
+
+Command line and its help, `plots.render`, figures, scenario files and their schema, the debugger,
+animations and replay pages, and every message about a wrong ending.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import plots
+from gms_fsm import Prescribed, Trace, simulate
+from gms_fsm.app.scenario import Scenario
+from gms_fsm.charts import LUGRE
+from gms_fsm.errors import MissingExtraError, ParameterError
+from plots import formats
+from plots.formats import FORMATS, Format, Subject, register
+from tests.helpers import ROOT, stick_slip
+from tests.scenario_files import OPEN_LOOP, CommandLine, command_line, one_message
+
+SUBJECTS: tuple[Subject, ...] = ("graph", "chart", "figure", "animation", "page")
+
+
+@pytest.fixture(autouse=True)
+def _own_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(formats, "FORMATS", list(FORMATS))
+
+
+@pytest.fixture
+def gms_fsm(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> CommandLine:
+    monkeypatch.chdir(tmp_path)
+    return command_line(monkeypatch, capsys)
+
+
+@pytest.fixture(scope="module")
+def trace() -> Trace:
+    return simulate(stick_slip("signed"), Prescribed("0.2"), 2.0)
+
+
+def new(subject: Subject, **fields: Any) -> Format:
+    """Return a format that writes the kind of what it is given."""
+
+    def write(made: object) -> bytes:
+        return type(made).__name__.encode()
+
+    given = {"ending": ".new", "kind": "a name", "writer": "a test", "write": write}
+    return Format(**{**given, "subject": subject, **fields})
+
+
+# --------------------------------------------------------------------------- one new row
+def test_a_new_format_of_graphs(gms_fsm: CommandLine) -> None:
+    register(new("graph"))
+    for verb in (["chart", "lugre"], ["blocks"]):
+        assert gms_fsm(*verb, "-o", "a.new").out == "a.new\n"
+        assert Path("a.new").read_text().endswith("aph")  # ChartGraph, Digraph
+        assert ".new for a name" in gms_fsm(verb[0], "--help").out
+        one_message(gms_fsm(*verb, "-o", "a.bmp"), "path is 'a.bmp'; it must", ".new for a name")
+
+
+def test_a_new_format_of_charts_only(gms_fsm: CommandLine) -> None:
+    register(new("chart"))
+    assert gms_fsm("chart", "lugre", "-o", "a.NEW").out == "a.NEW\n"
+    assert ".new" in gms_fsm("chart", "--help").out
+    assert ".new" not in gms_fsm("blocks", "--help").out
+    one_message(gms_fsm("blocks", "-o", "a.new"), "it must end in .svg")
+
+
+def test_a_new_format_of_figures(gms_fsm: CommandLine) -> None:
+    pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
+    register(new("figure"))
+    Path("own.toml").write_text(OPEN_LOOP)
+    assert gms_fsm("run", "own.toml", "-o", "out", "--set", 'output.figures=["new"]').code == 0
+    assert Path("out/overview.new").read_text() == "Figure"
+    assert "new" in json.dumps(Scenario.model_json_schema())
+    one_message(
+        gms_fsm("run", "own.toml", "--set", 'output.figures=["bmp"]'),
+        "output.figures.0 = 'bmp': it must be 'png', 'svg', 'pdf' or 'new'",
+    )
+
+
+def test_a_new_format_of_figures_in_the_debugger(
+    gms_fsm: CommandLine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
+    register(new("figure"))
+    Path("own.toml").write_text(OPEN_LOOP)
+    monkeypatch.setattr("sys.stdin", io.StringIO("plot a.new\nplot a.bmp\nquit\n"))
+    done = gms_fsm("debug", "own.toml")
+    assert "written to a.new" in done.out
+    assert ".png, .svg, .pdf for a figure or .new for" in done.out
+    assert Path("a.new").read_text() == "Figure"
+
+
+def test_a_new_format_of_animations(gms_fsm: CommandLine, trace: Trace) -> None:
+    pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
+    pytest.importorskip("pygraphviz", reason="charts need Graphviz, extra 'render'")
+    count = new("animation", kind="an animation", write=lambda m: b"%d" % len(list(m.pictures())))
+    register(count)
+    trace.save("t.npz")
+    assert gms_fsm("animate", "t.npz", "-o", "a.new", "--frames", "3").out == "a.new\n"
+    assert Path("a.new").read_text() == "3"
+    assert ".gif or .new" in gms_fsm("animate", "--help").out
+    one_message(gms_fsm("animate", "t.npz", "-o", "a.mp4"), "it must end in", ".new")
+
+
+def test_a_new_format_of_pages(gms_fsm: CommandLine, trace: Trace) -> None:
+    pytest.importorskip("uplot", reason="the page needs the extra 'replay'")
+    pytest.importorskip("pygraphviz", reason="charts need Graphviz, extra 'render'")
+    register(new("page"))
+    trace.save("t.npz")
+    assert gms_fsm("replay", "t.npz", "-o", "a.new").out == "a.new\n"
+    assert Path("a.new").read_text() == "Replay"
+    assert ".new" in gms_fsm("replay", "--help").out
+    one_message(gms_fsm("replay", "t.npz", "-o", "a.txt"), "it must end in", ".html", ".new")
+
+
+def test_a_usual_format_is_written_where_nobody_chooses(gms_fsm: CommandLine, trace: Trace) -> None:
+    pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
+    register(new("figure", usual=True))
+    trace.save("t.npz")
+    assert gms_fsm("plot", "t.npz", "-o", "out").code == 0
+    Path("own.toml").write_text(OPEN_LOOP.replace("figures = []\n", ""))
+    assert gms_fsm("run", "own.toml", "-o", "ran").code == 0
+    assert Path("ran/overview.new").read_text() == "Figure"
+    assert Path("out/ribbons.new").read_text() == "Figure"
+
+
+def test_what_a_format_lacks_is_said_and_a_graph_is_written_as_text(tmp_path: Path) -> None:
+    def write(_: object) -> bytes:
+        raise MissingExtraError("the writer is away")
+
+    register(new("graph", write=write, extra="render"))
+    with pytest.warns(UserWarning, match="charts are written as DOT text: the writer is away"):
+        path = plots.render(plots.statechart(LUGRE), tmp_path / "a.new")
+    assert path == tmp_path / "a.dot"
+    assert "digraph" in path.read_text()
+
+
+# --------------------------------------------------------------------------- wrong rows
+def test_a_format_is_registered_once() -> None:
+    register(new("figure"))
+    register(new("page"))
+    with pytest.raises(ParameterError, match=r"there is a format \.new of the subject 'page'"):
+        register(new("page"))
+
+
+@pytest.mark.parametrize("ending", ["", "new", ".", ".New", ".a.b", " .a", 5])
+def test_an_ending_is_a_dot_and_small_letters(ending: Any) -> None:
+    with pytest.raises(ParameterError, match=re.escape(f"ending is {ending!r}; it must be a dot")):
+        new("figure", ending=ending)
+
+
+def test_subject_and_extra_are_known_ones() -> None:
+    with pytest.raises(ParameterError, match=r"subject is 'film'; it must be one of 'graph', "):
+        new("film")  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match=r"extra is 'fats'; it must be one of '', 'plots', "):
+        new("figure", extra="fats")
+
+
+# --------------------------------------------------------------------------- no second list
+KNOWN = {word for each in FORMATS for word in (each.ending, each.ending[1:])}
+MENTIONED = re.compile(rf"(?<![\w.])({'|'.join(re.escape(e.ending) for e in FORMATS)})(?!\w)")
+
+
+def lists_of_endings(text: str) -> Iterator[str]:
+    """Yield the places of a module's code that name several endings, docstrings too."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            if len(set(MENTIONED.findall(node.value))) > 1:
+                yield f"line {node.lineno}: {node.value[:60]!r}"
+        elif isinstance(node, ast.Tuple | ast.List | ast.Set | ast.Dict):
+            parts = node.keys if isinstance(node, ast.Dict) else node.elts
+            named = {p.value for p in parts if isinstance(p, ast.Constant)}
+            if len(named & KNOWN) > 1:
+                yield f"line {node.lineno}: {sorted(named & KNOWN)}"
+
+
+@pytest.mark.parametrize(
+    "path",
+    [p for room in ("gms_fsm", "plots") for p in sorted((ROOT / room).rglob("*.py"))],
+    ids=lambda path: str(path.relative_to(ROOT)),
+)
+def test_nobody_else_lists_endings(path: Path) -> None:
+    found = list(lists_of_endings(path.read_text(encoding="utf-8")))
+    assert bool(found) == (path == ROOT / "plots" / "formats.py"), found
+
+
+def test_a_list_is_found() -> None:
+    assert list(lists_of_endings('x = ("png", 1, "svg")'))
+    assert list(lists_of_endings('x = {".png": 1, ".svg": 2}'))
+    assert list(lists_of_endings('x = f"ends in .png or .pdf{y}"'))
+    assert list(lists_of_endings('"""Ends in ``.png``, ``.svg``."""'))
+    assert not list(lists_of_endings('x = "a.png", "b.png", ".png", "svg"[0]'))
+
+
+def test_pages_name_endings_that_are_there() -> None:
+    pages = [*(ROOT / "docs").rglob("*.md"), ROOT / "README.md"]
+    said = [
+        ending
+        for page in pages
+        for listed in re.findall(r"# or ((?:\.\w+(?:, )?)+)", page.read_text(encoding="utf-8"))
+        for ending in listed.split(", ")
+    ]
+    assert len(said) > 4
+    assert set(said) <= set(formats.endings(*SUBJECTS))

@@ -1,0 +1,322 @@
+"""A live chart shows a row of the run: what is active, what could fire, what fired last.
+
+The claim is checked on the SVG that is handed out, against `explain` and the log: one active state
+an element, marks on the edges that leave it and on no others, the last edge of the log thick. One
+layout serves all frames.
+"""
+
+from __future__ import annotations
+
+import math
+import shutil
+import sys
+from functools import cache
+from xml.etree import ElementTree
+
+import pytest
+
+import plots.live_chart
+from gms_fsm import LuGre, Prescribed, Stribeck, Trace, simulate
+from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
+from gms_fsm.inspection.explain import explain, explain_state, values_at
+from gms_fsm.systems.models import ChartModel
+from plots.live_chart import LiveChart, live_statechart
+from plots.style import CHART_THEMES
+from tests.helpers import one_element, open_loop, stick_slip
+from tests.plots.test_statechart_shows_the_whole_chart import FIVE_STATES, THREE_STATES
+
+CURVE = Stribeck(1.0, 1.5, 0.05)
+NAMES = ("bank", "one", "lugre", "three states", "five states", "wanted times")
+
+Group = ElementTree.Element
+
+
+@pytest.fixture(autouse=True)
+def _graphviz() -> None:
+    if shutil.which("dot") is None:
+        pytest.importorskip("pygraphviz", reason="drawing needs Graphviz, program or package")
+
+
+@cache
+def run(name: str) -> Trace:
+    if name == "bank":
+        return simulate(stick_slip("signed"), open_loop(), 45.0)
+    if name == "wanted times":
+        log = run("bank").transitions
+        return run("bank").sample(sorted({0.0, *log.t.tolist(), 10.0, 44.0}))
+    if name == "one":
+        return simulate(one_element("published"), open_loop(), 45.0)
+    if name == "lugre":
+        lugre = LuGre(sigma_0=1.0, sigma_1=0.1, sigma_2=0.4, stribeck=CURVE)
+        return simulate(lugre, open_loop(), 5.0)
+    chart, n = (THREE_STATES, 3) if name == "three states" else (FIVE_STATES, 1)
+    model = ChartModel(chart, {"k": 0.5, "v_c": 1e-3, "v_hi": 0.25}, n=n, stribeck=CURVE)
+    return simulate(model, Prescribed("0.3*sin(2*pi*t/17)"), 40.0)
+
+
+@cache
+def live(name: str) -> LiveChart:
+    return LiveChart(run(name))
+
+
+def groups(svg: str) -> dict[str, Group]:
+    root = ElementTree.fromstring(svg.replace(' xmlns="http://www.w3.org/2000/svg"', ""))
+    return {group.get("id", ""): group for group in root.iter("g")}
+
+
+def classes(group: Group) -> set[str]:
+    return set(group.get("class", "").split())
+
+
+def marks(guard: Group) -> list[str]:
+    """The marks that can be seen on an edge."""
+    return [
+        text.text or ""
+        for text in guard.iter("text")
+        if "mark" in classes(text) and text.get("visibility") != "hidden"
+    ]
+
+
+def last_fired(trace: Trace, row: int, element: int) -> str:
+    """Replay the log up to a row."""
+    edge, at_once = "", 0
+    steps = trace.microstep[trace.t == trace.t[row]].any()
+    for record in trace.transitions:
+        if record.t == trace.t[row]:
+            at_once += 1
+            if steps and at_once > trace.microstep[row]:
+                break
+        if record.t > trace.t[row]:
+            break
+        if record.element == element:
+            edge = str(record.edge)
+    return edge
+
+
+def some_rows(trace: Trace) -> list[int]:
+    """Every row around a firing, and some between."""
+    near = {
+        row + step
+        for row in range(len(trace))
+        if trace.microstep[row]
+        for step in (-1, 0, 1)
+        if row + step < len(trace)
+    }
+    return sorted({0, len(trace) - 1, *range(0, len(trace), 25), *near})[:150]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_look_is_what_the_log_and_the_explanation_say(name: str) -> None:
+    trace, chart = run(name), live(name)
+    edges = {edge.name: edge for edge in trace.model.chart.transitions}
+    fired_rows = 0
+    for row in range(len(trace)):
+        for look in chart.look(row):
+            i = look.element
+            assert look.active == trace.states[row, i]
+            assert look.fired == last_fired(trace, row, i)
+            assert not look.fired or edges[look.fired].target == look.active
+            here = explain_state(trace.model.chart, look.active, values_at(trace, row, i))
+            expected = {e.edge.name: tuple(c.holds for c in e.clauses) for e in here}
+            assert look.leaving == tuple(expected)
+            then = explain(trace, row, i)
+            taken = [e for e in then if e.fired]
+            fired_rows += len(taken)
+            if not taken:
+                assert expected == {e.edge.name: tuple(c.holds for c in e.clauses) for e in then}
+            for e in taken:
+                assert e.edge.name == look.fired
+                assert e.holds
+                expected[look.fired] = tuple(c.holds for c in e.clauses)
+            assert look.marks == expected
+    if name != "wanted times":
+        assert fired_rows == len(trace.transitions)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_svg_shows_the_look(name: str) -> None:
+    trace, chart = run(name), live(name)
+    colours = CHART_THEMES["light"]
+    for row in some_rows(trace):
+        drawn = groups(chart.frame(row))
+        for look in chart.look(row):
+            element = f"element{look.element + 1}"
+            for state in trace.model.chart.states:
+                group = drawn[f"{element}-state-{state.name}"]
+                active = state.name == look.active
+                assert ("active" in classes(group)) == active
+                borders = [s.get("stroke-width") for s in group.iter() if s.get("fill") == "none"]
+                assert borders == ["3" if active else "1"]
+                (dot,) = (text for text in group.iter("text") if "●" in (text.text or ""))
+                assert (dot.get("visibility") == "visible") == active
+            for edge in trace.model.chart.transitions:
+                guard = drawn[f"{element}-guard-{edge.name}"]
+                halves = [drawn[f"{element}-edge-{edge.name}-{half}"] for half in (1, 2)]
+                expected = [{True: "✓", False: "✗"}[m] for m in look.marks.get(edge.name, ())]  # type: ignore[index]
+                assert marks(guard) == expected
+                fired, leaving = edge.name == look.fired, edge.name in look.leaving
+                pale = not fired and not leaving
+                for group in (guard, *halves):
+                    assert ("fired" in classes(group)) == fired
+                    assert ("leaving" in classes(group)) == leaving
+                colour = colours.fired if fired else colours.ink if leaving else colours.pale
+                lines = [s for half in halves for s in half.iter() if s.get("stroke-width")]
+                assert {s.get("stroke") for s in lines} == {colour}
+                assert {s.get("stroke-width") for s in lines} == {"2.6" if fired else "1.1"}
+                shown = [t for t in guard.iter("text") if t.get("visibility") != "hidden"]
+                assert pale == ({t.get("fill") for t in shown} == {colours.pale})
+
+
+def test_a_frame_depends_on_its_row_only() -> None:
+    chart = LiveChart(run("bank"), values=True)
+    rows = some_rows(run("bank"))[:20]
+    forward = [chart.frame(row) for row in rows]
+    backward = [chart.frame(row) for row in reversed(rows)]
+    assert forward == backward[::-1]
+    assert chart.frame(-1) == chart.frame(len(run("bank")) - 1)
+
+
+def test_one_layout_serves_all_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = []
+    real = plots.live_chart.picture
+
+    def counted(*arguments: object) -> bytes:
+        calls.append(arguments)
+        return real(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(plots.live_chart, "picture", counted)
+    chart = LiveChart(run("bank"))
+    for row in range(len(run("bank"))):
+        chart.frame(row)
+    assert len(calls) == 1
+
+
+def test_texts_do_not_move_between_frames() -> None:
+    chart, trace = live("three states"), run("three states")
+
+    def places(row: int) -> list[tuple[str | None, str | None]]:
+        return [(t.get("x"), t.get("y")) for t in groups(chart.frame(row))["graph0"].iter("text")]
+
+    first = places(0)
+    assert all(places(row) == first for row in range(0, len(trace), 10))
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("notation", ["stateflow", "math"])
+@pytest.mark.parametrize("direction", ["TB", "LR"])
+def test_options(theme: str, notation: str, direction: str) -> None:
+    svg = live_statechart(
+        run("bank"), row=-1, elements=[2, 0], notation=notation, theme=theme, direction=direction
+    )
+    drawn = groups(svg)
+    assert not drawn["graph0"].findall("text")
+    assert {"element1", "element3"} <= set(drawn)
+    assert "element2" not in drawn
+    assert ("s(v)" in svg) == (notation == "math")
+    assert CHART_THEMES[theme].active in svg
+
+
+def test_values_are_those_of_the_row() -> None:
+    trace = run("bank")
+    chart = LiveChart(trace, values=True)
+    for row in (0, 50, len(trace) - 1):
+        drawn = groups(chart.frame(row))
+        for i in range(trace.n):
+            texts = [t.text or "" for t in drawn[f"element{i + 1}"].findall("text")]
+            shown = dict(part.split(" = ") for part in texts[2].replace("\xa0", " ").split("   "))
+            for name, column in (("z", trace.z[:, i]), ("v", trace.v), ("s", trace.s[:, i])):
+                assert float(shown[name]) == pytest.approx(column[row], rel=1e-3, abs=1e-300)
+        (foot,) = drawn["graph0"].findall("text")
+        assert foot.text == f"t = {trace.t[row]:.6g} s"
+    one = groups(LiveChart(run("five states"), values=True).frame(3))
+    texts = [t.text or "" for t in one["graph0"].findall("text")]
+    assert [text.split()[0] for text in texts] == ["z", "s", "t"]  # z w v, s, t
+
+
+def test_at_is_the_last_row_at_or_before_a_time() -> None:
+    trace, chart = run("bank"), live("bank")
+    for row in range(len(trace)):
+        found = chart.at(float(trace.t[row]))
+        assert found >= row
+        assert trace.t[found] == trace.t[row]
+        after = chart.at(min(float(trace.t[row]) + 1e-9, float(trace.t[-1])))
+        assert after >= found
+    assert live_statechart(trace, t=20.0) == chart.frame(chart.at(20.0))
+    mixed = trace.sample([30.0, 10.0, 20.0])
+    assert LiveChart(mixed).at(25.0) == 2
+
+
+@pytest.mark.parametrize("t", [-0.1, 45.1, math.nan, math.inf])
+def test_a_time_outside_is_refused(t: float) -> None:
+    with pytest.raises(ParameterError, match=r"t is .* within the run, 0 to 45 s"):
+        live("bank").at(t)
+
+
+def test_wrong_options_are_refused() -> None:
+    trace = run("bank")
+    with pytest.raises(ParameterError, match=r"elements is \[4\].*the run has 4, counted from 0"):
+        LiveChart(trace, [4])
+    with pytest.raises(ParameterError, match="elements is 5"):
+        LiveChart(trace, 5)
+    with pytest.raises(ParameterError, match=r"'latex'.*'stateflow' or 'math'"):
+        LiveChart(trace, notation="latex")
+    with pytest.raises(ParameterError, match=r"'grey'.*'light' or 'dark'"):
+        LiveChart(trace, theme="grey")
+    with pytest.raises(ParameterError, match="row is None and t is None; give exactly one"):
+        live_statechart(trace)
+    with pytest.raises(ParameterError, match="give exactly one"):
+        live_statechart(trace, row=0, t=0.0)
+    for row in (len(trace), -len(trace) - 1):
+        with pytest.raises(IndexError, match=f"row {row}: the trace has"):
+            live("bank").look(row)
+
+
+def test_without_graphviz_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.modules["plots.render"], "drawn", lambda *_: None)
+    with pytest.raises(
+        MissingExtraError, match=r"Graphviz, .* pip install .*\[render\].* program dot"
+    ):
+        LiveChart(run("one"))
+
+
+def test_a_graphviz_that_writes_other_texts_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = plots.live_chart.picture
+
+    def other(graph: object, form: str) -> bytes:
+        return real(graph, form).replace(b"<text", b"<tspan", 1).replace(b"</text", b"</tspan", 1)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(plots.live_chart, "picture", other)
+    with pytest.raises(OutputError, match="cannot be used for live charts"):
+        LiveChart(run("one"))
+
+
+def test_program_and_package_give_the_same_look(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pygraphviz", reason="pygraphviz is the optional extra 'render'")
+    by_program = groups(LiveChart(run("bank"), values=True).frame(40))
+    monkeypatch.setenv("PATH", "")
+    by_package = groups(LiveChart(run("bank"), values=True).frame(40))
+    for name, group in by_program.items():
+        assert classes(group) == classes(by_package[name])
+        assert [t.text for t in group.findall("text")] == [
+            t.text for t in by_package[name].findall("text")
+        ]
+
+
+def test_a_guard_that_cannot_be_computed_is_marked_so() -> None:
+    from gms_fsm.charts.chart import Chart, State, Transition
+
+    chart = Chart(
+        "division",
+        inputs=("v",),
+        variables=("z",),
+        parameters=(),
+        states=(State("a", flow={"z": "1"}), State("b", flow={"z": "0"})),
+        transitions=(Transition("ab", "a", "b", guard="z > 9 and 1 / v > 2"),),
+        outputs={"F": "z"},
+    )
+    trace = simulate(ChartModel(chart, {}, n=1, stribeck=CURVE), Prescribed("1"), 1.0)
+    shown = LiveChart(trace)
+    assert shown.look(0)[0].marks == {"ab": (False, False)}
+    trace.__dict__["_observed"] = {**trace._observed, "v": 0.0 * trace.v}  # a cached property
+    assert shown.look(0)[0].marks == {"ab": (False, None)}
+    assert marks(groups(shown.frame(0))["element1-guard-ab"]) == ["✗", "?"]

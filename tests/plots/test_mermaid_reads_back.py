@@ -1,0 +1,184 @@
+"""The Mermaid text of a chart is read back by Mermaid's own parser as the very same chart.
+
+Mermaid runs in node. ``GMS_FSM_MERMAID`` names a folder where it is installed, or will be by the
+first run: 180 MB are not fetched unasked.
+"""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import gms_fsm.charts.chart
+from gms_fsm.charts import GMS_ELEMENT, LUGRE
+from gms_fsm.charts.chart import Chart, State, Transition
+from gms_fsm.language import MATLAB_LIKE, spell
+from plots.mermaid import mermaid
+from tests.plots.test_statechart_options import HOSTILE
+from tests.plots.test_statechart_shows_the_whole_chart import FIVE_STATES, THREE_STATES
+
+WORDS = Chart(
+    name="---\nwords of Mermaid: %% {} <br/>",
+    inputs=("v", "s"),
+    variables=("style", "classDef"),
+    parameters=("note", "direction"),
+    states=tuple(
+        State(name, flow={"style": "v * note", "classDef": "-v"}, entry={"style": "0"})
+        for name in ("end", "note_", "stateDiagram", "click", "linkStyle", "choice")
+    ),
+    transitions=(
+        Transition("fork", "end", "note_", guard="style > s and v < -direction"),
+        Transition("join", "note_", "note_", guard="v < 0 or v > 0", actions={"style": "-style"}),
+    ),
+    outputs={"F": "style"},
+)
+CHARTS = [*GMS_ELEMENT.values(), LUGRE, THREE_STATES, FIVE_STATES, HOSTILE, WORDS]
+PACKAGES = ("mermaid@11", "jsdom@26")  # mermaid cleans texts with a DOM, which node has not
+
+READER = """
+import { JSDOM } from 'jsdom';
+const { window } = new JSDOM('');
+globalThis.window = window;
+globalThis.document = window.document;
+const { default: mermaid } = await import('mermaid');
+let text = '';
+for await (const part of process.stdin) text += part;
+const found = [];
+for (const source of JSON.parse(text)) {
+  const { diagramType } = await mermaid.parse(source);
+  const diagram = await mermaid.mermaidAPI.getDiagramFromText(source);
+  const states = {};
+  for (const [id, state] of diagram.db.getStates()) states[id] = state.descriptions;
+  const edges = diagram.db.getRelations().map((e) => [e.id1, e.id2, e.relationTitle ?? '']);
+  found.push({ diagramType, states, edges });
+}
+console.log(JSON.stringify(found));
+"""
+
+
+def parsed(texts: list[str]) -> list[dict[str, Any]]:
+    """Hand texts to Mermaid."""
+    folder = os.environ.get("GMS_FSM_MERMAID")
+    if not folder:
+        pytest.skip("GMS_FSM_MERMAID names no folder for Mermaid's own parser")
+    node, npm = shutil.which("node"), shutil.which("npm")
+    if node is None:
+        pytest.skip("Mermaid's own parser needs node on PATH")
+    modules = Path(folder, "node_modules")
+    if not (modules / "mermaid").is_dir() or not (modules / "jsdom").is_dir():
+        if npm is None:
+            pytest.skip(f"{folder} has no mermaid and jsdom, and there is no npm to install them")
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        command = [npm, "install", "--no-audit", "--no-fund", "--prefix", folder, *PACKAGES]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+        if done.returncode != 0:
+            pytest.skip(f"npm could not install mermaid: {done.stderr.strip()[-300:]}")
+    reader = Path(folder, "reader.mjs")
+    reader.write_text(READER, encoding="utf-8")
+    done = subprocess.run(
+        [node, str(reader)],
+        input=json.dumps(texts),
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+        encoding="utf-8",
+    )
+    assert done.returncode == 0, done.stderr
+    found: list[dict[str, Any]] = json.loads(done.stdout)
+    return found
+
+
+def shown(text: str) -> str:
+    """Decode a text as Mermaid does when it draws it."""
+    return html.unescape(text.replace("ﬂ°°", "&#").replace("ﬂ°", "&").replace("¶ß", ";")).strip()
+
+
+def printable(text: str) -> str:
+    return "".join(c if c.isprintable() else " " for c in text)
+
+
+def expected(chart: Chart) -> tuple[list[list[str]], list[tuple[int, int, str]]]:
+    states = []
+    for state in chart.states:
+        lines = [state.name[0].upper() + state.name[1:]]
+        flow = {f"d{v}": chart.flows[state.name, v] for v in chart.variables}
+        for kind, trees in (
+            ("entry", chart.assignments["entry", state.name]),
+            ("during", flow),
+            ("exit", chart.assignments["exit", state.name]),
+        ):
+            lines += [f"{kind}: {n} = {spell(tree, MATLAB_LIKE)};" for n, tree in trees.items()]
+        states.append([printable(line) for line in lines])
+    edges = []
+    for state in chart.states:
+        for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
+            trees = chart.assignments["action", edge.name]
+            action = " ".join(f"{n} = {spell(tree, MATLAB_LIKE)};" for n, tree in trees.items())
+            label = f"{priority} [{chart.guard_text(edge.name)}]"
+            label += f" {{{action}}}" if action else ""
+            ends = (chart.state_index(edge.source), chart.state_index(edge.target))
+            edges.append((*ends, printable(label)))
+    return states, edges
+
+
+@pytest.fixture
+def hostile(monkeypatch: pytest.MonkeyPatch) -> Chart:
+    """A chart with names that no chart would take."""
+    monkeypatch.setattr(gms_fsm.charts.chart, "_check_name", lambda *_: None)
+    bad = 'a"\n[*] --> evil: <b>&#x41;; %%{init}%% \u2028 --'
+    return Chart(
+        name=bad,
+        inputs=("v",),
+        variables=("v" + bad,),
+        parameters=(),
+        states=(State(bad, flow={"v" + bad: "v"}),),
+        transitions=(Transition("e" + bad, bad, bad, guard="v > 0"),),
+        outputs={"F": "v"},
+    )
+
+
+def test_mermaid_itself_reads_the_same_chart(hostile: Chart) -> None:
+    """One call for all charts: starting node takes longer than reading them."""
+    charts = [*CHARTS, hostile]
+    for chart, found in zip(charts, parsed([mermaid(c) for c in charts]), strict=True):
+        assert found["diagramType"] == "stateDiagram"
+        states, edges = expected(chart)
+        ids = [
+            f"s{i}_{re.sub('[^A-Za-z0-9_]', '_', s.name)}" for i, s in enumerate(chart.states, 1)
+        ]
+        assert set(found["states"]) == {*ids, "root_start"}
+        for own, state in zip(ids, states, strict=True):
+            assert [shown(line) for line in found["states"][own]] == state
+        first, *rest = found["edges"]
+        assert first == ["root_start", ids[0], ""]
+        assert [(ids.index(a), ids.index(b), shown(text)) for a, b, text in rest] == edges
+
+
+@pytest.mark.parametrize("chart", CHARTS, ids=lambda chart: chart.states[0].name)
+def test_what_mermaid_could_misread_is_a_code(chart: Chart) -> None:
+    head, body = mermaid(chart).split("stateDiagram-v2\n")
+    assert head.startswith('---\ntitle: "')
+    assert head.count("\n") == 3
+    for line in body.splitlines():
+        text = line.partition(" : ")[2]
+        assert not re.search(r'[:;#<>&%{}"\\]', re.sub(r"#\d+;", "", text))
+        assert line.isprintable()
+    texts = html.unescape(re.sub(r"#(\d+);", r"&#\1;", body))
+    states, edges = expected(chart)
+    for text in [line for state in states for line in state] + [e[2] for e in edges]:
+        assert text in texts
+
+
+def test_names_that_no_chart_would_take(hostile: Chart) -> None:
+    lines = mermaid(hostile).splitlines()
+    assert len(lines) == 8
+    assert not [line for line in lines[4:] if "evil:" in line or "%%" in line]

@@ -1,0 +1,128 @@
+"""A run's memory is its transition log: under 1,000 bytes a transition, and nothing for its steps.
+
+With ``output="end"`` nothing else grows, however long the run. Twenty thousand transitions here;
+tests/soak.py runs a million and looks at what the operating system says.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+import time
+import tracemalloc
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gms_fsm import Trace, simulate
+from tests.helpers import ROOT, open_loop, stick_slip
+
+BYTES_A_FIRING = 1000
+PERIOD, EACH_PERIOD = 20.0, 16  # of the sine [s]; four elements, four transitions each
+compiled = pytest.param(
+    "compiled",
+    20_000,
+    marks=pytest.mark.skipif(not importlib.util.find_spec("numba"), reason="needs extra fast"),
+)
+
+
+def run(engine: str, transitions: int, **options: float) -> Trace:
+    """Run so many periods that at least so many transitions fire; keep the end only."""
+    periods = -(-transitions // EACH_PERIOD) + 1
+    return simulate(
+        stick_slip("signed"),
+        open_loop(),
+        periods * PERIOD + 1.0,
+        engine=engine,
+        output="end",
+        **options,
+    )
+
+
+def peak(engine: str, transitions: int, **options: float) -> tuple[int, Trace]:
+    """Return the most memory [bytes] that Python and NumPy held, and the run."""
+    tracemalloc.start()
+    try:
+        trace = run(engine, transitions, **options)
+        return tracemalloc.get_traced_memory()[1], trace
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize(("engine", "transitions"), [compiled, ("ifelse", 800), ("machines", 400)])
+def test_memory_grows_with_the_log_only(engine: str, transitions: int) -> None:
+    run(engine, EACH_PERIOD)  # what is loaded once does not count
+    few, first = peak(engine, transitions // 4)
+    many, second = peak(engine, transitions)
+    assert len(second.transitions) >= transitions
+    assert len(second) == 1
+    more = len(second.transitions) - len(first.transitions)
+    assert (many - few) / more < BYTES_A_FIRING
+
+
+@pytest.mark.parametrize("engine", [pytest.param("compiled", marks=compiled.marks), "ifelse"])
+def test_ten_times_the_steps_take_no_more_memory(engine: str) -> None:
+    run(engine, EACH_PERIOD)
+    few, first = peak(engine, 64)
+    many, second = peak(engine, 64, max_step=0.02)  # tens of thousands of steps, a few times more
+    assert len(first.transitions) == len(second.transitions)
+    assert many < few + 100_000
+
+
+@pytest.mark.parametrize(("engine", "transitions"), [compiled, ("ifelse", 2000)])
+def test_every_period_is_like_the_last(engine: str, transitions: int) -> None:
+    """Late transitions are as good as early ones: same order, same phase, same values."""
+    log = run(engine, transitions).transitions
+    first, last = log[EACH_PERIOD : 2 * EACH_PERIOD], log[-EACH_PERIOD:]
+    assert first.edge.tolist() == last.edge.tolist()
+    assert first.element.tolist() == last.element.tolist()
+    for name, most in (("z", 1e-4), ("F_before", 1e-3)):
+        np.testing.assert_allclose(first[name], last[name], rtol=0, atol=most)
+    phase = np.sort((last.t - first.t + PERIOD / 2) % PERIOD - PERIOD / 2)
+    assert np.abs(phase).max() < 1e-3
+
+
+# --------------------------------------------------------------------------- in a process alone
+@dataclass(frozen=True)
+class Figures:
+    """What a run took."""
+
+    transitions: int
+    seconds: float
+    peak: int  # bytes, of the whole process
+
+
+def in_a_child(engine: str, transitions: int) -> Figures:
+    """Run in a process of its own and ask the operating system what it used."""
+    code = f"from {__name__} import measured; measured({engine!r}, {transitions})"
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+    )
+    count, seconds, most = done.stdout.split()
+    return Figures(int(count), float(seconds), int(most))
+
+
+def measured(engine: str, transitions: int) -> None:
+    """Run, then print transitions, seconds and the peak of memory in bytes."""
+    run(engine, EACH_PERIOD)
+    began = time.perf_counter()
+    trace = run(engine, transitions)
+    seconds = time.perf_counter() - began
+    with Path("/proc/self/status").open() as file:  # the child's own, not what it was forked from
+        (line,) = [line for line in file if line.startswith("VmHWM")]
+    print(len(trace.transitions), seconds, 1024 * int(line.split()[1]))
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
+def test_the_operating_system_agrees() -> None:
+    few, many = in_a_child("ifelse", 64), in_a_child("ifelse", 1600)
+    assert many.transitions >= 1600
+    # Pages come in fours of kilobytes and heaps in more: a megabyte is within the noise.
+    assert many.peak - few.peak < BYTES_A_FIRING * many.transitions + 2**21

@@ -1,0 +1,237 @@
+"""A run interrupted anywhere and continued from its checkpoint equals the run left alone."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.integrate
+
+from gms_fsm import ElementMachines, Prescribed, Trace, simulate
+from gms_fsm.app.report import run_scenario
+from gms_fsm.app.scenario import load_scenario
+from gms_fsm.errors import CheckpointError, OutputError, ParameterError
+from gms_fsm.run._checkpoint import Keeper
+from tests.helpers import ROOT, open_loop, pulled_mass, same_bits, stick_slip
+
+ENGINES = [
+    "machines",
+    "ifelse",
+    pytest.param(
+        "compiled",
+        marks=pytest.mark.skipif(
+            not __import__("importlib.util").util.find_spec("numba"), reason="needs the extra fast"
+        ),
+    ),
+]
+
+
+class Interrupted(Exception):
+    """Stands for a lost machine."""
+
+
+def interrupted(path: Path, after: int, *arguments: Any, **options: Any) -> Trace | None:
+    """Run until the progress has been told `after` times; None if it was interrupted there."""
+    told = itertools.count(1)
+
+    def stop(_: object) -> None:
+        if next(told) == after:
+            raise Interrupted
+
+    try:
+        return simulate(*arguments, **options, checkpoint=path, checkpoint_every=0.0, progress=stop)
+    except Interrupted:
+        return None
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"t_eval": np.linspace(0, 25, 333)},
+        {"output": "end"},
+        {"method": "rk4", "step": 0.0101},
+        {"events": "step", "max_step": 0.05},
+    ],
+    ids=["all", "t_eval", "end", "rk4", "step"],
+)
+def test_interrupted_again_and_again(
+    engine: str, options: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gms_fsm.run._compiled_run.STEPS_AT_ONCE", 60)
+    model, rig = pulled_mass()
+    whole = simulate(model, rig, 25.0, engine=engine, **options)
+    path, rounds, trace = tmp_path / "run.checkpoint", 0, None
+    while trace is None:
+        rounds += 1
+        trace = interrupted(
+            path, 3 if engine == "compiled" else 17, model, rig, 25.0, engine=engine, **options
+        )
+    assert rounds > 1
+    assert not path.exists()
+    same_bits(trace, whole)
+    np.testing.assert_array_equal(trace.stops.y, whole.stops.y)
+
+
+@pytest.mark.parametrize("engine", ["machines", "compiled"])
+def test_machines_of_ones_own_go_on_in_their_states(engine: str, tmp_path: Path) -> None:
+    if engine == "compiled":
+        pytest.importorskip("numba", reason="needs the extra fast")
+    model = stick_slip("signed")
+    fired: list[str] = []
+
+    def machines() -> ElementMachines:
+        made = ElementMachines(model)
+        made.machine.on_enter_slip(lambda event: fired.append(event.transition.dest))
+        made.machine.on_enter_stick(lambda event: fired.append(event.transition.dest))
+        return made
+
+    arguments = model, open_loop(), 25.0
+    path = tmp_path / "run.checkpoint"
+    while interrupted(path, 9, *arguments, engine=engine, machines=machines()) is None:
+        pass
+    made = machines()
+    whole = simulate(*arguments)
+    assert fired == whole.transitions.target.tolist()
+    assert made.elements[0].state == "stick"
+
+
+def test_a_killed_process_goes_on(tmp_path: Path) -> None:
+    """SIGKILL at some moment; the next process ends with the bits of an undisturbed run."""
+    script = tmp_path / "long.py"
+    script.write_text(
+        textwrap.dedent(
+            """
+            import sys, time
+            from gms_fsm import simulate
+            from tests.helpers import pulled_mass
+            trace = simulate(*pulled_mass(), 40.0, checkpoint="long.checkpoint",
+                             checkpoint_every=0.0, progress=lambda _: time.sleep(1e-3))
+            trace.save("long.npz")
+            """
+        )
+    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, str(script)]
+    child = subprocess.Popen(command, cwd=tmp_path, env=environment)
+    while not (tmp_path / "long.checkpoint").exists():
+        time.sleep(0.01)
+    time.sleep(0.3)
+    child.send_signal(signal.SIGKILL)
+    child.wait()
+    assert (tmp_path / "long.checkpoint").exists()
+    assert not (tmp_path / "long.npz").exists()
+    subprocess.run(command, cwd=tmp_path, env=environment, check=True)
+    same_bits(Trace.load(tmp_path / "long.npz"), simulate(*pulled_mass(), 40.0))
+    assert not (tmp_path / "long.checkpoint").exists()
+
+
+def begun(path: Path) -> None:
+    assert interrupted(path, 5, stick_slip("signed"), open_loop(), 25.0) is None
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"rtol": 1e-7}, "another"),
+        ({"t_end": 26.0}, "another"),
+        ({"output": "end"}, "another"),
+        ({"model": stick_slip("published")}, "another"),
+        ({"rig": Prescribed("0.2")}, "another"),
+        ({"initial": {"x": 1.0}}, "another"),
+    ],
+)
+def test_a_checkpoint_of_another_run_is_refused(
+    change: dict[str, Any], words: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.checkpoint"
+    begun(path)
+    before = path.read_bytes()
+    arguments = {"model": stick_slip("signed"), "rig": open_loop(), "t_end": 25.0} | change
+    with pytest.raises(CheckpointError, match=words) as caught:
+        simulate(**arguments, checkpoint=path)
+    assert "remove it" in str(caught.value)
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("damage", ["cut", "text", "empty", "npz"])
+def test_a_damaged_checkpoint_is_refused(damage: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.checkpoint"
+    begun(path)
+    if damage == "npz":
+        with path.open("wb") as file:
+            np.savez(file, a=np.zeros(3))
+    else:
+        data = {"cut": path.read_bytes()[:500], "text": b"hello", "empty": b""}[damage]
+        path.write_bytes(data)
+    with pytest.raises(CheckpointError, match="damaged"):
+        simulate(stick_slip("signed"), open_loop(), 25.0, checkpoint=path)
+
+
+def test_a_scipy_solver_cannot_be_kept(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="history"):
+        simulate(
+            stick_slip("signed"),
+            open_loop(),
+            5.0,
+            method=scipy.integrate.Radau,
+            checkpoint=tmp_path / "run.checkpoint",
+        )
+
+
+def test_a_folder_that_is_not_there_is_said_before_the_run(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="cannot write"):
+        simulate(stick_slip("signed"), open_loop(), 5.0, checkpoint=tmp_path / "no" / "file")
+
+
+def test_it_is_written_as_often_as_asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    saved = []
+    save = Keeper.save
+    monkeypatch.setattr(Keeper, "save", lambda keeper: (saved.append(0), save(keeper))[1])
+    path = tmp_path / "run.checkpoint"
+    simulate(stick_slip("signed"), open_loop(), 25.0, checkpoint=path, checkpoint_every=1e6)
+    assert len(saved) == 1  # at the start
+
+
+def test_the_command_line_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`gms-fsm run --checkpoint`, interrupted, then the same command again."""
+    loaded = load_scenario(ROOT / "scenarios" / "pulled_mass.toml", [])
+    told = itertools.count(1)
+
+    def stop(_: object) -> None:
+        if next(told) == 30:
+            raise Interrupted
+
+    with pytest.raises(Interrupted):
+        run_scenario(loaded, tmp_path, stop, checkpoint=True)
+    assert (tmp_path / "run.checkpoint").exists()
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            "from gms_fsm.app.cli import main; main()",
+            "run",
+            str(loaded.path),
+            "-o",
+            str(tmp_path),
+            "--checkpoint",
+            "--set",
+            "output.figures=[]",
+        ],
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    assert not (tmp_path / "run.checkpoint").exists()
+    whole = simulate(loaded.model, loaded.rig, **loaded.arguments)
+    same_bits(Trace.load(tmp_path / "trace.npz"), whole)

@@ -1,0 +1,144 @@
+"""A run that gets nowhere ends in an error that says why, with all that was computed.
+
+Chattering a little slower than the clock's resolution kept millions of rows; a stiff run was silent
+for a minute; a trial set of parameters kept a fit busy for as long as it liked.
+"""
+
+import numpy as np
+import pytest
+from scipy.integrate import Radau
+
+from gms_fsm import (
+    GMS,
+    Chart,
+    ChartModel,
+    GMSParameters,
+    Prescribed,
+    Session,
+    State,
+    Stribeck,
+    Transition,
+    simulate,
+)
+from gms_fsm.errors import ParameterError
+from gms_fsm.traces.failures import LivelockError, StepLimitError
+from tests.helpers import ROOT, banging, pulled_mass
+
+ENGINES = ["machines", "ifelse", "compiled"]
+
+
+def stiff(C: float) -> GMS:
+    """One element whose deflection relaxes at the rate C / s."""
+    p = GMSParameters(
+        [4e6], [0], [C], sigma_2=250, stribeck=Stribeck(8, 9.5, 5e-4), v_c=7.3e-7, weights=[1 / 4e6]
+    )
+    return GMS(p, law="signed")
+
+
+def needs(engine):
+    if engine == "compiled":
+        pytest.importorskip("numba", reason="needs the extra fast")
+    return engine
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("gap", [1e-9, 1e-8, 1e-7])
+def test_chattering_below_the_tolerance_is_a_livelock(engine, gap):
+    """The state moves by less than the integrator can tell, a switch every 1e-9 of the time."""
+    with pytest.raises(LivelockError, match="chattering") as caught:
+        simulate(banging(gap), Prescribed("1"), 10.0, engine=needs(engine))
+    assert len(caught.value.trace.transitions) < 2000
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_fast_switching_that_goes_somewhere_is_none(engine):
+    """Some thousand switches a second, each by a step that is well above the tolerance."""
+    trace = simulate(banging(1e-3), Prescribed("1"), 2.0, engine=needs(engine))
+    assert len(trace.transitions) == 1000
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_switching_by_the_clock_is_none(engine):
+    """Guards of t alone, while nothing moves at all."""
+    chart = Chart(
+        "blinker",
+        inputs=("t",),
+        variables=("z",),
+        parameters=("w",),
+        states=(State("on", flow={"z": "0"}), State("off", flow={"z": "0"})),
+        transitions=(
+            Transition("a", "on", "off", guard="sin(w * t) < 0"),
+            Transition("b", "off", "on", guard="sin(w * t) > 0"),
+        ),
+        outputs={"F": "z"},
+    )
+    w = 2.0 * np.pi * 1000.0
+    trace = simulate(
+        ChartModel(chart, {"w": w}), Prescribed("0"), 2.0, engine=needs(engine), max_step=1e-4
+    )
+    assert len(trace.transitions) == pytest.approx(4000, abs=2)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_steps_of_a_run_are_limited(engine):
+    model, rig = pulled_mass()
+    with pytest.raises(StepLimitError, match="max_steps = 300 steps") as caught:
+        simulate(model, rig, 60.0, engine=needs(engine), max_steps=300)
+    part = caught.value.trace
+    assert 0.0 < part.t[-1] < 60.0
+    whole = simulate(model, rig, 60.0, engine=engine)
+    count = int(np.searchsorted(whole.t, part.t[-1], side="right"))
+    assert 100 < count < 400
+    assert np.array_equal(whole.z[: count - 1], part.z[: count - 1])
+    assert len(simulate(model, rig, 60.0, engine=engine, max_steps=100_000)) == len(whole)
+
+
+def test_scipys_steps_are_limited_too():
+    model, rig = pulled_mass()
+    with pytest.raises(StepLimitError, match="max_steps = 50 steps"):
+        simulate(model, rig, 60.0, method=Radau, max_steps=50)
+
+
+@pytest.mark.parametrize("given", [0, -3, 2.5, True, "many"])
+def test_what_is_no_number_of_steps_is_refused(given):
+    model, rig = pulled_mass()
+    with pytest.raises(ParameterError, match=r"max_steps is .* an integer, at least 1 step"):
+        simulate(model, rig, 1.0, max_steps=given)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_stiff_run_says_so_after_some_thousand_steps(engine):
+    """A rate of 1e8 /s allows steps of 4e-8 s: 3e8 of them for ten seconds."""
+    with pytest.raises(
+        StepLimitError, match=r"stiff: the flow has a rate of 8\.\d*e\+07 /s"
+    ) as caught:
+        simulate(stiff(200.0), Prescribed("1e-3*sin(t)"), 10.0, engine=needs(engine))
+    for part in ("Radau", "max_steps is 1000000", "kept in .trace"):
+        assert part in str(caught.value)
+    assert len(caught.value.trace) < 30_000
+
+
+def test_an_implicit_method_takes_it_in_its_stride():
+    trace = simulate(stiff(200.0), Prescribed("1e-3*sin(t)"), 10.0, method=Radau)
+    assert len(trace.transitions) > 4
+    assert len(trace) < 1000
+
+
+def test_a_mildly_stiff_run_that_can_end_ends():
+    trace = simulate(stiff(0.02), Prescribed("1e-3*sin(t)"), 2.0, engine="ifelse")
+    assert trace.t[-1] == 2.0
+    assert len(trace) > 5000
+
+
+def test_a_session_ends_with_the_same_words():
+    session = Session(stiff(200.0), Prescribed("1e-3*sin(t)"), 10.0, engine="ifelse")
+    session.proceed()
+    assert session.branch.failure.reason.startswith("stiff: the flow has a rate")
+
+
+def test_a_scenario_takes_the_limit():
+
+    from gms_fsm.app.scenario import load_scenario
+
+    path = ROOT / "scenarios" / "pulled_mass.toml"
+    assert load_scenario(path, ["run.max_steps=777"]).arguments["max_steps"] == 777

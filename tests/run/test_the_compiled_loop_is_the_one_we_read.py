@@ -1,0 +1,79 @@
+"""`integrators.loop.record`, run by Python over the compiled engine's arrays, gives the same rows.
+
+So the loop that fills the columns is right as it is read, whatever a compiler makes of it; that the
+compiler makes the same of it is the claim of test_compiled_is_bit_identical.py.
+"""
+
+import numpy as np
+import pytest
+
+import gms_fsm.lowering._compiled
+import integrators.compiled
+from gms_fsm import Slider, simulate
+from gms_fsm.traces.failures import LivelockError
+from integrators import loop
+from tests.helpers import one_element, open_loop, pulled_mass, stick_slip
+from tests.traces.test_monitors_see_what_happens import SLOWING, memoryless
+
+TIMES = np.linspace(0.0, 20.0, 41)
+
+
+@pytest.fixture
+def read(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let engine="compiled" run the text."""
+    module = gms_fsm.lowering._compiled
+    monkeypatch.setattr(module, "machine_code", lambda program, name: program.ieee[name])
+    monkeypatch.setattr(module, "store", lambda: None)
+    kernel = integrators.compiled
+    monkeypatch.setattr(kernel, "record", lambda arguments, store, tell: loop.record(*arguments))
+    monkeypatch.setattr(kernel, "_compiled_each_row", lambda store: kernel._each_row)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"output": "end"},
+        {"t_eval": TIMES},
+        {"method": "rk4", "step": 9.03e-3},
+        {"events": "step", "method": "heun", "step": 0.01},
+        {"max_step": 0.01},
+    ],
+    ids=["all", "end", "t_eval", "rk4", "step", "many rows"],
+)
+@pytest.mark.parametrize("case", ["open loop", "pulled mass"])
+def test_the_same_rows_and_the_same_log(case, options, read):
+    model, rig = (stick_slip("signed"), open_loop()) if case == "open loop" else pulled_mass()
+    ours = simulate(model, rig, 20.0, engine="compiled", **options)
+    theirs = simulate(model, rig, 20.0, engine="ifelse", **options)
+    assert len(theirs.transitions) > 2
+    for name in ("t", "microstep", "y", "mode"):
+        np.testing.assert_array_equal(getattr(ours.rows, name), getattr(theirs.rows, name))
+        np.testing.assert_array_equal(getattr(ours.stops, name), getattr(theirs.stops, name))
+    np.testing.assert_array_equal(ours.transitions, theirs.transitions)
+    for name in ("v", "F", "s", "F_elements", "dz"):
+        np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name))
+
+
+def test_it_slides_along_the_same_rows(read):
+    model = one_element("published", F_c=1.0, F_s=1.5, v_s=0.05, C=0.1, sigma=5.0, k=1.0)
+    start = {"z": [-2.5], "states": ["slip"], "v": 0.05}
+    runs = [
+        simulate(model, Slider(1.0, "-2.4 - 2*t"), 5.0, initial=start, engine=engine)
+        for engine in ("compiled", "ifelse")
+    ]
+    assert len(runs[0].sliding) == 1
+    for name in ("t", "microstep", "y", "mode"):
+        np.testing.assert_array_equal(*(getattr(run.rows, name) for run in runs))
+
+
+def test_what_ends_a_run_ends_it_at_the_same_place(read):
+    model, rig = memoryless([0.5, 0.4]), SLOWING
+    scenes = []
+    for engine in ("compiled", "ifelse"):
+        with pytest.raises(LivelockError) as caught:
+            simulate(model, rig, 10.0, engine=engine)
+        scenes.append((str(caught.value), caught.value.trace))
+    (text, ours), (same, theirs) = scenes
+    assert text == same
+    np.testing.assert_array_equal(ours.rows.y, theirs.rows.y)

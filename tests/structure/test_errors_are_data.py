@@ -1,0 +1,124 @@
+"""An error is its fields: the text is made from them, and no place in the code puts them together.
+
+Of raise sites that still hide an advice in the reason there may only be fewer.
+"""
+
+from __future__ import annotations
+
+import ast
+import copy
+import pickle
+from pathlib import Path
+
+import pytest
+
+import gms_fsm
+from gms_fsm import ExpressionError, GMSError, ParameterError, RecordError, simulate
+from gms_fsm.traces.failures import SimulationError
+from tests.helpers import ROOT, open_loop, stick_slip
+
+KINDS = [
+    each
+    for each in (getattr(gms_fsm, name) for name in gms_fsm.__all__)
+    if isinstance(each, type) and issubclass(each, GMSError)
+]
+PLAIN = [each for each in KINDS if not issubclass(each, ExpressionError | SimulationError)]
+HIDDEN = 0  # raise sites with "; " in the reason, by `_hiding`; this number may only shrink
+
+
+def _failed() -> SimulationError:
+    with pytest.raises(SimulationError) as caught:
+        simulate(stick_slip("signed"), open_loop(), 100.0, max_steps=50)
+    return caught.value
+
+
+def _made() -> list[GMSError]:
+    fields = {"place": "step", "value": -1.0, "advice": "leave it out"}
+    found: list[GMSError] = [each("it must be > 0", **fields) for each in PLAIN]
+    return [*found, ExpressionError("unknown name 'u'", "z > u", 5, "z", "guard"), _failed()]
+
+
+@pytest.mark.parametrize("kind", PLAIN, ids=lambda kind: kind.__name__)
+def test_the_text_is_made_from_the_fields(kind: type[GMSError]) -> None:
+    assert str(kind("it is damaged")) == "it is damaged"
+    assert str(kind("it is damaged", place="a.npz")) == "a.npz: it is damaged"
+    assert str(kind("it must be > 0", place="k", value=None)) == "k is None; it must be > 0"
+    error = kind("it must be > 0", place="k", value=-1.0, advice="leave it out")
+    assert str(error) == "k is -1.0; it must be > 0; leave it out"
+    assert str(error.replaced(advice="")) == "k is -1.0; it must be > 0"
+
+
+def test_a_failed_run_says_when_and_where_the_run_is_kept() -> None:
+    error = _failed()
+    assert error.t == error.trace.t[-1]
+    assert str(error) == (
+        f"t = {error.t!r} s: {error.reason}; {error.advice}; the run up to there is kept in .trace"
+    )
+    assert str(error.replaced(kept="partial.npz")).endswith("is kept in partial.npz")
+    assert error.happened == str(error).removesuffix("; the run up to there is kept in .trace")
+
+
+@pytest.mark.parametrize("error", _made(), ids=lambda error: type(error).__name__)
+def test_copies_have_the_same_fields(error: GMSError) -> None:
+    """A trace is compared by its text: it is large."""
+    error = error.inside("run.toml")
+    for again in (copy.copy(error), pickle.loads(pickle.dumps(error))):
+        assert type(again) is type(error)
+        assert str(again) == str(error)
+        assert {**vars(again), "trace": None} == {**vars(error), "trace": None}
+
+
+def test_places_nest() -> None:
+    error = GMSError("it must be > 0", place="step", value=0).inside("[run]").inside(Path("a.toml"))
+    assert str(error) == "a.toml: [run]: step is 0; it must be > 0"
+    assert (error.outer, error.place) == ("a.toml: [run]", "step")
+
+
+def test_an_error_can_be_made_from_another() -> None:
+    error = ParameterError("it must be > 0", place="step", value=0, advice="leave it out")
+    made = RecordError.of(error.inside("a.csv"))
+    assert type(made) is RecordError
+    assert str(made) == "a.csv: step is 0; it must be > 0; leave it out"
+
+
+def _hiding(source: str) -> list[int]:
+    """Return the lines of errors made from one text that holds several fields."""
+    names, found = {kind.__name__ for kind in KINDS}, []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") in names and node.args:
+            parts = (
+                node.args[0].values if isinstance(node.args[0], ast.JoinedStr) else node.args[:1]
+            )
+            texts = [part.value for part in parts if isinstance(part, ast.Constant)]
+            if any("; " in text for text in texts if isinstance(text, str)):
+                found.append(node.lineno)
+    return found
+
+
+def test_the_check_finds_a_hidden_advice() -> None:
+    assert _hiding('raise ChartError("none; give one")') == [1]
+    assert _hiding('raise ChartError(f"{a} is none; give {b}")') == [1]
+    assert _hiding('raise ChartError("none", advice="give one; or two")') == []
+
+
+def test_hardly_any_reason_hides_an_advice() -> None:
+    found = [
+        f"{path.relative_to(ROOT)}:{line}"
+        for folder in ("gms_fsm", "plots")
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        for line in _hiding(path.read_text(encoding="utf-8"))
+    ]
+    assert len(found) <= HIDDEN, found
+
+
+def test_no_place_reads_a_message() -> None:
+    """What an error says is for people; programs have its fields."""
+    for folder in ("gms_fsm", "plots"):
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if not isinstance(node, ast.Attribute) or path.name == "errors.py":
+                    continue
+                inner = node.value
+                read = isinstance(inner, ast.Call) and ast.unparse(inner) == "str(error)"
+                if read and path.name != "_compiled.py":  # there it is numba's, in colours
+                    raise AssertionError(f"{path}:{node.lineno}: str(error).{node.attr}")

@@ -1,0 +1,152 @@
+"""The laws of the architecture hold: who imports whom, who knows what, and nothing is evaluated.
+
+Checked on the source (by tokens, not by substrings) and in fresh interpreters.
+"""
+
+from __future__ import annotations
+
+import io
+import itertools
+import json
+import keyword
+import re
+import subprocess
+import sys
+import tokenize
+from pathlib import Path
+
+import pytest
+
+from tests.helpers import ROOT
+
+PACKAGES = ("gms_fsm", "integrators", "plots")
+
+
+def _sources(*packages: str) -> list[Path]:
+    return [path for package in packages for path in sorted((ROOT / package).rglob("*.py"))]
+
+
+def _tokens(path: Path) -> list[tokenize.TokenInfo]:
+    return list(tokenize.generate_tokens(io.StringIO(path.read_text(encoding="utf-8")).readline))
+
+
+def _calls(path: Path, function: str) -> list[int]:
+    tokens = [t for t in _tokens(path) if t.type not in (tokenize.NL, tokenize.COMMENT)]
+    return [
+        one.start[0]
+        for one, after in itertools.pairwise(tokens)
+        if one.type == tokenize.NAME and one.string == function and after.string == "("
+    ]
+
+
+def _python(code: str) -> str:
+    """Run code in a fresh interpreter in the project's root and return what it prints."""
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_the_import_contracts_are_kept() -> None:
+    pytest.importorskip("importlinter", reason="needs import-linter (extra: dev)")
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            "import sys; from importlinter.cli import lint_imports; sys.exit(lint_imports())",
+        ],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    kept = re.search(r"(\d+) kept, 0 broken", done.stdout)
+    assert kept, done.stdout
+    assert int(kept[1]) >= 3
+
+
+@pytest.mark.parametrize("path", _sources("integrators"), ids=lambda p: p.name)
+def test_integrators_know_nothing_of_friction(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert re.findall(r"(?i)\b(?:slip|stick|friction|stribeck|bristle)\w*", text) == []
+    assert "gms" not in text.lower()  # nor who calls: what a user is told is the caller's
+    names = {t.string for t in _tokens(path) if t.type == tokenize.NAME}
+    assert "z" not in names
+    imported = {
+        re.split(r"[.\s]", line.split(None, 1)[1])[0]
+        for line in text.splitlines()
+        if re.match(r"\s*(?:from|import)\s", line)
+    }
+    outside = imported - set(sys.stdlib_module_names) - {"integrators", "numpy", "scipy", "numba"}
+    assert outside == set()
+
+
+@pytest.mark.parametrize("path", _sources(*PACKAGES), ids=lambda p: f"{p.parent.name}/{p.name}")
+def test_nothing_is_evaluated(path: Path) -> None:
+    assert _calls(path, "eval") == []
+    expected = path == ROOT / "gms_fsm" / "lowering" / "_generated.py"
+    assert bool(_calls(path, "exec")) == expected
+    assert bool(_bare(path, "compile")) == expected
+
+
+def _bare(path: Path, function: str) -> list[int]:
+    """Calls of a builtin; re.compile and the like are methods."""
+    tokens = _tokens(path)
+    return [
+        one.start[0]
+        for before, one, after in zip(tokens, tokens[1:], tokens[2:], strict=False)
+        if one.string == function and after.string == "(" and before.string not in (".", "def")
+    ]
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_there_is_source_to_check(package: str) -> None:
+    assert len(_sources(package)) >= 3
+
+
+def test_the_search_by_tokens_finds_what_it_looks_for(tmp_path: Path) -> None:
+    path = tmp_path / "example.py"
+    path.write_text("# eval(1)\ntext = 'eval(1)'\nevaluate(1)\nmodel.eval\neval (1)\nexec(text)\n")
+    assert _calls(path, "eval") == [5]
+    assert _calls(path, "exec") == [6]
+    path.write_text("re.compile('a')\ndef compile(a): ...\ncompile('a')\n")
+    assert _bare(path, "compile") == [3]
+
+
+def test_simulating_loads_neither_matplotlib_nor_graphviz_nor_plots() -> None:
+    code = """
+import json, sys
+from gms_fsm import GMS, GMSParameters, LuGre, Prescribed, Slider, Stribeck, simulate
+model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+assert len(simulate(model, Prescribed("0.2*sin(2*pi*t/20)"), 21.0).transitions) > 0
+lugre = LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4, stribeck=Stribeck(1, 1.5, 1e-3))
+simulate(lugre, Slider(1.0, "0.1*t"), 0.1).columns()
+print(json.dumps(sorted({name.partition(".")[0] for name in sys.modules})))
+"""
+    loaded = set(json.loads(_python(code)))
+    assert {"gms_fsm", "integrators", "transitions", "numpy"} <= loaded
+    assert loaded & {"matplotlib", "pygraphviz", "plots", "pandas", "IPython"} == set()
+
+
+def test_integrators_load_nothing_of_ours() -> None:
+    code = "import json, sys, integrators\nprint(json.dumps(sorted(sys.modules)))"
+    loaded = {name.partition(".")[0] for name in json.loads(_python(code))}
+    assert "integrators" in loaded
+    assert loaded & {"gms_fsm", "plots", "transitions"} == set()
+
+
+CORE = [p for p in _sources("gms_fsm") if p.name != "cli.py" and p.parent.name != "paper"]
+
+
+@pytest.mark.parametrize("path", CORE, ids=lambda p: p.name)
+def test_no_switching_outside_the_charts(path: Path) -> None:
+    # A state is named in a chart's page; whoever compares with such a name has a rule of its own.
+    if path.parent.name in ("charts", "lessons"):
+        return
+    tokens = [t for t in _tokens(path) if t.type in (tokenize.NAME, tokenize.OP, tokenize.STRING)]
+    for before, one in itertools.pairwise(tokens):
+        compared = before.string in ("==", "!=") or keyword.iskeyword(before.string)
+        if one.type == tokenize.STRING and compared:
+            assert one.string.strip("\"'") not in {"stick", "slip"}, f"line {one.start[0]}"

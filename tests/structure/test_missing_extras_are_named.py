@@ -1,0 +1,111 @@
+"""What needs an extra that is not installed says so: which module, which extra, what works without.
+
+One function writes these texts, `gms_fsm._extras.missing`, from one table of the extras.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from gms_fsm import Prescribed, Sweep, prove, simulate, sweep
+from gms_fsm._extras import EXTRAS, missing, require
+from gms_fsm.errors import MissingExtraError
+from tests.helpers import ROOT, stick_slip
+
+FOR_DEVELOPERS = {"all", "bench", "cluster", "dev", "docs", "mutation", "test"}
+
+
+def test_the_table_has_the_extras_that_users_can_install() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert set(EXTRAS) == set(project["optional-dependencies"]) - FOR_DEVELOPERS
+
+
+@pytest.mark.parametrize("extra", EXTRAS)
+def test_a_message_says_what_to_type_and_what_works_without(extra: str) -> None:
+    needed, without = EXTRAS[extra]
+    said = str(missing("thing", extra))
+    assert said.startswith(f"{needed} thing, which is not installed: ")
+    assert f'pip install "gms-fsm[{extra}]"' in said
+    assert said.endswith(f"(without it: {without})")
+
+
+def test_the_text_has_one_home() -> None:
+    sources = [p for room in ("gms_fsm", "integrators", "plots") for p in (ROOT / room).rglob("*")]
+    texts = {p: p.read_text(encoding="utf-8") for p in sources if p.suffix == ".py"}
+    homes = {p.relative_to(ROOT).as_posix() for p, text in texts.items() if "gms-fsm[" in text}
+    raised = {p.name for p, text in texts.items() if "MissingExtraError(" in text}
+    assert homes == {"gms_fsm/_extras.py"}
+    assert raised == {"_extras.py", "errors.py"}
+
+
+def made() -> Sweep:
+    return sweep(stick_slip("signed"), Prescribed("0.2"), 1.0, {"v_s": [0.1]}, engine="machines")
+
+
+@pytest.mark.parametrize(
+    ("module", "extra", "call"),
+    [
+        (
+            "pandas",
+            "pandas",
+            lambda _: simulate(stick_slip("signed"), Prescribed("0.2"), 0.1).to_pandas(),
+        ),
+        ("pandas", "pandas", lambda _: made().to_dataframe()),
+        ("xarray", "sweep", lambda _: made().to_xarray()),
+        ("pandas", "sweep", lambda folder: made().save(folder / "a.parquet")),
+        ("z3", "check", lambda _: prove(stick_slip("signed").chart)),
+    ],
+)
+def test_a_function_names_the_module_and_the_extra(
+    module: str,
+    extra: str,
+    call: Callable[[Path], object],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    monkeypatch.setitem(sys.modules, module, None)
+    words = rf"need\w* {module}, which is not installed: pip install \"gms-fsm\[{extra}\]\""
+    with pytest.raises(MissingExtraError, match=words):
+        call(tmp_path)
+
+
+@pytest.mark.parametrize("absent", ["matplotlib", "PIL"])
+@pytest.mark.parametrize("module", ["figures", "panels", "schematic", "animation"])
+def test_a_module_names_the_module_and_the_extra(absent: str, module: str) -> None:
+    if absent == "PIL":  # which only matplotlib asks for
+        pytest.importorskip("matplotlib", reason="needs the extra plots")
+    code = (
+        f"import sys; sys.modules[{absent!r}] = None\n"
+        "from gms_fsm.errors import MissingExtraError\n"
+        f"try:\n    import plots.{module}\n"
+        "except MissingExtraError as error:\n    print(error)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    said = f'need {absent}, which is not installed: pip install "gms-fsm[plots]"'
+    assert said in done.stdout
+
+
+def test_a_module_that_is_there_but_broken_is_not_called_absent(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "halfdone.py").write_text("from math import no_such_name")
+    (tmp_path / "needy.py").write_text("import no_such_module")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(MissingExtraError, match=r"halfdone, which cannot be imported \(Import"):
+        require("halfdone", "plots")
+    with pytest.raises(MissingExtraError, match="need no_such_module, which is not installed"):
+        require("needy", "plots")
+
+
+def test_what_is_there_is_returned() -> None:
+    assert require("xml.etree", "plots") is sys.modules["xml.etree"]
+    assert re.__name__ == require("re", "plots").__name__
