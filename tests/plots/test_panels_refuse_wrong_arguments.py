@@ -109,7 +109,7 @@ def test_formats(run: Trace, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("row", [10_000, -10_000, 1.5, True, None], ids=str)
 def test_rows_of_a_schematic(run: Trace, row: object) -> None:
-    with pytest.raises(ParameterError, match=r"row is .* whole number from"):
+    with pytest.raises(ParameterError, match=r"row is .* integer from"):
         schematic.schematic(Figure().subplots(), run, row)  # type: ignore[arg-type]
 
 
