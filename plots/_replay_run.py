@@ -242,7 +242,7 @@ def _with_microsteps(trace: Trace) -> Trace:
     if (trace.microstep > 0).any() or not (stops.microstep > 0).any():
         return trace
     rows = trace.rows
-    new = ~np.isin(rows.t, stops.t)  # at a stop its own rows tell more
+    new = ~np.isin(rows.t, stops.t)  # the rows of a stop contain more
     pairs = zip(vars(stops).values(), vars(rows.at(new)).values(), strict=True)
     table = Rows(*(np.concatenate(pair) for pair in pairs))
     table = table.at(np.argsort(table.t, kind="stable"))

@@ -40,12 +40,12 @@ from plots.style import CHART_THEMES, RC, ChartTheme
 __all__ = ["animate"]
 
 SMOOTH = 2000  # points of the force curve
-POINTS = 72.0  # an inch
+POINTS = 72.0  # per inch
 CURVE_WIDTH, CURVE_HEIGHT = 4.4, 3.4  # inches, of the force and its labels
 DPI = 100
-FASTEST = 50  # frames a second: a GIF counts in hundredths, and readers refuse a single one
-STEPS = 8  # shades of a colour along an edge; many more would be taken for one another
-WIDE = 0.88  # matplotlib's own sans serif is wider than the one the layout was made for
+FASTEST = 50  # frames per second: GIF delays are in 10 ms, and readers reject a delay of 10 ms
+STEPS = 8  # shades of a colour along an edge; more could hardly be distinguished
+WIDE = 0.88  # matplotlib's sans serif is wider than the one used for the layout
 
 
 def animate(
@@ -207,7 +207,7 @@ class _Film:
         tall = max(height / POINTS, CURVE_HEIGHT)
         wide = width / POINTS + CURVE_WIDTH
         self.figure = Figure(figsize=(wide, tall), dpi=DPI, facecolor=colours.paper)
-        # Half of its methods have no types.
+        # Half of its methods are untyped.
         self.canvas = cast(Any, FigureCanvasAgg(self.figure))
         box = (0, (1 - height / POINTS / tall) / 2, width / POINTS / wide, height / POINTS / tall)
         ax = self.figure.add_axes(box)

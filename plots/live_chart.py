@@ -136,7 +136,7 @@ class LiveChart:
         self.root.set("style", f"background:{self._sheet.colours.paper}")
         groups = {group.get("id", ""): group for group in self.root.iter("g")}
         self._parts = {i: _ElementParts(self._sheet, i, groups) for i in self.elements}
-        texts = groups["graph0"].findall("text")  # under the picture: the values, last the time
+        texts = groups["graph0"].findall("text")  # below the picture: the values, and last the time
         self._value_texts = {
             i: texts[:-1] if bare else groups[element_id(i)].findall("text")[TITLE:]
             for i in self.elements
@@ -353,7 +353,7 @@ def _plain_tree(picture: bytes) -> ElementTree.Element:
     for node in root.iter():
         node.tag = node.tag.removeprefix(f"{{{SVG}}}")
         if node.tag == "text":
-            node.set("xml:space", "preserve")  # some readers drop a blank at the beginning
+            node.set("xml:space", "preserve")  # some readers drop leading spaces
             node.attrib.pop("{http://www.w3.org/XML/1998/namespace}space", None)
     root.set("xmlns", SVG)
     # Graphviz rounds the size up; the exact size avoids a light border around a dark picture.
@@ -432,7 +432,7 @@ class _ElementParts:
             if shape.get("fill") == "none":  # the border
                 shape.set("stroke", line)
                 shape.set("stroke-width", BORDER if active else "1")
-            elif shape.get("stroke") in ("none", "transparent"):  # the ground
+            elif shape.get("stroke") in ("none", "transparent"):  # the background
                 shape.set("fill", colours.active_fill if active else colours.paper)
             else:  # the line under the title
                 shape.set("stroke", line)

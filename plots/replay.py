@@ -321,6 +321,6 @@ def _theme() -> str:
 
 
 def _inert(data: object) -> str:
-    """Write data as JSON in which nothing can end or begin markup."""
+    """Write data as JSON that cannot be read as markup."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

@@ -182,7 +182,7 @@ def chosen(elements: int | Sequence[int], n: int | None = None) -> tuple[int, ..
 
 def _whole(number: object, name: str) -> int:
     try:
-        return operator.index(number)  # type: ignore[arg-type]  # that is what is tried
+        return operator.index(number)  # type: ignore[arg-type]  # may fail
     except TypeError:
         raise ParameterError(
             "the number of elements must be an integer of at least 1", place=name, value=number

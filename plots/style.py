@@ -24,7 +24,7 @@ PALE_GREY = "#B9BEC6"
 PAPER = "#FFFFFF"
 PANEL = "#F5F7FA"
 
-# Lists of names: the first one that is installed is taken.
+# Lists of names; the first installed one is used.
 SANS = "Helvetica,Arial,Liberation Sans,DejaVu Sans,sans-serif"
 MONO = "DejaVu Sans Mono,Menlo,Consolas,Liberation Mono,monospace"
 
@@ -44,7 +44,7 @@ STATE_FILLS = ("#CFE3F2", "#F7CDB0", "#CDEBE0", "#F1D9E7", "#FAE8C0")
 STATE_EDGES = (BLUE, VERMILION, "#009E73", "#CC79A7", "#E69F00")
 HATCHES = ("", "////", "....", "xxxx", "\\\\\\\\")
 
-RC: Any = {  # matplotlib types its keys one by one
+RC: Any = {  # matplotlib types each key separately
     "font.family": "sans-serif",
     "font.size": 9.0,
     "axes.titlesize": 9.5,
