@@ -3,8 +3,8 @@
 A relation is a margin that is true where positive (or, if not strict, where zero). Its truth value
 at the start of the arc is stored; a crossing is the first point where any watched value differs.
 The point is bracketed until both ends are one clock tick apart, and the *right* end is returned:
-there the raw comparison has changed, so the caller can simply evaluate it. The interval is half-open
-on the left: a margin that starts at zero does not fire again.
+there the raw comparison has changed, so the caller can simply evaluate it. The interval is
+half-open on the left: a margin that starts at zero does not fire again.
 
 Before a point is accepted as the first one, the step up to it is searched for a change that is
 undone again: an interval counts as quiet only if start, middle and end show each margin to be
