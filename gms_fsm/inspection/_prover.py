@@ -31,10 +31,10 @@ from gms_fsm.language import (
     Value,
     evaluate,
     fold,
+    integer_power,
     names_in,
     parse_condition,
     spell,
-    whole_power,
 )
 
 __all__ = [
@@ -145,7 +145,7 @@ class _Formulas:
         return Dual(a.value / b.value, slope)
 
     def power(self, node: Binary, parts: Iterator[Dual]) -> Dual:
-        whole = whole_power(node.right)
+        whole = integer_power(node.right)
         if whole is None:
             raise Undecided(
                 f"only whole powers up to {LARGEST_PRODUCT_POWER} are encoded: {shown(node)}"

@@ -234,7 +234,9 @@ def _wide(argument: Any) -> Any:
     return argument
 
 
-def _quiet(function: Callable[..., float], replacement: Callable[..., Any]) -> Callable[..., Any]:
+def _without_raising(
+    function: Callable[..., float], replacement: Callable[..., Any]
+) -> Callable[..., Any]:
     """Return a function of `math` that falls back on NumPy where it would raise."""
 
     def computed(*arguments: Any) -> Any:
@@ -247,9 +249,9 @@ def _quiet(function: Callable[..., float], replacement: Callable[..., Any]) -> C
 
 
 _IEEE: Mapping[str, Callable[..., Any]] = {
-    "exp": _quiet(math.exp, np.exp),
-    "sqrt": _quiet(math.sqrt, np.sqrt),
-    "sin": _quiet(math.sin, np.sin),
-    "cos": _quiet(math.cos, np.cos),
-    "pow": _quiet(math.pow, np.power),
+    "exp": _without_raising(math.exp, np.exp),
+    "sqrt": _without_raising(math.sqrt, np.sqrt),
+    "sin": _without_raising(math.sin, np.sin),
+    "cos": _without_raising(math.cos, np.cos),
+    "pow": _without_raising(math.pow, np.power),
 }

@@ -287,7 +287,7 @@ def plan_of(model: Model, rig: Rig) -> Plan:
     rig_rough = _rig_rough(rig, acceleration)
     rough = {state: _rough(chart, state, force) for state, force in forces.items()}
     found = [*rig_rough, *(u for each in rough.values() for u in each)]
-    held = _parted(found, names, model.n)
+    held = _partitioned(found, names, model.n)
     surfaces = Places(
         tuple(u for u in held.shared if _can_be_slid_on(u, chart, rig, names)),
         tuple(u for u in held.own if _can_be_slid_on(u, chart, rig, names)),
@@ -394,7 +394,7 @@ def _rough(chart: Chart, state: str, force: Value) -> tuple[Value, ...]:
     return tuple(dict.fromkeys(u for tree in trees for u in rough_points(tree)))
 
 
-def _parted(found: Iterable[Value], names: Names, n: int) -> Places[Value]:
+def _partitioned(found: Iterable[Value], names: Names, n: int) -> Places[Value]:
     """Split values into those shared by all elements and those of one element."""
     shared = {u: names.is_shared(u) for u in found}
     return Places(

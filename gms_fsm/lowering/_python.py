@@ -202,7 +202,7 @@ class _Writer:
         lines: list[str] = []
         for each in self.plan.gradients:
             word, inner = "elif" if lines else "if", self.gradient(each)
-            asked, element = self.plan.surfaces.asking_text(each.surface, "surface")
+            asked, element = self.plan.surfaces.membership_text(each.surface, "surface")
             lines.append(f"{word} {asked}:  # {self.spell(each.surface)}")
             if element:
                 first = self.element_values(reads.of_gradient(self.plan, each))

@@ -213,7 +213,7 @@ class Places(Generic[Name]):
         """Return the number of places plus `more`, as Python text in terms of ``n``."""
         return f"{len(self.shared) + more} + {len(self.own)} * n"
 
-    def asking_text(self, name: Name, place: str) -> tuple[str, str]:
+    def membership_text(self, name: Name, place: str) -> tuple[str, str]:
         """Return texts that test whether a place belongs to a name, names being tested in order.
 
         Parameters

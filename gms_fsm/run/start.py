@@ -135,7 +135,7 @@ class Start:
             rows_at_once,
         )
         last = _covered(rig, t_start, t_end)
-        program = _watchful(lower(model, rig), rig, t_start, last)
+        program = _with_waking_times(lower(model, rig), rig, t_start, last)
         y, mode = _initial(model, rig, {} if initial is None else initial)
         kept: dict[str, Setting] = {
             "method": chosen.method_name,
@@ -240,7 +240,7 @@ def _tolerances(
     return places.joined(used), used
 
 
-def _watchful(program: Program, rig: Rig, t_start: float, t_end: float) -> Program:
+def _with_waking_times(program: Program, rig: Rig, t_start: float, t_end: float) -> Program:
     """Return the program with the times at which its formulas start to change as knots."""
     times = {
         time

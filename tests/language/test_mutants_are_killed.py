@@ -40,7 +40,7 @@ from gms_fsm.language import (
 from gms_fsm.language._tree import walk
 from gms_fsm.run.machines import Element, ElementMachines, Guard
 from integrators import advance as kernel
-from integrators.crossings import NO_CHANGE, Path, first_change, nothing_near, watched
+from integrators.crossings import NO_CHANGE, Path, first_change, is_quiet_step, watched
 from integrators.hybrid import Buffers, Equations, Options, buffers
 from integrators.sliding import Surfaces
 from integrators.step_size import next_factor
@@ -567,7 +567,7 @@ def test_the_cubic_between_two_ends_is_that_of_both_slopes() -> None:
     w.start[0] = 1.0 - 100.0
     now = Now([1.0], y=[1.0], f=[3.0], mode=[], held=[], floor=[])
     scratch = Scratch([], y_new=[27.0], f_new=[27.0], error=[], dense=Dense([], [], [], [], []))
-    assert nothing_near(Motion(fill, fill, None), now, 3.0, scratch, w)
+    assert is_quiet_step(Motion(fill, fill, None), now, 3.0, scratch, w)
     assert seen == [(3.0, 27.0), (2.0, 8.0)]
 
 

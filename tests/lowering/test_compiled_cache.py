@@ -308,7 +308,7 @@ def test_another_edition_signature_option_or_numba_is_kept_under_another_name(
     from numba.core.registry import cpu_target
 
     def name(signature: Any = "iifVIP", function: Any = _other) -> str:
-        return machine._Kept(function, None, machine._silent)._name(
+        return machine._VerifiedCache(function, None, machine._silent)._name(
             signature, cpu_target.target_context
         )
 

@@ -213,7 +213,7 @@ def test_texts_name_the_same_places(shared: tuple[str, ...], n: int) -> None:
     places = Places(shared, ("z", "w", "u"), n)
     for place, (name, i) in enumerate(places):
         assert eval(places.text(name), {"n": n, "i": i}) == place
-        asked = [places.asking_text(each, "k") for each in (*shared, *places.own)]
+        asked = [places.membership_text(each, "k") for each in (*shared, *places.own)]
         whose = [eval(whether, {"n": n, "k": place}) for whether, _ in asked].index(True)
         assert (*shared, *places.own)[whose] == name
         assert i is None or eval(asked[whose][1], {"n": n, "k": place}) == i

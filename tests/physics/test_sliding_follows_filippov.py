@@ -312,7 +312,7 @@ def test_a_session_walks_over_it():
 
 
 def test_a_checkpoint_within_it_goes_on_bit_for_bit(tmp_path):
-    from gms_fsm.run._checkpoint import Keeper
+    from gms_fsm.run._checkpoint import Checkpointer
     from gms_fsm.run.simulate import Run
     from gms_fsm.run.start import Start
 
@@ -321,10 +321,10 @@ def test_a_checkpoint_within_it_goes_on_bit_for_bit(tmp_path):
     while not any(run.recorder.latest[2][3:]):
         run.advance()
     run.advance()
-    keeper = Keeper(run, tmp_path / "run.check", 0.0)
+    keeper = Checkpointer(run, tmp_path / "run.check", 0.0)
     keeper.look()
     other = Run(start)
-    Keeper(other, tmp_path / "run.check", 1e9)
+    Checkpointer(other, tmp_path / "run.check", 1e9)
     while other.advance():
         pass
     while run.advance():

@@ -20,7 +20,7 @@ from gms_fsm import ElementMachines, Prescribed, Trace, simulate
 from gms_fsm.app.report import run_scenario
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.errors import CheckpointError, OutputError, ParameterError
-from gms_fsm.run._checkpoint import Keeper
+from gms_fsm.run._checkpoint import Checkpointer
 from tests.helpers import ROOT, open_loop, pulled_mass, same_bits, stick_slip
 
 ENGINES = [
@@ -196,8 +196,8 @@ def test_a_folder_that_is_not_there_is_said_before_the_run(tmp_path: Path) -> No
 
 def test_it_is_written_as_often_as_asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     saved = []
-    save = Keeper.save
-    monkeypatch.setattr(Keeper, "save", lambda keeper: (saved.append(0), save(keeper))[1])
+    save = Checkpointer.save
+    monkeypatch.setattr(Checkpointer, "save", lambda keeper: (saved.append(0), save(keeper))[1])
     path = tmp_path / "run.checkpoint"
     simulate(stick_slip("signed"), open_loop(), 25.0, checkpoint=path, checkpoint_every=1e6)
     assert len(saved) == 1  # at the start

@@ -28,7 +28,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import Prescribed, Sweep, Trace, simulate, sweep
-from gms_fsm._files import LIST, leftovers, written_together, written_whole
+from gms_fsm._files import LIST, leftovers, write_together, write_whole
 from gms_fsm.app.cli import main
 from gms_fsm.errors import OutputError
 from gms_fsm.inspection.session import Session
@@ -347,12 +347,12 @@ def test_leftovers_are_those_of_the_file_alone(tmp_path: Path) -> None:
 def test_files_written_together_are_all_old_if_one_cannot_be_written(tmp_path: Path) -> None:
     paths = [tmp_path / "one", tmp_path / "two"]
     for path in paths:
-        written_whole(path, lambda file: file.write(b"old"))
+        write_whole(path, lambda file: file.write(b"old"))
 
     def fails(_: object) -> None:
         raise OSError("disk full")
 
     with pytest.raises(OutputError, match="disk full"):
-        written_together({paths[0]: lambda file: file.write(b"new"), paths[1]: fails})
+        write_together({paths[0]: lambda file: file.write(b"new"), paths[1]: fails})
     assert [path.read_bytes() for path in paths] == [b"old", b"old"]
     assert len(list(tmp_path.iterdir())) == 2
