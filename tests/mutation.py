@@ -45,6 +45,7 @@ NEAR = {  # module: its tests, the quickest to notice first
     "gms_fsm/run/machines.py": [
         "language/test_mutants_are_killed",
         "run/test_callbacks_run_once_per_firing",
+        "run/test_callbacks_only_look",
         "charts/test_gms_chart_is_the_papers",
     ],
     "integrators/advance.py": [

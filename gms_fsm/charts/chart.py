@@ -63,12 +63,12 @@ class State:
     entry: Mapping[str, str] = field(default_factory=dict)
     exit: Mapping[str, str] = field(default_factory=dict)
 
-    def __new__(cls, *_: Any, **given: Any) -> State:
+    def __new__(cls, *parts: Any, **given: Any) -> State:
         """Refuse unknown arguments with an error of this package."""
         for name in sorted(given.keys() - {each.name for each in fields(cls)}):
             raise ChartError(
                 f"a State takes name, flow, entry and exit, not {name!r}",
-                place=f"state {shown(given.get('name', '?'))}",
+                place=f"state {shown(given.get('name', parts[0] if parts else '?'))}",
                 advice="states do not nest, so write one state for each combination",
             )
         return object.__new__(cls)

@@ -1,6 +1,6 @@
-"""One file in ``gms_fsm/charts`` is all that a new chart takes: every verb then has it.
+"""A new chart needs only one file in ``gms_fsm/charts``: every command then knows it.
 
-In a copy of the packages, in processes of their own.
+Tested in a copy of the packages, in separate processes.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ CODE = "from gms_fsm.app.cli import main; main()"
 
 @pytest.fixture(scope="module")
 def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy with one file more, and a scenario beside it."""
+    """A copy of the packages with one additional file, and a scenario next to it."""
     folder = tmp_path_factory.mktemp("copy")
     skip = shutil.ignore_patterns("__pycache__")
     for package in ("gms_fsm", "integrators", "plots"):
@@ -92,7 +92,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def gms_fsm(home: Path, *arguments: str, said: str = "", code: int = 0) -> str:
-    """Run the copy's command line and return what it prints; a mistake is on standard error."""
+    """Run the copy's command line and return its output; `said` is expected on standard error."""
     done = subprocess.run(
         [sys.executable, "-c", CODE, *arguments],
         cwd=home,

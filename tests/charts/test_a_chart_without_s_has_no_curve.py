@@ -1,6 +1,6 @@
 """A chart without the input s has no Stribeck curve: none is invented, offered, printed or saved.
 
-Whatever shows thresholds copes: they are NaN in the trace and absent where people read.
+Code that shows thresholds copes: they are NaN in the trace and omitted in texts for people.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A chart that contradicts itself is refused when it is built, and building it runs nothing.
+"""An inconsistent chart is refused when it is built, and building it runs nothing.
 
 The message names the chart, the place (state, edge, output), what is wrong and what would be
 allowed; an unreadable text is shown with its column and its owner.
@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from gms_fsm.charts.chart import RESERVED, Chart, State, Transition
+from gms_fsm.charts.parameters import Parameter
 from gms_fsm.errors import ChartError, ExpressionError
 from gms_fsm.language import CONSTANTS, FUNCTIONS, spell
 
@@ -24,7 +25,7 @@ BACK = Transition("back", "slip", "stick", guard="abs(v) <= v_c")
 
 
 def chart(**changes: Any) -> Chart:
-    """A sound chart, with changes."""
+    """Return a valid chart with changes."""
     sound: dict[str, Any] = {
         "name": "rubber",
         "inputs": ("v", "s"),
@@ -38,12 +39,12 @@ def chart(**changes: Any) -> Chart:
 
 
 def edge(**changes: Any) -> dict[str, Any]:
-    """The sound chart's edges with the first one changed."""
+    """Return the valid chart's edges with the first one changed."""
     return {"transitions": (dataclasses.replace(GO, **changes), BACK)}
 
 
 def state(**changes: Any) -> dict[str, Any]:
-    """The sound chart's states with the second one changed."""
+    """Return the valid chart's states with the second one changed."""
     return {"states": (STICK, dataclasses.replace(SLIP, **changes))}
 
 
@@ -63,6 +64,19 @@ def test_a_state_asked_for_by_a_wrong_name_is_refused_with_the_right_ones() -> N
         chart().state_index("slide")
 
 
+def test_an_edge_asked_for_by_a_wrong_name_is_refused_with_the_right_ones() -> None:
+    for name in ("slide", None, ["go"]):
+        with pytest.raises(ChartError, match=r"'rubber' has no edge .*'go', 'back'"):
+            chart().guard_text(name)
+    with pytest.raises(ChartError, match=r"'rubber' has no edge 'go'; its edges are none"):
+        chart(transitions=()).guard_text("go")
+
+
+def test_a_state_with_an_unknown_part_is_refused() -> None:
+    with pytest.raises(ChartError, match=r"state 'stick': a State takes .*, not 'during'"):
+        State("stick", flow={"z": "v"}, during="z = 0")  # type: ignore[call-arg]
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -78,6 +92,12 @@ def test_a_state_asked_for_by_a_wrong_name_is_refused_with_the_right_ones() -> N
         ({"outputs": {}}, ["outputs has none", "exactly 'F'"]),
         ({"outputs": {"G": "k"}}, ["outputs has 'G'", "exactly 'F'"]),
         ({"outputs": {"F": {"stick": "k * z"}}}, ["one text for all states", "a variable f"]),
+        ({"states": (STICK, "slip")}, ["states has 'slip'", "write it as State("]),
+        ({"transitions": (GO, None)}, ["transitions has None", "write it as Transition("]),
+        (
+            {"parameters": ("k", "C", Parameter("v_c", "m/s", "< v_max"))},
+            ["parameter 'v_c'", "names 'v_max'", "'C', 'k'"],
+        ),
         ({"outputs": {"F": "k", "G": "k"}}, ["outputs has 'F', 'G'", "exactly 'F'"]),
         # one name, one meaning
         ({"parameters": ("k", "C", "v_c", "k")}, ["'k' is used twice", "parameter"]),

@@ -1,7 +1,7 @@
-"""A parameter that breaks its rule is refused; the message names it, its value and the rule.
+"""A parameter that violates its rule is refused; the message names it, its value and the rule.
 
-And the parameters that are right are the paper's: Table I to the last digit, shares of friction
-that add up in steady slip, arrays nobody can change afterwards.
+Valid parameters match the paper: Table I to the last digit, shares of friction that add up in
+steady slip. Their arrays cannot be changed afterwards.
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ BROKEN: list[tuple[Callable[..., object], dict[str, Any], list[str]]] = [
     (lugre, {"sigma_1": -1}, ["sigma_1 is -1.0", ">= 0"]),
     (lugre, {"sigma_2": NAN}, ["sigma_2 is nan", "finite"]),
     (lugre, {"stribeck": 3}, ["stribeck is 3", "Stribeck"]),
-    # one's own chart
+    # user-defined chart
     (own, {"n": 0}, ["n is 0", "at least 1"]),
     (own, {"n": -1}, ["n is -1", "at least 1"]),
     (own, {"n": 2.5}, ["n is 2.5"]),
@@ -240,7 +240,7 @@ def test_published_law_without_a_dip_warns_and_the_signed_one_does_not() -> None
 
 
 def test_the_curve_is_eq_2() -> None:
-    with pytest.MonkeyPatch.context() as patch:  # what it computes is its text
+    with pytest.MonkeyPatch.context() as patch:  # it evaluates its text
         patch.setattr(Stribeck, "text", "F_c + v_s * v")
         assert float(CURVE(2.0)) == 1.002
     for v in (0.0, 1e-4, -1e-3, 2e-3, -0.5):

@@ -1,6 +1,6 @@
-"""What lies in the folder of charts is found, and what does not fit there is said.
+"""The charts in the folder are found, and files that do not fit there are reported.
 
-Each chart that ships has numbers that run, and run alike on two engines.
+Each built-in chart has numbers that run, with the same result on two engines.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def test_an_unknown_name_is_answered_with_the_known_ones() -> None:
         entry("dahl")
 
 
-# --------------------------------------------------------------------------- what does not fit
+# --------------------------------------------------------------------------- invalid entries
 def chart(*parameters: Parameter | str, inputs: tuple[str, ...] = ("v",)) -> Chart:
     return Chart("c", inputs, ("z",), parameters, (gms_fsm.State("a", {"z": "v"}),), (), {"F": "z"})
 
@@ -114,7 +114,7 @@ def test_an_entry_that_does_not_fit_is_refused(arguments: Any, words: str) -> No
 # --------------------------------------------------------------------------- files
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder whose modules count as charts that ship."""
+    """A folder whose modules count as built-in charts."""
     monkeypatch.setattr(gms_fsm.charts, "__path__", [*gms_fsm.charts.__path__, str(tmp_path)])
     before = set(sys.modules)
     registered.cache_clear()

@@ -1,4 +1,4 @@
-"""A condition over arrays has, place by place, the truth that one evaluation at a time has."""
+"""A condition evaluated over arrays gives the same truth values as evaluated one by one."""
 
 from __future__ import annotations
 

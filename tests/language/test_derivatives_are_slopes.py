@@ -1,4 +1,4 @@
-"""A derivative is the slope of its value, written with nothing that could be left out."""
+"""A derivative is the slope of its value, printed without superfluous terms."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""A tree evaluates to the very bits that Python computes from its printed text.
+"""A tree evaluates bit for bit to what Python computes from its printed text.
 
 `evaluate(tree)` equals Python's own value of ``spell(tree, PYTHON)`` to the last bit, including
-which error is raised; printing, reading and printing again changes nothing; and `split` says the
-same as the condition it splits, on the boundary too.
+which error is raised; printing, parsing and printing again changes nothing; and `split` agrees with
+the condition it splits, also on the boundary.
 """
 
 from __future__ import annotations
@@ -173,7 +173,7 @@ def test_a_product_stays_short() -> None:
         tree = parse_value(text, NAMES)
     except ExpressionError:
         return
-    assert len(spell(tree)) < 20_000, "eight times longer with every level: it never ends"
+    assert len(spell(tree)) < 20_000, "otherwise eight times longer with every level: endless"
 
 
 # --------------------------------------------------------------------------- spell, read, spell
@@ -186,7 +186,7 @@ def test_printing_reading_printing_changes_no_value(tree: Value, point: dict[str
     text = spell(tree)
     try:
         again = parse_value(text, NAMES)
-    except ExpressionError as error:  # the products of a power may be longer than a text may be
+    except ExpressionError as error:  # the product for a power may exceed the longest text
         assume("nested too deeply" not in error.reason and len(text) <= 10_000)
         raise
     assert spell(again) == text

@@ -1,7 +1,7 @@
 """A text outside the expression language is refused with its column, and nothing is ever executed.
 
-Columns count characters from 1 and point at where the offending construct begins; a text that ends
-too early is refused one column behind its end. Only `ExpressionError` leaves the parser, whatever
+Columns count characters from 1 and point at the start of the offending construct; for a text that
+ends too early, the column is one past its end. Only `ExpressionError` leaves the parser, whatever
 the text, and no text makes Python execute, import or open anything.
 """
 
@@ -61,7 +61,7 @@ NO_VALUES = [
     ("1 + ~v", 5, FOREIGN, GRAMMAR),
     ("...", 1, FOREIGN, GRAMMAR),
     ("await v", 1, FOREIGN, GRAMMAR),
-    # constants that are no finite real numbers
+    # constants that are not finite real numbers
     ("'a'", 1, FOREIGN, GRAMMAR),
     ("1 + 'a'", 5, FOREIGN, GRAMMAR),
     ("b'a'", 1, FOREIGN, GRAMMAR),
@@ -75,7 +75,7 @@ NO_VALUES = [
     ("-1e999", 2, "too large", "finite"),
     ("v + " + "9" * 400, 5, "too large", "finite"),
     ("0x" + "f" * 400, 1, "too large", "finite"),
-    # wrong kind
+    # wrong type
     ("z < s", 1, NUMBER_WANTED, GRAMMAR),
     ("1 + (z < s)", 6, NUMBER_WANTED, GRAMMAR),
     ("z == s", 1, NUMBER_WANTED, GRAMMAR),
@@ -104,7 +104,7 @@ NO_VALUES = [
     ("v + \u20ac + u", 5, "cannot be read", GRAMMAR),
     ("v \u2212 z", 3, FOREIGN, "- instead"),  # a typographer's minus
     ("v + \ud800", 5, "cannot be read", GRAMMAR),  # half a surrogate pair
-    # what is not even Python
+    # not even Python
     ("", 1, "empty", GRAMMAR),
     (" \t\n", 1, "empty", GRAMMAR),
     ("v # comment", 3, "unexpected '#'", GRAMMAR),
@@ -268,7 +268,7 @@ _ACTS = {"exec", "import", "open", "os.system", "subprocess.Popen"}
 
 
 def _hook(event: str, _: object) -> None:
-    # An audit hook cannot be taken off again; it sleeps while `_watching` is no thread's number.
+    # An audit hook cannot be removed; it is inactive while `_watching` is not a thread's number.
     if get_ident() == _watching and event in {
         "exec",
         "import",

@@ -1,4 +1,4 @@
-"""`fold` gives each node to the operation of its kind, and folds a part only when it is taken."""
+"""`fold` passes each node to the operation for its kind, and folds a part only when requested."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from gms_fsm.language import (
 
 
 class _Same:
-    """Builds every node anew from its parts, and writes down which operation did it."""
+    """Rebuilds every node from its parts, and records the operation used."""
 
     def __init__(self) -> None:
         self.called: list[str] = []

@@ -1,7 +1,7 @@
-"""A small change of language, chart, machines, crossings or advance is noticed.
+"""A small change in language, chart, machines, crossings or advance is detected.
 
-Each test pins down what a mutant of `tests/mutation.py` got away with. At the end stands what
-no test can notice, and why.
+Each test covers a mutant of `tests/mutation.py` that survived at first. The comment at the end
+lists the mutants that no test can detect, and why.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def test_the_longest_text_has_ten_thousand_characters() -> None:
 def test_the_deepest_tree_has_sixty_levels() -> None:
     assert parse_value("-" * 59 + "v", "v")
     assert "nested" in str(_refused("-" * 60 + "v", "v"))
-    deep = _refused("-" * 9_000 + "v", "v")  # too deep for Python itself
+    deep = _refused("-" * 9_000 + "v", "v")  # too deep even for Python
     assert ("nested" in deep.reason, deep.column) == (True, 1)
     assert parse_condition("not " * 58 + "v > 1", "v")
     with pytest.raises(ExpressionError, match="nested"):
@@ -125,14 +125,14 @@ def test_min_takes_fifty_arguments_folded_from_the_left_as_deep_as_any_tree_may_
     assert "at most 50" in str(_refused("max(" + "v, " * 50 + "v)", "v"))
     assert parse_value("-" * 10 + "max(" + "v, " * 49 + "v)", "v")  # 10 + 1 + 48 + 1 levels
     assert "nested" in str(_refused("-" * 11 + "max(" + "v, " * 49 + "v)", "v"))
-    for several in (2, 3, 4, 5, 6):  # a fold may jump over the deepest level, and is noticed
+    for several in (2, 3, 4, 5, 6):  # a fold may skip the deepest level, and is still detected
         nested = "v"
         for _ in range(59 // (several - 1)):
             nested = f"min({nested}{', v' * (several - 1)})"
         assert parse_value(nested, "v")
         over = f"min({nested}{', v' * (several - 1)})"
         assert "nested" in str(_refused(over, "v"))
-    # The last argument lies at the top of the fold, the first two at its bottom.
+    # The last argument is at the top of the fold, the first two at its bottom.
     assert parse_value("max(" + "v, " * 49 + "-" * 58 + "v)", "v")
     assert "nested" in str(_refused("max(" + "v, " * 49 + "-" * 59 + "v)", "v"))
     assert parse_value("max(v, " + "-" * 10 + "v, " + "v, " * 47 + "v)", "v")
@@ -443,7 +443,7 @@ Margin = Callable[[float], float]
 
 
 def _first(*margins: Margin, strict: bool = False, resolution: float = 1e-12) -> tuple:
-    """Return the place in [0, 1] where a truth first changes, and how often was looked."""
+    """Return the point in [0, 1] where a truth value first changes, and the number of probes."""
     w = watched([strict] * len(margins), 1)
     looks = []
 
@@ -464,7 +464,7 @@ def _first(*margins: Margin, strict: bool = False, resolution: float = 1e-12) ->
     path = Path(Motion(fill, fill, None), [], interpolate, None, 0.0, 1.0, [1.0])
     place = first_change(path, w, resolution)
     looks.clear()
-    # Whatever the scratch holds of the search before.
+    # Whatever the scratch space contained before the search.
     assert first_change(path, w, resolution) == place
     return place, len(looks)
 
@@ -490,9 +490,9 @@ def test_the_place_is_right_of_the_change_by_at_most_the_resolution(
 
 
 def test_a_straight_margin_is_found_by_its_slope_not_by_halving() -> None:
-    # End, both sides of the place, and the middle of the quiet step before it.
+    # The end, both sides of the point, and the middle of the quiet step before it.
     assert _first(lambda t: t - 0.3)[1] <= 4
-    assert _first(lambda t: 0.3 - t)[1] <= 6  # exactly zero is still true: once more
+    assert _first(lambda t: 0.3 - t)[1] <= 6  # exactly zero is still true: one more probe
     assert _first(lambda t: t - 0.3, lambda t: 0.8 - t)[1] <= 4
 
 
@@ -519,7 +519,7 @@ def test_a_margin_that_is_never_quiet_is_looked_at_in_every_512th_of_a_step_and_
     for k in range(1, 512, 2):
         place, _ = _first(lambda t, k=k: rough(t, k / 512))
         assert place == pytest.approx(k / 512, abs=1.1e-9)
-    assert _first(lambda t: rough(t, 2.0)) == (NO_CHANGE, 512)  # the end, and 511 between
+    assert _first(lambda t: rough(t, 2.0)) == (NO_CHANGE, 512)  # the end, and 511 in between
 
 
 def test_of_two_windows_the_earlier_counts_though_the_later_is_seen_first() -> None:
@@ -531,14 +531,14 @@ def test_of_two_windows_the_earlier_counts_though_the_later_is_seen_first() -> N
 
 
 def test_a_window_before_the_first_place_believed_in_is_found() -> None:
-    # False position lands behind the window, at 0.59, and closes on 0.75 first.
+    # False position lands after the window, at 0.59, and converges to 0.75 first.
     assert _first(lambda t: (t - 0.39) * (t - 0.43) * (t - 0.75))[0] == pytest.approx(
         0.39, abs=1e-11
     )
 
 
 def test_a_margin_that_starts_or_touches_at_zero_changes_as_its_kind_says() -> None:
-    assert _first(lambda t: t)[0] == NO_CHANGE  # true at zero already
+    assert _first(lambda t: t)[0] == NO_CHANGE  # already true at zero
     assert 0.0 < _first(lambda t: t, strict=True)[0] <= 1e-12
     assert _first(lambda t: 0.0)[0] == _first(lambda t: 0.0, strict=True)[0] == NO_CHANGE
     touching = -((0.5) ** 2)
@@ -554,7 +554,7 @@ def test_a_far_margin_with_a_bend_is_quiet_after_one_look_inside() -> None:
 
 
 def test_the_cubic_between_two_ends_is_that_of_both_slopes() -> None:
-    # y = t**3 between 1 and 3: the middle of the cubic is 8, of a line 14, and t = 2 is handed on.
+    # y = t**3 between 1 and 3: the cubic's midpoint is 8, a line's is 14, and t = 2 is passed on.
     w = watched([False], 1)
     w.watch[0] = 1
     w.active.append(0)
@@ -573,7 +573,7 @@ def test_the_cubic_between_two_ends_is_that_of_both_slopes() -> None:
 
 # --------------------------------------------------------------------------- advance
 class _Run:
-    """One machine-less run of y' = slope(t, y), y(0) = 1, called by hand."""
+    """A run of y' = slope(t, y), y(0) = 1, without machines, called directly."""
 
     def __init__(
         self,
@@ -596,7 +596,7 @@ class _Run:
             dy[0] = slope(t, y[0])
 
         def margins(t: float, y: list, mode: list, p: None, watch: list, out: list) -> None:
-            assert margin is not None, "nothing is watched, and margins are asked for"
+            assert margin is not None, "nothing is watched, but margins are requested"
             out[0] = margin(t, y[0])
 
         equations = Equations(
@@ -677,14 +677,14 @@ def test_no_step_is_longer_than_the_longest_allowed() -> None:
 
 def test_a_step_cut_short_by_a_stop_does_not_shorten_the_one_after_it() -> None:
     assert _Run().to(1e-9, h=0.5)[2] == 0.5  # ten times the sliver would be 1e-8
-    assert _Run().to(0.2, h=0.5)[2] == 2.0  # but it may grow by what was learned: 10 * 0.2
+    assert _Run().to(0.2, h=0.5)[2] == 2.0  # but it may grow from the tried length: 10 * 0.2
     assert _Run().to(0.5, h=0.5)[2] == 5.0
 
 
 def test_the_step_after_a_rejected_one_does_not_grow_at_once() -> None:
     run = _Run(lambda t, y: math.inf if t > 0.3 else 1.0)
-    assert run.to(100.0, h=1.0, steps=1)[1:3] == (0.2, 0.2)  # a fifth; without error from there
-    assert run.to(100.0, h=0.05, steps=1)[2] == pytest.approx(0.5)  # but the one after that may
+    assert run.to(100.0, h=1.0, steps=1)[1:3] == (0.2, 0.2)  # a fifth; no error from there on
+    assert run.to(100.0, h=0.05, steps=1)[2] == pytest.approx(0.5)  # but the next one may grow
 
 
 def test_a_step_that_was_accepted_narrowly_is_followed_by_a_shorter_one() -> None:
@@ -713,7 +713,7 @@ def test_it_comes_back_when_the_steps_or_the_rows_are_used_up() -> None:
     full = _Run(step=0.25, capacity=2)
     assert full.to(100.0)[:2] == (kernel.FULL, 0.5)
     assert full.rows == [0.25, 0.5]
-    wanted = _Run(step=0.25, times=[0.3], capacity=1)  # a row a time, however many steps
+    wanted = _Run(step=0.25, times=[0.3], capacity=1)  # one row per time, however many steps
     assert wanted.to(1.0)[:2] == (kernel.REACHED, 1.0)
 
 
@@ -748,14 +748,14 @@ def test_an_adaptive_step_with_an_early_crossing_is_done_again_up_to_it() -> Non
     _, t, _, _ = run.to(2.0, h=0.5)
     assert t == pytest.approx(0.2, abs=1e-12)
     assert max(run.asked) >= 0.5
-    assert max(run.asked[-6:]) <= 0.2 + 1e-12  # no stage of the step kept lies behind it
+    assert max(run.asked[-6:]) <= 0.2 + 1e-12  # no stage of the accepted step lies beyond it
     later = _Run(lambda t, y: 1.0, lambda t, y: t - 0.9)  # after a quiet step in the same call
     assert later.to(2.0, h=0.1)[1] == pytest.approx(0.9, abs=1e-12)
     assert later.rows[0] == 0.1
     assert max(later.asked[-6:]) <= 0.9 + 1e-12
     late = _Run(lambda t, y: math.cos(t), lambda t, y: t - 0.097)
     late.to(2.0, h=0.1)
-    assert max(late.asked[-6:]) == 0.1  # near the step's end it is kept
+    assert max(late.asked[-6:]) == 0.1  # near the step's end the step is kept
 
 
 def test_between_stops_a_quiet_step_hands_its_margins_to_the_next() -> None:
@@ -786,28 +786,28 @@ def test_an_infinite_slope_and_a_step_of_nothing_are_told_apart() -> None:
     assert blind.to(1.0)[0] == kernel.TOO_SMALL
 
 
-# --------------------------------------------------------------------------- what nobody can notice
-# Of all mutants these survive, by reason:
+# --------------------------------------------------------------------------- undetectable mutants
+# These mutants survive, grouped by reason:
 #
-# - Cannot occur: a bend, a depth, a count of steps and `quiet` are never negative, a cursor
-#   never beyond its list, a time never behind its stop, no place beyond `NO_CHANGE`, a chain of
-#   comparisons never empty, no atom stands firmer than an atom, an estimate of the error is
-#   infinite where it is no number, Python knows of no column behind a text's end, a whole power of
-#   0 or 1 was answered before, `sgn` and `abs` have one argument. So `> 0` and `!= 0`, `>=` and
-#   `==`, `<` and `!=` are the same there.
-# - Equality of floats: where two computed numbers are exactly alike, `<` and `<=` differ by a
-#   halving, a look or a redone step, never by the place found.
-# - Read by nobody: scratch is filled before it is read, and may be longer; the place returned with
-#   `NO_CHANGE`; which negative number says "no edge"; a sum that is only held against infinity; a
-#   dense output fitted for a time that is not in the step.
-# - A hint: the grid's index may be too low, a loop climbs from there; a guess in `_bracket` is
-#   clamped into the bracket. Both only take longer.
-# - Names: the numbers of statuses and of `NO_CHANGE`; of the levels of binding the order alone
-#   counts, and only of those that can stand side by side.
+# - Cannot occur: a bend, a depth, a count of steps and `quiet` are never negative; a cursor is
+#   never past its list, a time never past its stop, no point beyond `NO_CHANGE`; a chain of
+#   comparisons is never empty; nothing binds tighter than an atom; an error estimate is infinite
+#   rather than NaN; Python reports no column past a text's end; integer powers 0 and 1 are handled
+#   before; `sgn` and `abs` have one argument. So `> 0` and `!= 0`, `>=` and `==`, `<` and `!=` are
+#   the same there.
+# - Equality of floats: where two computed numbers are exactly equal, `<` and `<=` differ by a
+#   halving, a probe or a repeated step, never by the point found.
+# - Never read: scratch space is filled before it is read, and may be longer; the point returned
+#   with `NO_CHANGE`; which negative number means "no edge"; a sum that is only compared with
+#   infinity; a dense output fitted for a time that is not in the step.
+# - Hints: the grid's index may be too low, a loop counts up from there; a guess in `_bracket` is
+#   clamped to the bracket. Both only take longer.
+# - Names: the numbers of statuses and of `NO_CHANGE`; of the precedence levels only the order
+#   matters, and only between those that can be adjacent.
 # - Words: no function sorts before `abs`, no word for not before `!`, and only `min` and `max` have
 #   two arguments. So `==` and `<=`, or `>=`, are the same there.
 # - Scale: a margin times 2 is on the same side of every comparison.
-# - The least tolerance of a bracket matters to a step longer than the times at both its ends.
-# - Follows from the rest: `compare=True` for the trees of a `Chart`, for equal texts give equal
-#   trees; `strict=True` where two lists come from one length; what a reader of values never meets;
-#   how much of a long name is held against the known ones.
+# - The smallest tolerance of a bracket matters only for a step longer than the times at its ends.
+# - Implied by the rest: `compare=True` for the trees of a `Chart`, because equal texts give equal
+#   trees; `strict=True` for two lists derived from one; input that a reader of values never
+#   receives; how much of a long name is compared with the known ones.

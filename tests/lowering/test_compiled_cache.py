@@ -1,8 +1,8 @@
-"""Machine code is kept on disk, and whatever happens to it there costs time and nothing else.
+"""Machine code is cached on disk, and damage to the cache costs time and nothing else.
 
-Another process does not compile again; two may start at once; an unwritable folder or a damaged
-file is survived, down to a single wrong bit; changed source has another name; programs that were
-compiled in different processes are never taken for each other. Without numba the words say what to
+Another process does not compile again; two may start at the same time; an unwritable folder or a
+damaged file is tolerated, down to a single wrong bit; changed source has another name; programs
+compiled in different processes are never confused. Without numba, the message says what to
 install, and the machines run.
 """
 
@@ -32,7 +32,7 @@ numba = pytest.importorskip("numba", reason="needs the extra fast")
 
 NOTE = "gms-fsm: compiling the engine, once on this machine"
 
-# A whole run, by both engines. A new machine pays some 10 s for it.
+# A whole run, by both engines. On a new machine this takes some 10 s.
 RUN = """
     from gms_fsm import GMS, GMSParameters, Prescribed, simulate
     model = GMS(GMSParameters.paper("stick-slip"), law="signed")
@@ -43,7 +43,7 @@ RUN = """
     assert one.transitions.tobytes() == other.transitions.tobytes()
     print("equal", len(one.transitions))
 """
-# One function of one program: a second. The velocities are such that a mix-up is seen.
+# One function of one program: a second. The velocities are chosen so that a mix-up is visible.
 ROWS = """
     import sys
     import numpy as np
@@ -76,7 +76,7 @@ def _start(code: str, *arguments: str, **environment: str) -> subprocess.Popen[s
 
 
 def _ended(process: subprocess.Popen[str]) -> tuple[str, str]:
-    """Return what a process said, on both channels; it must have ended well."""
+    """Return a process's output on both streams; it must have ended successfully."""
     out, err = process.communicate()
     assert process.returncode == 0, err
     return out, err
@@ -95,7 +95,7 @@ def _kept(folder: Path) -> set[Path]:
 # --------------------------------------------------------------------------- once on this machine
 @pytest.fixture(scope="module")
 def warm(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[tuple[str, str]]]:
-    """A new cache folder after two processes have started at once, and what these said."""
+    """Start two processes at the same time with a new cache folder; return it and their output."""
     folder = tmp_path_factory.mktemp("cache")
     started = [_start(RUN, NUMBA_CACHE_DIR=str(folder)) for _ in range(2)]
     return folder, [_ended(process) for process in started]
@@ -122,7 +122,7 @@ def test_the_next_process_does_not_compile_again(
 
 
 def test_a_damaged_cache_only_costs_time(warm: tuple[Path, list[tuple[str, str]]]) -> None:
-    """Every file of it: garbage, or cut short."""
+    """Every file of it is garbage, or truncated."""
     folder = warm[0]
     for turn, path in enumerate(sorted(_kept(folder))):
         content = path.read_bytes()
@@ -135,7 +135,7 @@ def test_a_damaged_cache_only_costs_time(warm: tuple[Path, list[tuple[str, str]]
 def test_a_wrong_bit_anywhere_is_found_before_the_code_is_loaded(
     warm: tuple[Path, list[tuple[str, str]]],
 ) -> None:
-    """Unfound, every fifth of them ends the process. Each process here has one in each file."""
+    """Undetected, one in five crashes the process. Each process here has one in each file."""
     folder, source = warm[0], random.Random(14)
     whole = _kept(folder)
     for _ in range(3):
@@ -144,7 +144,7 @@ def test_a_wrong_bit_anywhere_is_found_before_the_code_is_loaded(
             _flip(path, source)
         assert _ended(_start(RUN, NUMBA_CACHE_DIR=str(folder))) == ("equal 24\n", "")
         assert _kept(folder) == set(whole)
-        assert all(Store(path.parent).get(path.name) for path in whole), "all are made anew"
+        assert all(Store(path.parent).get(path.name) for path in whole), "all are recreated"
 
 
 # --------------------------------------------------------------------------- damage of every kind
@@ -155,7 +155,7 @@ def _forget_all() -> None:
 
 @pytest.fixture
 def observe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], Any]]:
-    """Compile one function of a program as a new process would, with a cache of its own; try it."""
+    """Return a function that compiles and tries one function, as a new process would."""
     monkeypatch.setattr(compiled, "store", lambda: Store.at(tmp_path))
     program = lower(stick_slip("signed"), Prescribed("0.1*t"))
     y, mode = [0.1, 0.2, 0.3, 0.2, 0.1], [0, 1, 0, 1]
@@ -204,14 +204,14 @@ def _another_kind(path: Path) -> None:
 
 
 def _another_name(path: Path) -> None:
-    """What is whole, but was kept for another function."""
+    """A complete file that was stored for another function."""
     Store(path.parent).put("other", b"content")
     path.write_bytes((path.parent / "other").read_bytes())
     (path.parent / "other").unlink()
 
 
 def _unreadable(path: Path) -> None:
-    """What was put there whole, by somebody whose bytes mean something else."""
+    """A complete file whose content has another meaning."""
     Store(path.parent).put(path.name, b"something else")
 
 
@@ -253,7 +253,7 @@ def test_a_folder_that_cannot_be_written_only_costs_time(tmp_path: Path) -> None
 
 # --------------------------------------------------------------------------- no mix-up
 def test_programs_compiled_in_different_processes_are_told_apart(tmp_path: Path) -> None:
-    """Each is the first that its process compiles; a third loads both and uses both again."""
+    """Each is the first that its process compiles; a third process loads and uses both twice."""
     velocities = "0.1*t", "0.2*sin(t)"
     for velocity in velocities:
         _rows(tmp_path, velocity)
@@ -266,7 +266,7 @@ def test_the_names_are_the_same_in_every_process(tmp_path: Path) -> None:
     for seed in ("0", "1", "random"):
         out, _ = _ended(_start(ROWS, "0.1*t", NUMBA_CACHE_DIR=str(tmp_path), PYTHONHASHSEED=seed))
         assert out == "equal\n"
-    assert len(_kept(tmp_path)) == 2  # the program's observe, and what calls it for each row
+    assert len(_kept(tmp_path)) == 2  # the program's observe, and its caller for each row
 
 
 # --------------------------------------------------------------------------- changed source
@@ -351,7 +351,7 @@ def test_a_digest_follows_code_and_constants_but_not_the_place() -> None:
 
 # --------------------------------------------------------------------------- several threads
 def test_settings_of_numba_are_as_they_were_whoever_compiles() -> None:
-    """Many threads compile at once; the user's own numba functions must not notice."""
+    """Many threads compile at once; the user's own numba functions must not be affected."""
     code = """
         import threading
         import numba
@@ -422,7 +422,7 @@ def test_without_the_extra_the_words_say_what_to_install(absent: list[str], tmp_
     for line in said:
         for word in (absent[0], "not installed", "gms-fsm[fast]", "engine='machines'"):
             assert word in line
-    assert loaded == f"{float(trace.F[-1])} 1", "what was computed with it is read without it"
+    assert loaded == f"{float(trace.F[-1])} 1", "results computed with it are readable without it"
     assert err == ""
 
 

@@ -1,7 +1,7 @@
-"""The generated program is text a person can read, search, and step through with a debugger.
+"""The generated program is text that a person can read, search, and step through with a debugger.
 
-It holds the guards as the chart writes them and no number of the user's; a traceback through it
-shows its lines; `inspect` finds its source.
+It contains the guards as the chart writes them and no values chosen by the user; a traceback
+through it shows its lines; `inspect` finds its source.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ LUGRE = LuGre(sigma_0=1234.5, sigma_1=31.625, sigma_2=4.125, stribeck=Stribeck(1
 
 
 def odd_numbers(n: int, seed: int) -> GMS:
-    """A bank whose parameters are like no number a program needs."""
+    """A bank whose parameters differ from every number that a program contains."""
     random = np.random.default_rng(seed)
     parameters = GMSParameters(
         *random.uniform(0.1, 0.9, (3, n)),
@@ -154,7 +154,7 @@ def test_a_traceback_shows_the_line_that_failed() -> None:
 
 
 def _stepped(program: Program, name: str, *arguments: Any) -> list[str]:
-    """Run a function under a tracer, as a debugger does, and return the lines it saw."""
+    """Run a function under a tracer, as a debugger does, and return the lines visited."""
     filename, seen = program.functions[name].__code__.co_filename, []
 
     def tracer(frame: FrameType, event: str, _: Any) -> Any:

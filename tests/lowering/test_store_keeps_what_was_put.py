@@ -1,7 +1,7 @@
-"""A store gives back what was put into it, to the last bit, or nothing; whoever uses it at once.
+"""A store returns exactly what was put into it, or nothing, even with several users at once.
 
-One bit anywhere is found, in name, checksum and content. What it finds damaged it removes, so that
-it is made anew. It does not know what the bytes are.
+Every wrong bit is detected, in name, checksum and content. Damaged files are removed, so that they
+are recreated. The store does not interpret its contents.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """However a motion is given (expression, ramps, record, function), the run is the same.
 
-Jumps are right-continuous, a record has no value outside itself, and what is no signal is refused
+Jumps are right-continuous, a record has no value outside its range, and anything else is refused
 with its value.
 """
 
@@ -60,7 +60,7 @@ def test_the_same_motion_gives_the_same_run(given: str, reference: Trace) -> Non
     assert len(reference.transitions) > 8
     assert trace.transitions.edge.tolist() == reference.transitions.edge.tolist()
     assert trace.transitions.element.tolist() == reference.transitions.element.tolist()
-    # The corners of a function are unknown; only error control meets them.
+    # The corners of a function are unknown; only error control detects them.
     close = 1e-5 if given.startswith("function") else 1e-7
     np.testing.assert_allclose(trace.transitions.t, reference.transitions.t, atol=10 * close)
     np.testing.assert_allclose(trace.v, np.interp(GRID, TIMES, VALUES), atol=1e-15)
@@ -121,7 +121,7 @@ def test_a_jump_can_release_an_element_at_once() -> None:
     jump = [(0.0, 0.5), (1.0, 0.5), (1.0, 0.0), (3.0, 0.0), (3.0, 0.5)]
     trace = simulate(stick_slip("signed"), Prescribed(jump), 5.0)
     # z = 0.5 > 0.4 = s at t = 0.8: slip; at rest s is 1.5 and |z| < s: all arrest at the jump; and
-    # at the next jump s falls under z again: all break away there.
+    # at the next jump s falls below z again: all break away there.
     np.testing.assert_allclose(trace.transitions.t, [0.8] * 4 + [1.0] * 4 + [3.0] * 4, atol=1e-9)
     assert trace.transitions.edge.tolist() == (
         ["break_away_forward"] * 4 + ["arrest"] * 4 + ["break_away_forward"] * 4
@@ -147,7 +147,7 @@ def test_two_functions_on_one_generated_text_stay_apart() -> None:
 
 @dataclass
 class Ramp:
-    """A callable that compares by part of what it knows, and cannot be hashed."""
+    """A callable that compares by only part of its data, and cannot be hashed."""
 
     unit: str
     slope: float = field(compare=False)
@@ -238,7 +238,7 @@ def test_an_unreadable_expression_is_an_expression_error_of_the_signal(text: str
         Prescribed(text)
 
 
-# --------------------------------------------------------------------------- signals that give out
+# --------------------------------------------------------------------------- signals that end
 def _fails(error: type[SimulationError], signal: Any, t_end: float, **options: Any) -> Any:
     with pytest.raises(error) as caught:
         simulate(stick_slip("signed"), Prescribed(signal), t_end, **options)
