@@ -1,4 +1,4 @@
-"""A signal that jumps is met exactly: its left value before, its right value after, full order."""
+"""At a jump of a signal its left value is used before, its right value after, at full order."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Corners and jumps in outputs and in a rig's equation are stopped at, as those in flows are.
+"""Steps end on corners and jumps in outputs and in a rig's equation, just as on those in flows.
 
-A run with `F = "F_c * sgn(v)"` came to t = 0.015 of 5 s and kept gigabytes; a corner in a rig's
-text cost the method its order.
+Before, a run with `F = "F_c * sgn(v)"` reached t = 0.015 of 5 s and recorded gigabytes; a corner in
+a rig's text cost the method its order.
 """
 
 import numpy as np
@@ -29,7 +29,7 @@ def force(text: str, **parameters: float) -> ChartModel:
 
 
 class Buffer:
-    """A mass that meets a spring at x = gap; the chart has a parameter `gap` of its own."""
+    """A mass that meets a spring at x = gap; the chart has its own parameter `gap`."""
 
     title = "mass and buffer"
     acceleration = "(push - stiffness * max(x - gap, 0) - F) / mass"

@@ -1,7 +1,7 @@
-"""A pulse that fills a small part of a run is met, wherever it lies, with no max step set.
+"""A pulse that fills a small part of a run is found, wherever it lies, without a maximum step.
 
-A step is judged by what its few stages see. A formula that rests lets the steps grow, and one of
-them went over the whole pulse: x was 0.010 m instead of 0.060 m.
+A step is judged by its few stages. A formula at rest lets the steps grow, and one of them jumped
+over the whole pulse: x was 0.010 m instead of 0.060 m.
 """
 
 import numpy as np
@@ -54,7 +54,7 @@ def test_a_bank_of_elements_moves_as_far_as_with_small_steps():
 
 @pytest.mark.parametrize("text", ["sin(t)", "0.2*t", "3", "1e-5*exp(t/5)", "sqrt(3 - t)"])
 def test_formulas_that_never_rest_get_no_places(text):
-    """Their runs are the same to the bit as without this."""
+    """Their runs are bit for bit the same as without this."""
     assert waking_times(parse_value(text, ["t"]), 0.0, 10.0) == ()
 
 

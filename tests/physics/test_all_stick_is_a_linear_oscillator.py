@@ -1,4 +1,4 @@
-"""While every element sticks the slider is a linear oscillator, and Fig. 3 is one from end to end.
+"""While every element sticks, the slider is a linear oscillator, and Fig. 3 is one throughout.
 
 m x'' + (sum sigma_i + sigma_2) x' + (sum k_i) x = F_a(t): a ramp up, a ramp down and a sine on a
 constant, each solved by a matrix exponential.
@@ -60,7 +60,7 @@ def test_default_tolerances_keep_a_micrometre():
 
 
 def test_the_band_of_x_is_the_known_one():
-    """In every cycle x runs between 1.769 and 2.732 mm: the spring does not drift."""
+    """In every cycle x oscillates between 1.769 and 2.732 mm: the spring does not drift."""
     model, rig = non_drifting("published")
     for first in (10.0, 29.0):
         times = np.linspace(first, first + 1.0, 2001)

@@ -1,6 +1,6 @@
-"""A run with located events finds every switch, with no step prescribed.
+"""A run with located events finds every switch without a prescribed step.
 
-Looking at the guards only at step ends (``events="step"``) does not: it is luck which ones it sees.
+Evaluating the guards only at step ends (``events="step"``) does not: which ones it finds is luck.
 """
 
 from collections import Counter

@@ -1,6 +1,6 @@
-"""Where both sides push back onto v = 0 a run goes on along it, with the sign that keeps it there.
+"""Where both sides push back onto v = 0, a run slides along it, with the sigma that keeps it there.
 
-An element that slips with |z| >= s while v changes sign cannot arrest; sgn(v) then chatters, and
+An element that slips with |z| >= s while v changes sign cannot arrest; sgn(v) then chattered, and
 the run ended in a livelock error.
 """
 
@@ -111,7 +111,7 @@ def test_a_mass_on_coulomb_friction_waits_for_its_spring(engine):
 
 
 def test_it_comes_to_rest_and_stays():
-    """Pushed once: decelerated by F_c / m, it stops after v^2 / 2 and is held for ever."""
+    """Pushed once: decelerated by F_c / m, it stops after v^2 / 2 and is held there."""
     trace = simulate(coulomb(), Slider(1.0, "0"), 5.0, initial={"v": 2.0})
     (slide,) = trace.sliding
     assert slide.t_start == pytest.approx(2.0, abs=1e-12)
@@ -138,7 +138,7 @@ def test_other_corners_at_the_same_place_do_not_hinder_it(text):
 
 
 def test_a_flow_that_is_not_linear_in_the_sign_is_combined_from_both_sides():
-    """F = 1 or -1/4 by the side: sigma is (2 F_a - 3/4) / (5/4), and F is F_a."""
+    """F = 1 or -1/4 depending on the side: sigma is (2 F_a - 3/4) / (5/4), and F is F_a."""
     model = coulomb("F_c * (sgn(v) + 0.6 * sgn(v) * sgn(v)) / 1.6")
     trace = simulate(model, Slider(1.0, "0.5"), 3.0)
     (slide,) = trace.sliding
@@ -202,7 +202,7 @@ def test_elements_come_to_rest_on_surfaces_of_their_own(engine):
 @pytest.mark.parametrize("guard", ["v >= 0 and z > 4", "abs(v) <= 0 and z > 4", "v <= 0 and z > 4"])
 @pytest.mark.parametrize("v0", [2.0, 1.7, -1.7, 0.3])
 def test_guards_that_compare_with_the_surface_are_asked_on_it(guard, v0, engine):
-    """A rounding beside it another comparison keeps them false, and they were not looked at."""
+    """A rounding error off it another comparison keeps them false; they were not evaluated."""
     chart = Chart(
         "waits",
         inputs=("v",),
@@ -219,7 +219,7 @@ def test_guards_that_compare_with_the_surface_are_asked_on_it(guard, v0, engine)
 
 @pytest.mark.parametrize("v0", np.linspace(0.31, 2.9, 30))
 def test_the_force_beside_a_slide_is_that_of_the_arc(v0):
-    """Not that of the sign as it looks on the surface: no dip of F_c on either side."""
+    """Not that of the sign evaluated on the surface: no dip of F_c on either side."""
     trace = simulate(coulomb(), Slider(1.0, [(0, 0), (4, 0), (5, 3)]), 6.0, initial={"v": v0})
     (slide,) = trace.sliding
     assert (trace.F[trace.t <= slide.t_start - 1e-12] == 1.0).all()
@@ -256,7 +256,7 @@ def test_twenty_elements_slide_at_once():
     assert (trace.z[-1] == 0.0).all()
 
 
-# --------------------------------------------------------------------------- where it is seen
+# --------------------------------------------------------------------------- where it shows
 def test_files_keep_it(tmp_path):
     trace = simulate(BANK, PUSHED, 0.4, engine="ifelse")
     for name in ("a.npz", "a.csv"):
@@ -267,7 +267,7 @@ def test_files_keep_it(tmp_path):
 
 
 def test_files_from_before_there_were_slides_are_read(tmp_path):
-    """Their rows have no flags of surfaces: no motion along one."""
+    """Their rows have no flags of surfaces, which means no sliding."""
     trace = simulate(BANK, PUSHED, 0.3, engine="ifelse")
     assert len(trace.sliding) == 0
     path = trace.save(tmp_path / "a.npz")

@@ -1,7 +1,7 @@
-"""Steps never grow past half a period of the input, though a sliding element gives no reason.
+"""Steps never exceed half a period of the input, though a sliding element does not limit them.
 
 A sliding element rests at z = s. x, the integral of v, is a state under error control and keeps
-the steps short; a solver that carries z alone strides over reversals.
+the steps short; a solver that integrates z alone steps over reversals.
 """
 
 import math

@@ -1,7 +1,7 @@
 """A callback that changes a parameter or a state is refused, by both engines that call it.
 
-The run integrates with the model's parameters and follows the chart's edges; what a callback set
-otherwise would be asked for and not located, or would put the machines and the rows apart.
+The run integrates with the model's parameters and follows the chart's edges; other changes by a
+callback would not be located, or would make the machines and the rows disagree.
 """
 
 from __future__ import annotations

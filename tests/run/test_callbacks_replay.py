@@ -1,8 +1,8 @@
-"""Machines of the user's own see of a compiled run what they see of their own.
+"""A user's own machines see the same in a replayed compiled run as when they run themselves.
 
 `simulate(..., engine="compiled", machines=...)` fires every edge through `transitions` too: each
-callback runs once a firing, in the log's order, with the values the machines engine shows, and the
-machines end in the states of the last row. The run is the same to the last bit.
+callback runs once per firing, in the log's order, with the values the machines engine shows, and
+the machines end in the states of the last row. The run is the same to the last bit.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ PLACES = ("prepare_event", "before_state_change", "after_state_change", "finaliz
 
 
 def _watched(model: Model, kind: type[Element] = Element) -> tuple[ElementMachines, list[Call]]:
-    """Machines with a note of every callback at every place, and the notes."""
+    """Return machines that record every callback at every place, and the records."""
     machines, calls = ElementMachines(model, kind), []
     variables, parameters = model.chart.variables, model.chart.parameter_names
 
@@ -86,7 +86,7 @@ def _watched(model: Model, kind: type[Element] = Element) -> tuple[ElementMachin
 
 
 def _both(case: str, **options: Any) -> tuple[Trace, list[Call]]:
-    """Run the machines engine and the compiled one with a replay; compare; return one."""
+    """Run the machines engine and the compiled one with a replay; compare and return one run."""
     model, rig, t_end = CASES[case]
     own, wanted = _watched(model)
     replayed, calls = _watched(model)
@@ -112,7 +112,7 @@ def test_every_callback_sees_what_it_would_have_seen(case: str, options: str) ->
 
 
 def test_the_values_are_those_of_the_log() -> None:
-    """v, s and z of the instant before the firing, for the first of a set at least."""
+    """v, s and z at the instant before the firing, at least for the first of a set."""
     trace, calls = _both("open loop")
     for r, call in zip(trace.transitions, [c for c in calls if c[0] == "on_exit"], strict=True):
         name, element, state, t, _, v, s, z = call[1:9]
@@ -191,7 +191,7 @@ def test_every_element_starts_in_its_own_state() -> None:
         initial=initial,
     )
     assert [e.state for e in machines.elements] == states
-    assert calls == [], "being put into the initial state is no firing"
+    assert calls == [], "setting the initial state is not a firing"
 
 
 def test_elements_of_a_class_of_ones_own() -> None:
@@ -222,7 +222,7 @@ def test_more_firings_than_the_columns_hold_at_first() -> None:
     same_bits(trace, simulate(model, rig, 25.0, engine="compiled"))
 
 
-# --------------------------------------------------------------------------- one truth
+# --------------------------------------------------------------------------- the chart decides
 @pytest.mark.parametrize("error", [ZeroDivisionError, ValueError, KeyError, KeyboardInterrupt])
 def test_an_error_of_a_callback_reaches_the_user_as_it_is(error: type[BaseException]) -> None:
     model = stick_slip("signed")

@@ -1,7 +1,7 @@
-"""User callbacks run exactly once per firing, with the values of that instant at hand.
+"""User callbacks run exactly once per firing, with access to the values at that instant.
 
 Nothing is called between firings; the machines end in the states of the last row; and the chart
-stays the only truth: a machine that was given other edges or conditions is refused.
+remains the only source of switching: a machine with other edges or conditions is refused.
 """
 
 from __future__ import annotations
@@ -208,10 +208,10 @@ def test_every_element_starts_in_its_own_state(model: GMS) -> None:
     )
     assert trace.states[0].tolist() == states
     assert trace.z[0].tolist() == [0.0, 0.1, 0.2, 0.3]
-    assert calls == [], "being put into the initial state is no firing"
+    assert calls == [], "setting the initial state is not a firing"
 
 
-# --------------------------------------------------------------------------- one truth
+# --------------------------------------------------------------------------- the chart decides
 def test_a_condition_of_the_users_is_refused(model: GMS) -> None:
     for target in (True, False):
         machines = ElementMachines(model)

@@ -1,8 +1,8 @@
-"""A checkpoint is refused unless this program wrote it, for these functions, with possible numbers.
+"""A checkpoint is refused unless this program wrote it, for these functions, with possible values.
 
 The same Python function means the same code, constants, defaults, enclosed values and globals, in
-any process; where that cannot be told the run is refused before it starts. Compiled code would take
-a wrong number for a place in memory, so each is looked at; nothing is unpacked that is too large.
+any process; if that cannot be determined, the run is refused before it starts. Compiled code would
+use an invalid number as a memory address, so each is checked; nothing too large is unpacked.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ ENGINES = [
 
 @pytest.fixture(autouse=True)
 def _short_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have a compiled run come back often enough to be interrupted."""
+    """Make a compiled run return often enough to be interrupted."""
     monkeypatch.setattr("gms_fsm.run._compiled_run.STEPS_AT_ONCE", 60)
 
 
 def begun(path: Path, rig: Any, engine: str = "machines", **options: Any) -> None:
-    """Leave the checkpoint of a run that was interrupted on its way."""
+    """Create the checkpoint of a run interrupted on its way."""
 
     def stop(moment: Any) -> None:
         if moment.t > 11.0:
@@ -131,7 +131,7 @@ def test_another_value_of_a_global_is_another_function(monkeypatch: pytest.Monke
 def test_another_value_in_a_module_or_class_of_ones_own_is_another_function(
     own: Any, others: int
 ) -> None:
-    """Also where the names are many, and their numbers long."""
+    """Even if the names are many, and their numbers long."""
     own.level, names = 0.2, {"own": own}
     many = "".join(f"    t = t + name{i}\n" for i in range(others))
     names |= {f"name{i}": 0.0 for i in range(others)}
@@ -237,14 +237,14 @@ def test_a_function_compiled_by_numba_is_known_by_its_text(tmp_path: Path) -> No
     goes_on(path, Prescribed(numba.njit(_louder(0.2))), "compiled")
 
 
-# --------------------------------------------------------------------------- rigs of one's own
+# --------------------------------------------------------------------------- user-defined rigs
 class _Own:
     title, acceleration, numbers = "mine", "(F_a - F) / mass", {"mass": 1.0}
     signals = Slider(1.0, "0.2 * t").signals
 
 
 def _own_rigs() -> dict[str, Any]:
-    """One with a name of its own, one with the name of ours, one derived from ours."""
+    """Return rigs with a name of their own, with a built-in rig's name, and derived from one."""
     namesake = type("Slider", (_Own,), {"acceleration": "(2 * F_a - F) / mass"})
     derived = type("Slider", (Slider,), {"acceleration": "(2 * F_a - F) / mass"})
     return {"own": _Own(), "namesake": namesake(), "derived": derived(1.0, "0.2 * t")}
@@ -305,7 +305,7 @@ def _write(path: Path, arrays: dict[str, Any]) -> None:
 def test_every_whole_number_and_every_shape_is_looked_at(
     engine: str, options: dict[str, Any], tmp_path: Path
 ) -> None:
-    """Each array in turn: far out of range, one row short, one axis more, another kind."""
+    """Each array in turn: far out of range, one row short, one axis more, another type."""
     path = tmp_path / "run.checkpoint"
     begun(path, open_loop(), engine, **options)
     whole = _arrays(path)

@@ -1,4 +1,4 @@
-"""A run interrupted anywhere and continued from its checkpoint equals the run left alone."""
+"""A run interrupted anywhere and continued from its checkpoint equals the uninterrupted run."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ ENGINES = [
 
 
 class Interrupted(Exception):
-    """Stands for a lost machine."""
+    """Represents a lost machine."""
 
 
 def interrupted(path: Path, after: int, *arguments: Any, **options: Any) -> Trace | None:
-    """Run until the progress has been told `after` times; None if it was interrupted there."""
+    """Run until `progress` has been called `after` times; None if interrupted there."""
     told = itertools.count(1)
 
     def stop(_: object) -> None:

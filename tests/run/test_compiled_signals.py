@@ -1,8 +1,8 @@
-"""A Python function of t drives a compiled run too, where numba can compile it.
+"""A Python function of t can drive a compiled run, if numba can compile it.
 
-The trace is then that of the machines engine to 1e-12. A function that cannot be compiled is
-refused by the signal's name before anything runs; one that raises ends the run in words, with the
-part before it kept.
+The trace then equals that of the machines engine to 1e-12. A function that cannot be compiled is
+refused by the signal's name before anything runs; one that raises ends the run with an explanation,
+and the part before it is kept.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Signal = Callable[[float], float]
 TABLE = np.array([0.1, 0.2, -0.2, 0.3])
 
 
-# --------------------------------------------------------------------------- that compile
+# --------------------------------------------------------------------------- compilable
 def _sine(t: float) -> float:
     return 0.2 * math.sin(2 * math.pi * t / 20)
 
@@ -116,7 +116,7 @@ def test_a_function_that_pushes_a_slider() -> None:
 
 
 def test_functions_of_one_text_are_not_taken_for_each_other() -> None:
-    """Closures share their code and their name; what they enclose is read anew."""
+    """Closures share their code and their name; their enclosed values are read each time."""
     model = stick_slip("signed")
     levels = 0.3, 0.5
     found = [
@@ -138,7 +138,7 @@ def test_nothing_is_kept_on_disk_of_a_function_that_may_change(
     assert [path.name for path in tmp_path.iterdir() if path.match("flow*")]
 
 
-# --------------------------------------------------------------------------- that do not
+# --------------------------------------------------------------------------- not compilable
 class _Callable:
     def __call__(self, t: float) -> float:
         return 0.1
@@ -196,7 +196,7 @@ def test_what_numba_cannot_compile_is_refused_by_its_name(kind: str) -> None:
         for word in (f"signal {name!r}", "numba cannot compile", "engine='machines'", "expression"):
             assert word in str(caught.value)
         assert str(caught.value).isprintable()
-        assert "Failed in nopython" not in str(caught.value), "which says nothing"
+        assert "Failed in nopython" not in str(caught.value), "which explains nothing"
         assert not isinstance(caught.value, SimulationError)
 
 
@@ -206,7 +206,7 @@ def test_a_sweep_refuses_it_in_every_row() -> None:
     assert all("signal 'v'" in text for text in result.message)
 
 
-# --------------------------------------------------------------------------- that raise
+# --------------------------------------------------------------------------- raising
 def _too_late(t: float) -> float:
     if t > 7.0:
         raise ValueError("too late")
@@ -243,7 +243,7 @@ def test_what_raises_ends_the_run_and_keeps_what_was_before(
 
 
 def test_with_the_end_only_time_and_state_belong_together() -> None:
-    """The run raises amid steps; what is kept is a state that was reached at the time beside it."""
+    """The run raises within steps; the recorded state was reached at the recorded time."""
     with pytest.raises(SimulationError) as caught:
         simulate(
             stick_slip("signed"),
@@ -289,7 +289,7 @@ def test_in_a_sweep_it_is_the_outcome_of_its_run() -> None:
     "function", [lambda t: 0.1 * math.sqrt(2.0 - t), lambda t: math.exp(400 * (t - 2.0))]
 )
 def test_a_function_that_leaves_its_domain(function: Signal) -> None:
-    """Python raises there and machine code gets NaN or infinity; both runs end before it."""
+    """There Python raises and machine code yields NaN or infinity; both runs end before it."""
     model, rig = stick_slip("signed"), Prescribed(function)
     with pytest.raises(SimulationError) as ours:
         simulate(model, rig, 10.0)

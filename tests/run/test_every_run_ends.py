@@ -1,7 +1,7 @@
-"""A run that gets nowhere ends in an error that says why, with all that was computed.
+"""A run that makes no progress ends in an error that says why, with everything computed so far.
 
-Chattering a little slower than the clock's resolution kept millions of rows; a stiff run was silent
-for a minute; a trial set of parameters kept a fit busy for as long as it liked.
+Before, chattering a little slower than the clock's resolution recorded millions of rows; a stiff
+run was silent for a minute; one trial set of parameters kept a fit busy indefinitely.
 """
 
 import numpy as np
@@ -44,7 +44,7 @@ def needs(engine):
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("gap", [1e-9, 1e-8, 1e-7])
 def test_chattering_below_the_tolerance_is_a_livelock(engine, gap):
-    """The state moves by less than the integrator can tell, a switch every 1e-9 of the time."""
+    """The state moves by less than the integrator resolves, a switch every 1e-9 of the time."""
     with pytest.raises(LivelockError, match="chattering") as caught:
         simulate(banging(gap), Prescribed("1"), 10.0, engine=needs(engine))
     assert len(caught.value.trace.transitions) < 2000
@@ -52,7 +52,7 @@ def test_chattering_below_the_tolerance_is_a_livelock(engine, gap):
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_fast_switching_that_goes_somewhere_is_none(engine):
-    """Some thousand switches a second, each by a step that is well above the tolerance."""
+    """Some thousand switches a second, each by a step well above the tolerance."""
     trace = simulate(banging(1e-3), Prescribed("1"), 2.0, engine=needs(engine))
     assert len(trace.transitions) == 1000
 

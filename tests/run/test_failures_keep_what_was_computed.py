@@ -1,7 +1,7 @@
-"""A run that cannot go on says what happened and what to try, and keeps what it had.
+"""A run that cannot continue says what happened and what to try, and keeps its results so far.
 
 Before a run every argument is checked: the message has the value and the rule. During a run the
-error carries the rows and transitions up to there in ``.trace``.
+error carries the rows and transitions up to that point in ``.trace``.
 """
 
 from __future__ import annotations
@@ -209,8 +209,8 @@ def test_a_self_loop_that_never_turns_false_is_a_livelock() -> None:
 
 
 def test_a_surface_whose_slope_is_not_known_is_a_livelock_of_its_comparison() -> None:
-    # A belt moved by a Python function: v is pushed onto it from both sides, and to ride on it the
-    # run would have to know how fast its speed changes.
+    # A belt moved by a Python function: v is pushed onto it from both sides, and to follow it the
+    # run would have to know its acceleration.
     chart = Chart("free", ("v",), ("z",), ("k",), (State("on", {"z": "0"}),), (), {"F": "k * z"})
     with pytest.raises(LivelockError) as caught:
         simulate(ChartModel(chart, {"k": 0.0}), FunctionBelt(), 2.0, initial={"v": 1.0})
@@ -247,7 +247,7 @@ def _singular(flow: str, n: int = 2) -> ChartModel:
 def test_a_flow_that_escapes_to_infinity_is_a_step_size_error(
     options: dict[str, Any], rows: Any
 ) -> None:
-    # z' = z^2, z(0) = 1: z = 1/(1 - t) leaves the numbers at t = 1.
+    # z' = z^2, z(0) = 1: z = 1/(1 - t) diverges at t = 1.
     error = _failed(
         SimulationError,
         _singular("z * z"),
@@ -313,7 +313,7 @@ def test_a_guard_that_cannot_be_computed_is_a_simulation_error(guard: str, engin
 def test_an_infinite_side_of_a_guard_compares_as_ieee_arithmetic_does(
     guard: str, engine: str
 ) -> None:
-    """Python raises in 1/0 and exp(1e4); the engines agree to take them for infinity."""
+    """Python raises for 1/0 and exp(1e4); the engines agree to treat them as infinity."""
     model = _broken(Transition("go", "stick", "slip", guard=guard))
     trace = simulate(model, Prescribed("0.1"), 1.0, engine=engine)
     assert set(trace.transitions.t.tolist()) == {0.0}

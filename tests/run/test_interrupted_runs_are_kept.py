@@ -1,5 +1,5 @@
-"""Ctrl-C loses no run: what was computed is in `.trace` of the KeyboardInterrupt, and on disk by
-the command line, wherever it strikes.
+"""Ctrl-C loses no run: the results so far are in `.trace` of the KeyboardInterrupt, and the command
+line writes them to disk, whenever it occurs.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ OPTIONS = {"all": {}, "t_eval": {"t_eval": np.linspace(0, 25, 333)}}
 
 
 def begins(whole: Trace, part: Trace) -> None:
-    """Assert that a part is how the whole run begins, to the bit, and whole in itself."""
+    """Assert that a part is complete in itself and equals the beginning of the whole run."""
     count = len(part)
     for name in ("t", "microstep", "x", "v", "z", "F", "states"):
         np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[:count], name)
@@ -83,7 +83,7 @@ def test_a_strike_within_a_step_keeps_the_steps_before(call: int) -> None:
         simulate(stick_slip("signed"), Prescribed(velocity), 3.0, max_step=0.01)
     part: Trace = caught.value.trace  # type: ignore[attr-defined]
     count = len(part)
-    assert count >= call // 8 - 1  # evaluations a step
+    assert count >= call // 8 - 1  # evaluations per step
     np.testing.assert_array_equal(part.rows.y, whole.rows.y[:count])
 
 

@@ -1,4 +1,4 @@
-"""Claim: one `Settings` object means the same to simulate, sessions and sweeps."""
+"""One `Settings` object means the same to simulate, sessions and sweeps."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""A sweep file is refused unless it holds what a sweep of so many runs has, and no more.
+"""A sweep file is refused unless it contains exactly what a sweep of so many runs has.
 
-Shapes, kinds and numbers that are places are looked at; nothing is unpacked that is too large; a
-file of another format is named as such.
+Shapes, types and indices are checked; nothing too large is unpacked; a file of another format is
+identified as such.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from tests.helpers import pulled_mass
 
 @pytest.fixture(scope="module")
 def arrays(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """A file of three runs, one of which cannot start, with rows."""
+    """Return the arrays of a file with rows and three runs, one of which cannot start."""
     values = {"F_c": [1.0, 0.9, -1.0], "k": np.full((3, 4), 25.0)}
     made = sweep(*pulled_mass(), 8.0, values, engine="ifelse", output="t_eval", t_eval=[0.0, 8.0])
     assert len(made.transitions) > 4
@@ -75,7 +75,7 @@ def test_every_shape_and_kind_is_looked_at(
     for changed in changes:
         others = {other: value for other, value in arrays.items() if other != name}
         if changed is None and name.startswith("parameter_"):
-            continue  # a sweep of the other one
+            continue  # valid for another sweep
         with pytest.raises(TraceFileError, match=r"runs\.npz: not a sweep, or damaged"):
             _load(others | ({} if changed is None else {name: changed}), tmp_path)
 

@@ -1,7 +1,7 @@
 """A sweep is many runs: each row is, to the last bit, what simulate() gives for its parameters.
 
-Whatever happens to one run is its row's outcome and ends no other; the order is that of the
-parameters wherever the runs ran; and what is kept does not grow with the length of the runs.
+Whatever happens to one run is the outcome in its row and ends no other; the order is that of the
+parameters wherever the runs were executed; and memory does not grow with the length of the runs.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ from tests.helpers import non_drifting, open_loop, pulled_mass, stick_slip
 ENGINES = ("compiled", "machines", "ifelse")
 K = np.array([40.0, 30.0, 20.0, 10.0])
 RNG = np.random.default_rng(5)
-inside = sys.modules[sweep.__module__]  # the module; its name is the function's
+inside = sys.modules[sweep.__module__]  # the module; its name refers to the function
 
 
 @pytest.fixture(params=ENGINES)
 def engine(request: pytest.FixtureRequest) -> str:
-    """Each engine; the compiled one where its extra is installed."""
+    """Each engine; the compiled one only if its extra is installed."""
     if request.param == "compiled":
         pytest.importorskip("numba", reason="needs the extra fast")
     return str(request.param)
@@ -167,7 +167,7 @@ def test_each_row_is_a_run(case: str, options: dict[str, Any], engine: str) -> N
 
 
 def test_more_runs_than_a_task_holds_and_more_firings_than_a_column() -> None:
-    """Buffers are used again by the next run of a task; what the run before left does not show."""
+    """Buffers are reused by the next run of a task; nothing of the previous run shows."""
     pytest.importorskip("numba", reason="needs the extra fast")
     model, _ = pulled_mass()
     rig = Prescribed("0.3*sin(20*t)")
@@ -187,7 +187,7 @@ def test_more_runs_than_a_task_holds_and_more_firings_than_a_column() -> None:
     assert 0 <= counts[1] < counts[2] < counts[0]
 
 
-# --------------------------------------------------------------------------- what is varied
+# --------------------------------------------------------------------------- parameters
 def test_a_charts_own_parameter_goes_before_a_shared_one_of_its_name() -> None:
     chart = Chart(
         "own Coulomb",
@@ -305,7 +305,7 @@ def test_what_is_wrong_for_all_is_said_once(options: dict[str, Any], words: str)
 
 # --------------------------------------------------------------------------- failures
 def _fragile() -> ChartModel:
-    """Livelocks where v_c is above the speed; its flow is infinite where k is 1."""
+    """Livelocks if v_c is above the speed; its flow is infinite if k is 1."""
     sound = gms_element("signed")
     chart = Chart(
         "fragile",
@@ -427,7 +427,7 @@ def _same(one: Sweep, other: Sweep) -> None:
 
 
 class Backwards(Executor):
-    """Runs a task when its result is wanted, the last one first."""
+    """Runs a task when its result is requested, the last one first."""
 
     def __init__(self) -> None:
         self.tasks: list[tuple[Future[Any], Callable[[], Any]]] = []
@@ -462,7 +462,7 @@ def _die(*_: Any) -> None:
 
 
 class Deadly(Executor):
-    """A process pool whose worker dies over the third task."""
+    """A process pool whose worker dies in the third task."""
 
     def __init__(self, pool: Executor) -> None:
         self.pool, self.count = pool, 0
@@ -486,7 +486,7 @@ def test_processes_and_one_that_is_killed() -> None:
         np.testing.assert_array_equal(hurt.F[:2], usual.F[:2])
         assert np.isnan(hurt.F[2:]).all()
         assert hurt.transition_count[2:].sum() == 0
-        # A pool that is broken from the start makes rows too.
+        # A pool that is broken from the start gives rows too.
         dead = sweep(model, rig, 3.0, sets, executor=pool, engine="machines")
         assert dead.outcome.tolist() == ["BrokenProcessPool"] * 8
 
@@ -509,7 +509,7 @@ def test_what_cannot_be_sent_to_a_process_is_a_row_that_says_so() -> None:
 
 # --------------------------------------------------------------------------- Ctrl-C
 def _interrupting(after: int) -> Any:
-    """A progress display that presses Ctrl-C."""
+    """Return a progress display that raises Ctrl-C."""
 
     @contextmanager
     def bar(runs: int, progress: bool | None) -> Iterator[Callable[[int], None]]:
@@ -543,7 +543,7 @@ def test_ctrl_c_leaves_no_threads_running(place: str, monkeypatch: pytest.Monkey
         sweep(*pulled_mass(), 10.0, _sets(60), engine="ifelse")
     assert set(threading.enumerate()) <= before
     count = len(begun)
-    assert 2 <= count < 40, "what had not begun is not begun"
+    assert 2 <= count < 40, "pending tasks are not started"
     assert len(begun) == count
 
 
@@ -557,10 +557,10 @@ def test_progress_is_shown_where_it_is_wanted(capsys: pytest.CaptureFixture[str]
         assert said.out + said.err == ""
 
 
-# --------------------------------------------------------------------------- handing on
+# --------------------------------------------------------------------------- tables and files
 @pytest.fixture(scope="module")
 def mixed() -> Sweep:
-    """Two runs that end, one that cannot start; rows, wide and narrow parameters."""
+    """Return two runs that end and one that cannot start; rows, wide and narrow parameters."""
     return sweep(
         *pulled_mass(),
         8.0,
@@ -693,7 +693,7 @@ def test_files_that_cannot_be_written_or_read_say_so(mixed: Sweep, tmp_path: Pat
 
 # --------------------------------------------------------------------------- many
 def test_no_sequence_of_two_hundred_depends_on_the_tolerance() -> None:
-    """72 transitions each, more or less: the same elements by the same edges in the same order."""
+    """About 72 transitions each: the same elements by the same edges in the same order."""
     pytest.importorskip("numba", reason="needs the extra fast")
     k = K * np.random.default_rng(0).uniform(0.8, 1.2, (200, 4))
     loose, tight = (
@@ -709,7 +709,7 @@ def test_no_sequence_of_two_hundred_depends_on_the_tolerance() -> None:
 
 
 def test_memory_grows_with_the_results_only() -> None:
-    """A run's steps are not kept: at most its firings twice, while they are put together."""
+    """A run's steps are not recorded: at most its firings twice, while they are assembled."""
     pytest.importorskip("numba", reason="needs the extra fast")
     model, rig = pulled_mass()
 

@@ -1,7 +1,7 @@
 """`integrators.loop.record`, run by Python over the compiled engine's arrays, gives the same rows.
 
-So the loop that fills the columns is right as it is read, whatever a compiler makes of it; that the
-compiler makes the same of it is the claim of test_compiled_is_bit_identical.py.
+So the loop that fills the columns is correct as source, whatever a compiler makes of it; that the
+compiled code does the same is the claim of test_compiled_is_bit_identical.py.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ TIMES = np.linspace(0.0, 20.0, 41)
 
 @pytest.fixture
 def read(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let engine="compiled" run the text."""
+    """Make engine="compiled" run the Python source."""
     module = gms_fsm.lowering._compiled
     monkeypatch.setattr(module, "machine_code", lambda program, name: program.ieee[name])
     monkeypatch.setattr(module, "store", lambda: None)
