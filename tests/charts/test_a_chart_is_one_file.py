@@ -182,7 +182,7 @@ def test_debug_steps_through_it(home: Path) -> None:
     assert "return_forward does not fire: v < 0 is false by 0.0" in told
 
 
-def test_code_and_the_schema_have_it(home: Path) -> None:
+def test_code_and_the_schema_know_it(home: Path) -> None:
     assert gms_fsm(home, "code", "x").startswith("# yielding spring, prescribed velocity\n")
     schema = json.loads(gms_fsm(home, "schema"))
     (table,) = (t for name, t in schema["$defs"].items() if name.endswith("x"))

@@ -74,7 +74,7 @@ def test_three_states_and_two_variables(rig: Rig, options: dict[str, Any]) -> No
             assert 0 < slipped <= 0.3 * 40
 
 
-def test_events_by_step_agree_too() -> None:
+def test_events_at_steps_agree_too() -> None:
     trace = both(wear(), Prescribed("0.3*sin(2*pi*t/17)"), 20.0, events="step", step=1e-2)
     assert {"yield_", "tear"} <= set(trace.transitions.edge.tolist())
 
@@ -194,7 +194,7 @@ def _capped(t: float) -> float:
         ("abs(sgn(v)) + abs(-abs(v))", 10.0, lambda t: t + _waves(t)),
     ],
 )
-def test_corners_of_a_flow_are_met_exactly(flow: str, t_end: float, exact: Any) -> None:
+def test_steps_end_exactly_on_corners_of_a_flow(flow: str, t_end: float, exact: Any) -> None:
     times = np.linspace(0.0, t_end, 41)
     trace = both(element(flow), Prescribed("sin(t)"), t_end, t_eval=times, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(trace.z[:, 0], [exact(t) for t in times], atol=2e-8)
@@ -220,7 +220,7 @@ def test_corners_in_an_elements_own_variable() -> None:
         np.testing.assert_allclose(trace.z[:, i], np.where(times < t0, before, after), atol=2e-8)
 
 
-def test_corners_of_the_signal_are_met_exactly() -> None:
+def test_steps_end_exactly_on_corners_of_a_signal() -> None:
     times = np.linspace(0.0, 10.0, 41)
     for text in ("abs(sin(t))", "max(sin(t), -sin(t))", "sgn(sin(t)) * sin(t)"):
         trace = both(element("v"), Prescribed(text), 10.0, t_eval=times, rtol=1e-9, atol=1e-12)

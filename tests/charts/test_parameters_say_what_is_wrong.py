@@ -189,7 +189,7 @@ def test_a_missing_value_of_a_chart_is_named() -> None:
         ChartModel(gms_element("signed"), {"k": 1, "sigma": 0}, n=1, stribeck=CURVE)
 
 
-def test_a_wrong_length_is_not_blamed_on_a_parameter_the_chart_has_not() -> None:
+def test_a_wrong_length_does_not_blame_a_parameter_the_chart_lacks() -> None:
     with pytest.raises(ParameterError, match=r"q has 3 entries") as caught:
         ChartModel(ONLY_Q, {"q": np.ones(3)}, n=2, stribeck=CURVE)
     assert "2" in str(caught.value)
@@ -210,7 +210,7 @@ def test_a_wrong_length_is_not_blamed_on_a_parameter_the_chart_has_not() -> None
         (("k", {"rule": "> k"}), "its rule names 'k', which is not another parameter"),
     ],
 )
-def test_a_rule_that_is_none_is_refused(parameters: tuple[str, dict[str, Any]], words: str) -> None:
+def test_an_invalid_rule_is_refused(parameters: tuple[str, dict[str, Any]], words: str) -> None:
     name, changes = parameters
     with pytest.raises(ChartError, match=words):
         with_parameters(lambda: (Parameter(name, **changes), "h"))
@@ -249,7 +249,7 @@ def test_the_curve_is_eq_2() -> None:
     assert CURVE(CURVE.dip) - CURVE.F_c < 1e-16
 
 
-def test_the_curve_is_to_the_bit_what_a_run_computes() -> None:
+def test_the_curve_equals_what_a_run_computes_to_the_bit() -> None:
     trace = simulate(GMS(bank(), law="signed"), Prescribed("2e-3*sin(t)"), 7.0)
     assert len(np.unique(trace.s[:, 0])) > 10
     assert (CURVE(trace.v) == trace.s[:, 0]).all()

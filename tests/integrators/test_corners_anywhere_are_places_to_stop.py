@@ -46,7 +46,7 @@ def needs(engine):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_buffer_in_a_rigs_equation_is_met_exactly(engine):
+def test_steps_end_exactly_on_a_buffer_in_a_rigs_equation(engine):
     """Free flight at 1 m/s, half a swing of 10 rad/s in the spring, flight back."""
     trace = simulate(
         force("0 * gap", gap=7.0),
@@ -98,7 +98,7 @@ def test_in_open_loop_the_jump_of_a_force_is_a_row():
     assert trace.t[row + 1] == pytest.approx(np.pi / 2, abs=1e-12)
 
 
-def test_names_of_chart_and_rig_are_kept_apart():
+def test_names_of_chart_and_rig_are_kept_separate():
     """A chart's own mass is not the rig's, neither in a corner of one nor of the other."""
     model = force("abs(z - mass)", mass=0.4)
     program = lower(model, Slider(2.0, "1"))

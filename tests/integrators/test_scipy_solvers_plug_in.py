@@ -39,7 +39,7 @@ def test_pulled_mass(solver):
 
 
 @solvers
-def test_a_step_leads_the_solver_over_the_grid(solver):
+def test_with_a_step_the_solver_follows_the_grid(solver):
     """With step=h each grid point is among the rows, including the end."""
     h, T = 0.13, 6.0
     trace = simulate(stick_slip("signed"), open_loop(), T, method=solver, step=h)
@@ -50,7 +50,7 @@ def test_a_step_leads_the_solver_over_the_grid(solver):
 
 
 @solvers
-def test_wanted_times(solver):
+def test_requested_times(solver):
     """t_eval gives exactly these rows, and the log of the run without it."""
     model, rig = stick_slip("published"), open_loop()
     options = {"method": solver, "rtol": 1e-8, "atol": 1e-11}

@@ -117,7 +117,7 @@ def _outcome_of_text(text: str, point: Mapping[str, float]) -> str:
 # --------------------------------------------------------------------------- evaluate
 @settings(max_examples=300, deadline=None)
 @given(any_values, points)
-def test_a_value_is_what_python_computes_from_its_text(
+def test_a_value_equals_what_python_computes_from_its_text(
     tree: Value, point: dict[str, float]
 ) -> None:
     assert _outcome_of_tree(tree, point) == _outcome_of_text(spell(tree, PYTHON), point)
@@ -125,7 +125,7 @@ def test_a_value_is_what_python_computes_from_its_text(
 
 @settings(max_examples=150, deadline=None)
 @given(conditions, points)
-def test_a_condition_is_what_python_decides_from_its_text(
+def test_a_condition_equals_what_python_decides_from_its_text(
     tree: Condition, point: dict[str, float]
 ) -> None:
     assert _outcome_of_tree(tree, point) == _outcome_of_text(spell(tree, PYTHON), point)
@@ -182,7 +182,7 @@ def test_a_product_stays_short() -> None:
 @example(parse_value("(-((a**8)**3))**3", NAMES), {"a": 1.1, "b": 0.0, "c": 0.0})
 @example(parse_value(f"(({'+'.join('a' * 30)})**0)**3", NAMES), {"a": 1.1, "b": 0.0, "c": 0.0})
 @example(parse_value("((a**-8)**8)**b", NAMES), {"a": 1.1, "b": 0.5, "c": 0.0})
-def test_printing_reading_printing_changes_no_value(tree: Value, point: dict[str, float]) -> None:
+def test_printing_and_parsing_preserve_values(tree: Value, point: dict[str, float]) -> None:
     text = spell(tree)
     try:
         again = parse_value(text, NAMES)
@@ -196,9 +196,7 @@ def test_printing_reading_printing_changes_no_value(tree: Value, point: dict[str
 
 @settings(max_examples=150, deadline=None)
 @given(conditions, points)
-def test_printing_reading_printing_changes_no_condition(
-    tree: Condition, point: dict[str, float]
-) -> None:
+def test_printing_and_parsing_preserve_conditions(tree: Condition, point: dict[str, float]) -> None:
     text = spell(tree)
     try:
         again = parse_condition(text, NAMES)
@@ -228,7 +226,7 @@ def test_printing_reading_printing_changes_no_condition(
         ("abs(a-b)", "abs(a - b)", "|a - b|"),
     ],
 )
-def test_no_more_brackets_than_needed(text: str, python: str, matlab: str) -> None:
+def test_no_superfluous_parentheses(text: str, python: str, matlab: str) -> None:
     tree = parse_value(text, NAMES)
     assert spell(tree, PYTHON) == python
     assert spell(tree, MATLAB_LIKE) == matlab
@@ -269,7 +267,7 @@ def _requirements(part: Split) -> list[Requirement]:
 
 @settings(max_examples=400, deadline=None)
 @given(tame_conditions, near, st.booleans())
-def test_split_says_the_same_as_the_condition(
+def test_split_agrees_with_the_condition(
     condition: Condition, point: dict[str, float], holds: bool
 ) -> None:
     parts = split(condition, holds)
@@ -292,7 +290,7 @@ def test_a_relation_and_its_opposite_share_one_comparison(one: str, other: str) 
     assert (first.holds == second.holds) == one.startswith("not")
 
 
-def test_strict_and_not_strict_are_two_comparisons() -> None:
+def test_strict_and_non_strict_comparisons_differ() -> None:
     assert split(parse_condition("a < b", NAMES)) == Requirement(
         Comparison(Name("a"), Name("b"), strict=False), holds=False
     )
@@ -325,7 +323,7 @@ def test_a_chain_reads_as_its_links() -> None:
 
 @settings(max_examples=50, deadline=None)
 @given(near)
-def test_two_absolute_values_split_and_end(point: dict[str, float]) -> None:
+def test_splitting_two_absolute_values_terminates(point: dict[str, float]) -> None:
     condition = parse_condition("abs(a) <= abs(b)", NAMES)
     parts = split(condition)
     assert _truth(parts, point) == evaluate(condition, point)

@@ -171,7 +171,7 @@ def _refused(parse: Callable[..., object], text: str) -> ExpressionError:
 
 
 @pytest.mark.parametrize(("text", "column", "reason", "allowed"), NO_VALUES)
-def test_a_text_that_is_no_value_is_refused_where_it_goes_wrong(
+def test_an_invalid_value_is_refused_with_its_column(
     text: str, column: int, reason: str, allowed: str
 ) -> None:
     error = _refused(parse_value, text)
@@ -182,7 +182,7 @@ def test_a_text_that_is_no_value_is_refused_where_it_goes_wrong(
 
 
 @pytest.mark.parametrize(("text", "column", "reason", "allowed"), NO_CONDITIONS)
-def test_a_text_that_is_no_condition_is_refused_where_it_goes_wrong(
+def test_an_invalid_condition_is_refused_with_its_column(
     text: str, column: int, reason: str, allowed: str
 ) -> None:
     error = _refused(parse_condition, text)
@@ -192,13 +192,13 @@ def test_a_text_that_is_no_condition_is_refused_where_it_goes_wrong(
 
 
 @pytest.mark.parametrize("text", [row[0] for row in NO_VALUES])
-def test_a_reason_speaks_of_the_text_not_of_pythons_syntax_tree(text: str) -> None:
+def test_messages_refer_to_the_text_not_to_pythons_syntax_tree(text: str) -> None:
     words = set(_refused(parse_value, text).reason.replace("'", " ").split())
     classes = {name for name, kind in vars(ast).items() if isinstance(kind, type)}
     assert {word for word in words & classes if word[0].isupper()} == set()
 
 
-def test_the_caret_stands_under_the_column_even_in_a_long_text() -> None:
+def test_the_caret_is_under_the_column_even_in_a_long_text() -> None:
     for lead in (3, 200):
         text = "v" + "+v" * 2 + " " * lead + "+ \u00e9"
         error = _refused(parse_value, text)
@@ -206,13 +206,13 @@ def test_the_caret_stands_under_the_column_even_in_a_long_text() -> None:
         assert shown[len(caret) - 1] == "\u00e9"
 
 
-def test_line_breaks_are_spaces_and_columns_run_on() -> None:
+def test_line_breaks_count_as_spaces_for_columns() -> None:
     assert spell(parse_value("v\n  + z", NAMES)) == "v + z"
     assert _refused(parse_value, "v\n + u").column == 6
 
 
 @pytest.mark.parametrize("given_instead", [None, 5, b"v", ["v"], object()])
-def test_what_is_no_text_is_refused(given_instead: object) -> None:
+def test_values_other_than_text_are_refused(given_instead: object) -> None:
     for parse in (parse_value, parse_condition):
         with pytest.raises(ExpressionError, match="expected a text, got"):
             parse(given_instead, NAMES)
@@ -239,7 +239,7 @@ def test_too_deep_or_too_long_is_refused(text: str) -> None:
 
 @pytest.mark.parametrize("function", ["min", "max"])
 @pytest.mark.parametrize("count", [3, 50, 500, 3000])
-def test_many_arguments_are_refused_or_can_be_read_by_everyone(function: str, count: int) -> None:
+def test_many_arguments_are_refused_or_handled_by_every_reader(function: str, count: int) -> None:
     try:
         tree = parse_value(f"{function}({','.join(['v'] * count)})", NAMES)
     except ExpressionError:
@@ -252,7 +252,7 @@ def test_many_arguments_are_refused_or_can_be_read_by_everyone(function: str, co
 
 
 @pytest.mark.parametrize("text", ["1if v else z", "z*0x1or v", "1and v < z", "z > 1and v > 0"])
-def test_no_warning_of_python_reaches_the_user(text: str) -> None:
+def test_no_python_warning_reaches_the_user(text: str) -> None:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         for parse in (parse_value, parse_condition):
@@ -320,7 +320,7 @@ TEXTS = st.one_of(
 @example("\N{DIGIT ONE}\N{ARABIC-INDIC DIGIT ONE}")
 @example("1__0")
 @example("\ufeffv")
-def test_only_expression_errors_escape_whatever_the_text(text: str) -> None:
+def test_only_expression_errors_are_raised_whatever_the_text(text: str) -> None:
     for parse in (parse_value, parse_condition):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SyntaxWarning)
@@ -384,7 +384,7 @@ def test_hostile_text_creates_nothing(text: str, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_watch_itself_sees_execution(tmp_path: Path) -> None:
+def test_the_audit_hook_detects_execution(tmp_path: Path) -> None:
     with pytest.raises(AssertionError), nothing_executed():
         (tmp_path / "canary").touch()
     with pytest.raises(AssertionError), nothing_executed():
@@ -395,7 +395,7 @@ def test_the_watch_itself_sees_execution(tmp_path: Path) -> None:
     ("text", "meant"),
     [("sign(v)", "sgn"), ("Abs(v)", "abs"), ("F_Y * v", "F_y"), ("vc", "v_c"), ("q", None)],
 )
-def test_the_nearest_name_is_asked_for(text: str, meant: str | None) -> None:
+def test_the_nearest_name_is_suggested(text: str, meant: str | None) -> None:
     with pytest.raises(ExpressionError) as caught:
         parse_value(text, ["v", "v_c", "F_y"])
     question = f"(did you mean {meant!r}?)"

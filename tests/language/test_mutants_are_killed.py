@@ -70,7 +70,7 @@ def test_no_part_of_a_chart_can_be_exchanged_afterwards() -> None:
             setattr(part, attribute, "another")
 
 
-def test_a_chart_shows_and_compares_what_was_written_not_what_was_parsed() -> None:
+def test_charts_are_shown_and_compared_by_text_not_by_tree() -> None:
     chart = _chart()
     assert "guards=" not in repr(chart)
     assert "flows=" not in repr(chart)
@@ -100,7 +100,7 @@ def test_a_tree_and_its_spelling_cannot_be_changed() -> None:
             setattr(part, dataclasses.fields(part)[0].name, None)
 
 
-def test_the_sign_of_what_is_no_number_is_zero() -> None:
+def test_the_sign_of_nan_is_zero() -> None:
     assert [sgn(u) for u in (math.nan, 0.0, -0.0, 5e-324, -5e-324)] == [0.0, 0.0, 0.0, 1.0, -1.0]
 
 
@@ -173,7 +173,7 @@ def test_pow_takes_two_arguments() -> None:
         assert "two arguments" in str(_refused(f"pow({arguments})", "a", "b"))
 
 
-def test_what_counts_as_a_mark_that_cannot_be_read() -> None:
+def test_which_marks_cannot_be_read() -> None:
     assert "half a character" in str(_refused("v + \ud800", "v"))
     assert "half a character" in str(_refused("v + \udfff", "v"))
     assert "half a character" not in str(_refused("v + \ue000", "v"))
@@ -240,14 +240,12 @@ def test_small_powers_are_products_until_the_text_grows_too_long() -> None:
         ("1234567", "1234567.0", "1234567.0"),
     ],
 )
-def test_a_value_has_no_more_and_no_fewer_brackets_than_its_order_needs(
-    text: str, python: str, matlab: str
-) -> None:
+def test_values_have_exactly_the_parentheses_they_need(text: str, python: str, matlab: str) -> None:
     tree = parse_value(text, "abc")
     assert (spell(tree), spell(tree, MATLAB_LIKE)) == (python, matlab)
 
 
-def test_a_number_below_zero_binds_like_a_sign() -> None:  # of derivatives: read are none
+def test_a_negative_number_binds_like_a_sign() -> None:  # of derivatives: read are none
     assert spell(Negative(Number(-0.5))) == "-(-0.5)"
     assert spell(Binary("**", Name("a"), Number(-0.5)), MATLAB_LIKE) == "a^(-0.5)"
 
@@ -268,14 +266,14 @@ def test_a_number_below_zero_binds_like_a_sign() -> None:  # of derivatives: rea
         ("state != slip", "not state == slip", "!(state == slip)"),
     ],
 )
-def test_a_condition_has_no_more_and_no_fewer_brackets_than_its_order_needs(
+def test_conditions_have_exactly_the_parentheses_they_need(
     text: str, python: str, matlab: str
 ) -> None:
     tree = parse_condition(text, "abc", ["stick", "slip"], 2, own_state=True)
     assert (spell(tree), spell(tree, MATLAB_LIKE)) == (python, matlab)
 
 
-def test_a_state_is_asked_for_by_a_number_from_one_and_by_equality() -> None:
+def test_states_are_referred_to_by_number_from_one_and_by_equality() -> None:
     known: dict[str, Any] = {"states": ["slip"], "elements": 2}
     assert parse_condition("state(1) == slip", "v", **known) == InState(1, "slip")
     assert parse_condition("state(2) != slip", "v", **known) == Not(InState(2, "slip"))
@@ -299,7 +297,7 @@ def _requirements(text: str, holds: bool = True) -> Any:
     return told(split(parse_condition(text, "abc"), holds))
 
 
-def test_splitting_knows_both_ways_of_every_comparison() -> None:
+def test_splitting_handles_both_directions_of_every_comparison() -> None:
     for op, not_op in ((">", "<="), (">=", "<"), ("<", ">="), ("<=", ">")):
         assert _requirements(f"a {op} b") == f"a {op} b"
         assert _requirements(f"a {op} b", holds=False) == f"a {not_op} b"
@@ -311,7 +309,7 @@ def test_splitting_knows_both_ways_of_every_comparison() -> None:
         assert _requirements(f"abs(abs(a)) {op} b") == _requirements(f"abs(a) {op} b")
 
 
-def test_splitting_flattens_like_in_like_and_turns_words_under_negation() -> None:
+def test_splitting_flattens_nesting_and_swaps_words_under_negation() -> None:
     text = "a > b and (b > c and (c > a or abs(a) > c))"
     assert _requirements(text) == ("both", "a > b", "b > c", ("either", "c > a", "a > c", "a < -c"))
     turned = ("either", "a <= b", "b <= c", ("both", "c <= a", "a <= c", "a >= -c"))
@@ -338,7 +336,7 @@ def test_rough_calls_become_names_in_the_order_they_are_computed_and_smooth_ones
 
 
 # --------------------------------------------------------------------------- machines
-def test_an_element_knows_its_number_and_its_own_parameters_as_floats() -> None:
+def test_an_element_has_its_index_and_its_parameters_as_floats() -> None:
     machines = ElementMachines(stick_slip("signed"))
     assert [e.index for e in machines.elements] == [0, 1, 2, 3]
     k = machines.model.values["k"]
@@ -346,7 +344,7 @@ def test_an_element_knows_its_number_and_its_own_parameters_as_floats() -> None:
     assert {type(e.k) for e in machines.elements} == {float} == {type(machines.elements[0].v_c)}
 
 
-def test_a_guard_says_its_text_and_answers_an_event_as_it_answers_an_element() -> None:
+def test_a_guard_shows_its_text_and_accepts_an_event_or_an_element() -> None:
     guard = Guard("leave", parse_condition("z >= s", "zs"))
     assert repr(guard) == "<guard z >= s>"
     for z, truth in ((0.9, False), (1.0, True)):
@@ -399,7 +397,7 @@ def test_of_two_edges_enabled_at_once_the_earlier_is_taken(engine: Any, first: s
     assert [str(edge) for edge in trace.transitions.edge] == [first]
 
 
-def test_an_element_shows_the_values_of_the_moment_it_is_asked_at() -> None:
+def test_an_element_shows_the_values_of_the_present_moment() -> None:
     model, rig = pulled_mass()
     seen = []
 
@@ -416,7 +414,7 @@ def test_an_element_shows_the_values_of_the_moment_it_is_asked_at() -> None:
         assert x == trace.x[trace.t == t][0]
 
 
-def test_an_element_shows_every_variable_of_its_own() -> None:
+def test_an_element_shows_all_its_variables() -> None:
     chart = Chart(
         "two",
         ("v",),
@@ -511,7 +509,7 @@ def test_a_window_of_a_256th_of_a_step_is_found_wherever_it_lies(
     assert place == pytest.approx(middle - half, abs=1e-11)
 
 
-def test_a_margin_that_is_never_quiet_is_looked_at_in_every_512th_of_a_step_and_no_more() -> None:
+def test_a_margin_that_is_never_quiet_is_evaluated_512_times_per_step() -> None:
     def rough(t: float, window: float) -> float:
         halvings = Fraction(t).denominator.bit_length() - 1
         return 1.0 if abs(t - window) < 1e-9 else -1.0 if halvings % 2 else -1e-3
@@ -530,7 +528,7 @@ def test_of_two_windows_the_earlier_counts_though_the_later_is_seen_first() -> N
     assert _first(lambda t: t - 0.9, two)[0] == pytest.approx(0.18, abs=1e-11)
 
 
-def test_a_window_before_the_first_place_believed_in_is_found() -> None:
+def test_a_window_before_the_first_candidate_is_found() -> None:
     # False position lands after the window, at 0.59, and converges to 0.75 first.
     assert _first(lambda t: (t - 0.39) * (t - 0.43) * (t - 0.75))[0] == pytest.approx(
         0.39, abs=1e-11
@@ -546,7 +544,7 @@ def test_a_margin_that_starts_or_touches_at_zero_changes_as_its_kind_says() -> N
     assert _first(lambda t: touching + t * (1 - t), strict=True)[0] == NO_CHANGE
 
 
-def test_a_far_margin_with_a_bend_is_quiet_after_one_look_inside() -> None:
+def test_a_distant_curved_margin_is_quiet_after_one_evaluation() -> None:
     assert _first(lambda t: -10.0 + t * (1 - t)) == (NO_CHANGE, 2)
     assert _first(lambda t: 10.0 - t * (1 - t)) == (NO_CHANGE, 2)
     assert _first(lambda t: -1e-3 - t * t * 0.1 - t) == (NO_CHANGE, 2)  # near, but monotone
@@ -661,7 +659,7 @@ def test_no_sliver_is_stepped_at_either_end(share: float) -> None:
 
 
 @pytest.mark.parametrize("step", [None, 0.25])
-def test_steps_end_on_knots_and_go_on_as_before(step: float | None) -> None:
+def test_steps_end_on_knots_and_continue_as_before(step: float | None) -> None:
     run = _Run(step=step, knots=(0.0, 0.3, 0.31, 5.0), max_step=0.25)
     run.to(1.0, h=0.25)
     assert {0.3, 0.31, 1.0} <= set(run.rows)
@@ -687,7 +685,7 @@ def test_the_step_after_a_rejected_one_does_not_grow_at_once() -> None:
     assert run.to(100.0, h=0.05, steps=1)[2] == pytest.approx(0.5)  # but the next one may grow
 
 
-def test_a_step_that_was_accepted_narrowly_is_followed_by_a_shorter_one() -> None:
+def test_a_narrowly_accepted_step_is_followed_by_a_shorter_one() -> None:
     narrow = 0
     for i in range(60):
         h = 0.04 + 0.001 * i
@@ -706,7 +704,7 @@ def test_the_remembered_error_is_that_of_the_last_step_but_never_vanishes() -> N
     assert 1e-4 < run.to(10.0, h=0.04, steps=1)[3] <= 1.0
 
 
-def test_it_comes_back_when_the_steps_or_the_rows_are_used_up() -> None:
+def test_it_returns_when_the_steps_or_the_rows_are_used_up() -> None:
     run = _Run(step=0.25)
     assert run.to(100.0, steps=3)[:2] == (kernel.FULL, 0.75)
     assert run.to(100.0, steps=1)[:2] == (kernel.FULL, 1.0)
@@ -737,13 +735,13 @@ def test_a_crossing_ends_the_arc_there_with_state_and_row() -> None:
         assert run.rows[-1] == t
 
 
-def test_rows_behind_a_crossing_wait_for_what_is_switched_there() -> None:
+def test_rows_after_a_crossing_wait_for_the_switch() -> None:
     run = _Run(lambda t, y: 1.0, lambda t, y: y - 1.6, step=1.0, times=[0.5, 0.7])
     assert run.to(1.0)[0] == kernel.CROSSED
     assert run.rows == [0.5]
 
 
-def test_an_adaptive_step_with_an_early_crossing_is_done_again_up_to_it() -> None:
+def test_an_adaptive_step_with_an_early_crossing_is_repeated_up_to_it() -> None:
     run = _Run(lambda t, y: math.cos(t), lambda t, y: t - 0.2)
     _, t, _, _ = run.to(2.0, h=0.5)
     assert t == pytest.approx(0.2, abs=1e-12)
@@ -758,13 +756,13 @@ def test_an_adaptive_step_with_an_early_crossing_is_done_again_up_to_it() -> Non
     assert max(late.asked[-6:]) == 0.1  # near the step's end the step is kept
 
 
-def test_between_stops_a_quiet_step_hands_its_margins_to_the_next() -> None:
+def test_between_stops_a_quiet_step_passes_its_margins_to_the_next() -> None:
     run = _Run(lambda t, y: 1.0, lambda t, y: t - 1.1, step=0.25)
     assert run.to(2.0)[1] == pytest.approx(1.1, abs=1e-12)
     assert run.b.relations.start[0] == pytest.approx(-0.1)
 
 
-def test_an_infinite_slope_and_a_step_of_nothing_are_told_apart() -> None:
+def test_an_infinite_slope_and_a_zero_step_are_distinguished() -> None:
     known = (kernel.REACHED, kernel.CROSSED, kernel.FULL, kernel.TOO_SMALL, kernel.NOT_FINITE)
     assert len(set(known)) == 5
 

@@ -132,7 +132,7 @@ def test_a_damaged_cache_only_costs_time(warm: tuple[Path, list[tuple[str, str]]
     assert "Traceback" not in err
 
 
-def test_a_wrong_bit_anywhere_is_found_before_the_code_is_loaded(
+def test_a_wrong_bit_is_detected_before_the_code_is_loaded(
     warm: tuple[Path, list[tuple[str, str]]],
 ) -> None:
     """Undetected, one in five crashes the process. Each process here has one in each file."""
@@ -219,7 +219,7 @@ DAMAGES = [_flipped, _truncated, _empty, _garbage, _another_name, _unreadable]
 
 
 @pytest.mark.parametrize("damage", [*DAMAGES, _another_kind])
-def test_a_damaged_file_is_survived(
+def test_a_damaged_file_is_tolerated(
     damage: Callable[[Path], None], observe: Callable[[], Any], tmp_path: Path
 ) -> None:
     observe()
@@ -229,7 +229,7 @@ def test_a_damaged_file_is_survived(
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_cache_is_made_anew(
+def test_a_damaged_cache_is_rebuilt(
     damage: Callable[[Path], None], observe: Callable[[], Any], tmp_path: Path
 ) -> None:
     """It costs the time once, not each time."""
@@ -252,7 +252,7 @@ def test_a_folder_that_cannot_be_written_only_costs_time(tmp_path: Path) -> None
 
 
 # --------------------------------------------------------------------------- no mix-up
-def test_programs_compiled_in_different_processes_are_told_apart(tmp_path: Path) -> None:
+def test_programs_compiled_in_different_processes_are_not_confused(tmp_path: Path) -> None:
     """Each is the first that its process compiles; a third process loads and uses both twice."""
     velocities = "0.1*t", "0.2*sin(t)"
     for velocity in velocities:
@@ -289,7 +289,7 @@ def _changes(patch: pytest.MonkeyPatch) -> dict[str, Callable[[], None]]:
     }
 
 
-def test_changed_source_is_another_edition() -> None:
+def test_changed_source_changes_the_edition() -> None:
     usual = machine.edition()
     found = {"nothing": usual}
     with pytest.MonkeyPatch.context() as patch:
@@ -302,7 +302,7 @@ def test_changed_source_is_another_edition() -> None:
     assert machine.edition() == usual
 
 
-def test_another_edition_signature_option_or_numba_is_kept_under_another_name(
+def test_another_edition_signature_option_or_numba_changes_the_name(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     from numba.core.registry import cpu_target
@@ -328,7 +328,7 @@ def test_another_edition_signature_option_or_numba_is_kept_under_another_name(
     assert name() == found[0]
 
 
-def test_a_digest_follows_code_and_constants_but_not_the_place() -> None:
+def test_a_digest_depends_on_code_and_constants_but_not_on_the_file() -> None:
     def function(text: str) -> Callable[..., Any]:
         names: dict[str, Any] = {}
         exec(compile(text, "<one>", "exec"), names)
@@ -350,7 +350,7 @@ def test_a_digest_follows_code_and_constants_but_not_the_place() -> None:
 
 
 # --------------------------------------------------------------------------- several threads
-def test_settings_of_numba_are_as_they_were_whoever_compiles() -> None:
+def test_compiling_leaves_numbas_settings_unchanged() -> None:
     """Many threads compile at once; the user's own numba functions must not be affected."""
     code = """
         import threading
@@ -413,7 +413,9 @@ WITHOUT = """
 
 
 @pytest.mark.parametrize("absent", [["numba"], ["platformdirs"]])
-def test_without_the_extra_the_words_say_what_to_install(absent: list[str], tmp_path: Path) -> None:
+def test_without_the_extra_the_message_says_what_to_install(
+    absent: list[str], tmp_path: Path
+) -> None:
     trace = simulate(stick_slip("signed"), open_loop(), 3.0, engine="compiled")
     path = trace.save(tmp_path / "compiled.npz")
     out, err = _ended(_start(WITHOUT.format(absent=absent), str(path)))

@@ -165,7 +165,7 @@ def test_the_search_finds_what_it_looks_for(case: str) -> None:
 
 
 @pytest.mark.parametrize("code", FINE)
-def test_the_search_leaves_the_rest_alone(code: str) -> None:
+def test_the_search_reports_nothing_else(code: str) -> None:
     assert list(_found(code)) == []
 
 
@@ -178,7 +178,7 @@ def test_no_place_is_computed_outside_the_layout(path: Path) -> None:
         assert found == ALLOWED.get(path.as_posix(), set())
 
 
-def test_all_files_that_may_are_there() -> None:
+def test_all_listed_exceptions_exist() -> None:
     assert {Path(name) for name in ALLOWED} <= set(SOURCES)
 
 
@@ -221,7 +221,7 @@ def test_texts_name_the_same_places(shared: tuple[str, ...], n: int) -> None:
     assert eval(places.size_text(2), {"n": n}) == places.size + 2
 
 
-def test_machine_code_finds_what_it_writes_into_the_log() -> None:
+def test_machine_code_finds_the_places_of_the_log() -> None:
     """For a firing `integrators.loop.record` stores y[first + i], seen[0], seen[2 + i], seen[1]."""
     model, rig = stick_slip("signed"), pulled_mass()[1]
     layout = lower(model, rig).layout

@@ -143,7 +143,7 @@ def _rough() -> ChartModel:
     ],
     ids=["ramps", "record", "every function", "LuGre"],
 )
-def test_texts_of_other_models(model: Model, rig: Rig, t_end: float) -> None:
+def test_printed_programs_of_other_models(model: Model, rig: Rig, t_end: float) -> None:
     _compare(model, rig, standalone(lower(model, rig).source), t_end)
 
 

@@ -82,7 +82,7 @@ def disagreements(source: str) -> list[tuple[str, set[str]]]:
 
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("rig", RIGS)
-def test_what_is_read_is_used_and_the_other_way_round(model: str, rig: str) -> None:
+def test_names_are_read_exactly_if_used(model: str, rig: str) -> None:
     assert disagreements(lower(MODELS[model], RIGS[rig]).source) == []
 
 

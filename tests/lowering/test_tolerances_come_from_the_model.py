@@ -86,7 +86,7 @@ def test_without_guards_the_scale_is_the_deflection_that_carries_the_friction():
         ("t > 3", 0.0),
     ],
 )
-def test_charts_of_ones_own_have_the_scales_of_their_guards(guard, scale):
+def test_user_defined_charts_have_the_scales_of_their_guards(guard, scale):
     """How far from 0 a comparison turns, by its slope; one that turns at 0 has no scale."""
     chart = Chart(
         "own",
@@ -148,12 +148,12 @@ def test_a_tolerance_may_be_a_number_or_given_by_name():
         ("fine", "atol is 'fine'; it must be a number"),
     ],
 )
-def test_what_is_no_tolerance_is_refused(atol, says):
+def test_an_invalid_tolerance_is_refused(atol, says):
     with pytest.raises(ParameterError, match=says):
         simulate(pulled_mass()[0], PulledSlider(1.0, 2.0, 0.1), 1.0, atol=atol)
 
 
-def test_a_foreign_solver_asks_for_a_tolerance_where_there_is_no_scale():
+def test_a_scipy_solver_requires_a_tolerance_for_components_without_scale():
     """SciPy's own error norm divides by it."""
     from scipy.integrate import RK45
 

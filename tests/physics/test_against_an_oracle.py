@@ -162,7 +162,7 @@ def test_same_events_same_deflections(case):
     np.testing.assert_allclose(trace.z[-1], z, rtol=0, atol=1e-6 * max(1.0, np.abs(z).max()))
 
 
-def test_the_oracle_meets_all_edges():
+def test_the_oracle_takes_all_edges():
     """The comparison is meaningful: a known case takes all three edges."""
     events, _ = bank(
         "signed",
@@ -181,7 +181,7 @@ def test_the_oracle_meets_all_edges():
     }
 
 
-def test_a_break_away_beside_a_reversal_is_met_in_one_long_step():
+def test_a_break_away_near_a_reversal_is_found_in_one_long_step():
     """While it sticks, z is a parabola, so steps have any length; s has a narrow peak."""
     case = {
         "law": "signed",

@@ -88,7 +88,7 @@ def test_fixed_steps_scale_to_the_bit(axis: str, rig: Rig) -> None:
         assert other_bits(scaled(case, **by).run("ifelse"), case.run("ifelse"), **by) == []
 
 
-def test_a_wrong_unit_is_seen() -> None:
+def test_a_wrong_unit_is_detected() -> None:
     """The comparison is meaningful: a stiffness that is not scaled changes the bits."""
     model, rig = pulled_mass()
     case = Case(model, rig, {"method": "rk4", "step": 0.01, "t_end": 9.0, "events": "step"})

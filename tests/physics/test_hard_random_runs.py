@@ -345,7 +345,7 @@ def test_random_banks(model: GMS, rig: Any, given: dict[str, Any], t_end: float)
 
 @hard(60)
 @given(banks(), rigs(), options(), st.data())
-def test_wanted_times_change_nothing(
+def test_requested_times_change_nothing(
     model: GMS, rig: Any, given: dict[str, Any], data: st.DataObject
 ) -> None:
     """With rows at requested times, or none at all, the log is the same to the bit."""
@@ -572,7 +572,7 @@ def test_pieces_of_constant_velocity_are_closed_forms(data: st.DataObject, law: 
     ),
     st.floats() | st.just(0.3),
 )
-def test_arguments_that_make_no_sense_are_refused_in_words(
+def test_meaningless_arguments_are_refused_with_an_explanation(
     model: Any, rig: Any, nonsense: dict[str, Any], t_end: float
 ) -> None:
     """Whatever the argument: it runs, or a `GMSError` says what is wrong."""

@@ -25,7 +25,7 @@ def test_no_switch_is_lost_or_made_up(family: str) -> None:
     assert sum(len(judged.exact.sequence) for judged in found) > 10 * COUNT
 
 
-def test_the_judge_sees_a_coarse_run() -> None:
+def test_the_judge_detects_a_coarse_run() -> None:
     """At rtol 1e-2 runs are wrong, so the judge can fail one."""
     found = [judge(trial("pulled", 14, index), rtol=1e-2, atol=1e-3) for index in range(10)]
     wrong = [judged for judged in found if judged.verdict == "wrong"]
@@ -41,7 +41,7 @@ def test_a_switch_at_the_very_end_is_not_judged() -> None:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_a_trial_can_be_had_again(family: str) -> None:
+def test_a_trial_can_be_repeated(family: str) -> None:
     """It depends on family, seed and index, and on each of them."""
     assert str(trial(family, 1, 7)) == str(trial(family, 1, 7))
     assert len({str(trial(family, seed, index)) for seed in (1, 2) for index in (7, 8)}) == 4

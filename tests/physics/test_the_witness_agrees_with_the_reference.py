@@ -77,7 +77,7 @@ def test_a_carriage_that_never_breaks_away() -> None:
     agrees(CARRIAGE)
 
 
-def test_a_mass_held_on_standstill() -> None:
+def test_a_mass_held_at_standstill() -> None:
     seen = witness(HELD.model, HELD.rig, HELD.t_end)
     assert len(seen.transitions) == 14
     ((begin, end),) = seen.sliding

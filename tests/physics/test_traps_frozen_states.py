@@ -52,7 +52,7 @@ def test_stages_that_switch_cost_the_order():
 
 @pytest.mark.parametrize("case", ["open loop", "pulled mass"])
 @pytest.mark.parametrize("method", ["dp45", "rk4"])
-def test_the_flow_sees_one_mode_a_step(case, method):
+def test_the_flow_sees_one_mode_per_step(case, method):
     """Every call of the flow between two firings has the same modes."""
     model, rig = pulled_mass() if case == "pulled mass" else (stick_slip("signed"), open_loop())
     program = lower(model, rig)

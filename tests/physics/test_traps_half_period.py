@@ -17,7 +17,7 @@ F_c, F_s, v_s, C, A, T = 0.4, 1.5, 1e-3, 0.1, 0.2, 20.0
 WAVES = 12
 
 
-def test_a_solver_without_x_strides_over_reversals():
+def test_a_solver_without_x_steps_over_reversals():
     """z alone, slip law with events at v = 0: SciPy misses reversals in twelve waves."""
 
     def slip(t, z):

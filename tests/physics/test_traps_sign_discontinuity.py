@@ -56,7 +56,7 @@ def test_fixed_steps_keep_order_four():
 
 
 @pytest.mark.parametrize("options", [{}, {"method": "bs23"}])
-def test_adaptive_steps_do_not_dig(options):
+def test_adaptive_steps_do_not_shrink_toward_the_reversal(options):
     """Adaptive runs stop once at the reversal instead of shrinking their steps toward it."""
     trace = ours(**options)
     assert abs(trace.z[-1, 0] - EXACT) < 2e-6

@@ -46,7 +46,7 @@ def test_the_naive_loop_chatters():
         {"method": "rk4", "step": 1e-3},
     ],
 )
-def test_it_slides_as_the_closed_form_does(options):
+def test_sliding_follows_the_closed_form(options):
     """It reaches v = 0 after 38 ms and never leaves: |z| stays above s."""
     model, rig, start = case("published")
     trace = simulate(model, rig, 20.0, initial=start, **options)
@@ -64,7 +64,7 @@ def test_it_slides_as_the_closed_form_does(options):
     assert slide.sigma_end == pytest.approx(rate[-1] / (C * (1 - z[-1] / F_s)), abs=1e-12)
 
 
-def test_it_leaves_where_the_push_outgrows_both_sides():
+def test_it_leaves_when_the_push_exceeds_both_sides():
     """F_a falls until the side v < 0 releases: sigma reaches -1, and v becomes negative."""
     model, _, start = case("published")
     trace = simulate(model, Slider(1.0, f"{F_a} - 5*t"), 5.0, initial=start)

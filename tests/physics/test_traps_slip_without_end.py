@@ -44,7 +44,7 @@ def test_a_threshold_that_moves_is_not_followed():
     assert len(trace.transitions) == 0
 
 
-def test_sliding_for_an_hour_costs_few_steps():
+def test_slipping_for_an_hour_costs_few_steps():
     """3,600 s at constant speed: the number of stops does not grow with time."""
     trace = simulate(one_element("signed", C=1e-3), Prescribed(0.1), 3600.0, t_eval=[3600.0])
     assert len(trace.transitions) == 1

@@ -58,7 +58,7 @@ def located(case, **options):
 
 @cases
 @pytest.mark.parametrize("method", ["dp45", "bs23"])
-def test_default_tolerances_see_the_dip(case, method):
+def test_default_tolerances_resolve_the_dip(case, method):
     """rtol 1e-6, atol 1e-9, no longest step: z is right to 2e-5 m."""
     exact = z_at_arrest(*case)
     assert exact - case[0] > 1e-5  # the dip has an effect
@@ -66,13 +66,13 @@ def test_default_tolerances_see_the_dip(case, method):
 
 
 @cases
-def test_tight_tolerances_see_the_dip(case):
+def test_tight_tolerances_resolve_the_dip(case):
     """rtol 1e-10: z is right to 1e-8 m."""
     assert abs(located(case, rtol=1e-10, atol=1e-13) - z_at_arrest(*case)) < 1e-8
 
 
 @pytest.mark.parametrize("solver", ["RK45", "LSODA"])
-def test_a_solver_without_the_stop_jumps_it(solver):
+def test_a_solver_without_the_stop_steps_over_it(solver):
     """SciPy's solvers, with the sign frozen but no stop at the dip, are wrong by over 1e-3 m."""
     case = CASES["Table I, element 1"]
     F_c, F_s, v_s, C, A, T = case
@@ -90,7 +90,7 @@ def test_a_solver_without_the_stop_jumps_it(solver):
     assert abs(located(case) - exact) < 2e-5
 
 
-def test_the_old_step_jumps_it():
+def test_the_previous_step_length_steps_over_it():
     """A step that was right before the dip passes it in one go: the first one must be small.
 
     At |v| = 6.1 v_s the sliding element is at rest (z = s), so a controller that keeps its old

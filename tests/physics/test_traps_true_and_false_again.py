@@ -63,13 +63,13 @@ def test_a_window_inside_the_step(a, b, sign):
     assert located(margin, strict=[sign < 0]) == pytest.approx(a, abs=1e-13)
 
 
-def test_a_peak_below_zero_is_no_crossing():
+def test_a_peak_below_zero_is_not_a_crossing():
     """The parabola comes near but stays false."""
     assert located(lambda x: -((x - 0.5) ** 2) - 1e-9) == NO_CHANGE
     assert located(lambda x: -1 - x) == NO_CHANGE
 
 
-def test_the_right_end_is_kept():
+def test_the_right_end_is_returned():
     """At the returned point the relation has changed; one tick before it has not."""
     for c in (0.1, 1 / 3, 0.7123, 0.999):
         theta = located(lambda x, c=c: x - c)
@@ -128,7 +128,7 @@ WINDOWS = [
 
 @pytest.mark.parametrize("options", [{}, {"rtol": 1e-10, "atol": 1e-13}, {"method": "bs23"}])
 @pytest.mark.parametrize("window", WINDOWS)
-def test_a_break_away_that_a_long_step_steps_over(window, options):
+def test_a_break_away_inside_a_long_step_is_found(window, options):
     """Steps of up to a second in stick: the break-away and its arrest are the fine run's."""
     F_c, F_s, v_s, ramps, z0 = window
     model, rig = one_element("signed", F_c=F_c, F_s=F_s, v_s=v_s, C=0.1), Prescribed(ramps)

@@ -60,7 +60,7 @@ def test_step_ends_step_over_the_window():
     assert abs(z - located.z[-1, 0]) < 5e-3
 
 
-def test_a_composed_margin_has_no_sign_to_see():
+def test_a_composed_margin_shows_no_sign_change():
     """SciPy's event search on min(v_c - |v|, s - |z|) sees no arrest at any tolerance."""
 
     def slip(t, z):

@@ -73,7 +73,7 @@ def test_ten_times_the_steps_take_no_more_memory(engine: str) -> None:
 
 
 @pytest.mark.parametrize(("engine", "transitions"), [compiled, ("ifelse", 2000)])
-def test_every_period_is_like_the_last(engine: str, transitions: int) -> None:
+def test_every_period_equals_the_last(engine: str, transitions: int) -> None:
     """Late transitions are as accurate as early ones: same order, same phase, same values."""
     log = run(engine, transitions).transitions
     first, last = log[EACH_PERIOD : 2 * EACH_PERIOD], log[-EACH_PERIOD:]
@@ -121,7 +121,7 @@ def measured(engine: str, transitions: int) -> None:
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
-def test_the_operating_system_agrees() -> None:
+def test_the_operating_system_reports_the_same() -> None:
     few, many = in_a_child("ifelse", 64), in_a_child("ifelse", 1600)
     assert many.transitions >= 1600
     # Memory comes in pages and heaps in larger blocks: a megabyte is within the noise.

@@ -35,7 +35,7 @@ def test_the_error_names_the_element_and_says_that_it_chatters(weights, element,
     assert "sliding mode" not in text
 
 
-def test_what_it_did_before_is_not_counted():
+def test_earlier_switches_are_not_counted():
     """At the start it arrests, seconds before it chatters."""
     with pytest.raises(LivelockError) as caught:
         simulate(memoryless([0.5]), SLOWING, 10.0, initial={"states": ["slip"]})

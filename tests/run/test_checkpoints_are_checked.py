@@ -114,7 +114,7 @@ def test_another_function_is_refused(pair: str, tmp_path: Path) -> None:
     assert not path.exists()
 
 
-def test_a_function_made_anew_is_the_same(tmp_path: Path) -> None:
+def test_a_recreated_function_is_the_same(tmp_path: Path) -> None:
     path = tmp_path / "run.checkpoint"
     begun(path, Prescribed(_louder(0.2)))
     goes_on(path, Prescribed(_louder(0.2)))
@@ -128,9 +128,7 @@ def test_another_value_of_a_global_is_another_function(monkeypatch: pytest.Monke
 
 @pytest.mark.parametrize("own", [types.ModuleType("settings_of_mine"), type("Settings", (), {})])
 @pytest.mark.parametrize("others", [0, 400])
-def test_another_value_in_a_module_or_class_of_ones_own_is_another_function(
-    own: Any, others: int
-) -> None:
+def test_another_value_in_a_user_module_or_class_is_another_function(own: Any, others: int) -> None:
     """Even if the names are many, and their numbers long."""
     own.level, names = 0.2, {"own": own}
     many = "".join(f"    t = t + name{i}\n" for i in range(others))
@@ -141,7 +139,7 @@ def test_another_value_in_a_module_or_class_of_ones_own_is_another_function(
     assert identity(names["call"]) != before
 
 
-def test_a_function_of_a_package_under_way_is_known_by_its_code_not_by_its_version(
+def test_a_function_of_an_editable_package_is_identified_by_its_code(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.syspath_prepend(tmp_path)
@@ -217,7 +215,7 @@ UNKNOWN = {
 
 
 @pytest.mark.parametrize("kind", UNKNOWN)
-def test_a_function_that_cannot_be_known_again_is_refused_before_the_run(
+def test_a_function_that_cannot_be_identified_is_refused_before_the_run(
     kind: str, tmp_path: Path
 ) -> None:
     path, rig = tmp_path / "run.checkpoint", Prescribed(UNKNOWN[kind])
@@ -228,7 +226,7 @@ def test_a_function_that_cannot_be_known_again_is_refused_before_the_run(
         identity(UNKNOWN[kind])
 
 
-def test_a_function_compiled_by_numba_is_known_by_its_text(tmp_path: Path) -> None:
+def test_a_function_compiled_by_numba_is_identified_by_its_text(tmp_path: Path) -> None:
     numba = pytest.importorskip("numba", reason="needs the extra fast")
     path = tmp_path / "run.checkpoint"
     begun(path, Prescribed(numba.njit(_louder(0.2))), "compiled")
@@ -251,7 +249,7 @@ def _own_rigs() -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("kind", ["own", "namesake", "derived"])
-def test_a_rig_of_ones_own_is_refused_in_words(kind: str, tmp_path: Path) -> None:
+def test_a_user_defined_rig_is_refused_with_an_explanation(kind: str, tmp_path: Path) -> None:
     rig = _own_rigs()[kind]
     told: list[object] = []
     with pytest.raises(OutputError, match="a class of your own"):
@@ -280,7 +278,7 @@ def test_another_version_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
             goes_on(path, open_loop())
 
 
-def test_a_checkpoint_of_another_format_is_of_another_program(tmp_path: Path) -> None:
+def test_a_checkpoint_of_another_format_belongs_to_another_program(tmp_path: Path) -> None:
     path = tmp_path / "run.checkpoint"
     begun(path, open_loop())
     arrays = _arrays(path)
@@ -302,7 +300,7 @@ def _write(path: Path, arrays: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("options", [{}, {"t_eval": np.linspace(0, 25, 333)}], ids=["all", "eval"])
-def test_every_whole_number_and_every_shape_is_looked_at(
+def test_every_integer_and_every_shape_is_checked(
     engine: str, options: dict[str, Any], tmp_path: Path
 ) -> None:
     """Each array in turn: far out of range, one row short, one axis more, another type."""
@@ -334,9 +332,7 @@ def test_every_whole_number_and_every_shape_is_looked_at(
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("place", ["PHASE", "MACHINE", "EDGE", "JUMP", "ACTIVE", "TAKEN"])
-def test_each_number_that_is_a_place_is_in_its_range(
-    place: str, engine: str, tmp_path: Path
-) -> None:
+def test_each_index_is_checked_against_its_range(place: str, engine: str, tmp_path: Path) -> None:
     path = tmp_path / "run.checkpoint"
     begun(path, open_loop(), engine)
     whole = _arrays(path)
@@ -348,7 +344,7 @@ def test_each_number_that_is_a_place_is_in_its_range(
             goes_on(path, open_loop(), engine)
 
 
-def test_what_unpacks_to_more_than_the_file_is_not_unpacked(tmp_path: Path) -> None:
+def test_data_that_unpacks_to_more_than_the_file_is_not_unpacked(tmp_path: Path) -> None:
     path = tmp_path / "run.checkpoint"
     begun(path, open_loop())
     whole = _arrays(path)
@@ -360,7 +356,7 @@ def test_what_unpacks_to_more_than_the_file_is_not_unpacked(tmp_path: Path) -> N
         goes_on(path, open_loop())
 
 
-def test_an_interrupted_run_with_a_function_goes_on_bit_for_bit(tmp_path: Path) -> None:
+def test_an_interrupted_run_with_a_function_continues_bit_for_bit(tmp_path: Path) -> None:
     path, rig = tmp_path / "run.checkpoint", Prescribed(_louder(0.2))
     begun(path, rig)
     trace = simulate(stick_slip("signed"), rig, 25.0, checkpoint=path)

@@ -180,7 +180,7 @@ def test_every_method(case: str, options: str) -> None:
 
 @pytest.mark.parametrize("options", FEW)
 @pytest.mark.parametrize("case", CASES)
-def test_wanted_rows_and_the_end_alone(case: str, options: str) -> None:
+def test_requested_rows_and_only_the_end(case: str, options: str) -> None:
     trace = agreed(*CASES[case], 12.0, **OPTIONS[options], t_eval=T_EVAL)
     np.testing.assert_array_equal(trace.t, T_EVAL)
     assert len(trace.stops) > len(trace.transitions) > 0
@@ -581,7 +581,7 @@ FAILURES: dict[str, tuple[type[SimulationError], Model, Rig, float, dict[str, An
 
 
 @pytest.mark.parametrize("case", FAILURES)
-def test_failures_are_the_same_to_the_word(case: str) -> None:
+def test_failures_have_identical_messages(case: str) -> None:
     error, model, rig, t_end, options = FAILURES[case]
     whole, said = both(model, rig, t_end, **options)
     kind, _, text = said.partition(": ")
@@ -597,7 +597,7 @@ def test_failures_are_the_same_to_the_word(case: str) -> None:
 
 
 @pytest.mark.parametrize("case", FAILURES)
-def test_failures_keep_the_state_they_got_to(case: str) -> None:
+def test_failures_keep_the_state_reached(case: str) -> None:
     """With output="end" the recorded row is the last one that output="all" would record."""
     _, model, rig, t_end, options = FAILURES[case]
     arguments = {"t_end": t_end, "engine": "compiled", **options}
@@ -623,14 +623,14 @@ def test_an_infinite_side_of_a_guard(guard: str) -> None:
     assert set(trace.transitions.t.tolist()) == {0.0}
 
 
-def test_an_infinite_force_is_kept_as_it_is() -> None:
+def test_an_infinite_force_is_recorded_unchanged() -> None:
     chart = Chart("loud", ("v",), ("z",), (), (State("on", {"z": "v"}),), (), {"F": "1 / (1 - z)"})
     model = ChartModel(chart, {}, n=1, stribeck=CURVE)
     trace = agreed(model, Prescribed("1"), 2.0, initial={"z": [1.0]})
     assert np.isinf(trace.F[0])
 
 
-def test_a_solver_of_scipy_is_not_compiled() -> None:
+def test_scipy_solvers_are_not_compiled() -> None:
     scipy_integrate = pytest.importorskip("scipy.integrate")
     with pytest.raises(
         ParameterError, match=r"'compiled' runs the built-in methods.*RK45.*'machines'"

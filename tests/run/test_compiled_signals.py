@@ -95,7 +95,7 @@ def _close(a: Trace, b: Trace) -> None:
     ],
     ids=lambda function: getattr(function, "__name__", ""),
 )
-def test_what_numba_can_compile_gives_the_same_trace(function: Signal) -> None:
+def test_compilable_functions_give_the_same_trace(function: Signal) -> None:
     model, rig = stick_slip("signed"), Prescribed(function)
     traces = [simulate(model, rig, 9.0, engine=engine) for engine in ("machines", "compiled")]
     _close(*traces)
@@ -115,7 +115,7 @@ def test_a_function_that_pushes_a_slider() -> None:
     assert len(traces[0].transitions) > 0
 
 
-def test_functions_of_one_text_are_not_taken_for_each_other() -> None:
+def test_functions_with_the_same_text_are_not_confused() -> None:
     """Closures share their code and their name; their enclosed values are read each time."""
     model = stick_slip("signed")
     levels = 0.3, 0.5
@@ -127,7 +127,7 @@ def test_functions_of_one_text_are_not_taken_for_each_other() -> None:
     assert len(found[0]) != len(found[1]) or (found[0].F != found[1].F).any()
 
 
-def test_nothing_is_kept_on_disk_of_a_function_that_may_change(
+def test_functions_that_may_change_are_not_cached_on_disk(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(compiled, "store", lambda: Store.at(tmp_path))
@@ -188,7 +188,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("kind", REFUSED)
-def test_what_numba_cannot_compile_is_refused_by_its_name(kind: str) -> None:
+def test_functions_that_numba_cannot_compile_are_refused_by_name(kind: str) -> None:
     rigs: dict[str, Rig] = {"v": Prescribed(REFUSED[kind]), "F_a": Slider(1.0, REFUSED[kind])}
     for name, rig in rigs.items():
         with pytest.raises(SignalError) as caught:
@@ -226,7 +226,7 @@ def _out_of_bounds(t: float) -> float:
     ids=["raise", "index"],
 )
 @pytest.mark.parametrize("rows", [{}, {"t_eval": np.linspace(0, 20, 201)}], ids=["all", "t_eval"])
-def test_what_raises_ends_the_run_and_keeps_what_was_before(
+def test_functions_that_raise_end_the_run_and_keep_the_part_before(
     function: Signal, words: tuple[str, ...], rows: dict[str, Any]
 ) -> None:
     model, rig = stick_slip("signed"), Prescribed(function)
@@ -242,7 +242,7 @@ def test_what_raises_ends_the_run_and_keeps_what_was_before(
     assert 0.1 < kept[0].t[-1] < 7.0
 
 
-def test_with_the_end_only_time_and_state_belong_together() -> None:
+def test_with_only_the_end_recorded_time_and_state_match() -> None:
     """The run raises within steps; the recorded state was reached at the recorded time."""
     with pytest.raises(SimulationError) as caught:
         simulate(

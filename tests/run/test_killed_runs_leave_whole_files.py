@@ -344,7 +344,7 @@ def test_leftovers_are_those_of_the_file_alone(tmp_path: Path) -> None:
     assert [path.name for path in leftovers(tmp_path / "a.csv")] == names[:1]
 
 
-def test_files_written_together_are_all_old_if_one_cannot_be_written(tmp_path: Path) -> None:
+def test_if_one_of_several_files_cannot_be_written_all_keep_the_old_content(tmp_path: Path) -> None:
     paths = [tmp_path / "one", tmp_path / "two"]
     for path in paths:
         write_whole(path, lambda file: file.write(b"old"))

@@ -74,7 +74,7 @@ def test_the_end_is_the_last_of_all_rows(case: str, method: str, engine: str) ->
 
 @every_method
 @every_case
-def test_wanted_rows_and_no_others(case: str, method: str, engine: str) -> None:
+def test_only_requested_rows_are_recorded(case: str, method: str, engine: str) -> None:
     model, rig, t_end = CASES[case]
     options = METHODS[method] | {"engine": engine}
     whole = simulate(model, rig, t_end, **options)
@@ -94,7 +94,7 @@ def test_wanted_rows_and_no_others(case: str, method: str, engine: str) -> None:
             )
 
 
-def test_without_output_it_is_what_the_arguments_say(engine: str) -> None:
+def test_the_default_output_depends_on_t_eval(engine: str) -> None:
     model, rig, t_end = CASES["open loop"]
 
     def shapes(**options: Any) -> tuple[int, int, int]:
@@ -107,7 +107,7 @@ def test_without_output_it_is_what_the_arguments_say(engine: str) -> None:
     assert shapes(output="end")[0] == 1
 
 
-def test_both_sides_of_every_stop_are_kept_beside_wanted_rows(engine: str) -> None:
+def test_both_sides_of_every_stop_are_recorded_with_requested_rows(engine: str) -> None:
     """So that samples between distant rows do not cross a switch or a jump."""
     model, rig, t_end = CASES["jumps"]
     trace = simulate(model, rig, t_end, t_eval=[0.0, t_end], engine=engine)
@@ -125,7 +125,7 @@ def test_both_sides_of_every_stop_are_kept_beside_wanted_rows(engine: str) -> No
 
 
 @pytest.mark.parametrize("rows", [[0.0], [31.0], [15.5], np.linspace(0, 31, 4001)])
-def test_few_and_many_wanted_rows(rows: Any, engine: str) -> None:
+def test_few_and_many_requested_rows(rows: Any, engine: str) -> None:
     model, rig, t_end = CASES["open loop"]
     trace = simulate(model, rig, t_end, t_eval=rows, engine=engine)
     assert trace.t.tolist() == list(rows)
@@ -170,7 +170,7 @@ def test_contradictions_are_refused(
         assert word in str(caught.value)
 
 
-def test_progress_is_told_of_a_run_that_keeps_its_end_only() -> None:
+def test_progress_is_reported_for_a_run_that_records_only_its_end() -> None:
     """The last reported moment is before the end, in order of time, with finite values."""
     seen: list[tuple[float, float]] = []
     simulate(
@@ -194,7 +194,7 @@ def test_progress_is_told_of_a_run_that_keeps_its_end_only() -> None:
         ("step", {"t_eval": [0.0, 45.0]}),
     ],
 )
-def test_a_long_compiled_run_comes_up_for_air(events: str, options: dict[str, Any]) -> None:
+def test_a_long_compiled_run_checks_for_ctrl_c(events: str, options: dict[str, Any]) -> None:
     pytest.importorskip("numba", reason="needs the extra fast")
     seen: list[float] = []
     simulate(

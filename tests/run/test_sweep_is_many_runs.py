@@ -188,7 +188,7 @@ def test_more_runs_than_a_task_holds_and_more_firings_than_a_column() -> None:
 
 
 # --------------------------------------------------------------------------- parameters
-def test_a_charts_own_parameter_goes_before_a_shared_one_of_its_name() -> None:
+def test_a_charts_own_parameter_takes_precedence_over_a_shared_one() -> None:
     chart = Chart(
         "own Coulomb",
         ("v",),
@@ -206,7 +206,7 @@ def test_a_charts_own_parameter_goes_before_a_shared_one_of_its_name() -> None:
     assert other.weights.tolist() == [1.0, 1.0]
 
 
-def test_one_number_goes_to_all_elements() -> None:
+def test_one_number_applies_to_all_elements() -> None:
     model, rig = pulled_mass()
     level = np.array([20.0, 30.0])
     wide = np.repeat(level[:, None], 4, axis=1)
@@ -297,7 +297,7 @@ def test_lugre_has_no_weights() -> None:
         ({"initial": {"q": 1}}, "'q'"),
     ],
 )
-def test_what_is_wrong_for_all_is_said_once(options: dict[str, Any], words: str) -> None:
+def test_errors_common_to_all_runs_are_raised_once(options: dict[str, Any], words: str) -> None:
     with pytest.raises(ParameterError) as caught:
         sweep(*pulled_mass(), 1.0, {"F_s": [1.5]}, **({"engine": "machines"} | options))
     assert words in str(caught.value)
@@ -323,7 +323,7 @@ def _fragile() -> ChartModel:
     return ChartModel(chart, values, n=2, stribeck=Stribeck(1.0, 1.5, 1e-3), weights=[2, 1])
 
 
-def test_a_run_that_fails_is_a_row_and_ends_no_other(engine: str) -> None:
+def test_a_failed_run_is_a_row_and_does_not_end_the_others(engine: str) -> None:
     good = {"F_c": 1.0, "v_c": 0.01, "k": 2.0}
     wrong: list[dict[str, float]] = [
         {},
@@ -381,7 +381,7 @@ def test_a_run_that_fails_is_a_row_and_ends_no_other(engine: str) -> None:
     assert repr(result) == "<Sweep: 11 runs over F_c, v_c, k; 6 failed, 100 transitions>"
 
 
-def test_a_run_that_fails_amid_steps_says_where_it_got_to(engine: str) -> None:
+def test_a_run_that_fails_between_steps_reports_where(engine: str) -> None:
     rig = Slider(1.0, "0.1*sqrt(3 - t)")
     result = sweep(stick_slip("signed"), rig, 10.0, {"mass": [1.0, 2.0]}, engine=engine)
     assert result.outcome.tolist() == ["NotFiniteError"] * 2
@@ -472,7 +472,7 @@ class Deadly(Executor):
         return self.pool.submit(_die if self.count == 3 else function, *a, **b)
 
 
-def test_processes_and_one_that_is_killed() -> None:
+def test_process_pools_and_a_killed_worker() -> None:
     model, rig = pulled_mass()
     sets = _sets(8)
     usual = sweep(model, rig, 3.0, sets, engine="machines")
@@ -491,7 +491,7 @@ def test_processes_and_one_that_is_killed() -> None:
         assert dead.outcome.tolist() == ["BrokenProcessPool"] * 8
 
 
-def test_what_cannot_be_sent_to_a_process_is_a_row_that_says_so() -> None:
+def test_a_run_that_cannot_be_sent_to_a_process_is_a_row_that_says_so() -> None:
     with _pool(1) as pool:
         result = sweep(
             stick_slip("signed"),
@@ -547,7 +547,7 @@ def test_ctrl_c_leaves_no_threads_running(place: str, monkeypatch: pytest.Monkey
     assert len(begun) == count
 
 
-def test_progress_is_shown_where_it_is_wanted(capsys: pytest.CaptureFixture[str]) -> None:
+def test_progress_is_shown_on_request(capsys: pytest.CaptureFixture[str]) -> None:
     sets = {"F_s": np.linspace(1, 2, 6)}
     sweep(*pulled_mass(), 1.0, sets, engine="ifelse", progress=True)
     assert "6/6" in capsys.readouterr().err
@@ -571,7 +571,7 @@ def mixed() -> Sweep:
     )
 
 
-def test_a_dataframe_has_one_row_a_run(mixed: Sweep) -> None:
+def test_a_dataframe_has_one_row_per_run(mixed: Sweep) -> None:
     pytest.importorskip("pandas", reason="needs the extra pandas")
     frame = mixed.to_dataframe()
     assert frame.index.name == "run"
@@ -613,7 +613,7 @@ def test_a_dataset_has_dimensions_and_units(mixed: Sweep) -> None:
     assert "F" not in bare
 
 
-def test_parameters_that_are_called_like_results_are_kept_apart() -> None:
+def test_parameters_with_names_of_results_are_kept_separate() -> None:
     names = ("transitions", "outcome", "time", "run", "element", "z1", "state1", "x_end")
     chart = Chart(
         "names",

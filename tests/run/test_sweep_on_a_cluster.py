@@ -97,7 +97,7 @@ class Deadly(Executor):
 
 
 @quiet
-def test_what_kills_every_worker_is_a_row_that_says_so() -> None:
+def test_a_run_that_kills_every_worker_is_a_row_that_says_so() -> None:
     dask = pytest.importorskip("dask", reason="needs the extra cluster")
     pytest.importorskip("numba", reason="needs the extra fast")
     model, rig = pulled_mass()

@@ -18,7 +18,7 @@ cases = pytest.mark.parametrize("case", CASES)
 
 @pytest.mark.parametrize("options", METHODS)
 @cases
-def test_rows_are_the_wanted_times(case, options):
+def test_rows_are_at_the_requested_times(case, options):
     """Few times, many times, unevenly spread: these are the rows, all with micro-step 0."""
     model, rig, T = CASES[case]
     full = simulate(model, rig, T, **options)
@@ -69,7 +69,7 @@ def test_rows_on_steps_are_the_steps_rows(case):
 
 
 @cases
-def test_rows_between_steps_are_as_good_as_the_steps(case):
+def test_rows_between_steps_are_as_accurate_as_the_steps(case):
     """Dense output: rows inside steps are as close to a run at rtol 1e-12 as its steps are."""
     model, rig, T = CASES[case]
     times = np.linspace(0, T, 1501)

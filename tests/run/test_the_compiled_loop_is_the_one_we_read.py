@@ -55,7 +55,7 @@ def test_the_same_rows_and_the_same_log(case, options, read):
         np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name))
 
 
-def test_it_slides_along_the_same_rows(read):
+def test_sliding_gives_the_same_rows(read):
     model = one_element("published", F_c=1.0, F_s=1.5, v_s=0.05, C=0.1, sigma=5.0, k=1.0)
     start = {"z": [-2.5], "states": ["slip"], "v": 0.05}
     runs = [
@@ -67,7 +67,7 @@ def test_it_slides_along_the_same_rows(read):
         np.testing.assert_array_equal(*(getattr(run.rows, name) for run in runs))
 
 
-def test_what_ends_a_run_ends_it_at_the_same_place(read):
+def test_failures_end_the_run_at_the_same_point(read):
     model, rig = memoryless([0.5, 0.4]), SLOWING
     scenes = []
     for engine in ("compiled", "ifelse"):
