@@ -35,7 +35,7 @@ from gms_fsm import (
     Transition,
     simulate,
 )
-from gms_fsm._files import written_whole
+from gms_fsm._files import write_whole
 from gms_fsm.errors import GMSError, OutputError, SignalError, TraceFileError
 from tests.helpers import non_drifting, pulled_mass, stick_slip
 
@@ -279,7 +279,7 @@ def test_a_writer_that_fails_leaves_the_old_file_and_nothing_else(
         raise error
 
     with pytest.raises(OutputError if isinstance(error, OSError) else type(error)) as caught:
-        written_whole(path, fail)
+        write_whole(path, fail)
     if isinstance(error, OSError):
         assert "disk full" in str(caught.value)
         assert str(path) in str(caught.value)
