@@ -25,7 +25,7 @@ from gms_fsm import (
     simulate,
     sweep,
 )
-from gms_fsm._files import written_whole
+from gms_fsm._files import write_whole
 from gms_fsm.app.paper import FIG4_END, VELOCITY
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
@@ -73,7 +73,7 @@ def draw_charts(published: Trace, signed: Trace) -> None:
     first_alone = int((signed.transitions.element == 3).nonzero()[0][2])  # E4, backward
     row = int((signed.t == signed.transitions.t[first_alone]).nonzero()[0][-1])
     live = plots.live_statechart(signed, row=row, elements=4, values=True)
-    written_whole(FOLDER / "chart_live.svg", lambda file: file.write(live.encode()))
+    write_whole(FOLDER / "chart_live.svg", lambda file: file.write(live.encode()))
     plots.animate(signed, FOLDER / "film.gif", elements=[0], frames=50, t_end=50.0, fps=10)
 
 
@@ -106,7 +106,7 @@ def draw_concepts(published: Trace) -> None:
     figures.save(element_figure(), FOLDER / "concept_element.png")
     row = int(np.flatnonzero(published.t <= 25.0)[-1])
     live = plots.live_statechart(published, row=row, elements=[0], values=True)
-    written_whole(FOLDER / "concept_guard.svg", lambda file: file.write(live.encode()))
+    write_whole(FOLDER / "concept_guard.svg", lambda file: file.write(live.encode()))
     figures.save(microstep_figure(published), FOLDER / "concept_microstep.png")
     figures.save(crossing_figure(), FOLDER / "concept_crossing.png")
 

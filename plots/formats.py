@@ -15,7 +15,7 @@ from typing import Any, Literal, get_args
 
 from gms_fsm._arguments import checked_path
 from gms_fsm._extras import EXTRAS
-from gms_fsm._files import written_whole
+from gms_fsm._files import write_whole
 from gms_fsm.errors import ParameterError
 
 __all__ = [
@@ -325,4 +325,4 @@ def save(made: Any, path: str | Path, *subjects: Subject) -> Path:
     """
     write = chosen(path, *subjects).write
     # The folder is checked first, because an animation takes long.
-    return written_whole(Path(path), lambda file: file.write(write(made)))
+    return write_whole(Path(path), lambda file: file.write(write(made)))

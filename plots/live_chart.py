@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from gms_fsm._arguments import checked_whole
+from gms_fsm._arguments import checked_integer
 from gms_fsm.errors import OutputError, ParameterError, shown
 from gms_fsm.inspection.explain import values_at
 from gms_fsm.language import Condition, clauses, evaluate
@@ -195,7 +195,7 @@ class LiveChart:
 
     def _row(self, row: int) -> int:
         rows = len(self.trace)
-        row = checked_whole("row", row)
+        row = checked_integer("row", row)
         if not -rows <= row < rows:
             raise IndexError(f"row {row}: the trace has {rows} rows")
         return row % rows

@@ -17,7 +17,7 @@ import graphviz
 
 from gms_fsm._arguments import checked_path
 from gms_fsm._extras import missing
-from gms_fsm._files import written_whole
+from gms_fsm._files import write_whole
 from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
 from plots import formats
 from plots.statechart import ChartGraph
@@ -78,7 +78,7 @@ def render(graph: graphviz.Digraph, path: str | Path) -> Path:
         content = formats.chosen(path, "graph").write(graph)
         # The same text each time, so that Python shows it once per process, not per picture.
         warnings.warn(f"charts are written as DOT text: {error}", stacklevel=2)
-    return written_whole(path, lambda file: file.write(content))
+    return write_whole(path, lambda file: file.write(content))
 
 
 def picture(graph: graphviz.Digraph, form: str) -> bytes:

@@ -21,7 +21,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup, TyperOption
 
 import gms_fsm
-from gms_fsm._files import no_input, output_folder, written_whole
+from gms_fsm._files import output_folder, refuse_input, write_whole
 from gms_fsm.app.paper import FORCE, VELOCITY
 from gms_fsm.errors import GMSError
 
@@ -393,7 +393,7 @@ def _write_report(report: Report, folder: Path) -> list[Path]:
     stems = [f"{number}-{finding.check}" for number, finding in enumerate(found, start=1)]
     pictures = [name for stem in stems for name in formats.files(stem, "graph")]
     output_folder(folder, ["report.txt", *pictures])
-    written = [written_whole(folder / "report.txt", lambda file: file.write(text))]
+    written = [write_whole(folder / "report.txt", lambda file: file.write(text))]
     edges = report.chart.guards
     for stem, finding in zip(stems, found, strict=True):
         marked = [part for part in finding.where if part in edges] or finding.where
@@ -460,7 +460,7 @@ def animate_command(
     from gms_fsm.traces.trace import Trace, files_of
     from plots.animation import animate
 
-    no_input(output, *files_of(trace))
+    refuse_input(output, *files_of(trace))
     run = Trace.load(trace)
     with _progress() as bar:
         task = bar.add_task("frames", total=frames)
@@ -486,7 +486,7 @@ def replay_command(
     from gms_fsm.traces.trace import Trace, files_of
     from plots import write_replay
 
-    no_input(output, *files_of(trace), *([] if other is None else files_of(other)))
+    refuse_input(output, *files_of(trace), *([] if other is None else files_of(other)))
     second = None if other is None else Trace.load(other)
     names = [] if other is None else [trace.stem, other.stem]
     page = write_replay(output, Trace.load(trace), second, title=title, names=names)
