@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from gms_fsm.language import (
-    Literal,
+    Requirement,
     parse_condition,
     parse_value,
     rough_points,
@@ -17,7 +17,7 @@ from gms_fsm.language import (
 
 def _literals(text: str, holds: bool = True) -> Any:
     def told(part: Any) -> Any:
-        if isinstance(part, Literal):
+        if isinstance(part, Requirement):
             return spell(part.relation)
         return (part[0], *(told(p) for p in part[1]))
 

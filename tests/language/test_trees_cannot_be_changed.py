@@ -8,7 +8,7 @@ import pytest
 
 from gms_fsm.language import (
     MATLAB_LIKE,
-    Literal,
+    Requirement,
     parse_condition,
     split,
 )
@@ -22,7 +22,7 @@ def test_a_tree_and_its_spelling_cannot_be_changed() -> None:
     parts = list(walk(condition))
     assert len({type(part) for part in parts}) == 10
     comparison = split(parse_condition("a > b", "abc"))
-    assert isinstance(comparison, Literal)
+    assert isinstance(comparison, Requirement)
     for part in (*parts, MATLAB_LIKE, comparison, comparison.comparison):
         with pytest.raises(dataclasses.FrozenInstanceError):
             setattr(part, dataclasses.fields(part)[0].name, None)
