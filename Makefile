@@ -2,9 +2,10 @@
 #   make help    this list
 #   make paper   the paper's two experiments -> folder paper/
 #   make test    all tests
+#   make quick   those that are not slow, in less than a minute
 #   make coverage  all tests, and what of the three packages they run
 #   make lint    formatting, style, types, import contracts
-#   make core    the tests with only the required dependencies
+#   make core    the tests that are not slow, with only the required dependencies
 #   make lowest  the tests near a dependency, with the lowest versions that pyproject.toml allows
 #   make bench   speed and error against C, SciPy, CVODE and PathSim
 #   make soak    hard use: fuzzing, kills, a million transitions, 2,000 runs judged by a reference;
@@ -20,7 +21,7 @@ RUN := $(VENV)/bin
 SOAK_MINUTES ?= 10
 PIP := $(RUN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: help paper test coverage lint core lowest bench soak gallery docs wheel clean
+.PHONY: help paper test quick coverage lint core lowest bench soak gallery docs wheel clean
 .DEFAULT_GOAL := test
 
 $(VENV)/bin/python:
@@ -65,6 +66,9 @@ paper: $(VENV)/all.stamp
 test: $(VENV)/dev.stamp
 	$(RUN)/python -m pytest -n auto
 
+quick: $(VENV)/dev.stamp
+	$(RUN)/python -m pytest -n auto -m "not slow"
+
 coverage: $(VENV)/dev.stamp
 	$(RUN)/python -m pytest -n auto --cov --cov-report=term
 
@@ -75,7 +79,7 @@ lint: $(VENV)/dev.stamp
 	$(RUN)/lint-imports
 
 core: .venv-core/stamp
-	.venv-core/bin/python -m pytest -n auto tests gms_fsm integrators
+	.venv-core/bin/python -m pytest -n auto -m "not slow" tests gms_fsm integrators
 
 # transitions; typer and pydantic; numba; scipy; pandas, pyarrow, xarray, distributed; z3; the drawing libraries
 LOWEST_TESTS := callbacks_* command_line* overrides_* scenarios_run compiled_* engines_agree_* scipy_* \

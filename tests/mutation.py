@@ -38,22 +38,28 @@ PHYSICS = [
 ]
 NEAR = {  # module: its tests, those that detect most first
     "gms_fsm/charts/chart.py": [
-        "language/test_mutants_are_killed",
+        "charts/test_a_chart_cannot_be_changed",
         "charts/test_chart_refuses_contradictions",
         "charts/test_gms_chart_is_the_papers",
+        "run/test_elements_answer_for_themselves",
     ],
     "gms_fsm/run/machines.py": [
-        "language/test_mutants_are_killed",
+        "run/test_elements_answer_for_themselves",
         "run/test_callbacks_run_once_per_firing",
         "run/test_callbacks_only_look",
         "charts/test_gms_chart_is_the_papers",
     ],
     "integrators/advance.py": [
-        "language/test_mutants_are_killed",
+        "integrators/test_steps_and_stops",
+        "integrators/test_the_first_change_is_found",
         *PHYSICS,
         "integrators/test_convergence_orders",
     ],
-    "integrators/crossings.py": ["language/test_mutants_are_killed", *PHYSICS],
+    "integrators/crossings.py": [
+        "integrators/test_the_first_change_is_found",
+        "integrators/test_steps_and_stops",
+        *PHYSICS,
+    ],
 }
 LANGUAGE = [
     "tree",
@@ -68,7 +74,10 @@ LANGUAGE = [
 ]
 NEAR |= {
     f"gms_fsm/language/_{name}.py": [
-        "language/test_mutants_are_killed",
+        "language/test_limits_and_columns",
+        "language/test_printed_text_is_exact",
+        "language/test_conditions_are_split",
+        "language/test_trees_cannot_be_changed",
         "language/test_fold_reads_each_part_once_and_only_when_taken",
         "language/test_derivatives_are_slopes",
         "language/test_expression_refuses_everything_else",

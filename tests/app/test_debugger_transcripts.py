@@ -77,6 +77,7 @@ step, then why 2: the edges that leave slip
     assert "first different transition at t = " in said
 
 
+@pytest.mark.slow
 def test_pulled_mass_story() -> None:
     said = answers(
         PULLED,

@@ -235,6 +235,7 @@ def _folder(path: Path) -> None:
     path.mkdir()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [_pipe, _device, _standard_output, _folder])
 @pytest.mark.parametrize(
     ("verb", "name"), [("chart", "x.mmd"), ("blocks", "x.dot"), ("replay", "x.html")]
@@ -340,6 +341,7 @@ def test_what_only_has_such_a_name_is_left_alone(tmp_path: Path) -> None:
 
 
 # --------------------------------------------------------------------------- at once
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", [".npz", ".csv"])
 def test_three_threads_that_save_to_one_path_never_show_a_damaged_file(
     ending: str, tmp_path: Path
@@ -350,7 +352,7 @@ def test_three_threads_that_save_to_one_path_never_show_a_damaged_file(
     traces[0].save(path)
     known = {trace.F.tobytes() + trace.transitions.t.tobytes() for trace in traces}
     wrong: list[object] = []
-    end = time.monotonic() + 4.0
+    end = time.monotonic() + 1.5
 
     def write(trace: Trace) -> None:
         while time.monotonic() < end and not wrong:

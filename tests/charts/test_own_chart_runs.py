@@ -294,6 +294,7 @@ def test_the_plain_chart_does_something(plain: list[Trace]) -> None:
     assert all(len(trace.transitions) > 0 for trace in plain)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("kind", ["parameter", "variable"])
 def test_a_name_is_refused_or_changes_nothing(name: str, kind: str, plain: list[Trace]) -> None:

@@ -19,6 +19,7 @@ def test_velocity_step_moves_z_exactly() -> None:
         assert trace.v[at].tolist() == [0.1, -0.3]
 
 
+@pytest.mark.slow
 def test_force_step_keeps_the_order_of_the_method() -> None:
     """The error of rk4 across a force step falls with the fourth power of the step."""
     model, _ = non_drifting("published")

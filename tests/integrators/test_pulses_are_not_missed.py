@@ -26,6 +26,7 @@ SPRING = ChartModel(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["ifelse", "compiled"])
 @pytest.mark.parametrize("share", [0.02, 0.005, 0.001])
 @pytest.mark.parametrize("place", [0.137, 0.5, 0.9123])

@@ -17,6 +17,7 @@ def assert_same_run(trace, reference, t_bound, z_bound):
     assert np.abs(trace.z[-1] - reference.z[-1]).max() < z_bound
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["signed", "published"])
 @solvers
 def test_open_loop(solver, law):
@@ -28,6 +29,7 @@ def test_open_loop(solver, law):
     assert_same_run(trace, reference, 1e-5, 1e-5)
 
 
+@pytest.mark.slow
 @solvers
 def test_pulled_mass(solver):
     """Two stick-slip cycles in closed loop."""

@@ -40,6 +40,7 @@ from gms_fsm.language import (
     names_in,
     parse_condition,
     parse_value,
+    sgn,
     spell,
     split,
 )
@@ -115,6 +116,7 @@ def _outcome_of_text(text: str, point: Mapping[str, float]) -> str:
 
 
 # --------------------------------------------------------------------------- evaluate
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(any_values, points)
 def test_a_value_equals_what_python_computes_from_its_text(
@@ -123,6 +125,7 @@ def test_a_value_equals_what_python_computes_from_its_text(
     assert _outcome_of_tree(tree, point) == _outcome_of_text(spell(tree, PYTHON), point)
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(conditions, points)
 def test_a_condition_equals_what_python_decides_from_its_text(
@@ -177,6 +180,7 @@ def test_a_product_stays_short() -> None:
 
 
 # --------------------------------------------------------------------------- spell, read, spell
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(any_values, points)
 @example(parse_value("(-((a**8)**3))**3", NAMES), {"a": 1.1, "b": 0.0, "c": 0.0})
@@ -194,6 +198,7 @@ def test_printing_and_parsing_preserve_values(tree: Value, point: dict[str, floa
     assert names_in(again) <= names_in(tree)  # a zeroth power is printed as 1.0
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(conditions, points)
 def test_printing_and_parsing_preserve_conditions(tree: Condition, point: dict[str, float]) -> None:
@@ -265,6 +270,7 @@ def _requirements(part: Split) -> list[Requirement]:
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=400, deadline=None)
 @given(tame_conditions, near, st.booleans())
 def test_split_agrees_with_the_condition(
@@ -336,3 +342,7 @@ def test_nested_absolute_values_do_not_multiply() -> None:
         text = f"abs({text})"
     found = _requirements(split(parse_condition(f"{text} <= c", NAMES)))
     assert len(found) <= 24, "twice as many with every level: 40 levels never end"
+
+
+def test_the_sign_of_nan_is_zero() -> None:
+    assert [sgn(u) for u in (math.nan, 0.0, -0.0, 5e-324, -5e-324)] == [0.0, 0.0, 0.0, 1.0, -1.0]

@@ -33,8 +33,8 @@ from gms_fsm.lowering._generated import standalone
 from gms_fsm.lowering.program import Program, lower
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
-from tests.app.test_command_line import run
 from tests.helpers import stick_slip
+from tests.scenario_files import CommandLine
 
 RIGS: dict[str, Rig] = {
     "prescribed": Prescribed(paper.VELOCITY),
@@ -103,11 +103,11 @@ def _compare(model: Model, rig: Rig, text: str, t_end: float) -> None:
 
 @pytest.mark.parametrize("rig", RIGS)
 @pytest.mark.parametrize("law", ["signed", "published"])
-def test_what_the_command_line_prints(law: Any, rig: str) -> None:
-    printed = run("code", "--law", law, "--rig", rig)
-    assert printed.returncode == 0, printed.stderr
+def test_what_the_command_line_prints(law: Any, rig: str, gms_fsm: CommandLine) -> None:
+    printed = gms_fsm("code", "--law", law, "--rig", rig)
+    assert printed.code == 0, printed.err
     model = GMS(GMSParameters.paper("stick-slip"), law=law)
-    _compare(model, RIGS[rig], printed.stdout, 30.0)
+    _compare(model, RIGS[rig], printed.out, 30.0)
 
 
 def _rough() -> ChartModel:

@@ -8,6 +8,7 @@ import math
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -15,6 +16,8 @@ from scipy.optimize import brentq
 
 from gms_fsm import GMS, GMSParameters, Prescribed, Stribeck, simulate
 from tests.helpers import event_sequence
+
+pytestmark = pytest.mark.slow
 
 V_C = 1e-4
 

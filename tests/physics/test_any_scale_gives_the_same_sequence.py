@@ -19,6 +19,8 @@ from tests.app.test_scenarios_run import SHIPPED, data_folder
 from tests.helpers import pulled_mass
 from tests.scaled import AXES, Case, factors, other_bits, scaled, sequence
 
+pytestmark = pytest.mark.slow
+
 HAS_NUMBA = bool(importlib.util.find_spec("numba"))
 EXPONENTS = (-40, -37, -33, -30, -27, -23, -20, -13, -10, -7, -3, -1, 4, 10, 15, 20)
 FEW = (-40, -13, 20)
@@ -42,7 +44,7 @@ def shipped(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
 def test_shipped_scenarios(shipped: Case, axis: str) -> None:
     engine = engine_for(shipped.rig)
     base = shipped.run(engine)
-    exponents = EXPONENTS if HAS_NUMBA else FEW
+    exponents = EXPONENTS if engine == "compiled" else FEW
     changed, rounded = [], []
     for exponent in exponents:
         by = factors(axis, exponent)

@@ -38,6 +38,8 @@ from gms_fsm.inspection.explain import Explanation, explain, explain_state, valu
 from gms_fsm.traces.failures import SimulationError
 from tests.helpers import same_bits
 
+pytestmark = pytest.mark.slow
+
 EXAMPLES = int(os.environ.get("GMS_FSM_EXAMPLES", "0"))
 HAS_NUMBA = bool(importlib.util.find_spec("numba"))
 

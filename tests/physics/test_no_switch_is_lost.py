@@ -40,6 +40,7 @@ def test_default_run_finds_all_of_them_in_place(law, reference):
     assert np.abs(trace.z - reference.z).max() < z_bound
 
 
+@pytest.mark.slow
 def test_rk4_with_a_step_that_does_not_divide_the_period_finds_them_too(law, reference):
     """Fixed steps of 1.0001 ms, cut at each crossing."""
     trace = simulate(stick_slip(law), open_loop(), T, method="rk4", step=1.0001e-3)
@@ -47,6 +48,7 @@ def test_rk4_with_a_step_that_does_not_divide_the_period_finds_them_too(law, ref
     assert np.abs(trace.transitions.t - reference.transitions.t).max() < 1e-8
 
 
+@pytest.mark.slow
 def test_evaluating_guards_at_step_ends_loses_most_switches(law, reference):
     """With a step of 1.003 ms no sample falls into |v| <= v_c: 4 switches, z wrong by 0.5 m."""
     trace = simulate(
@@ -56,6 +58,7 @@ def test_evaluating_guards_at_step_ends_loses_most_switches(law, reference):
     assert np.abs(trace.z - reference.z).max() > 0.5
 
 
+@pytest.mark.slow
 def test_evaluating_guards_at_step_ends_is_luck(law, reference):
     """With a step of 1.0001 ms all are found, because the grid happens to land on v = 0.
 
@@ -72,6 +75,7 @@ def test_evaluating_guards_at_step_ends_is_luck(law, reference):
     assert len(trace.transitions) == COUNT[law]
 
 
+@pytest.mark.slow
 def test_pulled_mass():
     """The stick-slip rig: 72 transitions, 34 of them arrests, and the known range of v."""
     model, rig = pulled_mass()

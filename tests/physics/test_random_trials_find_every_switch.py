@@ -11,6 +11,8 @@ import pytest
 
 from tests.trials import FAMILIES, JUDGED, is_finding, judge, reference, said, trial
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("numba", reason="needs the extra fast: the machines take too long for this")
 
 COUNT = 40

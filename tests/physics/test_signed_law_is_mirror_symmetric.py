@@ -89,6 +89,7 @@ def cases(draw):
     return GMS(parameters, law="signed"), times, np.array(speeds)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(cases())
 def test_random_ramps_and_parameters(case):

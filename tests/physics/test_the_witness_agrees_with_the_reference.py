@@ -16,6 +16,8 @@ from tests.helpers import pulled_mass
 from tests.trials import JUDGED, Trial, reference, trial
 from tests.witness import witness
 
+pytestmark = pytest.mark.slow
+
 HAS_NUMBA = bool(importlib.util.find_spec("numba"))
 ENGINE = "compiled" if HAS_NUMBA else "ifelse"
 

@@ -100,6 +100,7 @@ def test_the_flow_sees_one_mode_per_step(case, method):
     assert arcs > firings / 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("amplitude", [5e-3, 0.1])
 @pytest.mark.parametrize("law", ["signed", "published"])
 def test_sticking_makes_no_stops_at_reversals(law, amplitude):

@@ -37,6 +37,7 @@ def test_the_naive_loop_chatters():
     assert abs(v) < 1e-2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [

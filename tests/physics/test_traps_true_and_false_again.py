@@ -126,6 +126,7 @@ WINDOWS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"rtol": 1e-10, "atol": 1e-13}, {"method": "bs23"}])
 @pytest.mark.parametrize("window", WINDOWS)
 def test_a_break_away_inside_a_long_step_is_found(window, options):

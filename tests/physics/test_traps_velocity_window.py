@@ -105,6 +105,7 @@ def test_raw_guards_hold_where_they_fire(case, method):
         assert guard_holds(record, v_c)
 
 
+@pytest.mark.slow
 def test_a_root_is_not_yet_true():
     """A root finder's zero of v_c - v(t) often lies where |v| <= v_c is still false."""
     false = 0

@@ -115,6 +115,7 @@ def test_text_alone_tells_graphviz_how_to_draw(tmp_path: Path) -> None:
     assert again.read_bytes() == direct.read_bytes()
 
 
+@pytest.mark.slow
 @needs_dot
 @pytest.mark.parametrize("suffix", BEGINS)
 def test_same_graph_same_file(suffix: str, tmp_path: Path) -> None:

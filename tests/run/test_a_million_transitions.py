@@ -20,11 +20,13 @@ import pytest
 from gms_fsm import Trace, simulate
 from tests.helpers import ROOT, open_loop, stick_slip
 
+pytestmark = pytest.mark.slow
+
 BYTES_A_FIRING = 1000
 PERIOD, EACH_PERIOD = 20.0, 16  # of the sine [s]; four elements, four transitions each
 compiled = pytest.param(
     "compiled",
-    20_000,
+    6_000,
     marks=pytest.mark.skipif(not importlib.util.find_spec("numba"), reason="needs extra fast"),
 )
 
@@ -52,7 +54,7 @@ def peak(engine: str, transitions: int, **options: float) -> tuple[int, Trace]:
         tracemalloc.stop()
 
 
-@pytest.mark.parametrize(("engine", "transitions"), [compiled, ("ifelse", 800), ("machines", 400)])
+@pytest.mark.parametrize(("engine", "transitions"), [compiled, ("ifelse", 400), ("machines", 200)])
 def test_memory_grows_with_the_log_only(engine: str, transitions: int) -> None:
     run(engine, EACH_PERIOD)  # memory for one-time loading does not count
     few, first = peak(engine, transitions // 4)

@@ -22,6 +22,7 @@ def last_row(trace):
     return values if trace.rig.acceleration is None else values | {"v": trace.v[-1]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.31, 0.5, 0.77])
 @pytest.mark.parametrize("case", CASES)
 def test_continued(case, share):

@@ -98,6 +98,7 @@ def _both(case: str, **options: Any) -> tuple[Trace, list[Call]]:
     return other, calls
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", OPTIONS)
 @pytest.mark.parametrize("case", CASES)
 def test_every_callback_sees_the_same_values(case: str, options: str) -> None:

@@ -226,6 +226,7 @@ def test_a_function_that_cannot_be_identified_is_refused_before_the_run(
         identity(UNKNOWN[kind])
 
 
+@pytest.mark.slow
 def test_a_function_compiled_by_numba_is_identified_by_its_text(tmp_path: Path) -> None:
     numba = pytest.importorskip("numba", reason="needs the extra fast")
     path = tmp_path / "run.checkpoint"
@@ -298,6 +299,7 @@ def _write(path: Path, arrays: dict[str, Any]) -> None:
         np.savez(file, **arrays)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("options", [{}, {"t_eval": np.linspace(0, 25, 333)}], ids=["all", "eval"])
 def test_every_integer_and_every_shape_is_checked(
@@ -344,6 +346,7 @@ def test_each_index_is_checked_against_its_range(place: str, engine: str, tmp_pa
             goes_on(path, open_loop(), engine)
 
 
+@pytest.mark.slow
 def test_data_that_unpacks_to_more_than_the_file_is_not_unpacked(tmp_path: Path) -> None:
     path = tmp_path / "run.checkpoint"
     begun(path, open_loop())

@@ -53,6 +53,7 @@ def interrupted(path: Path, after: int, *arguments: Any, **options: Any) -> Trac
         return None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(
     "options",
@@ -106,6 +107,7 @@ def test_user_machines_continue_in_their_states(engine: str, tmp_path: Path) -> 
     assert made.elements[0].state == "stick"
 
 
+@pytest.mark.slow
 def test_a_killed_process_can_be_resumed(tmp_path: Path) -> None:
     """SIGKILL at some moment; the next process ends with the bits of an undisturbed run."""
     script = tmp_path / "long.py"
@@ -205,6 +207,7 @@ def test_checkpoints_are_written_at_the_requested_interval(
     assert len(saved) == 1  # at the start
 
 
+@pytest.mark.slow
 def test_the_command_line_resumes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """`gms-fsm run --checkpoint`, interrupted, then the same command again."""
     loaded = load_scenario(ROOT / "scenarios" / "pulled_mass.toml", [])

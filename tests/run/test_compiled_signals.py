@@ -24,17 +24,15 @@ from gms_fsm.systems.rigs import Rig
 from gms_fsm.traces.failures import NotFiniteError, SimulationError
 from tests.helpers import event_sequence, non_drifting, same_bits, stick_slip
 
+pytestmark = pytest.mark.slow
+
 numba = pytest.importorskip("numba", reason="needs the extra fast")
 
 Signal = Callable[[float], float]
 TABLE = np.array([0.1, 0.2, -0.2, 0.3])
 
 
-# --------------------------------------------------------------------------- compilable
-def _sine(t: float) -> float:
-    return 0.2 * math.sin(2 * math.pi * t / 20)
-
-
+# --------------------------------------------------------------------------- that compile
 def _of_numpy(t: float) -> float:
     return 0.2 * np.sin(2 * np.pi * t / 20) + np.interp(t, TABLE.cumsum(), TABLE) * 0.1
 
@@ -84,11 +82,9 @@ def _close(a: Trace, b: Trace) -> None:
 @pytest.mark.parametrize(
     "function",
     [
-        _sine,
         _of_numpy,
         _with_branches,
         _whole_numbers,
-        _louder(0.3),
         _jitted,
         _jitted_eagerly,
         _calls_compiled,

@@ -57,6 +57,7 @@ def test_fast_switching_that_makes_progress_is_not_a_livelock(engine):
     assert len(trace.transitions) == 1000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_switching_by_the_clock_is_not_a_livelock(engine):
     """Guards of t alone, while nothing moves at all."""
@@ -74,9 +75,9 @@ def test_switching_by_the_clock_is_not_a_livelock(engine):
     )
     w = 2.0 * np.pi * 1000.0
     trace = simulate(
-        ChartModel(chart, {"w": w}), Prescribed("0"), 2.0, engine=needs(engine), max_step=1e-4
+        ChartModel(chart, {"w": w}), Prescribed("0"), 0.5, engine=needs(engine), max_step=1e-4
     )
-    assert len(trace.transitions) == pytest.approx(4000, abs=2)
+    assert len(trace.transitions) == pytest.approx(1000, abs=2)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

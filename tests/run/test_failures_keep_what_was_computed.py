@@ -28,7 +28,7 @@ from gms_fsm import (
 from gms_fsm.charts import gms_element
 from gms_fsm.errors import ChartError, GMSError, ParameterError
 from gms_fsm.traces.failures import LivelockError, NotFiniteError, SimulationError, StepSizeError
-from tests.helpers import FunctionBelt, open_loop, pulled_mass, stick_slip
+from tests.helpers import FASTEST, FunctionBelt, open_loop, pulled_mass, stick_slip
 
 CURVE = Stribeck(1.0, 1.5, 1e-3)
 
@@ -336,6 +336,7 @@ def test_an_output_that_is_infinite_is_shown_as_infinite() -> None:
     assert np.isfinite(trace.F[1:]).all()
 
 
+@pytest.mark.slow
 def test_transitions_before_the_failure_are_kept() -> None:
     model = stick_slip("signed")
     record = (np.linspace(0, 35, 3501), 0.2 * np.sin(2 * np.pi * np.linspace(0, 35, 3501) / 20))
@@ -372,6 +373,7 @@ def test_an_exception_from_the_progress_callback_is_passed_on() -> None:
     assert seen[-2] <= 10.0 < seen[-1]
 
 
+@pytest.mark.slow
 def test_a_run_at_extreme_parameters_ends_or_fails_with_a_message() -> None:
     for k in (1e-8, 1e8):
         parameters = GMSParameters(
@@ -379,7 +381,11 @@ def test_a_run_at_extreme_parameters_ends_or_fails_with_a_message() -> None:
         )
         try:
             trace = simulate(
-                GMS(parameters, law="signed"), Slider(1e-3, "sin(50*t)"), 0.05, max_step=1e-2
+                GMS(parameters, law="signed"),
+                Slider(1e-3, "sin(50*t)"),
+                0.05,
+                max_step=1e-2,
+                engine=FASTEST,
             )
         except SimulationError as error:
             trace = error.trace

@@ -24,6 +24,8 @@ from gms_fsm.run._recording import Recorder, _Columns
 from tests.helpers import ROOT, pulled_mass, stick_slip
 from tests.scenario_files import OPEN_LOOP
 
+pytestmark = pytest.mark.slow
+
 ENGINES = [
     "machines",
     "ifelse",
@@ -152,7 +154,7 @@ def test_the_command_line_keeps_the_results_and_says_so(engine: str, tmp_path: P
     )
     while not (tmp_path / "out" / "run.checkpoint").exists():
         time.sleep(0.01)
-    time.sleep(2.0)
+    time.sleep(2.0 if engine == "compiled" else 0.5)  # to load the machine code
     child.send_signal(signal.SIGINT)
     out, err = child.communicate()
     assert child.returncode == 130

@@ -1,9 +1,9 @@
 """A process killed at any moment leaves the old file or a complete new one, and no obstacles.
 
-Writers write two known contents alternately, again and again, and are killed with SIGKILL at a
-random moment; then every file is the one or the other, to the last bit. Other leftovers of a kill
-are named ``.<file>.<random>.gms-fsm-part`` and are gone after the next run. About 25 kills here,
-200 in tests/soak.py.
+Writers write two known things in turns, again and again, and are killed with SIGKILL at a random
+moment; then every file is the one thing or the other, to the last bit. What a kill leaves besides
+is named ``.<file>.<random>.gms-fsm-part`` and is gone after the next run. A dozen kills here, 200
+in tests/soak.py.
 """
 
 from __future__ import annotations
@@ -36,7 +36,10 @@ from tests.helpers import ROOT, pulled_mass, same_bits, stick_slip
 from tests.scenario_files import OPEN_LOOP
 
 PARTS = re.compile(r"\..+\.[0-9a-f]{16}\.gms-fsm-(part|rest)")
-pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and SIGKILL")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and SIGKILL"),
+]
 
 
 # --------------------------------------------------------------------------- writers
@@ -190,9 +193,12 @@ WRITERS = {
 }
 
 
-# --------------------------------------------------------------------------- child processes
-# Forking the test process, which has threads, would be unsafe; so one process is started for it,
-# which loads everything and then forks a writer for each line it reads.
+SHARES = (0.03, 0.47), (0.21, 0.83)  # of a writer's span, for one writer and the next
+
+
+# --------------------------------------------------------------------------- the killed
+# Forking the process of the tests, with its threads, is asking for trouble; so one process is
+# started for it, which loads everything and then forks a writer for each line it reads.
 def nursery() -> None:
     """Fork a writer for each line ``name<TAB>folder``, print its number, wait until it ends."""
     with contextlib.redirect_stdout(io.StringIO()):
@@ -273,8 +279,10 @@ def _one_nursery() -> Iterator[None]:
     end_nursery()
 
 
-@pytest.mark.parametrize("share", [0.03, 0.21, 0.47, 0.83])
-@pytest.mark.parametrize("name", WRITERS)
+@pytest.mark.parametrize(
+    ("name", "share"),
+    [(name, share) for i, name in enumerate(WRITERS) for share in SHARES[i % 2]],
+)
 def test_killed_at_some_moment(name: str, share: float, tmp_path: Path) -> None:
     if name == "run":
         pytest.importorskip("matplotlib", reason="a run draws figures: needs the extra plots")

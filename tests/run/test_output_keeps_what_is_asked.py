@@ -55,6 +55,7 @@ def _same_row(one: dict[str, Any], other: dict[str, Any]) -> None:
         np.testing.assert_array_equal(value, other[name], err_msg=name)
 
 
+@pytest.mark.slow
 @every_method
 @every_case
 def test_the_end_is_the_last_of_all_rows(case: str, method: str, engine: str) -> None:
@@ -72,6 +73,7 @@ def test_the_end_is_the_last_of_all_rows(case: str, method: str, engine: str) ->
     assert (len(whole.transitions) > 0) == (case != "no edges")
 
 
+@pytest.mark.slow
 @every_method
 @every_case
 def test_only_requested_rows_are_recorded(case: str, method: str, engine: str) -> None:

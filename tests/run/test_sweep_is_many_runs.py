@@ -126,6 +126,7 @@ def _one(case: str, run: int) -> tuple[Model, Rig]:
     return with_values(model, values), with_numbers(rig, values)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [{}, {"rtol": 1e-9, "atol": 1e-12}, {"method": "rk4", "step": 9.03e-3}],
@@ -472,6 +473,7 @@ class Deadly(Executor):
         return self.pool.submit(_die if self.count == 3 else function, *a, **b)
 
 
+@pytest.mark.slow
 def test_process_pools_and_a_killed_worker() -> None:
     model, rig = pulled_mass()
     sets = _sets(8)
@@ -692,6 +694,7 @@ def test_files_that_cannot_be_written_or_read_say_so(mixed: Sweep, tmp_path: Pat
 
 
 # --------------------------------------------------------------------------- many
+@pytest.mark.slow
 def test_no_sequence_of_two_hundred_depends_on_the_tolerance() -> None:
     """About 72 transitions each: the same elements by the same edges in the same order."""
     pytest.importorskip("numba", reason="needs the extra fast")
@@ -708,6 +711,7 @@ def test_no_sequence_of_two_hundred_depends_on_the_tolerance() -> None:
     np.testing.assert_allclose(loose.transitions["t"], tight.transitions["t"], atol=2e-3)
 
 
+@pytest.mark.slow
 def test_memory_grows_with_the_results_only() -> None:
     """A run's steps are not recorded: at most its firings twice, while they are assembled."""
     pytest.importorskip("numba", reason="needs the extra fast")

@@ -20,6 +20,8 @@ from gms_fsm import Prescribed, sweep
 from gms_fsm.run.sweep import _Collected
 from tests.helpers import pulled_mass, stick_slip
 
+pytestmark = pytest.mark.slow
+
 distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
 
 RUNS = 192

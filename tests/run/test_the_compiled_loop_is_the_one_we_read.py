@@ -29,6 +29,7 @@ def read(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kernel, "_compiled_each_row", lambda store: kernel._each_row)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [
