@@ -1,4 +1,4 @@
-"""A chart is data: no part of it can be exchanged, and it compares as it was written."""
+"""A chart is data: no part of it can be replaced, and it compares by its texts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Printed text has the brackets that its order needs and no others; small powers are products."""
+"""Printed text has exactly the parentheses that it needs; small powers are products."""
 
 from __future__ import annotations
 

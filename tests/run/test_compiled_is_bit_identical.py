@@ -382,7 +382,7 @@ def test_any_number_of_elements(n: int) -> None:
     assert set(trace.transitions.element.tolist()) == set(range(n))
 
 
-# --------------------------------------------------------------------------- charts of one's own
+# --------------------------------------------------------------------------- user-defined charts
 SWINGING, PULLED = Prescribed("0.3*sin(2*pi*t/17)"), PulledSlider(1, 2, 0.1)
 
 

@@ -32,7 +32,7 @@ Signal = Callable[[float], float]
 TABLE = np.array([0.1, 0.2, -0.2, 0.3])
 
 
-# --------------------------------------------------------------------------- that compile
+# --------------------------------------------------------------------------- compilable
 def _of_numpy(t: float) -> float:
     return 0.2 * np.sin(2 * np.pi * t / 20) + np.interp(t, TABLE.cumsum(), TABLE) * 0.1
 

@@ -1,4 +1,4 @@
-"""The machine of an element has its own number, parameters and values, and asks edges in order."""
+"""An element's machine has its own index, parameters and values, and tests edges in order."""
 
 from __future__ import annotations
 

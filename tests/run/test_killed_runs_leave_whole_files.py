@@ -1,8 +1,8 @@
 """A process killed at any moment leaves the old file or a complete new one, and no obstacles.
 
-Writers write two known things in turns, again and again, and are killed with SIGKILL at a random
-moment; then every file is the one thing or the other, to the last bit. What a kill leaves besides
-is named ``.<file>.<random>.gms-fsm-part`` and is gone after the next run. A dozen kills here, 200
+Writers write two known contents alternately, again and again, and are killed with SIGKILL at a
+random moment; then every file is the one or the other, to the last bit. Other leftovers of a kill
+are named ``.<file>.<random>.gms-fsm-part`` and are gone after the next run. A dozen kills here, 200
 in tests/soak.py.
 """
 
@@ -193,12 +193,12 @@ WRITERS = {
 }
 
 
-SHARES = (0.03, 0.47), (0.21, 0.83)  # of a writer's span, for one writer and the next
+SHARES = (0.03, 0.47), (0.21, 0.83)  # of a writer's span, alternating between writers
 
 
-# --------------------------------------------------------------------------- the killed
-# Forking the process of the tests, with its threads, is asking for trouble; so one process is
-# started for it, which loads everything and then forks a writer for each line it reads.
+# --------------------------------------------------------------------------- child processes
+# Forking the test process, which has threads, would be unsafe; so one process is started for it,
+# which loads everything and then forks a writer for each line it reads.
 def nursery() -> None:
     """Fork a writer for each line ``name<TAB>folder``, print its number, wait until it ends."""
     with contextlib.redirect_stdout(io.StringIO()):

@@ -75,7 +75,7 @@ def test_rows_between_steps_are_as_accurate_as_the_steps(case):
     times = np.linspace(0, T, 1501)
     trace = simulate(model, rig, T, engine=FASTEST, t_eval=times)
     exact = simulate(model, rig, T, engine=FASTEST, t_eval=times, rtol=1e-12, atol=1e-15)
-    # Rows within the error of an event's place may lie on its other side.
+    # Rows within the error of an event's time may be on its other side.
     near = np.abs(times[:, None] - exact.transitions.t).min(axis=1) < 1e-4
     assert near.mean() < 0.1
     assert np.abs(trace.z - exact.z)[~near].max() < 5e-5
