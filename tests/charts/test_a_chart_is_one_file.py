@@ -1,6 +1,6 @@
 """A new chart needs only one file in ``gms_fsm/charts``: every command then knows it.
 
-Tested in a copy of the packages, in a separate process that runs one command after another.
+Tested in a copy of the packages, in a separate process that answers one command after another.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ numba = pytest.importorskip("numba", reason="needs the extra fast")
 
 NOTE = "gms-fsm: compiling the engine, once on this machine"
 
-# A whole run, by both engines. On a new machine this takes some 10 s, mostly for the loop.
+# A whole run, by both engines. On a new machine this takes some 10 s, most of it for the loop.
 RUN = """
     from gms_fsm import GMS, GMSParameters, Prescribed, simulate
     model = GMS(GMSParameters.paper("stick-slip"), law="signed")
@@ -97,7 +97,7 @@ def _kept(folder: Path) -> set[Path]:
 # --------------------------------------------------------------------------- once on this machine
 @pytest.fixture(scope="module")
 def warm(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """Return a new cache folder after a first run, and that run's standard error."""
+    """A new cache folder after a first run, and what that run wrote to standard error."""
     folder = tmp_path_factory.mktemp("cache")
     out, err = _ended(_start(RUN, NUMBA_CACHE_DIR=str(folder)))
     assert out == "equal 24\n"
@@ -125,7 +125,7 @@ def test_the_next_process_does_not_compile_again(warm: tuple[Path, str]) -> None
 
 
 def test_a_damaged_cache_only_costs_time(warm: tuple[Path, str]) -> None:
-    """Every file of it: garbage, or truncated. The loop, which takes 10 s, is only checked."""
+    """Every file of it is garbage, or truncated. The loop, which takes 10 s, is not compiled again."""
     folder, _ = warm
     for turn, path in enumerate(sorted(_kept(folder))):
         content = path.read_bytes()
@@ -138,7 +138,7 @@ def test_a_damaged_cache_only_costs_time(warm: tuple[Path, str]) -> None:
     assert "Traceback" not in err
 
 
-def test_a_wrong_bit_is_detected_before_the_code_is_loaded(warm: tuple[Path, str]) -> None:
+def test_a_wrong_bit_anywhere_is_detected_before_the_code_is_loaded(warm: tuple[Path, str]) -> None:
     """Undetected, one in five crashes the process. Each process here has one in each file."""
     folder, source = warm[0], random.Random(14)
     whole = _kept(folder)

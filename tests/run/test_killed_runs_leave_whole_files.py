@@ -193,7 +193,7 @@ WRITERS = {
 }
 
 
-SHARES = (0.03, 0.47), (0.21, 0.83)  # of a writer's span, alternating between writers
+SHARES = (0.03, 0.47), (0.21, 0.83)  # of a writer's span, for one writer and the next
 
 
 # --------------------------------------------------------------------------- child processes
