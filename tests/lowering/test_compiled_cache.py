@@ -125,7 +125,7 @@ def test_the_next_process_does_not_compile_again(warm: tuple[Path, str]) -> None
 
 
 def test_a_damaged_cache_only_costs_time(warm: tuple[Path, str]) -> None:
-    """Every file of it is garbage, or truncated. The loop, which takes 10 s, is not recompiled."""
+    """Every file of it is garbage, or truncated. The loop is not compiled again (10 s)."""
     folder, _ = warm
     for turn, path in enumerate(sorted(_kept(folder))):
         content = path.read_bytes()

@@ -124,7 +124,7 @@ def test_one_layout_serves_all_frames(tmp_path: Path, monkeypatch: pytest.Monkey
     ("options", "message"),
     [
         ({"path": "run.mp4"}, r"path is 'run\.mp4'; it must end in \.gif"),
-        ({"frames": 1}, "frames is 1; it must be a whole number of at least 2"),
+        ({"frames": 1}, "frames is 1; it must be an integer of at least 2"),
         ({"frames": 2.5}, r"frames is 2\.5"),
         ({"frames": True}, "frames is True"),
         ({"fps": 0}, "fps is 0; it must be above 0 and at most 50"),

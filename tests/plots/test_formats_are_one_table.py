@@ -143,7 +143,7 @@ def test_what_a_format_lacks_is_said_and_a_graph_is_written_as_text(tmp_path: Pa
 def test_a_format_is_registered_once() -> None:
     register(new("figure"))
     register(new("page"))
-    with pytest.raises(ParameterError, match=r"there is a format \.new of the subject 'page'"):
+    with pytest.raises(ParameterError, match=r"the subject 'page' already has a format \.new"):
         register(new("page"))
 
 

@@ -231,7 +231,7 @@ def test_playing_stops_at_the_end(open_page: Open) -> None:
     page.keyboard.press("ArrowLeft")
     page.click("#play")
     wait(page, "timer === 0")
-    assert "the end" in said(page)
+    assert "end of the run" in said(page)
 
 
 def test_reduced_motion_plays_slowly(open_page: Open) -> None:
@@ -273,7 +273,7 @@ def test_the_table_explains_the_chosen_element(open_page: Open) -> None:
     assert lines.nth(0).locator("em").inner_text() == "FIRED"
     page.keyboard.press("3")  # still sticks: its guard is true and not yet taken
     assert page.locator(".element").input_value() == "3"
-    assert page.locator("tbody em").all_inner_texts() == ["", "", "not asked"]
+    assert page.locator("tbody em").all_inner_texts() == ["", "", "not checked"]
     assert page.locator("tbody tr").nth(0).locator("td").last.inner_text() == "✓ true"
 
 
@@ -307,7 +307,7 @@ def test_a_breakpoint_by_click_stops_where_its_guard_becomes_true(open_page: Ope
     guard.click()
     assert guard.get_attribute("aria-pressed") == "false"
     page.keyboard.press("c")
-    assert "the end: no breakpoint" in said(page)
+    assert "end of the run: no breakpoint" in said(page)
 
 
 def test_breakpoints_by_keyboard_on_the_guard_and_in_the_table(open_page: Open) -> None:
@@ -351,7 +351,7 @@ def test_until_stops_on_the_first_row_where_it_holds(open_page: Open) -> None:
     assert page.evaluate("runs[0].mode[1][frame]") == 1
     page.fill("#until", "t > 1e9")
     page.press("#until", "Enter")
-    assert "the end: nothing stopped it" in said(page)
+    assert "end of the run: nothing stopped it" in said(page)
     page.fill("#until", "c -")
     assert frame(page) == int(page.locator("#scrubber").get_attribute("max") or 0)
     page.press("#until", "Escape")

@@ -270,7 +270,7 @@ def test_a_chart_without_edges_and_a_bank_of_many_elements_have_pages() -> None:
 @uplot
 def test_without_graphviz_the_page_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(_replay_chart, "drawn", lambda graph, form: None)
-    assert "The chart is left out" in replay_html(fig4("signed"))
+    assert "No chart: Graphviz" in replay_html(fig4("signed"))
 
 
 @pytest.mark.slow
