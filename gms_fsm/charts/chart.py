@@ -433,7 +433,7 @@ class Chart:
 
 
 def _tuple(given: Any, owner: str) -> tuple[Any, ...]:
-    """Return a copy of a sequence, which is no single thing."""
+    """Return a copy of a sequence as a tuple; refuse a single value."""
     if isinstance(given, str | State | Transition | Parameter):
         text = shown(given) if isinstance(given, str) else f"{type(given).__name__}(...)"
         raise ChartError(

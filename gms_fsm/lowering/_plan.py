@@ -454,7 +454,7 @@ def _relations(chart: Chart, held: Places[Value], names: Names) -> Places[Compar
     )
 
 
-# --------------------------------------------------------------------------- what is computed
+# --------------------------------------------------------------------------- parts of the plan
 def _tables(signals: Mapping[str, Signal], n: int) -> Places[tuple[str, str]]:
     tabled = [name for name, signal in signals.items() if isinstance(signal, Corners)]
     return Places(tuple((name, column) for name in tabled for column in ("times", "values")), (), n)

@@ -65,7 +65,7 @@ class Recording(Protocol):
 
     @property
     def start(self) -> Start:
-        """The run's settings."""
+        """The model, rig and settings of the run."""
 
     @property
     def latest(self) -> tuple[float, list[float], tuple[int, ...]]:
@@ -277,7 +277,7 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
     start = recorder.start
     scope = Scope.of(start.model, start.program, error.t, error.y, error.mode)
 
-    def told(i: int) -> str:
+    def described(i: int) -> str:
         s = f", s = {scope.s[i]:.6g}" if "s" in chart.inputs else ""
         return f"{chart.variables[0]} = {scope.z[i]:.6g}{s}, v = {scope.v:.6g}"
 
@@ -301,7 +301,7 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
         return LivelockError(
             f"switched {len(taken)} times{f' in {time:.3g} s' if time else ''}, "
             f"last by {str(last.edge)!r} from {last.source} to {last.target} "
-            f"({told(error.machine)}): {cause}",
+            f"({described(error.machine)}): {cause}",
             trace,
             t=error.t,
             place=f"element {error.machine + 1}",
@@ -317,7 +317,7 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
     edges = ", ".join(f"{edge.name} [{edge.guard}]" for _, edge in chart.leaving(state.name))
     return LivelockError(
         f"{' and '.join(error.relations)} changed {error.times} times: "
-        f"the element is in {state.name} ({told(i)}), its flow pushes back on both sides, "
+        f"the element is in {state.name} ({described(i)}), its flow pushes back on both sides, "
         f"no edge leaves ({edges or 'it has none'}), and no value of the sign between -1 and 1 "
         f"holds it there",
         trace,

@@ -226,8 +226,8 @@ class Sweep:
                 {name: self.transitions[name] for name in LOG.names or ()}
                 | {"edge": np.array(self.edges, dtype=object)[self.transitions["edge"]]}
             )
-            beside = path.with_name(f"{path.stem}.transitions.parquet")
-            write_whole(beside, log.to_parquet)
+            log_path = path.with_name(f"{path.stem}.transitions.parquet")
+            write_whole(log_path, log.to_parquet)
             return write_whole(path, self.to_dataframe().to_parquet)
         raise OutputError(
             f"a sweep is saved as .npz or .parquet, not {path.suffix!r}", place=str(path)

@@ -101,7 +101,7 @@ for line in sys.stdin:
 
 @dataclass(frozen=True)
 class Copy:
-    """A copy of the packages with one file more, and a process that runs it."""
+    """A copy of the packages with one additional file, and a process that runs it."""
 
     folder: Path
     process: subprocess.Popen[str]
@@ -111,7 +111,7 @@ class Copy:
         return json.loads(self.process.stdout.readline())
 
     def gms_fsm(self, *arguments: str, said: str = "", code: int = 0) -> str:
-        """Run a command and return what it prints; a mistake is on standard error."""
+        """Run a command and return its output; `said` is its standard input."""
         assert self.process.stdin is not None
         self.process.stdin.write(json.dumps([arguments, said]) + "\n")
         self.process.stdin.flush()

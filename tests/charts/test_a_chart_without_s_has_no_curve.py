@@ -166,7 +166,7 @@ def test_pictures(trace: Trace, tmp_path: Path) -> None:
         (figures.overview, figures.ribbons_figure, figures.cascade_figure)
     ):
         figures.save(draw(trace), tmp_path / f"{number}.png")
-    with pytest.raises(ParameterError, match="a latch: its chart has no input s, and so no"):
+    with pytest.raises(ParameterError, match="a latch: its chart has no input s, and therefore no"):
         panels.stribeck(Figure().subplots(), trace)
 
 

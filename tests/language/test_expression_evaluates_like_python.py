@@ -344,5 +344,5 @@ def test_nested_absolute_values_do_not_multiply() -> None:
     assert len(found) <= 24, "twice as many with every level: 40 levels never end"
 
 
-def test_the_sign_of_what_is_no_number_is_zero() -> None:
+def test_the_sign_of_nan_is_zero() -> None:
     assert [sgn(u) for u in (math.nan, 0.0, -0.0, 5e-324, -5e-324)] == [0.0, 0.0, 0.0, 1.0, -1.0]

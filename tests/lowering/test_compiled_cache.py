@@ -70,7 +70,7 @@ def _start(code: str, *arguments: str, **environment: str) -> subprocess.Popen[s
     return subprocess.Popen(
         [sys.executable, "-W", "error", "-c", textwrap.dedent(code), *arguments],
         cwd=ROOT,
-        env={**os.environ, "NUMBA_OPT": "0", **environment},  # half of the time to compile
+        env={**os.environ, "NUMBA_OPT": "0", **environment},  # halves the compilation time
         text=True,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

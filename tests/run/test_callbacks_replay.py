@@ -253,7 +253,7 @@ def test_a_callback_that_changes_the_values_before_the_guard_is_refused() -> Non
         event.model.v = 0.0
 
     machines.machine.prepare_event = [stop]
-    said = r"element 1, edge 'break_away_forward' at t = .*changed the element's values.*only look"
+    said = r"element 1, edge 'break_away_forward' at t = .*changed the element's values.*only read"
     with pytest.raises(CallbackError, match=said):
         simulate(machines.model, open_loop(), 20.0, engine="compiled", machines=machines)
 
@@ -312,7 +312,7 @@ def test_callbacks_run_up_to_a_livelock_too() -> None:
 def test_machines_of_another_model_are_refused() -> None:
     machines = ElementMachines(one_element("signed"))
     for engine in ("machines", "compiled"):
-        with pytest.raises(ParameterError, match="another model"):
+        with pytest.raises(ParameterError, match="different model"):
             simulate(stick_slip("signed"), open_loop(), 20.0, engine=engine, machines=machines)
 
 

@@ -260,7 +260,7 @@ def test_a_callback_that_changes_the_values_before_the_guard_is_refused(model: G
         event.model.v = 0.0
 
     machines.machine.prepare_event = [stop]
-    said = r"element 1, edge 'break_away_forward' at t = .*changed the element's values.*only look"
+    said = r"element 1, edge 'break_away_forward' at t = .*changed the element's values.*only read"
     with pytest.raises(CallbackError, match=said) as caught:
         simulate(model, open_loop(), 20.0, engine=machines)
     assert len(caught.value.trace) > 1
@@ -294,7 +294,7 @@ def test_an_error_in_a_callback_reaches_the_user_unchanged(
 
 
 def test_machines_of_another_model_are_refused(model: GMS) -> None:
-    with pytest.raises(ParameterError, match="another model"):
+    with pytest.raises(ParameterError, match="different model"):
         simulate(model, open_loop(), 20.0, engine=ElementMachines(one_element("signed")))
 
 

@@ -271,7 +271,7 @@ def test_another_version_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     with monkeypatch.context() as patch:
         patch.setattr("gms_fsm._version.__version__", "0.0.7")
         begun(path, open_loop())
-    with pytest.raises(CheckpointError, match=r"begun by gms-fsm 0\.0\.7 .* this is gms-fsm "):
+    with pytest.raises(CheckpointError, match=r"started by gms-fsm 0\.0\.7 .* this is gms-fsm "):
         goes_on(path, open_loop())
     with monkeypatch.context() as patch:
         patch.setattr("integrators.compiled.edition", lambda: "another loop")
@@ -284,7 +284,7 @@ def test_a_checkpoint_of_another_format_belongs_to_another_program(tmp_path: Pat
     begun(path, open_loop())
     arrays = _arrays(path)
     _write(path, {"format": np.array("gms-fsm checkpoint 1"), "identity": arrays["identity"]})
-    with pytest.raises(CheckpointError, match="begun by an older gms-fsm"):
+    with pytest.raises(CheckpointError, match="started by an older gms-fsm"):
         goes_on(path, open_loop())
 
 
@@ -342,7 +342,7 @@ def test_each_index_is_checked_against_its_range(place: str, engine: str, tmp_pa
         counts = whole["loop_counts"].copy()
         counts[getattr(loop, place)] = value
         _write(path, {**whole, "loop_counts": counts})
-        with pytest.raises(CheckpointError, match="outside of"):
+        with pytest.raises(CheckpointError, match="not within"):
             goes_on(path, open_loop(), engine)
 
 
