@@ -101,8 +101,8 @@ CONTENTS: dict[str, tuple[bytes, tuple[str, ...]]] = {
     "no head line": (GOOD.partition("\n")[2].encode(), ("no column 't'", "'0.0'")),
     "units in the second line": (row(2, "s,mm,N"), ("row 2", "column 't'", "'s'", "number")),
     # sizes
-    "an empty file": (b"", ("line 1 is empty", "name the columns")),
-    "an empty first line": (b"\n" + GOOD.encode(), ("line 1 is empty", "name the columns")),
+    "an empty file": (b"", ("line 1 is empty", "column names")),
+    "an empty first line": (b"\n" + GOOD.encode(), ("line 1 is empty", "column names")),
     "a head line only": (b"t,x,F\n", ("0 row(s)", "at least")),
     "one row": (b"t,x,F\n0,0,0\n", ("1 row(s)", "at least")),
     "four rows": (b"t,x,F\n0,0,0\n1,1,1\n2,2,2\n3,3,3\n", ("4 rows", "at least 5")),
@@ -352,6 +352,6 @@ def test_the_program_itself_says_one_line(tmp_path: Path) -> None:
     assert done.stdout == ""
     assert done.stderr.splitlines() == [
         "error: own.csv: row 5, column 'x': 'abc' is not a number (a decimal point is a point); "
-        "mend it, or leave the row out by where = ..., a condition that does not hold there"
+        "correct it, or exclude the row with where = ..., a condition that is false there"
     ]
     nothing_written(tmp_path, {"scenario.toml", "own.csv"})

@@ -164,7 +164,7 @@ CHANGES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
         ("initial", "'v'", "0.1", "prescribes"),
     ),
     # forms of parameters
-    "preset and parameters": ((MODEL, PAPER + "v_c = 1e-6\n"), ("[model] preset", "take out v_c")),
+    "preset and parameters": ((MODEL, PAPER + "v_c = 1e-6\n"), ("[model] preset", "remove v_c")),
     "shares that are not everything": (
         (SHARES[0], "C = 2.0\nshares = [0.5, 0.4]"),
         ("[model]", "shares", "0.9", "add up to 1"),
@@ -179,7 +179,7 @@ CHANGES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     ),
     "shares with a list of C": (
         (SHARES[0], "C = [0.1, 0.1]\nshares = [0.5, 0.5]"),
-        ("[model] shares", "one number C"),
+        ("[model] shares", "C as one number"),
     ),
     "one C for all": (("C = [0.1, 0.1]", "C = 2.0"), ("[model] C", "list", "shares")),
     # signals

@@ -83,7 +83,7 @@ def test_a_domain_replaces_the_usual_one(gms_fsm: CommandLine) -> None:
     answer = gms_fsm("check", "broken:arms", "--domain", "s > 0", "--domain", "C > 0")
     assert "assumed: s > 0, C > 0\n" in answer.out
     arms = "stick, break_away_forward, break_away_backward"
-    assert f"proved     {arms}: never enabled at once" in answer.out
+    assert f"proved     {arms}: never enabled at the same time" in answer.out
 
 
 def test_the_list_names_everything_and_says_what_is_wrong(gms_fsm: CommandLine) -> None:

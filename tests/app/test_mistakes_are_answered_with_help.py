@@ -253,7 +253,7 @@ def _calls(trace: Trace, late: Any) -> dict[str, Any]:
     session = Session(trace.model, trace.rig, 3.0)
     calls: dict[str, Any] = {
         "frames|t_start is 20.0": lambda: _animate(trace, late),
-        "t = -20.0 s lies before": lambda: session.goto(-late),
+        "t = -20.0 s is before": lambda: session.goto(-late),
         "name is 20.0": lambda: trace.variable(late),
         "elements is 20.0": lambda: statechart(LUGRE, late),
     }

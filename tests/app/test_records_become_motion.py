@@ -264,7 +264,7 @@ def test_the_note_states_time_constant_frequency_and_what_is_left() -> None:
     (note,) = motion_of(record_of(time=t, position=position), 0.02).notes
     assert "time constant 0.02 s" in note
     assert "7.96 Hz" in note  # 1 / (2 pi 0.02 s)
-    left = float(note.partition("leaves ")[2].split()[0])
+    left = float(note.partition("positions is ")[2].split()[0])
     assert left == pytest.approx(2e-6, rel=0.15)
 
 
@@ -394,11 +394,11 @@ def test_the_command_line_warns_of_a_v_c_below_the_noise(
     done = gms_fsm("run", _noisy_scenario(tmp_path, "1e-6"), "-o", tmp_path / "out")
     assert done.code == 0, done.err
     assert done.err.count("v_c = 1e-06 m/s is below the velocity noise") == 1
-    suggested = f"v_c = {dwelling(5e-6).fitting_v_c():.2g} m/s would fit"
+    suggested = f"v_c = {dwelling(5e-6).fitting_v_c():.2g} m/s would suit"
     assert suggested in done.err
     summary = (tmp_path / "out" / "summary.md").read_text()
     assert suggested in summary
-    assert "What this record cannot tell" in summary
+    assert "Parameters not identifiable from this record" in summary
 
 
 def test_the_suggested_v_c_is_not_warned_of(gms_fsm: CommandLine, tmp_path: Path) -> None:

@@ -156,7 +156,7 @@ def test_the_tribometer_says_what_its_record_cannot_tell(
     tribometer: tuple[Loaded, Trace, list[Path]],
 ) -> None:
     summary = tribometer[2][0].read_text(encoding="utf-8")
-    doubts = summary.partition("### What this record cannot tell")[2]
+    doubts = summary.partition("### Parameters not identifiable from this record")[2]
     for said in ("Stribeck", "F_s, v_s and sigma_2", "C:", "sigma_i"):
         assert said in doubts, said
     assert "velocity noise" not in doubts  # the scenario's v_c lies above it

@@ -58,7 +58,7 @@ def test_a_row_without_a_place_between_rows_that_count(tmp_path: Path, cell: str
     assert len(record) == 19
     assert 0.08 not in record.columns["time"]
     assert record.chosen.all()
-    assert any("1 row(s) without time or place" in note for note in record.notes)
+    assert any("1 row(s) without time or position" in note for note in record.notes)
 
 
 def test_row_numbers_stay_those_of_the_file(tmp_path: Path) -> None:
@@ -83,7 +83,7 @@ def test_row_numbers_stay_those_of_the_file(tmp_path: Path) -> None:
 def test_in_a_row_that_counts_it_is_an_error_that_names_the_way_out(
     tmp_path: Path, changes: dict[int, str], where: str, said: str
 ) -> None:
-    with pytest.raises(RecordError, match=rf"{said}.*leave .* out by where = \.\.\., a condition"):
+    with pytest.raises(RecordError, match=rf"{said}.*exclude .* with where = \.\.\., a condition"):
         _read(tmp_path, changes, where)
 
 
