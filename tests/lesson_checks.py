@@ -40,7 +40,7 @@ def check_figure(lesson: Lesson, result: Result) -> None:
     for ax in figure.axes:
         for axis in (ax.xaxis, ax.yaxis):
             label = axis.label.get_text()
-            counts = label in ("", "elements n", "switches found once a step", "elements in slip")
+            counts = label in ("", "elements n", "switches found once per step", "elements in slip")
             assert counts or "[" in label, label
         texts = [ax.title, ax._left_title, ax.xaxis.label, ax.yaxis.label, *_notes(ax)]
         boxes += [(t.get_text(), t.get_window_extent(renderer)) for t in texts if t.get_text()]

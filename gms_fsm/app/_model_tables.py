@@ -114,7 +114,7 @@ class GMSTable(Table):
             given = [name for name in own if getattr(self, name) is not None]
             if given:
                 raise ValueError(
-                    f"with preset only weights can be given; remove {', '.join(given)}"
+                    f"preset can be combined with weights only; remove {', '.join(given)}"
                 )
             parameters = GMSParameters.paper(self.preset)
             if self.weights is not None:

@@ -431,7 +431,7 @@ def what_it_cannot_tell(trace: Trace, motion: Motion) -> list[str]:
         viscous = float(np.sum(sigma)) * fast
         if viscous < 0.01 * float(np.abs(trace.F).max()):
             doubts.append(
-                f"sigma_i: at this speed the total bristle damping force is {1e3 * viscous:.2g} mN, "
-                f"less than 1 % of the friction"
+                f"sigma_i: at this speed the total bristle damping force is {1e3 * viscous:.2g} "
+                f"mN, less than 1 % of the friction"
             )
     return doubts

@@ -54,7 +54,7 @@ def test_it_greets_without_a_scenario(title: str) -> None:
     assert said[: bool(title)] == [title] * bool(title)
     assert said[bool(title) :][:3] == [
         "warming contact; prescribed velocity, to t = 8 s",
-        "help shows the commands, where shows everything, quit leaves.",
+        "help lists the commands, where shows everything, quit exits.",
         "(t=0.0000 s) next",
     ]
 
@@ -96,7 +96,7 @@ def test_help_without_a_threshold_or_an_edge() -> None:
         assert help_of(name, made.session).examples
         assert "error:" not in made.reply(f"help {name}")
     assert "no edge leaves this state" in made.reply("why")
-    assert made.reply("why go").startswith("error: 'go' is no edge; there are none")
+    assert made.reply("why go").startswith("error: 'go' is not an edge; there are none")
     assert made.reply("where").splitlines()[2].split() == [
         "el",
         "state",
@@ -195,22 +195,22 @@ def test_why_takes_an_edge() -> None:
     assert said.splitlines()[1] == "break_away does not fire: |z| >= s is false by 0.2 m."
     assert made.reply("why let_go") == "error: let_go leaves rising; element 1 is in static"
     assert made.reply("why 2 let_go") == "error: let_go leaves rising; element 2 is in static"
-    assert "'let' is no edge; there are break_away, let_go, arrest" in made.reply("why 1 let")
+    assert "'let' is not an edge; there are break_away, let_go, arrest" in made.reply("why 1 let")
 
 
 def test_after_a_firing_why_says_how_to_ask_for_the_new_state() -> None:
     made = own(2)
     assert "element 1: static -> rising by break_away" in made.reply("next")
     said = made.reply("why").splitlines()
-    assert said[1] == "it has just left static; the values are those before"
+    assert said[1] == "it has just left static; the values are those before the firing"
     assert said[2] == "break_away fired here: every clause was true."
-    assert said[-1] == "step, then why: the edges that leave rising"
+    assert said[-1] == "for the edges that leave rising: step, then why"
     new = made.reply("why let_go")  # asked for by name, it is there at once
     assert new.splitlines()[1] == "let_go does not fire: w > 0.5 is false by 0.5."
     assert "just left" not in new
     assert "step, then" not in made.reply("why break_away")
     made.reply("element 2")
-    assert made.reply("why 1").splitlines()[-1] == "step, then why 1: the edges that leave rising"
+    assert made.reply("why 1").splitlines()[-1] == "for the edges that leave rising: step, then why 1"
     made.reply("step")
     assert "let_go does not fire" in made.reply("why 1")
 
@@ -274,7 +274,7 @@ def test_capitals_matter_where_only_they_differ() -> None:
     [
         (
             "mine.py",
-            "mine.py is Python; debug takes a scenario (.toml); for a model of your own: "
+            "mine.py is a Python file; debug takes a scenario (.toml); for a custom model use "
             "Debugger(Session(model, rig, t_end)).run(), see docs/howto/debugging.md",
         ),
         (

@@ -48,7 +48,7 @@ def test_fig_4_story() -> None:
     expected = """\
 Stick-slip (paper, Fig. 4)
 GMS, 4 elements, published law; prescribed velocity, to t = 100 s
-help shows the commands, where shows everything, quit leaves.
+help lists the commands, where shows everything, quit exits.
 (t=0.0000 s) break fires break_away_backward element 2
 breakpoint 1: fires break_away_backward, element 2
 (t=0.0000 s) continue
@@ -57,7 +57,7 @@ row 52, t = 20.140677 s, micro-step 1: v = -0.140931 m/s, F = -1.2408 N
   element 2: stick -> slip by break_away_backward
 (t=20.1407 s) why 2
 element 2 is in slip at t = 20.140677 s
-it has just left stick; the values are those before
+it has just left stick; the values are those before the firing
 break_away_forward did not fire: z >= s is false by 0.8 m and v > v_c is false
   by 0.141 m/s.
 break_away_backward fired here: every clause was true.
@@ -67,7 +67,7 @@ break_away_backward fired here: every clause was true.
   2 break_away_backward: stick -> slip
     true   z <= -s   left -0.4        right -0.4        margin 0 (rounding)
     true   v < -v_c  left -0.14093    right -1e-06      margin +0.141 m/s
-step, then why 2: the edges that leave slip
+for the edges that leave slip: step, then why 2
 (t=20.1407 s) back 10
 """
     assert said.startswith(expected)
@@ -96,7 +96,7 @@ def test_pulled_mass_story() -> None:
         "branches",
     )
     # It is pulled forward: of itself it never breaks away backward.
-    assert said[1].startswith("no breakpoint hit\nrow 2043, t = 60 s")
+    assert said[1].startswith("no breakpoint was hit\nrow 2043, t = 60 s")
     assert "arrest does not fire: |v| <= v_c is false by" in said[2]
     assert said[4].startswith("branch 1, from branch 0: v = -0.5")
     assert said[5].startswith("breakpoint 1: fires break_away_backward, element 2")

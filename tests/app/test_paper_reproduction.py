@@ -66,7 +66,7 @@ def cells(folder: Path, claim: str) -> list[str]:
         (
             "spikes at the transitions",
             r"42 of 50 transitions lost",
-            "holds only with guards looked",
+            "holds only with guards evaluated",
         ),
         ("residual of about 1e-4 N", r"\|dF\\\| \d\.\de-0\d N", "differs: identical under one"),
     ],
@@ -161,5 +161,5 @@ def test_a_run_that_fails_leaves_the_runs_before_it(tmp_path: Path) -> None:
 def test_own_signals_are_used_and_not_judged() -> None:
     text = claims_text(run("0.1*t", "0.1*sin(t)"), "0.1*t", "0.1*sin(t)")
     assert "F_a = 0.1*t" in text
-    assert "Not judged" in text
+    assert "Not assessed" in text
     assert "| claim |" not in text

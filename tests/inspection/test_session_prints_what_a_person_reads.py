@@ -29,7 +29,7 @@ def test_why_prints_as_the_debugger_says_it() -> None:
     session, debugger = _both()
     for _ in range(20):
         for element in range(4):
-            said = debugger.reply(f"why {element + 1}").partition("\nstep, then why")[0]
+            said = debugger.reply(f"why {element + 1}").partition("\nfor the edges that leave")[0]
             assert _one_line(str(session.why(element))) == _one_line(said)
             for each in session.why(element):
                 verdict, *detail = str(each).split("\n")
