@@ -93,12 +93,12 @@ def _described(each: Entry) -> Iterator[str]:
     rows = [(one.name, one.described) for one in each.parameters]
     rows.append(("numbers", each.demonstration.source))
     wide = max(len(name) for name, _ in rows)
-    for name, told in rows:
+    for name, text in rows:
         lead, rest = f"  {name:<{wide}}  ", " " * (wide + 4)
-        yield textwrap.fill(lead + told, WIDTH, subsequent_indent=rest).rstrip()
+        yield textwrap.fill(lead + text, WIDTH, subsequent_indent=rest).rstrip()
 
 
 def _faulty() -> str:
     found = [each for each in registered().values() if each.wrong]
-    told = (f"{each.name}  {each.wrong}" for each in found)
-    return "\n".join(textwrap.fill(each, WIDTH, subsequent_indent="  ") for each in told)
+    text = (f"{each.name}  {each.wrong}" for each in found)
+    return "\n".join(textwrap.fill(each, WIDTH, subsequent_indent="  ") for each in text)

@@ -48,8 +48,8 @@ def explained(error: ValidationError, data: dict[str, Any]) -> str:
     if kind == "union_tag_not_found":
         return f"{key}.kind is missing{more}"
     if kind == "union_tag_invalid":
-        said, allowed = first["ctx"]["discriminator"].strip("'"), first["ctx"]["expected_tags"]
-        return f"{key}.{said} = {shown(first['ctx']['tag'])}: it must be one of {allowed}{more}"
+        tag, allowed = first["ctx"]["discriminator"].strip("'"), first["ctx"]["expected_tags"]
+        return f"{key}.{tag} = {shown(first['ctx']['tag'])}: it must be one of {allowed}{more}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         return f"{key} = {shown(value)}: it must be a table, [{key}]{more}"
     text = first["msg"].removeprefix("Value error, ")

@@ -231,10 +231,13 @@ def _chart_table(entry: Entry) -> type[ChartTable]:
         fields["law"] = (law, Field(description="there is no default"))
     for each in entry.parameters:
         numbers: Any = Numbers if each.per_element else float
-        told = each.described
-        fields[_FIELD.format(each.name)] = (numbers, Field(alias=each.name, description=told))
+        description = each.described
+        fields[_FIELD.format(each.name)] = (
+            numbers,
+            Field(alias=each.name, description=description),
+        )
     if entry.curve:
-        fields["stribeck"] = (StribeckTable, Field(description="the curve behind the input s"))
+        fields["stribeck"] = (StribeckTable, Field(description="the curve that gives the input s"))
         shared: tuple[Parameter, ...] = (SIGMA_2, WEIGHTS)
     else:
         shared = (SIGMA_2,)

@@ -59,11 +59,11 @@ def check_element(element: int, model: Model) -> None:
     """Raise `SessionError` unless the model has this element."""
     whole = isinstance(element, int | np.integer) and not isinstance(element, bool)
     if not whole or not 0 <= element < model.n:
-        said = shown(element)
-        if said in [repr(edge.name) for edge in model.chart.transitions]:
-            said += f" (to name an edge, use edge={said})"
+        text = shown(element)
+        if text in [repr(edge.name) for edge in model.chart.transitions]:
+            text += f" (to name an edge, use edge={text})"
         raise SessionError(
-            f"no element {said}",
+            f"no element {text}",
             advice=f"there are 0 to {model.n - 1} (counted from 0 in Python, from 1 in text)",
         )
 

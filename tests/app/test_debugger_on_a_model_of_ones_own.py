@@ -210,7 +210,9 @@ def test_after_a_firing_why_says_how_to_ask_for_the_new_state() -> None:
     assert "just left" not in new
     assert "step, then" not in made.reply("why break_away")
     made.reply("element 2")
-    assert made.reply("why 1").splitlines()[-1] == "for the edges that leave rising: step, then why 1"
+    assert (
+        made.reply("why 1").splitlines()[-1] == "for the edges that leave rising: step, then why 1"
+    )
     made.reply("step")
     assert "let_go does not fire" in made.reply("why 1")
 

@@ -239,9 +239,7 @@ def test_messages_of_calls_show_plain_numbers() -> None:
     model = stick_slip("signed")
     trace = simulate(model, Prescribed("0.2"), 3.0)
     late: Any = np.float64(20.0)
-    with pytest.raises(
-        ParameterError, match=r"^time 20\.0 s is outside the run, 0\.0 to 3\.0 s$"
-    ):
+    with pytest.raises(ParameterError, match=r"^time 20\.0 s is outside the run, 0\.0 to 3\.0 s$"):
         trace.sample([late])
     for said, call in _calls(trace, late).items():
         with pytest.raises(ValueError, match=said) as caught:

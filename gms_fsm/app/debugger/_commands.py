@@ -226,7 +226,7 @@ class Commands:
         """Return a condition with the states spelled as in the chart."""
         return re.sub(
             r"(\bstate\b\s*(?:\(\s*\d+\s*\)\s*)?[=!]=\s*)(\w+)",
-            lambda found: found[1] + _spelt(found[2], self._states),
+            lambda found: found[1] + _spelled(found[2], self._states),
             condition,
         )
 
@@ -263,7 +263,7 @@ class Commands:
         if words and words[0].isdigit():
             i = self._element("why", words.pop(0))
         if words:
-            edge = _spelt(words.pop(0), self._edges)
+            edge = _spelled(words.pop(0), self._edges)
             if edge not in self._edges or words:
                 raise SessionError(
                     f"{' '.join([edge, *words])!r} is not an edge",
@@ -337,7 +337,7 @@ class Commands:
         yield f"element {self.element + 1} is in {self.session.here.states[self.element]}"
 
     def _element(self, command: str, text: str) -> int:
-        number = _whole(text, help_of(command, self.session).usage)
+        number = _integer(text, help_of(command, self.session).usage)
         if not 1 <= number <= self.session.model.n:
             raise SessionError(
                 f"no element {number}", advice=f"there are 1 to {self.session.model.n}"
@@ -360,7 +360,7 @@ class Commands:
         kind, name, element, condition, hits = form.groups()
         states, edges = self._states, self._edges
         asked = {None: states + edges, "enter": states, "leave": states}.get(kind, edges)
-        name = _spelt(name, asked)
+        name = _spelled(name, asked)
         if name not in states + edges:
             raise SessionError(
                 f"no edge or state {name!r}",
@@ -371,7 +371,7 @@ class Commands:
             name,
             None if element in (None, "all") else self._element("break", element),
             self._with_states(condition or ""),
-            _whole(hits, "hits K") if hits else 1,
+            _integer(hits, "hits K") if hits else 1,
         )
         yield f"breakpoint {len(self.session.breakpoints)}: {text_of.breakpoint_text(point)}"
 
@@ -408,7 +408,7 @@ class Commands:
             if not value or not what:
                 raise SessionError(f"{part!r} cannot be poked", advice=f"{self._usage('poke')}")
             if what == "state":
-                states[i] = _spelt(value, self._states)
+                states[i] = _spelled(value, self._states)
             else:
                 variables.setdefault(what, {})[i] = self.session.watch(value)
         parent = self.session.current
@@ -435,13 +435,13 @@ class Commands:
 
     def do_branch(self, arg: str) -> Iterator[str]:
         """Switch to another branch."""
-        self.session.switch(_whole(arg, "branch N"))
+        self.session.switch(_integer(arg, "branch N"))
         yield f"branch {self.session.current}"
         yield from self.here()
 
     def do_compare(self, arg: str) -> Iterator[str]:
         """Compare branches."""
-        numbers = [_whole(text, "compare A B") for text in arg.split()]
+        numbers = [_integer(text, "compare A B") for text in arg.split()]
         if len(numbers) not in (0, 2):
             raise SessionError("two branches are needed", advice=f"{self._usage('compare')}")
         yield str(self.session.compare(*numbers))
@@ -484,14 +484,14 @@ class Commands:
         yield from ()
 
 
-def _whole(text: str, usage: str) -> int:
+def _integer(text: str, usage: str) -> int:
     if not re.fullmatch(r"\d{1,9}", text):
         raise SessionError(f"{text!r} is not an integer", advice=f"usage: {usage}")
     return int(text)
 
 
 def _count(name: str, text: str, default: int = 1) -> int:
-    count = _whole(text, COMMANDS[name].usage) if text else default
+    count = _integer(text, COMMANDS[name].usage) if text else default
     if count < 1:
         raise SessionError(
             f"{name} {count}: the count must be at least 1", advice=f"usage: {COMMANDS[name].usage}"
@@ -508,13 +508,13 @@ def _remove(where: list[Breakpoint] | list[str], name: str, arg: str) -> None:
     if arg == "all":
         where.clear()
         return
-    number = _whole(arg, COMMANDS[name].usage)
+    number = _integer(arg, COMMANDS[name].usage)
     if not 1 <= number <= len(where):
         raise SessionError(f"there is no number {number}", advice=f"there are {len(where)}")
     del where[number - 1]
 
 
-def _spelt(name: str, known: Iterable[str]) -> str:
+def _spelled(name: str, known: Iterable[str]) -> str:
     """Return the known name that differs only in case; the name itself unless there is one."""
     same = [each for each in known if each.casefold() == name.casefold()]
     return same[0] if len(same) == 1 else name
