@@ -1,9 +1,9 @@
 """gms-fsm: friction as an explicit state machine.
 
-The Generalized Maxwell Slip model, every element a `transitions` machine with guarded stick/slip
-edges, run by fixed- or adaptive-step integrators with located crossings.
+The Generalized Maxwell Slip model, with every element a `transitions` machine with guarded
+stick/slip edges, run by fixed- or adaptive-step integrators with located crossings.
 
-Every name below is imported when it is first asked for.
+The names below are imported lazily, on first access.
 
 >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
 >>> trace = simulate(GMS(GMSParameters.paper("stick-slip"), law="published"),
@@ -66,7 +66,7 @@ if TYPE_CHECKING:
     from gms_fsm.traces.failures import StepSizeError as StepSizeError
     from gms_fsm.traces.trace import Trace as Trace
 
-# The same names again, for Python; type checkers read those above. A test holds the two together.
+# The same names again, for run time; type checkers read those above. A test keeps the two in step.
 _HOMES = {
     "charts.chart": "Chart State Transition",
     "charts.parameters": "Parameter",

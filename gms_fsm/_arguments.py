@@ -1,4 +1,4 @@
-"""Checks of the kind of an argument, for every public entry; numbers are in `charts.parameters`."""
+"""Checks of argument types for the public API; checks of numbers are in `charts.parameters`."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from typing import Any
 
 from gms_fsm.errors import GMSError, ParameterError
 
-__all__ = ["checked_kind", "checked_path", "checked_whole", "listed"]
+__all__ = ["checked_integer", "checked_kind", "checked_path", "listed"]
 
 
 def checked_kind(name: str, value: Any, kind: type | tuple[type, ...], wanted: str) -> Any:
-    """Return a value if it is of a kind.
+    """Return a value if it has the required type.
 
     Parameters
     ----------
     name : str
-        The argument.
+        The argument's name.
     value : object
-        What was given.
+        The value to check.
     kind : type or tuple of type
-        What it must be.
+        The required type.
     wanted : str
-        The same in words.
+        The same in words, for the message.
 
     Returns
     -------
@@ -35,7 +35,7 @@ def checked_kind(name: str, value: Any, kind: type | tuple[type, ...], wanted: s
     Raises
     ------
     ParameterError
-        If it is of another kind.
+        If it has another type.
 
     Examples
     --------
@@ -49,14 +49,14 @@ def checked_kind(name: str, value: Any, kind: type | tuple[type, ...], wanted: s
 
 
 def checked_path(name: str, value: Any) -> Path:
-    """Return a path; raise a `ParameterError` for what is none.
+    """Return a path; raise a `ParameterError` for anything else.
 
     Parameters
     ----------
     name : str
-        The argument.
+        The argument's name.
     value : str or Path
-        What was given.
+        The value to check.
 
     Returns
     -------
@@ -66,21 +66,21 @@ def checked_path(name: str, value: Any) -> Path:
     return Path(checked_kind(name, value, (str, os.PathLike), "a path, as a text or a Path"))
 
 
-def checked_whole(
+def checked_integer(
     name: str, value: Any, least: int | None = None, kind: type[GMSError] = ParameterError
 ) -> int:
-    """Return a whole number.
+    """Return an integer.
 
     Parameters
     ----------
     name : str
-        The argument.
+        The argument's name.
     value : int
-        What was given; True and False are no numbers here.
+        The value to check; True and False are not accepted.
     least : int, optional
-        The smallest that will do.
+        The smallest allowed value.
     kind : type of GMSError
-        What to raise.
+        The class of error to raise.
 
     Returns
     -------
@@ -90,11 +90,11 @@ def checked_whole(
     Raises
     ------
     GMSError
-        If it is none, or too small.
+        If it is not an integer, or too small.
 
     Examples
     --------
-    >>> checked_whole("points", 0, 1)
+    >>> checked_integer("points", 0, 1)
     Traceback (most recent call last):
     gms_fsm.errors.ParameterError: points is 0; it must be an integer, at least 1
     """
@@ -109,16 +109,16 @@ def checked_whole(
 
 
 def listed(name: str, value: Any, wanted: str) -> list[Any]:
-    """Return what can be gone through as a list; raise a `ParameterError` for what cannot.
+    """Return an iterable as a list; raise a `ParameterError` for anything else.
 
     Parameters
     ----------
     name : str
-        The argument.
+        The argument's name.
     value : iterable
-        What was given.
+        The value to convert.
     wanted : str
-        What it must be, in words.
+        The requirement in words, for the message.
 
     Returns
     -------

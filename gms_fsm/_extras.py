@@ -1,4 +1,4 @@
-"""Optional packages: what each extra is for, and one text for all that are missing."""
+"""Optional packages: what each extra is for, and one message for all that are missing."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from gms_fsm.errors import MissingExtraError, why
 
 __all__ = ["EXTRAS", "missing", "require"]
 
-# By extra: who needs it, and what to do without it.
+# For each extra: the feature that needs it, and the alternative without it.
 EXTRAS: Mapping[str, tuple[str, str]] = {
     "plots": ("figures and animations need", "runs, traces and charts need no extra"),
     "render": (
         "pictures of charts need",
-        "Graphviz's program dot draws them too, and charts can be written as texts",
+        "Graphviz's program dot draws them too, and charts can be written as text",
     ),
     "pandas": ("data frames need", "Trace.columns() has the same numbers, and so has a CSV file"),
     "fast": ("engine 'compiled' needs", "engine='machines' gives the same result, slower"),
@@ -26,14 +26,14 @@ EXTRAS: Mapping[str, tuple[str, str]] = {
 
 
 def require(module: str, extra: str) -> Any:
-    """Import an optional module, or say how to get it.
+    """Import an optional module, or say how to install it.
 
     Parameters
     ----------
     module : str
-        Its name, for example ``"pandas"``.
+        The module's name, for example ``"pandas"``.
     extra : str
-        Which extra of gms-fsm brings it, a key of `EXTRAS`.
+        The extra of gms-fsm that provides it, a key of `EXTRAS`.
 
     Returns
     -------
@@ -62,12 +62,12 @@ def require(module: str, extra: str) -> Any:
 
 
 def missing(name: str, extra: str, state: str = "is not installed") -> MissingExtraError:
-    """Return the error that says what is missing, which extra brings it, and what works without it.
+    """Return an error that says what is missing, which extra provides it, and the alternative.
 
     Parameters
     ----------
     name : str
-        A module, or a program.
+        A module or a program.
     extra : str
         A key of `EXTRAS`.
     state : str, optional
@@ -76,10 +76,10 @@ def missing(name: str, extra: str, state: str = "is not installed") -> MissingEx
     Returns
     -------
     MissingExtraError
-        To be raised.
+        The error to raise.
     """
     needed, without = EXTRAS[extra]
     return MissingExtraError(
-        f'{needed} {name}, which {state}: pip install "gms-fsm[{extra}]" brings it '
+        f'{needed} {name}, which {state}: pip install "gms-fsm[{extra}]" installs it '
         f"(without it: {without})"
     )

@@ -1,8 +1,8 @@
-"""Writing files whole: the old one or the new one, never a half, and never over what is not ours.
+"""Atomic writing of files, which never overwrites files that gms-fsm did not write.
 
-A file is written beside its place under a name of its own, ``.<name>.<random>.gms-fsm-part``, and
-then renamed. Whoever writes holds a lock on it, which ends with its process: what can be locked by
-somebody else was left by a process that was killed, and is removed.
+A file is written next to its destination under a temporary name, ``.<name>.<random>.gms-fsm-part``,
+and then renamed. The writer holds a lock on it, which ends with its process: a file that another
+process can lock was left behind by a killed process, and is removed.
 """
 
 from __future__ import annotations
@@ -23,35 +23,35 @@ from typing import IO
 
 from gms_fsm.errors import OutputError
 
-if sys.platform != "win32":  # there nothing is locked, and nothing that was left is removed
+if sys.platform != "win32":  # on Windows nothing is locked, and no leftovers are removed
     import fcntl
 
 __all__ = [
-    "in_turn",
+    "folder_lock",
     "leftovers",
-    "no_input",
     "output_folder",
+    "refuse_input",
     "remove_leftovers",
-    "written_together",
-    "written_whole",
+    "write_together",
+    "write_whole",
 ]
 
-LIST = ".gms-fsm-files.json"  # in an output folder: the checksums of what was written there
+LIST = ".gms-fsm-files.json"  # in an output folder: checksums of the files written there
 _prepared: set[Path] = set()  # output folders of this process
 _LEFT = re.compile(r"\..+\.[0-9a-f]{16}\.gms-fsm-(part|rest)")
 
 
 # --------------------------------------------------------------------------- folders
 def output_folder(path: str | Path, names: Iterable[str] = ()) -> Path:
-    """Make a folder for output, and make sure it can be written, before any work is done.
+    """Create a folder for output and make sure that it is writable, before any work is done.
 
-    What killed processes have left in it is removed. What is written into it from now on is put on
-    a list there.
+    Leftovers of killed processes are removed. Files written into the folder from now on are
+    recorded in a list there.
 
     Parameters
     ----------
     path : str or Path
-        The folder; it and its parents are made where missing.
+        The folder; it and its parents are created if missing.
     names : iterable of str
         Files that will be written there.
 
@@ -63,8 +63,8 @@ def output_folder(path: str | Path, names: Iterable[str] = ()) -> Path:
     Raises
     ------
     OutputError
-        If it cannot be made or written, or if one of the files is there and not as gms-fsm has
-        written it.
+        If it cannot be created or written, or if one of the files exists and is not as gms-fsm
+        wrote it.
 
     Examples
     --------
@@ -73,24 +73,24 @@ def output_folder(path: str | Path, names: Iterable[str] = ()) -> Path:
     >>> _ = (folder / "summary.md").write_text("my own notes")
     >>> output_folder(folder, ["summary.md"])  # doctest: +ELLIPSIS
     Traceback (most recent call last):
-    gms_fsm.errors.OutputError: .../summary.md: is there and gms-fsm has not written it ...
+    gms_fsm.errors.OutputError: .../summary.md: already exists and was not written by gms-fsm...
     """
     folder = Path(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(
-            f"cannot make the folder {folder}: {error.strerror or error}",
+            f"cannot create the folder {folder}: {error.strerror or error}",
             advice="choose another folder",
         ) from None
     remove_leftovers(folder)
-    with in_turn(folder):
+    with folder_lock(folder):
         listed = _listed(folder)
         for place in (folder / name for name in names):
             _check_place(place)
             if place.exists() and _checksum(place) not in listed.get(place.name, ()):
                 raise OutputError(
-                    "is there and gms-fsm has not written it like that",
+                    "already exists and was not written by gms-fsm in this form",
                     place=str(place),
                     advice="move it away, or choose another folder",
                 )
@@ -104,8 +104,8 @@ def output_folder(path: str | Path, names: Iterable[str] = ()) -> Path:
     return folder
 
 
-def no_input(path: str | Path, *inputs: Path) -> None:
-    """Refuse to write over what is read.
+def refuse_input(path: str | Path, *inputs: Path) -> None:
+    """Refuse to overwrite an input file.
 
     Parameters
     ----------
@@ -121,29 +121,29 @@ def no_input(path: str | Path, *inputs: Path) -> None:
 
     Examples
     --------
-    >>> no_input("run.html", Path("run.npz"))
+    >>> refuse_input("run.html", Path("run.npz"))
     """
     for given in inputs:
         try:
             same = os.path.samefile(path, given)
-        except OSError:  # one of them is not there
+        except OSError:  # one of them does not exist
             continue
         if same:
             raise OutputError(
-                "is read here and would be written over",
+                "is an input here and would be overwritten",
                 place=str(path),
                 advice="choose another output",
             )
 
 
 # --------------------------------------------------------------------------- files
-def written_whole(path: Path, write: Callable[[IO[bytes]], object]) -> Path:
-    """Write a file through a temporary one beside it: the old file or the new, never a half.
+def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> Path:
+    """Write a file atomically through a temporary one: the result is the old file or the new one.
 
     Parameters
     ----------
     path : Path
-        Where it goes.
+        The destination.
     write : callable
         ``write(file)`` fills the open binary file.
 
@@ -155,27 +155,27 @@ def written_whole(path: Path, write: Callable[[IO[bytes]], object]) -> Path:
     Raises
     ------
     OutputError
-        If the folder cannot be written, or a device, a pipe or a folder is in its place.
+        If the folder cannot be written, or the path is a device, a pipe or a folder.
     """
-    written_together({path: write})
+    write_together({path: write})
     return path
 
 
-def written_together(files: Mapping[Path, Callable[[IO[bytes]], object]]) -> None:
-    """Write files of one folder that belong together.
+def write_together(files: Mapping[Path, Callable[[IO[bytes]], object]]) -> None:
+    """Write several files of one folder that belong together.
 
-    All are complete before the first takes its place, and no other writer comes between them.
+    All are complete before the first is renamed, and no other writer can interleave.
 
     Parameters
     ----------
     files : mapping of Path to callable
-        ``write(file)`` fills the open binary file; they take their places in this order. A process
+        ``write(file)`` fills the open binary file; the files are renamed in this order. A process
         killed in between leaves the complete ones behind as `leftovers`.
 
     Raises
     ------
     OutputError
-        If the folder cannot be written, or a device, a pipe or a folder is in the place of one.
+        If the folder cannot be written, or a path is a device, a pipe or a folder.
     """
     for path in files:
         _check_place(path)
@@ -184,7 +184,7 @@ def written_together(files: Mapping[Path, Callable[[IO[bytes]], object]]) -> Non
 
 
 def leftovers(path: Path) -> list[Path]:
-    """Return what may be a file that a killed process has written but not put in its place.
+    """Return files that a killed process may have completed but not renamed.
 
     Parameters
     ----------
@@ -194,23 +194,23 @@ def leftovers(path: Path) -> list[Path]:
     Returns
     -------
     list of Path
-        ``.<name>.<random>.gms-fsm-rest``; the next that writes the file removes them.
+        ``.<name>.<random>.gms-fsm-rest``; the next writer of the file removes them.
     """
     pattern = re.compile(rf"\.{re.escape(path.name)}\.[0-9a-f]{{16}}\.gms-fsm-rest")
     return sorted(other for other in path.parent.iterdir() if pattern.fullmatch(other.name))
 
 
 def remove_leftovers(folder: Path, name: str = "") -> None:
-    """Remove what processes that were killed while writing have left in a folder.
+    """Remove what processes killed while writing have left in a folder.
 
-    Nothing of a living process, and nothing that `leftovers` may be asked for.
+    Files of a running process, and files that `leftovers` returns, are kept.
 
     Parameters
     ----------
     folder : Path
         Where to look.
     name : str
-        Only what was to become the file of this name.
+        Only temporary files of the file with this name.
     """
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
@@ -219,18 +219,18 @@ def remove_leftovers(folder: Path, name: str = "") -> None:
 
 
 @contextlib.contextmanager
-def in_turn(folder: Path, *, shared: bool = False) -> Iterator[None]:
-    """Wait until nobody else puts files in their places in a folder, and keep them off.
+def folder_lock(folder: Path, *, shared: bool = False) -> Iterator[None]:
+    """Wait until no other process renames files in a folder, and keep others out meanwhile.
 
     Parameters
     ----------
     folder : Path
         An existing folder.
     shared : bool
-        Whether others may do the same: for readers.
+        Whether other readers may enter at the same time.
     """
     with ExitStack() as stack:
-        with contextlib.suppress(OSError):  # a file system without locks: then without
+        with contextlib.suppress(OSError):  # a file system without locks: continue without one
             place = os.open(folder, os.O_RDONLY)
             stack.callback(os.close, place)
             if sys.platform != "win32":
@@ -248,16 +248,16 @@ def _write(files: Mapping[Path, Callable[[IO[bytes]], object]]) -> None:
                 file, parts[path] = stack.enter_context(_part(path, kind))
                 write(file)
                 file.flush()
-                if sys.platform == "win32":  # which renames no open file
+                if sys.platform == "win32":  # Windows cannot rename open files
                     file.close()
             folder = path.parent
             listing = path.name != LIST and (
                 folder.resolve() in _prepared or (folder / LIST).exists()
             )
             if listing or len(parts) > 1:
-                stack.enter_context(in_turn(folder))
+                stack.enter_context(folder_lock(folder))
             if listing:
-                _put_on_list(folder, parts)
+                _add_to_list(folder, parts)
             for path, part in parts.items():
                 os.replace(part, path)
             for follower in list(files)[1:]:
@@ -266,9 +266,9 @@ def _write(files: Mapping[Path, Callable[[IO[bytes]], object]]) -> None:
     except OSError as error:
         if isinstance(error, OutputError):
             raise
-        advice = "make room" if error.errno == errno.ENOSPC else "choose another folder"
+        advice = "free some space" if error.errno == errno.ENOSPC else "choose another folder"
         if isinstance(error, FileNotFoundError):
-            advice = "make its folder first, or choose another folder"
+            advice = "create its folder first, or choose another folder"
         raise OutputError(
             f"cannot write {path}: {error.strerror or error}", advice=advice
         ) from None
@@ -276,26 +276,26 @@ def _write(files: Mapping[Path, Callable[[IO[bytes]], object]]) -> None:
 
 @contextlib.contextmanager
 def _part(path: Path, kind: str) -> Iterator[tuple[IO[bytes], Path]]:
-    """Open a temporary file beside a file, locked; what is left of it at the end is removed."""
+    """Open a locked temporary file next to a file; whatever is left of it is removed at the end."""
     while True:
         part = path.with_name(f".{path.name}.{secrets.token_hex(8)}.gms-fsm-{kind}")
         try:
-            with part.open("xb") as file:  # exclusively: neither a file nor a link is there
+            with part.open("xb") as file:  # exclusive: no file or link with that name exists
                 if sys.platform != "win32":
                     with contextlib.suppress(OSError):  # a file system without locks
                         fcntl.flock(file, fcntl.LOCK_EX)
-                if os.fstat(file.fileno()).st_nlink:  # else it was taken for one that was left
+                if os.fstat(file.fileno()).st_nlink:  # else it was removed as a leftover
                     yield file, part
                     return
-        finally:  # also when the writer itself fails, or is interrupted
+        finally:  # also if the writer itself fails or is interrupted
             part.unlink(missing_ok=True)
 
 
 def _remove_if_left(path: str | Path) -> None:
-    """Remove a temporary file unless its process lives, which then holds a lock on it."""
+    """Remove a temporary file unless its process is still running and holds a lock on it."""
     if sys.platform == "win32" or not _LEFT.fullmatch(os.path.basename(path)):
         return
-    with contextlib.suppress(OSError):  # somebody else's, gone, locked, or no locks here
+    with contextlib.suppress(OSError):  # owned by someone else, gone, locked, or no locks here
         file = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
         try:
             if stat.S_ISREG(os.fstat(file).st_mode):
@@ -306,7 +306,7 @@ def _remove_if_left(path: str | Path) -> None:
 
 
 def _check_place(path: Path) -> None:
-    """Refuse to put a file where something else is than a file."""
+    """Refuse to write where something other than a regular file exists."""
     kinds = {
         stat.S_IFDIR: "folder",
         stat.S_IFCHR: "device",
@@ -317,26 +317,26 @@ def _check_place(path: Path) -> None:
     try:
         kind = kinds.get(stat.S_IFMT(path.stat().st_mode))
         if path.is_symlink() and os.readlink(path).startswith("/proc/"):
-            kind = "device"  # /dev/stdout, whatever it leads to
+            kind = "device"  # /dev/stdout, whatever it points to
     except OSError:
-        return  # nothing there, or nothing that can be looked at: the writing will say so
+        return  # nothing there, or not accessible: writing will report it
     if kind is not None:
         raise OutputError(
             f"cannot write {path}: a {kind} is there, not a file", advice="give another name"
         )
 
 
-# The list holds for each name the checksum of the file to come and of the one it replaces, so that
-# a kill between the two writings does no harm.
+# For each name, the list holds the checksums of the new file and of the one it replaces, so that a
+# kill between the two writes does no harm.
 def _listed(folder: Path) -> dict[str, list[str]]:
     try:
         listed = json.loads((folder / LIST).read_bytes())
         return {str(name): [str(each) for each in sums] for name, sums in listed.items()}
-    except (OSError, ValueError, AttributeError, TypeError):  # not there, or not ours
+    except (OSError, ValueError, AttributeError, TypeError):  # missing, or not ours
         return {}
 
 
-def _put_on_list(folder: Path, parts: Mapping[Path, Path]) -> None:
+def _add_to_list(folder: Path, parts: Mapping[Path, Path]) -> None:
     listed = _listed(folder)
     for path, part in parts.items():
         sums = {_checksum(part)}

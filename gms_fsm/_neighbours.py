@@ -1,4 +1,4 @@
-"""`integrators` and `plots` stand beside `gms_fsm`; a user's file may have one of these names."""
+"""`integrators` and `plots` are installed next to `gms_fsm`; a user's file may shadow them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ __all__ = ["check_neighbours"]
 
 
 def check_neighbours() -> None:
-    """Refuse to start where another file or folder stands before one of our packages.
+    """Refuse to start if another file or folder shadows one of our packages.
 
     Raises
     ------
@@ -26,7 +26,7 @@ def check_neighbours() -> None:
         resolved = Path(place).resolve()
         if place and home / name not in (resolved, *resolved.parents):
             raise ImportError(
-                f"{place} hides the package {name!r} that gms-fsm brings; rename that file or "
+                f"{place} hides the package {name!r} of gms-fsm; rename that file or "
                 "folder, or run Python from another folder"
             )
 

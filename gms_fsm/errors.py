@@ -1,7 +1,7 @@
-"""Every error of the product has one base; those that hold a run are in `gms_fsm.traces.failures`.
+"""The errors of the package, with one base; those that carry a run: `gms_fsm.traces.failures`.
 
 A user's mistake is a `GMSError`: its text says what is wrong, where, with which value, and what to
-do. The command line prints that text and exits with code 2; Python callers can catch the one base.
+do. The command line prints that text and exits with code 2; Python callers can catch the base.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ LONGEST_SHOWN = 120  # characters of a value in a message
 
 
 def cut(text: str, longest: int = LONGEST_SHOWN) -> str:
-    """Return a text that is not too long for a message.
+    """Return a text cut to a length suitable for a message.
 
     >>> cut("abcdef", 3)
     'abc ...'
@@ -24,21 +24,21 @@ def cut(text: str, longest: int = LONGEST_SHOWN) -> str:
 
 
 def shown(value: object) -> str:
-    """Return a value as a message can show it: its text in Python, cut where it is long.
+    """Return a value as a message shows it: its Python repr, cut if it is long.
 
-    Numbers of numpy are written as plain numbers: 20.0, not np.float64(20.0).
+    NumPy numbers appear as plain numbers: 20.0, not np.float64(20.0).
 
     >>> shown("abc")
     "'abc'"
     """
     try:
         return cut(repr(_plain(value)))
-    except (RecursionError, ValueError):  # nested too deeply; a whole number of 5,000 digits
+    except (RecursionError, ValueError):  # nested too deeply; an integer of 5,000 digits
         return "..."
 
 
 def _plain(value: object) -> object:
-    """Return numbers of numpy as Python's own, inside tuples, lists and mappings too."""
+    """Return NumPy numbers as Python numbers, also inside tuples, lists and mappings."""
     if type(value) is tuple:
         return tuple(map(_plain, value))
     if type(value) is list:
@@ -49,9 +49,9 @@ def _plain(value: object) -> object:
 
 
 def why(error: BaseException) -> str:
-    """Return what another library's error says, in one line.
+    """Return another library's error message in one line.
 
-    Numpy's advice to unpickle a file that it cannot read is not passed on.
+    NumPy's advice to unpickle an unreadable file is left out.
 
     >>> why(ValueError("no header. If you trust the file, unpickle it"))
     'ValueError: no header.'
@@ -61,7 +61,7 @@ def why(error: BaseException) -> str:
 
 
 class _Nothing(enum.Enum):
-    """Stands for no value: None may be the value that is wrong."""
+    """Represents a missing value, because None may be the invalid value."""
 
     NOTHING = enum.auto()
 
@@ -70,16 +70,16 @@ NOTHING = _Nothing.NOTHING
 
 
 class GMSError(Exception):
-    """Base of every error this package raises on purpose; its text is made from its fields.
+    """Base of every error that this package raises on purpose; its text is made from its fields.
 
     Parameters
     ----------
     reason : str
         What is wrong: ``"it must be > 0"``, ``"there is no such file"``.
     place : str, optional
-        Where: an argument, a file, a file's key or column, an edge of a chart.
+        Where: an argument, a file, a key or column in a file, an edge of a chart.
     value : object, optional
-        What stands there.
+        The value found there.
     advice : str, optional
         What to do about it.
 
@@ -97,7 +97,7 @@ class GMSError(Exception):
         self, reason: str, *, place: str = "", value: object = NOTHING, advice: str = ""
     ) -> None:
         self.reason, self.place, self.value, self.advice = reason, place, value, advice
-        self.outer = ""  # what holds the place: files, keys
+        self.outer = ""  # what contains the place: files, keys
         super().__init__(reason)
 
     def __str__(self) -> str:
@@ -116,32 +116,32 @@ class GMSError(Exception):
         return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # type: ignore[attr-defined]
 
     def inside(self, place: object) -> Self:
-        """Return this error with a further place around it, such as a file.
+        """Return this error with an enclosing place added, such as a file.
 
         Parameters
         ----------
         place : str or Path
-            What holds the place that the error names.
+            What contains the place that the error names.
 
         Returns
         -------
         GMSError
-            Of the same class and fields.
+            An error of the same class with the same fields.
         """
         return self.replaced(outer=f"{place}: {self.outer}" if self.outer else str(place))
 
     def replaced(self, **fields: object) -> Self:
-        """Return this error with other fields.
+        """Return this error with some fields replaced.
 
         Parameters
         ----------
         **fields : object
-            New values by name.
+            New values, by name.
 
         Returns
         -------
         GMSError
-            Of the same class.
+            An error of the same class.
 
         Examples
         --------
@@ -160,12 +160,12 @@ class GMSError(Exception):
         Parameters
         ----------
         error : GMSError
-            For example what is wrong with a signal that a scenario file gives.
+            For example an error in a signal from a scenario file.
 
         Returns
         -------
         GMSError
-            Of this class.
+            An error of this class.
 
         Examples
         --------
@@ -177,20 +177,20 @@ class GMSError(Exception):
 
 
 class ExpressionError(GMSError, ValueError):
-    """A text of the expression language cannot be read.
+    """A text in the expression language cannot be parsed.
 
     Parameters
     ----------
     reason : str
         What is wrong.
     text : str
-        The whole offending text.
+        The whole text.
     column : int
-        Where it goes wrong, counted from 1.
+        Column of the error, counted from 1.
     allowed : str
         What would be allowed there.
     where : str, optional
-        Whose text it is, for example ``guard of 'arrest'``.
+        The owner of the text, for example ``guard of 'arrest'``.
 
     Examples
     --------
@@ -201,7 +201,7 @@ class ExpressionError(GMSError, ValueError):
     """
 
     def __init__(self, reason: str, text: str, column: int, allowed: str, where: str = "") -> None:
-        # A very long text is cut around the column, so that a message stays a message.
+        # A very long text is cut around the column to keep the message short.
         start = max(0, column - 61)
         shown = text[start : start + 120].replace("\n", " ").replace("\t", " ")
         super().__init__(
@@ -217,15 +217,15 @@ class ExpressionError(GMSError, ValueError):
 
 
 class ChartError(GMSError, ValueError):
-    """A chart contradicts itself: an unknown state, a missing flow, a name used twice."""
+    """A chart is inconsistent: an unknown state, a missing flow, a name used twice."""
 
 
 class ParameterError(GMSError, ValueError):
-    """A parameter breaks its rule; the text names the parameter, the value and the rule."""
+    """A parameter violates its rule; the text names the parameter, the value and the rule."""
 
 
 class SignalError(GMSError, ValueError):
-    """An input signal cannot be used: not finite, not in time order, too short."""
+    """An input signal cannot be used: not finite, not in order of time, too short."""
 
 
 class TraceFileError(GMSError, ValueError):
@@ -241,20 +241,20 @@ class OutputError(GMSError, OSError):
 
 
 class MissingExtraError(GMSError, ImportError):
-    """An optional dependency is not installed; the text says which extra brings it."""
+    """An optional dependency is not installed; the text names the extra that provides it."""
 
 
 class UnitError(GMSError, ValueError):
-    """A unit is unknown, or measures something else."""
+    """A unit is unknown, or measures a different quantity."""
 
 
 class RecordError(GMSError, ValueError):
-    """A measured record cannot be used; the text names file, row and column."""
+    """A measured record cannot be used; the text names the file, row and column."""
 
 
 class ScenarioError(GMSError, ValueError):
-    """A scenario file is wrong; the text names file, key, value and rule."""
+    """A scenario file is invalid; the text names the file, key, value and rule."""
 
 
 class SessionError(GMSError, ValueError):
-    """A step-by-step session is asked for something that is not there."""
+    """A step-by-step session was asked for something that does not exist."""

@@ -1,7 +1,7 @@
 """Integrators for systems that flow, and switch at located crossings.
 
-This package knows nothing of what it integrates. `Equations` are a handful of functions over plain
-indexable numbers (lists in Python, arrays when compiled); a loop over them yields what happened.
+This package knows nothing about what it integrates. `Equations` are a handful of functions over
+plain indexable numbers (lists in Python, arrays when compiled); a loop over them yields events.
 """
 
 from integrators.hybrid import (
@@ -22,7 +22,7 @@ from integrators.hybrid import (
     TooManySteps,
     run,
 )
-from integrators.sliding import LIVE, Functions, Held, Surfaces, look, room_to_slide, slope_on
+from integrators.sliding import LIVE, Functions, Held, Surfaces, look, sliding_scratch, slope_on
 from integrators.tableaux import BS23, DP45, EULER, HEUN, METHODS, RK4, Tableau
 
 __all__ = [
@@ -53,7 +53,7 @@ __all__ = [
     "Tableau",
     "TooManySteps",
     "look",
-    "room_to_slide",
     "run",
+    "sliding_scratch",
     "slope_on",
 ]

@@ -1,7 +1,7 @@
-"""The kernel: run on with all states frozen until the next stop or a full buffer.
+"""The kernel: integrate with all states frozen until the next stop or a full buffer.
 
-Array-only, plain loops, the system's functions as arguments. It neither asks nor fires: that is the
-outer loop's work, between two calls.
+Array-only, plain loops, with the system's functions as arguments. It neither evaluates guards nor
+fires edges: the outer loop does so between two calls.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from integrators.crossings import (
     Watched,
     copy_margins,
     first_change,
-    nothing_near,
+    is_quiet_step,
 )
 from integrators.step_size import INFINITY, Control, error_norm, next_factor, retry_factor
 from integrators.steps import (
@@ -31,46 +31,46 @@ from integrators.steps import (
     fit_dense,
     interpolate,
     take_step,
-    weigh,
+    weighted_sum,
 )
 
 __all__ = ["Output", "Plan", "advance"]
 
-# Why the kernel came back.
+# Reasons for returning from the kernel.
 REACHED, CROSSED, FULL, TOO_SMALL, NOT_FINITE = 0, 1, 2, 3, 4
-# What becomes of a step; else TOO_SMALL or NOT_FINITE.
+# Outcomes of a step, besides TOO_SMALL and NOT_FINITE.
 ACCEPTED, REJECTED = 5, 6
-REDO = 0.9  # a crossing before this fraction of an adaptive step has the step done again
-SMALLEST = 1e-280  # an absolute tolerance: smaller numbers lose their digits
-AT_ONCE = 1e3  # ticks; a crossing that is nearer comes at once
-# Of a time: a difference that counts. Four places of its last digit, whatever the run's length.
+REDO = 0.9  # a crossing before this fraction of an adaptive step causes the step to be repeated
+SMALLEST = 1e-280  # of an absolute tolerance: smaller numbers lose precision
+AT_ONCE = 1e3  # ticks; a crossing closer than this is taken immediately
+# Significant difference of two times: four units in the last place, whatever the run's length.
 TICK = 4.0 * 2.0**-52
-# Places in Output.cursor.
+# Indices into Output.cursor.
 ROW, NEXT_TIME, NEXT_KNOT, STEPS = 0, 1, 2, 3
 
 
 class Plan(NamedTuple):
-    """What a run keeps to."""
+    """The settings of a run."""
 
     method: Coefficients
     control: Control
     t_end: float
-    located: bool  # stop at crossings; else ask once at the end of each step
-    foreign: bool  # the caller takes the steps (the loop asks for them)
+    located: bool  # stop at crossings; otherwise evaluate guards once at the end of each step
+    foreign: bool  # the caller takes the steps (the loop requests them)
     jumps: Vector  # times at which the flow jumps, increasing
     before_jumps: Vector  # one clock tick before each
     knots: Vector  # times that steps may not jump over
-    max_steps: int  # tried, in the whole run
+    max_steps: int  # attempted steps in the whole run
 
 
 class Output(NamedTuple):
-    """Where rows go: every accepted step, or the wanted times."""
+    """The destination of rows: every accepted step, or the requested times."""
 
-    times: Vector  # wanted times, increasing
+    times: Vector  # requested times, increasing
     every_step: bool
     rows_t: Vector  # shape (capacity,)
     rows_y: list[Vector]  # shape (capacity, m)
-    cursor: list[int]  # [rows written, next wanted time, next knot, steps tried]
+    cursor: list[int]  # [rows written, next requested time, next knot, steps tried]
 
 
 def put_row(out: Output, t: float, y: Vector) -> None:
@@ -84,19 +84,19 @@ def put_row(out: Output, t: float, y: Vector) -> None:
 
 
 def tick_at(t: float) -> float:
-    """Return the smallest difference of times that counts at t."""
+    """Return the smallest significant difference of times at t."""
     return TICK * abs(t)
 
 
 def raise_floor(control: Control, now: Now) -> None:
-    """Let the tolerances of components without a scale follow the largest value they have had."""
+    """Let the tolerances of components without a scale follow their largest value so far."""
     for j in range(len(now.y)):
         if control.atol[j] == 0.0:
             now.floor[j] = max(now.floor[j], control.rtol * abs(now.y[j]), SMALLEST)
 
 
 def next_on_grid(control: Control, t: float) -> float:
-    """Return the next place of the fixed grid, with no sliver before it."""
+    """Return the next point of the fixed grid, avoiding a sliver before it."""
     index = int((t - control.origin) / control.step) + 1
     t_new = control.origin + index * control.step
     while t_new - t <= tick_at(t_new):
@@ -106,7 +106,7 @@ def next_on_grid(control: Control, t: float) -> float:
 
 
 def limit_after(plan: Plan, clock: Vector, cursor: list[int]) -> float:
-    """Return how far the next step may go: to the next stop or knot."""
+    """Return the end of the next step at the latest: the next stop or knot."""
     knots, t, limit = plan.knots, clock[T], clock[T_STOP]
     while cursor[NEXT_KNOT] < len(knots) and knots[cursor[NEXT_KNOT]] <= t:
         cursor[NEXT_KNOT] += 1
@@ -129,17 +129,17 @@ def advance(
     Parameters
     ----------
     motion : Motion
-        What flows, and what is watched.
+        The flow and what is watched.
     plan : Plan
-        The method and how steps are chosen.
+        The method and the step-size settings.
     now : Now
-        Where the run is. The slope is not valid after a crossing.
+        The state of the run. The slope is not valid after a crossing.
     w : Watched
-        Relations; ``w.start`` holds the margins of the start.
+        Relations; ``w.start`` contains the margins at the start.
     out, scratch
         Buffers.
     most_steps : int
-        How many steps at most.
+        Maximum number of steps.
 
     Returns
     -------
@@ -162,13 +162,13 @@ def advance(
             return REACHED
         if most_steps <= 0 or (out.every_step and cursor[ROW] >= len(out.rows_t)):
             return FULL
-        t_new, tick = _aim(plan, clock, cursor)
+        t_new, tick = _next_end(plan, clock, cursor)
         if not t_new > t:
             return TOO_SMALL
         h = t_new - t
         cursor[STEPS] += 1
         take_step(motion, plan.method, now, t_new, scratch)
-        status = _judge(plan, now, h, tick, scratch, rejected)
+        status = _assess_step(plan, now, h, tick, scratch, rejected)
         rejected = status == REJECTED
         if rejected:
             continue
@@ -177,16 +177,16 @@ def advance(
 
         wanted = cursor[NEXT_TIME] < len(times) and times[cursor[NEXT_TIME]] < t_new
         theta = NO_CHANGE
-        near = watching and not nothing_near(motion, now, t_new, scratch, w)
+        near = watching and not is_quiet_step(motion, now, t_new, scratch, w)
         if near or wanted:
             fit_dense(plan.method, h, y, scratch)
         if near:
             path = Path(motion, now.mode, interpolate, scratch.dense, t, t_new, y_new)
             theta = first_change(path, w, tick)
         if theta < REDO and theta * h > AT_ONCE * tick and adaptive and not redone:
-            # The stages lay behind the crossing and may have jumped what comes before it: the step
-            # up to the crossing is done for its own sake. Not where it is next to none: rounding
-            # may then take the crossing back, and a run would creep on by ticks.
+            # The stages lay beyond the crossing and may have missed events before it: the step up
+            # to the crossing is repeated on its own. Except if its length is almost zero: rounding
+            # might then undo the crossing, and a run would creep forward tick by tick.
             clock[H] = theta * h
             redone = True
             continue
@@ -213,10 +213,10 @@ def advance(
             return CROSSED
 
 
-def _aim(plan: Plan, clock: Vector, cursor: list[int]) -> tuple[float, float]:
-    """Return where the next step is to end, and the difference of times that counts there.
+def _next_end(plan: Plan, clock: Vector, cursor: list[int]) -> tuple[float, float]:
+    """Return the end of the next step, and the significant difference of times there.
 
-    On the grid or where the controller says, but not past a stop, and with no sliver before it.
+    It follows the grid or the controller, but not past a stop, and avoids a sliver before one.
     """
     t, control = clock[T], plan.control
     if control.step > 0.0:
@@ -230,8 +230,10 @@ def _aim(plan: Plan, clock: Vector, cursor: list[int]) -> tuple[float, float]:
     return t_new, tick
 
 
-def _judge(plan: Plan, now: Now, h: float, tick: float, scratch: Scratch, rejected: bool) -> int:
-    """Tell what becomes of the step of length h just tried, and choose the next one's length."""
+def _assess_step(
+    plan: Plan, now: Now, h: float, tick: float, scratch: Scratch, rejected: bool
+) -> int:
+    """Return the outcome of the attempted step of length h, and choose the next step's length."""
     control, method, clock = plan.control, plan.method, now.clock
     y_new, f_new = scratch.y_new, scratch.f_new
     if control.step > 0.0:
@@ -240,7 +242,7 @@ def _judge(plan: Plan, now: Now, h: float, tick: float, scratch: Scratch, reject
             total += abs(y_new[j]) + abs(f_new[j])
         return ACCEPTED if total < INFINITY else NOT_FINITE
     order = method.error_order
-    weigh(method.E, len(method.B), f_new, scratch.k, scratch.error)
+    weighted_sum(method.E, len(method.B), f_new, scratch.k, scratch.error)
     error = error_norm(scratch.error, h, now.y, y_new, control.rtol, now.floor)
     if not error <= 1.0:
         clock[H] = h * retry_factor(error, order)
@@ -250,7 +252,7 @@ def _judge(plan: Plan, now: Now, h: float, tick: float, scratch: Scratch, reject
     factor = next_factor(error, clock[ERROR_BEFORE], order)
     if rejected:
         factor = min(factor, 1.0)
-    # A step cut short by a stop says little of the step after it.
+    # A step cut short by a stop says little about the step after it.
     cut_short = h < clock[H] and not rejected
     clock[H] = max(clock[H], h * factor) if cut_short else h * factor
     clock[ERROR_BEFORE] = max(error, 1e-4)
@@ -258,10 +260,10 @@ def _judge(plan: Plan, now: Now, h: float, tick: float, scratch: Scratch, reject
 
 
 def _put_wanted(out: Output, dense: Dense, t: float, h: float, t_new: float) -> None:
-    """Write the rows wanted before t_new, from the step of length h that began at t.
+    """Write the rows requested before t_new, from the step of length h that began at t.
 
-    They are right-continuous: a time that falls on a stop is written after it, when the states have
-    switched.
+    They are right-continuous: a time that coincides with a stop is written after the stop, when the
+    states have switched.
     """
     cursor = out.cursor
     while cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] < t_new:

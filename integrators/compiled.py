@@ -1,7 +1,7 @@
-"""`integrators.loop.record` as machine code: the very same functions, through numba.
+"""`integrators.loop.record` as machine code: the very same functions, compiled by numba.
 
-The system's functions come in as addresses of functions with fixed signatures, so that the loop is
-compiled once per machine and kept, whatever it integrates.
+The system's functions are passed as addresses of functions with fixed signatures, so that the loop
+is compiled once per machine and cached, whatever it integrates.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ __all__ = [
     "usable_inside",
 ]
 
-# Every function that `record` reaches. Those of a step are inlined: a call hands on ten arrays,
+# Every function that `record` reaches. Those within a step are inlined: a call passes ten arrays,
 # which takes as long as their work does.
 _OF_A_STEP: tuple[Callable[..., Any], ...] = (
-    advance._aim,
-    advance._judge,
+    advance._next_end,
+    advance._assess_step,
     advance._put_wanted,
     advance.limit_after,
     advance.next_on_grid,
@@ -54,7 +54,7 @@ _OF_A_STEP: tuple[Callable[..., Any], ...] = (
     crossings.any_changed,
     crossings.copy_margins,
     crossings.first_change,
-    crossings.nothing_near,
+    crossings.is_quiet_step,
     sliding.flow_on,
     sliding.margins_on,
     step_size.error_norm,
@@ -63,9 +63,9 @@ _OF_A_STEP: tuple[Callable[..., Any], ...] = (
     steps.fit_dense,
     steps.interpolate,
     steps.take_step,
-    steps.weigh,
+    steps.weighted_sum,
 )
-# So are the phases of the loop, and what is written of an event: called from one place each.
+# The phases of the loop are inlined too, and the writing of events: each is called from one place.
 _OF_AN_EVENT: tuple[Callable[..., Any], ...] = (
     loop._begin_arc,
     loop._choose_stop,
@@ -84,9 +84,9 @@ _OF_AN_EVENT: tuple[Callable[..., Any], ...] = (
 _OF_AN_ARC: tuple[Callable[..., Any], ...] = (
     advance.advance,
     crossings.listed,
-    loop._count_anew,
+    loop._reset_counts,
     loop._list,
-    loop._look_at_clock,
+    loop._reset_if_advanced,
     loop._no_progress,
     loop._often_changed,
     loop._put_modes,
@@ -110,7 +110,7 @@ _ARRAYS: Mapping[Any, tuple[type[Any], int]] = {
     tuple[tuple[float, ...], ...]: (np.float64, 2),
     list[list[int]]: (np.int64, 2),
 }
-# Of the functions a system is made of: letters for float, Vector, list[int], int and p.
+# The functions that make up a system: letters for float, Vector, list[int], int and p.
 SIGNATURES: Mapping[str, str] = {
     "flow": "fVIVPV",
     "flow_live": "fVIVPV",
@@ -121,9 +121,9 @@ SIGNATURES: Mapping[str, str] = {
     "act": "iifVIP",
     "observe": "fVIVPV",
 }
-# IEEE arithmetic: x / 0 is inf or NaN as it is for our Python (pairs with the caller's own
-# numbers that do not raise). And no counting of references, which is atomic and took half of the
-# time: nothing is allocated here, all arrays belong to the caller.
+# IEEE arithmetic: x / 0 is inf or NaN, as in our Python (together with the caller's numbers that do
+# not raise). No reference counting either, which is atomic and took half of the time: nothing is
+# allocated here, and all arrays belong to the caller.
 _OPTIONS: Mapping[str, Any] = {"error_model": "numpy", "_nrt": False}
 _hints: Callable[[type], Mapping[str, Any]] = functools.cache(typing.get_type_hints)
 
@@ -134,12 +134,12 @@ def arrays(record: Any) -> Any:
     Parameters
     ----------
     record : NamedTuple
-        Of lists, numbers and named tuples.
+        Contains lists, numbers and named tuples.
 
     Returns
     -------
     NamedTuple
-        Lists of lists are padded with zeros to a table.
+        Lists of lists are padded with zeros to form a table.
 
     Examples
     --------
@@ -164,31 +164,31 @@ def _array(value: Any, hint: Any) -> Any:
     return table
 
 
-# --------------------------------------------------------------------------- what is kept
+# --------------------------------------------------------------------------- caching
 class Store(Protocol):
-    """Where machine code is kept. What comes out is what was put in: wrong bits end the process."""
+    """A cache for machine code. It must return exactly what was stored: wrong bits crash."""
 
     def __hash__(self) -> int: ...
 
     def get(self, name: str) -> bytes | None:
-        """Return what is kept under a name, None if there is nothing."""
+        """Return the content stored under a name, or None."""
 
     def put(self, name: str, content: bytes) -> None:
-        """Keep bytes under a name, if that is possible."""
+        """Store content under a name, if possible."""
 
 
 def digest(*functions: Callable[..., Any], text: str = "") -> str:
-    """Return a short name for what some functions do.
+    """Return a hash of what some functions do.
 
-    Of their code as it was loaded, not of their files: these may have been replaced under a running
-    program, which would then keep its old code under the new name.
+    It is computed from their code as loaded, not from their files: these may have been replaced
+    under a running program, which would then store its old code under the new name.
 
     Parameters
     ----------
     *functions : callable
         Python functions.
     text : str
-        What else counts.
+        Further text that affects the result.
 
     Returns
     -------
@@ -206,7 +206,7 @@ def digest(*functions: Callable[..., Any], text: str = "") -> str:
 
 
 def edition() -> str:
-    """Return a short name for what the loop computes, whoever runs it.
+    """Return a hash of what the loop computes, whatever system it runs.
 
     Returns
     -------
@@ -228,11 +228,11 @@ def edition() -> str:
     return digest(*functions, text=repr((sys.version, constants)))
 
 
-_lock = threading.RLock()  # of numba's settings, and so that nothing is compiled twice
+_lock = threading.RLock()  # for numba's settings, and to compile nothing twice
 
 
-class _Kept:
-    """Stands in for numba's own cache, which loads whatever its files hold."""
+class _VerifiedCache:
+    """Replaces numba's own cache, which loads files without verifying them."""
 
     cache_path = None
 
@@ -243,7 +243,7 @@ class _Kept:
         self.missed = False
 
     def load_overload(self, signature: Any, target: Any) -> Any:
-        """Return a result that was kept, None to have it compiled."""
+        """Return a cached result, or None to have it compiled."""
         from numba.core.compiler import CompileResult
 
         target.refresh()
@@ -251,14 +251,14 @@ class _Kept:
         if kept is not None:
             try:
                 return CompileResult._rebuild(target, *pickle.loads(kept))
-            except Exception:  # kept by a numba that differs from this one in more than its number
+            except Exception:  # stored by a numba that differs in more than its version number
                 pass
         self.missed = True
         self.on_miss()
         return None
 
     def save_overload(self, signature: Any, result: Any) -> None:
-        """Keep a result."""
+        """Store a result."""
         from numba.core.serialize import dumps
 
         if self.store is not None:
@@ -268,7 +268,7 @@ class _Kept:
     def _name(self, signature: Any, target: Any) -> str:
         import numba
 
-        # The processor too: a folder may be shared between machines.
+        # Includes the processor: a folder may be shared between machines.
         what = signature, target.codegen().magic_tuple(), numba.__version__, _OPTIONS
         function = self.function
         text = repr((what, edition(), function.__module__, function.__qualname__))
@@ -285,19 +285,19 @@ def _machine_code(
     store: Store | None,
     on_miss: Callable[[], None] = _silent,
 ) -> Any:
-    """Compile a function, or load what was kept of it in a store."""
+    """Compile a function, or load its cached code from a store."""
     import numba
 
     config = numba.config
     with _lock:
         before = config.LOOP_VECTORIZE
-        # Vectorized loops cost a fifth at n = 4, and gain only where n is in the hundreds.
+        # Vectorized loops cost a fifth at n = 4, and pay off only if n is in the hundreds.
         config.LOOP_VECTORIZE = 0
         collecting = gc.isenabled()
-        gc.disable()  # compiling makes objects by the million and no garbage worth looking for
+        gc.disable()  # compiling creates millions of objects and hardly any cyclic garbage
         try:
             dispatcher = numba.njit(nogil=True, **_OPTIONS)(function)
-            dispatcher._cache = _Kept(function, store, on_miss)
+            dispatcher._cache = _VerifiedCache(function, store, on_miss)
             dispatcher.compile(signature)
             dispatcher.disable_compile()
             return dispatcher
@@ -309,12 +309,12 @@ def _machine_code(
 
 # --------------------------------------------------------------------------- compiling
 def usable_inside(function: Callable[..., Any], *, inlined: bool = False) -> None:
-    """Let compiled code call a Python function by its name.
+    """Make a Python function callable by name from compiled code.
 
     Parameters
     ----------
     function : callable
-        Of plain loops over numbers and arrays.
+        Contains plain loops over numbers and arrays.
     inlined : bool
         Whether its code is copied into that of its callers.
     """
@@ -344,62 +344,62 @@ def _signature(letters: str) -> Any:
 
 
 def compiled(name: str, function: Callable[..., None], store: Store | None) -> Any:
-    """Return a system's function as machine code.
+    """Return a system's function compiled to machine code.
 
     Parameters
     ----------
     name : str
         A key of `SIGNATURES`.
     function : callable
-        Its qualified name is that of no other function: the linker knows it by nothing else.
+        Its qualified name must be unique: the linker identifies it by nothing else.
     store : Store, optional
-        Where to keep it.
+        The cache for its machine code.
 
     Returns
     -------
     callable
-        With the fixed signature.
+        A function with the fixed signature.
     """
     return _machine_code(_signature(SIGNATURES[name]), function, store)
 
 
-def record(arguments: tuple[Any, ...], store: Store | None, tell: Callable[[str], None]) -> int:
-    """Call `integrators.loop.record` as machine code; it releases the GIL.
+def record(arguments: tuple[Any, ...], store: Store | None, notify: Callable[[str], None]) -> int:
+    """Call `integrators.loop.record` as machine code; this releases the GIL.
 
     Parameters
     ----------
     arguments : tuple
-        Its arguments: named tuples of compiled functions, of arrays and numbers.
+        The function's arguments: named tuples of compiled functions, of arrays and numbers.
     store : Store, optional
-        Where to keep the machine code.
-    tell : callable
-        Called with a text before the loop is compiled, which takes a while, and after it.
+        The cache for the machine code.
+    notify : callable
+        Called with a text before the loop is compiled, which takes a while, and afterwards.
 
     Returns
     -------
     int
-        What it returns.
+        The result of `integrators.loop.record`.
     """
     functions, machines, *others = arguments
     addresses: list[Any] = [_address(function) for function in (*functions[:4], *machines)]
     flow, arm, margins, normal, *switch = addresses
     at = Functions(flow, arm, margins, normal, functions.p), Machines(*switch)
-    machine_code: Callable[..., int] = _record((*at, *others), store, tell)
+    machine_code: Callable[..., int] = _record((*at, *others), store, notify)
     return machine_code(*at, *others)
 
 
 @functools.lru_cache(maxsize=1024)
 def _address(function: Any) -> int:
-    """Return where the machine code of a compiled function lies."""
+    """Return the address of a compiled function's machine code."""
     (code,) = function.overloads.values()
     address: int = code.library.get_pointer_to_function(code.fndesc.llvm_func_name)
     return address
 
 
 def _function_at(signature: Any) -> Any:
-    """Return what makes a function of an address, in machine code.
+    """Return an intrinsic that turns an address into a function, in machine code.
 
-    Handed over as itself, numba unpickles a function's type twice at every call: 27 us each.
+    If functions were passed directly, numba would unpickle their types at every call: 27 us each.
     """
     from numba import types
     from numba.core import cgutils
@@ -421,17 +421,17 @@ def _function_at(signature: Any) -> Any:
 _compiled_record: list[Any] = []
 
 
-def _record(arguments: tuple[Any, ...], store: Store | None, tell: Callable[[str], None]) -> Any:
+def _record(arguments: tuple[Any, ...], store: Store | None, notify: Callable[[str], None]) -> Any:
     if _compiled_record:
         return _compiled_record[0]
     with _lock:
         if not _compiled_record:
-            _compiled_record.append(_compile_record(arguments, store, tell))
+            _compiled_record.append(_compile_record(arguments, store, notify))
         return _compiled_record[0]
 
 
 def _compile_record(
-    arguments: tuple[Any, ...], store: Store | None, tell: Callable[[str], None]
+    arguments: tuple[Any, ...], store: Store | None, notify: Callable[[str], None]
 ) -> Any:
     import numba
 
@@ -441,7 +441,7 @@ def _compile_record(
     at_flow, at_arm, at_margins, at_normal, at_switch, at_act, at_observe = (
         _function_at(_signature(SIGNATURES[name])) for name in names
     )
-    run = numba.njit(inline="always", **_OPTIONS)(loop.record)  # else it is compiled twice
+    run = numba.njit(inline="always", **_OPTIONS)(loop.record)  # otherwise it is compiled twice
 
     def record(
         at: Any, machines: Any, b: Any, log: Any, first: Any, most_steps: Any, pause: Any
@@ -454,16 +454,16 @@ def _compile_record(
         )
         return run(functions, switch, b, log, first, most_steps, pause)
 
-    record.__qualname__ = "record"  # under which it is kept
+    record.__qualname__ = "record"  # the name in the cache
     start = time.perf_counter()
     result = _machine_code(
         numba.types.int64(*map(numba.typeof, arguments)),
         record,
         store,
-        lambda: tell("compiling the engine, once on this machine ..."),
+        lambda: notify("compiling the engine, once on this machine ..."),
     )
     if result._cache.missed:
-        tell(f"compiled in {time.perf_counter() - start:.1f} s")
+        notify(f"compiled in {time.perf_counter() - start:.1f} s")
     return result
 
 
@@ -499,8 +499,8 @@ def for_each_row(
     p : tuple of ndarray
         Parameters.
     table : ndarray, shape (rows, width)
-        Filled.
+        Filled with the results.
     store : Store, optional
-        Where to keep the machine code.
+        The cache for the machine code.
     """
     _compiled_each_row(store)(observe, *rows, live, p, table)

@@ -1,19 +1,19 @@
-"""Finds where in a step a watched relation first changes its truth.
+"""Locating the first point in a step where a watched relation changes its truth value.
 
-A relation is a margin that is true where positive (or, if not strict, where zero). Its truth at the
-start of the arc is remembered; a crossing is the first place where any watched truth differs. The
-place is bracketed until both ends are one clock tick apart and the *right* end is kept: there the
-raw comparison has changed, so whoever asks next just evaluates it. Half-open on the left: a margin
-that starts at zero does not fire again.
+A relation is a margin that is true where positive (or, if not strict, where zero). Its truth value
+at the start of the arc is stored; a crossing is the first point where any watched value differs.
+The point is bracketed until both ends are one clock tick apart, and the *right* end is returned:
+there the raw comparison has changed, so the caller can simply evaluate it. The interval is
+half-open on the left: a margin that starts at zero does not fire again.
 
-Before a place is believed to be the first, the step up to it is searched for a change that is
-undone again: an interval counts as quiet only where start, middle and end show each margin to be
-monotone, or farther from a change than `WARY` times the curvature they show could carry it; else
-it is halved.
+Before a point is accepted as the first one, the step up to it is searched for a change that is
+undone again: an interval counts as quiet only if start, middle and end show each margin to be
+monotone, or farther from a change than `WARY` times the curvature they show could carry it;
+otherwise it is halved.
 
-Roads not taken: a root finder on the margin stops at a place where the comparison is not yet true
-(margin -5e-17); a bracket by sign fails when the arc starts on the zero; one relation after another
-misses what becomes true and false again before the first of them.
+Alternatives considered: a root finder on the margin stops at a point where the comparison is not
+yet true (margin -5e-17); a bracket by sign fails if the arc starts on the zero; searching one
+relation after another misses one that becomes true and false again before the first of them.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ __all__ = [
     "Watched",
     "any_changed",
     "first_change",
+    "is_quiet_step",
     "listed",
-    "nothing_near",
     "watched",
 ]
 
 NO_CHANGE = 2.0
-# A margin with a narrow hump between two of the places bends more than they show.
+# A margin with a narrow hump between two of the points has more curvature than they show.
 WARY = 4.0
-DEEPEST = 8  # halvings of a step: windows down to 1/256 of it are searched for
+DEEPEST = 8  # halvings of a step: windows down to 1/256 of it are found
 
 
 class Search(NamedTuple):
@@ -47,10 +47,10 @@ class Search(NamedTuple):
 
     low: Vector  # margins at the left end of the bracket, shape (r,)
     high: Vector  # ... at its right end
-    probe: Vector  # ... where it is looked
+    probe: Vector  # ... at the point under test
     y_probe: Vector  # the state there, shape (m,)
-    rights: list[Vector]  # right ends of the intervals still to search, shape (DEEPEST + 1, r)
-    places: Vector  # where these are, shape (DEEPEST + 1,)
+    rights: list[Vector]  # margins at right ends of intervals to search, shape (DEEPEST + 1, r)
+    places: Vector  # positions of these right ends, shape (DEEPEST + 1,)
     depths: list[int]  # how often they were halved, shape (DEEPEST + 1,)
 
 
@@ -58,10 +58,10 @@ class Watched(NamedTuple):
     """The relations watched during an arc."""
 
     watch: list[int]  # one flag per relation, shape (r,)
-    room: list[int]  # for the indices of the flagged ones, shape (r,)
+    room: list[int]  # space for the indices of the flagged ones, shape (r,)
     active: list[int]  # those indices
-    truth: list[bool]  # truth at the arc's start, shape (r,)
-    changed: list[int]  # whether it is another where the arc ended, shape (r,)
+    truth: list[bool]  # truth values at the arc's start, shape (r,)
+    changed: list[int]  # whether the value was different where the arc ended, shape (r,)
     strict: list[bool]  # shape (r,)
     start: Vector  # margins at the step's start, shape (r,)
     end: Vector  # ... at its end
@@ -69,7 +69,7 @@ class Watched(NamedTuple):
 
 
 class Path(NamedTuple):
-    """A step just taken, as the search sees it."""
+    """The last step in the form that the search uses."""
 
     motion: Motion
     mode: list[int]
@@ -81,19 +81,19 @@ class Path(NamedTuple):
 
 
 def watched(strict: list[bool], size: int) -> Watched:
-    """Return room to watch relations, none of them flagged yet.
+    """Return storage for watching relations, with none of them flagged yet.
 
     Parameters
     ----------
     strict : list of bool, shape (r,)
-        For each relation whether zero is false.
+        For each relation, whether it is false at zero.
     size : int
         Length of the state vector.
 
     Returns
     -------
     Watched
-        With scratch for all of them.
+        With scratch space for all of them.
     """
     r = len(strict)
 
@@ -113,21 +113,21 @@ def watched(strict: list[bool], size: int) -> Watched:
 
 
 def listed(w: Watched, count: int) -> Watched:
-    """Return the relations with the first few indices in `room` as the active ones."""
+    """Return the relations with the first `count` indices in `room` as the active ones."""
     return Watched(
         w.watch, w.room, w.room[:count], w.truth, w.changed, w.strict, w.start, w.end, w.search
     )
 
 
 def any_changed(w: Watched, margin: Vector) -> bool:
-    """Tell whether any watched relation differs from its truth at the arc's start.
+    """Return whether any watched relation differs from its truth value at the arc's start.
 
     Parameters
     ----------
     w : Watched
-        The relations and their truth then.
+        The relations and their truth values at the start.
     margin : list of float, shape (r,)
-        Margins now; only the active ones are read.
+        Current margins; only the active ones are read.
 
     Returns
     -------
@@ -148,11 +148,11 @@ def copy_margins(w: Watched, source: Vector, target: Vector) -> None:
         target[r] = source[r]
 
 
-def nothing_near(motion: Motion, now: Now, t_new: float, scratch: Scratch, w: Watched) -> bool:
-    """Tell whether a whole step is quiet: most are, and then no dense output is needed.
+def is_quiet_step(motion: Motion, now: Now, t_new: float, scratch: Scratch, w: Watched) -> bool:
+    """Return whether a whole step is quiet: most are, and then no dense output is needed.
 
-    Expects ``w.start`` filled with the margins at its start; fills ``w.end`` with those at its end.
-    The place between is that of the cubic through both ends and both slopes.
+    Expects ``w.start`` to contain the margins at its start; fills ``w.end`` with those at its end.
+    The midpoint is taken from the cubic through both ends and both slopes.
 
     Parameters
     ----------
@@ -165,12 +165,12 @@ def nothing_near(motion: Motion, now: Now, t_new: float, scratch: Scratch, w: Wa
     scratch : Scratch
         State and slope there.
     w : Watched
-        Relations.
+        The relations.
 
     Returns
     -------
     bool
-        False if `first_change` has to look.
+        False if `first_change` must search.
     """
     margins, p, mode = motion.margins, motion.p, now.mode
     t, y, f = now.clock[T], now.y, now.f
@@ -187,19 +187,19 @@ def nothing_near(motion: Motion, now: Now, t_new: float, scratch: Scratch, w: Wa
 
 
 def first_change(path: Path, w: Watched, resolution: float) -> float:
-    """Return the fraction of the step at which a watched truth first differs.
+    """Return the fraction of the step at which a watched truth value first differs.
 
-    Expects ``w.start`` filled with the margins at its start; on `NO_CHANGE` ``w.end`` holds those
-    at its end.
+    Expects ``w.start`` to contain the margins at its start; for `NO_CHANGE`, ``w.end`` contains
+    those at its end.
 
     Parameters
     ----------
     path : Path
         The step.
     w : Watched
-        Relations.
+        The relations.
     resolution : float
-        The bracket's width in time at which the search ends.
+        The width of the bracket, in time, at which the search ends.
 
     Returns
     -------
@@ -209,7 +209,7 @@ def first_change(path: Path, w: Watched, resolution: float) -> float:
     motion, search = path.motion, w.search
     motion.margins(path.t_new, path.y_new, path.mode, motion.p, w.watch, w.end)
     found = NO_CHANGE
-    quiet = 1.0  # the step up to here is to be searched; its margins are in rights[0]
+    quiet = 1.0  # the step up to this point must be searched; its margins are in rights[0]
     copy_margins(w, w.end, search.rights[0])
     if any_changed(w, w.end):
         copy_margins(w, w.start, search.low)
@@ -224,7 +224,7 @@ def first_change(path: Path, w: Watched, resolution: float) -> float:
 
 
 def _probe(path: Path, place: float, w: Watched) -> bool:
-    """Fill the margins at a place; tell whether any has changed there."""
+    """Fill the margins at a point; return whether any has changed there."""
     motion, search = path.motion, w.search
     path.interpolate(path.dense, place, search.y_probe)
     t = path.t + place * (path.t_new - path.t)
@@ -237,7 +237,7 @@ def _bracket(
 ) -> tuple[float, float]:
     """Close the bracket (low unchanged, high changed; margins in search.low, search.high).
 
-    Leaves the margins of the place before the change in ``search.rights[0]``, for `_search`.
+    Leaves the margins at the point before the change in ``search.rights[0]``, for `_search`.
     """
     search = w.search
     tolerance = max(resolution / (path.t_new - path.t), 4e-16)
@@ -252,7 +252,7 @@ def _bracket(
                     a = search.low[r]
                     if a != b:
                         guess = min(guess, low + (high - low) * (a / (a - b)))
-            # One half tick inside the bracket, so that the last look closes it.
+            # Half a tick inside the bracket, so that the last evaluation closes it.
             guess = min(max(guess, low + 0.5 * tolerance), high - 0.5 * tolerance)
         width = high - low
         if _probe(path, guess, w):
@@ -269,7 +269,7 @@ def _bracket(
 def _search(path: Path, quiet: float, w: Watched) -> tuple[float, float]:
     """Search [0, quiet], unchanged at both ends, for a change inside.
 
-    Returns an unchanged place and a changed one right of it, with their margins in search.low and
+    Returns an unchanged point and a changed one right of it, with their margins in search.low and
     search.high, or `NO_CHANGE`.
     """
     search = w.search
@@ -299,14 +299,14 @@ def _search(path: Path, quiet: float, w: Watched) -> tuple[float, float]:
 
 
 def _is_quiet(w: Watched, left: Vector, middle: Vector, right: Vector) -> bool:
-    """Tell whether no margin can have changed between three unchanged places."""
+    """Return whether no margin can have changed between three unchanged points."""
     truth = w.truth
     for r in w.active:
-        sign = -1.0 if truth[r] else 1.0  # of a margin that is negative while unchanged
+        sign = -1.0 if truth[r] else 1.0  # makes an unchanged margin negative
         a, m, b = sign * left[r], sign * middle[r], sign * right[r]
         first, second = m - a, b - m
         bend = abs(second - first)
-        monotone = bend < min(abs(first), abs(second))  # of opposite signs they bend by more
+        monotone = bend < min(abs(first), abs(second))  # bend is larger if their signs differ
         if not monotone and max(a, m, b) + WARY * bend >= 0.0 and bend > 0.0:
             return False
     return True

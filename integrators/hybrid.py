@@ -1,7 +1,7 @@
 """The outer loop for Python: a generator over `integrators.loop.run_to_event`.
 
-It yields what happened (`Arc`, `Stop`, `Slide`, `Firing`) and raises when it cannot go on, so
-whoever listens keeps everything up to there.
+It yields events (`Arc`, `Stop`, `Slide`, `Firing`) and raises an error when it cannot continue, so
+that the caller keeps everything up to that point.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from integrators.sliding import (
     Surfaces,
     flow_on,
     margins_on,
-    room_to_slide,
+    sliding_scratch,
 )
 from integrators.step_size import Control
 from integrators.steps import Dense, Flow, Margins, Motion, Now, Scratch, T, Vector, coefficients
@@ -53,13 +53,13 @@ __all__ = [
     "take_rows",
 ]
 
-ROWS_AT_ONCE = 512  # a buffer
+ROWS_AT_ONCE = 512  # capacity of a buffer
 
 
-# --------------------------------------------------------------------------- what goes in
+# --------------------------------------------------------------------------- input
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """What flows, and what is watched meanwhile.
+    """The system's flow, and what is watched meanwhile.
 
     Parameters
     ----------
@@ -75,21 +75,21 @@ class Equations:
         ``normal(surface, t, y, mode, p, out)`` fills a surface's gradient over y, then its rate in
         t.
     p : Any
-        Parameters, handed on.
+        Parameters, passed on to the functions.
     held : int
         Number of held signs.
     strict : list of bool
-        For each relation whether zero is false.
+        For each relation, whether it is false at zero.
     relations : list of str
         Their names, for messages.
     surfaces : Surfaces
-        What can be slid on.
+        The surfaces that can be slid on.
     knots : list of float
         Times that steps may not jump over.
     jumps : list of float
-        Times at which the flow jumps: the step size starts anew.
+        Times at which the flow jumps; the step size is chosen afresh there.
     seen : int
-        How many numbers `integrators.loop.record` is to observe.
+        Number of values that `integrators.loop.record` observes.
     """
 
     flow: Flow
@@ -107,7 +107,7 @@ class Equations:
     seen: int = 0
 
     def functions(self, located: bool) -> Functions:
-        """Return the functions for a run that stops at crossings, or for one that does not."""
+        """Return the functions for a run with or without located crossings."""
         flow = self.flow if located else self.flow_live
         return Functions(flow, self.arm, self.margins, self.normal, self.p)
 
@@ -121,23 +121,23 @@ class Options:
     method : Tableau or type
         A tableau, or a `scipy.integrate.OdeSolver` class.
     step : float, optional
-        Fixed step; adaptive when left out.
+        Fixed step; adaptive if omitted.
     rtol, max_step : float
-        Of adaptive steps.
+        For adaptive steps.
     atol : list of float, shape (m,)
-        Absolute tolerances of the components; one that is 0 follows the largest value that the
-        component has had, times rtol.
+        Absolute tolerances of the components; a component with tolerance 0 is measured relative to
+        its largest value so far.
     time_scale : float
-        Of the system, s; first steps are chosen by it. 0 if it has none.
+        Time scale of the system, s; used to choose first steps. 0 if it has none.
     max_steps : int
-        How many steps may be tried.
+        Maximum number of attempted steps.
     located : bool
-        Stop at crossings; otherwise the machines are asked once at the end of each step, and take
-        at most one edge each.
+        Stop at crossings; otherwise guards are evaluated once at the end of each step, and each
+        machine takes at most one edge.
     times : list of float, optional
-        Wanted rows; every accepted step when left out.
+        Requested rows; every accepted step if omitted.
     rows_at_once : int
-        How many steps an arc that is yielded holds at most.
+        Maximum number of steps in each arc that is yielded.
     """
 
     method: Tableau | type[Any]
@@ -152,19 +152,19 @@ class Options:
     rows_at_once: int = ROWS_AT_ONCE
 
 
-# --------------------------------------------------------------------------- what comes out
+# --------------------------------------------------------------------------- output
 @dataclass(frozen=True, eq=False)
 class Arc:
-    """Rows between two switches: times, states y (rows, m), and the modes that held."""
+    """Rows between two switches: times, states y (rows, m), and the modes that were active."""
 
     t: list[float]
     y: list[Vector]
-    mode: tuple[int, ...]  # of each machine, then for each surface whether it is slid on
+    mode: tuple[int, ...]  # of each machine, then for each surface whether the motion slides on it
 
 
 @dataclass(frozen=True, eq=False)
 class Stop:
-    """A place where an arc ends: a crossing, either side of a jump, the end of the run."""
+    """The end of an arc: a crossing, either side of a jump, the end of the run."""
 
     t: float
     y: Vector
@@ -173,7 +173,7 @@ class Stop:
 
 @dataclass(frozen=True, eq=False)
 class Slide:
-    """Onto a surface, or off it: the modes from here."""
+    """Start or end of sliding on a surface: the modes from here on."""
 
     t: float
     microstep: int
@@ -183,7 +183,7 @@ class Slide:
 
 @dataclass(frozen=True, eq=False)
 class Firing:
-    """One edge taken: where, when, and both sides of it."""
+    """One edge taken: where, when, and the state on both sides of it."""
 
     t: float
     microstep: int
@@ -199,7 +199,7 @@ Event = Arc | Stop | Slide | Firing
 
 
 class HybridError(Exception):
-    """The run cannot go on; carries the scene."""
+    """The run cannot continue; carries the time, state and modes."""
 
     def __init__(self, message: str, t: float, y: Vector, mode: Sequence[int]) -> None:
         super().__init__(message)
@@ -227,7 +227,7 @@ class Livelock(HybridError):
 
 
 class StepTooSmall(HybridError):
-    """The error estimate asks for steps under the clock's resolution."""
+    """Error control requires steps below the clock's resolution."""
 
 
 class NotFinite(HybridError):
@@ -235,7 +235,7 @@ class NotFinite(HybridError):
 
 
 class TooManySteps(HybridError):
-    """The steps are used up before the end."""
+    """The maximum number of steps was reached before the end."""
 
 
 # --------------------------------------------------------------------------- the loop
@@ -253,9 +253,9 @@ def run(
     Parameters
     ----------
     equations : Equations
-        What flows.
+        The system.
     switch : Switch
-        The machines; asked at the start and after every stop.
+        The machines; their guards are evaluated at the start and after every stop.
     t : float
         Start.
     y, mode : list of float, shape (m,), and of int, shape (n,)
@@ -268,32 +268,32 @@ def run(
     Yields
     ------
     Arc, Stop, Slide or Firing
-        Arcs hold the rows wanted; firings come one per edge, m of them at one time numbered 1..m.
+        Arcs contain the requested rows; each edge gives one firing, numbered from 1 at each time.
 
     Raises
     ------
     Livelock, StepTooSmall, NotFinite, TooManySteps
-        When it cannot go on; all before has been yielded.
+        If it cannot continue; everything before has been yielded.
     """
     return events(equations, switch, buffers(equations, t, y, mode, t_end, options), options)
 
 
 def events(equations: Equations, switch: Switch, b: Buffers, options: Options) -> Iterator[Event]:
-    """Go on from where some buffers are; see `run`.
+    """Continue from the state in some buffers; see `run`.
 
-    Between two events the buffers hold all there is to know of the run (`state_of`).
+    Between two events the buffers contain the complete state of the run (`state_of`).
 
     Parameters
     ----------
     equations, switch, options
         As in `run`.
     b : Buffers
-        From `buffers`, perhaps with a state put back.
+        From `buffers`, possibly with a restored state.
 
     Yields
     ------
     Arc, Stop, Slide or Firing
-        As `run`.
+        As in `run`.
     """
     functions = equations.functions(options.located)
     on = Held(functions, b.now.held, b.sliding)
@@ -344,14 +344,14 @@ def buffers(
     options: Options,
     capacity: int | None = None,
 ) -> Buffers:
-    """Make the buffers of a run, as lists.
+    """Create the buffers of a run, as lists.
 
     Parameters
     ----------
     equations, t, y, mode, t_end, options
         As in `run`.
     capacity : int, optional
-        Room for rows.
+        Capacity for rows.
 
     Returns
     -------
@@ -359,7 +359,7 @@ def buffers(
         Ready for the first call of `integrators.loop.run_to_event`.
     """
     size, n, surfaces = len(y), len(mode), equations.surfaces
-    # Behind the relations of the equations those that end a slide: sigma <= 1 and sigma >= -1.
+    # After the relations of the equations, those that end a slide: sigma <= 1 and sigma >= -1.
     strict = equations.strict + [False] * (2 * min(len(surfaces.sign), MOST_SLIDING))
     plan = _plan(equations, t, t_end, options)
     times = options.times
@@ -387,7 +387,7 @@ def buffers(
             anchor=list(y),
         ),
         relations=watched(strict, size),
-        sliding=room_to_slide(surfaces, size, equations.held, len(strict), equations.seen),
+        sliding=sliding_scratch(surfaces, size, equations.held, len(strict), equations.seen),
         out=Output(
             times=times or [],
             every_step=times is None,
@@ -406,7 +406,7 @@ def buffers(
 
 
 def _plan(equations: Equations, t: float, t_end: float, options: Options) -> Plan:
-    # A SciPy solver needs no coefficients, but the loop's signature does.
+    # A SciPy solver needs no coefficients, but the loop's signature requires them.
     tableau = options.method if isinstance(options.method, Tableau) else EULER
     jumps = [s for s in equations.jumps if options.located and t < s <= t_end]
     control = Control(
@@ -431,17 +431,17 @@ def _plan(equations: Equations, t: float, t_end: float, options: Options) -> Pla
 
 
 def state_of(b: Buffers) -> dict[str, Any]:
-    """Return the lists (or arrays) that say how far a run is; not copies.
+    """Return the lists (or arrays) that make up a run's state, without copying them.
 
     Parameters
     ----------
     b : Buffers
-        Of a run between two events.
+        The buffers of a run between two events.
 
     Returns
     -------
     dict
-        By name; to go on bit for bit, put copies of them back into buffers made alike.
+        By name; to resume bit for bit, copy them back into buffers created in the same way.
     """
     w, s = b.relations, b.sliding
     return {
@@ -459,23 +459,23 @@ def state_of(b: Buffers) -> dict[str, Any]:
 
 
 def modes_of(b: Buffers) -> tuple[int, ...]:
-    """Return the mode of each machine, then for each surface whether it is slid on.
+    """Return the mode of each machine, then for each surface whether the motion slides on it.
 
     Parameters
     ----------
     b : Buffers
-        Of a run.
+        The buffers of a run.
 
     Returns
     -------
     tuple of int
-        What rows are kept with.
+        The modes stored with rows.
     """
     return (*b.now.mode, *b.sliding.flags)
 
 
 def beginning(t: float, t_end: float) -> Vector:
-    """Return `Now.clock` of a run that has not begun."""
+    """Return `Now.clock` for a run that has not started."""
     return [t, 0.0, 1.0, t_end, t, -math.inf]
 
 
@@ -485,24 +485,24 @@ def failure(event: int, b: Buffers, relations: list[str]) -> HybridError:
     Parameters
     ----------
     event : int
-        What `integrators.loop.run_to_event` returned.
+        The value returned by `integrators.loop.run_to_event`.
     b : Buffers
-        Of the run.
+        The buffers of the run.
     relations : list of str
         Their names.
 
     Returns
     -------
     HybridError
-        To be raised.
+        The error to raise.
     """
     memory = b.memory
     counts = memory.counts
     scene = b.now.clock[T], b.now.y, modes_of(b)
     if event == kernel.TOO_SMALL:
-        return StepTooSmall("step size under the clock's resolution", *scene)
+        return StepTooSmall("step size below the clock's resolution", *scene)
     if event == loop.TOO_MANY_STEPS:
-        return TooManySteps(f"{b.plan.max_steps} steps are used up", *scene)
+        return TooManySteps(f"the maximum of {b.plan.max_steps} steps was reached", *scene)
     if event == loop.MACHINE_LIVELOCK:
         machine = counts[loop.MACHINE]
         return Livelock(*scene, machine, memory.switches[machine], [])
@@ -523,17 +523,17 @@ def failure(event: int, b: Buffers, relations: list[str]) -> HybridError:
 
 
 def take_rows(b: Buffers) -> Arc:
-    """Take the rows that wait in the buffers; only whole ones are counted there.
+    """Take the rows waiting in the buffers; only complete ones are counted there.
 
     Parameters
     ----------
     b : Buffers
-        Of the run.
+        The buffers of the run.
 
     Returns
     -------
     Arc
-        Perhaps without rows.
+        Possibly without rows.
     """
     rows = b.out.cursor[kernel.ROW]
     b.out.cursor[kernel.ROW] = 0

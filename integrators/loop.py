@@ -1,9 +1,9 @@
-"""The outer loop as a function that runs until something happens, then comes back.
+"""The outer loop as a function that runs until the next event and then returns.
 
-Ask every machine for an enabled edge, fire, ask again until all is quiet; then freeze the states
-and let the kernel advance to the next stop. All memory lies in arrays, so that the loop can come
-back at every event and be called again: Python's generator (`integrators.hybrid`) hands each event
-to its listener, the compiled engine (`record`) writes it into columns.
+Evaluate the guards of every machine, fire, and repeat until no edge is enabled; then freeze the
+states and let the kernel advance to the next stop. The whole state is kept in arrays, so that the
+loop can return at every event and be called again: Python's generator (`integrators.hybrid`) passes
+each event to its caller, the compiled engine (`record`) writes it into columns.
 """
 
 from __future__ import annotations
@@ -62,29 +62,29 @@ __all__ = [
 ]
 
 MOST_SWITCHES = 100  # of one machine, or of one relation, without progress
-# Switches make no progress where they follow each other by less than this part of the time itself
+# Switches make no progress if successive ones are closer than this part of the time itself
 CLOCK_STANDS = 1e-9
-# ... or by less than this, while the state moves by less than a tenth of its tolerance a switch.
+# ... or closer than this, while the state moves by less than a tenth of its tolerance per switch.
 CLOCK_CRAWLS = 1e-6
 STATE_STANDS = 0.1
 
-# What happened (TOO_SMALL and NOT_FINITE are the kernel's).
+# Events (TOO_SMALL and NOT_FINITE are the kernel's).
 ROWS, FIRING, FIRED, STOPPED, DONE, SLID = 10, 11, 12, 13, 14, 15
 MACHINE_LIVELOCK, RELATION_LIVELOCK, ADVANCE, TOO_MANY_STEPS = 16, 17, 18, 19
-NOTHING = -1  # yet
-# Places in Memory.counts.
+NOTHING = -1  # no event yet
+# Indices into Memory.counts.
 PLACES = 11
 PHASE, MICROSTEP, MACHINE, EDGE, FIRED_ONE, FRESH, STATUS, JUMP, ACTIVE, TAKEN, NEW_ARC = range(
     PLACES
 )
 # Phases.
 START, ASK, PICK, FIRE, SETTLED, BEGIN, ARC, AFTER, JUMPING, FINISH, END = range(11)
-# Places in Log.counts.
+# Indices into Log.counts.
 FIRINGS, STOPS = 0, 1
 
 
 class Switch(Protocol):
-    """The machines, as the loop sees them."""
+    """The interface of the machines to the loop."""
 
     def ask(self, t: float, y: Vector, mode: list[int], p: Any, edges: list[int]) -> None:
         """Fill the first enabled edge of each machine, or -1."""
@@ -94,7 +94,7 @@ class Switch(Protocol):
 
 
 class Machines(NamedTuple):
-    """A `Switch` of two functions, and what a firing is seen by."""
+    """A `Switch` made of two functions, and a function that observes firings."""
 
     ask: Callable[..., Any]
     act: Callable[..., Any]
@@ -102,17 +102,17 @@ class Machines(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What the loop remembers between two calls."""
+    """What the loop stores between two calls."""
 
-    counts: list[int]  # see the places above
+    counts: list[int]  # see the indices above
     edges: list[int]  # the enabled edge of each machine, or -1
     switches: list[int]  # firings of each machine since the time Now.clock[ANCHOR]
-    changes: list[int]  # changes of each relation since then
-    anchor: Vector  # the state then
+    changes: list[int]  # changes of each relation since that time
+    anchor: Vector  # the state at that time
 
 
 class Buffers(NamedTuple):
-    """All that one run needs besides the system's functions; changed in place."""
+    """Everything that one run needs besides the system's functions; changed in place."""
 
     plan: Plan
     now: Now
@@ -124,16 +124,16 @@ class Buffers(NamedTuple):
 
 
 class Log(NamedTuple):
-    """Columns that `record` fills: one entry a firing, and both sides of every stop."""
+    """Columns that `record` fills: one entry per firing, and both sides of every stop."""
 
     counts: list[int]  # [firings, stops]
     t: Vector
     machine: list[int]
     edge: list[int]
     numbers: list[Vector]  # [own variable, seen 0, own seen, seen 1 before, seen 1 after]
-    seen: Vector  # scratch of `observe`
-    rows_microstep: list[int]  # beside the rows of Output
-    rows_mode: list[list[int]]  # of each machine, then for each surface whether it is slid on
+    seen: Vector  # scratch space for `observe`
+    rows_microstep: list[int]  # alongside the rows of Output
+    rows_mode: list[list[int]]  # of each machine, then for each surface whether it slides
     stops_t: Vector
     stops_microstep: list[int]
     stops_y: list[Vector]
@@ -143,7 +143,7 @@ class Log(NamedTuple):
 def run_to_event(
     functions: Functions, switch: Switch, motion: Motion, b: Buffers, most_steps: int
 ) -> int:
-    """Run until something happens.
+    """Run until the next event.
 
     Parameters
     ----------
@@ -152,20 +152,20 @@ def run_to_event(
     switch : Switch
         Its machines.
     motion : Motion
-        How to flow and what is watched: `flow_on`, `margins_on` and a `Held`. While nothing is slid
-        on, those of the system itself do the same in less time.
+        The flow and what is watched: `flow_on`, `margins_on` and a `Held`. While nothing slides,
+        the functions of the system itself do the same in less time.
     b : Buffers
-        The run, changed in place.
+        The state of the run, changed in place.
     most_steps : int
-        Come back after so many steps at most.
+        Return after at most this many steps.
 
     Returns
     -------
     int
-        ROWS (to be taken, all of the present mode; possibly none when the steps are used up),
+        ROWS (to be taken, all with the present mode; possibly none if the steps are used up),
         FIRING (before) and FIRED (after an edge), STOPPED (a crossing, either side of a jump),
-        SLID (onto a surface or off it), ADVANCE (a foreign solver is to go on), DONE; or the error
-        TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK, RELATION_LIVELOCK, TOO_MANY_STEPS.
+        SLID (sliding started or ended), ADVANCE (a foreign solver must continue), DONE; or the
+        error TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK, RELATION_LIVELOCK, TOO_MANY_STEPS.
     """
     plan, now, memory = b.plan, b.now, b.memory
     relations, sliding, scratch = b.relations, b.sliding, b.scratch
@@ -216,7 +216,7 @@ def run_to_event(
 
 
 # --------------------------------------------------------------------------- one helper per phase
-# They are handed what they need, not all the buffers: a call hands on every array by itself.
+# They take only what they need, not all the buffers: every array is passed separately in a call.
 def _start(plan: Plan, now: Now, counts: list[int], out: Output) -> None:
     counts[PHASE] = ASK
     counts[FRESH] = 1
@@ -240,13 +240,13 @@ def _pick(plan: Plan, counts: list[int], edges: list[int]) -> int:
 
 
 def _fired(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> int:
-    """Count the edge just taken."""
+    """Count the edge that was just taken."""
     counts, i = memory.counts, memory.counts[MACHINE]
     counts[MICROSTEP] += 1
     counts[FIRED_ONE] = 1
     counts[FRESH] = 1
     counts[PHASE] = PICK
-    _look_at_clock(now, memory)
+    _reset_if_advanced(now, memory)
     memory.switches[i] += 1
     if memory.switches[i] >= MOST_SWITCHES and _no_progress(plan, now, memory, scratch):
         counts[PHASE] = AFTER
@@ -255,12 +255,12 @@ def _fired(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> int:
 
 
 def _choose_stop(plan: Plan, clock: Vector, counts: list[int]) -> None:
-    """All machines are quiet: on to the next jump, or to the end."""
+    """Choose the next stop once no edge is enabled: the next jump, or the end."""
     t, jumps = clock[T], plan.jumps
     if t >= plan.t_end:
         counts[PHASE] = FINISH
         return
-    # A step that ends on a jump would see the value behind it: stop one clock tick before.
+    # A step that ends on a jump would see the value after it: stop one clock tick before.
     while counts[JUMP] < len(jumps) and jumps[counts[JUMP]] <= t:
         counts[JUMP] += 1
     clock[T_STOP] = plan.t_end
@@ -273,7 +273,7 @@ def _choose_stop(plan: Plan, clock: Vector, counts: list[int]) -> None:
 def _rearm(
     functions: Functions, now: Now, relations: Watched, sliding: Sliding, counts: list[int]
 ) -> int:
-    """Hold signs, choose what to watch and to slide on, remember the truth of what is watched."""
+    """Freeze signs, choose what to watch and to slide on, store the truth values watched."""
     surfaces, watch, p = sliding.surfaces, relations.watch, functions.p
     t, y = now.clock[T], now.y
     mode, held = now.mode, now.held
@@ -298,14 +298,14 @@ def _rearm(
     for r in w.active:
         g = w.start[r]
         w.truth[r] = g > 0.0 or (g == 0.0 and not w.strict[r])
-    for k in range(len(surfaces.sign)):  # one met exactly is left to the side of its sign
+    for k in range(len(surfaces.sign)):  # one met exactly is left on the side of its sign
         sign = held[surfaces.sign[k]]
         if watch[surfaces.above[k]] and sign != 0.0:
             w.truth[surfaces.above[k]] = w.truth[surfaces.at_least[k]] = sign > 0.0
     if _undefined(w):
         counts[PHASE] = AFTER
         counts[STATUS] = NOT_FINITE
-    elif slid:  # y lies on the surface now: whoever compares with it has to be asked again
+    elif slid:  # y is on the surface now: comparisons with it must be evaluated again
         counts[PHASE] = ASK
         return SLID
     return NOTHING
@@ -323,7 +323,7 @@ def _list(relations: Watched, counts: list[int]) -> Watched:
 
 
 def _undefined(w: Watched) -> bool:
-    """Tell whether a comparison that keeps a guard false is of NaN: it would never turn true."""
+    """Return whether a comparison that keeps a guard false is NaN: it would never turn true."""
     undefined = False
     for r in w.active:
         undefined = undefined or w.start[r] != w.start[r]
@@ -331,7 +331,7 @@ def _undefined(w: Watched) -> bool:
 
 
 def _begin_arc(motion: Motion, plan: Plan, now: Now, scratch: Scratch, counts: list[int]) -> int:
-    """Behind a switch or a jump fill the slope and choose the first step."""
+    """Compute the slope and choose the first step after a switch or a jump."""
     control, clock = plan.control, now.clock
     counts[PHASE] = ARC
     if plan.located or counts[FRESH] == 1:
@@ -339,7 +339,7 @@ def _begin_arc(motion: Motion, plan: Plan, now: Now, scratch: Scratch, counts: l
         counts[FRESH] = 0
         if not plan.foreign:
             motion.flow(clock[T], now.y, now.mode, now.held, motion.p, now.f)
-            # Without location the solver knows of no switch: it keeps its step.
+            # Without location the solver knows nothing of switches: it keeps its step.
             if control.step <= 0.0 and (plan.located or clock[H] <= 0.0):
                 clock[ERROR_BEFORE] = 1.0
                 clock[H] = starting_step(motion, plan.method.error_order, control, now, scratch)
@@ -347,13 +347,13 @@ def _begin_arc(motion: Motion, plan: Plan, now: Now, scratch: Scratch, counts: l
 
 
 def _steps_ahead(plan: Plan, cursor: list[int], most_steps: int) -> int:
-    """Return how many steps may be taken at once."""
+    """Return how many steps may be taken in one call."""
     left = plan.max_steps - cursor[STEPS]
     return min(most_steps, left) if plan.located else min(1, left)
 
 
 def _flowed(plan: Plan, counts: list[int], steps: int) -> int:
-    """Tell whether the arc goes on; a foreign solver has taken its steps before."""
+    """Return whether the arc continues; a foreign solver has already taken its steps."""
     counts[MICROSTEP] = 0
     if steps <= 0:
         return TOO_MANY_STEPS
@@ -364,7 +364,7 @@ def _flowed(plan: Plan, counts: list[int], steps: int) -> int:
 
 
 def _end_arc(plan: Plan, clock: Vector, counts: list[int], often: bool) -> int:
-    """Tell why the arc has ended."""
+    """Return the reason for the end of the arc."""
     status = counts[STATUS]
     if status in (TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK):
         return status
@@ -373,14 +373,14 @@ def _end_arc(plan: Plan, clock: Vector, counts: list[int], often: bool) -> int:
         counts[PHASE] = JUMPING
         return STOPPED
     if status == FULL and not plan.located:
-        return ROWS  # perhaps none, but a caller may want to breathe
+        return ROWS  # possibly none; yields control to the caller
     if status == CROSSED:
         return RELATION_LIVELOCK if often else STOPPED
     return NOTHING
 
 
 def _jump(plan: Plan, now: Now, counts: list[int], out: Output) -> int:
-    """Go over a jump of the flow."""
+    """Pass a jump of the flow."""
     now.clock[T] = plan.jumps[counts[JUMP]]
     counts[PHASE] = ASK
     if out.every_step:
@@ -389,7 +389,7 @@ def _jump(plan: Plan, now: Now, counts: list[int], out: Output) -> int:
 
 
 def _finish(now: Now, counts: list[int], out: Output) -> None:
-    """Write the rows wanted at the end itself."""
+    """Write the rows requested for the end itself."""
     counts[PHASE] = END
     t, cursor = now.clock[T], out.cursor
     while cursor[NEXT_TIME] < len(out.times) and out.times[cursor[NEXT_TIME]] <= t:
@@ -398,15 +398,15 @@ def _finish(now: Now, counts: list[int], out: Output) -> None:
 
 
 # --------------------------------------------------------------------------- progress
-def _look_at_clock(now: Now, memory: Memory) -> None:
-    """Count anew where time has gone on since the last switch."""
+def _reset_if_advanced(now: Now, memory: Memory) -> None:
+    """Restart the count of switches if time has advanced since the last one."""
     t = now.clock[T]
     if t - now.clock[SWITCHED] > CLOCK_CRAWLS * abs(t):
-        _count_anew(now, memory)
+        _reset_counts(now, memory)
     now.clock[SWITCHED] = t
 
 
-def _count_anew(now: Now, memory: Memory) -> None:
+def _reset_counts(now: Now, memory: Memory) -> None:
     now.clock[ANCHOR] = now.clock[T]
     for j in range(len(now.y)):
         memory.anchor[j] = now.y[j]
@@ -417,7 +417,7 @@ def _count_anew(now: Now, memory: Memory) -> None:
 
 
 def _no_progress(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> bool:
-    """Tell whether the switches counted led nowhere; if they led on, count anew from here."""
+    """Return whether the counted switches made no progress; otherwise restart the count here."""
     y, anchor, moved = now.y, memory.anchor, scratch.error
     t, elapsed = now.clock[T], now.clock[T] - now.clock[ANCHOR]
     stands = elapsed <= MOST_SWITCHES * CLOCK_STANDS * abs(t)
@@ -427,7 +427,7 @@ def _no_progress(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> bool
         distance = error_norm(moved, 1.0, y, anchor, plan.control.rtol, now.floor)
         stands = distance <= MOST_SWITCHES * STATE_STANDS
     if not stands:
-        _count_anew(now, memory)
+        _reset_counts(now, memory)
     return stands
 
 
@@ -440,9 +440,9 @@ def _often_changed(
     memory: Memory,
     scratch: Scratch,
 ) -> bool:
-    """Count the relations that have just changed; tell whether one has too often."""
+    """Count the relations that have just changed; return whether one has changed too often."""
     changes, probe, surfaces = memory.changes, w.search.probe, sliding.surfaces
-    _look_at_clock(now, memory)
+    _reset_if_advanced(now, memory)
     motion.margins(now.clock[T], now.y, now.mode, motion.p, w.watch, probe)
     often = False
     for r in w.active:
@@ -470,34 +470,34 @@ def record(
     most_steps: int,
     pause: bool,
 ) -> int:
-    """Run on, writing all that happens into columns, until they are full or the run has ended.
+    """Run and write all events into columns, until they are full or the run has ended.
 
     Parameters
     ----------
     functions, machines
-        The system. ``observe(t, y, mode, signs, p, seen)`` fills what is seen of a state; the log
-        keeps seen[0], seen[1] on both sides of a firing and, of machine i, seen[2 + i] and
-        y[first + i].
+        The system. ``observe(t, y, mode, signs, p, seen)`` fills the observed values of a state;
+        the log stores seen[0], seen[1] on both sides of a firing and, for machine i, seen[2 + i]
+        and y[first + i].
     b : Buffers
-        The run, changed in place.
+        The state of the run, changed in place.
     log : Log
-        Filled; with room in ``stops_t`` stops are kept too.
+        Filled; if it has room in ``stops_t``, stops are stored too.
     first : int
-        Where the machines' own variables start in y.
+        Index in y where the machines' own variables start.
     most_steps : int
-        Come back after about so many steps or events.
+        Return after about this many steps or events.
     pause : bool
-        Come back before each firing too.
+        Return before each firing as well.
 
     Returns
     -------
     int
-        ROWS when a column is full or the steps are used up, FIRING, DONE or an error as
+        ROWS if a column is full or the steps are used up, FIRING, DONE or an error as in
         `run_to_event`.
     """
     observe, now = machines.observe, b.now
     counts, cursor = b.memory.counts, b.out.cursor
-    seen_at = float("nan")  # the time log.seen is of
+    seen_at = float("nan")  # the time at which log.seen was computed
     on = Held(functions, now.held, b.sliding)
     motion = Motion(flow_on, margins_on, on)
     left = most_steps
@@ -537,7 +537,7 @@ def record(
 
 
 def _is_full(out: Output, log: Log) -> bool:
-    """Tell whether a column has no room for what may come next."""
+    """Return whether a column has no room for the next event."""
     if out.every_step and out.cursor[ROW] + 1 >= len(out.rows_t):
         return True
     if log.counts[FIRINGS] >= len(log.t):
@@ -546,7 +546,7 @@ def _is_full(out: Output, log: Log) -> bool:
 
 
 def _put_firing(now: Now, counts: list[int], log: Log, first: int) -> None:
-    """Write what is known before a firing."""
+    """Write the values known before a firing."""
     i, row = counts[MACHINE], log.counts[FIRINGS]
     numbers = log.numbers[row]
     log.t[row] = now.clock[T]

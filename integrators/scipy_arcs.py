@@ -1,7 +1,6 @@
 """The same outer loop over any `scipy.integrate.OdeSolver`: RK45, DOP853, Radau, BDF, LSODA.
 
-For stiff systems. The solver chooses its steps; crossings
-are located on its own dense output.
+For stiff systems. The solver chooses its steps; crossings are located on its dense output.
 """
 
 from __future__ import annotations
@@ -42,12 +41,12 @@ __all__ = ["SciPyStepper"]
 
 
 class SciPyStepper:
-    """Takes the steps of a run by a SciPy solver.
+    """Takes the steps of a run with a SciPy solver.
 
     Parameters
     ----------
     on, buffers, options
-        The system on its surfaces, and the run. With a fixed ``step`` the solver is led from grid
+        The system on its surfaces, and the run. With a fixed ``step`` the solver goes from grid
         point to grid point (it keeps its error control, so it may take several steps to each).
     """
 
@@ -60,7 +59,7 @@ class SciPyStepper:
     def advance(self, most_steps: int) -> None:
         """Step until the next stop, a crossing, a full buffer or most_steps steps."""
         counts = self.buffers.memory.counts
-        if counts[NEW_ARC]:  # after a stop the old solver's step and history mean nothing
+        if counts[NEW_ARC]:  # after a stop the old solver's step and history are invalid
             self.solver = None
             counts[NEW_ARC] = 0
         counts[STATUS] = self._advance(most_steps)
@@ -122,7 +121,7 @@ class SciPyStepper:
                 path = Path(motion, now.mode, _interpolate, dense, t, t_new, y_new)
                 theta = first_change(path, w, tick)
             if theta < REDO and not redone and theta * (t_new - t) > AT_ONCE * tick:
-                # As in the kernel: the solver's stages lay behind the crossing.
+                # As in the kernel: the solver's stages lay beyond the crossing.
                 self.solver, redone = None, True
                 ahead = t + theta * (t_new - t)
                 continue

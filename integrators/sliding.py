@@ -1,15 +1,15 @@
 """Motion along a surface where the flow jumps and pushes back from both sides (Filippov).
 
-A surface is u(t, y) = 0, and the flow depends on the sign of u. Where the flow of either side leads
-onto the surface, the solution goes on along it: with a number sigma from -1 to 1 in place of the
-sign, such that du/dt = 0. It leaves where sigma reaches 1 or -1. Flows that are not linear in the
+A surface is u(t, y) = 0, and the flow depends on the sign of u. Where the flow on either side leads
+onto the surface, the solution continues along it, with the sign replaced by a number sigma from -1
+to 1 such that du/dt = 0. It leaves where sigma reaches 1 or -1. Flows that are not linear in the
 sign are combined as Filippov does: the mean of both sides plus sigma times half their difference,
 which is the same where they are linear.
 
-Several surfaces are slid on at once by as many sigmas, from a linear system of that size.
+Sliding on several surfaces at once takes as many sigmas, from a linear system of that size.
 
-Roads not taken: to let the sign chatter costs a switch a clock tick; to smooth it by a steep ramp
-changes the solution and makes the system stiff.
+Alternatives considered: letting the sign chatter costs one switch per clock tick; smoothing it by a
+steep ramp changes the solution and makes the system stiff.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ __all__ = [
     "flow_on",
     "look",
     "margins_on",
-    "room_to_slide",
     "seize",
+    "sliding_scratch",
     "slope_on",
 ]
 
 MOST_SLIDING = 32  # surfaces at once
-LIVE = 2.0  # in place of a held sign: take the sign of what is seen
-BEYOND = 2.0  # sigma is cut here: behind 1 it only has to say that it is
-# Rows of the scratch table behind three a surface (its gradient over y and rate in t; half the
-# difference of both sides; its line of the linear system): du/dt with all their signs 0, how du/dt
-# answers to the own sign, what flows and what is seen on either side, a slope.
+LIVE = 2.0  # in place of a held sign: evaluate the sign live
+BEYOND = 2.0  # sigma is clipped here: above 1 only the fact matters
+# Rows of the scratch table after three per surface (its gradient over y and rate in t; half the
+# difference of both sides; its row of the linear system): du/dt with all their signs 0, the
+# response of du/dt to its own sign, flow and observed values on either side, a slope.
 RATES, GAINS, UPPER, LOWER, SEEN_UPPER, SEEN_LOWER, SLOPE = range(7)
 NORMAL, COLUMN, MATRIX = range(3)
 
@@ -56,35 +56,35 @@ class Functions(NamedTuple):
 
 
 class Surfaces(NamedTuple):
-    """The surfaces that can be slid on."""
+    """The surfaces on which the motion can slide."""
 
-    sign: list[int]  # the place of each one's sign among the held signs, shape (S,)
+    sign: list[int]  # the index of each one's sign among the held signs, shape (S,)
     above: list[int]  # its relation u > 0, shape (S,)
     at_least: list[int]  # its relation u >= 0, shape (S,)
 
 
 class Sliding(NamedTuple):
-    """Which surfaces are slid on, and scratch for it."""
+    """The surfaces on which the motion slides, with scratch space."""
 
     surfaces: Surfaces
-    which: list[int]  # those slid on; in the last place how many, shape (MOST_SLIDING + 1,)
-    sigma: Vector  # in place of their signs, shape (MOST_SLIDING,)
-    table: list[Vector]  # scratch, see the rows above
-    flags: list[int]  # whether each is slid on, shape (S,)
+    which: list[int]  # the sliding surfaces; their number in the last entry, (MOST_SLIDING + 1,)
+    sigma: Vector  # replaces their signs, shape (MOST_SLIDING,)
+    table: list[Vector]  # scratch space, see the rows above
+    flags: list[int]  # whether the motion slides on each, shape (S,)
     arrived: list[int]  # whether each has just been reached, shape (S,)
-    live: Vector  # signs, all to be taken as they are seen
-    watch: list[int]  # flags that nobody reads, shape (r,)
+    live: Vector  # signs, all set to LIVE
+    watch: list[int]  # unused flags, shape (r,)
 
 
 class Held(NamedTuple):
-    """A system on the surfaces it slides on: what `flow_on` and `margins_on` take as parameters."""
+    """A system on the surfaces it slides on: the parameters of `flow_on` and `margins_on`."""
 
     functions: Functions
     held: Vector
     sliding: Sliding
 
 
-def room_to_slide(
+def sliding_scratch(
     surfaces: Surfaces,
     size: int,
     signs: int,
@@ -92,25 +92,25 @@ def room_to_slide(
     seen: int,
     flags: Sequence[int] = (),
 ) -> Sliding:
-    """Return scratch for sliding; small if there is nothing to slide on.
+    """Return scratch space for sliding; small if there are no surfaces.
 
     Parameters
     ----------
     surfaces : Surfaces
-        Of the system.
+        The surfaces of the system.
     size : int
         Length of the state vector.
     signs, relations : int
-        How many signs are held, and how many comparisons can be watched.
+        Number of held signs, and of comparisons that can be watched.
     seen : int
-        How many numbers are observed.
+        Number of observed values.
     flags : sequence of int, optional
-        Whether each surface is slid on; on none when left out.
+        Whether the motion slides on each surface; on none if omitted.
 
     Returns
     -------
     Sliding
-        Of lists.
+        Made of lists.
     """
     number = len(surfaces.sign)
     most = min(number, MOST_SLIDING)
@@ -130,14 +130,14 @@ def room_to_slide(
 
 # --------------------------------------------------------------------------- along the surfaces
 def slope_on(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None:
-    """Fill dy along the surfaces slid on, and the sigmas that keep it there.
+    """Fill dy along the surfaces slid on, and the sigmas that keep the motion on them.
 
     Parameters
     ----------
     on : Held
-        The system; the signs held of these surfaces become their sigmas.
+        The system; the held signs of these surfaces are replaced by their sigmas.
     t, y, mode
-        Handed on.
+        Passed on to the flow.
     dy : list of float, shape (m,)
         Filled.
     """
@@ -152,7 +152,7 @@ def slope_on(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None
     upper, lower = table[first + UPPER], table[first + LOWER]
     for c in range(count):
         held[sign[which[c]]] = 0.0
-    # A mean that is right for any sum of functions of one sign each.
+    # A mean that is exact for any sum of functions of one sign each.
     if count == 1:
         for j in range(size):
             dy[j] = 0.0
@@ -191,7 +191,7 @@ def slope_on(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None
         column = table[COLUMN * most + c]
         for j in range(size):
             dy[j] += sigma[c] * column[j]
-    for r in range(count):  # what rounding leaves across the surface: v itself does not move
+    for r in range(count):  # rounding errors normal to the surface: v itself does not move
         g = table[NORMAL * most + r]
         rate, square = g[size], 0.0
         for j in range(size):
@@ -203,7 +203,7 @@ def slope_on(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None
 
 
 def _solve(table: list[Vector], first: int, count: int, out: Vector) -> None:
-    """Solve a small linear system, right side in the last column; cut what is beyond."""
+    """Solve a small linear system, right side in the last column; clip large values."""
     for c in range(count):
         best = c
         for r in range(c + 1, count):
@@ -228,17 +228,17 @@ def _solve(table: list[Vector], first: int, count: int, out: Vector) -> None:
             rest -= row[c] * out[c]
         if row[r] != 0.0:
             out[r] = min(max(rest / row[r], -BEYOND), BEYOND)
-        else:  # the sign has no hold on it
+        else:  # the sign has no effect on it
             out[r] = 0.0 if rest == 0.0 else BEYOND
 
 
 def flow_on(t: float, y: Vector, mode: list[int], held: Vector, on: Held, dy: Vector) -> None:
-    """Fill dy, along the surfaces if some are slid on: a flow like any other.
+    """Fill dy, along the surfaces if the motion slides on some; usable as a flow.
 
     Parameters
     ----------
     t, y, mode, held, dy
-        As of a flow.
+        As for a flow.
     on : Held
         The system, as the parameters.
     """
@@ -251,12 +251,12 @@ def flow_on(t: float, y: Vector, mode: list[int], held: Vector, on: Held, dy: Ve
 def margins_on(
     t: float, y: Vector, mode: list[int], on: Held, watch: list[int], out: Vector
 ) -> None:
-    """Fill the watched margins; behind them, of each surface slid on, 1 - sigma and 1 + sigma.
+    """Fill the watched margins and, after them, 1 - sigma and 1 + sigma of each sliding surface.
 
     Parameters
     ----------
     t, y, mode, watch, out
-        As of margins.
+        As for margins.
     on : Held
         The system, as the parameters.
     """
@@ -272,27 +272,27 @@ def margins_on(
         out[first + 2 * c + 1] = 1.0 + sigma[c]
 
 
-# --------------------------------------------------------------------------- getting on and off
+# --------------------------------------------------------------------------- start, end of sliding
 def seize(on: Held, now: Now, w: Watched) -> bool:
     """Choose the surfaces to slide on from here, and put y onto them.
 
-    Those are candidates that were slid on, have just been reached, or are met exactly. One that
-    does not attract, or whose sigma lies beyond 1, is let go again: its sign is that of the side
-    the flow takes.
+    They are candidates that were slid on, have just been reached, or are met exactly. One that does
+    not attract, or whose sigma lies beyond 1, is released again: its sign is that of the side to
+    which the flow leads.
 
     Parameters
     ----------
     on : Held
-        The system, and what it slides on; the signs held of candidates are set.
+        The system, and what it slides on; the held signs of candidates are set.
     now : Now
-        Where the run is; y is moved onto the surfaces, which it has left by rounding only.
+        The state of the run; y is moved onto the surfaces, which it left only by rounding.
     w : Watched
-        Armed, ``w.start`` filled with margins.
+        Armed, with ``w.start`` filled with margins.
 
     Returns
     -------
     bool
-        Whether other surfaces are slid on than before.
+        Whether the set of sliding surfaces has changed.
     """
     t, y, mode = now.clock[T], now.y, now.mode
     held, sliding, surfaces = on.held, on.sliding, on.sliding.surfaces
@@ -329,7 +329,7 @@ def seize(on: Held, now: Now, w: Watched) -> bool:
         dy, g = table[3 * most + SLOPE], table[3 * most + RATES]
         flow_on(t, y, mode, held, on, dy)
         for c in range(count, candidates):
-            # On a surface that another one keeps it on, such as a mere corner at v = 0 beside
+            # On a surface on which another one keeps it, for example a mere corner at v = 0 next to
             # sgn(v), it goes to neither side.
             on.functions.normal(which[c], t, y, mode, on.functions.p, g)
             rate = g[size]
@@ -340,7 +340,7 @@ def seize(on: Held, now: Now, w: Watched) -> bool:
                 square += g[j] * g[j]
             if rate == 0.0 and u == 0.0:
                 held[surfaces.sign[which[c]]] = 0.0
-            elif sliding.flags[which[c]] == 1 and square > 0.0:  # left without what errors added
+            elif sliding.flags[which[c]] == 1 and square > 0.0:  # left only by accumulated errors
                 for j in range(size):
                     y[j] -= g[j] * (u / square)
     changed = False
@@ -367,20 +367,20 @@ def _sign(u: float) -> float:
     return -1.0 if u < 0.0 else 0.0
 
 
-# --------------------------------------------------------------------------- seeing
+# --------------------------------------------------------------------------- observing
 def look(
     observe: Callable[..., Any], on: Held, t: float, y: Vector, mode: list[int], out: Vector
 ) -> None:
-    """Observe a state: with live signs, but on surfaces with their sigmas.
+    """Observe a state: with live signs, but with sigmas on sliding surfaces.
 
     Parameters
     ----------
     observe : callable
-        ``observe(t, y, mode, signs, p, out)``; a sign that is `LIVE` it takes as it sees it.
+        ``observe(t, y, mode, signs, p, out)``; a sign equal to `LIVE` is evaluated live.
     on : Held
-        The system, and what it slides on; the signs held beside those slid on are filled.
+        The system, and what it slides on; the held signs other than those are filled.
     t, y, mode
-        Handed on.
+        Passed on to `observe`.
     out : list of float
         Filled.
     """

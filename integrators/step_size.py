@@ -1,4 +1,4 @@
-"""Step sizes: where to start, how to go on.
+"""Step-size control: the first step and the following ones.
 
 References
 ----------
@@ -15,13 +15,13 @@ from integrators.steps import T_STOP, Motion, Now, Scratch, T, Vector
 __all__ = ["Control", "error_norm", "next_factor", "retry_factor", "starting_step"]
 
 SAFETY = 0.9
-LEAST, MOST = 0.2, 10.0  # a step shrinks or grows by no more than this
+LEAST, MOST = 0.2, 10.0  # limits of the change from one step to the next
 INFINITY = float("inf")
 NO_TOLERANCE = 1e100
 
 
 class Control(NamedTuple):
-    """How steps are chosen."""
+    """Settings of the step-size control."""
 
     step: float  # fixed grid if > 0, else adaptive
     origin: float  # where the grid starts
@@ -36,23 +36,23 @@ def error_norm(
 ) -> float:
     """Return the largest component of h error in units of its tolerance; infinity if not finite.
 
-    The maximum, not the mean: one component in trouble among many at rest has to count.
+    The maximum, not the mean: one bad component among many at rest must count.
 
     Parameters
     ----------
     error, y, y_new : list of float, shape (m,)
-        Error estimate per step length, and the state at both ends of the step.
+        Error estimate per unit step length, and the state at both ends of the step.
     h : float
         The step's length.
     rtol : float
         Relative tolerance.
     atol : list of float, shape (m,)
-        Absolute tolerances; with 0 a component that is 0 at both ends must have no error.
+        Absolute tolerances; if 0, a component that is 0 at both ends must have no error.
 
     Returns
     -------
     float
-        At most 1 for a step that is good enough.
+        At most 1 for an acceptable step.
 
     Examples
     --------
@@ -75,19 +75,19 @@ def error_norm(
 
 
 def next_factor(error: float, error_before: float, order: int) -> float:
-    """Return the growth after an accepted step (PI control).
+    """Return the growth factor after an accepted step (PI control).
 
     Parameters
     ----------
     error, error_before : float
-        Norms of this step's error and of the one before.
+        Norms of this step's error and of the previous one's.
     order : int
         The error shrinks like h ** order.
 
     Returns
     -------
     float
-        From LEAST to MOST.
+        Between LEAST and MOST.
 
     Examples
     --------
@@ -100,7 +100,7 @@ def next_factor(error: float, error_before: float, order: int) -> float:
 
 
 def retry_factor(error: float, order: int) -> float:
-    """Return the shrinkage after a rejected step.
+    """Return the reduction factor after a rejected step.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def retry_factor(error: float, order: int) -> float:
     Returns
     -------
     float
-        From LEAST to SAFETY.
+        Between LEAST and SAFETY.
 
     Examples
     --------
@@ -130,12 +130,12 @@ def starting_step(
 ) -> float:
     """Return the usual starting step, from the size of y, y' and y''.
 
-    No second of its own: with all times multiplied by a power of two it gives that multiple.
+    It contains no time constant: if all times are multiplied by a power of two, so is the step.
 
     Parameters
     ----------
     motion : Motion
-        What flows.
+        The flow.
     order : int
         Exponent of the step's error.
     control : Control
@@ -143,7 +143,7 @@ def starting_step(
     now : Now
         Time, state and slope at the start, and the next stop.
     scratch : Scratch
-        A state and a slope are tried there.
+        Used for a trial state and slope.
 
     Returns
     -------
@@ -151,7 +151,7 @@ def starting_step(
         A step, > 0.
     """
     t = now.clock[T]
-    # Where the system has a scale, how far there is to go does not count: the kernel cuts.
+    # If the system has a scale, the remaining time does not matter: the kernel cuts the step.
     time_scale = control.time_scale if control.time_scale > 0.0 else now.clock[T_STOP] - t
     y, f = now.y, now.f
     y_try, f_try = scratch.y_new, scratch.f_new
@@ -159,9 +159,9 @@ def starting_step(
     d0 = error_norm(y, 1.0, y, y, rtol, atol)
     d1 = error_norm(f, 1.0, y, y, rtol, atol)
     h = min(time_scale, longest)
-    if not d1 * h < NO_TOLERANCE:  # y is 0 and has no scale: nothing to measure by
+    if not d1 * h < NO_TOLERANCE:  # y is 0 and has no scale: there is no reference size
         return 1e-3 * h
-    if d1 > 0.0:  # until y has moved by a hundredth, or by a tolerance where it is next to zero
+    if d1 > 0.0:  # until y has moved by a hundredth, or by a tolerance if it is almost zero
         h = min(h, 0.01 * max(d0, 100.0) / d1)
     else:  # nothing moves yet
         h = 1e-6 * h
@@ -172,7 +172,7 @@ def starting_step(
         f_try[j] = (f_try[j] - f[j]) / h
     d2 = error_norm(f_try, 1.0, y, y, rtol, atol)
     if not d2 < INFINITY:
-        return LEAST * h  # the look ahead went too far
+        return LEAST * h  # the trial step went too far
     steepest = max(time_scale * d1, time_scale * time_scale * d2)
     better = 1e-3 * h if steepest <= 1e-15 else time_scale * (0.01 / steepest) ** (1.0 / order)
     return min(100.0 * h, better, longest)

@@ -1,7 +1,7 @@
-"""One explicit Runge-Kutta step and the dense output inside it.
+"""One explicit Runge-Kutta step and its dense output.
 
 Plain loops over indexable numbers: Python runs them on lists, a compiler on arrays, with the same
-result to the last bit (sums run in order, nothing is reassociated).
+result to the last bit (sums are evaluated in order, nothing is reassociated).
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ __all__ = [
 Vector = list[float]
 Flow = Callable[..., Any]  # flow(t, y, mode, held, p, dy) -> None, fills dy
 Margins = Callable[..., Any]  # margins(t, y, mode, p, watch, out) -> None, fills watched entries
-# Places in Now.clock: the time, the next step, the controller's error, the next stop; since when
-# switches are counted, and when the last one was.
+# Indices into Now.clock: the time, the next step, the controller's error, the next stop; the time
+# since which switches are counted, and the time of the last one.
 T, H, ERROR_BEFORE, T_STOP, ANCHOR, SWITCHED = range(6)
 
 
 class Coefficients(NamedTuple):
-    """A tableau as the kernel takes it."""
+    """A tableau in the form that the kernel uses."""
 
     A: tuple[Row, ...]
     B: Row
     C: Row
     E: Row
     D: Row
-    error_order: int  # the error of one step shrinks like h ** error_order
+    error_order: int  # the error of one step is proportional to h ** error_order
 
 
 class Dense(NamedTuple):
@@ -53,7 +53,7 @@ class Dense(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """What flows on an arc and what is watched meanwhile, with the parameters of both."""
+    """The flow on an arc and what is watched meanwhile, with the parameters of both."""
 
     flow: Flow
     margins: Margins
@@ -61,18 +61,18 @@ class Motion(NamedTuple):
 
 
 class Now(NamedTuple):
-    """Where a run is; changed in place."""
+    """The state of a run; changed in place."""
 
-    clock: Vector  # see the places above
+    clock: Vector  # see the indices above
     y: Vector  # state, shape (m,)
     f: Vector  # slope, shape (m,)
     mode: list[int]  # of each machine, shape (n,); frozen within a step
     held: Vector  # signs; frozen within a step
-    floor: Vector  # absolute tolerances, shape (m,); without a scale they grow with the component
+    floor: Vector  # absolute tolerances, shape (m,); they grow for components without a scale
 
 
 class Scratch(NamedTuple):
-    """The step that is tried."""
+    """The attempted step."""
 
     k: list[Vector]  # slopes of the stages, shape (stages, m)
     y_new: Vector
@@ -82,7 +82,7 @@ class Scratch(NamedTuple):
 
 
 def coefficients(tableau: Tableau) -> Coefficients:
-    """Return a tableau as the kernel takes it.
+    """Return a tableau in the form that the kernel uses.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def coefficients(tableau: Tableau) -> Coefficients:
 def take_step(
     motion: Motion, method: Coefficients, now: Now, t_new: float, scratch: Scratch
 ) -> None:
-    """Step from where a run is to t_new.
+    """Step from the present state to t_new.
 
     Parameters
     ----------
@@ -111,9 +111,9 @@ def take_step(
     now : Now
         Time, state and slope at the start.
     t_new : float
-        End.
+        End of the step.
     scratch : Scratch
-        The stages' slopes, the state at t_new and its slope are filled.
+        Filled with the slopes of the stages, the state at t_new and its slope.
     """
     flow, p = motion.flow, motion.p
     t, y = now.clock[T], now.y
@@ -135,7 +135,7 @@ def take_step(
             for j in range(size):
                 y_new[j] = y[j] + h * (a * first[j])
         else:
-            # Two stages at a time: half the loads and stores.
+            # Two stages at a time: half the number of loads and stores.
             b = row[1]
             second = k[1]
             for j in range(size):
@@ -159,7 +159,7 @@ def take_step(
 
 
 def fit_dense(method: Coefficients, h: float, y: Vector, scratch: Scratch) -> None:
-    """Fill the polynomial of the step of length h just taken from y."""
+    """Compute the polynomial of the step of length h just taken from y."""
     k, y_new, f_new = scratch.k, scratch.y_new, scratch.f_new
     D = method.D
     stages = len(method.B)
@@ -173,13 +173,13 @@ def fit_dense(method: Coefficients, h: float, y: Vector, scratch: Scratch) -> No
         bends[j] = bend
         twists[j] = rise - h * f_new[j] - bend
     if len(D) > 0:
-        weigh(D, stages, f_new, k, bumps)
+        weighted_sum(D, stages, f_new, k, bumps)
         for j in range(len(y)):
             bumps[j] = h * bumps[j]
 
 
-def weigh(weights: Row, stages: int, f_new: Vector, k: list[Vector], out: Vector) -> None:
-    """Fill the sum of all slopes of a step, weighted."""
+def weighted_sum(weights: Row, stages: int, f_new: Vector, k: list[Vector], out: Vector) -> None:
+    """Compute the weighted sum of all slopes of a step."""
     last, a = weights[stages], weights[0]
     first = k[0]
     for j in range(len(out)):

@@ -1,4 +1,4 @@
-"""Butcher tableaux of the explicit methods, as frozen data that checks itself.
+"""Butcher tableaux of the explicit methods, as frozen data with self-checks.
 
 References
 ----------
@@ -25,18 +25,18 @@ class Tableau:
     Parameters
     ----------
     name : str
-        As users write it.
+        The name that users write.
     order : int
-        Order p of the solution that is carried on.
+        Order p of the solution that is propagated.
     A : tuple of tuple of float
-        Row i holds the i coefficients of stage i.
+        Row i contains the i coefficients of stage i.
     B, C : tuple of float
-        Weights and nodes, one a stage.
+        Weights and nodes, one per stage.
     E : tuple of float
-        Error weights, one a stage and one for the slope at the step's end; empty for a method
-        without error estimate.
+        Error weights, one per stage and one for the slope at the step's end; empty for a method
+        without an error estimate.
     D : tuple of float
-        Dense-output weights, as E; empty for plain Hermite.
+        Dense-output weights, like E; empty for plain Hermite.
 
     Raises
     ------

@@ -1,7 +1,8 @@
-"""Shared cases of the tests: the models and rigs whose results are known, and small readers."""
+"""Cases shared by the tests: models and rigs with known results, and small helper functions."""
 
 from __future__ import annotations
 
+import importlib.util
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,8 @@ from gms_fsm import (
 from gms_fsm.systems.signals import as_signal
 
 ROOT = Path(__file__).resolve().parents[1]  # of the repository
+# For long runs in tests that claim nothing of engines, which all give the same bits.
+FASTEST = "compiled" if importlib.util.find_spec("numba") else "ifelse"
 SINE = "0.2*sin(2*pi*t/20)"
 FIG4_SINE = "0.15*sin(2*pi*t/25)"
 FIG3_FORCE = "min(0.25*t, max(0.25, 0.75 - 0.125*t)) + 0.1*sin(2*pi*2*(max(t, 4) - 4))"
@@ -33,7 +36,7 @@ def stick_slip(law: str) -> GMS:
 
 
 def open_loop() -> Prescribed:
-    """The sine whose period no step divides."""
+    """A sine whose period is not a multiple of any step."""
     return Prescribed(SINE)
 
 
@@ -71,7 +74,7 @@ def one_element(
     sigma: float = 0.1,
     k: float = 1.0,
 ) -> GMS:
-    """One element with everything at hand."""
+    """Return a model of one element with all its numbers as arguments."""
     parameters = GMSParameters(
         [k], [sigma], [C], sigma_2=0.0, stribeck=Stribeck(F_c, F_s, v_s), v_c=v_c
     )
@@ -87,7 +90,7 @@ def same_bits(a: Trace, b: Trace) -> None:
 
 
 def event_sequence(trace: Trace) -> list[tuple[int, str]]:
-    """Which element took which edge, in order."""
+    """Return which element took which edge, in order."""
     log = trace.transitions
     return list(zip(log.element.tolist(), log.edge.tolist(), strict=True))
 
@@ -116,7 +119,7 @@ WEAR = Chart(
 
 
 def banging(gap: float) -> ChartModel:
-    """Return an element driven to and fro between two guards that are `gap` apart."""
+    """Return an element driven back and forth between two guards that are `gap` apart."""
     chart = Chart(
         "to and fro",
         inputs=("v",),
@@ -148,6 +151,6 @@ def _belt(t: float) -> float:
 
 
 def wear(n: int = 3) -> ChartModel:
-    """A bank of the chart above: three states, two variables, actions of every kind."""
+    """Return a bank of the chart above: three states, two variables, actions of every kind."""
     values = {"k": np.linspace(1, 2, n), "C": 0.3, "v_c": 1e-6, "share": np.linspace(0.5, 0.7, n)}
     return ChartModel(WEAR, values, n=n, stribeck=CURVE, weights=np.linspace(0.5, 1, n))

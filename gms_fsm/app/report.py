@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm._files import no_input, output_folder, written_whole
+from gms_fsm._files import output_folder, refuse_input, write_whole
 from gms_fsm.app.records import Motion, Record
 from gms_fsm.app.scenario import Loaded
 from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, FloatArray
@@ -136,7 +136,7 @@ def run_scenario(
     names += ["trace.csv", "trace.transitions.csv"] if output.csv else []
     folder = output_folder(folder, names)
     for name in names:
-        no_input(folder / name, loaded.path, *([loaded.record.path] if loaded.record else []))
+        refuse_input(folder / name, loaded.path, *([loaded.record.path] if loaded.record else []))
     try:
         trace = simulate(
             loaded.model,
@@ -175,9 +175,9 @@ def _reported(loaded: Loaded, trace: Trace, folder: Path, saved: Path) -> list[P
     log = trace.transitions_csv().encode()
     text = summary_text(loaded, trace).encode()
     files = [
-        written_whole(folder / "summary.md", lambda file: file.write(text)),
+        write_whole(folder / "summary.md", lambda file: file.write(text)),
         saved,
-        written_whole(folder / "transitions.csv", lambda file: file.write(log)),
+        write_whole(folder / "transitions.csv", lambda file: file.write(log)),
     ]
     if loaded.scenario.output.csv:
         files.append(trace.save(folder / "trace.csv"))

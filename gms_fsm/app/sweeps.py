@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm._files import no_input, output_folder, written_whole
+from gms_fsm._files import output_folder, refuse_input, write_whole
 from gms_fsm.app.report import plain
 from gms_fsm.app.scenario import Loaded
 from gms_fsm.charts.parameters import FloatArray, Parameter
@@ -133,7 +133,7 @@ def sweep_scenario(
     names = ["summary.md", "runs.csv", "sweep.npz"]
     folder = output_folder(folder, names)
     for name in names:
-        no_input(folder / name, loaded.path, *([loaded.record.path] if loaded.record else []))
+        refuse_input(folder / name, loaded.path, *([loaded.record.path] if loaded.record else []))
     grid = np.meshgrid(*(each.values for each in axes), indexing="ij")
     parameters = {each.name: values.ravel() for each, values in zip(axes, grid, strict=True)}
     options: dict[str, Any] = dict(loaded.arguments)
@@ -149,8 +149,8 @@ def sweep_scenario(
     table = _csv(result).encode()
     text = sweep_summary(loaded, axes, result, engine).encode()
     return result, [
-        written_whole(folder / "summary.md", lambda file: file.write(text)),
-        written_whole(folder / "runs.csv", lambda file: file.write(table)),
+        write_whole(folder / "summary.md", lambda file: file.write(text)),
+        write_whole(folder / "runs.csv", lambda file: file.write(table)),
         saved,
     ]
 

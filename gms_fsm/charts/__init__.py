@@ -1,4 +1,4 @@
-"""Friction models as charts: each module is a page of data with its reference."""
+"""Friction models as charts: each module is data for one model, with its reference."""
 
 from gms_fsm.charts.gms import GMS_ELEMENT, LAWS, SLIP_LAWS, gms_element
 from gms_fsm.charts.lugre import LUGRE

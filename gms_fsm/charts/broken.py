@@ -1,8 +1,8 @@
-"""Broken readings of the GMS element's guards: what each of them gets wrong, as data.
+"""Incorrect readings of the GMS element's guards, as data with an explanation of each fault.
 
-Each is one or two edges away from `gms_fsm.charts.gms` and looks right at first sight. They are a
-demonstration for `gms_fsm.prove` and for teaching, not models: nothing in the package builds on
-them. All have the signed slip law, so that nothing but the guards is wrong.
+Each differs from `gms_fsm.charts.gms` by one or two edges and looks right at first sight. They
+demonstrate `gms_fsm.prove` and serve teaching; they are not models, and nothing in the package
+builds on them. All use the signed slip law, so that only the guards are wrong.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Broken:
     wrong : str
         What is wrong with it, in one sentence.
     domain : tuple of str, optional
-        The domain in which the fault shows; None for the usual one.
+        The domain in which the fault shows; None for the default one.
     """
 
     chart: Chart
@@ -47,7 +47,7 @@ BROKEN: Mapping[str, Broken] = {
             Transition("break_away", "stick", "slip", guard="abs(z) >= s"),
             Transition("arrest", "slip", "stick", guard="abs(v) <= v_c"),
         ),
-        "Break-away looks at z alone and arrest at v alone, so both hold at once and the element "
+        "Break-away depends on z alone and arrest on v alone, so both hold at once and the element "
         "switches without end: livelock.",
     ),
     "literal": Broken(
@@ -56,7 +56,7 @@ BROKEN: Mapping[str, Broken] = {
             Transition("break_away", "stick", "slip", guard="z >= s"),
             Transition("arrest", "slip", "stick", guard="v <= v_c"),
         ),
-        "The signs of z and v are forgotten as well: livelock at z = s, v = 0, and a backward "
+        "The signs of z and v are ignored as well: livelock at z = s, v = 0, and a backward "
         "motion never breaks away.",
     ),
     "memoryless": Broken(
@@ -65,8 +65,8 @@ BROKEN: Mapping[str, Broken] = {
             Transition("break_away", "stick", "slip", guard="abs(z) >= s"),
             Transition("arrest", "slip", "stick", guard="abs(z) < s"),
         ),
-        "The two guards never hold at once, but each is the other's negation: while s rises, stick "
-        "pushes z over s and slip lets it fall behind at once: chattering.",
+        "The two guards never hold at once, but each is the negation of the other: while s rises, "
+        "stick pushes z above s and slip immediately lets it fall below: chattering.",
     ),
     "arms": Broken(
         _reading(
@@ -75,8 +75,8 @@ BROKEN: Mapping[str, Broken] = {
             Transition("break_away_backward", "stick", "slip", guard="z <= -s"),
             Transition("arrest", "slip", "stick", guard="abs(v) <= v_c and abs(z) < s"),
         ),
-        "With s = 0 both break-away arms hold at once at z = 0, and nothing but the order of the "
-        "edges settles which is taken.",
+        "With s = 0 both break-away arms hold at once at z = 0, and only the order of the edges "
+        "decides which one is taken.",
         domain=("s >= 0", "v_c > 0", "C > 0"),
     ),
 }

@@ -1,7 +1,7 @@
 """A friction chart is data: states with flows, edges with guards, all as text.
 
-Everything else reads it: the machines, the pictures, the generated if-else code, the relations for
-event location. Building a chart checks it and never runs anything.
+Machines, pictures, generated if-else code and the relations for event location are all derived
+from it. Building a chart checks it but never runs anything.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from gms_fsm.language import (
 
 __all__ = ["Chart", "State", "Transition"]
 
-SUPPLIED = ("t", "x", "v", "s")  # what a model supplies to its chart
+SUPPLIED = ("t", "x", "v", "s")  # inputs that a model supplies to its chart
 # Names that the generated code and the element objects use themselves.
 RESERVED = frozenset(
     {"F", "S", "dy", "edge", "held", "i", "index", "machine", "mode", "n", "out", "own", "p"}
@@ -41,16 +41,16 @@ RESERVED = frozenset(
 
 @dataclass(frozen=True)
 class State:
-    """One state of an element: what its variables do while it is active.
+    """One state of an element: how its variables evolve while it is active.
 
     Parameters
     ----------
     name : str
         For example ``"stick"``.
     flow : mapping of str to str
-        For each variable the text of its time derivative, for example ``{"z": "v"}``.
+        For each variable, the text of its time derivative, for example ``{"z": "v"}``.
     entry, exit : mapping of str to str, optional
-        Assignments ``variable: expression`` done when the state is entered or left.
+        Assignments ``variable: expression`` performed when the state is entered or left.
 
     Examples
     --------
@@ -63,18 +63,18 @@ class State:
     entry: Mapping[str, str] = field(default_factory=dict)
     exit: Mapping[str, str] = field(default_factory=dict)
 
-    def __new__(cls, *_: Any, **given: Any) -> State:
-        """Refuse what is no part of a state, in our words."""
+    def __new__(cls, *parts: Any, **given: Any) -> State:
+        """Refuse unknown arguments with an error of this package."""
         for name in sorted(given.keys() - {each.name for each in fields(cls)}):
             raise ChartError(
                 f"a State takes name, flow, entry and exit, not {name!r}",
-                place=f"state {shown(given.get('name', '?'))}",
+                place=f"state {shown(given.get('name', parts[0] if parts else '?'))}",
                 advice="states do not nest, so write one state for each combination",
             )
         return object.__new__(cls)
 
     def __post_init__(self) -> None:
-        for each in ("flow", "entry", "exit"):  # nobody else keeps a hand on a frozen chart
+        for each in ("flow", "entry", "exit"):  # copies: nobody else can change a frozen chart
             texts = _texts(getattr(self, each), f"state {shown(self.name)}: {each}")
             object.__setattr__(self, each, texts)
 
@@ -92,7 +92,7 @@ class Transition:
     guard : str
         The condition under which the edge is taken.
     actions : mapping of str to str, optional
-        Assignments ``variable: expression`` done when it is taken.
+        Assignments ``variable: expression`` performed when it is taken.
 
     Examples
     --------
@@ -125,23 +125,23 @@ class Chart:
     variables : sequence of str
         The element's own continuous states, for example ``("z",)``.
     parameters : sequence of Parameter or str
-        Constants, each with unit and rule; a plain name is short for one of unknown unit that may
-        be any number.
+        Constants, each with a unit and a rule; a plain name stands for a parameter of unknown unit
+        that may be any finite number.
     states : sequence of State
         The first one is the default state.
     transitions : sequence of Transition
-        Among the edges of one state, the earlier has priority.
+        Among the edges that leave one state, earlier ones have priority.
     outputs : mapping of str to str
-        Must give ``F``, the element's force [N]; may use ``d<variable>`` for a derivative.
+        Must define ``F``, the element's force [N]; may use ``d<variable>`` for a derivative.
     reference : str, optional
-        Where the equations are printed.
+        Where the equations are published.
 
     Raises
     ------
     ChartError
-        If states, edges, flows and names do not fit together.
+        If states, edges, flows and names are inconsistent.
     ExpressionError
-        If a text cannot be read; the message has the text, the column and what is allowed.
+        If a text cannot be parsed; the message gives the text, the column and what is allowed.
 
     Examples
     --------
@@ -190,14 +190,14 @@ class Chart:
         constants = _tuple(parameters, f"{here}: parameters")
         given["parameters"] = tuple(_parameter(each, here) for each in constants)
         given["outputs"] = _texts(outputs, f"{here}: outputs")
-        for each, value in given.items():  # nobody else keeps a hand on a frozen chart
+        for each, value in given.items():  # copies: nobody else can change a frozen chart
             object.__setattr__(self, each, value)
         self._check_names()
         self._check_rules()
         self._read()
 
     def _read(self) -> None:
-        """Turn the texts into trees."""
+        """Parse the texts into trees."""
         here, symbols = f"chart {self.name!r}", self._symbols
         guards, flows, assignments = {}, {}, {}
         for state in self.states:
@@ -233,7 +233,7 @@ class Chart:
             raise ChartError(
                 f"output 'F' is {shown(self.outputs['F'])}",
                 place=here,
-                advice="it is one text for all states. Where the law differs by state let a "
+                advice="it is one text for all states. Where the law differs by state, let a "
                 "variable carry it, for example a variable f with the flow 'k * v' in "
                 "one state and an entry {'f': 'F_c * sgn(v)'} in another",
             )
@@ -306,7 +306,7 @@ class Chart:
             for name in sorted(each.others - known):
                 raise ChartError(
                     f"chart {self.name!r}, parameter {each.name!r}: its rule names {name!r}, "
-                    "which is no other parameter",
+                    "which is not another parameter",
                     advice=f"there are {_listed(sorted(known))}",
                 )
 
@@ -327,18 +327,18 @@ class Chart:
 
     @property
     def _symbols(self) -> tuple[str, ...]:
-        """What its texts may name."""
+        """The names its texts may use."""
         return self.inputs + self.variables + self.parameter_names
 
-    # ------------------------------------------------------------------ readers' questions
+    # ------------------------------------------------------------------ queries
     @property
     def parameter_names(self) -> tuple[str, ...]:
-        """Names of the constants, in their order."""
+        """Names of the constants, in order."""
         return tuple(each.name for each in self.parameters)
 
     @property
     def declared(self) -> Mapping[str, Parameter]:
-        """What is known of its names: unit and rule of inputs, parameters, and the variable z."""
+        """Parameters for its known names: inputs, parameters and the variable z."""
         own = {each.name: each for each in self.parameters}
         shared = self.inputs + self.variables
         return {name: each for name, each in QUANTITIES.items() if name in shared} | own
@@ -354,7 +354,7 @@ class Chart:
         Returns
         -------
         str
-            Empty if it is not known.
+            Empty if unknown.
 
         Examples
         --------
@@ -367,7 +367,7 @@ class Chart:
 
     @property
     def default_state(self) -> State:
-        """The state an element starts in unless told otherwise."""
+        """The initial state of an element unless another is given."""
         return self.states[0]
 
     def state_index(self, name: str) -> int:
@@ -397,7 +397,7 @@ class Chart:
         return names.index(name)
 
     def leaving(self, state: str) -> tuple[tuple[int, Transition], ...]:
-        """Return the edges that leave a state, with their index, highest priority first.
+        """Return the edges that leave a state, each with its index, highest priority first.
 
         Parameters
         ----------

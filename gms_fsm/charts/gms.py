@@ -1,7 +1,7 @@
-"""The Generalized Maxwell Slip element: all switching of the model is on this page.
+"""The Generalized Maxwell Slip element: all of the model's switching is defined in this file.
 
-This file does not know how it will be run. It says when an element sticks, when it slips, and what
-its deflection does meanwhile; Fig. 2b and 2c of the paper beside it show nothing more.
+The file does not know how the chart will be run. It says when an element sticks, when it slips, and
+how its deflection evolves meanwhile; it corresponds to Fig. 2b and 2c of the paper.
 
 References
 ----------
@@ -41,7 +41,7 @@ LAWS: tuple[Law, ...] = get_args(Law)
 PARAMETERS = (
     Parameter("k", "N/m", "> 0", meaning="stiffness"),
     Parameter("sigma", "Ns/m", ">= 0", meaning="damping"),
-    # With C = 0 the slip flow is no law but a standstill.
+    # With C = 0 the deflection does not move at all while slipping.
     Parameter("C", "m/s", ">= 0", assumed="> 0", meaning="attraction"),
     Parameter("v_c", "m/s", "> 0", per_element=False, meaning="arrest velocity"),
 )
@@ -52,7 +52,7 @@ SLIP_LAWS = {
 
 
 def check_law(law: object) -> None:
-    """Refuse what is no slip law.
+    """Refuse anything that is not a slip law.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def check_law(law: object) -> None:
     Raises
     ------
     ParameterError
-        If it is neither.
+        If it is not one of them.
     """
     if law not in LAWS:
         raise ParameterError(
@@ -80,7 +80,7 @@ def gms_element(law: Law) -> Chart:
     ----------
     law : {"published", "signed"}
         ``"published"`` is eq. (1) of the paper as printed, ``"signed"`` the law of Al-Bender,
-        Lampaert and Swevers (2005). They agree for v > 0. There is no default on purpose.
+        Lampaert and Swevers (2005). They agree for v > 0. There is deliberately no default.
 
     Returns
     -------
@@ -90,7 +90,7 @@ def gms_element(law: Law) -> Chart:
     Raises
     ------
     ParameterError
-        If the law is neither.
+        If the law is not one of the two.
 
     Examples
     --------
@@ -119,7 +119,7 @@ def gms_element(law: Law) -> Chart:
 
 GMS_ELEMENT: Mapping[str, Chart] = {law: gms_element(law) for law in LAWS}
 
-# Numbers of the paper: a column for each of its two experiments, four elements, SI units.
+# The paper's numbers: one column for each of its two experiments, four elements, SI units.
 TABLE_I = {
     "non-drifting": Demonstration(
         {"k": (100, 10, 1, 0.1), "sigma": (10, 0.1, 1, 1), "C": (1, 1, 1, 1), "v_c": 1e-6},

@@ -1,4 +1,4 @@
-"""LuGre, the paper's benchmark: one state, no edges, on the same machinery.
+"""LuGre, the paper's benchmark: one state and no edges, run by the same code as every chart.
 
 References
 ----------
@@ -29,7 +29,7 @@ LUGRE = Chart(
     reference="Canudas de Wit et al. (1995)",
 )
 
-# The paper compares LuGre with a column of its Table I, and prints no numbers of the bristle.
+# The paper compares LuGre with a column of its Table I, but prints no values for the bristle.
 BENCHMARK = Demonstration(
     {"sigma_0": 1e3, "sigma_1": 31.6},
     "sigma_0 and sigma_1 chosen by us; the rest from the paper's Table I, column stick-slip",

@@ -1,8 +1,8 @@
 """Parameters as data: the name, unit and rule of every number that a chart or a model takes.
 
-A parameter is declared once, where its chart is. The checks and their messages, the keys of
-scenario files, the names that a sweep takes, what a proof assumes, and the units in reports and
-figures all come from that declaration.
+A parameter is declared once, next to its chart. The checks and their messages, the keys of
+scenario files, the names accepted by a sweep, the assumptions of a proof, and the units in reports
+and figures are all derived from that declaration.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ __all__ = [
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
-ANY = "finite"  # the rule that every number keeps
+ANY = "finite"  # the rule that applies to every number
 _HOLDS: Mapping[str, Callable[[Any, Any], Any]] = {
     ">=": operator.ge,
     "<=": operator.le,
@@ -54,11 +54,11 @@ class Bound:
     Parameters
     ----------
     op : {">", ">=", "<", "<="}
-        How the parameter compares.
+        The comparison operator.
     limit : float or str
         A number, or the name of another parameter.
     text : str
-        As it is written, for example ``">= F_c"``.
+        The bound as written, for example ``">= F_c"``.
     """
 
     op: str
@@ -66,24 +66,24 @@ class Bound:
     text: str
 
     def holds(self, value: Any, limit: Any) -> Any:
-        """Return whether a number keeps the bound, or an array of truths.
+        """Return whether a number satisfies the bound, or an array of such truth values.
 
         Parameters
         ----------
         value, limit : float or ndarray
-            What is compared.
+        The two sides of the comparison.
 
         Returns
         -------
         bool or ndarray of bool
-            The truth.
+            The truth value.
         """
         return _HOLDS[self.op](value, limit)
 
 
 @functools.lru_cache(maxsize=256)
 def bounds_of(rule: str) -> tuple[Bound, ...]:
-    """Return the comparisons of a rule; none for ``"finite"``.
+    """Return the comparisons in a rule; none for ``"finite"``.
 
     Parameters
     ----------
@@ -93,12 +93,12 @@ def bounds_of(rule: str) -> tuple[Bound, ...]:
     Returns
     -------
     tuple of Bound
-        In the order they are written.
+        In the order in which they are written.
 
     Raises
     ------
     ChartError
-        If the text is no rule.
+        If the text is not a rule.
 
     Examples
     --------
@@ -131,9 +131,9 @@ def _bound(text: str, rule: str) -> Bound:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number that a chart or a model takes: what it is called, its unit, its rule.
+    """A number that a chart or a model takes: its name, unit and rule.
 
-    In `Chart.parameters` a plain name is short for a parameter of unknown unit and without a rule.
+    In `Chart.parameters` a plain name stands for a parameter of unknown unit without a rule.
 
     Parameters
     ----------
@@ -142,16 +142,16 @@ class Parameter:
     unit : str
         An SI unit, for example ``"N/m"``; ``"1"`` for a plain number, empty if unknown.
     rule : str
-        What its value has to keep, besides being finite: ``"finite"`` (no more than that), or
+        What its value must satisfy besides being finite: ``"finite"`` (nothing more), or
         comparisons with numbers and other parameters: ``"> 0"``, ``">= F_c"``, ``">= 0 and < 1"``.
     per_element : bool
         Whether the elements of a bank may differ in it: one number per element, or one for all.
-        If False it is one number for all.
+        If False, only one number for all is accepted.
     meaning : str
-        In a few words, for messages and tables: ``"bristle stiffness"``.
+        A short description for messages and tables: ``"bristle stiffness"``.
     assumed : str
-        What a proof takes for granted in place of the rule; only where the rule allows a limit at
-        which the model is none.
+        What a proof assumes in place of the rule; only needed if the rule allows a limit at which
+        the model degenerates.
 
     Raises
     ------
@@ -176,7 +176,7 @@ class Parameter:
             given = getattr(self, name)
             if not isinstance(given, str):
                 raise ChartError(
-                    f"{name} is {shown(given)}, no text", place=f"parameter {shown(self.name)}"
+                    f"{name} is {shown(given)}, not a text", place=f"parameter {shown(self.name)}"
                 )
         try:
             bounds_of(self.rule)
@@ -191,18 +191,18 @@ class Parameter:
 
     @property
     def conditions(self) -> tuple[str, ...]:
-        """What a proof takes for granted, as texts of the expression language."""
+        """What a proof assumes, as texts in the expression language."""
         return tuple(f"{self.name} {bound.text}" for bound in bounds_of(self.assumed or self.rule))
 
     @property
     def others(self) -> frozenset[str]:
-        """The parameters that its rule names."""
+        """The parameters that its rule refers to."""
         every = (*self.bounds, *bounds_of(self.assumed or ANY))
         return frozenset(bound.limit for bound in every if isinstance(bound.limit, str))
 
     @property
     def described(self) -> str:
-        """What is known of it, in one line.
+        """A description in one line.
 
         >>> Parameter("k", "N/m", "> 0", meaning="bristle stiffness").described
         'bristle stiffness, N/m, > 0; one number per element'
@@ -212,7 +212,7 @@ class Parameter:
         return "; ".join(filter(None, (known, "one number per element" * self.per_element)))
 
 
-# What has the same name in every chart and on every rig.
+# Names with the same meaning in every chart and on every rig.
 QUANTITIES: Mapping[str, Parameter] = {
     each.name: each
     for each in (
@@ -224,7 +224,7 @@ QUANTITIES: Mapping[str, Parameter] = {
         Parameter("F", "N", meaning="friction force"),
     )
 }
-# What a model has besides its chart's own numbers.
+# What a model takes in addition to its chart's parameters.
 SIGMA_2 = Parameter("sigma_2", "Ns/m", ">= 0", per_element=False, meaning="viscous friction")
 WEIGHTS = Parameter("weights", "m/N", "> 0", meaning="threshold weights")
 STRIBECK = (
@@ -235,19 +235,19 @@ STRIBECK = (
 
 
 def with_shared(own: Iterable[Parameter], *, curve: bool) -> tuple[Parameter, ...]:
-    """Return a chart's parameters and those that every model has.
+    """Return a chart's parameters and those shared by all models.
 
     Parameters
     ----------
     own : iterable of Parameter
-        The chart's; one of them goes before a shared one of its name.
+        The chart's; they take precedence over shared ones of the same name.
     curve : bool
-        Whether there is a Stribeck curve, and so weights.
+        Whether there is a Stribeck curve, and therefore weights.
 
     Returns
     -------
     tuple of Parameter
-        Own ones first.
+        The chart's own first.
 
     Examples
     --------
@@ -263,16 +263,16 @@ def with_shared(own: Iterable[Parameter], *, curve: bool) -> tuple[Parameter, ..
 
 # --------------------------------------------------------------------------- checks
 def checked_scalar(name: str, value: Any, rule: str) -> float:
-    """Return a value as a float if it is finite and keeps a rule.
+    """Return a value as a float if it is finite and satisfies a rule.
 
     Parameters
     ----------
     name : str
-        For the message.
+        The name to use in the message.
     value : float
-        What is checked.
+        The value to check.
     rule : str
-        As of a `Parameter`; bounds that name others are left to `checked_values`.
+        As in `Parameter`; bounds that name other parameters are left to `checked_values`.
 
     Returns
     -------
@@ -290,8 +290,8 @@ def checked_scalar(name: str, value: Any, rule: str) -> float:
         number = float(value)
     except (TypeError, ValueError):
         raise ParameterError("it must be a number", place=name, value=value) from None
-    except OverflowError:  # a whole number that no float can hold
-        raise ParameterError("too large a number", place=name, advice="it must be finite") from None
+    except OverflowError:  # an integer too large for a float
+        raise ParameterError("it is too large", place=name, advice="it must be finite") from None
     if not math.isfinite(number):
         raise ParameterError("it must be finite", place=name, value=number)
     for bound in bounds_of(rule):
@@ -301,16 +301,16 @@ def checked_scalar(name: str, value: Any, rule: str) -> float:
 
 
 def checked_array(name: str, values: ArrayLike, n: int | None, rule: str) -> FloatArray:
-    """Return a read-only copy, shape (n,), if every entry is finite and keeps a rule.
+    """Return a read-only copy, shape (n,), if every entry is finite and satisfies a rule.
 
     Parameters
     ----------
     name : str
-        For the message.
+        The name to use in the message.
     values : array_like, shape (n,)
-        What is checked.
+        The values to check.
     n : int or None
-        How many there must be; None for any number of them.
+        The required number of entries; None for any number.
     rule : str
         As in `checked_scalar`.
 
@@ -342,14 +342,14 @@ def checked_array(name: str, values: ArrayLike, n: int | None, rule: str) -> Flo
 
 
 def as_numbers(name: str, values: ArrayLike) -> FloatArray:
-    """Return a copy as an array of floats, of any shape; raise a `ParameterError` if it is none.
+    """Return a copy as an array of floats of any shape; raise a `ParameterError` if impossible.
 
     Parameters
     ----------
     name : str
-        For the message.
+        The name to use in the message.
     values : array_like
-        What was given.
+        The value to convert.
 
     Returns
     -------
@@ -362,21 +362,21 @@ def as_numbers(name: str, values: ArrayLike) -> FloatArray:
         raise ParameterError("it must be a list of numbers", place=name, value=values) from None
     except OverflowError:
         raise ParameterError(
-            "it has too large a number", place=name, advice="it must be finite"
+            "a number in it is too large", place=name, advice="it must be finite"
         ) from None
 
 
 def checked_values(
     parameters: Iterable[Parameter], values: Mapping[str, Any], n: int = 1
 ) -> dict[str, float | FloatArray]:
-    """Return the values of parameters if all keep their rules.
+    """Return the values of parameters if all of them satisfy their rules.
 
     Parameters
     ----------
     parameters : iterable of Parameter
-        Which.
+        The parameters.
     values : mapping of str to float or array_like, shape (n,)
-        By name; each parameter has one.
+        A value for each parameter, by name.
     n : int
         Number of elements.
 
@@ -427,7 +427,7 @@ def _is_list(value: Any) -> bool:
 def _compare(
     one: Parameter, other: Parameter, bound: Bound, values: Mapping[str, float | FloatArray]
 ) -> None:
-    """Check a bound that names another parameter."""
+    """Check a bound that refers to another parameter."""
     pair = np.broadcast_arrays(values[one.name], values[other.name])
     value, limit = (np.atleast_1d(each) for each in pair)
     for i in np.flatnonzero(~bound.holds(value, limit))[:1]:
@@ -441,6 +441,6 @@ def _compare(
 
 
 def as_floats(values: FloatArray) -> list[float]:
-    """Return plain Python floats; the readable engine is three times faster on lists."""
+    """Return plain Python floats; the readable engine is three times as fast with lists."""
     floats: list[float] = values.tolist()
     return floats

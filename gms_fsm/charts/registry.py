@@ -1,7 +1,7 @@
-"""The charts that ship, found by looking into this folder: one file is all that a chart takes.
+"""The built-in charts, discovered by scanning this folder, so that a new chart needs only one file.
 
-A module of `gms_fsm.charts` that has a tuple ``CHARTS`` of entries is found. The command line, the
-scenario files and the documentation then know its charts by name.
+A module of `gms_fsm.charts` is discovered if it has a tuple ``CHARTS`` of entries. The command
+line, the scenario files and the documentation then know its charts by name.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ from gms_fsm.errors import ChartError, GMSError, ParameterError, shown, why
 
 __all__ = ["Demonstration", "Entry", "entry", "registered"]
 
-# Keys of a scenario's table [model] that are no parameter.
+# Keys of a scenario's table [model] that are not parameters.
 KEYS = ("chart", "law", "n", "stribeck")
 
 
 @dataclass(frozen=True)
 class Demonstration:
-    """Numbers with which a chart can be tried out; the same as `ChartModel` takes.
+    """Numbers with which to try out a chart; the same as `ChartModel` takes.
 
     Parameters
     ----------
     values : mapping of str to float or tuple of float
-        For each parameter of the chart a number, or one per element.
+        A number, or one per element, for each parameter of the chart.
     source : str
-        Where they are printed, or ``"chosen by us"``.
+        Where they are published, or ``"chosen by us"``.
     stribeck : Stribeck, optional
-        The curve behind the input ``s``; None for charts without this input.
+        The curve behind the input ``s``; None for charts without that input.
     sigma_2 : float
         Viscous friction, Ns/m.
     weights : tuple of float, optional
-        Threshold weights, m/N; 1 where left out.
+        Threshold weights, m/N; 1 if omitted.
     """
 
     values: Mapping[str, float | tuple[float, ...]]
@@ -51,29 +51,29 @@ class Demonstration:
 
     @property
     def n(self) -> int:
-        """Number of elements: as many as the longest list has."""
+        """Number of elements: the length of the longest list."""
         lists = [self.weights or (), *self.values.values()]
         return max((len(each) for each in lists if isinstance(each, tuple)), default=0) or 1
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A chart as the command line, scenario files and tables know it.
+    """A chart as known to the command line, scenario files and tables.
 
     Parameters
     ----------
     name : str
         For example ``"lugre"``.
     charts : Chart or mapping of str to Chart
-        The chart; of a model with several laws one for each, by the law's name.
+        The chart; for a model with several laws, one chart per law, by the law's name.
     demonstration : Demonstration
-        Numbers to try it out.
+        Numbers with which to try it out.
     title : str, optional
-        The chart's name where left out.
+        The chart's name if omitted.
     wrong : str, optional
-        What is wrong with a chart that is there to show a fault.
+        What is wrong with it, for a chart that demonstrates a fault.
     domain : sequence of str, optional
-        What a proof assumes; `gms_fsm.inspection.prove.default_domain` where left out.
+        What a proof assumes; `gms_fsm.inspection.prove.default_domain` if omitted.
 
     Raises
     ------
@@ -103,16 +103,16 @@ class Entry:
         for other in charts[1:]:
             if (other.inputs, other.parameters) != (first.inputs, first.parameters):
                 raise ChartError(
-                    f"{first.name!r} and {other.name!r} have other inputs or parameters",
+                    f"{first.name!r} and {other.name!r} have different inputs or parameters",
                     place=here,
-                    advice="give them entries of their own",
+                    advice="give each its own entry",
                 )
         for name in KEYS:
             if name in first.parameter_names:
                 raise ChartError(
                     f"the parameter {name!r} has the name of a key of scenario files",
                     place=here,
-                    advice="call it otherwise",
+                    advice="rename it",
                 )
         self._check_demonstration()
 
@@ -129,8 +129,8 @@ class Entry:
             raise ChartError(
                 f"stribeck is {shown(given.stribeck)}",
                 place=here,
-                advice="a chart with the input s takes a curve, Stribeck(F_c, F_s, v_s), any "
-                "other none",
+                advice="a chart with the input s takes a curve, Stribeck(F_c, F_s, v_s); any "
+                "other chart takes none",
             )
         try:
             checked_values(self._any.parameters, given.values, given.n)
@@ -143,7 +143,7 @@ class Entry:
 
     @property
     def laws(self) -> tuple[str, ...]:
-        """Names of the laws among which one has to be chosen; empty where there is one chart."""
+        """Names of the laws to choose from; empty if there is only one chart."""
         return () if isinstance(self.charts, Chart) else tuple(self.charts)
 
     @property
@@ -153,21 +153,21 @@ class Entry:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """What its charts take."""
+        """The parameters of its charts."""
         return self._any.parameters
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
-        """Their names."""
+        """Names of the parameters."""
         return self._any.parameter_names
 
     def chart(self, law: str = "") -> Chart:
-        """Return the chart under a law.
+        """Return the chart for a law.
 
         Parameters
         ----------
         law : str
-            One of `laws`; empty where there are none.
+            One of `laws`; empty if there are none.
 
         Returns
         -------
@@ -177,12 +177,12 @@ class Entry:
         Raises
         ------
         ParameterError
-            If a law is missing, or not known.
+            If a law is missing or unknown.
         """
         if isinstance(self.charts, Chart):
             if law:
                 raise ParameterError(
-                    f"{self.name} has one law only", advice=f"leave law={law!r} out"
+                    f"{self.name} has only one law", advice=f"leave out law={law!r}"
                 )
             return self.charts
         if law not in self.charts:
@@ -197,17 +197,17 @@ class Entry:
 
 @functools.cache
 def registered() -> Mapping[str, Entry]:
-    """Return the charts that ship, by name; those that show a fault come last.
+    """Return the built-in charts by name; those that demonstrate a fault come last.
 
     Returns
     -------
     mapping of str to Entry
-        What the modules of this folder list in ``CHARTS``.
+        The contents of ``CHARTS`` in the modules of this folder.
 
     Raises
     ------
     ChartError
-        If a module cannot be imported, or two of them use one name.
+        If a module cannot be imported, or two of them use the same name.
 
     Examples
     --------
@@ -220,7 +220,7 @@ def registered() -> Mapping[str, Entry]:
         for each in _entries(f"gms_fsm.charts.{module.name}", place):
             if each.name in found:
                 raise ChartError(
-                    f"the name {each.name!r} is taken by {found[each.name][1]}",
+                    f"the name {each.name!r} is already used by {found[each.name][1]}",
                     place=place,
                     advice="choose another",
                 )
@@ -236,7 +236,7 @@ def _entries(module: str, place: str) -> tuple[Entry, ...]:
         raise ChartError.of(error).inside(place) from error
     except Exception as error:
         raise ChartError(
-            f"it cannot be imported ({why(error)})", place=place, advice="mend it"
+            f"it cannot be imported ({why(error)})", place=place, advice="fix it"
         ) from error
     entries = getattr(page, "CHARTS", ())
     if not isinstance(entries, tuple) or not all(isinstance(each, Entry) for each in entries):
@@ -247,7 +247,7 @@ def _entries(module: str, place: str) -> tuple[Entry, ...]:
 
 
 def entry(name: str) -> Entry:
-    """Return a chart that ships.
+    """Return a built-in chart.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ def entry(name: str) -> Entry:
     Raises
     ------
     ParameterError
-        If there is none of that name.
+        If there is no chart of that name.
 
     Examples
     --------

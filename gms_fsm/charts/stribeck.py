@@ -14,7 +14,7 @@ from gms_fsm.language._vectors import values_of
 
 __all__ = ["Stribeck"]
 
-DIP_WIDTH = 6.1  # in v_s: beyond it exp(-(v/v_s)**2) is under 1e-16, the curve is flat
+DIP_WIDTH = 6.1  # in v_s: beyond this exp(-(v/v_s)**2) is below 1e-16 and the curve is flat
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ class Stribeck:
     Raises
     ------
     ParameterError
-        Naming the parameter, its value and the rule. With s = 0 both ``z >= s`` and ``z <= -s``
-        could hold at once, and z / s means nothing, hence F_c > 0.
+        Naming the parameter, its value and the rule. F_c > 0 is required because with s = 0 both
+        ``z >= s`` and ``z <= -s`` could hold at once, and z / s would be undefined.
 
     Examples
     --------
@@ -53,16 +53,16 @@ class Stribeck:
 
     @property
     def text(self) -> str:
-        """The curve in the expression language; every reader computes this text."""
+        """The curve in the expression language; every reader evaluates this text."""
         return "F_c + (F_s - F_c) * exp(-(v / v_s)**2)"
 
     @property
     def dip(self) -> float:
-        """Speed [m/s] outside of which the curve is flat; drivers stop at +dip and -dip."""
+        """Speed [m/s] beyond which the curve is flat; integrators stop at +dip and -dip."""
         return DIP_WIDTH * self.v_s
 
     def __call__(self, v: ArrayLike) -> FloatArray:
-        """Return s(v) [N] for velocities v [m/s], any shape: `text`, computed as every run does."""
+        """Return s(v) [N] for velocities v [m/s] of any shape, computed exactly as in a run."""
         return values_of(_tree(self.text), {"v": np.asarray(v, dtype=np.float64), **asdict(self)})
 
 

@@ -25,8 +25,8 @@ from gms_fsm.inspection._prover import (
 )
 from gms_fsm.language import (
     Condition,
-    Literal,
     Not,
+    Requirement,
     Split,
     Value,
     evaluate,
@@ -263,12 +263,12 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
     return Answer("proved", "there is no surface on which both flows push into the other's guard")
 
 
-Ways: TypeAlias = list[tuple[Literal, ...]]
+Ways: TypeAlias = list[tuple[Requirement, ...]]
 
 
 def _ways(parts: Split) -> Ways:
     """Return the alternatives under which a split condition holds."""
-    if isinstance(parts, Literal):
+    if isinstance(parts, Requirement):
         return [(parts,)]
     word, inner = parts
     ways = [_ways(part) for part in inner]
@@ -279,7 +279,7 @@ def _ways(parts: Split) -> Ways:
     return [tuple(part for way in some for part in way) for some in product(*ways)]
 
 
-def _at_one_time(prover: Prover, parts: Sequence[Literal]) -> bool:
+def _at_one_time(prover: Prover, parts: Sequence[Requirement]) -> bool:
     """Return whether the comparisons of inputs alone allow both guards.
 
     Inputs are the same in both states, so both guards must allow them at one time: ``v > v_c`` in

@@ -22,19 +22,19 @@ from gms_fsm.language import (
     Call,
     Condition,
     Either,
-    Literal,
     Name,
     Negative,
     Not,
     Number,
     Relation,
+    Requirement,
     Value,
     evaluate,
     fold,
+    integer_power,
     names_in,
     parse_condition,
     spell,
-    whole_power,
 )
 
 __all__ = [
@@ -103,11 +103,11 @@ class Reading:
         """Return a condition as a formula."""
         return fold(condition, _Formulas(self, names))
 
-    def margin(self, literal: Literal, names: Duals) -> Dual:
-        """Return the margin of a literal, positive where it holds."""
-        pair = literal.comparison
+    def margin(self, requirement: Requirement, names: Duals) -> Dual:
+        """Return the margin of a requirement, positive where it holds."""
+        pair = requirement.comparison
         left, right = self.value(pair.left, names), self.value(pair.right, names)
-        if not literal.holds:
+        if not requirement.holds:
             left, right = right, left
         return Dual(left.value - right.value, left.slope - right.slope)
 
@@ -145,7 +145,7 @@ class _Formulas:
         return Dual(a.value / b.value, slope)
 
     def power(self, node: Binary, parts: Iterator[Dual]) -> Dual:
-        whole = whole_power(node.right)
+        whole = integer_power(node.right)
         if whole is None:
             raise Undecided(
                 f"only integer powers up to {LARGEST_PRODUCT_POWER} are encoded: {shown(node)}"

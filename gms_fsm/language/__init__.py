@@ -1,16 +1,16 @@
-"""The expression language: text -> checked tree -> every other spelling.
+"""The expression language: text -> checked tree -> every other notation.
 
 All physics and all switching of this package is written as short texts (``z >= s and v > v_c``).
 Here such a text becomes a tree that can be evaluated, printed as Python or as Stateflow text,
-differentiated, and split into its atomic comparisons. Nothing is ever handed to `eval`: the text is
-parsed with `ast` and only nodes on an allow-list survive; code is generated from the checked tree
-alone. Whatever reads a tree is an algebra of `fold`.
+differentiated, and split into its atomic comparisons. Nothing is ever passed to `eval`: the text is
+parsed with `ast`, only nodes on an allow-list are accepted, and code is generated from the checked
+tree alone. Every reader of a tree is an algebra for `fold`.
 
 Grammar: numbers, declared names, ``pi``, ``+ - * / **``, ``< <= > >=`` (chains are split),
 ``and or not``, ``abs exp sqrt sgn min max sin cos tanh``. ``==`` on floats is refused.
-``pow(a, b)``, as code prints some powers, is read as ``a**b``.
+``pow(a, b)``, which generated code contains for some powers, is read as ``a**b``.
 
-Nothing here knows of friction.
+Nothing in this package knows about friction.
 """
 
 from gms_fsm.language._derivative import derivative
@@ -27,7 +27,7 @@ from gms_fsm.language._functions import (
 )
 from gms_fsm.language._normal import (
     Comparison,
-    Literal,
+    Requirement,
     Split,
     clauses,
     comparisons,
@@ -37,7 +37,7 @@ from gms_fsm.language._normal import (
     substitute,
     turning_inside,
 )
-from gms_fsm.language._powers import LARGEST_PRODUCT_POWER, product_power, whole_power
+from gms_fsm.language._powers import LARGEST_PRODUCT_POWER, integer_power, product_power
 from gms_fsm.language._print import LEVELS, MATLAB_LIKE, PYTHON, Spelling, spell
 from gms_fsm.language._read import parse_condition, parse_value
 from gms_fsm.language._tree import (
@@ -77,13 +77,13 @@ __all__ = [
     "Condition",
     "Either",
     "InState",
-    "Literal",
     "Name",
     "Negative",
     "Node",
     "Not",
     "Number",
     "Relation",
+    "Requirement",
     "Spelling",
     "Split",
     "Value",
@@ -93,6 +93,7 @@ __all__ = [
     "derivative",
     "evaluate",
     "fold",
+    "integer_power",
     "names_in",
     "parse_condition",
     "parse_value",
@@ -105,5 +106,4 @@ __all__ = [
     "states_in",
     "substitute",
     "turning_inside",
-    "whole_power",
 ]

@@ -1,4 +1,4 @@
-"""Partial derivatives of values, as values of the same language."""
+"""Partial derivatives of values, as values in the same language."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ ZERO, ONE = Number(0.0), Number(1.0)
 
 
 def derivative(value: Value, name: str) -> Value | None:
-    """Return the partial derivative of a value by a name; its corners count as smooth.
+    """Return the partial derivative of a value with respect to a name, ignoring its corners.
 
     Parameters
     ----------
     value : Value
-        A flow, a signal, one side of a guard.
+        A flow, a signal or one side of a guard.
     name : str
-        By which.
+        The name to differentiate with respect to.
 
     Returns
     -------
     Value or None
-        None where the language cannot write it: a power with the name in its exponent.
+        None if the language cannot express it: a power with the name in its exponent.
 
     Examples
     --------
@@ -41,7 +41,7 @@ def derivative(value: Value, name: str) -> Value | None:
 
 
 class _Slope:
-    """The algebra of derivatives by one name."""
+    """The algebra of derivatives with respect to one name."""
 
     def __init__(self, by: str) -> None:
         self.by = by
@@ -78,7 +78,7 @@ class _Slope:
         if self.by not in names_in(node):
             return ZERO
         if node.function in SEVERAL:
-            # The mean of both on the corner itself.
+            # On the corner itself this gives the mean of both sides.
             du, dw = parts
             apart = _times(Call("sgn", (Binary("-", *node.arguments),)), _minus(du, dw))
             half = Binary("*", Number(0.5), _plus(du, dw))
@@ -88,7 +88,7 @@ class _Slope:
 
 
 def _outer(call: Call) -> Value:
-    """Return the derivative of a function of one argument by that argument."""
+    """Return the derivative of a function of one argument with respect to that argument."""
     (u,) = call.arguments
     match call.function:
         case "abs":

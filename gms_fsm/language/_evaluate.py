@@ -1,4 +1,4 @@
-"""Computing a tree at one point, to the bit as generated code does."""
+"""Evaluation of a tree at one point, bit for bit as generated code computes it."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ __all__ = ["evaluate"]
 
 
 def evaluate(node: Node, values: Mapping[str, Any]) -> float | bool:
-    """Compute a tree, rounding exactly as the generated code does.
+    """Evaluate a tree, rounding exactly as the generated code does.
 
     Parameters
     ----------
     node : Node
         A value or a condition.
     values : mapping of str to float
-        A number for every name in the tree; for ``state(1)`` under that key a state's name.
+        A number for every name in the tree; for ``state(1)``, the key of that name maps to a state.
 
     Returns
     -------
     float or bool
-        The number, or the truth.
+        The number, or the truth value.
 
     Examples
     --------
@@ -39,7 +39,7 @@ def evaluate(node: Node, values: Mapping[str, Any]) -> float | bool:
 
 
 class _Numbers:
-    """The algebra of numbers and truths; like Python, `and` and `or` stop where they can."""
+    """The algebra of numbers and truth values; `and` and `or` short-circuit as in Python."""
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         self.values = values

@@ -1,7 +1,7 @@
-"""`fold`: the one way in which a tree is read, whatever it becomes.
+"""`fold`: the single way to traverse a tree, whatever the result.
 
-An algebra says what each kind of node becomes, given what the parts of the node became. Numbers,
-arrays over rows, formulas of a solver, printed text and derivatives are algebras.
+An algebra defines the result for each kind of node, given the results for the node's parts.
+Numbers, arrays over rows, solver formulas, printed text and derivatives are all algebras.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ C = TypeVar("C")
 
 
 class ValueAlgebra(Protocol[V]):
-    """What the nodes of a value become.
+    """Results for the nodes of a value.
 
-    The parts of a node are folded one at a time, when they are taken from the iterator; one that
-    is not taken is not read.
+    The parts of a node are folded lazily, as they are taken from the iterator; a part that is not
+    taken is not evaluated.
     """
 
     def number(self, value: float, /) -> V:
@@ -58,13 +58,13 @@ class ValueAlgebra(Protocol[V]):
 
 
 class Algebra(ValueAlgebra[V], Protocol[V, C]):
-    """What the nodes of a condition become too."""
+    """Results for the nodes of a condition as well."""
 
     def relation(self, node: Relation, parts: Iterator[V], /) -> C:
         """Read a comparison; two parts."""
 
     def in_state(self, element: int, state: str, /) -> C:
-        """Read whether an element is in a state; it is 0 for the element at hand."""
+        """Read ``state(element) == state``; element 0 is the current element."""
 
     def negation(self, node: Not, parts: Iterator[C], /) -> C:
         """Read ``not a``; one part."""
@@ -94,7 +94,7 @@ def fold(tree: Condition, algebra: Algebra[V, C]) -> C: ...
 @overload
 def fold(tree: Node, algebra: Algebra[V, C]) -> V | C: ...
 def fold(tree: Node, algebra: Any) -> Any:
-    """Return what a tree becomes under an algebra.
+    """Return the result of applying an algebra to a tree.
 
     Parameters
     ----------
@@ -106,11 +106,11 @@ def fold(tree: Node, algebra: Any) -> Any:
     Returns
     -------
     object
-        What the algebra makes of the root.
+        The algebra's result for the root.
 
     Examples
     --------
-    The longest chain of nodes, as an algebra:
+    Tree depth as an algebra:
 
     >>> from gms_fsm.language import fold, parse_value
     >>> class Depth:

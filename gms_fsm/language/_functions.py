@@ -45,8 +45,8 @@ def sgn(u: float) -> float:
     return 0.0
 
 
-# Scalar functions on purpose: numpy's array exp differs from math.exp in the last bit now and then,
-# and the readable and the compiled engine have to agree bit for bit.
+# Scalar functions on purpose: numpy's array exp sometimes differs from math.exp in the last bit,
+# and the readable and the compiled engine must agree bit for bit.
 FUNCTIONS: Mapping[str, Callable[..., float]] = {
     "abs": abs,
     "exp": math.exp,

@@ -1,4 +1,4 @@
-"""Trees in other forms: clauses, atomic comparisons, corners and jumps, names replaced."""
+"""Transformations of trees: clauses, atomic comparisons, corners and jumps, renaming."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from gms_fsm.language._functions import ROUGH
-from gms_fsm.language._powers import whole_power
+from gms_fsm.language._powers import integer_power
 from gms_fsm.language._tree import (
     Binary,
     Both,
@@ -27,7 +27,7 @@ from gms_fsm.language._tree import (
 
 __all__ = [
     "Comparison",
-    "Literal",
+    "Requirement",
     "Split",
     "clauses",
     "comparisons",
@@ -66,8 +66,8 @@ def clauses(condition: Condition) -> tuple[Condition, ...]:
 class Comparison:
     """The one relation behind ``z >= s`` and ``z < s``: its margin is ``left - right``.
 
-    True where the margin is positive, and, unless `strict`, also where it is zero. In IEEE
-    arithmetic the sign of ``left - right`` is exactly the raw comparison.
+    True where the margin is positive and, unless `strict`, also where it is zero. In IEEE
+    arithmetic the sign of ``left - right`` agrees exactly with the raw comparison.
     """
 
     left: Value
@@ -76,29 +76,29 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class Literal:
-    """A comparison that has to be true (or, with `holds` False, false)."""
+class Requirement:
+    """A comparison that must be true (or false, if `holds` is False)."""
 
     comparison: Comparison
     holds: bool
 
     @property
     def relation(self) -> Relation:
-        """The literal as ordinary text would write it."""
+        """The requirement as an ordinary relation."""
         strict = self.comparison.strict
         op = (">" if strict else ">=") if self.holds else ("<=" if strict else "<")
         return Relation(op, self.comparison.left, self.comparison.right)
 
 
-Split: TypeAlias = "Literal | tuple[str, tuple[Split, ...]]"
+Split: TypeAlias = "Requirement | tuple[str, tuple[Split, ...]]"
 
 
 def split(condition: Condition, holds: bool = True) -> Split:
-    """Split a condition into comparisons joined by ``"both"`` and ``"either"`` only.
+    """Split a condition into comparisons joined only by ``"both"`` and ``"either"``.
 
-    ``abs(u) <= c`` becomes ``u <= c`` and ``u >= -c`` (a root finder on ``c - abs(u)`` steps over
-    a narrow window, two monotone margins do not), negations move down to the comparisons, and
-    ``z < s`` and ``z >= s`` become the same `Comparison`.
+    ``abs(u) <= c`` becomes ``u <= c`` and ``u >= -c`` (a root finder on ``c - abs(u)`` would step
+    over a narrow window; two monotone margins prevent that), negations are pushed down to the
+    comparisons, and ``z < s`` and ``z >= s`` become the same `Comparison`.
 
     Parameters
     ----------
@@ -109,8 +109,8 @@ def split(condition: Condition, holds: bool = True) -> Split:
 
     Returns
     -------
-    Literal or (str, tuple)
-        A literal, or ``("both" | "either", parts)``.
+    Requirement or (str, tuple)
+        A requirement, or ``("both" | "either", parts)``.
 
     Examples
     --------
@@ -129,9 +129,9 @@ def split(condition: Condition, holds: bool = True) -> Split:
             parts: list[Split] = []
             for operand in operands:
                 part = split(operand, holds)
-                if isinstance(part, Literal) or part[0] != word:
+                if isinstance(part, Requirement) or part[0] != word:
                     parts.append(part)
-                else:  # a conjunction inside a conjunction
+                else:  # a conjunction nested in a conjunction
                     parts.extend(part[1])
             return word, tuple(parts)
         case Relation(op, Call("abs", (Call("abs") as inner,)), bound):
@@ -147,7 +147,7 @@ def split(condition: Condition, holds: bool = True) -> Split:
         case Relation(op, left, right):
             positive = op in (">", ">=")
             strict = op in (">", "<=")  # a <= b is the negation of a > b
-            return Literal(Comparison(left, right, strict), positive == holds)
+            return Requirement(Comparison(left, right, strict), positive == holds)
 
 
 def comparisons(part: Split) -> tuple[Comparison, ...]:
@@ -155,7 +155,7 @@ def comparisons(part: Split) -> tuple[Comparison, ...]:
 
     Parameters
     ----------
-    part : Literal or (str, tuple)
+    part : Requirement or (str, tuple)
         From `split`.
 
     Returns
@@ -169,14 +169,14 @@ def comparisons(part: Split) -> tuple[Comparison, ...]:
     >>> [spell(c.left) for c in comparisons(split(parse_condition("z >= s and v > 0", "zsv")))]
     ['z', 'v']
     """
-    if isinstance(part, Literal):
+    if isinstance(part, Requirement):
         return (part.comparison,)
     return tuple(c for each in part[1] for c in comparisons(each))
 
 
 # --------------------------------------------------------------------------- corners and jumps
 def rough_points(value: Value) -> tuple[Value, ...]:
-    """Return each u whose sign decides a corner or a jump of `value`, innermost first.
+    """Return every u whose sign decides a corner or a jump of `value`, innermost first.
 
     ``sgn(u)`` and ``abs(u)`` turn at u = 0, ``min(a, b)`` and ``max(a, b)`` at a - b = 0.
 
@@ -188,7 +188,7 @@ def rough_points(value: Value) -> tuple[Value, ...]:
     Returns
     -------
     tuple of Value
-        Without repetition.
+        Without duplicates.
 
     Examples
     --------
@@ -201,19 +201,19 @@ def rough_points(value: Value) -> tuple[Value, ...]:
 
 
 def turning_inside(value: Value, new: Mapping[str, Value]) -> Value:
-    """Return a value with names replaced inside its rough calls only.
+    """Return a value with names replaced only inside its calls to sgn, abs, min and max.
 
     Parameters
     ----------
     value : Value
-        For example an output that names the rate dz.
+        For example an output that uses the rate dz.
     new : mapping of str to Value
-        What the names stand for.
+        The replacement for each name.
 
     Returns
     -------
     Value
-        A tree whose corners are written without these names.
+        A tree whose corners do not depend on these names.
 
     Examples
     --------
@@ -236,24 +236,24 @@ def _turning(call: Call) -> Value:
 def substitute(
     value: Value, name_of: Callable[[Value, Call], str | None]
 ) -> tuple[Value, dict[str, Call]]:
-    """Replace every rough call by a name, to be computed beforehand from a held sign.
+    """Replace every rough call by a name whose value is computed beforehand from a frozen sign.
 
     Parameters
     ----------
     value : Value
         A flow or a signal.
     name_of : callable
-        Given the value at whose sign a call turns and the call, its arguments smooth already:
-        its name, another for each call; None where it stays as it is.
+        Takes the value at whose sign a call turns and the call, whose arguments are already
+        smooth; returns a different name for each call, or None to leave it in place.
 
     Returns
     -------
     smooth : Value
         The tree with names in place of the calls.
     calls : dict of str to Call
-        For each such name the call it stands for, in the order they must be computed; arguments
-        are already smooth. A call under a square root or a power stays where it is: with its sign
-        held it would go below zero behind the corner, where these are not defined.
+        The call that each such name stands for, in the order in which they must be computed;
+        arguments are already smooth. A call under a square root or a power is left in place: with
+        its sign frozen, it would become negative beyond the corner, where these are not defined.
     """
     calls: dict[str, Call] = {}
 
@@ -261,7 +261,7 @@ def substitute(
         match node:
             case Call("sqrt"):
                 return node
-            case Binary("**", base, exponent) if whole_power(exponent) is None:
+            case Binary("**", base, exponent) if integer_power(exponent) is None:
                 return Binary("**", base, smooth(exponent))
             case Call(function, arguments) if function in ROUGH:
                 inner = Call(function, tuple(smooth(argument) for argument in arguments))
@@ -276,19 +276,19 @@ def substitute(
 
 
 def renamed(value: Value, new: Mapping[str, Value]) -> Value:
-    """Return a value with other values in place of some names.
+    """Return a value with some names replaced by other values.
 
     Parameters
     ----------
     value : Value
         A tree.
     new : mapping of str to Value
-        By name.
+        The replacements, by name.
 
     Returns
     -------
     Value
-        Another tree.
+        The new tree.
 
     Examples
     --------

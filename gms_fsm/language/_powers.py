@@ -1,27 +1,27 @@
-"""Which powers are computed as products: alike in every engine, for pow rounds otherwise."""
+"""The powers that every engine computes as products, because pow rounds differently."""
 
 from __future__ import annotations
 
 from gms_fsm.language._tree import Binary, Name, Negative, Number, Value
 
-__all__ = ["LARGEST_PRODUCT_POWER", "product_power", "whole_power"]
+__all__ = ["LARGEST_PRODUCT_POWER", "integer_power", "product_power"]
 
 LARGEST_PRODUCT_POWER = 8  # x**8 and below are printed as products ...
-LARGEST_PRODUCT = 64  # ... unless the text would grow beyond this many parts
+LARGEST_PRODUCT = 64  # ... unless the text would exceed this many parts
 
 
 def product_power(base: Value, exponent: Value) -> int | None:
-    """Return the power if it is computed as a product, else None (it is computed by pow).
+    """Return the power if it is computed as a product, or None if it is computed by pow.
 
     Parameters
     ----------
     base, exponent : Value
-        Of ``base**exponent``.
+        The parts of ``base**exponent``.
 
     Returns
     -------
     int or None
-        The whole power, -8 to 8.
+        The integer power, -8 to 8.
 
     Examples
     --------
@@ -33,24 +33,24 @@ def product_power(base: Value, exponent: Value) -> int | None:
 
 
 def _fitting_power(parts: int, exponent: Value) -> int | None:
-    whole = whole_power(exponent)
+    whole = integer_power(exponent)
     return None if whole is None or abs(whole) * parts > LARGEST_PRODUCT else whole
 
 
 def _parts(node: Value) -> int:
-    """Count the names and numbers of a value as printed, powers as products."""
+    """Count the names and numbers in a value as printed, with powers as products."""
     match node:
         case Number() | Name():
             return 1
         case Binary("**", base, exponent):
-            parts = _parts(base)  # once: a power of a power of a power would double the work
+            parts = _parts(base)  # once: nested powers would otherwise double the work each time
             whole = _fitting_power(parts, exponent)
             return parts + _parts(exponent) if whole is None else max(1, parts * abs(whole))
     return sum(map(_parts, node.parts))
 
 
-def whole_power(exponent: Value) -> int | None:
-    """Return the power that an exponent stands for: a small whole number, or None."""
+def integer_power(exponent: Value) -> int | None:
+    """Return the integer that an exponent stands for if it is small, else None."""
     sign = 1.0
     while isinstance(exponent, Negative):
         sign, exponent = -sign, exponent.operand

@@ -1,4 +1,4 @@
-"""Printing: checked tree -> text, as Python for generated code or as Stateflow for charts."""
+"""Printing of a checked tree, as Python for generated code or as Stateflow text for charts."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ __all__ = ["LEVELS", "MATLAB_LIKE", "PYTHON", "Spelling", "spell"]
 
 @dataclass(frozen=True)
 class Spelling:
-    """How a tree is written: the words of the logic and how functions and powers look.
+    """Notation for a tree: the logical operators, and how functions and powers look.
 
     Parameters
     ----------
     both, either, negation : str
-        The words for and, or, not, with their spaces.
+        The words for and, or and not, with their spaces.
     bars : bool
-        Write ``|u|`` for ``abs(u)``.
+        Write ``abs(u)`` as ``|u|``.
     products : bool
         Write small integer powers as products, and other powers as ``pow(a, b)``.
     """
@@ -37,7 +37,7 @@ class Spelling:
 PYTHON = Spelling(" and ", " or ", "not ", bars=False, products=True)
 MATLAB_LIKE = Spelling(" && ", " || ", "!", bars=True, products=False)
 
-# How tightly each operator binds.
+# How tightly each operator binds (its precedence).
 LEVELS = {"or": 1, "and": 2, "not": 3, "<": 4, "+": 5, "-": 5, "*": 6, "/": 6, "neg": 7, "**": 8}
 _ATOM = 9
 
@@ -51,14 +51,14 @@ def spell(node: Node, spelling: Spelling = PYTHON, rename: Mapping[str, str] | N
         A value or a condition.
     spelling : Spelling
         `PYTHON` for generated code (a small integer power is printed as a product, so that the
-        readable and the compiled engine round alike), `MATLAB_LIKE` for charts.
+        readable and the compiled engine round identically), `MATLAB_LIKE` for charts.
     rename : mapping, optional
-        Names to write differently, for example ``{"k": "k[i]"}``.
+        Names to replace, for example ``{"k": "k[i]"}``.
 
     Returns
     -------
     str
-        The text, with no more parentheses than needed.
+        The text, with no more parentheses than necessary.
 
     Examples
     --------
@@ -73,18 +73,18 @@ def spell(node: Node, spelling: Spelling = PYTHON, rename: Mapping[str, str] | N
 
 
 class _Printed(NamedTuple):
-    """A text and how tightly it binds."""
+    """A text and its precedence."""
 
     text: str
     level: int
 
     def at(self, level: int) -> str:
-        """Return the text, in parentheses if it binds less tightly than wanted."""
+        """Return the text, in parentheses if its precedence is below `level`."""
         return self.text if self.level >= level else f"({self.text})"
 
 
 class _Printer:
-    """The algebra of texts."""
+    """The algebra of printed text."""
 
     def __init__(self, spelling: Spelling, rename: Mapping[str, str]) -> None:
         self.spelling, self.rename = spelling, rename
@@ -103,8 +103,8 @@ class _Printer:
 
     def binary(self, node: Binary, parts: Iterator[_Printed]) -> _Printed:
         level, (left, right) = LEVELS[node.op], parts
-        # The right side of + and * is bracketed too: floats do not associate, and the text has
-        # to say which order is computed.
+        # The right operand of + and * gets parentheses too: floating-point arithmetic is not
+        # associative, and the text must show the order of evaluation.
         return _Printed(f"{left.at(level)} {node.op} {right.at(level + 1)}", level)
 
     def power(self, node: Binary, parts: Iterator[_Printed]) -> _Printed:

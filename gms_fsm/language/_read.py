@@ -1,7 +1,7 @@
-"""Reading: text -> checked tree.
+"""Parsing of text into a checked tree.
 
-Nothing is ever handed to `eval`: a text is parsed with `ast`, and only nodes on an allow-list
-survive. An error says where in the text, and what would be allowed.
+Nothing is ever passed to `eval`: a text is parsed with `ast`, and only nodes on an allow-list are
+accepted. An error gives the position in the text and what would be allowed.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ from gms_fsm.language._tree import (
 __all__ = ["parse_condition", "parse_value"]
 
 LONGEST_TEXT = 10_000  # characters; a chart's text is a line, not a program
-DEEPEST_TREE = 60  # levels; keeps every recursive reader far from Python's own limit
+DEEPEST_TREE = 60  # levels; keeps every recursive reader far below Python's recursion limit
 MOST_ARGUMENTS = 50  # of min and max
-MOST_COMPARISONS = 100  # in one text; a guard is a line, and each is watched on its own
+MOST_COMPARISONS = 100  # in one text; a guard is a line, and each comparison is watched separately
 
 _OPERATORS: Mapping[type[ast.operator], str] = {
     ast.Add: "+",
@@ -51,7 +51,7 @@ _COMPARISONS: Mapping[type[ast.cmpop], str] = {
     ast.Gt: ">",
     ast.GtE: ">=",
 }
-# What pictures show and other languages write, and what is written here.
+# What pictures show and other languages use, and its equivalent here.
 _INSTEAD: Mapping[str, str] = {
     "&&": "and",
     "&": "and",
@@ -74,7 +74,7 @@ _GRAMMAR = "numbers, names, + - * / **, < <= > >=, and or not, " + " ".join(FUNC
 
 
 def parse_value(text: str, names: Iterable[str]) -> Value:
-    """Read a text that stands for a number.
+    """Parse a text that stands for a number.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def parse_value(text: str, names: Iterable[str]) -> Value:
     Raises
     ------
     ExpressionError
-        With the text, the column and what would be allowed.
+        With the text, the column and what would be allowed there.
 
     Examples
     --------
@@ -110,7 +110,7 @@ def parse_condition(
     *,
     own_state: bool = False,
 ) -> Condition:
-    """Read a text that is true or false, such as a guard.
+    """Parse a text that is true or false, such as a guard.
 
     Parameters
     ----------
@@ -119,21 +119,21 @@ def parse_condition(
     names : iterable of str
         The names that may occur.
     states : iterable of str, optional
-        State names that ``state(i) == name`` may ask for (breakpoints do, guards do not).
+        State names that ``state(i) == name`` may use (in breakpoints, not in guards).
     elements : int, optional
-        How many elements there are; i counts from 1.
+        Number of elements; i counts from 1.
     own_state : bool
-        Whether ``state == name`` may ask for the element at hand (invariants do).
+        Whether ``state == name`` may refer to the current element (as in invariants).
 
     Returns
     -------
     Condition
-        The checked tree; a chain ``a < b < c`` is split at once.
+        The checked tree; a chain ``a < b < c`` is already split.
 
     Raises
     ------
     ExpressionError
-        With the text, the column and what would be allowed.
+        With the text, the column and what would be allowed there.
 
     Examples
     --------
@@ -169,18 +169,18 @@ def _parsed(text: str) -> ast.expr:
             f"{mark} is not part of the language",
             text,
             foreign.start() + 1,
-            f"{_INSTEAD[mark]}, in its place",
+            f"{_INSTEAD[mark]} instead",
         )
-    flat = "".join(" " if c.isspace() else c for c in text)  # same length: columns stay true
+    flat = "".join(" " if c.isspace() else c for c in text)  # same length: columns stay correct
     lead = len(flat) - len(flat.lstrip())
     if lead == len(flat):
         raise ExpressionError("the text is empty", text, 1, _GRAMMAR)
     try:
         with PARSER, warnings.catch_warnings():
-            warnings.simplefilter("error")  # "1and v" is a warning to Python, a mistake here
+            warnings.simplefilter("error")  # Python only warns about "1and v"; here it is an error
             body = ast.parse(flat[lead:], mode="eval").body
     except SyntaxError as error:
-        # Python reports offset 0 where it reached the end and wanted more.
+        # Python reports offset 0 when it reached the end and expected more.
         column = min(error.offset + lead, len(text) + 1) if error.offset else len(text) + 1
         reason = "the text ends too early" if column > len(text) else "cannot be read from here"
         raise ExpressionError(reason, text, column, _GRAMMAR) from None
@@ -188,13 +188,13 @@ def _parsed(text: str) -> ast.expr:
         raise ExpressionError("cannot be read (nested too deeply)", text, 1, _GRAMMAR) from None
     raw = flat[lead:].encode()
     for node in ast.walk(body):
-        if isinstance(node, ast.expr):  # ast counts bytes, a reader counts characters
+        if isinstance(node, ast.expr):  # ast counts bytes, the reader counts characters
             node.col_offset = lead + len(raw[: node.col_offset].decode(errors="ignore"))
     return body
 
 
-def _meant(name: str, known: Iterable[str]) -> str:
-    """Return the known name that is nearest to a wrong one, as a question."""
+def _suggestion(name: str, known: Iterable[str]) -> str:
+    """Return a question that suggests the known name closest to a wrong one."""
     by_case = {each.casefold(): each for each in known}
     wanted = _ALIASES.get(name, name).casefold()
     near = difflib.get_close_matches(wanted[:100], by_case, n=1, cutoff=0.75)
@@ -202,7 +202,7 @@ def _meant(name: str, known: Iterable[str]) -> str:
 
 
 class _Reader:
-    """Turns `ast` nodes into our own, refusing everything that is not on the list."""
+    """Turns `ast` nodes into tree nodes, refusing everything not on the allow-list."""
 
     def __init__(
         self,
@@ -249,7 +249,7 @@ class _Reader:
                     raise self.refuse(f"the function {name!r} needs (...)", node, f"{name}(...)")
                 known = ", ".join(self.names) or "none"
                 raise self.refuse(
-                    f"unknown name {shown(name)}{_meant(name, self.names)}",
+                    f"unknown name {shown(name)}{_suggestion(name, self.names)}",
                     node,
                     f"the names {known}, and pi",
                 )
@@ -265,13 +265,13 @@ class _Reader:
                 self.known(node, function)
                 return self.call(node, function, arguments, depth)
             case ast.Compare() | ast.BoolOp() | ast.UnaryOp(op=ast.Not()):
-                raise self.refuse("a comparison stands where a number is needed", node)
+                raise self.refuse("found a comparison where a number is needed", node)
         raise self.refuse(f"{_plain(node)} is not part of the language", node)
 
     def known(self, node: ast.expr, function: str) -> None:
         if function not in NAMESPACE:
             raise self.refuse(
-                f"unknown function {shown(function)}{_meant(function, FUNCTIONS)}",
+                f"unknown function {shown(function)}{_suggestion(function, FUNCTIONS)}",
                 node,
                 "the functions " + ", ".join(FUNCTIONS),
             )
@@ -289,7 +289,7 @@ class _Reader:
             raise self.refuse(
                 f"{function} got {len(arguments)} arguments", node, f"at most {MOST_ARGUMENTS}"
             )
-        # min(a, b, c) is min(min(a, b), c), one corner at a time: the first arguments lie deepest.
+        # min(a, b, c) is min(min(a, b), c), one corner at a time: the first arguments are deepest.
         folds = max(0, len(arguments) - 2)
         values = [
             self.value(argument, depth + min(folds, len(arguments) - 1 - i))
@@ -322,7 +322,7 @@ class _Reader:
                 for i, op in enumerate(ops):
                     if type(op) not in _COMPARISONS:
                         raise self.refuse(
-                            "only < <= > >= compare floats (== and != almost never hold)",
+                            "only < <= > >= compare floats (== and != are almost never true)",
                             sides[i + 1],
                             "< <= > >=, for example a <= x <= b",
                         )
@@ -341,10 +341,10 @@ class _Reader:
                 return Not(self.condition(operand, depth))
             case ast.Constant() | ast.Name() | ast.BinOp() | ast.UnaryOp() | ast.Call():
                 match node:
-                    case ast.Call(func=ast.Name(id=function)):  # after(0.2), say
+                    case ast.Call(func=ast.Name(id=function)):  # after(0.2), for example
                         self.known(node, function)
                 raise self.refuse(
-                    "a number stands where a comparison is needed", node, "for example v > v_c"
+                    "found a number where a comparison is needed", node, "for example v > v_c"
                 )
         raise self.refuse(f"{_plain(node)} is not part of the language", node)
 
@@ -354,7 +354,7 @@ class _Reader:
                 if 1 <= element <= self.elements:
                     return element
         raise self.refuse(
-            "state(...) takes an element's number", call, f"state(1) to state({self.elements})"
+            "state(...) takes an element number", call, f"state(1) to state({self.elements})"
         )
 
     def in_state(self, element: int, op: ast.cmpop, name: ast.expr) -> Condition:

@@ -1,4 +1,4 @@
-"""The checked tree of a text: its nodes, and plain walks over them."""
+"""The nodes of a checked tree, and simple traversals."""
 
 from __future__ import annotations
 
@@ -98,9 +98,9 @@ class Relation:
 
 @dataclass(frozen=True)
 class InState:
-    """``state(element) == name``, elements counted from 1: of breakpoints, never of guards.
+    """``state(element) == name``, elements counted from 1: in breakpoints, never in guards.
 
-    Element 0 is the one that is asked: ``state == name``, of invariants.
+    Element 0 is the current element: ``state == name`` in invariants.
     """
 
     element: int
@@ -150,7 +150,7 @@ Node: TypeAlias = Value | Condition
 
 
 def walk(node: Node) -> Iterator[Node]:
-    """Yield every node of a tree, the parts of a node before the node itself."""
+    """Yield every node of a tree, with the parts of a node before the node itself."""
     for part in node.parts:
         yield from walk(part)
     yield node
@@ -167,7 +167,7 @@ def names_in(node: Node) -> frozenset[str]:
     Returns
     -------
     frozenset of str
-        Without order.
+        In no particular order.
 
     Examples
     --------
@@ -179,7 +179,7 @@ def names_in(node: Node) -> frozenset[str]:
 
 
 def states_in(node: Node) -> frozenset[int]:
-    """Return the elements whose states a condition asks for, 0 for the one at hand.
+    """Return the elements whose states a condition refers to; 0 is the current element.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def states_in(node: Node) -> frozenset[int]:
     Returns
     -------
     frozenset of int
-        Without order.
+        In no particular order.
 
     Examples
     --------
@@ -202,7 +202,7 @@ def states_in(node: Node) -> frozenset[int]:
 
 
 def rebuilt(value: Value, change: Callable[[Value], Value]) -> Value:
-    """Return the same kind of value, with each of its parts changed."""
+    """Return a copy of a value with a function applied to each of its parts."""
     match value:
         case Negative(operand):
             return Negative(change(operand))

@@ -1,8 +1,8 @@
-"""The truth of a condition at many rows at once: the verdict of one row at a time, to the bit.
+"""Evaluation of a condition at many rows at once, bit for bit as row by row.
 
-Sums, products and comparisons of numpy round as Python's do. Functions that do not (`exp`, `sin`
-...) are taken from `math`, number by number. Where Python would raise (1/0) numpy goes on with inf;
-such places are noted and decided by `evaluate` itself.
+Sums, products and comparisons round in numpy as they do in Python. Functions that do not (`exp`,
+`sin` ...) are computed with `math`, one number at a time. Where Python would raise (1/0), numpy
+continues with inf; such places are recorded and then decided by `evaluate`.
 """
 
 from __future__ import annotations
@@ -38,22 +38,22 @@ Truths = NDArray[np.bool_]
 def truths(
     condition: Condition, columns: Mapping[str, ArrayLike], shape: tuple[int, ...]
 ) -> Truths:
-    """Return where a condition holds; what cannot be computed (1/0) is not true.
+    """Return where a condition is true; where it cannot be computed (1/0) it counts as false.
 
     Parameters
     ----------
     condition : Condition
-        A guard, a clause, an invariant.
+        A guard, a clause or an invariant.
     columns : mapping of str to array_like
-        For every name numbers that broadcast to `shape`; for ``state(1)`` under that key (for
-        ``state`` under ``state(0)``) names of states.
+        For every name, numbers that broadcast to `shape`; for ``state(1)`` the key of that name
+        (for ``state`` the key ``state(0)``) maps to names of states.
     shape : tuple of int
-        Of the answer.
+        Shape of the result.
 
     Returns
     -------
     ndarray of bool
-        Equal, place by place, to `gms_fsm.inspection.explain.holds`.
+        Equal, element by element, to `gms_fsm.inspection.explain.holds`.
 
     Examples
     --------
@@ -75,19 +75,19 @@ def truths(
 
 
 def values_of(tree: Value, columns: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
-    """Return a value at many places; NaN or infinity where it cannot be computed.
+    """Evaluate a value at many points; NaN or infinity where it cannot be computed.
 
     Parameters
     ----------
     tree : Value
         For example a signal.
     columns : mapping of str to array_like
-        For every name numbers of one shape.
+        For every name, numbers of one common shape.
 
     Returns
     -------
     ndarray
-        Of that shape.
+        An array of that shape.
 
     Examples
     --------
@@ -102,7 +102,7 @@ def values_of(tree: Value, columns: Mapping[str, ArrayLike]) -> NDArray[np.float
 
 
 class _Arrays:
-    """The algebra of arrays; it notes where Python would have raised."""
+    """The algebra of arrays; it records where Python would have raised."""
 
     def __init__(self, columns: Mapping[str, ArrayLike], shape: tuple[int, ...]) -> None:
         self.columns = columns
@@ -151,7 +151,7 @@ class _Arrays:
                 return np.sqrt(u)
             case "sgn":
                 return np.where(u > 0.0, 1.0, np.where(u < 0.0, -1.0, 0.0))
-            case "min":  # Python's own: the second only if it is smaller, NaN or not
+            case "min":  # as in Python: the second only if it is smaller, even with NaN
                 return np.where(others[0] < u, others[0], u)
             case "max":
                 return np.where(others[0] > u, others[0], u)
@@ -173,7 +173,7 @@ class _Arrays:
         return np.logical_or.reduce(np.broadcast_arrays(*parts))
 
     def one_by_one(self, function: Callable[..., float], *arguments: Any) -> Any:
-        """Compute with Python's own function; where it raises it is NaN, and noted."""
+        """Compute with the Python function; where it raises, store NaN and record the place."""
         arrays = np.broadcast_arrays(*arguments)
         shape, lists = arrays[0].shape, [array.ravel().tolist() for array in arrays]
         try:

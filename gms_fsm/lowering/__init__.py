@@ -1,4 +1,4 @@
-"""A model on a rig becomes a program: functions printed as Python text.
+"""Lowering of a model on a rig to a program: functions printed as Python text.
 
-They run as they are, or as machine code.
+They run as Python or are compiled to machine code.
 """

@@ -1,4 +1,4 @@
-"""A program's functions as machine code, from the same generated text (extra ``fast``)."""
+"""A program's functions compiled to machine code from the same generated text (extra ``fast``)."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ from gms_fsm.lowering._store import Store
 from gms_fsm.lowering.program import Arguments, Program
 from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
 
-__all__ = ["check_numba", "machine_code", "observe_rows", "packed", "store", "tell"]
+__all__ = ["check_numba", "machine_code", "notify", "observe_rows", "packed", "store"]
 
 Packed = tuple[FloatArray, FloatArray, FloatArray]
-_lock = threading.RLock()  # a sweep asks from several threads
+_lock = threading.RLock()  # a sweep may compile from several threads
 
 
 def check_numba() -> None:
-    """Raise unless numba is there.
+    """Raise an error unless numba is installed.
 
     Raises
     ------
     MissingExtraError
-        With what to do.
+        With advice on how to install it.
     """
     for module in ("numba", "platformdirs"):
         if importlib.util.find_spec(module) is None:
@@ -55,8 +55,8 @@ def packed(p: Arguments) -> Packed:
     Returns
     -------
     tuple of ndarray
-        Shared numbers (m,), own parameters (rows, n), corner tables (2 tables, corners). Tables
-        shorter than the longest repeat their last corner, which changes no value.
+        Shared numbers (m,), own parameters (rows, n), corner tables (2 tables, corners). Shorter
+        tables are padded by repeating their last corner, which changes no value.
 
     Examples
     --------
@@ -74,26 +74,26 @@ def packed(p: Arguments) -> Packed:
 
 
 def machine_code(program: Program, name: str) -> Any:
-    """Return one of a program's functions as machine code.
+    """Return one of a program's functions, compiled to machine code.
 
     Parameters
     ----------
     program : Program
         From `gms_fsm.lowering.program.lower`.
     name : str
-        Such as ``"flow"``.
+        For example ``"flow"``.
 
     Returns
     -------
     callable
-        Over the arrays of `packed`.
+        A function that takes the arrays from `packed`.
 
     Raises
     ------
     MissingExtraError
         If numba is not installed.
     SignalError
-        If numba cannot compile a Python function that is a signal.
+        If numba cannot compile a Python function used as a signal.
     """
     check_numba()
     with _lock:
@@ -107,11 +107,11 @@ def _machine_code(
     from integrators import compiled
 
     function = _loaded(source, callables)[name]
-    # The linker knows machine code from disk by its function's name alone: without a name of its
-    # own the flow of one program would be run in place of another's.
+    # The linker identifies machine code loaded from disk by its function's name alone: without a
+    # unique name, the flow of one program would be run in place of another's.
     stamp = compiled.digest(sgn, piecewise_linear, _loaded.__wrapped__, text=source)
     function.__qualname__ = f"{name}_{stamp}"
-    # A user's function may change without its text changing: such code is not kept.
+    # A user's function may change while its text stays the same: such code is not cached.
     return compiled.compiled(name, function, None if callables else store())
 
 
@@ -119,12 +119,12 @@ def _machine_code(
 def _loaded(
     source: str, callables: tuple[tuple[str, Callable[[float], float]], ...]
 ) -> dict[str, Any]:
-    """Load a text with what machine code can call."""
+    """Load a text together with the functions that machine code can call."""
     from integrators import compiled
 
     for helper in (sgn, piecewise_linear, piecewise_slope):
         compiled.usable_inside(helper)
-    # The name of a module that exists: numba imports it when it loads machine code from disk.
+    # The name of an existing module: numba imports it when it loads machine code from disk.
     names: dict[str, Any] = {
         "piecewise_linear": piecewise_linear,
         "piecewise_slope": piecewise_slope,
@@ -139,9 +139,9 @@ def _loaded(
 
 @functools.cache
 def _power() -> Any:
-    """Return ``pow`` of the C library, which `math.pow` is.
+    """Return ``pow`` of the C library, which `math.pow` calls.
 
-    Left to itself LLVM makes 8**z an exp2 and z**0.5 a sqrt, whose last bits are others.
+    Otherwise LLVM would turn 8**z into exp2 and z**0.5 into sqrt, which differ in the last bits.
     """
     from numba import types
     from numba.core.cgutils import ir
@@ -163,14 +163,14 @@ def _power() -> Any:
 
 @functools.cache
 def store() -> Store | None:
-    """Return where machine code is kept, None where nothing can be.
+    """Return the cache for machine code, or None if no cache can be used.
 
-    It is the platform's folder for caches, or NUMBA_CACHE_DIR.
+    It is in the platform's folder for caches, or in NUMBA_CACHE_DIR.
 
     Returns
     -------
     Store or None
-        Ready.
+        Ready for use.
     """
     from platformdirs import user_cache_path
 
@@ -178,13 +178,13 @@ def store() -> Store | None:
     return Store.at((Path(given) if given else user_cache_path("gms-fsm")) / "machine-code")
 
 
-def tell(text: str) -> None:
-    """Say what takes so long.
+def notify(text: str) -> None:
+    """Print a message about a slow step to stderr.
 
     Parameters
     ----------
     text : str
-        What machine code is made of, or how long that took.
+        What is being compiled, or how long that took.
     """
     print(f"gms-fsm: {text}", file=sys.stderr)
 
@@ -197,13 +197,13 @@ def _compiled_signal(name: str, call: Callable[[float], float]) -> Any:
     )
     try:
         return jit(getattr(call, "py_func", call))
-    except Exception as error:  # numba raises many kinds, TypeError and its own among them
+    except Exception as error:  # numba raises many kinds, including TypeError and its own
         lines = (re.sub(r"\x1b\[\d*m", "", line).strip() for line in str(error).splitlines())
         reason = next((u for u in lines if u and not u.startswith("Failed in nopython mode")), "")
         raise SignalError(
             f"numba cannot compile the function ({type(error).__name__}: {reason})",
             place=f"signal {name!r}",
-            advice="use engine='machines', or give the signal as an expression of t or as "
+            advice="use engine='machines', or give the signal as an expression in t or as "
             "arrays (times, values)",
         ) from None
 
@@ -211,7 +211,7 @@ def _compiled_signal(name: str, call: Callable[[float], float]) -> Any:
 def observe_rows(
     program: Program, t: FloatArray, y: FloatArray, mode: NDArray[np.int64]
 ) -> FloatArray:
-    """Return what `observe` says of many rows, all signs as they are seen.
+    """Return the result of `observe` for many rows, with all signs evaluated live.
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ def observe_rows(
     Returns
     -------
     ndarray, shape (rows, observed)
-        Bit for bit as the readable engine.
+        Bit for bit the same as the readable engine.
     """
     from integrators import compiled
 

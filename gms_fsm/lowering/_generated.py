@@ -1,6 +1,7 @@
-"""Loads generated code so that debuggers and tracebacks find its lines.
+"""Loading of generated code so that debuggers and tracebacks find its lines.
 
-The only place where text becomes code, and it is always our own text, printed from a checked tree.
+This is the only place where text becomes code, and the text is always our own, printed from a
+checked tree.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ __all__ = ["ieee", "load", "load_careful", "standalone"]
 
 
 def load(title: str, source: str, names: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    r"""Run generated text and return what it defines.
+    r"""Run generated text and return the names it defines.
 
     Parameters
     ----------
@@ -36,7 +37,7 @@ def load(title: str, source: str, names: Mapping[str, Any] | None = None) -> dic
     source : str
         Python text.
     names : mapping, optional
-        Objects it may use besides the functions of the expression language.
+        Objects it may use in addition to the functions of the expression language.
 
     Returns
     -------
@@ -54,7 +55,7 @@ def load(title: str, source: str, names: Mapping[str, Any] | None = None) -> dic
 
 
 def load_careful(title: str, source: str, names: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Run generated text with functions and numbers that never raise, for `ieee`.
+    """Run generated text with functions and numbers that never raise, for use by `ieee`.
 
     Parameters
     ----------
@@ -72,7 +73,7 @@ def load_careful(title: str, source: str, names: Mapping[str, Any] | None = None
 
 
 def standalone(source: str) -> str:
-    r"""Return generated text as a program of its own, with the imports and functions that it uses.
+    r"""Return generated text as a standalone program, with the imports and functions that it uses.
 
     Parameters
     ----------
@@ -82,12 +83,12 @@ def standalone(source: str) -> str:
     Returns
     -------
     str
-        Python text that needs nothing but Python.
+        Python text that depends only on the standard library.
 
     Raises
     ------
     ParameterError
-        If a signal in it is a Python function of the user's, which no text can hold.
+        If one of its signals is a user's Python function, which cannot be written as text.
 
     Examples
     --------
@@ -117,9 +118,9 @@ def standalone(source: str) -> str:
     missing = sorted(used - own - set(dir(builtins)))
     if foreign := [name for name in missing if name not in known]:
         raise ParameterError(
-            "a Python function, which no text can hold",
+            "a Python function, which cannot be written as text",
             place=f"{', '.join(foreign)}",
-            advice="give the signal as a formula or as corners",
+            advice="give the signal as an expression or as corners",
         )
     borrowed = [name for name in missing if known[name] is getattr(math, name, None)]
     parts = [f"from math import {', '.join(borrowed)}\n"] if borrowed else []
@@ -129,20 +130,20 @@ def standalone(source: str) -> str:
 
 
 def _tree(source: str) -> ast.Module:
-    """Parse a text, alone."""
+    """Parse a text, one at a time."""
     with PARSER:
         return ast.parse(source)
 
 
 def _split_head(source: str) -> tuple[str, str]:
-    """Split the comments that a text begins with from the rest."""
+    """Split the leading comments of a text from the rest."""
     lines = source.splitlines(keepends=True)
     end = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
     return "".join(lines[:end]), "".join(lines[end:])
 
 
 def _bare(function: Callable[..., Any]) -> str:
-    """Return a function's text without annotations, its docstring cut to the first line."""
+    """Return a function's text without annotations, with its docstring cut to the first line."""
     tree = _tree(inspect.getsource(function))
     for node in ast.walk(tree):
         if isinstance(node, ast.arg):
@@ -157,7 +158,7 @@ def _bare(function: Callable[..., Any]) -> str:
 @functools.lru_cache(maxsize=256)
 def _compiled(title: str, source: str, careful: bool = False) -> CodeType:
     digest = hashlib.sha256(source.encode()).hexdigest()[:8]
-    shown = "".join(c if c.isprintable() else "?" for c in title)  # a file name takes not all
+    shown = "".join(c if c.isprintable() else "?" for c in title)  # not all are valid in file names
     filename = f"<{shown} {digest}>"
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
     if not careful:
@@ -167,7 +168,7 @@ def _compiled(title: str, source: str, careful: bool = False) -> CodeType:
 
 
 class _WideNumbers(ast.NodeTransformer):
-    """Has every number written in a text made one that does not raise: 1.0 / 0.0 is inf."""
+    """Replaces every literal number by one that does not raise: 1.0 / 0.0 becomes inf."""
 
     def visit_Constant(self, node: ast.Constant) -> ast.AST:
         if not isinstance(node.value, float):
@@ -176,23 +177,23 @@ class _WideNumbers(ast.NodeTransformer):
 
 
 # --------------------------------------------------------------------------- IEEE arithmetic
-# A trial step may land where exp overflows or a root is of a negative number. IEEE arithmetic says
-# inf or NaN there and the step size shrinks; Python raises. So the text runs as it is, fast, and
-# where it raises once more with numbers that do not: the same bits as the compiled text.
+# A trial step may reach a point where exp overflows or a root has a negative argument. There IEEE
+# arithmetic yields inf or NaN and the step size shrinks; Python raises. So the text runs as it is,
+# fast, and if it raises, again with numbers that do not: the same bits as the compiled text.
 def ieee(fast: Callable[..., Any], careful: Callable[..., Any]) -> Callable[..., Any]:
-    r"""Return a generated function that computes inf and NaN where Python would raise.
+    r"""Return a generated function that yields inf and NaN where Python would raise.
 
     Parameters
     ----------
     fast : callable
-        The function over Python's floats.
+        The function, operating on Python floats.
     careful : callable
-        The same, from `load_careful`.
+        The same function from `load_careful`.
 
     Returns
     -------
     callable
-        Takes the arguments of both.
+        Takes the same arguments as both.
 
     Examples
     --------
@@ -209,7 +210,7 @@ def ieee(fast: Callable[..., Any], careful: Callable[..., Any]) -> Callable[...,
         try:
             return fast(*arguments)
         except (ArithmeticError, ValueError) as error:
-            if isinstance(error, GMSError):  # of a user's own signal
+            if isinstance(error, GMSError):  # from a user's own signal
                 raise
         wide = [_wide(argument) for argument in arguments]
         with np.errstate(all="ignore"):
@@ -223,18 +224,20 @@ def ieee(fast: Callable[..., Any], careful: Callable[..., Any]) -> Callable[...,
 
 
 def _wide(argument: Any) -> Any:
-    """Return floats, wherever they are, as numbers of numpy, which do not raise."""
+    """Return floats, however nested, as NumPy numbers, which do not raise."""
     if isinstance(argument, float):
         return np.float64(argument)
     if isinstance(argument, list | tuple):
         return type(argument)(_wide(part) for part in argument)
-    if hasattr(argument, "__dict__"):  # an element, whose values a guard reads
+    if hasattr(argument, "__dict__"):  # an element, whose values are read by a guard
         return SimpleNamespace(**{name: _wide(value) for name, value in vars(argument).items()})
     return argument
 
 
-def _quiet(function: Callable[..., float], replacement: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function of `math` that falls back on numpy's where it would raise."""
+def _without_raising(
+    function: Callable[..., float], replacement: Callable[..., Any]
+) -> Callable[..., Any]:
+    """Return a function of `math` that falls back on NumPy where it would raise."""
 
     def computed(*arguments: Any) -> Any:
         try:
@@ -246,9 +249,9 @@ def _quiet(function: Callable[..., float], replacement: Callable[..., Any]) -> C
 
 
 _IEEE: Mapping[str, Callable[..., Any]] = {
-    "exp": _quiet(math.exp, np.exp),
-    "sqrt": _quiet(math.sqrt, np.sqrt),
-    "sin": _quiet(math.sin, np.sin),
-    "cos": _quiet(math.cos, np.cos),
-    "pow": _quiet(math.pow, np.power),
+    "exp": _without_raising(math.exp, np.exp),
+    "sqrt": _without_raising(math.sqrt, np.sqrt),
+    "sin": _without_raising(math.sin, np.sin),
+    "cos": _without_raising(math.cos, np.cos),
+    "pow": _without_raising(math.pow, np.power),
 }

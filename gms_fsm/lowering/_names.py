@@ -1,4 +1,4 @@
-"""What things are called: in the trees of a program's plan, and in its text."""
+"""The names used in the trees of a program's plan and in its text."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ from gms_fsm.systems.rigs import Rig
 __all__ = ["DIP", "Names", "computed_names", "names_of"]
 
 DIP = "v dip"  # not an identifier, so no chart can have a name like it
-# Names of the text itself, besides those that no chart may have either.
+# Names used by the text itself, in addition to those reserved for every chart.
 TEXT = {"F_i", "len", "range", "piecewise_linear", "piecewise_slope", "v_dip"}
 TEXT |= {"surface", "j", "dS", "nan"}
-MODEL = {"F_c", "F_s", "v_s", "sigma_2"}  # numbers of a model beside its chart's
+MODEL = {"F_c", "F_s", "v_s", "sigma_2"}  # numbers of a model other than its chart's parameters
 
 
 @dataclass(frozen=True, eq=False)
 class Names:
-    """What things are called in the text.
+    """The names of quantities in the text.
 
     Parameters
     ----------
     shared : tuple of str
-        Numbers that all elements share, in the order of the program's arguments.
+        Numbers shared by all elements, in the order of the program's arguments.
     own : tuple of str
         Numbers with one value per element, in the order of the program's arguments.
     local : mapping of str to str
-        For a name in the trees its name in the text, where it has another one or is a chart's.
+        For a name in the trees, its name in the text, if that differs or belongs to the chart.
     rig : mapping of str to Name
-        For the rig's signals and numbers their names in the trees: a chart may have the same ones.
+        For the rig's signals and numbers, their names in the trees: a chart may use the same ones.
     taken : frozenset of str
-        All names that may not be used for something else.
+        All names that are already in use.
     states, edges : mapping of str to str
-        The constants of the states and of the edges, in the chart's order.
+        Constants for the states and for the edges, in the chart's order.
     """
 
     shared: tuple[str, ...]
@@ -53,7 +53,7 @@ class Names:
 
     @cached_property
     def texts(self) -> Mapping[str, str]:
-        """How each name of the trees is spelled in the loop over the elements."""
+        """The spelling of each name from the trees inside the loop over the elements."""
         own = {*self.own}
         return {
             name: f"{local}[i]" if local in own else local for name, local in self.local.items()
@@ -61,17 +61,17 @@ class Names:
 
     @cached_property
     def plain(self) -> Mapping[str, str]:
-        """How the rig's names are spelled in messages."""
+        """The spelling of the rig's names in messages."""
         return {apart.id: name for name, apart in self.rig.items()}
 
     def read_by(self, *nodes: Node) -> frozenset[str]:
-        """Return what trees read, as it is called in the text."""
+        """Return the names that trees read, as spelled in the text."""
         return frozenset(
             self.local.get(name, name) for node in nodes for name in computed_names(node)
         )
 
     def is_shared(self, node: Node) -> bool:
-        """Tell whether a tree of the chart has one value for all elements."""
+        """Return whether a tree of the chart has the same value for all elements."""
         return all(
             name in ("t", "x", "v") or name in self.plain or self.local.get(name) in self.shared
             for name in names_in(node)
@@ -79,7 +79,7 @@ class Names:
 
 
 def computed_names(node: Node) -> frozenset[str]:
-    """Return the names that a tree is computed from: ``u**0`` is 1 whatever u is.
+    """Return the names that the value of a tree depends on: ``u**0`` is 1 whatever u is.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def computed_names(node: Node) -> frozenset[str]:
     Returns
     -------
     frozenset of str
-        As `names_in` otherwise.
+        The same as `names_in` otherwise.
 
     Examples
     --------
@@ -106,17 +106,17 @@ def computed_names(node: Node) -> frozenset[str]:
 
 
 def names_of(model: Model, rig: Rig) -> Names:
-    """Name what the program of a model on a rig reads.
+    """Choose names for everything that the program of a model on a rig reads.
 
     Parameters
     ----------
     model, rig
-        What runs; of their numbers only the shape counts.
+        The model and the rig; only the shapes of their numbers matter.
 
     Returns
     -------
     Names
-        Without clashes.
+        Free of clashes.
 
     Examples
     --------
@@ -132,10 +132,10 @@ def names_of(model: Model, rig: Rig) -> Names:
     _check_rig(rig, chart)
     taken = set(shared) | set(rig.signals) | {f"{name}_signal" for name in rig.signals}
     taken |= TEXT
-    # A chart may have names of the rig's: those of the rig are set apart.
+    # A chart may use names of the rig: the rig's are kept separate.
     apart = {name: Name(f"rig {name}") for name in (*rig.signals, *rig.numbers)}
     local = {DIP: "v_dip"} | {each.id: name for name, each in apart.items()}
-    # A chart may call its own parameter F_c or mass: it gets a name of its own in the text.
+    # A chart may call its own parameter F_c or mass: it gets a different name in the text.
     chart_names = (*chart.variables, *chart.parameter_names)
     for name in chart_names:
         found = name
@@ -146,8 +146,8 @@ def names_of(model: Model, rig: Rig) -> Names:
     for name in chart.parameter_names:
         (shared if np.ndim(model.values[name]) == 0 else own).append(local[name])
     local |= {f"d{name}": f"d{local[name]}" for name in chart.variables}
-    # STICK reads best, but a state called c must not become the parameter C, nor the edge
-    # Home the state home.
+    # STICK is the most readable, but a state called c must not become the parameter C, nor the
+    # edge Home the state home.
     constants = {*taken, *RESERVED}
     return Names(
         shared=tuple(shared),
@@ -161,9 +161,10 @@ def names_of(model: Model, rig: Rig) -> Names:
 
 
 def _check_rig(rig: Rig, chart: Chart) -> None:
-    """Refuse names of a rig that mean something else in the text.
+    """Refuse names of a rig that have another meaning in the text.
 
-    A chart's names are refused likewise, by the chart; the velocity of a prescribed motion is v.
+    The chart itself refuses its own names in the same way; the velocity of a prescribed motion is
+    v.
     """
     forbidden = {*RESERVED, *SUPPLIED, *MODEL, *TEXT} | {f"d{name}" for name in chart.variables}
     velocity = {"v"} if rig.acceleration is None else set()
@@ -172,12 +173,12 @@ def _check_rig(rig: Rig, chart: Chart) -> None:
             raise ParameterError(
                 f"the {kind} {name!r} has a name that the generated program uses itself",
                 place=f"rig {rig.title!r}",
-                advice=f"call it something else, for example '{name}_rig'",
+                advice=f"rename it, for example to '{name}_rig'",
             )
 
 
 def _constant(name: str, taken: set[str]) -> str:
-    """Return a constant for a name, and note it as taken."""
+    """Return a constant for a name and reserve it."""
     constant = name.upper()
     while constant in taken or not constant.isidentifier():
         constant += "_"

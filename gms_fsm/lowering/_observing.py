@@ -1,7 +1,8 @@
-"""What is seen of a state: velocity, force, thresholds, rates; along a surface with its sigma.
+"""Observed quantities of a state: velocity, force, thresholds, rates; on a surface, its sigma.
 
-A row's modes are those of the elements, then for each surface of the program whether the motion
-slides on it (`integrators.sliding`). There a sign is a number from -1 to 1.
+The modes of a row are the states of the elements, followed by one flag per surface of the program
+that says whether the motion slides on it (`integrators.sliding`). While sliding, a sign is replaced
+by a number from -1 to 1.
 """
 
 from __future__ import annotations
@@ -13,29 +14,29 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.lowering.program import Program
-from integrators import Functions, Held, look, room_to_slide, slope_on
+from integrators import Functions, Held, look, sliding_scratch, slope_on
 
 __all__ = ["armed", "observe", "rate", "sigmas"]
 
 
 def observe(program: Program, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
-    """Return what a run observes of a state, by place (`gms_fsm.lowering.layout`).
+    """Return the observed quantities of a state, by place (`gms_fsm.lowering.layout`).
 
     Parameters
     ----------
     program : Program
-        Of the run.
+        The program of the run.
     t : float
         s.
     y : list of float, shape (m,)
         State.
     mode : sequence of int, shape (n,) or (n + surfaces,)
-        Of a row.
+        The modes of a row.
 
     Returns
     -------
     list of float
-        At the places of ``program.layout.observed``.
+        In the layout of ``program.layout.observed``.
     """
     out = [0.0] * program.layout.observed.size
     if not any(mode[program.layout.slides]):
@@ -47,7 +48,7 @@ def observe(program: Program, t: float, y: list[float], mode: Sequence[int]) -> 
 
 
 def sigmas(program: Program, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
-    """Return for each surface the sigma in place of its sign.
+    """Return for each surface the sigma that replaces its sign.
 
     Parameters
     ----------
@@ -57,7 +58,7 @@ def sigmas(program: Program, t: float, y: list[float], mode: Sequence[int]) -> l
     Returns
     -------
     list of float
-        From -1 to 1; NaN for a surface that is not slid on.
+        From -1 to 1; NaN for a surface on which the motion does not slide.
     """
     found = [math.nan] * program.layout.surfaces
     if any(mode[program.layout.slides]):
@@ -69,7 +70,7 @@ def sigmas(program: Program, t: float, y: list[float], mode: Sequence[int]) -> l
 
 
 def armed(program: Program, t: float, y: list[float], mode: Sequence[int]) -> list[float]:
-    """Return the signs that an arc from a state would hold.
+    """Return the signs that an arc starting from a state would freeze.
 
     Parameters
     ----------
@@ -79,7 +80,7 @@ def armed(program: Program, t: float, y: list[float], mode: Sequence[int]) -> li
     Returns
     -------
     list of float
-        -1, 0 or 1; of the surfaces slid on not yet their sigmas.
+        -1, 0 or 1; for sliding surfaces this is not yet their sigma.
     """
     held = [0.0] * program.held
     program.ieee["arm"](t, y, mode, program.p, held, [0] * len(program.strict))
@@ -89,19 +90,19 @@ def armed(program: Program, t: float, y: list[float], mode: Sequence[int]) -> li
 def rate(
     program: Program, t: float, y: list[float], mode: Sequence[int], held: list[float]
 ) -> FloatArray:
-    """Return dy/dt with the signs held.
+    """Return dy/dt with frozen signs.
 
     Parameters
     ----------
     program, t, y, mode
         As in `observe`.
     held : list of float
-        The signs; those of surfaces that are slid on are found here.
+        The frozen signs; those of sliding surfaces are computed here.
 
     Returns
     -------
     ndarray, shape (m,)
-        The slope.
+        The derivative.
     """
     dy = [0.0] * program.layout.y.size
     if not any(mode[program.layout.slides]):
@@ -112,10 +113,10 @@ def rate(
 
 
 def _sliding(program: Program, mode: Sequence[int], held: list[float]) -> Held:
-    """Return the program on the surfaces that a row is on."""
+    """Return the program restricted to the surfaces that a row slides on."""
     names = ("flow", "arm", "margins", "normal")
     flow, arm, margins, normal = (program.ieee[name] for name in names)
-    sliding = room_to_slide(
+    sliding = sliding_scratch(
         program.surfaces,
         program.layout.y.size,
         program.held,

@@ -1,7 +1,7 @@
 """The plan of a program: what is computed where, and from what, before any text is written.
 
-`plan_of` makes it from the chart, the shape of the model and the rig; it holds no numbers. Printers
-write it down (`gms_fsm.lowering._python`) and do not decide anything more.
+`plan_of` derives it from the chart, the shape of the model and the rig; it contains no parameter
+values. Printers write it as text (`gms_fsm.lowering._python`) and make no further decisions.
 """
 
 from __future__ import annotations
@@ -41,16 +41,16 @@ __all__ += ["both_sides", "plan_of"]
 
 @dataclass(frozen=True)
 class RoughCall:
-    """A call with a corner or a jump, computed before what it is part of.
+    """A call with a corner or a jump, computed before the expression that contains it.
 
     Parameters
     ----------
     name : str
-        What its value is called.
+        The name of its value.
     call : Call
-        The call; its arguments may name other rough calls.
+        The call; its arguments may refer to other rough calls.
     turning : Value
-        The value whose sign decides.
+        The value whose sign selects the branch.
     """
 
     name: str
@@ -60,18 +60,18 @@ class RoughCall:
 
 @dataclass(frozen=True)
 class StateFlow:
-    """What is computed for an element in one state.
+    """The computations for an element in one state.
 
     Parameters
     ----------
     state : str
-        Which.
+        The state.
     calls : tuple of RoughCall
-        Those of this element alone, in the order of computation.
+        The element's own calls, in order of computation.
     rates : mapping of str to Value
-        By variable, without rough calls.
+        The rate of each variable, without rough calls.
     force : Value or None
-        F_i where it differs from state to state, without rough calls.
+        F_i if it depends on the state, without rough calls.
     """
 
     state: str
@@ -82,18 +82,18 @@ class StateFlow:
 
 @dataclass(frozen=True)
 class Flow:
-    """What is computed of all rates and forces.
+    """The computation of all rates and forces.
 
     Parameters
     ----------
     calls : tuple of RoughCall
-        Those that all elements share, in the order of computation.
+        Those shared by all elements, in order of computation.
     states : tuple of StateFlow
-        For each state.
+        One for each state.
     force : Value or None
-        F_i where it is the same text in all states; None too where no force is wanted.
+        F_i if it is the same text in all states; None also if no force is needed.
     acceleration : Value or None
-        dv/dt, without rough calls; None if v is prescribed or not wanted.
+        dv/dt, without rough calls; None if v is prescribed or dv/dt is not needed.
     """
 
     calls: tuple[RoughCall, ...]
@@ -103,7 +103,7 @@ class Flow:
 
     @property
     def by_state(self) -> bool:
-        """Whether the force is computed state by state."""
+        """Whether the force is computed separately for each state."""
         return any(each.force is not None for each in self.states)
 
 
@@ -116,9 +116,9 @@ class Edge:
     name, source, target : str
         As in the chart.
     guard : Condition
-        When it is taken.
+        The condition for taking the edge.
     steps : tuple of (str, Value)
-        The assignments to variables, in the order of computation.
+        The assignments to variables, in order of computation.
     """
 
     name: str
@@ -130,18 +130,18 @@ class Edge:
 
 @dataclass(frozen=True)
 class Gradient:
-    """The derivatives of what is zero on a surface, where they are not zero by form.
+    """The derivatives of a surface's defining value, where they are not identically zero.
 
     Parameters
     ----------
     surface : Value
-        What is zero.
+        The value that is zero on the surface.
     by_state : mapping of str to Value
-        By x and by the chart's variables.
+        With respect to x and to the chart's variables.
     by_v, by_s, by_t : Value or None
-        By the velocity, the threshold, the time.
+        With respect to velocity, threshold and time.
     by_signal : mapping of str to Value
-        By the rig's signals.
+        With respect to the rig's signals.
     """
 
     surface: Value
@@ -153,24 +153,24 @@ class Gradient:
 
     @property
     def by_speed(self) -> bool:
-        """Whether it changes with the velocity, by any way."""
+        """Whether the value depends on the velocity in any way."""
         return self.by_v is not None or self.by_s is not None
 
 
 @dataclass(frozen=True)
 class Input:
-    """A signal: a formula, a table of corners, or else a Python function.
+    """A signal: a formula, a table of corners, or a Python function.
 
     Parameters
     ----------
     name : str
         As in the rig.
     calls : tuple of RoughCall
-        Those of the formula, in the order of computation.
+        Those in the formula, in order of computation.
     formula : Value or None
         Without rough calls.
     slope : Value or None
-        Derivative of the formula by t, where there is one.
+        Derivative of the formula with respect to t, if it has one.
     tabled : bool
         Whether it is a table of corners.
     """
@@ -184,44 +184,44 @@ class Input:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """All that a program computes.
+    """Everything that a program computes.
 
     Parameters
     ----------
     title : str
-        Of the chart and the rig.
+        Chart and rig, for the heading.
     names : Names
-        What things are called.
+        The names used in the text.
     layout : Layout
-        Where everything stands.
+        The layout of all arrays.
     tables : Places
-        Where times and values of each table of corners stand.
+        Places of the times and the values of each table of corners.
     curve : Value or None
         The Stribeck curve S(v).
     curve_slope : Value or None
-        Its derivative by v.
+        Its derivative with respect to v.
     threshold : bool
-        Whether the chart reads s.
+        Whether the chart uses s.
     inputs : tuple of Input
         The signals, in the rig's order.
     edges : tuple of Edge
         In the chart's order.
     held : Places
-        The values whose signs are held.
+        The values whose signs are frozen.
     surfaces : Places
-        Those of them that the motion can slide on.
+        Those of them on which the motion can slide.
     relations : Places
-        The comparisons that are watched.
+        The comparisons that may be watched.
     always : tuple of Comparison
         Those watched in every state.
     rough : mapping of str to tuple of Value
-        By state, the values whose signs decide corners and jumps there.
+        By state, the values whose signs select corners and jumps there.
     flow : Flow
         For the rates dy/dt.
     observed : Flow
-        For what a run observes.
+        For the observed quantities.
     gradients : tuple of Gradient
-        For each value that can be slid on, in the order of `surfaces`.
+        One for each entry of `surfaces`, in the same order.
     """
 
     title: str
@@ -244,12 +244,12 @@ class Plan:
 
     @property
     def prescribed(self) -> bool:
-        """Whether the velocity is given."""
+        """Whether the velocity is prescribed."""
         return "v" not in self.layout.y.shared
 
     @property
     def variables(self) -> tuple[str, ...]:
-        """The chart's."""
+        """The chart's variables."""
         return self.layout.y.own
 
     def leaving(self, state: str) -> tuple[Edge, ...]:
@@ -263,12 +263,12 @@ def plan_of(model: Model, rig: Rig) -> Plan:
     Parameters
     ----------
     model, rig
-        What runs; of their numbers only the shape counts.
+        The model and the rig; only the shapes of their numbers matter.
 
     Returns
     -------
     Plan
-        For a printer.
+        Input for a printer.
 
     Examples
     --------
@@ -287,7 +287,7 @@ def plan_of(model: Model, rig: Rig) -> Plan:
     rig_rough = _rig_rough(rig, acceleration)
     rough = {state: _rough(chart, state, force) for state, force in forces.items()}
     found = [*rig_rough, *(u for each in rough.values() for u in each)]
-    held = _parted(found, names, model.n)
+    held = _partitioned(found, names, model.n)
     surfaces = Places(
         tuple(u for u in held.shared if _can_be_slid_on(u, chart, rig, names)),
         tuple(u for u in held.own if _can_be_slid_on(u, chart, rig, names)),
@@ -318,7 +318,7 @@ def plan_of(model: Model, rig: Rig) -> Plan:
 
 
 def _labels(held: Places[Value], names: Names) -> dict[Value, str]:
-    """Return for each held sign what the rough calls at it are called after."""
+    """Return, for each frozen sign, the label used to name its rough calls."""
     labels: dict[Value, str] = {}
     for number, u in enumerate([*held.shared, *held.own]):
         label = u.id if isinstance(u, Name) and u.id.isidentifier() else str(number)
@@ -332,7 +332,7 @@ def _labels(held: Places[Value], names: Names) -> dict[Value, str]:
 
 # --------------------------------------------------------------------------- corners and jumps
 class _Smoothing:
-    """Takes the rough calls out of values."""
+    """Replaces the rough calls in values by names."""
 
     def __init__(self, held: Places[Value], names: Names) -> None:
         self.held, self.labels, self.taken = held, _labels(held, names), names.taken
@@ -342,18 +342,18 @@ class _Smoothing:
         self.named: dict[Call, str] = {}
 
     def __call__(self, value: Value) -> tuple[Value, tuple[RoughCall, ...]]:
-        """Return a value with names in place of its rough calls, and these calls in order."""
+        """Return a value with its rough calls replaced by names, and these calls in order."""
         smooth, calls = substitute(value, self.name_of)
         return smooth, tuple(
             RoughCall(name, call, self.turning[name]) for name, call in calls.items()
         )
 
     def name_of(self, turning: Value, call: Call) -> str | None:
-        """Return what a rough call is named, None where its sign is not held."""
+        """Return the name of a rough call, or None if its sign is not frozen."""
         if turning not in self.labels:
             return None
         if call not in self.named:
-            # max(v, 2) and max(v - 2, 0) turn at the same place, and are not the same.
+            # max(v, 2) and max(v - 2, 0) turn at the same place, but are not the same.
             first = name = f"{call.function}_{self.labels[turning]}"
             number = 2
             while name in self.named.values() or (
@@ -371,31 +371,31 @@ def _acceleration(rig: Rig, names: Names) -> Value | None:
 
 
 def _force(chart: Chart, state: str) -> Value:
-    """Return the force in a state: in its rough calls the flows stand for the rates."""
+    """Return the force in a state, with the rates in its rough calls replaced by the flows."""
     rates = {f"d{name}": chart.flows[state, name] for name in chart.variables}
     return turning_inside(chart.forces["F"], rates)
 
 
 def _rig_rough(rig: Rig, acceleration: Value | None) -> tuple[Value, ...]:
-    """Return where the rig or a signal has a corner or a jump."""
+    """Return the values at whose zeros the rig or a signal has a corner or a jump."""
     found: list[Value] = []
     for signal in rig.signals.values():
         if isinstance(signal, Formula):
             found += rough_points(signal.tree)
     if acceleration is not None:
-        # A sign of F itself stays live: F is known only with the flow.
+        # A sign of F itself is evaluated live: F is known only together with the flow.
         found += [u for u in rough_points(acceleration) if "F" not in names_in(u)]
     return tuple(found)
 
 
 def _rough(chart: Chart, state: str, force: Value) -> tuple[Value, ...]:
-    """Return where a flow or the force has a corner or a jump: there the driver stops."""
+    """Return the values at whose zeros a flow or the force has a corner or a jump."""
     trees = [*(chart.flows[state, name] for name in chart.variables), force]
     return tuple(dict.fromkeys(u for tree in trees for u in rough_points(tree)))
 
 
-def _parted(found: Iterable[Value], names: Names, n: int) -> Places[Value]:
-    """Part values into those that all elements share and those of one element."""
+def _partitioned(found: Iterable[Value], names: Names, n: int) -> Places[Value]:
+    """Split values into those shared by all elements and those of one element."""
     shared = {u: names.is_shared(u) for u in found}
     return Places(
         tuple(u for u in shared if shared[u]), tuple(u for u in shared if not shared[u]), n
@@ -403,7 +403,7 @@ def _parted(found: Iterable[Value], names: Names, n: int) -> Places[Value]:
 
 
 def _can_be_slid_on(u: Value, chart: Chart, rig: Rig, names: Names) -> bool:
-    """Tell whether u depends on the state, by ways that have a derivative."""
+    """Return whether u depends on the state, and only in ways that have a derivative."""
     read, prescribed = names_in(u), rig.acceleration is None
     if "s" in read:
         read |= {"v"}
@@ -426,20 +426,20 @@ def _has_slope(signal: Signal) -> bool:
 
 # --------------------------------------------------------------------------- comparisons
 def both_sides(u: Value) -> tuple[Comparison, Comparison]:
-    """Return the comparisons of a value with zero: above it, and at least at it."""
+    """Return the comparisons of a value with zero: strictly above it, and at or above it."""
     zero = Number(0.0)
     return Comparison(u, zero, strict=True), Comparison(u, zero, strict=False)
 
 
 def _landmarks() -> list[Comparison]:
-    """Return where s(v) starts to change fast: a large step would jump the whole dip unseen."""
+    """Return the speeds where s(v) starts to change fast: a large step could jump over the dip."""
     v, dip = Name("v"), Name(DIP)
-    # Mirror images of each other, so that a mirrored run stops at mirrored places.
+    # Mirror images of each other, so that a mirrored run stops at mirrored points.
     return [Comparison(v, dip, strict=True), Comparison(Negative(dip), v, strict=True)]
 
 
 def _relations(chart: Chart, held: Places[Value], names: Names) -> Places[Comparison]:
-    """Place all comparisons that may be watched."""
+    """Lay out all comparisons that may be watched."""
     wanted: list[Comparison] = []
     for edge in chart.transitions:
         wanted += comparisons(split(chart.guards[edge.name]))
@@ -489,7 +489,7 @@ def _flow(
     chart: Chart, forces: Mapping[str, Value], acceleration: Value | None, smoothing: _Smoothing
 ) -> Flow:
     """Plan the rates, and the forces if there are any."""
-    # With corners in it the force differs from state to state.
+    # With corners in it, the force differs from state to state.
     by_state = any(rough_points(force) for force in forces.values())
     shared: dict[str, RoughCall] = {}
     states = []
@@ -525,7 +525,7 @@ def _gradient(u: Value, chart: Chart, rig: Rig, names: Names) -> Gradient:
 
 
 def _known(value: Value, name: str) -> Value:
-    """Return a derivative that there is: surfaces without one are not slid on."""
+    """Return a derivative that is known to exist: surfaces without one cannot be slid on."""
     found = derivative(value, name)
     assert found is not None
     return found

@@ -1,9 +1,9 @@
-"""Where a formula wakes up: a step over a flat stretch must not jump a pulse in it.
+"""Times at which a formula starts to change, so that steps over a flat stretch cannot miss a pulse.
 
-A step is accepted by what its few stages see, and a pulse between them is not seen. So a formula is
-sampled before the run. Where it rests for a while and then changes, steps have to end at the
-beginning of the change, at its end and at some places inside; the error control does the rest.
-Formulas that never rest, such as a sine, get no such places.
+Step-size control sees only a few stages of a step, and misses a pulse between them. So a formula is
+sampled before the run. Where it is constant for a while and then changes, steps must end at the
+beginning of the change, at its end and at some points inside; error control does the rest.
+Formulas that never rest, such as a sine, get no such times.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from gms_fsm.language._vectors import values_of
 
 __all__ = ["SAMPLES", "waking_times"]
 
-SAMPLES = 4096  # a pulse that lies between two of them is not seen
-REST = 1e-5  # of the whole range: a change between two samples that is none
-LONG = SAMPLES // 100  # samples of rest that count as one
-INSIDE = 8  # parts of a change
+SAMPLES = 4096  # a pulse that lies between two of them is missed
+REST = 1e-5  # of the whole range: smaller changes between two samples count as none
+LONG = SAMPLES // 100  # samples; a rest must be at least this long to count
+INSIDE = 8  # parts into which a change is divided
 
 
 @functools.lru_cache(maxsize=256)
@@ -32,7 +32,7 @@ def waking_times(tree: Value, t_start: float, t_end: float) -> tuple[float, ...]
     Parameters
     ----------
     tree : Value
-        A formula of t.
+        A formula in t.
     t_start, t_end : float
         s.
 
@@ -67,7 +67,7 @@ def waking_times(tree: Value, t_start: float, t_end: float) -> tuple[float, ...]
 
 
 def _rests(moves: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Tell which intervals belong to a long rest."""
+    """Return which intervals belong to a long rest."""
     edges = np.flatnonzero(np.diff(np.concatenate([[True], moves, [True]]).astype(np.int8)))
     rests = np.zeros(moves.size, dtype=np.bool_)
     for first, last in zip(edges[::2], edges[1::2], strict=True):

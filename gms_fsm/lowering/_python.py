@@ -1,4 +1,4 @@
-"""Prints the plan of a program as Python text: if-else that one can read and step through."""
+"""Printing of a program's plan as Python text: if-else code to read and step through."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping
 from gms_fsm.language import (
     Binary,
     Comparison,
-    Literal,
     Name,
     Negative,
     Node,
     Number,
+    Requirement,
     Split,
     spell,
     split,
@@ -32,12 +32,12 @@ def python(plan: Plan) -> str:
     Parameters
     ----------
     plan : Plan
-        Of the program.
+        The plan of the program.
 
     Returns
     -------
     str
-        The functions that `FUNCTIONS` names, behind the constants for states and edges.
+        The functions listed in `FUNCTIONS`, after the constants for states and edges.
 
     Examples
     --------
@@ -50,7 +50,7 @@ def python(plan: Plan) -> str:
     writer = _Writer(plan)
     lines = [
         f"# {_one_line(plan.title)}",
-        "# Generated from the chart; parameters are arguments: one text for every set of them.",
+        "# Generated from the chart; parameters are arguments, so one text serves all values.",
         "",
         f"{_numbered(plan.names.states.values())}  # states",
     ]
@@ -71,7 +71,7 @@ def python(plan: Plan) -> str:
 
 
 class _Writer:
-    """Writes the functions of a plan, as lines."""
+    """Writes the functions of a plan as lines."""
 
     def __init__(self, plan: Plan) -> None:
         self.plan, self.names, self.layout = plan, plan.names, plan.layout
@@ -107,13 +107,13 @@ class _Writer:
                 f"{word} edge == {self.names.edges[edge.name]}:",
                 *_indented(self.taken(edge)),
             ]
-        body = [*self.element_values(found), *lines] or ["pass  # the chart has no edge"]
+        body = [*self.element_values(found), *lines] or ["pass  # the chart has no edges"]
         return self.function(
             "act(edge, i, t, y, mode, p)", "Take an edge of element i.", body, found
         )
 
     def taken(self, edge: Edge) -> list[str]:
-        """Write what happens when an edge is taken."""
+        """Write the effect of taking an edge."""
         lines = []
         for variable, value in edge.steps:
             local, place = self.names.local[variable], self.layout.y.text(variable)
@@ -123,7 +123,7 @@ class _Writer:
     def flow(self) -> list[str]:
         return self.function(
             "flow(t, y, mode, held, p, dy)",
-            "dy = dy/dt, all states frozen and all signs held.",
+            "dy = dy/dt, all states and all signs frozen.",
             self.rates("held"),
             reads.of_flow(self.plan, "held"),
             signs="held",
@@ -158,7 +158,7 @@ class _Writer:
         ]
 
     def flow_branches(self, flow: Flow, signs: Signs) -> dict[str, list[str]]:
-        """Write by state the rates, and the force if it differs."""
+        """Write the rates for each state, and the force if it depends on the state."""
         branches = {}
         for each in flow.states:
             lines = self.rough_lines(each.calls, signs)
@@ -193,7 +193,7 @@ class _Writer:
         ]
         return self.function(
             "observe(t, y, mode, held, p, out)",
-            f"out = v, F, then for all elements s, F_i and the rates; a sign {LIVE} is taken live.",
+            f"out = v, F, then for all elements s, F_i and the rates; sign {LIVE} means live.",
             body,
             found,
         )
@@ -202,7 +202,7 @@ class _Writer:
         lines: list[str] = []
         for each in self.plan.gradients:
             word, inner = "elif" if lines else "if", self.gradient(each)
-            asked, element = self.plan.surfaces.asking_text(each.surface, "surface")
+            asked, element = self.plan.surfaces.membership_text(each.surface, "surface")
             lines.append(f"{word} {asked}:  # {self.spell(each.surface)}")
             if element:
                 first = self.element_values(reads.of_gradient(self.plan, each))
@@ -211,7 +211,7 @@ class _Writer:
         clear = [f"for j in range({self.layout.y.size_text(1)}):", "    out[j] = 0.0"]
         return self.function(
             "normal(surface, t, y, mode, p, out)",
-            "out = the gradient over y of what is zero on a surface, then its rate in t.",
+            "out = the gradient of a surface's value over y, then its rate in t.",
             [*clear, *lines] if lines else ["pass"],
             reads.of_normal(self.plan),
         )
@@ -224,7 +224,7 @@ class _Writer:
         ]
         by_v = [] if gradient.by_v is None else [self.spell(gradient.by_v)]
         if gradient.by_s is not None:
-            assert self.plan.curve_slope is not None  # charts with s have one
+            assert self.plan.curve_slope is not None  # charts with s have a curve
             lines.append(f"dS = {spell(self.plan.curve_slope)}")
             by_v.append(f"({self.spell(gradient.by_s)}) * weight[i] * dS")
         rates = [] if gradient.by_t is None else [self.spell(gradient.by_t)]
@@ -259,7 +259,7 @@ class _Writer:
             body += self.elements(found, self.by_state(branches))
         return self.function(
             "arm(t, y, mode, p, held, watch)",
-            "Hold the signs and mark the comparisons that keep every false guard false.",
+            "Freeze the signs and mark the comparisons that keep every false guard false.",
             body or ["pass"],
             found,
         )
@@ -268,9 +268,9 @@ class _Writer:
         return f"watch[{self.plan.relations.text(relation)}] = 1"
 
     def witness(self, part: Split) -> list[str]:
-        """Write: if this part is false, watch what keeps it false."""
-        if isinstance(part, Literal):
-            # Not the opposite comparison: of NaN neither is true, and it has to be watched.
+        """Write: if this part is false, watch the comparison that keeps it false."""
+        if isinstance(part, Requirement):
+            # Not the opposite comparison: for NaN neither is true, but it must be watched.
             return [f"if not {self.spell(part.relation)}:", f"    {self.watch(part.comparison)}"]
         word, parts = part
         if word == "either":
@@ -278,7 +278,7 @@ class _Writer:
         lines: list[str] = []
         for each in parts:
             other = "el" if lines else ""
-            if isinstance(each, Literal):
+            if isinstance(each, Requirement):
                 first, *rest = self.witness(each)
                 lines += [other + first, *rest]
             else:
@@ -286,12 +286,12 @@ class _Writer:
         return lines
 
     def truth(self, part: Split) -> str:
-        """Spell a split condition; brackets everywhere, as it is only read by machines."""
-        if isinstance(part, Literal):
+        """Spell a split condition, fully parenthesized, since only machines read it."""
+        if isinstance(part, Requirement):
             return self.spell(part.relation)
         word, parts = part
         return (" and " if word == "both" else " or ").join(
-            self.truth(q) if isinstance(q, Literal) else f"({self.truth(q)})" for q in parts
+            self.truth(q) if isinstance(q, Requirement) else f"({self.truth(q)})" for q in parts
         )
 
     def margins(self) -> list[str]:
@@ -300,7 +300,7 @@ class _Writer:
         own = [line for each in relations.own for line in self.margin(each)]
         return self.function(
             "margins(t, y, mode, p, watch, out)",
-            "For each watched comparison left - right.",
+            "For each watched comparison, left - right.",
             body + (self.elements(found, own) if own else []) or ["pass"],
             found,
         )
@@ -314,20 +314,20 @@ class _Writer:
             margin = f"{margin} - {right if simple else f'({right})'}"
         return [f"if watch[{index}]:", f"    out[{index}] = {margin}"]
 
-    # ------------------------------------------------------------------ their parts
+    # ------------------------------------------------------------------ building blocks
     def spell(self, node: Node) -> str:
         return spell(node, rename=self.names.texts)
 
     def function(
         self, signature: str, doc: str, body: list[str], found: Reads, *, signs: Signs = "live"
     ) -> list[str]:
-        """Put a function together: signature, what its body reads, then the body."""
+        """Assemble a function: signature, the values its body reads, the body."""
         head = reads.head_of(self.plan, found, signs)
         lines = ["shared, own, tables = p"] if head.arguments else []
         lines += [f"{name} = shared[{j}]" for name, j in head.shared]
         lines += [f"{name} = own[{j}]" for name, j in head.own]
         if head.size:
-            lines.append("n = len(own[0])")  # behind the elements' modes stand the surfaces'
+            lines.append("n = len(own[0])")  # mode also has the surfaces' flags, after the elements
         for signal in head.inputs:
             lines += self.signal_lines(signal, signs)
         if head.x:
@@ -343,7 +343,7 @@ class _Writer:
         return ["for i in range(n):", *_indented([*self.element_values(found), *lines])]
 
     def element_values(self, found: Reads) -> list[str]:
-        """Assign the element's own variables and threshold, as far as they are read."""
+        """Assign the element's variables and threshold, as far as they are read."""
         return [
             "s = weight[i] * S"
             if name == "s"
@@ -379,7 +379,7 @@ class _Writer:
         return "" if signal.slope is None else f"({spell(signal.slope)})"
 
     def table(self, signal: Input) -> str:
-        """Spell the corners of a signal: their times and values."""
+        """Spell the table of a signal: its times and values."""
         places = (self.plan.tables.text((signal.name, column)) for column in ("times", "values"))
         return ", ".join(f"tables[{place}]" for place in places)
 
@@ -388,7 +388,7 @@ class _Writer:
         return [f"{each.name} = {self.rough_call(each, signs)}" for each in calls]
 
     def rough_call(self, rough: RoughCall, signs: Signs) -> str:
-        """Spell a rough call, whose sign is held, live or given."""
+        """Spell a rough call, whose sign is frozen, live or given."""
         call, live = rough.call, self.spell(rough.call)
         if signs == "live":
             return live
@@ -417,5 +417,5 @@ def _numbered(constants: Iterable[str]) -> str:
 
 
 def _one_line(text: str) -> str:
-    """Return text fit for a comment: a line break would end it."""
+    """Return text as one printable line, for use in a comment."""
     return "".join(c if c.isprintable() else " " for c in text)

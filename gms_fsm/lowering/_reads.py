@@ -1,6 +1,6 @@
-"""What each function of a program reads, found from the trees of its plan.
+"""What each function of a program reads, derived from the trees of its plan.
 
-Names are those of the text, `Names.local`. What is assigned to a variable counts as reading it.
+Names are those of the text, `Names.local`. A variable that is assigned counts as read.
 """
 
 from __future__ import annotations
@@ -15,28 +15,28 @@ from gms_fsm.lowering._plan import Flow, Gradient, Input, Plan, RoughCall, both_
 __all__ = ["Head", "Signs", "head_of", "of_act", "of_arm", "of_element", "of_flow", "of_gradient"]
 __all__ += ["of_margins", "of_normal", "of_observe", "of_switch"]
 
-# Where a rough call takes its sign from: held ones, those seen now, or given ones, of which each
-# may say that it is to be taken as it is seen.
+# Where a rough call takes its sign from: frozen, evaluated live, or given; each given sign may
+# specify that it is to be evaluated live.
 Signs = OneOf["held", "live", "given"]
 Reads = frozenset[str]
 
 
 @dataclass(frozen=True)
 class Head:
-    """What a function reads before its body.
+    """The values that a function reads before its body.
 
     Parameters
     ----------
     arguments : bool
-        Whether it reads any numbers.
+        Whether it reads any arguments.
     shared, own : tuple of (str, int)
-        Names of the numbers, and where they stand.
+        Names of the numbers, and their positions.
     size : bool
         Whether it reads the number of elements.
     inputs : tuple of Input
-        The signals.
+        The signals that it evaluates.
     x, v : bool
-        Whether it reads them from the state vector.
+        Whether it reads these from the state vector.
     curve : bool
         Whether it computes S.
     """
@@ -52,21 +52,21 @@ class Head:
 
 
 def head_of(plan: Plan, reads: Reads, signs: Signs) -> Head:
-    """Return what a function reads before its body.
+    """Return the values that a function reads before its body.
 
     Parameters
     ----------
     plan : Plan
-        Of the program.
+        The plan of the program.
     reads : frozenset of str
-        What its body reads.
+        The names that its body reads.
     signs : {"held", "live", "given"}
-        Where the rough calls of signals take their signs from.
+        Where the rough calls in signals take their signs from.
 
     Returns
     -------
     Head
-        With all that has to be read for it.
+        Everything needed to compute these names.
     """
     curve = plan.curve is not None and "S" in reads
     if plan.curve is not None and curve:
@@ -88,14 +88,14 @@ def head_of(plan: Plan, reads: Reads, signs: Signs) -> Head:
 
 
 def of_element(plan: Plan, reads: Reads) -> tuple[str, ...]:
-    """Return which variables, and whether ``s``, are assigned first in a loop that reads this."""
+    """Return the variables, and possibly ``s``, that a loop reading this must assign first."""
     local = plan.names.local
     variables = tuple(name for name in plan.variables if local[name] in reads)
     return variables + (("s",) if "s" in reads else ())
 
 
 def _with_element(plan: Plan, reads: Reads) -> Reads:
-    """Return what is read where the values of an element are assigned first."""
+    """Return what is read if the values of an element are assigned first."""
     first = of_element(plan, reads)
     places = (plan.layout.y.text_names(name) for name in first if name != "s")
     return reads.union(*places, {"weight", "S"} if "s" in first else ())
@@ -146,7 +146,7 @@ def of_normal(plan: Plan) -> Reads:
 
 
 def of_gradient(plan: Plan, gradient: Gradient) -> Reads:
-    """Return what the derivatives at one surface read."""
+    """Return what the derivatives for one surface read."""
     trees = [*gradient.by_state.values(), *gradient.by_signal.values()]
     trees += [each for each in (gradient.by_v, gradient.by_s, gradient.by_t) if each is not None]
     reads = plan.names.read_by(*trees)
@@ -183,7 +183,7 @@ def of_margins(plan: Plan) -> Reads:
 
 
 def _of_rates(plan: Plan, flow: Flow, signs: Signs) -> Reads:
-    """Return what rates and forces read, and the rough calls before them."""
+    """Return what rates and forces, and the rough calls before them, read."""
     calls = [*flow.calls, *(call for state in flow.states for call in state.calls)]
     trees = [tree for state in flow.states for tree in state.rates.values()]
     forces = [flow.force, *(state.force for state in flow.states)]
@@ -192,7 +192,7 @@ def _of_rates(plan: Plan, flow: Flow, signs: Signs) -> Reads:
 
 
 def _of_call(plan: Plan, call: RoughCall, signs: Signs) -> Reads:
-    """Return what a rough call reads; of a held sgn nothing but the sign."""
+    """Return what a rough call reads; for a frozen sgn, only the sign."""
     place = frozenset() if signs == "live" else plan.held.text_names(call.turning)
     if signs == "held" and call.call.function == "sgn":
         return place

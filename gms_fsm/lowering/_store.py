@@ -1,9 +1,10 @@
-"""Bytes kept in a folder under names: what was put there, to the last bit, or nothing.
+"""A folder of byte strings under names, returned exactly as they were stored or not at all.
 
-A disk, a cable or a hand may change a file, and machine code with one wrong bit ends the process
-that runs it. So a checksum over name and content stands before the content and is verified before
-anybody sees it; a file that fails is removed, and whoever asked makes it anew. Whose bytes they are
-does not matter here. A checksum finds damage, not malice: the folder is as trusted as the program.
+A faulty disk or cable, or a user, may alter a file, and machine code with one wrong bit crashes the
+process that runs it. So each content is preceded by a checksum over name and content, which is
+verified before use; a file that fails is removed, and the caller recreates it. The kind of content
+does not matter here. A checksum detects damage, not malice: the folder must be as trusted as the
+program.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from gms_fsm._files import remove_leftovers, written_whole
+from gms_fsm._files import remove_leftovers, write_whole
 from gms_fsm.errors import OutputError
 
 __all__ = ["Store"]
@@ -22,12 +23,12 @@ __all__ = ["Store"]
 
 @dataclass(frozen=True)
 class Store:
-    """A folder of verified files; several processes and threads may use it at once.
+    """A folder of verified files; several processes and threads may use it at the same time.
 
     Parameters
     ----------
     folder : Path
-        Where they lie.
+        The location of the files.
 
     Examples
     --------
@@ -42,17 +43,17 @@ class Store:
 
     @classmethod
     def at(cls, folder: Path) -> Store | None:
-        """Return the store in a folder, None where the folder cannot be written.
+        """Return the store in a folder, or None if the folder cannot be written.
 
         Parameters
         ----------
         folder : Path
-            Made where missing. What killed processes have left in it is removed.
+            Created if missing. Leftovers of killed processes are removed.
 
         Returns
         -------
         Store or None
-            Ready.
+            Ready for use.
         """
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -64,7 +65,7 @@ class Store:
         return cls(folder)
 
     def get(self, name: str) -> bytes | None:
-        """Return what is kept under a name.
+        """Return the content stored under a name.
 
         Parameters
         ----------
@@ -74,7 +75,7 @@ class Store:
         Returns
         -------
         bytes or None
-            What was put there; None if there is nothing, or nothing whole.
+            The stored content; None if there is none, or if it is damaged.
         """
         path = self.folder / name
         try:
@@ -86,28 +87,28 @@ class Store:
         size = hashlib.sha256().digest_size
         if found[:size] == _checksum(name, found[size:]):
             return found[size:]
-        with contextlib.suppress(OSError):  # another process may have been faster
+        with contextlib.suppress(OSError):  # another process may have removed it first
             path.unlink()
         return None
 
     def put(self, name: str, content: bytes) -> None:
-        """Keep bytes under a name; on a full disk they are not kept.
+        """Store content under a name; on a full disk nothing is stored.
 
         Parameters
         ----------
         name : str
             A file's name.
         content : bytes
-            Replaces what is there, at once and as a whole.
+            Replaces an existing content atomically.
         """
         with contextlib.suppress(OutputError):
-            written_whole(
+            write_whole(
                 self.folder / name, lambda file: file.write(_checksum(name, content) + content)
             )
 
 
 def _checksum(name: str, content: bytes) -> bytes:
-    """Return what stands before a content; of the name too, so that no file stands for another."""
+    """Return the checksum over name and content; the name prevents files from being swapped."""
     stamp = hashlib.sha256(name.encode() + b"\0")
     stamp.update(content)
     return stamp.digest()

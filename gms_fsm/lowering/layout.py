@@ -1,6 +1,6 @@
-"""Where everything stands: in the state vector y, in what a run observes, in the modes, in the log.
+"""The layout of the state vector y, of a run's observed quantities, of the modes and of the log.
 
-No other module computes such a place, neither as a number nor as text: it asks by name.
+No other module computes such a position, neither as a number nor as text: it looks it up by name.
 
 y            ``x, [v,]`` then each variable of the chart, one per element
 observed     ``v, F`` then ``s``, ``F_elements`` and the rate of each variable, one per element
@@ -25,9 +25,9 @@ Name = TypeVar("Name", bound=Hashable)
 
 @dataclass(frozen=True)
 class Places(Generic[Name]):
-    """The places of an array: shared ones first, then for each own name one place per element.
+    """The layout of an array: shared names first, then each own name with one place per element.
 
-    In generated text the number of elements is called ``n`` and the element ``i``.
+    In generated text, the number of elements is called ``n`` and the element ``i``.
 
     Parameters
     ----------
@@ -55,23 +55,23 @@ class Places(Generic[Name]):
 
     @cached_property
     def size(self) -> int:
-        """How many places there are."""
+        """The number of places."""
         return len(self.shared) + len(self.own) * self.n
 
     def __iter__(self) -> Iterator[tuple[Name, int | None]]:
-        """Yield for each place, in order, its name and its element (None if shared)."""
+        """Yield the name and element (None if shared) of each place, in order."""
         yield from ((name, None) for name in self.shared)
         yield from ((name, i) for name in self.own for i in range(self.n))
 
     def index(self, name: Name, element: int = 0) -> int:
-        """Return the place of a shared name, or of an own name of one element.
+        """Return the place of a shared name, or of an own name for one element.
 
         Parameters
         ----------
         name : str or other key
-            One of `shared` or `own`.
+            An entry of `shared` or `own`.
         element : int
-            Counted from 0; does not matter for a shared name.
+            Counted from 0; ignored for a shared name.
 
         Returns
         -------
@@ -95,7 +95,7 @@ class Places(Generic[Name]):
         Parameters
         ----------
         name : str or other key
-            One of `own`.
+            An entry of `own`.
 
         Returns
         -------
@@ -106,23 +106,23 @@ class Places(Generic[Name]):
         return slice(start, start + self.n)
 
     def where(self, name: Name) -> int | slice:
-        """Return what to subscript an array with to have all that stands under a name.
+        """Return an index that selects everything stored under a name.
 
         Parameters
         ----------
         name : str or other key
-            One of `shared` or `own`.
+            An entry of `shared` or `own`.
 
         Returns
         -------
         int or slice
-            As `index` for a shared name, as `block` for an own one.
+            Like `index` for a shared name, like `block` for an own one.
         """
         return self._all[name]
 
     @cached_property
     def _all(self) -> Mapping[Name, int | slice]:
-        """What stands under each name."""
+        """The index for each name."""
         shared = {name: self._starts[name] for name in self.shared}
         return shared | {name: self.block(name) for name in self.own}
 
@@ -132,7 +132,7 @@ class Places(Generic[Name]):
         Parameters
         ----------
         name : str or other key
-            One of `shared` or `own`.
+            An entry of `shared` or `own`.
 
         Returns
         -------
@@ -143,7 +143,7 @@ class Places(Generic[Name]):
         return range(start, start + (1 if name in self.shared else self.n))
 
     def named(self, values: Any) -> dict[Name, Any]:
-        """Return by name what stands at the places.
+        """Return the values of an array by name.
 
         Parameters
         ----------
@@ -153,17 +153,17 @@ class Places(Generic[Name]):
         Returns
         -------
         dict
-            For a shared name its entry, for an own name its part of `values`, one per element.
+            For a shared name its entry; for an own name its part of `values`, one per element.
         """
         return {name: values[where] for name, where in self._all.items()}
 
     def joined(self, values: Mapping[Name, Any]) -> list[Any]:
-        """Return entries in the order of the places; the inverse of `named`.
+        """Return values in the order of the places; the inverse of `named`.
 
         Parameters
         ----------
         values : mapping
-            For a shared name its entry, for an own name a sequence with one entry per element.
+            For a shared name its entry; for an own name a sequence with one entry per element.
 
         Returns
         -------
@@ -174,17 +174,17 @@ class Places(Generic[Name]):
 
     # ------------------------------------------------------------------ as text
     def text(self, name: Name) -> str:
-        """Return a place as Python text over ``n`` and ``i``.
+        """Return a place as Python text in terms of ``n`` and ``i``.
 
         Parameters
         ----------
         name : str or other key
-            One of `shared` or `own`.
+            An entry of `shared` or `own`.
 
         Returns
         -------
         str
-            Such as ``"1"`` or ``"2 + n + i"``.
+            For example ``"1"`` or ``"2 + n + i"``.
         """
         if name in self.shared:
             return str(self.shared.index(name))
@@ -193,12 +193,12 @@ class Places(Generic[Name]):
         return f"{len(self.shared)}{blocks} + i"
 
     def text_names(self, name: Name) -> frozenset[str]:
-        """Return which of ``n`` and ``i`` the text of a place reads.
+        """Return which of ``n`` and ``i`` the text of a place uses.
 
         Parameters
         ----------
         name : str or other key
-            One of `shared` or `own`.
+            An entry of `shared` or `own`.
 
         Returns
         -------
@@ -210,23 +210,23 @@ class Places(Generic[Name]):
         return frozenset({"i"} if name == self.own[0] else {"n", "i"})
 
     def size_text(self, more: int = 0) -> str:
-        """Return how many places there are, and some more, as Python text over ``n``."""
+        """Return the number of places plus `more`, as Python text in terms of ``n``."""
         return f"{len(self.shared) + more} + {len(self.own)} * n"
 
-    def asking_text(self, name: Name, place: str) -> tuple[str, str]:
-        """Return texts that find out whose a place is, where names are asked in order.
+    def membership_text(self, name: Name, place: str) -> tuple[str, str]:
+        """Return texts that test whether a place belongs to a name, names being tested in order.
 
         Parameters
         ----------
         name : str or other key
-            One of `shared` or `own`; all names before it have been asked already.
+            An entry of `shared` or `own`; all names before it have already been tested.
         place : str
             Text of the place.
 
         Returns
         -------
         (str, str)
-            Whether the place is of this name; which element it is of (empty for a shared name).
+            A test for whether the place belongs to this name, and its element (empty if shared).
         """
         if name in self.shared:
             return f"{place} == {self.shared.index(name)}", ""
@@ -242,11 +242,12 @@ class Layout:
     Parameters
     ----------
     y : Places
-        Of the state vector: ``x``, ``v`` unless it is prescribed, and the chart's variables.
+        Layout of the state vector: ``x``, ``v`` unless prescribed, and the chart's variables.
     observed : Places
-        Of what a run observes: ``v, F``; ``s``, ``F_elements``, and ``d`` before each variable.
+        Layout of the observed quantities: ``v, F``; ``s``, ``F_elements``, and ``d`` before each
+        variable.
     surfaces : int
-        How many surfaces the motion can slide on.
+        Number of surfaces on which the motion can slide.
 
     Examples
     --------
@@ -263,19 +264,19 @@ class Layout:
 
     @classmethod
     def of(cls, model: Model, rig: Rig, surfaces: int) -> Layout:
-        """Lay out a model on a rig.
+        """Return the layout for a model on a rig.
 
         Parameters
         ----------
         model, rig
-            What runs.
+            The model and the rig.
         surfaces : int
-            How many surfaces the motion can slide on.
+            Number of surfaces on which the motion can slide.
 
         Returns
         -------
         Layout
-            Of this run.
+            The layout of this run.
         """
         variables = model.chart.variables
         rates = tuple(f"d{name}" for name in variables)
@@ -287,12 +288,12 @@ class Layout:
 
     @staticmethod
     def state(model: Model, rig: Rig) -> Places[str]:
-        """Lay out the state vector alone, which needs no generated program.
+        """Return the layout of the state vector alone, which needs no generated program.
 
         Parameters
         ----------
         model, rig
-            What runs.
+            The model and the rig.
 
         Returns
         -------
@@ -309,18 +310,18 @@ class Layout:
 
     @property
     def variable(self) -> str:
-        """The chart's first variable, the deflection: the one that the log and `Trace.z` show."""
+        """The chart's first variable, the deflection, shown by the log and `Trace.z`."""
         return self.y.own[0]
 
     @property
     def rate(self) -> str:
-        """Name of its rate in what is observed."""
+        """Name of its rate among the observed quantities."""
         return f"d{self.variable}"
 
     # ------------------------------------------------------------------ modes
     @cached_property
     def modes(self) -> int:
-        """How many modes a row has."""
+        """The number of modes of a row."""
         return self.n + self.surfaces
 
     @cached_property
@@ -334,7 +335,7 @@ class Layout:
         return slice(self.n, None)
 
     def not_sliding(self, states: Sequence[int]) -> tuple[int, ...]:
-        """Return the modes of elements in these states, sliding nowhere.
+        """Return the modes of elements in the given states, with no surface sliding.
 
         Parameters
         ----------
@@ -344,15 +345,16 @@ class Layout:
         Returns
         -------
         tuple of int, shape (modes,)
-            Those of a row.
+            The modes of a row.
         """
         return (*states, *[0] * self.surfaces)
 
 
 class LogRecord(NamedTuple):
-    """One firing, as the transition log has it.
+    """One firing, as recorded in the transition log.
 
-    ``z``, ``v`` and ``s`` are the element's first variable, the velocity and its threshold before.
+    ``z``, ``v`` and ``s`` are the element's first variable, the velocity and the threshold before
+    it.
     """
 
     t: float
@@ -368,5 +370,5 @@ class LogRecord(NamedTuple):
 
 
 LOG_TEXTS = ("edge", "source", "target")
-# In the order in which machine code keeps them for a firing.
+# In the order in which machine code stores them for a firing.
 LOG_NUMBERS = ("z", "v", "s", "F_before", "F_after")

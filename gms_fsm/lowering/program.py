@@ -1,24 +1,24 @@
-"""The generated program: a chart on a rig, lowered to if-else text one can read and step through.
+"""The generated program: a chart on a rig, lowered to if-else text to read and step through.
 
-This is the paper's Fig. 2c made from its Fig. 2b: one reader of the chart, with no rule of its own.
-The text holds no numbers of the user's; parameters arrive as arguments, so that one text serves
-every parameter set and every number of elements, in Python and, compiled, elsewhere.
+This is the paper's Fig. 2c derived from its Fig. 2b: one reader of the chart, with no rules of its
+own. The text contains no values chosen by the user; parameters arrive as arguments, so that one
+text serves every parameter set and every number of elements, in Python and compiled.
 
 The functions of a program
 --------------------------
-``flow``       dy/dt with every state frozen and every sign held (located crossings)
-``flow_live``  the same with sgn, abs, min, max as they stand (for guards looked at once a step)
+``flow``       dy/dt with every state and every sign frozen (located crossings)
+``flow_live``  the same with sgn, abs, min, max evaluated live (guards checked once per step)
 ``switch``     for each element the first edge whose guard holds, or -1
 ``act``        take an edge: its assignments and the new state
-``observe``    v, F, and per element s, F_i, dz; signs as given, or as they stand
+``observe``    v, F, and per element s, F_i, dz; signs as given or live
 ``normal``     the gradient of a surface that a motion can slide on (see `integrators.sliding`)
-``arm``        which comparisons to watch until the next stop, and the signs to hold
+``arm``        the comparisons to watch until the next stop, and the signs to freeze
 ``margins``    the watched comparisons as numbers that change sign where the comparison does
 
-What ``arm`` watches: a guard that is false stays false as long as one false comparison of it (of
-each arm, for ``or``) stays false. The first one in the text is the witness; when it turns true the
-driver stops, asks, and arms again. So nothing is watched that cannot change a state: not z - s
-while slipping toward it, not v_c while sticking below s.
+How ``arm`` chooses: a guard that is false stays false as long as one false comparison in it (in
+each arm, for ``or``) stays false. The first one in the text is the witness; when it turns true, the
+integrator stops, evaluates the guards, and arms again. So nothing is watched that cannot change a
+state: not z - s while slipping toward it, not v_c while sticking below s.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ import numpy as np
 import integrators
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.errors import SignalError
-from gms_fsm.language import Literal, spell
+from gms_fsm.language import Requirement, spell
 from gms_fsm.lowering._generated import ieee, load, load_careful
 from gms_fsm.lowering._plan import Plan, both_sides, plan_of
 from gms_fsm.lowering._python import FUNCTIONS, python
@@ -66,26 +66,26 @@ class Program:
     source : str
         The text of all functions.
     functions : mapping of str to callable
-        By name, see the module's text.
+        By name; see the module docstring.
     ieee : mapping of str to callable
-        The same functions; they compute inf and NaN where Python would raise.
+        The same functions, yielding inf and NaN where Python would raise.
     callables : mapping of str to callable
-        The Python functions that are signals, by the signal's name.
+        The Python functions used as signals, by the signal's name.
     p : tuple
-        (shared numbers, one list an own parameter, times and values of each corner table): an
+        (shared numbers, one list per own parameter, times and values of each corner table): an
         argument of all functions.
     layout : Layout
-        Where everything stands in the state vector, in what ``observe`` fills and in the modes.
+        The layout of the state vector, of the output of ``observe`` and of the modes.
     held : int
-        How many signs are held.
+        Number of frozen signs.
     strict : list of bool
-        For each relation whether its margin must be positive (or may be zero) to be true.
+        For each relation, whether its margin must be positive (or may be zero) for it to be true.
     relations : list of str
         Each relation in words, for messages.
     surfaces : integrators.Surfaces
-        Where the motion can slide.
+        The surfaces on which the motion can slide.
     surface_names : list of str
-        What is zero on each.
+        The value that is zero on each.
     knots, jumps : list of float
         Times [s] where a signal has a corner, and where it jumps.
     """
@@ -106,7 +106,7 @@ class Program:
 
     @property
     def live(self) -> list[float]:
-        """For every sign: as it is seen."""
+        """The argument that makes every sign be evaluated live."""
         return [LIVE] * self.held
 
 
@@ -116,9 +116,9 @@ def lower(model: Model, rig: Rig) -> Program:
     Parameters
     ----------
     model : Model
-        What rubs.
+        The friction model.
     rig : Rig
-        What it is mounted on.
+        The rig it is mounted on.
 
     Returns
     -------
@@ -154,10 +154,10 @@ def lower(model: Model, rig: Rig) -> Program:
 
 
 def _spelling(signal: Signal) -> str | int | None:
-    """Return what the text depends on in a signal, hashable.
+    """Return the part of a signal that the text depends on, in hashable form.
 
-    A callable counts by identity, which the rig in the cache keeps from being given away: callables
-    that call themselves equal need not return the same, and some cannot be hashed.
+    Callables are identified by `id`, which stays valid because the cache keeps the rig alive:
+    callables that compare equal need not return the same, and some cannot be hashed.
     """
     match signal:
         case Formula(text=text):
@@ -169,7 +169,7 @@ def _spelling(signal: Signal) -> str | int | None:
 
 @dataclass(frozen=True)
 class _Shape:
-    """What the text depends on; a model and a rig of that shape."""
+    """Everything that the text depends on, with a model and a rig of that shape."""
 
     key: tuple[Any, ...]
     model: Model = field(compare=False)
@@ -178,7 +178,7 @@ class _Shape:
 
 @functools.lru_cache(maxsize=64)
 def _lowered(shape: _Shape) -> Program:
-    """Generate the text for all models and rigs of a shape, without their numbers."""
+    """Generate the text for all models and rigs of one shape, without their numbers."""
     model, rig = shape.model, shape.rig
     plan = plan_of(model, rig)
     source = python(plan)
@@ -210,12 +210,12 @@ def _lowered(shape: _Shape) -> Program:
 
 
 def arguments(model: Model, rig: Rig) -> Arguments:
-    """Return the numbers of a model and a rig, as the functions of their program take them.
+    """Return the numbers of a model and a rig in the form that their program's functions take.
 
     Parameters
     ----------
     model, rig
-        What runs.
+        The model and the rig.
 
     Returns
     -------
@@ -238,7 +238,7 @@ def arguments(model: Model, rig: Rig) -> Arguments:
 
 
 def equations(program: Program) -> integrators.Equations:
-    """Return a program as the integrators take it.
+    """Return a program in the form that the integrators take.
 
     Parameters
     ----------
@@ -283,25 +283,25 @@ def _guarded(name: str, call: Callable[[float], float]) -> Callable[[float], flo
 
 # --------------------------------------------------------------------------- from the plan
 def _relation_names(plan: Plan) -> list[str]:
-    """Say each relation in words."""
+    """Describe each relation in words."""
     return [
-        spell(Literal(relation, True).relation, rename=plan.names.plain) + _of_element(i)
+        spell(Requirement(relation, True).relation, rename=plan.names.plain) + _of_element(i)
         for relation, i in plan.relations
     ]
 
 
 def _surface_names(plan: Plan) -> list[str]:
-    """Say what is zero on each surface."""
+    """Describe the value that is zero on each surface."""
     return [spell(u, rename=plan.names.plain) + _of_element(i) for u, i in plan.surfaces]
 
 
 def _of_element(element: int | None) -> str:
-    """Name an element, counted from 1 in texts; nothing where all share what is named."""
+    """Name an element, counted from 1 in texts; empty for values shared by all."""
     return "" if element is None else f" of element {element + 1}"
 
 
 def _surface_table(plan: Plan) -> integrators.Surfaces:
-    """Return where the surfaces' signs and relations stand."""
+    """Return the places of the surfaces' signs and relations."""
     surfaces = [*plan.surfaces.shared, *plan.surfaces.own]
     pairs = [both_sides(u) for u in surfaces]
     return integrators.Surfaces(

@@ -1,9 +1,9 @@
-"""The sizes that a model itself distinguishes: what its default tolerances are measured by.
+"""Characteristic sizes of a model, from which its default tolerances are derived.
 
 A component's scale is the smallest size at which something in the model changes: the deflection at
 which a guard turns true (w F_c for a GMS element), the deflection that carries the Coulomb friction
-alone (F_c / k), the velocities v_c and v_s. Scales come from the model only, never from rig, signal
-or the length of a run, so that a run in other units, or on another rig, is as accurate.
+alone (F_c / k), the velocities v_c and v_s. Scales depend only on the model, never on rig, signal
+or duration, so that a run in other units, or on another rig, is as accurate.
 """
 
 from __future__ import annotations
@@ -36,31 +36,31 @@ from gms_fsm.systems.models import Model
 __all__ = ["Scales", "Setting", "Tolerance", "scales_of"]
 
 T = TypeVar("T")
-Tolerance: TypeAlias = float | Mapping[str, ArrayLike] | None  # absolute, as it is given
-Setting: TypeAlias = str | float | Mapping[str, float | list[float]] | None  # of a run, as kept
+Tolerance: TypeAlias = float | Mapping[str, ArrayLike] | None  # absolute, as given
+Setting: TypeAlias = str | float | Mapping[str, float | list[float]] | None  # of a run, as stored
 
-# The default absolute tolerance is rtol times the scale times this: near zero a component is known
-# to the accuracy that it has at a tenth of its scale.
+# The default absolute tolerance is rtol times the scale times this: near zero, a component is as
+# accurate as at a tenth of its scale.
 SHARE = 0.1
-# A velocity in a guard is a window to pass through, not a size to move by: it counts so many times.
-# With rtol = 1e-6 the velocity is then known to 1e-5 v_c; coarser, a creep just under v_c is off.
+# A velocity in a guard is a window to pass through, not a typical size of motion: its weight.
+# With rtol = 1e-6 the velocity is then accurate to 1e-5 v_c; coarser, creep just below v_c is off.
 WINDOW = 1e2
 
 
 @dataclass(frozen=True)
 class Scales:
-    """Scales of a model's components; 0 where it has none.
+    """Scales of a model's components; 0 for one without a scale.
 
     Parameters
     ----------
     x, v : float
         m and m/s.
     variables : mapping of str to tuple of float
-        For each variable of the chart one per element.
+        For each variable of the chart, one per element.
     speed : float
         m/s: the smallest speed in a guard, v_c for a GMS element.
     time : float
-        s: what the fastest flow takes to relax, s / C for a slipping GMS element.
+        s: relaxation time of the fastest flow, s / C for a slipping GMS element.
 
     Examples
     --------
@@ -98,21 +98,21 @@ def scales_of(model: Model) -> Scales:
     Parameters
     ----------
     model : Model
-        Any.
+        Any model.
 
     Returns
     -------
     Scales
-        From its guards, its force and its curve.
+        Derived from its guards, its force and its curve.
     """
-    return _scales_of(_Same(model))
+    return _scales_of(_ByIdentity(model))
 
 
 @functools.lru_cache(maxsize=64)
-def _scales_of(key: _Same[Model]) -> Scales:
+def _scales_of(key: _ByIdentity[Model]) -> Scales:
     model = key.it
     chart = model.chart
-    sizes = _sizes(_Same(chart))
+    sizes = _sizes(_ByIdentity(chart))
     curve = model.stribeck if "s" in chart.inputs else None
     numbers = [as_floats(np.broadcast_to(value, model.n)) for value in model.values.values()]
     thresholds = [0.0] * model.n if curve is None else as_floats(model.weights * curve.F_c)
@@ -143,22 +143,22 @@ def _scales_of(key: _Same[Model]) -> Scales:
     return Scales(least_x, least_v, variables, slowest, time)
 
 
-# --------------------------------------------------------------------------- what a chart says
+# --------------------------------------------------------------------------- derived from a chart
 Numbers = Callable[..., float]  # of the threshold s and the parameters
 
 
 @dataclass(frozen=True, eq=False)
 class _Sizes:
-    """Functions of a chart's numbers, all at rest in the origin."""
+    """Functions of a chart's parameters, all evaluated at rest in the origin."""
 
     reach: Mapping[str, Sequence[tuple[Numbers, Numbers]]]  # margins of guards, and their slopes
     stiffness: Mapping[str, Numbers]  # slopes of the force
-    follows: Mapping[str, Sequence[Numbers]]  # by how much a variable changes with x, by state
-    paces: Sequence[Numbers]  # how fast variables relax, of v too
+    follows: Mapping[str, Sequence[Numbers]]  # slope of a variable with respect to x, by state
+    paces: Sequence[Numbers]  # relaxation rates of the variables and of v
 
 
-class _Same(Generic[T]):
-    """A chart or a model by identity: as data it cannot be hashed."""
+class _ByIdentity(Generic[T]):
+    """A chart or a model compared by identity, because its data cannot be hashed."""
 
     def __init__(self, it: T) -> None:
         self.it = it
@@ -167,11 +167,11 @@ class _Same(Generic[T]):
         return id(self.it)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and other.it is self.it
+        return isinstance(other, _ByIdentity) and other.it is self.it
 
 
 @functools.lru_cache(maxsize=64)
-def _sizes(key: _Same[Chart]) -> _Sizes:
+def _sizes(key: _ByIdentity[Chart]) -> _Sizes:
     chart = key.it
     states = ("x", "v", *chart.variables)
     rates = [f"d{name}" for name in chart.variables]
@@ -182,7 +182,7 @@ def _sizes(key: _Same[Chart]) -> _Sizes:
         still = {name: zero for name, zero in rest.items() if not (moving and name == "v")}
         names = f"v, {arguments}" if moving else arguments
         text = f"def number({names}):\n    return {spell(renamed(tree, still))}\n"
-        made: Numbers = load(f"scale in {chart.name}", text, {"sgn": _to_the_right})["number"]
+        made: Numbers = load(f"scale in {chart.name}", text, {"sgn": _sign_from_above})["number"]
         return made
 
     guards = chart.guards.values()
@@ -219,13 +219,13 @@ def _sizes(key: _Same[Chart]) -> _Sizes:
     return _Sizes(reach, stiffness, {name: row for name, row in follows.items() if row}, paces)
 
 
-def _to_the_right(u: float) -> float:
-    """Return the sign of u as seen from above: the slope of abs(z) at 0 is 1."""
+def _sign_from_above(u: float) -> float:
+    """Return the sign of u with sgn(0) = 1: the slope of abs(z) at 0 is 1."""
     return 1.0 if u >= 0.0 else -1.0
 
 
 def _number(function: Numbers, values: Sequence[float]) -> float:
-    """Compute a value at rest; 0 where it has none."""
+    """Evaluate a value at rest; 0 if it has none."""
     try:
         number = function(*values)
     except (ArithmeticError, ValueError):
@@ -238,6 +238,6 @@ def _quotient(height: Numbers, slope: Numbers, values: Sequence[float]) -> float
 
 
 def _divided(a: float, b: float) -> float:
-    """Return |a / b|, 0 where it means nothing."""
+    """Return |a / b|, or 0 if it is undefined."""
     quotient = abs(a / b) if b else 0.0
     return quotient if math.isfinite(quotient) else 0.0

@@ -1,1 +1,1 @@
-"""From a program to a trace: machines, the run and its files, sweeps."""
+"""Running a program to obtain a trace: machines, runs and their files, sweeps."""

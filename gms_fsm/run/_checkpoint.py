@@ -1,7 +1,7 @@
-"""Checkpoints: a long run that is interrupted goes on where it was, bit for bit.
+"""Checkpoints: an interrupted run continues where it stopped, bit for bit.
 
-So it goes on by the same program and the same functions only, and with numbers only that a run can
-have: compiled code would take a wrong one for a place in memory.
+Therefore it continues only with the same program and the same functions, and only with values that
+a run can have: compiled code would use an invalid one as a memory address.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm._files import written_whole
+from gms_fsm._files import write_whole
 from gms_fsm.errors import CheckpointError, ParameterError, SignalError, cut, shown, why
 from gms_fsm.lowering.layout import LOG_TEXTS
 from gms_fsm.run._identity import identity
@@ -28,55 +28,55 @@ from integrators import hybrid, loop
 from integrators.advance import NEXT_KNOT, NEXT_TIME, ROW
 from integrators.steps import T
 
-__all__ = ["Keeper"]
+__all__ = ["Checkpointer"]
 
 _FORMAT = "gms-fsm checkpoint 2"
 
 
 class Resumable(Protocol):
-    """A run whose state can be taken and put back."""
+    """A run whose state can be saved and restored."""
 
     start: Start
 
     @property
     def buffers(self) -> hybrid.Buffers:
-        """Where the loop keeps its state."""
+        """The buffers in which the loop keeps its state."""
 
     def kept(self) -> dict[str, Any]:
-        """Return what the recorder holds, as arrays."""
+        """Return the recorder's contents as arrays."""
 
-    def go_on_from(self, kept: dict[str, Any]) -> None:
-        """Take over what `kept` returned; the buffers are filled already."""
+    def restore(self, kept: dict[str, Any]) -> None:
+        """Restore what `kept` returned; the buffers are already filled."""
 
 
-class Keeper:
-    """Writes a run's state to a file now and then, and starts it from there.
+class Checkpointer:
+    """Saves a run's state to a file at intervals, and resumes the run from it.
 
     Parameters
     ----------
     run : Resumable
-        A run that has not begun.
+        A run that has not started yet.
     path : Path
         The file.
     every : float
-        s of the computer's time between two checkpoints.
+        Wall-clock time in s between two checkpoints.
 
     Raises
     ------
     CheckpointError
-        If the file is there and damaged, or belongs to another run or another program.
+        If the file exists and is damaged, or belongs to another run or another program.
     ParameterError
-        If a SciPy solver takes the steps, whose history cannot be kept, or if a signal is a
-        function that cannot be known again.
+        If the integrator is a SciPy solver, whose history cannot be saved, or if a signal is a
+        function that cannot be identified.
     OutputError
-        If the file cannot be written, or the rig is of a class of the user's own.
+        If the file cannot be written, or the rig is of a user-defined class.
     """
 
     def __init__(self, run: Resumable, path: Path, every: float) -> None:
         if run.buffers.plan.foreign:
             raise ParameterError(
-                "checkpoint: a SciPy solver's history cannot be kept",
-                advice="use method='dp45' or another of our own, or leave checkpoint out",
+                "checkpoint: the history of a SciPy solver cannot be saved",
+                advice="use method='dp45' or another built-in method, or leave checkpoint out",
             )
         self.run, self.path, self.every = run, path, every
         self.identity = _identity(run.start)
@@ -87,28 +87,28 @@ class Keeper:
         self.saved_at = time.monotonic()
 
     def look(self) -> None:
-        """Write a checkpoint if it is time."""
+        """Write a checkpoint if one is due."""
         if time.monotonic() - self.saved_at >= self.every:
             self.save()
             self.saved_at = time.monotonic()
 
     def save(self) -> None:
-        """Write a checkpoint: the old file or the new, never a half."""
+        """Write a checkpoint atomically."""
         state = {f"loop_{name}": u for name, u in hybrid.state_of(self.run.buffers).items()}
         kept = {f"kept_{name}": u for name, u in self.run.kept().items()}
         head: dict[str, Any] = {"format": _FORMAT, "program": _program(), "identity": self.identity}
-        written_whole(self.path, lambda file: np.savez(file, **head, **state, **kept))
+        write_whole(self.path, lambda file: np.savez(file, **head, **state, **kept))
 
     def finish(self) -> None:
-        """Remove the file: the run is over."""
+        """Remove the file because the run has ended."""
         self.path.unlink(missing_ok=True)
 
     def _restore(self) -> None:
         places, columns = hybrid.state_of(self.run.buffers), self.run.kept()
         ours = [_FORMAT, _program(), self.identity]
         try:
-            most = self.path.stat().st_size  # nothing in it is packed
-            # Opened here: np.load leaves a damaged file open.
+            most = self.path.stat().st_size  # nothing in it is compressed
+            # Opened here because np.load does not close a damaged file.
             with self.path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
                 head = [str(member(file, "format", most))]
                 if head[0].startswith("gms-fsm checkpoint"):
@@ -120,32 +120,32 @@ class Keeper:
                     state = {name: member(file, f"loop_{name}", most) for name in places}
                     kept = {name: member(file, f"kept_{name}", most) for name in columns}
                     _check(self.run, state, kept)
-        except Exception as error:  # numpy and zipfile raise many kinds over damaged files
+        except Exception as error:  # numpy and zipfile raise many kinds for damaged files
             raise CheckpointError(
                 f"not a checkpoint, or damaged ({why(error)})",
                 place=str(self.path),
-                advice="remove it to start the run anew",
+                advice="remove it to restart the run",
             ) from None
         if head[:2] != ours[:2]:
             begun = cut(head[1]) if len(head) == 3 else "an older gms-fsm"
             raise CheckpointError(
-                f"begun by {begun}, and this is {_program()}, which may compute other bits",
+                f"started by {begun}, but this is {_program()}, which may compute different bits",
                 place=str(self.path),
-                advice="go on with that one, or remove the file to start the run anew",
+                advice="continue with that one, or remove the file to restart the run",
             )
         if head != ours:
             raise CheckpointError(
                 "belongs to a run with another model, rig, signal or setting",
                 place=str(self.path),
-                advice="remove it, or give this run a file of its own",
+                advice="remove it, or use a separate file for this run",
             )
         for name, place in places.items():
             place[:] = state[name] if isinstance(place, np.ndarray) else state[name].tolist()
-        self.run.go_on_from(kept)
+        self.run.restore(kept)
 
 
 def _program() -> str:
-    """Return what runs: another version might go on with other bits, or lay out its state anew."""
+    """Identify the program: another version might compute other bits or use another layout."""
     from gms_fsm._version import __version__
     from integrators.compiled import edition
 
@@ -153,7 +153,7 @@ def _program() -> str:
 
 
 def _identity(start: Start) -> str:
-    """Return a short name for all that decides a run."""
+    """Return a hash of everything that determines a run."""
     head = Header.of(start.model, start.rig, start.settings).model_dump_json()
     functions = {}
     for name, signal in start.rig.signals.items():
@@ -163,7 +163,7 @@ def _identity(start: Start) -> str:
             except SignalError as error:
                 raise ParameterError(
                     f"checkpoint: {error}, so a run with it as signal {name!r} cannot be resumed",
-                    advice="give an expression of t, arrays (times, values) or a Python function "
+                    advice="give an expression in t, arrays (times, values) or a Python function "
                     "over plain values, or leave checkpoint out",
                 ) from None
     text = start.program.source
@@ -171,9 +171,9 @@ def _identity(start: Start) -> str:
     return hashlib.sha256(repr(what).encode()).hexdigest()
 
 
-# --------------------------------------------------------------------------- what a run can have
+# --------------------------------------------------------------------------- plausibility
 def _check(run: Resumable, state: Mapping[str, Any], kept: Mapping[str, Any]) -> None:
-    """Raise a ValueError unless a run like this one can have come to such numbers."""
+    """Raise a ValueError unless a run like this one can have reached such values."""
     start, b, chart = run.start, run.buffers, run.start.model.chart
     for name, place in hybrid.state_of(b).items():
         _expect(name, state[name], np.asarray(place), rows=False)
@@ -182,7 +182,7 @@ def _check(run: Resumable, state: Mapping[str, Any], kept: Mapping[str, Any]) ->
     states, edges, n = len(chart.states), len(chart.transitions), len(b.now.mode)
     layout = start.program.layout
     counts, cursor = state["counts"], state["cursor"]
-    # Compiled rows lie in the columns that were kept, others in the buffer.
+    # Compiled rows are in the saved columns, others in the buffer.
     capacity = max(len(kept["rows_t"]), len(b.out.rows_t))
     machine = 0 if counts[loop.PHASE] == loop.FIRE else -1
     within = {
@@ -210,13 +210,13 @@ def _check(run: Resumable, state: Mapping[str, Any], kept: Mapping[str, Any]) ->
         "stops slid": (kept["stops_mode"][:, layout.slides], 0, 1),
     }
     groups = [[name for name in kept if name.startswith(kind)] for kind in ("rows_", "stops_")]
-    if "log" in kept:  # of a run by Python
+    if "log" in kept:  # from a run in Python
         log = kept["log"]
         within["log"] = log["element"], 0, n - 1
         known = {(edge.name, edge.source, edge.target) for edge in chart.transitions}
         if not known >= {tuple(row) for row in log[[*LOG_TEXTS]].tolist()}:
-            raise ValueError("log: an edge that the chart has not")
-    else:  # of a compiled one
+            raise ValueError("log: an edge that the chart does not have")
+    else:  # from a compiled run
         groups.append(["t", "machine", "edge", "numbers"])
         firings, stops = kept["counts"]
         within["firings"] = firings, 0, len(kept["t"])
@@ -225,17 +225,17 @@ def _check(run: Resumable, state: Mapping[str, Any], kept: Mapping[str, Any]) ->
         within["fired edges"] = kept["edge"], 0, max(0, edges - 1)
     for group in groups:
         if len({len(kept[name]) for name in group}) != 1:
-            raise ValueError(f"{', '.join(group)}: not of one length")
+            raise ValueError(f"{', '.join(group)}: lengths differ")
     for name, (found, least, most) in within.items():
         if not np.all((np.asarray(found) >= least) & (np.asarray(found) <= most)):
-            raise ValueError(f"{name}: outside of {least} to {most}")
+            raise ValueError(f"{name}: not within {least} to {most}")
 
 
 def _expect(name: str, found: NDArray[Any], like: NDArray[Any], *, rows: bool) -> None:
-    """Refuse an array that is not like one of the run's, but for the number of its rows."""
+    """Refuse an array whose type or shape differs from the run's, except for its number of rows."""
     shape = (len(found), *like.shape[1:]) if rows and found.ndim else like.shape
     fitting = np.can_cast(found.dtype, like.dtype, "safe")
-    if like.dtype.fields:  # the log, whose texts may be of any length
+    if like.dtype.fields:  # the log, whose texts may have any length
         fitting = _kinds(found.dtype) == _kinds(like.dtype)
     if found.shape != shape or not fitting:
         raise ValueError(f"{name}: {found.dtype} {found.shape} is not {like.dtype} {shape}")

@@ -1,4 +1,4 @@
-"""A run by the compiled engine: the outer loop itself is machine code and fills columns."""
+"""A run by the compiled engine: the outer loop itself is machine code that fills columns."""
 
 from __future__ import annotations
 
@@ -11,8 +11,15 @@ import numpy as np
 from gms_fsm.lowering import _compiled as compiled
 from gms_fsm.lowering.layout import LOG_NUMBERS, LOG_TEXTS
 from gms_fsm.lowering.program import equations
-from gms_fsm.run._recording import PATIENCE, Recording, check_end, check_pace, explained, meddled
-from gms_fsm.run.machines import ElementMachines, MachineEngine, Meddling
+from gms_fsm.run._recording import (
+    PATIENCE,
+    Recording,
+    check_end,
+    check_pace,
+    explained,
+    interference_error,
+)
+from gms_fsm.run.machines import ElementMachines, Interference, MachineEngine
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
@@ -28,18 +35,18 @@ from integrators.steps import T
 
 __all__ = ["CompiledRun"]
 
-STEPS_AT_ONCE = 20_000  # between two looks at the keyboard and two calls of progress
+STEPS_AT_ONCE = 20_000  # between two checks for Ctrl-C and two calls of progress
 
 
 class CompiledRun:
-    """A simulation under way, chunk by chunk; the same interface as `gms_fsm.run.simulate.Run`.
+    """A simulation in progress, chunk by chunk; same interface as `gms_fsm.run.simulate.Run`.
 
     Parameters
     ----------
     start : Start
-        What to run.
+        The run to perform.
     machines : ElementMachines, optional
-        Machines of the user's own: each firing is replayed through them.
+        The user's own machines: each firing is replayed through them.
     """
 
     def __init__(self, start: Start, machines: ElementMachines | None = None) -> None:
@@ -56,46 +63,46 @@ class CompiledRun:
 
     @property
     def buffers(self) -> hybrid.Buffers:
-        """Where the loop keeps its state."""
+        """The buffers in which the loop keeps its state."""
         return self.columns.buffers
 
     def kept(self) -> dict[str, Any]:
-        """Return what the columns hold, for a checkpoint."""
+        """Return the columns for a checkpoint."""
         return self.columns.state()
 
-    def go_on_from(self, kept: dict[str, Any]) -> None:
-        """Take over what `kept` returned; the buffers are filled already."""
-        self.columns.put_back(kept)
+    def restore(self, kept: dict[str, Any]) -> None:
+        """Restore what `kept` returned; the buffers are already filled."""
+        self.columns.restore(kept)
         counts: Any = self.buffers.memory.counts
         t, y, mode = self.columns.latest
         if self.engine is not None:
-            self.engine.go_on_from(t, y, mode[self.start.program.layout.elements])
-            if counts[loop.PHASE] == loop.FIRE:  # its callbacks have run, the loop is yet to follow
+            self.engine.restore(t, y, mode[self.start.program.layout.elements])
+            if counts[loop.PHASE] == loop.FIRE:  # its callbacks have run, the loop has yet to fire
                 edge = self.start.model.chart.transitions[counts[loop.EDGE]]
                 self.engine.set_state(int(counts[loop.MACHINE]), edge.target)
 
-    def begin_again(self, model: Model, rig: Rig) -> None:
-        """Start over with other numbers; signals and initial values stay.
+    def reset(self, model: Model, rig: Rig) -> None:
+        """Start over with different numbers; signals and initial values stay.
 
         Parameters
         ----------
         model, rig
-            Of the same kind as those before.
+            Of the same kind as the previous ones.
         """
-        self.columns.begin_again(model, rig)
+        self.columns.reset(model, rig)
 
     def advance(self) -> bool:
-        """Let the run go on for a while.
+        """Run until a chunk of steps is complete.
 
         Returns
         -------
         bool
-            False when the run has reached its end.
+            False if the run has reached its end.
 
         Raises
         ------
         SimulationError
-            If it cannot go on.
+            If it cannot continue.
         """
         from integrators.compiled import record
 
@@ -110,7 +117,7 @@ class CompiledRun:
             event = record(
                 (functions, loop.Machines(*machines), b, columns.log, first, STEPS_AT_ONCE, pause),
                 compiled.store(),
-                compiled.tell,
+                compiled.notify,
             )
         except Exception as error:
             if not start.program.callables:
@@ -136,27 +143,27 @@ class CompiledRun:
         return True
 
     def _replay(self, engine: MachineEngine | None) -> None:
-        """Fire the user's machine as the compiled one is about to."""
+        """Fire the user's machine just before the compiled loop fires."""
         assert engine is not None
         memory, (t, y, mode) = self.columns.buffers.memory, self.columns.latest
         start = self.columns.start
-        if memory.counts[loop.FIRED_ONE] == 0:  # the elements saw these values when asked
+        if memory.counts[loop.FIRED_ONE] == 0:  # the values when the guards were evaluated
             engine.show(t, y, list(mode[start.program.layout.elements]))
         try:
             engine.trigger(int(memory.counts[loop.EDGE]), int(memory.counts[loop.MACHINE]), t)
-        except Meddling as error:
-            raise meddled(error, self.columns) from error.__cause__
+        except Interference as error:
+            raise interference_error(error, self.columns) from error.__cause__
 
 
 class Columns:
-    """The arrays a compiled run fills; they grow as needed.
+    """The arrays that a compiled run fills; they grow as needed.
 
     Parameters
     ----------
     start : Start
-        What runs.
+        The run.
     p : tuple of ndarray, optional
-        Parameters in place of the program's own.
+        Parameters that replace the program's own.
     """
 
     def __init__(self, start: Start, p: compiled.Packed | None = None) -> None:
@@ -168,10 +175,10 @@ class Columns:
         size, modes = layout.y.size, layout.modes
         made = equations(start.program)
         b = arrays(hybrid.buffers(made, start.t_start, start.y, start.mode, start.last, options, 0))
-        few = max(16, min(1024, 4_000_000 // size))  # rows to begin with
+        few = max(16, min(1024, 4_000_000 // size))  # initial number of rows
         rows = {"all": few, "t_eval": len(start.options.times or ()), "end": 0}[start.output]
         stops = few if start.output == "t_eval" else 0
-        floats: Any = np.empty  # the columns' fields say list; compiled code takes arrays
+        floats: Any = np.empty  # the columns' fields are typed as lists; compiled code uses arrays
         ints: Any = functools.partial(np.zeros, dtype=np.int64)
         out = b.out._replace(rows_t=floats(rows), rows_y=floats((rows, size)))
         self.buffers: hybrid.Buffers = b._replace(out=out)
@@ -194,14 +201,14 @@ class Columns:
             self.log.stops_mode[0] = list(layout.not_sliding(start.mode))
             self.log.counts[STOPS] = 1
 
-    def begin_again(self, model: Model, rig: Rig) -> None:
-        """Empty the columns and go back to the start, with the numbers of a model and a rig."""
+    def reset(self, model: Model, rig: Rig) -> None:
+        """Empty the columns and return to the start, with the numbers of a model and a rig."""
         self.start = self.start.with_numbers(model, rig)
         self.p = compiled.packed(self.start.program.p)
         self.empty()
 
     def empty(self) -> None:
-        """Empty the columns and go back to the start."""
+        """Empty the columns and return to the start."""
         start, log = self.start, self.log
         b: Any = self.buffers  # arrays
         now, memory, sliding = b.now, b.memory, b.sliding
@@ -225,12 +232,12 @@ class Columns:
         log.counts[:] = [0, min(1, len(log.stops_t))]
 
     def state(self) -> dict[str, Any]:
-        """Return what was kept, as arrays, for a checkpoint."""
+        """Return the contents as arrays, for a checkpoint."""
         out = self.buffers.out
         return {**self.log._asdict(), "rows_t": out.rows_t, "rows_y": out.rows_y}
 
-    def put_back(self, state: Mapping[str, Any]) -> None:
-        """Take over what `state` returned."""
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Restore what `state` returned."""
         self.log = loop.Log(**{name: state[name] for name in self.log._fields})
         out = self.buffers.out._replace(rows_t=state["rows_t"], rows_y=state["rows_y"])
         self.buffers = self.buffers._replace(out=out)
@@ -239,24 +246,27 @@ class Columns:
         """Double the columns that are full."""
         out, log = self.buffers.out, self.log
         if out.every_step and out.cursor[ROW] + 1 >= len(out.rows_t):
-            out = out._replace(rows_t=_twice(out.rows_t), rows_y=_twice(out.rows_y))
+            out = out._replace(rows_t=_doubled(out.rows_t), rows_y=_doubled(out.rows_y))
             self.buffers = self.buffers._replace(out=out)
             log = log._replace(
-                rows_microstep=_twice(log.rows_microstep), rows_mode=_twice(log.rows_mode)
+                rows_microstep=_doubled(log.rows_microstep), rows_mode=_doubled(log.rows_mode)
             )
         if log.counts[FIRINGS] >= len(log.t):
             log = log._replace(
-                **{name: _twice(getattr(log, name)) for name in ("t", "machine", "edge", "numbers")}
+                **{
+                    name: _doubled(getattr(log, name))
+                    for name in ("t", "machine", "edge", "numbers")
+                }
             )
         if 0 < len(log.stops_t) <= log.counts[STOPS]:
             names = ("stops_t", "stops_microstep", "stops_y", "stops_mode")
-            log = log._replace(**{name: _twice(getattr(log, name)) for name in names})
+            log = log._replace(**{name: _doubled(getattr(log, name)) for name in names})
         self.log = log
 
     def interrupted(self, before: tuple[float, list[float], tuple[int, ...]]) -> None:
-        """Make sense of what machine code leaves behind where a function of the user's raised.
+        """Recover from machine code that was interrupted by an error in a user's function.
 
-        The rows are whole but for their modes; of time and state only those before are certain.
+        The rows are complete except for their modes; only the previous time and state are certain.
         """
         b: Any = self.buffers
         log: Any = self.log
@@ -274,7 +284,7 @@ class Columns:
         return float(b.now.clock[T]), b.now.y.tolist(), modes
 
     def as_lists(self) -> hybrid.Buffers:
-        """Return the buffers with time, state and modes as Python's own numbers, for messages."""
+        """Return the buffers with time, state and modes as Python numbers, for messages."""
         b: Any = self.buffers
         lists = {name: getattr(b.now, name).tolist() for name in ("clock", "y", "mode")}
         memory = b.memory._replace(counts=b.memory.counts.tolist())
@@ -297,7 +307,7 @@ class Columns:
         return log_from(columns)
 
     def trace(self) -> Trace:
-        """Return all that was kept."""
+        """Return the trace of all recorded data."""
         start, log, out = self.start, self.log, self.buffers.out
         count = int(out.cursor[ROW])
         if start.output == "end":
@@ -317,7 +327,7 @@ class Columns:
         return Trace(rows, stops, self.transitions(), start.model, start.rig, start.settings)
 
 
-def _twice(column: Any) -> Any:
+def _doubled(column: Any) -> Any:
     return np.concatenate([column, np.zeros_like(column)])
 
 

@@ -1,9 +1,9 @@
-"""Which Python function this is, told so that another process gives the same answer.
+"""Identification of Python functions across processes.
 
-Two functions are the same if their code, constants, default values, what they enclose and the
-globals they read are. That can be told of functions written in Python over plain values; what a
-library has is known by its name and the library's version. Of what else can be called, nobody can
-see what it will do.
+Two functions are the same if their code, constants, default values, closures and the globals they
+read are the same. This can be determined for functions written in Python over plain values;
+objects from a library are identified by name and the library's version. The behaviour of other
+callables cannot be determined.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ _CODE = (
 
 
 def identity(call: Any) -> str:
-    """Return a short name for what a function does.
+    """Return a hash of what a function computes.
 
     Parameters
     ----------
@@ -60,8 +60,8 @@ def identity(call: Any) -> str:
     Raises
     ------
     SignalError
-        If what it does cannot be told: for a builtin, a method, an object with a ``__call__``, or
-        a function that uses an object of unknown contents.
+        If its behaviour cannot be determined: for a builtin, a method, an object with a
+        ``__call__``, or a function that uses an object of unknown contents.
 
     Examples
     --------
@@ -71,7 +71,7 @@ def identity(call: Any) -> str:
     False
     >>> identity(abs)
     Traceback (most recent call last):
-    gms_fsm.errors.SignalError: nobody can see what abs (builtin_function_or_method) will do
+    gms_fsm.errors.SignalError: the behaviour of abs (builtin_function_or_method) is unknown
     """
     inner = call
     while isinstance(inner, functools.partial):
@@ -89,11 +89,11 @@ def _unknown(value: Any) -> SignalError:
     name = getattr(value, "__qualname__", None)
     kind = type(value).__qualname__
     what = f"an object of class {kind}" if name is None else f"{name} ({kind})"
-    return SignalError(f"nobody can see what {what} will do")
+    return SignalError(f"the behaviour of {what} is unknown")
 
 
 def _parts(value: Any, inside: tuple[int, ...]) -> Iterator[bytes]:
-    """Yield what makes a value what it is; `inside` are the objects around it."""
+    """Yield everything that identifies a value; `inside` are the objects that enclose it."""
     if id(value) in inside:
         yield b"the one %d around it" % inside[::-1].index(id(value))
         return
@@ -135,7 +135,7 @@ def _function_parts(function: FunctionType, inside: tuple[int, ...]) -> Iterator
         try:
             enclosed = cell.cell_contents
         except ValueError:
-            yield b"empty"  # it would raise when called
+            yield b"empty"  # calling the function would raise
         else:
             yield from _parts(enclosed, inside)
     for path in sorted({*_globals_read(function.__code__)}):
@@ -143,7 +143,7 @@ def _function_parts(function: FunctionType, inside: tuple[int, ...]) -> Iterator
         name, *attributes = path
         if name in found:  # else a builtin
             found = found[name]
-            # What a module or class of the user's holds may change without its name.
+            # The contents of a user's module or class may change while its name stays.
             while attributes and _holds_names(found):
                 found = getattr(found, attributes.pop(0), None)
             yield ".".join(path).encode()
@@ -157,10 +157,10 @@ def _holds_names(value: Any) -> bool:
 
 
 def _globals_read(code: CodeType) -> Iterator[tuple[str, ...]]:
-    """Yield the globals that some code reads, each with the attributes asked of it."""
+    """Yield the globals that some code reads, each with the attributes read from it."""
     path: tuple[str, ...] = ()
     for step in dis.get_instructions(code):
-        if step.opname == "EXTENDED_ARG":  # belongs to the next one
+        if step.opname == "EXTENDED_ARG":  # belongs to the next instruction
             continue
         if step.opname in ("LOAD_ATTR", "LOAD_METHOD") and path:
             path = (*path, str(step.argval))
@@ -174,7 +174,7 @@ def _globals_read(code: CodeType) -> Iterator[tuple[str, ...]]:
 
 
 def _in_library(value: Any) -> bool:
-    """Tell whether a value is what a module of a library has under the value's own name."""
+    """Return whether a value is the object that a library's module has under the value's name."""
     module = sys.modules.get(getattr(value, "__module__", None) or "")
     if module is None or not _library(module):
         return False
@@ -185,7 +185,7 @@ def _in_library(value: Any) -> bool:
 
 
 def _library(module: ModuleType) -> str:
-    """Return name and version of a module that is installed, nothing of one of the user's."""
+    """Return name and version of an installed module; nothing for a user's module."""
     place = getattr(module, "__file__", None)
     if module.__name__ not in sys.builtin_module_names and not (place or "").startswith(_PLACES):
         return ""

@@ -1,4 +1,4 @@
-"""What a run keeps, and how it words an error."""
+"""Recording of a run, and the wording of its errors."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.language import rough_points
 from gms_fsm.lowering._observing import armed, rate
 from gms_fsm.lowering.layout import Layout, LogRecord
-from gms_fsm.run.machines import Meddling
+from gms_fsm.run.machines import Interference
 from gms_fsm.run.start import Start
 from gms_fsm.traces._log import log_of
 from gms_fsm.traces.failures import (
@@ -51,28 +51,28 @@ __all__ = [
     "check_end",
     "check_pace",
     "explained",
-    "meddled",
+    "interference_error",
     "scope_of",
 ]
 
-POWERS = 12  # turns of the power iteration
-STABLE = 1.5  # step times fastest rate; explicit methods go to 2 or 3.3, and hover below
-PATIENCE = 5_000  # steps between two looks at the pace
+POWERS = 12  # iterations of the power method
+STABLE = 1.5  # step times fastest rate; explicit methods are stable up to 2 or 3.3
+PATIENCE = 5_000  # steps between two pace checks
 
 
 class Recording(Protocol):
-    """What listeners may ask of a run under way."""
+    """What listeners may read from a run in progress."""
 
     @property
     def start(self) -> Start:
-        """What runs."""
+        """The run's settings."""
 
     @property
     def latest(self) -> tuple[float, list[float], tuple[int, ...]]:
         """Time, state and modes reached."""
 
     def trace(self) -> Trace:
-        """Return all that was kept."""
+        """Return the trace of all recorded data."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ class _Columns:
         self.mode.append(mode)
 
     def rows(self, layout: Layout) -> Rows:
-        count = min(map(len, vars(self).values()))  # Ctrl-C may come between two columns
+        count = min(map(len, vars(self).values()))  # Ctrl-C may arrive between two columns
         return Rows(
             np.array(self.t[:count], dtype=np.float64),
             np.array(self.microstep[:count], dtype=np.int64),
@@ -101,12 +101,12 @@ class _Columns:
 
 
 class Recorder:
-    """Keeps what the loop yields.
+    """Records what the loop yields.
 
     Parameters
     ----------
     start : Start
-        What runs.
+        The run.
     """
 
     def __init__(self, start: Start) -> None:
@@ -120,7 +120,7 @@ class Recorder:
             self.stops.add(start.t_start, 0, list(start.y), mode)
 
     def take(self, event: integrators.Event) -> None:
-        """Keep one event."""
+        """Record one event."""
         output = self.start.output
         match event:
             case Arc(t=times, y=states, mode=mode):
@@ -130,7 +130,7 @@ class Recorder:
                 self.rows.mode.extend([mode] * len(times))
                 self.latest = (times[-1], states[-1], mode)
             case Firing() | Slide():
-                # First the log: no row may show a firing that it has not.
+                # The log first: no row may show a firing that is not in it.
                 if isinstance(event, Firing):
                     self.log.append(self._record(event))
                 if output != "end":
@@ -143,7 +143,7 @@ class Recorder:
                 self.latest = (t, y, mode)
 
     def state(self) -> dict[str, Any]:
-        """Return what was kept, as arrays, for a checkpoint."""
+        """Return the contents as arrays, for a checkpoint."""
         layout = self.start.program.layout
         tables = {"rows": self.rows, "stops": self.stops}
         kept = {
@@ -153,10 +153,10 @@ class Recorder:
         }
         return kept | {"log": np.asarray(log_of(self.log))}
 
-    def put_back(
+    def restore(
         self, state: Mapping[str, Any], latest: tuple[float, list[float], tuple[int, ...]]
     ) -> None:
-        """Take over what `state` returned, and the state reached."""
+        """Restore what `state` returned, and the state reached."""
         for name in ("rows", "stops"):
             t, microstep, y, mode = (
                 state[f"{name}_{column}"].tolist() for column in ("t", "microstep", "y", "mode")
@@ -186,7 +186,7 @@ class Recorder:
         )
 
     def trace(self) -> Trace:
-        """Return all that was kept."""
+        """Return the trace of all recorded data."""
         start = self.start
         layout = start.program.layout
         if start.output == "end":
@@ -200,7 +200,7 @@ class Recorder:
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """The latest row of a running simulation; computed only when asked."""
+    """The latest row of a running simulation, computed on demand."""
 
     _recording: Recording
 
@@ -229,16 +229,16 @@ def scope_of(recording: Recording) -> Scope:
     return Scope.of(start.model, start.program, *recording.latest)
 
 
-# --------------------------------------------------------------------------- explaining
+# --------------------------------------------------------------------------- wording of errors
 def explained(error: HybridError, recorder: Recording) -> SimulationError:
-    """Put an error of the loop into the words of the model.
+    """Translate an error of the loop into the terms of the model.
 
     Parameters
     ----------
     error : HybridError
         From `integrators`.
     recorder : Recording
-        What was kept.
+        The recorded data.
 
     Returns
     -------
@@ -256,7 +256,7 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
         )
     if isinstance(error, StepTooSmall):
         return StepSizeError(
-            "the step size fell under the resolution of the clock: the flow changes too fast for "
+            "the step size fell below the resolution of the clock: the flow changes too fast for "
             "this method",
             trace,
             t=error.t,
@@ -266,8 +266,8 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
     if isinstance(error, TooManySteps):
         reason, advice = _slow(recorder)
         return StepLimitError(
-            f"the run has taken max_steps = {recorder.start.options.max_steps} steps and is short "
-            f"of t_end = {recorder.start.t_end!r} s{reason}",
+            f"the run has taken max_steps = {recorder.start.options.max_steps} steps before "
+            f"reaching t_end = {recorder.start.t_end!r} s{reason}",
             trace,
             t=error.t,
             advice=advice,
@@ -289,12 +289,12 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
         time = float(last.t - taken[0].t)
         cause, advice = (
             (
-                f"the flows on both sides of guard [{guard}] push back over it (chattering)",
-                "leave a gap between the guards there and back",
+                f"the flows on both sides of guard [{guard}] push back across it (chattering)",
+                "separate the guards of the two directions by a gap",
             )
             if time > 0.0
             else (
-                f"guard [{guard}] {_way_back(chart, taken)} hold together",
+                f"guard [{guard}] {_opposite_edge(chart, taken)} hold together",
                 "make the guards exclude each other",
             )
         )
@@ -328,7 +328,7 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
 
 
 def _slow(recorder: Recording) -> tuple[str, str]:
-    """Say why a run takes many steps, as far as it shows, and what to do."""
+    """Return a reason for a run's many steps, as far as it can be determined, and advice."""
     log = recorder.trace().transitions
     most = recorder.start.options.max_steps
     if 10 * len(log) > most:
@@ -336,7 +336,7 @@ def _slow(recorder: Recording) -> tuple[str, str]:
         worst = int(element[count.argmax()])
         return (
             f": element {worst + 1} has switched {int(count.max())} times (chattering)",
-            "leave a gap between its guards there and back, or give a larger max_steps",
+            "separate its guards for the two directions by a gap, or give a larger max_steps",
         )
     return "", (
         "give a larger max_steps, a larger rtol, or for a stiff run method=scipy.integrate.Radau"
@@ -344,17 +344,17 @@ def _slow(recorder: Recording) -> tuple[str, str]:
 
 
 def check_pace(recording: Recording, buffers: hybrid.Buffers) -> None:
-    """Stop a stiff run that cannot reach its end with the steps that are left.
+    """Stop a stiff run that cannot reach its end with the remaining steps.
 
-    Stiff is where stability, not accuracy, keeps the steps small: where the step times the fastest
+    A run is stiff if stability, not accuracy, keeps the steps small: if the step times the fastest
     rate of the flow is of the order of one. That rate is found by a power iteration.
 
     Parameters
     ----------
     recording : Recording
-        Of a run under way.
+        The run in progress.
     buffers : integrators.hybrid.Buffers
-        Where it is.
+        Its current state.
 
     Raises
     ------
@@ -384,9 +384,9 @@ def check_pace(recording: Recording, buffers: hybrid.Buffers) -> None:
     if step * fastest < STABLE:
         return
     raise StepLimitError(
-        f"stiff: the flow has a rate of {fastest:.3g} /s, which holds the steps of "
-        f"this method at {step:.3g} s: to t_end = {start.t_end!r} s it would take "
-        f"{(start.t_end - t) / step:.3g} of them, max_steps is {start.options.max_steps}",
+        f"stiff: the flow has a rate of {fastest:.3g} /s, which limits the steps of "
+        f"this method to {step:.3g} s: to reach t_end = {start.t_end!r} s it would take "
+        f"{(start.t_end - t) / step:.3g} of them, but max_steps is {start.options.max_steps}",
         recording.trace(),
         t=t,
         advice="use an implicit method (method=scipy.integrate.Radau; "
@@ -394,15 +394,15 @@ def check_pace(recording: Recording, buffers: hybrid.Buffers) -> None:
     )
 
 
-def meddled(error: Meddling, recorder: Recording) -> CallbackError:
-    """Put what a callback did into an error with the trace.
+def interference_error(error: Interference, recorder: Recording) -> CallbackError:
+    """Return an error with the trace for a callback that changed something.
 
     Parameters
     ----------
-    error : Meddling
+    error : Interference
         From the machines.
     recorder : Recording
-        What was kept.
+        The recorded data.
 
     Returns
     -------
@@ -414,8 +414,8 @@ def meddled(error: Meddling, recorder: Recording) -> CallbackError:
     )
 
 
-def _way_back(chart: Chart, taken: Any) -> str:
-    """Name the other edge of an endless to and fro."""
+def _opposite_edge(chart: Chart, taken: Any) -> str:
+    """Name the other edge of an endless back and forth."""
     other = next((edge for edge in chart.transitions if edge.name == taken[-2].edge), None)
     if len(set(taken.edge.tolist())) != 2 or other is None:
         return "and a way back"
@@ -423,7 +423,7 @@ def _way_back(chart: Chart, taken: Any) -> str:
 
 
 def _not_finite(error: NotFinite, recorder: Recording) -> str:
-    """Name what is not finite where a run ended, as far as it shows there."""
+    """Name the quantity that is not finite where a run ended, if it can be determined."""
     start = recorder.start
     scope = Scope.of(start.model, start.program, error.t, error.y, error.mode)
     if not math.isfinite(scope.v):
@@ -441,12 +441,12 @@ def _not_finite(error: NotFinite, recorder: Recording) -> str:
 
 
 def check_end(recorder: Recording) -> None:
-    """Raise if a sampled signal ended before the run should.
+    """Raise an error if a sampled signal ended before the run was meant to.
 
     Parameters
     ----------
     recorder : Recording
-        Of a run that has reached its last time.
+        A run that has reached its last time.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a sweep brings: the results of many runs, their table, and their files."""
+"""The result of a sweep: the outcomes of many runs, as tables and files."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gms_fsm._arguments import checked_path
 from gms_fsm._extras import require
-from gms_fsm._files import written_whole
+from gms_fsm._files import write_whole
 from gms_fsm.charts.parameters import QUANTITIES, FloatArray
 from gms_fsm.errors import OutputError, TraceFileError, cut, shown, why
 from gms_fsm.lowering.layout import LOG_NUMBERS
@@ -39,18 +39,18 @@ LOG = np.dtype(
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """The results of many runs, one row a run, in the order of the parameters.
+    """The results of many runs, one row per run, in the order of the parameters.
 
     Attributes
     ----------
     parameters : mapping of str to ndarray, shape (runs,) or (runs, n)
-        What was varied.
+        The parameters that were varied.
     outcome : ndarray of str, shape (runs,)
         ``"ok"``, or the name of the error that ended the run.
     message : ndarray of str, shape (runs,)
-        The error's text, else empty.
+        The error's text, or empty.
     t, x, v, F : ndarray, shape (runs,)
-        The end of each run: s, m, m/s, N. NaN for a run that could not start.
+        The final values: s, m, m/s, N. NaN for a run that could not start.
     z : ndarray, shape (runs, n), m
         Deflections at the end.
     states : ndarray of str, shape (runs, n)
@@ -61,7 +61,7 @@ class Sweep:
     edges : tuple of str
         Names of the chart's edges.
     times : ndarray, shape (rows,)
-        With ``output="t_eval"`` the times of the rows, else empty.
+        With ``output="t_eval"`` the times of the rows, otherwise empty.
     rows : mapping of str to ndarray
         With ``output="t_eval"``: ``x, v, F`` of shape (runs, rows), ``z`` of shape (runs, rows, n).
     """
@@ -96,12 +96,12 @@ class Sweep:
         return np.bincount(self.transitions["run"], minlength=len(self))
 
     def sequence(self, run: int) -> list[tuple[int, str]]:
-        """Return which element took which edge in a run, in order.
+        """Return the firings of a run in order, as element and edge.
 
         Parameters
         ----------
         run : int
-            From 0.
+            Counted from 0.
 
         Returns
         -------
@@ -117,8 +117,8 @@ class Sweep:
         Returns
         -------
         dict of str to ndarray, shape (runs,)
-            Parameters, outcome, end of the run; columns of elements are numbered from 1. A
-            parameter with the name of a result is called ``parameter_<name>``.
+            Parameters, outcome, end of the run; columns for elements are numbered from 1. A
+            parameter with the same name as a result is called ``parameter_<name>``.
 
         Examples
         --------
@@ -139,7 +139,7 @@ class Sweep:
         results |= _numbered("z", self.z) | _numbered("state", self.states)
         results |= {"transitions": self.transition_count}
         parameters = {
-            _apart(column, results): numbers
+            _distinct(column, results): numbers
             for name, values in self.parameters.items()
             for column, numbers in _numbered(name, values).items()
         }
@@ -151,7 +151,7 @@ class Sweep:
         Returns
         -------
         DataFrame
-            What `columns` gives.
+            The same data as `columns`.
         """
         pandas = require("pandas", "pandas")
         return pandas.DataFrame(self.columns(), index=pandas.RangeIndex(len(self), name="run"))
@@ -179,7 +179,7 @@ class Sweep:
             coordinates["time"] = self.times
         taken = {*data, *coordinates}
         parameters = {
-            _apart(name, taken): (("run", "element")[: values.ndim], values)
+            _distinct(name, taken): (("run", "element")[: values.ndim], values)
             for name, values in self.parameters.items()
         }
         dataset = xarray.Dataset(parameters | data, coordinates)
@@ -189,14 +189,14 @@ class Sweep:
         return dataset
 
     def save(self, path: str | Path) -> Path:
-        """Write the sweep to ``.npz`` (everything) or ``.parquet`` (one row a run).
+        """Write the sweep to ``.npz`` (everything) or ``.parquet`` (one row per run).
 
-        With Parquet the transitions lie beside it in ``<name>.transitions.parquet``.
+        With Parquet, the transitions go next to it into ``<name>.transitions.parquet``.
 
         Parameters
         ----------
         path : str or Path
-            Where to.
+            The destination.
 
         Returns
         -------
@@ -206,7 +206,7 @@ class Sweep:
         Raises
         ------
         OutputError
-            If the folder cannot be written or the ending is another.
+            If the folder cannot be written or the suffix is not supported.
         """
         path = checked_path("path", path)
         if path.suffix == ".npz":
@@ -218,7 +218,7 @@ class Sweep:
             arrays |= {name: getattr(self, name) for name in _SAVED}
             arrays |= {"transitions": np.asarray(self.transitions), "elements": self.z.shape[1]}
             arrays["edges"] = np.array(self.edges, dtype=np.str_)
-            return written_whole(path, lambda file: np.savez_compressed(file, **arrays))
+            return write_whole(path, lambda file: np.savez_compressed(file, **arrays))
         if path.suffix == ".parquet":
             pandas = require("pandas", "sweep")
             require("pyarrow", "sweep")
@@ -227,8 +227,8 @@ class Sweep:
                 | {"edge": np.array(self.edges, dtype=object)[self.transitions["edge"]]}
             )
             beside = path.with_name(f"{path.stem}.transitions.parquet")
-            written_whole(beside, log.to_parquet)
-            return written_whole(path, self.to_dataframe().to_parquet)
+            write_whole(beside, log.to_parquet)
+            return write_whole(path, self.to_dataframe().to_parquet)
         raise OutputError(
             f"a sweep is saved as .npz or .parquet, not {path.suffix!r}", place=str(path)
         )
@@ -255,14 +255,14 @@ class Sweep:
         """
         path = checked_path("path", path)
         try:
-            # Opened here: np.load leaves a damaged file open.
+            # Opened here because np.load does not close a damaged file.
             with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
                 return _read(file)
         except FileNotFoundError:
             raise TraceFileError(
                 "there is no such file", place=str(path), advice="check its name and the folder"
             ) from None
-        except Exception as error:  # numpy and zipfile raise many kinds over damaged files
+        except Exception as error:  # numpy and zipfile raise many kinds for damaged files
             raise TraceFileError(
                 f"not a sweep, or damaged ({why(error)})", place=str(path), advice="run it again"
             ) from None
@@ -275,7 +275,7 @@ LONGEST = 1000  # characters of a text
 
 
 def _read(file: Any) -> Sweep:
-    """Read an open archive: no array larger than that of a sweep of so many runs, all checked."""
+    """Read an open archive, checking every array against the size of a sweep of so many runs."""
     stamp = str(member(file, "format"))
     if stamp != _FORMAT:
         program = cut(str(member(file, "program")))
@@ -303,12 +303,12 @@ def _read(file: Any) -> Sweep:
             raise ValueError(f"{name} is {array.dtype} {array.shape}; a sweep has {kind} {shape}")
     log = member(file, "transitions")
     if log.ndim != 1 or log.dtype != LOG:
-        raise ValueError("the transition log has other columns than a sweep has")
+        raise ValueError("the columns of the transition log are not those of a sweep")
     for name, count in (("run", runs), ("element", n), ("edge", len(edges))):
         if log.size and not 0 <= log[name].min() <= log[name].max() < count:
             raise ValueError(f"the transition log: {name} must be within 0 to {count - 1}")
     if not (own and runs and n and (np.diff(log["run"]) >= 0).all()):
-        raise ValueError("no run, no parameter, or runs not in order")
+        raise ValueError("no runs, no parameters, or runs not in order")
     groups = {
         group: {name.removeprefix(group): found[name] for name in found if name.startswith(group)}
         for group in ("parameter_", "rows_")
@@ -329,6 +329,6 @@ def _numbered(name: str, values: NDArray[Any]) -> dict[str, Any]:
     return {column_name(name, i): values[:, i] for i in range(values.shape[1])}
 
 
-def _apart(name: str, taken: Collection[str]) -> str:
-    """Return a parameter's column name that is not one of the results'."""
+def _distinct(name: str, taken: Collection[str]) -> str:
+    """Return a column name for a parameter that differs from those of the results."""
     return f"parameter_{name}" if name in taken else name

@@ -1,8 +1,8 @@
-"""The elements as `transitions` machines, and the generated if-else in their place.
+"""The elements as `transitions` machines, and the generated if-else code as an alternative.
 
-One `transitions.Machine` serves n element objects. The driver asks a table read from that machine
-(its transitions and the guards that are their conditions) and fires through it, so that callbacks
-registered by a user (``on_enter_slip``, ``after`` ...) run, once a firing.
+One `transitions.Machine` serves n element objects. The engine evaluates a table read from that
+machine (its transitions and the guards that are their conditions) and fires through the machine, so
+that callbacks registered by a user (``on_enter_slip``, ``after`` ...) run once per firing.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from gms_fsm.lowering.program import Arguments, Program
 from gms_fsm.systems.models import Model
 from gms_fsm.traces.scope import GuardValues, parameter_values
 
-__all__ = ["Element", "ElementMachines", "Engine", "IfElse", "Meddling"]
+__all__ = ["Element", "ElementMachines", "Engine", "IfElse", "Interference"]
 
 
 class Element:
     """One Maxwell element: the model object of its machine.
 
-    Callbacks find here what they need: ``t`` [s], ``x`` [m], ``v`` [m/s], the threshold ``s``, each
-    variable (``z`` [m]) and each parameter (``k``, ``sigma``, ``C``, ``v_c``) of the chart, the
-    current ``state`` and the element's ``index`` counted from 0. Parameters are read-only: the run
-    is integrated with those of the model. Derive from it to give elements methods that
-    `transitions` calls by name, such as ``on_enter_slip(self, event)``.
+    Callbacks can read: ``t`` [s], ``x`` [m], ``v`` [m/s], the threshold ``s``, each variable
+    (``z`` [m]) and each parameter (``k``, ``sigma``, ``C``, ``v_c``) of the chart, the current
+    ``state`` and the element's ``index`` counted from 0. Parameters are read-only: the run is
+    integrated with those of the model. Derive from it to give elements methods that `transitions`
+    calls by name, for example ``on_enter_slip(self, event)``.
     """
 
-    # No __slots__ and no generated __eq__: transitions fails on the first and registers equal
-    # models only once.
+    # No __slots__ and no generated __eq__: transitions fails with the former, and registers models
+    # that compare equal only once.
     state: str
     index: int
     t: float
@@ -57,7 +57,7 @@ class Element:
 
 
 class Guard:
-    """A guard as a condition of `transitions`: callable on its event, or asked directly."""
+    """A guard as a condition of `transitions`: called with an event, or evaluated directly."""
 
     def __init__(self, edge: str, condition: Condition) -> None:
         names = {name: f"element.{name}" for name in names_in(condition)}
@@ -80,15 +80,15 @@ class ElementMachines:
     Parameters
     ----------
     model : Model
-        What the elements are.
+        The model whose elements are created.
     element : type, optional
-        Class of the element objects, `Element` or derived from it.
+        Class of the element objects: `Element` or a class derived from it.
 
     Attributes
     ----------
     machine : transitions.Machine
-        Add callbacks here: ``machines.machine.on_enter_slip(callback)``. With
-        ``send_event=True`` a callback gets the event; ``event.model`` is the `Element`.
+        Register callbacks here: ``machines.machine.on_enter_slip(callback)``. With
+        ``send_event=True`` a callback receives the event; ``event.model`` is the `Element`.
     elements : list of Element
         The model objects, one per element.
 
@@ -133,12 +133,12 @@ class ElementMachines:
         )
 
     def table(self, chart: Chart) -> list[list[tuple[int, Guard]]]:
-        """Read the machine: for each state its edges and guards, highest priority first.
+        """Read the edges and guards of each state from the machine, highest priority first.
 
         Parameters
         ----------
         chart : Chart
-            The chart the machine was made from.
+            The chart from which the machine was made.
 
         Returns
         -------
@@ -160,26 +160,25 @@ class ElementMachines:
                     if conditions != [self.guards[edge.name]] or transition.dest != edge.target:
                         raise ChartError(
                             f"the machine was given conditions {conditions} or the target "
-                            f"{transition.dest!r}, which chart {chart.name!r} does not know",
+                            f"{transition.dest!r}, which are not in chart {chart.name!r}",
                             place=f"edge {edge.name!r}",
-                            advice="write them in the chart's guard, it is the only truth",
+                            advice="write them in the chart's guard, the only source of switching",
                         )
                     rows.append((index, self.guards[edge.name]))
             found = [index for index, _ in rows]
             for index, edge in chart.leaving(state.name):
                 if found.count(index) != 1:
                     raise ChartError(
-                        f"the machine has the edge {edge.name!r} {found.count(index)} times, "
+                        f"the machine has the edge {edge.name!r} {found.count(index)} times, but "
                         f"chart {chart.name!r} has it once",
-                        advice="change the chart, it is the only truth",
+                        advice="change the chart, the only source of switching",
                     )
             table.append(rows)
         known = {edge.name for edge in chart.transitions}
         for trigger in self.machine.get_triggers(*self.machine.states):
             if trigger not in known:
                 raise ChartError(
-                    f"the machine has a trigger {trigger!r} that chart {chart.name!r} does "
-                    "not know",
+                    f"the machine has a trigger {trigger!r} that is not in chart {chart.name!r}",
                     advice="add a Transition to the chart",
                 )
         return table
@@ -190,12 +189,12 @@ def _new_element(kind: type[Element], model: Model, index: int) -> Element:
         raise ParameterError("it must be a class derived from Element", place="element", value=kind)
     if kind.__eq__ is not object.__eq__:
         raise ParameterError(
-            f"{kind.__name__} compares by value, so that transitions would take all "
-            "elements for one",
+            f"{kind.__name__} compares by value, so transitions would treat all elements as "
+            "the same",
             advice="use @dataclass(eq=False)",
         )
     element = kind()
-    values = vars(element)  # past __setattr__, as an __init__ may have set these names
+    values = vars(element)  # bypasses __setattr__, as an __init__ may have set these names
     values["index"] = index
     values |= parameter_values(model, index)
     values["_fixed"] = frozenset(model.values) | {"index"}
@@ -204,7 +203,7 @@ def _new_element(kind: type[Element], model: Model, index: int) -> Element:
 
 # --------------------------------------------------------------------------- engines
 class Engine(Protocol):
-    """Who decides; satisfies `integrators.Switch`."""
+    """The part of a run that evaluates the guards; satisfies `integrators.Switch`."""
 
     def ask(
         self, t: float, y: list[float], mode: list[int], p: Arguments, edges: list[int]
@@ -217,8 +216,8 @@ class Engine(Protocol):
         """Take an edge."""
 
 
-class Meddling(Exception):
-    """A callback changed what it may only look at; whoever holds the run says it to the user."""
+class Interference(Exception):
+    """A callback changed something it may only read; the run turns this into a user's error."""
 
     def __init__(self, reason: str, place: str, t: float) -> None:
         super().__init__(reason)
@@ -227,7 +226,7 @@ class Meddling(Exception):
 
 
 class MachineEngine:
-    """Asks and fires the `transitions` machines."""
+    """Evaluates and fires the `transitions` machines."""
 
     def __init__(self, machines: ElementMachines, program: Program, mode: list[int]) -> None:
         self.machines, self.program = machines, program
@@ -235,15 +234,15 @@ class MachineEngine:
         self.table = machines.table(self.chart)
         self.seen, self.live = [0.0] * program.layout.observed.size, program.live
         self.values = GuardValues(program.layout)
-        # Past __setattr__ of the elements, which would cost time.
+        # Bypasses __setattr__ of the elements, which would cost time.
         self.seen_by = [vars(element) for element in machines.elements]
         self.states = [""] * len(mode)
         self.set_states(mode)
 
-    def go_on_from(self, t: float, y: list[float], mode: Sequence[int]) -> None:
+    def restore(self, t: float, y: list[float], mode: Sequence[int]) -> None:
         """Put every element where it was when a run was interrupted."""
         self.set_states(mode)
-        self.show(t, y, list(mode))  # perhaps between two firings of a set
+        self.show(t, y, list(mode))  # possibly between two firings of a set
 
     def set_states(self, mode: Sequence[int]) -> None:
         """Put every element into a state, without callbacks."""
@@ -256,7 +255,7 @@ class MachineEngine:
         self.states[machine] = state
 
     def show(self, t: float, y: list[float], mode: list[int]) -> None:
-        """Put the present values at hand of every element."""
+        """Show the present values to every element."""
         program = self.program
         program.ieee["observe"](t, y, mode, self.live, program.p, self.seen)
         self.values.put(t, y, self.seen, self.seen_by)
@@ -265,7 +264,7 @@ class MachineEngine:
         self, t: float, y: list[float], mode: list[int], p: Arguments, edges: list[int]
     ) -> None:
         """Fill the first enabled edge of each element, or -1."""
-        del p  # the program has the same
+        del p  # the program has the same values
         self.show(t, y, mode)
         for i, element in enumerate(self.machines.elements):
             edges[i] = -1
@@ -282,25 +281,25 @@ class MachineEngine:
         self.program.ieee["act"](edge, machine, t, y, mode, p)
 
     def trigger(self, edge: int, machine: int, t: float) -> None:
-        """Fire the machine's edge on the values it was asked with.
+        """Fire the machine's edge with the values for which its guard was evaluated.
 
         Raises
         ------
-        Meddling
+        Interference
             If a callback changed these values, or a state.
         """
         row, elements = self.chart.transitions[edge], self.machines.elements
         place = f"element {machine + 1}, edge {row.name!r}"
-        # The trigger evaluates the guard once more; assignments come after, as in Stateflow, where
-        # the whole set was chosen before any of them.
+        # The trigger evaluates the guard once more; assignments follow, as in Stateflow, where the
+        # whole set is selected before any of them.
         try:
             fired = getattr(elements[machine], row.name)()
         except MachineError as error:
-            raise Meddling(
-                f"a callback moved a state ({error.value}); {ONLY_LOOK}", place, t
+            raise Interference(
+                f"a callback changed a state ({error.value}); {ONLY_LOOK}", place, t
             ) from error
         if not fired:
-            raise Meddling(
+            raise Interference(
                 "the edge was enabled, but a callback changed the element's values before "
                 f"it fired; {ONLY_LOOK}",
                 place,
@@ -309,7 +308,7 @@ class MachineEngine:
         self.states[machine] = row.target
         for i, (element, state) in enumerate(zip(elements, self.states, strict=True)):
             if element.state != state:
-                raise Meddling(
+                raise Interference(
                     f"a callback put element {i + 1} into state {shown(element.state)}, "
                     f"but the chart has it in {state!r}; {ONLY_LOOK}",
                     place,
@@ -317,11 +316,11 @@ class MachineEngine:
                 )
 
 
-ONLY_LOOK = "callbacks may only look"
+ONLY_LOOK = "callbacks may only read"
 
 
 class IfElse:
-    """Asks the generated if-else text, the paper's Fig. 2c."""
+    """Evaluates the generated if-else code, the paper's Fig. 2c."""
 
     def __init__(self, program: Program) -> None:
         self.ask = program.ieee["switch"]

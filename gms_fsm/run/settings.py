@@ -1,4 +1,4 @@
-"""How to integrate: one object that runs, sessions, sweeps and scenario files share."""
+"""Integration settings: one object shared by runs, sessions, sweeps and scenario files."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from gms_fsm.lowering.scales import Tolerance
 
 __all__ = ["ENGINES", "EVENTS", "MOST_STEPS", "OUTPUTS", "RunOptions", "SettingOptions", "Settings"]
 
-MOST_STEPS = 1_000_000  # of a run, unless told otherwise
+MOST_STEPS = 1_000_000  # default limit for a run
 ENGINES = ("machines", "ifelse", "compiled")
 EVENTS = ("located", "step")
 OUTPUTS = ("all", "t_eval", "end")
 
 
 class RunOptions(TypedDict, total=False):
-    """The fields of `Settings` but the engine, as arguments of `simulate`."""
+    """The fields of `Settings` except the engine, as arguments of `simulate`."""
 
     method: str | type[Any]
     step: float | None
@@ -47,46 +47,47 @@ class SettingOptions(RunOptions, total=False):
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """How to integrate, which engine decides, and what to keep.
+    """How to integrate, which engine evaluates the guards, and what to record.
 
     Parameters
     ----------
     method : {"dp45", "bs23", "rk4", "heun", "euler"} or OdeSolver class
-        dp45 and bs23 choose their steps, the others need `step`. Any `scipy.integrate.OdeSolver`
-        class (Radau, BDF, LSODA ...) for stiff cases.
+        dp45 and bs23 choose their own steps, the others need `step`. Any
+        `scipy.integrate.OdeSolver` class (Radau, BDF, LSODA ...) for stiff cases.
     step : float, optional
-        Fixed steps of this length [s], the last one cut to t_end; at a located crossing a step is
-        cut and the grid is met again after it. A SciPy class is led from grid point to grid point.
+        Length of fixed steps [s], the last one cut to t_end; at a located crossing a step is cut,
+        and the next one returns to the grid. A SciPy class goes from grid point to grid point.
     rtol : float
-        Relative tolerance of adaptive steps; the error is the largest component's.
+        Relative tolerance of adaptive steps; the error is that of the worst component.
     atol : float or mapping, optional
         Absolute tolerance of all components, or by name: ``x`` [m], ``v`` [m/s], the chart's
-        variables, a number or one per element. What is left out comes from the model's own scales
-        (`gms_fsm.lowering.scales`): a tenth of rtol times the smallest deflection at which a
+        variables, each a number or one per element. Omitted values are derived from the model's own
+        scales (`gms_fsm.lowering.scales`): a tenth of rtol times the smallest deflection at which a
         guard changes, or times v_c. A component for which the chart has no scale is measured
-        by the largest value it has had. What was used stands in ``Trace.settings``.
+        relative to its largest value so far. The values used are in ``Trace.settings``.
     max_step : float
-        Longest adaptive step, s. Accuracy does not need it.
+        Longest adaptive step, s. Not needed for accuracy.
     max_steps : int
-        How many steps may be tried; a run that needs more ends in a `StepLimitError`.
+        Maximum number of attempted steps; a run that needs more ends in a `StepLimitError`.
     events : {"located", "step"}
-        ``"located"`` finds the place of each switch. ``"step"`` looks at the guards once at the end
-        of a step, at most one edge per element, like an if-else in a block diagram: it loses
-        switches and is here to show that. It needs `step` or a finite `max_step`.
+        ``"located"`` finds the exact point of each switch. ``"step"`` evaluates the guards once at
+        the end of a step, at most one edge per element, like an if-else in a block diagram: it
+        misses switches and is here to demonstrate that. It needs `step` or a finite `max_step`.
     engine : {"machines", "ifelse", "compiled"}
-        Who decides: the `transitions` machines, the generated if-else text, or that text as machine
-        code (extra ``fast``). The results are the same to the last bit.
+        What evaluates the guards: the `transitions` machines, the generated if-else text, or that
+        text as machine code (extra ``fast``). The results are the same to the last bit.
     output : {"all", "t_eval", "end"}, optional
-        Rows to keep: every accepted step, the times of `t_eval`, or only the state at the end. The
-        transition log is always complete. By default ``"t_eval"`` if it is given, else ``"all"``.
+        Rows to record: every accepted step, the times in `t_eval`, or only the state at the end.
+        The transition log is always complete. Defaults to ``"t_eval"`` if that is given, else
+        ``"all"``.
     t_eval : array_like, shape (m,), optional
-        Wanted times [s], increasing; the trace has exactly these rows. All accepted steps and
-        micro-steps otherwise.
+        Requested times [s], increasing; the trace then has exactly these rows. Otherwise it has all
+        accepted steps and micro-steps.
 
     Raises
     ------
     ParameterError
-        If a field breaks its rule, or two contradict each other.
+        If a field violates its rule, or two contradict each other.
 
     Examples
     --------
@@ -119,14 +120,14 @@ class Settings:
         if self.max_step != math.inf:
             put(self, "max_step", checked_scalar("max_step", self.max_step, "> 0"))
         if isinstance(self.atol, Mapping):
-            put(self, "atol", dict(self.atol))  # what a tolerance belongs to, the model says
+            put(self, "atol", dict(self.atol))  # the names are checked against the model later
         elif self.atol is not None:
             put(self, "atol", checked_scalar("atol", self.atol, "> 0"))
         _check_count(self.max_steps)
         _check_choice("events", self.events, EVENTS)
         if self.events == "step" and self.step is None and not math.isfinite(self.max_step):
             raise ParameterError(
-                "events='step' looks at the guards once a step: give step=... or a finite max_step"
+                "events='step' checks the guards once per step: give step=... or a finite max_step"
             )
         if self.t_eval is not None:
             put(self, "t_eval", _increasing(self.t_eval))
@@ -162,7 +163,7 @@ class Settings:
             )
         elif self.engine == "compiled":
             raise ParameterError(
-                f"engine 'compiled' runs our own methods ({', '.join(integrators.METHODS)}), "
+                f"engine 'compiled' runs the built-in methods ({', '.join(integrators.METHODS)}), "
                 f"not {method.__name__}",
                 advice="use engine='machines' for SciPy's solvers",
             )
@@ -175,8 +176,8 @@ class Settings:
             raise ParameterError(
                 "output='t_eval' needs t_eval=..., the times of the rows"
                 if self.t_eval is None
-                else f"output is {self.output!r}, but t_eval asks for rows at given times; leave "
-                "one out"
+                else f"output is {self.output!r}, but t_eval requests rows at given times; leave "
+                "one of them out"
             )
         return self.output
 
@@ -189,21 +190,21 @@ class Settings:
         Parameters
         ----------
         settings : Settings or None
-            What to begin with; the defaults if None.
+            The settings to start from; the defaults if None.
         whose : str
-            Who was given the options, for messages.
+            The function that was given the options, for messages.
         **options
             Fields by name.
 
         Returns
         -------
         Settings
-            Checked anew.
+            Checked again.
 
         Raises
         ------
         ParameterError
-            If there is no such field, or one breaks its rule.
+            If there is no such field, or one violates its rule.
 
         Examples
         --------
@@ -234,7 +235,7 @@ class Settings:
 
     @property
     def method_name(self) -> str:
-        """The method's name, also of a class."""
+        """The method's name, also for a class."""
         return self.method if isinstance(self.method, str) else self.method.__name__
 
 

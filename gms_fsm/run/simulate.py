@@ -1,4 +1,4 @@
-"""simulate(): a model on a rig, run by its state machines."""
+"""simulate(): run a model on a rig by its state machines."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import integrators
 from gms_fsm._arguments import checked_kind, checked_path
 from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.lowering.program import equations
-from gms_fsm.run._checkpoint import Keeper
+from gms_fsm.run._checkpoint import Checkpointer
 from gms_fsm.run._compiled_run import CompiledRun
 from gms_fsm.run._recording import (
     PATIENCE,
@@ -19,9 +19,9 @@ from gms_fsm.run._recording import (
     check_end,
     check_pace,
     explained,
-    meddled,
+    interference_error,
 )
-from gms_fsm.run.machines import ElementMachines, IfElse, MachineEngine, Meddling
+from gms_fsm.run.machines import ElementMachines, IfElse, Interference, MachineEngine
 from gms_fsm.run.settings import RunOptions, SettingOptions, Settings
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
@@ -54,64 +54,64 @@ def simulate(
 ) -> Trace:
     """Run a friction model on a rig.
 
-    The driver asks the machines, freezes their states, integrates until a watched comparison
-    changes its truth, and asks again.
+    The driver evaluates the guards, freezes the states, integrates until a watched comparison
+    changes its truth value, and evaluates the guards again.
 
     Parameters
     ----------
     model : GMS, LuGre or ChartModel
-        What rubs.
+        Friction model to simulate.
     rig : Prescribed, Slider or PulledSlider
-        What it is mounted on.
+        The rig it is mounted on.
     t_end, t_start : float
         s.
     initial : mapping, optional
-        Any of the chart's variables by name, such as ``z`` (n,) [m], ``states`` (n,) names, ``v``
-        [m/s] (not with a prescribed velocity) and ``x`` [m].
+        Any of the chart's variables by name, for example ``z`` (n,) [m], ``states`` (n,) names,
+        ``v`` [m/s] (not with a prescribed velocity) and ``x`` [m].
     settings : Settings, optional
-        How to integrate and what to keep; the defaults when left out.
+        How to integrate and what to record; the defaults if omitted.
     engine : {"machines", "ifelse", "compiled"} or ElementMachines, optional
-        Field of `Settings`. Machines of your own, with callbacks, may stand here instead of
+        Field of `Settings`. Your own machines, with callbacks, may be given instead of
         ``"machines"``.
     machines : ElementMachines, optional
-        Machines of your own; with the compiled engine each firing is replayed through them, so that
-        callbacks run and their states are right at the end.
+        Your own machines; with the compiled engine each firing is replayed through them, so that
+        callbacks run and their states are correct at the end.
     progress : callable, optional
-        Called now and then with the `Moment` reached.
+        Called at intervals with the `Moment` reached.
     checkpoint : str or Path, optional
-        A file for the state of a long run, written now and then. If it is there when the run
-        starts, the run goes on from it, bit for bit as if it had not been interrupted; at the end
-        the file is removed. A signal may be a Python function over plain values: another function
-        is refused.
+        A file for the state of a long run, written at intervals. If it exists when the run starts,
+        the run continues from it, bit for bit as if it had not been interrupted; at the end the
+        file is removed. A signal may be a Python function over plain values: a changed function is
+        refused.
     checkpoint_every : float
-        s of the computer's time between two checkpoints.
+        Wall-clock time in s between two checkpoints.
     monitors : str or iterable of str or Monitor
-        What to watch the run for: ``"chattering"``, ``"passivity"``, ``"coverage"``, ``"all"``
-        of these, invariants such as ``"abs(z) <= 2*s"``, or objects of `gms_fsm.traces.monitors`.
-        What they say is in ``Trace.monitors``. They look at the rows and the log when the run has
-        ended, or has failed.
+        Checks of the run: ``"chattering"``, ``"passivity"``, ``"coverage"``, ``"all"`` of these,
+        invariants such as ``"abs(z) <= 2*s"``, or objects from `gms_fsm.traces.monitors`. Their
+        verdicts are in ``Trace.monitors``. They examine the rows and the log after the run has
+        ended or failed.
     **options
-        Fields of `Settings` by name, in place of those of `settings`: ``method``, ``step``,
+        Fields of `Settings` by name, which override those of `settings`: ``method``, ``step``,
         ``rtol``, ``atol``, ``max_step``, ``max_steps``, ``events``, ``output``, ``t_eval``.
 
     Returns
     -------
     Trace
-        Rows, transition log and what they were made from.
+        Rows, transition log, and the model, rig and settings that produced them.
 
     Raises
     ------
     ParameterError, SignalError
-        If an argument breaks its rule.
+        If an argument violates its rule.
     CheckpointError
         If the checkpoint belongs to another run or another program, or is damaged.
     OutputError
-        If there is to be a checkpoint and the rig is of a class of your own.
+        If a checkpoint is requested and the rig is of a user-defined class.
     SimulationError
-        If the run cannot go on (`LivelockError`, `StepSizeError`, `StepLimitError`,
-        `NotFiniteError`, `SignalEndError`, `CallbackError`); its ``trace`` holds the part before.
+        If the run cannot continue (`LivelockError`, `StepSizeError`, `StepLimitError`,
+        `NotFiniteError`, `SignalEndError`, `CallbackError`); its ``trace`` has the part before.
     KeyboardInterrupt
-        On Ctrl-C; its ``trace`` holds the part before, perhaps without a row.
+        On Ctrl-C; its ``trace`` has the part before, possibly without any rows.
 
     Examples
     --------
@@ -124,7 +124,7 @@ def simulate(
     if isinstance(engine, ElementMachines):
         if machines is not None:
             raise ParameterError(
-                "engine and machines are both machines of yours", advice="give one of them"
+                "engine and machines are both machines", advice="give only one of them"
             )
         machines, engine = engine, "machines"
     given: SettingOptions = {**options} if engine is None else {**options, "engine": engine}  # type: ignore[typeddict-item]
@@ -137,15 +137,15 @@ def simulate(
     if machines is not None:
         checked_kind("machines", machines, ElementMachines, "an ElementMachines, or left out")
         if machines.model is not model:
-            raise ParameterError("machines: these ElementMachines were made for another model")
+            raise ParameterError("machines: these ElementMachines were made for a different model")
         if chosen.engine == "ifelse":
             raise ParameterError(
-                "engine 'ifelse' asks no machines", advice="leave machines=... out"
+                "engine 'ifelse' uses no machines", advice="leave machines=... out"
             )
     start = Start.of(model, rig, t_end, chosen, t_start=t_start, initial=initial)
     watching = checked(monitors, model, start.output).values() if monitors else ()
     run = CompiledRun(start, machines) if chosen.engine == "compiled" else Run(start, machines)
-    keeper = None if path is None else Keeper(run, path, checkpoint_every)
+    keeper = None if path is None else Checkpointer(run, path, checkpoint_every)
     try:
         while run.advance():
             if keeper is not None:
@@ -166,14 +166,14 @@ def simulate(
 
 
 class Run:
-    """A simulation under way: what `simulate` drives to its end and a session step by step.
+    """A simulation in progress, which `simulate` drives to its end and a session step by step.
 
     Parameters
     ----------
     start : Start
-        What to run; for the engine ``"compiled"`` the machines run it, with the same result.
+        The run to perform; for the engine ``"compiled"``, machines run it, with the same result.
     machines : ElementMachines, optional
-        Machines of the user's own.
+        The user's own machines.
 
     Examples
     --------
@@ -198,29 +198,29 @@ class Run:
         self.events = hybrid.events(made, switch, self.buffers, options)
 
     def kept(self) -> dict[str, Any]:
-        """Return what the recorder holds, for a checkpoint."""
+        """Return the recorder's contents for a checkpoint."""
         return self.recorder.state()
 
-    def go_on_from(self, kept: dict[str, Any]) -> None:
-        """Take over what `kept` returned; the buffers are filled already."""
+    def restore(self, kept: dict[str, Any]) -> None:
+        """Restore what `kept` returned; the buffers are already filled."""
         now = self.buffers.now
         t, y = now.clock[T], list(now.y)
-        self.recorder.put_back(kept, (t, y, hybrid.modes_of(self.buffers)))
+        self.recorder.restore(kept, (t, y, hybrid.modes_of(self.buffers)))
         if self.engine is not None:
-            self.engine.go_on_from(t, list(y), now.mode)
+            self.engine.restore(t, list(y), now.mode)
 
     def advance(self) -> bool:
-        """Let the next thing happen.
+        """Advance to the next event.
 
         Returns
         -------
         bool
-            False when the run has reached its end.
+            False if the run has reached its end.
 
         Raises
         ------
         SimulationError
-            If it cannot go on.
+            If it cannot continue.
         """
         recorder = self.recorder
         try:
@@ -232,12 +232,12 @@ class Run:
             raise SimulationError(
                 error.reason, recorder.trace(), place=error.place, advice=error.advice
             ) from None
-        except KeyboardInterrupt:  # within a step; the rows before may have taken an hour
+        except KeyboardInterrupt:  # within a step; the previous rows may have taken an hour
             if self.buffers.out.cursor[ROW]:
                 recorder.take(hybrid.take_rows(self.buffers))
             raise
-        except Meddling as error:
-            raise meddled(error, recorder) from error.__cause__
+        except Interference as error:
+            raise interference_error(error, recorder) from error.__cause__
         if event is None:
             check_end(recorder)
             return False

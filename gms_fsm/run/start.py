@@ -1,4 +1,4 @@
-"""What a simulation is started with, checked."""
+"""The arguments of a simulation, checked and completed."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class Start:
     Parameters
     ----------
     model, rig
-        What runs.
+        The model and the rig.
     program : Program
-        Its generated text.
+        Their generated text.
     t_start, t_end, last : float
         s; `last` is earlier than t_end where a sampled signal ends.
     y : list of float, shape (m,)
@@ -46,9 +46,9 @@ class Start:
     options : integrators.Options
         How to integrate.
     settings : mapping
-        As they are kept in the trace.
+        As recorded in the trace.
     chosen : Settings
-        As they were given.
+        As given.
     """
 
     model: Model
@@ -65,8 +65,8 @@ class Start:
 
     @property
     def output(self) -> str:
-        """What to keep: ``"all"``, ``"t_eval"`` or ``"end"``."""
-        assert self.chosen.output is not None  # Settings fills it in
+        """What to record: ``"all"``, ``"t_eval"`` or ``"end"``."""
+        assert self.chosen.output is not None  # set by Settings
         return self.chosen.output
 
     @classmethod
@@ -88,19 +88,19 @@ class Start:
         model, rig, t_end, t_start, initial
             See `gms_fsm.simulate`.
         settings : Settings, optional
-            How to integrate; the defaults when left out.
+            How to integrate; the defaults if omitted.
         rows_at_once : int
-            How many steps an arc holds at most.
+            Maximum number of steps in an arc.
 
         Returns
         -------
         Start
-            Complete.
+            Ready to run.
 
         Raises
         ------
         ParameterError, SignalError
-            If an argument breaks its rule.
+            If an argument violates its rule.
         """
         for what, given, mark, example in (
             ("model", model, "chart", "GMS(parameters, law='signed')"),
@@ -119,7 +119,7 @@ class Start:
         if not isinstance(method, str) and min(tolerances) == 0.0:
             raise ParameterError(
                 f"method {method.__name__} needs an absolute tolerance, and the chart "
-                "gives no scale for every component",
+                "gives no scale for some component",
                 advice="give one, for example atol=1e-9, or by name atol={'x': 1e-9}",
             )
         options = Options(
@@ -135,7 +135,7 @@ class Start:
             rows_at_once,
         )
         last = _covered(rig, t_start, t_end)
-        program = _watchful(lower(model, rig), rig, t_start, last)
+        program = _with_waking_times(lower(model, rig), rig, t_start, last)
         y, mode = _initial(model, rig, {} if initial is None else initial)
         kept: dict[str, Setting] = {
             "method": chosen.method_name,
@@ -152,12 +152,12 @@ class Start:
         return cls(model, rig, program, t_start, t_end, last, y, mode, options, kept, chosen)
 
     def with_numbers(self, model: Model, rig: Rig) -> Start:
-        """Return the same start with other numbers; signals and initial values stay.
+        """Return the same start with different numbers; signals and initial values stay.
 
         Parameters
         ----------
         model, rig
-            Of the same kind as those before.
+            Of the same kind as the previous ones.
 
         Returns
         -------
@@ -183,7 +183,7 @@ def _times(t_start: float, t_end: float) -> tuple[float, float]:
     for name, time in (("t_start", t_start), ("t_end", t_end)):
         if abs(time) > LATEST:
             raise ParameterError(
-                f"{name} is {time!r} s", advice=f"beyond {LATEST:g} s the clock is too coarse"
+                f"{name} is {time!r} s", advice=f"beyond {LATEST:g} s time is resolved too coarsely"
             )
     if t_end <= t_start:
         raise ParameterError(
@@ -193,18 +193,18 @@ def _times(t_start: float, t_end: float) -> tuple[float, float]:
 
 
 def _check_resolution(chosen: Settings, t_start: float, t_end: float) -> None:
-    """Refuse steps that the clock cannot make at these times."""
+    """Refuse steps too short to be resolved at these times."""
     tick = 16.0 * math.ulp(max(abs(t_start), abs(t_end)))
     for name, length in (("step", chosen.step), ("max_step", chosen.max_step)):
         if length is not None and length <= tick:
             raise ParameterError(
-                f"{name} is {length!r} s, under the resolution of the clock ({tick:.2g} s here)",
-                advice="give a longer one",
+                f"{name} is {length!r} s, below the resolution of the clock ({tick:.2g} s here)",
+                advice="give a larger value",
             )
 
 
 def _wanted(chosen: Settings, t_start: float, t_end: float) -> list[float] | None:
-    """Return the wanted times, if there are any; all lie within the run."""
+    """Return the requested times, if any, after checking that all lie within the run."""
     if chosen.t_eval is None:
         return None
     times = as_floats(np.asarray(chosen.t_eval))
@@ -219,7 +219,7 @@ def _wanted(chosen: Settings, t_start: float, t_end: float) -> list[float] | Non
 def _tolerances(
     model: Model, rig: Rig, atol: Tolerance, default: Mapping[str, list[float]]
 ) -> tuple[list[float], float | dict[str, float | list[float]]]:
-    """Return the absolute tolerance of each component, and what to say of them."""
+    """Return the absolute tolerance of each component, and how to record them in the settings."""
     places = Layout.state(model, rig)
     if atol is not None and not isinstance(atol, Mapping):
         return [atol] * places.size, atol
@@ -240,8 +240,8 @@ def _tolerances(
     return places.joined(used), used
 
 
-def _watchful(program: Program, rig: Rig, t_start: float, t_end: float) -> Program:
-    """Return the program with the places where its formulas wake up as knots."""
+def _with_waking_times(program: Program, rig: Rig, t_start: float, t_end: float) -> Program:
+    """Return the program with the times at which its formulas start to change as knots."""
     times = {
         time
         for signal in rig.signals.values()
@@ -252,7 +252,7 @@ def _watchful(program: Program, rig: Rig, t_start: float, t_end: float) -> Progr
 
 
 def _covered(rig: Rig, t_start: float, t_end: float) -> float:
-    """Return the last time all sampled signals cover."""
+    """Return the last time covered by all sampled signals."""
     last = t_end
     for name, signal in rig.signals.items():
         if isinstance(signal, Corners) and not signal.held:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Sweep", "sweep"]
 
-AT_ONCE = 64  # runs a task, at most
+AT_ONCE = 64  # maximum number of runs per task
 
 
 def sweep(
@@ -55,36 +55,36 @@ def sweep(
     Parameters
     ----------
     model, rig, t_end
-        As in `simulate`; every run starts from these.
+        As in `simulate`; every run starts with these.
     parameters : mapping of str to array_like, or DataFrame
-        By name, the first axis is the run: shape (runs,) for a number or the same number in all
+        By name; the first axis is the run: shape (runs,) for one number or the same number in all
         elements, (runs, n) for one per element. Names are the chart's parameters (``k``, ``sigma``,
         ``C``, ``v_c``), ``weights``, ``sigma_2``, ``F_c``, ``F_s``, ``v_s``, and the rig's numbers
-        (``mass``, ``stiffness``, ``speed``). In a DataFrame ``k1``, ``k2`` ... are the elements'.
+        (``mass``, ``stiffness``, ``speed``). In a DataFrame, use ``k1``, ``k2`` ... for elements.
     executor : concurrent.futures.Executor, optional
         Where to run: a process pool, or the executor of a Dask ``Client`` (extra ``cluster``).
-        Threads on this machine when left out; compiled runs do not hold the interpreter.
+        Threads on this machine if omitted; compiled runs release the interpreter lock.
     t_start, initial
         As in `simulate`.
     settings : Settings, optional
-        How to integrate and what to keep: the end of each run (also where it says ``"all"``: runs
-        have different steps), or rows at ``t_eval``. When left out, ``engine="compiled"``, which
-        needs the extra ``fast``.
+        How to integrate and what to record: the end of each run (also for ``"all"``, because runs
+        have different steps), or rows at ``t_eval``. If omitted, ``engine="compiled"``, which needs
+        the extra ``fast``.
     progress : bool, optional
-        Show a progress bar on standard error; by default where that is a terminal.
+        Show a progress bar on standard error; by default if that is a terminal.
     **options
-        Fields of `Settings` by name, in place of those of `settings`.
+        Fields of `Settings` by name, which override those of `settings`.
 
     Returns
     -------
     Sweep
-        A run that fails is a row with its error; it ends no other.
+        A run that fails gives a row with its error; the other runs continue.
 
     Raises
     ------
     ParameterError
-        If a name is unknown, or lengths differ. A value that breaks its rule is the outcome of
-        that run.
+        If a name is unknown, or lengths differ. A value that violates its rule is the outcome of
+        its run.
 
     Examples
     --------
@@ -94,16 +94,16 @@ def sweep(
     >>> result.outcome.tolist(), result.transition_count.tolist()
     (['ok', 'ok'], [4, 4])
     """
-    begin = _Begin(t_end, t_start, initial, _chosen(settings, options))
+    begin = _Common(t_end, t_start, initial, _chosen(settings, options))
     if begin.settings.engine == "compiled":
         check_numba()
-    begin.start(model, rig)  # what is wrong for all is said once, here
+    begin.start(model, rig)  # errors common to all runs are raised once, here
     values = _values(model, rig, parameters)
     runs = len(next(iter(values.values())))
     collected = _Collected(model, runs, begin.settings.t_eval)
     size = max(1, min(AT_ONCE, runs // AT_ONCE))
     chunks = [range(start, min(start + size, runs)) for start in range(0, runs, size)]
-    # Dask takes tasks with equal arguments for one, and a failure of before for its result.
+    # Dask treats tasks with equal arguments as one, and returns an earlier failure as their result.
     name = uuid.uuid4().hex
     with contextlib.ExitStack() as stack:
         if executor is None:
@@ -111,14 +111,14 @@ def sweep(
         shown = stack.enter_context(_bar(runs, progress))
         waiting: dict[Future[list[_Result]], range] = {}
         try:
-            with _undisturbed():
+            with _interrupts_deferred():
                 for chunk in chunks:
                     part = {key: array[chunk.start : chunk.stop] for key, array in values.items()}
                     try:
                         task = executor.submit(_run_chunk, model, rig, begin, part, name)
                     except Exception as error:
-                        if not isinstance(error, BrokenExecutor):  # by a task before this one
-                            error = _NotSent(f"{type(error).__name__}: {error}")
+                        if not isinstance(error, BrokenExecutor):  # broken by an earlier task
+                            error = _NotDelivered(f"{type(error).__name__}: {error}")
                         task = Future()
                         task.set_exception(error)
                     waiting[task] = chunk
@@ -126,17 +126,17 @@ def sweep(
                 chunk = waiting.pop(future)
                 collected.take(chunk, _results(future, len(chunk)))
                 shown(len(chunk))
-        finally:  # also on Ctrl-C: what has not begun is not begun
+        finally:  # also on Ctrl-C: pending tasks are not started
             for future in waiting:
                 future.cancel()
     return collected.sweep(values)
 
 
-# --------------------------------------------------------------------------- what is varied
+# --------------------------------------------------------------------------- parameters
 def _values(
     model: Model, rig: Rig, parameters: Mapping[str, ArrayLike] | pandas.DataFrame
 ) -> dict[str, FloatArray]:
-    """Check names and shapes."""
+    """Check the names and shapes of the parameters."""
     if not hasattr(parameters, "keys"):
         raise ParameterError(
             "it must give values by name, for example {'k': [1.0, 2.0]}: "
@@ -170,14 +170,14 @@ def _values(
     lengths = {name: len(array) for name, array in arrays.items()}
     if len(set(lengths.values())) > 1 or 0 in lengths.values():
         raise ParameterError(
-            "parameters must have one entry a run, at least one; these have "
+            "parameters must have one entry per run, at least one; these have "
             + ", ".join(f"{name}: {length}" for name, length in lengths.items())
         )
     return arrays
 
 
 def _elements_joined(columns: Mapping[str, Any], known: Sequence[str], n: int) -> dict[str, Any]:
-    """Join the columns k1, k2 ... of a DataFrame to an array of shape (runs, n)."""
+    """Join the columns k1, k2 ... of a DataFrame into an array of shape (runs, n)."""
     joined: dict[str, Any] = {}
     for name in known:
         parts = [column_name(name, i) for i in range(n)]
@@ -196,7 +196,7 @@ def _elements_joined(columns: Mapping[str, Any], known: Sequence[str], n: int) -
 # --------------------------------------------------------------------------- running
 @dataclass(frozen=True, eq=False)
 class _Result:
-    """One run, as it comes back from wherever it ran."""
+    """One run, as returned by a worker."""
 
     outcome: str
     message: str
@@ -206,8 +206,8 @@ class _Result:
 
 
 @dataclass(frozen=True)
-class _Begin:
-    """What all runs of a sweep share."""
+class _Common:
+    """What all runs of a sweep have in common."""
 
     t_end: float
     t_start: float
@@ -221,7 +221,7 @@ class _Begin:
 
 
 def _chosen(settings: Settings | None, options: SettingOptions) -> Settings:
-    """Return the settings of each run: a sweep keeps ends, if not rows at wanted times."""
+    """Return the settings of each run: a sweep records ends unless rows are requested."""
     if settings is not None:
         checked_kind("settings", settings, Settings, "a Settings, for example Settings(rtol=1e-8)")
     whole = settings is None or settings.output == "all"
@@ -232,7 +232,7 @@ def _chosen(settings: Settings | None, options: SettingOptions) -> Settings:
     chosen = Settings.of(settings, "a sweep", **options)
     if chosen.output == "all":
         raise ParameterError(
-            "output is 'all'", advice="a sweep keeps 'end' or 't_eval' (runs have different steps)"
+            "output is 'all'", advice="use 'end' or 't_eval', because runs have different steps"
         )
     return chosen
 
@@ -240,7 +240,7 @@ def _chosen(settings: Settings | None, options: SettingOptions) -> Settings:
 def _run_chunk(
     model: Model,
     rig: Rig,
-    begin: _Begin,
+    begin: _Common,
     part: Mapping[str, FloatArray],
     _sweep: str,
 ) -> list[_Result]:
@@ -253,8 +253,8 @@ def _run_chunk(
         outcome, message = "ok", ""
         try:
             its_model, its_rig = with_values(model, values), with_numbers(rig, values)
-            if compiled is not None:  # the same buffers and machine code, other numbers
-                compiled.begin_again(its_model, its_rig)
+            if compiled is not None:  # the same buffers and machine code, different numbers
+                compiled.reset(its_model, its_rig)
                 run = compiled
             elif begin.settings.engine == "compiled":
                 run = compiled = CompiledRun(begin.start(its_model, its_rig))
@@ -289,22 +289,22 @@ def _result(run: Run | CompiledRun | None, outcome: str, message: str) -> _Resul
     return _Result(outcome, message, end, log, rows)
 
 
-class _NotSent(Exception):
-    """A task has not come as far as a worker: something in it cannot be pickled."""
+class _NotDelivered(Exception):
+    """A task did not reach a worker: something in it cannot be pickled."""
 
 
 def _results(future: Future[list[_Result]], count: int) -> list[_Result]:
-    """Return what a task brought; one that was lost makes rows that say so."""
+    """Return the results of a task; a lost task gives rows that say so."""
     try:
         return future.result()
-    except _NotSent as error:
+    except _NotDelivered as error:
         message = (
             f"the run could not be sent to a worker ({cut(str(error))}); give signals as "
-            "expressions of t or as arrays, or use threads (executor=None)"
+            "expressions in t or as arrays, or use threads (executor=None)"
         )
         lost = _Result("NotSent", message, None, np.empty(0, dtype=LOG), None)
         return [lost] * count
-    except Exception as error:  # a broken pool, a worker out of memory, what cannot be pickled
+    except Exception as error:  # a broken pool, a worker out of memory, or an unpicklable result
         message = (
             f"the worker failed: {type(error).__name__}: {cut(str(error), LONGEST // 2)}; run "
             "these again, or use threads (executor=None)"
@@ -331,7 +331,7 @@ class _Collected:
             self.rows["z"] = np.full((*rows, model.n), np.nan)
 
     def take(self, chunk: range, results: Sequence[_Result]) -> None:
-        """Put results in their rows."""
+        """Store results in their rows."""
         for run, result in zip(chunk, results, strict=True):
             self.outcome[run], self.message[run] = result.outcome, result.message
             result.log["run"] = run
@@ -344,7 +344,7 @@ class _Collected:
                 self.rows[name][run, : len(values)] = values
 
     def sweep(self, parameters: Mapping[str, FloatArray]) -> Sweep:
-        """Return all of it."""
+        """Return the sweep with all results."""
         chart = self.model.chart
         names = np.array([*(state.name for state in chart.states), ""])
         t, x, v, F = self.ends.T
@@ -371,8 +371,8 @@ def _threads() -> ThreadPoolExecutor:
 
 
 @contextlib.contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Put Ctrl-C off: in the middle of `submit` it would leave the executor's lock locked."""
+def _interrupts_deferred() -> Iterator[None]:
+    """Defer Ctrl-C: in the middle of `submit` it would leave the executor's lock locked."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -388,7 +388,7 @@ def _undisturbed() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _bar(runs: int, progress: bool | None) -> Iterator[Callable[[int], None]]:
-    """Show how many runs are done."""
+    """Show how many runs are complete."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 

@@ -1,1 +1,1 @@
-"""What moves, what rubs, what drives: models, rigs and input signals, as data."""
+"""Friction models, rigs and input signals, as data."""

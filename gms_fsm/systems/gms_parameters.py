@@ -1,4 +1,4 @@
-"""The numbers of a bank of GMS elements, checked when built."""
+"""The parameters of a bank of GMS elements, checked at construction."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ class GMSParameters:
     stribeck : Stribeck
         The curve common to all elements.
     v_c : float
-        Velocity under which an element may arrest, m/s, > 0.
+        Velocity below which an element may arrest, m/s, > 0.
     weights : array_like, shape (n,), optional
-        Threshold weights w_i, m/N, > 0: element i slips at ``|z_i| = w_i s(v)``. Left out they are
-        1 m/N, which is the paper's reading (it compares z in m with s(v) in N).
+        Threshold weights w_i, m/N, > 0: element i slips at ``|z_i| = w_i s(v)``. If omitted, they
+        are 1 m/N, which is the paper's reading (it compares z in m with s(v) in N).
 
     Raises
     ------
@@ -104,7 +104,7 @@ class GMSParameters:
         return int(self.k.size)
 
     def with_weights(self, weights: ArrayLike) -> GMSParameters:
-        """Return the same parameters with other threshold weights.
+        """Return the same parameters with different threshold weights.
 
         Parameters
         ----------
@@ -133,7 +133,7 @@ class GMSParameters:
         Parameters
         ----------
         column : {"non-drifting", "stick-slip"}
-            Which experiment.
+            The experiment.
 
         Returns
         -------
@@ -172,7 +172,7 @@ class GMSParameters:
         sigma: ArrayLike | None = None,
         sigma_2: float = 0.0,
     ) -> GMSParameters:
-        """Return parameters in Al-Bender's form: element i carries the share alpha_i of friction.
+        """Return parameters in Al-Bender's form: element i carries a share alpha_i of the friction.
 
         ``w_i = alpha_i / k_i`` and ``C_i = alpha_i C / k_i``, so that in steady slip the forces
         ``k_i z_i`` add up to s(v).
@@ -180,7 +180,7 @@ class GMSParameters:
         Parameters
         ----------
         alpha : array_like, shape (n,)
-            Shares, > 0, sum 1.
+            Shares, > 0, that add up to 1.
         k : array_like, shape (n,)
             Stiffness, N/m, > 0.
         C : float
@@ -190,7 +190,7 @@ class GMSParameters:
         v_c : float
             m/s, > 0.
         sigma : array_like, shape (n,), optional
-            Bristle damping, Ns/m; none when left out.
+            Bristle damping, Ns/m; zero if omitted.
         sigma_2 : float
             Viscous friction, Ns/m.
 
@@ -202,7 +202,7 @@ class GMSParameters:
         Raises
         ------
         ParameterError
-            If the shares do not add up to 1, or a parameter breaks its rule.
+            If the shares do not add up to 1, or a parameter violates its rule.
 
         Examples
         --------

@@ -1,6 +1,6 @@
-"""Friction models: a chart, the numbers it needs, and what the elements share.
+"""Friction models: a chart, its parameters, and what the elements share.
 
-A model says nothing of how it is run or what it is mounted on.
+A model says nothing about how it is run or what it is mounted on.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ __all__ = [
 
 
 class Model(Protocol):
-    """What a simulation needs to know of a friction model."""
+    """The interface of a friction model to a simulation."""
 
     @property
     def title(self) -> str:
@@ -52,7 +52,7 @@ class Model(Protocol):
 
     @property
     def chart(self) -> Chart:
-        """The chart every element runs."""
+        """The chart that every element runs."""
 
     @property
     def n(self) -> int:
@@ -60,7 +60,7 @@ class Model(Protocol):
 
     @property
     def values(self) -> Mapping[str, float | FloatArray]:
-        """For each parameter of the chart one number, or one per element, shape (n,)."""
+        """For each parameter of the chart, one number or one per element, shape (n,)."""
 
     @property
     def weights(self) -> FloatArray:
@@ -68,7 +68,7 @@ class Model(Protocol):
 
     @property
     def stribeck(self) -> Stribeck | None:
-        """The common Stribeck curve; None where the chart has no input ``s``."""
+        """The common Stribeck curve; None if the chart has no input ``s``."""
 
     @property
     def sigma_2(self) -> float:
@@ -91,7 +91,7 @@ class GMS:
     Raises
     ------
     ParameterError
-        If the law is neither.
+        If the law is not one of the two.
 
     Warns
     -----
@@ -213,29 +213,29 @@ class LuGre:
 
 @dataclass(frozen=True, eq=False)
 class ChartModel:
-    """Any chart run as a bank of n elements: your own reading of the guards, your own states.
+    """Any chart run as a bank of n elements, for example with your own guards or states.
 
     Parameters
     ----------
     chart : Chart
         The element's chart.
     values : mapping
-        For each parameter of the chart a number, or an array of shape (n,).
+        For each parameter of the chart, a number or an array of shape (n,).
     n : int, optional
-        Number of elements; 1 when left out.
+        Number of elements; 1 if omitted.
     stribeck : Stribeck, optional
-        The curve behind the input ``s``; None for charts without this input.
+        The curve behind the input ``s``; None for charts without that input.
     sigma_2 : float
         Viscous friction, Ns/m, >= 0.
     weights : array_like, shape (n,), optional
-        Threshold weights, m/N; 1 when left out.
+        Threshold weights, m/N; 1 if omitted.
     title : str, optional
-        For figures; the chart's name when left out.
+        For figures; the chart's name if omitted.
 
     Raises
     ------
     ParameterError
-        If a value is missing, unknown, not finite or of the wrong length, or the chart wants an
+        If a value is missing, unknown, not finite or of the wrong length, or if the chart needs an
         input that no model supplies, or ``s`` without a curve.
 
     Examples
@@ -257,27 +257,27 @@ class ChartModel:
     def __post_init__(self) -> None:
         if not isinstance(self.chart, Chart):
             raise ParameterError(
-                "it must be a gms_fsm.Chart (the transitions machine is made from it: "
+                "it must be a gms_fsm.Chart (the transitions machine is built from it: "
                 "ElementMachines(model).machine)",
                 place="chart",
                 value=self.chart,
             )
         if isinstance(self.n, bool) or not isinstance(self.n, int) or self.n < 1:
             raise ParameterError(
-                "a bank has a whole number of elements, at least one", place="n", value=self.n
+                "the number of elements must be an integer, at least 1", place="n", value=self.n
             )
         curve: Any = self.stribeck
         if not isinstance(curve, Stribeck) and (curve is not None or "s" in self.chart.inputs):
             raise ParameterError(
                 f"stribeck is {shown(curve)}",
                 place=f"chart {self.chart.name!r}",
-                advice="for the input s give its curve, stribeck=Stribeck(F_c, F_s, v_s), and "
-                "leave it out for a chart without s",
+                advice="if the chart has the input s, give its curve, stribeck=Stribeck(F_c, F_s, "
+                "v_s); otherwise leave it out",
             )
         for name in self.chart.inputs:
             if name not in SUPPLIED:
                 raise ParameterError(
-                    f"chart {self.chart.name!r} wants the input {name!r}",
+                    f"chart {self.chart.name!r} needs the input {name!r}",
                     advice=f"a model supplies {', '.join(SUPPLIED)}",
                 )
         if not isinstance(self.values, Mapping):
@@ -304,24 +304,24 @@ class ChartModel:
 
 
 def demonstration(entry: Entry, law: str = "") -> ChartModel:
-    """Return a model of a chart that ships, with the numbers it is shown with.
+    """Return a model of a built-in chart with its demonstration numbers.
 
     Parameters
     ----------
     entry : Entry
         From `gms_fsm.charts.registry`.
     law : str
-        One of its laws; empty where it has none.
+        One of its laws; empty if it has none.
 
     Returns
     -------
     ChartModel
-        With as many elements as the numbers have.
+        With as many elements as there are numbers.
 
     Raises
     ------
     ParameterError
-        If a law is missing, or not known.
+        If a law is missing or unknown.
 
     Examples
     --------
@@ -338,18 +338,18 @@ def demonstration(entry: Entry, law: str = "") -> ChartModel:
 
 # --------------------------------------------------------------------------- varying
 def parameters_of(model: Model) -> tuple[Parameter, ...]:
-    """Return what `with_values` can vary in a model.
+    """Return the parameters that `with_values` can vary in a model.
 
     Parameters
     ----------
     model : Model
-        Any.
+        Any model.
 
     Returns
     -------
     tuple of Parameter
-        The chart's parameters and what all models share: ``sigma_2``, and where there is a Stribeck
-        curve its numbers and the weights.
+        The chart's parameters and those shared by all models: ``sigma_2`` and, if there is a
+        Stribeck curve, its parameters and the weights.
 
     Examples
     --------
@@ -357,22 +357,22 @@ def parameters_of(model: Model) -> tuple[Parameter, ...]:
     ['N/m', 'Ns/m', 'm/s', 'm/s', 'm/N', 'Ns/m', 'N', 'N', 'm/s']
     """
     every = with_shared(model.chart.parameters, curve=model.stribeck is not None)
-    fixed = isinstance(model, LuGre)  # its bristle takes the curve as it is
+    fixed = isinstance(model, LuGre)  # its bristle uses the curve unweighted
     return tuple(each for each in every if not (fixed and each == WEIGHTS))
 
 
 def parameter_names(model: Model) -> tuple[str, ...]:
-    """Return the names `with_values` takes for a model.
+    """Return the names that `with_values` accepts for a model.
 
     Parameters
     ----------
     model : Model
-        Any.
+        Any model.
 
     Returns
     -------
     tuple of str
-        Of `parameters_of`.
+        The names from `parameters_of`.
 
     Examples
     --------
@@ -383,25 +383,25 @@ def parameter_names(model: Model) -> tuple[str, ...]:
 
 
 def with_values(model: Model, values: Mapping[str, ArrayLike]) -> Model:
-    """Return a model with some of its numbers replaced.
+    """Return a model with some of its parameters replaced.
 
     Parameters
     ----------
     model : GMS, LuGre or ChartModel
-        Where the others come from.
+        The model that supplies all other parameters.
     values : mapping
-        By a name of `parameter_names`; a single number goes to all elements. Other names are
-        ignored. A chart's own parameter goes before a shared one of its name.
+        By a name from `parameter_names`; a single number applies to all elements. Other names are
+        ignored. A chart's own parameter takes precedence over a shared one of the same name.
 
     Returns
     -------
     Model
-        A new one, checked.
+        A new model, checked.
 
     Raises
     ------
     ParameterError
-        If a value breaks its rule.
+        If a value violates its rule.
 
     Examples
     --------

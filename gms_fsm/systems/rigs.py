@@ -1,6 +1,6 @@
-"""Rigs: what the friction is mounted on. A rig owns x, v and dv/dt.
+"""Rigs: the mechanical systems that the friction acts in. A rig defines x, v and dv/dt.
 
-Each rig states its equation of motion as text, like a chart states its flows.
+Each rig states its equation of motion as text, just as a chart states its flows.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ MASS = Parameter("mass", "kg", "> 0", per_element=False, meaning="mass")
 
 
 class Rig(Protocol):
-    """What a simulation needs to know of a rig."""
+    """The interface of a rig to a simulation."""
 
     @property
     def title(self) -> str:
-        """For figures and summaries."""
+        """A title for figures and summaries."""
 
     @property
     def signals(self) -> Mapping[str, Signal]:
@@ -37,17 +37,17 @@ class Rig(Protocol):
 
     @property
     def acceleration(self) -> str | None:
-        """Text of dv/dt over t, x, v, F, the signals and the numbers; None if v is prescribed."""
+        """Text of dv/dt in t, x, v, F, the signals and the numbers; None if v is prescribed."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prescribed:
-    """Open loop: the velocity is given.
+    """Open loop: the velocity is prescribed.
 
     Parameters
     ----------
     velocity : signal
-        v(t), m/s: an expression of t, ramps, a record or a callable.
+        v(t), m/s: an expression in t, ramps, a record or a callable.
 
     Examples
     --------
@@ -67,7 +67,7 @@ class Prescribed:
 
     @property
     def numbers(self) -> Mapping[str, float]:
-        """None."""
+        """No constants."""
         return {}
 
 
@@ -117,9 +117,9 @@ class PulledSlider:
     mass : float
         kg, > 0.
     stiffness : float
-        Of the pulling spring, N/m, > 0.
+        Stiffness of the spring, N/m, > 0.
     speed : float
-        Of the spring's far end, m/s.
+        Speed of the spring's far end, m/s.
 
     Examples
     --------
@@ -144,12 +144,12 @@ class PulledSlider:
 
     @property
     def signals(self) -> Mapping[str, Signal]:
-        """None."""
+        """No signals."""
         return {}
 
     @property
     def numbers(self) -> Mapping[str, float]:
-        """Mass, stiffness, speed."""
+        """The mass, stiffness and speed."""
         return {each.name: getattr(self, each.name) for each in self.parameters}
 
 
@@ -160,12 +160,12 @@ def _check(rig: Slider | PulledSlider) -> None:
 
 
 def numbers_of(rig: Rig) -> tuple[Parameter, ...]:
-    """Return what `with_numbers` can vary in a rig.
+    """Return the numbers that `with_numbers` can vary in a rig.
 
     Parameters
     ----------
     rig : Rig
-        Any; one without ``parameters`` has numbers of unknown units.
+        Any rig; without ``parameters`` its numbers have unknown units.
 
     Returns
     -------
@@ -187,19 +187,19 @@ def with_numbers(rig: Rig, values: Mapping[str, ArrayLike]) -> Rig:
     Parameters
     ----------
     rig : Rig
-        A frozen dataclass that has its numbers as fields.
+        A frozen dataclass with its numbers as fields.
     values : mapping
-        By a name of ``rig.numbers``; other names are ignored.
+        By a name from ``rig.numbers``; other names are ignored.
 
     Returns
     -------
     Rig
-        A new one, checked.
+        A new rig, checked.
 
     Raises
     ------
     ParameterError
-        If a value breaks its rule.
+        If a value violates its rule.
 
     Examples
     --------

@@ -1,8 +1,8 @@
 """Input signals: functions of time that drive a rig.
 
-A signal is given as an expression of t (``"0.2*sin(2*pi*t/20)"``), as ramps (a list of
-``(t, value)`` corners, held after the last), as sampled arrays ``(times, values)`` (straight lines
-between samples, no value outside), or as any Python callable of t.
+A signal is given as an expression in t (``"0.2*sin(2*pi*t/20)"``), as ramps (a list of
+``(t, value)`` corners, with the last value held), as sampled arrays ``(times, values)``
+(interpolated linearly, undefined outside), or as any Python callable of t.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ __all__ = ["Corners", "Formula", "Function", "Signal", "SignalLike", "as_signal"
 
 @dataclass(frozen=True)
 class Formula:
-    """An expression of t [s].
+    """An expression in t [s].
 
     Parameters
     ----------
@@ -49,21 +49,21 @@ class Formula:
 
 @dataclass(frozen=True, eq=False)
 class Corners:
-    """Straight lines between corners; two corners at one time are a jump.
+    """Straight lines between corners; two corners at the same time make a jump.
 
     Parameters
     ----------
     times : array_like, shape (m,)
-        s, not decreasing.
+        Times in s, not decreasing.
     values : array_like, shape (m,)
         In the signal's unit.
     held : bool
-        Whether the first and the last value go on for ever (ramps); a record does not.
+        Whether the first and the last value are held outside (ramps) or not (a record).
 
     Raises
     ------
     SignalError
-        If lengths differ, a number is not finite, or time goes backward; rows count from 0.
+        If the lengths differ, a number is not finite, or time goes backward; rows count from 0.
 
     Examples
     --------
@@ -83,7 +83,7 @@ class Corners:
                 raise SignalError(
                     f"the {name} {shown(getattr(self, name))} are not numbers",
                     place="signal",
-                    advice="give numbers that a float can hold",
+                    advice="give numbers that fit into a float",
                 ) from None
             if array.ndim != 1:
                 raise SignalError(
@@ -101,7 +101,7 @@ class Corners:
             raise SignalError(
                 f"{self.times.size} times but {self.values.size} values",
                 place="signal",
-                advice="give one each",
+                advice="give one value per time",
             )
         if self.times.size < 2:
             raise SignalError(
@@ -154,24 +154,24 @@ SignalLike: TypeAlias = (
 
 
 def as_signal(given: SignalLike) -> Signal:
-    """Return the signal a user means.
+    """Return the signal that an argument describes.
 
     Parameters
     ----------
     given : str, number, list of (t, value), (times, values), callable or Signal
-        A pair of two arrays is a record; a list of pairs is ramps.
+        A pair of two arrays is a record; a list of pairs gives ramps.
 
     Returns
     -------
     Signal
-        Checked.
+        The signal, checked.
 
     Raises
     ------
     SignalError
-        If it is none of these, or its numbers do not make a signal.
+        If it is none of these, or its numbers do not form a signal.
     ExpressionError
-        If its text cannot be read.
+        If its text cannot be parsed.
 
     Examples
     --------
@@ -187,7 +187,7 @@ def as_signal(given: SignalLike) -> Signal:
         return Formula(form)
     if isinstance(form, bool):
         raise SignalError(
-            f"{form!r} is not a signal", place="signal", advice="give a number, say 1.0"
+            f"{form!r} is not a signal", place="signal", advice="give a number, for example 1.0"
         )
     if isinstance(form, Real | np.generic):
         try:
@@ -202,7 +202,7 @@ def as_signal(given: SignalLike) -> Signal:
     pair = form if isinstance(form, tuple) and len(form) == 2 else ()
     if pair and all(isinstance(part, tuple) and len(part) == 2 for part in pair):
         raise SignalError(
-            f"{shown(form)} can be read as two ramp corners and as a record of two samples",
+            f"{shown(form)} can mean two ramp corners or a record of two samples",
             place="signal",
             advice="give a list [(t, value), (t, value)] or arrays (times, values)",
         )
@@ -218,22 +218,22 @@ def as_signal(given: SignalLike) -> Signal:
     raise SignalError(
         f"{shown(form)} is not a signal",
         place="signal",
-        advice="give an expression of t in quotes, a list of (t, value) pairs, a pair "
+        advice="give an expression in t in quotes, a list of (t, value) pairs, a pair "
         "(times, values), or a function of t",
     )
 
 
 def piecewise_linear(t: float, times: Sequence[float], values: Sequence[float]) -> float:
-    """Return the value at t of straight lines through corners, held outside, right-continuous.
+    """Interpolate corners linearly at t; values are held outside, right-continuous at jumps.
 
-    Plain loops, because the compiled engine runs this same function.
+    Written as plain loops because the compiled engine runs this same function.
 
     Parameters
     ----------
     t : float
         s.
     times, values : sequence of float, shape (m,)
-        The corners, times not decreasing.
+        The corners, in order of time.
 
     Returns
     -------
@@ -264,14 +264,14 @@ def piecewise_linear(t: float, times: Sequence[float], values: Sequence[float]) 
 
 
 def piecewise_slope(t: float, times: Sequence[float], values: Sequence[float]) -> float:
-    """Return the slope at t of straight lines through corners; 0 outside, right-continuous.
+    """Return the slope at t of lines through corners; 0 outside, right-continuous at corners.
 
     Parameters
     ----------
     t : float
         s.
     times, values : sequence of float, shape (m,)
-        The corners, times not decreasing.
+        The corners, in order of time.
 
     Returns
     -------

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gms_fsm._arguments import checked_path, checked_whole
+from gms_fsm._arguments import checked_integer, checked_path
 from gms_fsm._extras import require
 from gms_fsm.charts.parameters import FloatArray, as_numbers
 from gms_fsm.errors import (
@@ -256,7 +256,7 @@ class Trace:
         dict of str to float
             Keyed by the quantity that is zero there, such as ``v``; empty at most rows.
         """
-        row = checked_whole("row", row)
+        row = checked_integer("row", row)
         on = np.flatnonzero(self.rows.mode[row, self.program.layout.slides])
         return {self.program.surface_names[k]: self._sigma(self.rows, row, int(k)) for k in on}
 
@@ -334,7 +334,7 @@ class Trace:
         Trace
             All rows of this trace, including micro-steps, and the samples.
         """
-        points = checked_whole("points", points, 1)
+        points = checked_integer("points", points, 1)
         even = self.sample(np.linspace(self.t[0], self.t[-1], points)).rows
         inner = ~np.isin(even.t, self.t)
         rows = merged(even.at(inner), self.rows)

@@ -5,9 +5,6 @@ Exit code 2, no traceback; only a record that ends before the run does keeps the
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,12 +12,10 @@ import pytest
 
 from gms_fsm import Trace
 from gms_fsm._files import LIST
-from tests.helpers import ROOT
 from tests.scenario_files import (
     MEASURED,
     CommandLine,
     changed,
-    command_line,
     nothing_written,
     one_message,
     sine_table,
@@ -30,11 +25,6 @@ from tests.scenario_files import (
 GOOD = sine_table()
 LINES = GOOD.splitlines()
 EVEN = np.arange(60) * 0.01
-
-
-@pytest.fixture
-def gms_fsm(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> CommandLine:
-    return command_line(monkeypatch, capsys)
 
 
 def row(number: int, text: str) -> bytes:
@@ -337,21 +327,15 @@ def test_five_rows_are_enough(gms_fsm: CommandLine, tmp_path: Path) -> None:
     assert len(Trace.load(tmp_path / "out" / "trace.npz")) == 5
 
 
-def test_the_program_itself_says_one_line(tmp_path: Path) -> None:
-    (tmp_path / "scenario.toml").write_text(MEASURED)
-    (tmp_path / "own.csv").write_bytes(row(5, "0.03,abc,1"))
-    done = subprocess.run(
-        [sys.executable, "-c", "from gms_fsm.app.cli import main; main()", "run", "scenario.toml"],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path,
-        check=False,
-        env={**os.environ, "COLUMNS": "80", "PYTHONPATH": str(ROOT)},
-    )
-    assert done.returncode == 2
-    assert done.stdout == ""
-    assert done.stderr.splitlines() == [
+def test_one_message_is_one_line(gms_fsm: CommandLine, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However narrow the terminal is."""
+    monkeypatch.setenv("COLUMNS", "80")
+    Path("scenario.toml").write_text(MEASURED)
+    Path("own.csv").write_bytes(row(5, "0.03,abc,1"))
+    answer = gms_fsm("run", "scenario.toml")
+    assert answer.code == 2
+    assert answer.out == ""
+    assert answer.err.splitlines() == [
         "error: own.csv: row 5, column 'x': 'abc' is not a number (a decimal point is a point); "
         "correct it, or exclude the row with where = ..., a condition that is false there"
     ]
-    nothing_written(tmp_path, {"scenario.toml", "own.csv"})

@@ -19,17 +19,10 @@ from tests.scenario_files import (
     OPEN_LOOP,
     CommandLine,
     changed,
-    command_line,
     nothing_written,
     one_message,
     sine_table,
 )
-
-
-@pytest.fixture
-def gms_fsm(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> CommandLine:
-    return command_line(monkeypatch, capsys)
-
 
 MODEL = OPEN_LOOP[OPEN_LOOP.index("[model]") : OPEN_LOOP.index("[rig]")]
 RIG = OPEN_LOOP[OPEN_LOOP.index("[rig]") : OPEN_LOOP.index("[run]")]
@@ -357,18 +350,19 @@ def test_the_program_itself_says_one_line(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("change", [("t_end = 1.0", "t_end = -1.0"), ("sin(t)", "sqrt(0.5 - t)")])
 def test_the_message_begins_its_own_line_after_the_progress_bar(
-    change: tuple[str, str], tmp_path: Path
+    change: tuple[str, str], gms_fsm: CommandLine
 ) -> None:
-    (tmp_path / "broken.toml").write_text(changed(OPEN_LOOP, *change))
-    done = process("run", "broken.toml", "-o", "out", cwd=tmp_path)
-    assert done.returncode == 2
-    assert "Traceback" not in done.stderr
-    assert [line for line in done.stderr.splitlines() if line.startswith("error: broken.toml")]
+    Path("broken.toml").write_text(changed(OPEN_LOOP, *change))
+    answer = gms_fsm("run", "broken.toml", "-o", "out")
+    assert answer.code == 2
+    assert "Traceback" not in answer.err
+    assert [line for line in answer.err.splitlines() if line.startswith("error: broken.toml")]
 
 
-def test_a_warning_of_a_scenario_is_said_once(tmp_path: Path) -> None:
+@pytest.mark.filterwarnings("default:published law")
+def test_a_warning_of_a_scenario_is_said_once(gms_fsm: CommandLine) -> None:
     text = changed(OPEN_LOOP, '"signed"', '"published"')
-    (tmp_path / "warns.toml").write_text(changed(text, "F_s = 1.5", "F_s = 1.0"))
-    done = process("run", "warns.toml", "-o", "out", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert done.stderr.count("never arrests") == 1
+    Path("warns.toml").write_text(changed(text, "F_s = 1.5", "F_s = 1.0"))
+    answer = gms_fsm("run", "warns.toml", "-o", "out")
+    assert answer.code == 0, answer.err
+    assert answer.err.count("never arrests") == 1

@@ -13,7 +13,7 @@ import plots
 from gms_fsm._files import LIST
 from gms_fsm.charts.broken import BROKEN
 from gms_fsm.errors import ParameterError
-from tests.scenario_files import CommandLine, command_line, one_message
+from tests.scenario_files import CommandLine, one_message
 
 EXPECTED = {
     "overlap": "livelock",
@@ -21,11 +21,6 @@ EXPECTED = {
     "memoryless": "chattering",
     "arms": "determinism",
 }
-
-
-@pytest.fixture
-def gms_fsm(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> CommandLine:
-    return command_line(monkeypatch, capsys)
 
 
 def z3() -> None:

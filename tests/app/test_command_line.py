@@ -2,48 +2,35 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-import gms_fsm
-from gms_fsm import GMS, GMSParameters, Prescribed
+from gms_fsm import GMS, GMSParameters, Prescribed, Trace, __version__
 from gms_fsm.lowering.program import lower
-from tests.helpers import ROOT
-
-
-def run(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-c", "from gms_fsm.app.cli import main; main()", *arguments],
-        capture_output=True,
-        text=True,
-        cwd=cwd,
-        check=False,
-        env={**os.environ, "COLUMNS": "200", "PYTHONPATH": str(ROOT)},
-    )
+from tests.scenario_files import CommandLine
 
 
 @pytest.mark.parametrize("law", ["signed", "published"])
-def test_code_prints_the_generated_program(law: str) -> None:
-    done = run("code", "--law", law)
-    assert done.returncode == 0, done.stderr
+def test_code_prints_the_generated_program(law: str, gms_fsm: CommandLine) -> None:
+    done = gms_fsm("code", "--law", law)
+    assert done.code == 0, done.err
     model = GMS(GMSParameters.paper("stick-slip"), law=law)  # type: ignore[arg-type]
     head, _, body = lower(model, Prescribed("0.15*sin(2*pi*t/25)")).source.partition("\n\n")
-    assert done.stdout.startswith(head)
-    assert done.stdout.endswith(body)
+    assert done.out.startswith(head)
+    assert done.out.endswith(body)
 
 
-def test_code_for_other_rigs() -> None:
-    assert "stiffness * (speed * t - x)" in run("code", "--law", "signed", "--rig", "pulled").stdout
-    assert "(F_a - F) / mass" in run("code", "--law", "signed", "--rig", "slider").stdout
+def test_code_for_other_rigs(gms_fsm: CommandLine) -> None:
+    assert (
+        "stiffness * (speed * t - x)" in gms_fsm("code", "--law", "signed", "--rig", "pulled").out
+    )
+    assert "(F_a - F) / mass" in gms_fsm("code", "--law", "signed", "--rig", "slider").out
 
 
-def test_version_and_help() -> None:
-    assert run("--version").stdout == f"gms-fsm {gms_fsm.__version__}\n"
-    help_text = run("--help").stdout
+def test_version_and_help(gms_fsm: CommandLine) -> None:
+    assert gms_fsm("--version").out == f"gms-fsm {__version__}\n"
+    help_text = gms_fsm("--help").out
     assert "paper" in help_text
     assert "code" in help_text
 
@@ -62,18 +49,18 @@ def test_version_and_help() -> None:
     ],
 )
 def test_a_mistake_is_one_message_and_exit_code_2(
-    arguments: list[str], said: str, tmp_path: Path
+    arguments: list[str], said: str, gms_fsm: CommandLine
 ) -> None:
-    (tmp_path / "file").write_text("in the way")
-    done = run(*arguments, cwd=tmp_path)
-    assert done.returncode == 2, done.stderr
-    assert said in done.stderr
-    assert "Traceback" not in done.stderr + done.stdout
-    assert done.stderr.count("error:") <= 1
+    Path("file").write_text("in the way")
+    done = gms_fsm(*arguments)
+    assert done.code == 2, done.err
+    assert said in done.err
+    assert "Traceback" not in done.err + done.out
+    assert done.err.count("error:") <= 1
 
 
-def test_a_failed_run_keeps_what_it_had(tmp_path: Path) -> None:
-    done = run("paper", "-o", "out", "--force", "0.1*sqrt(3 - t)", cwd=tmp_path)
-    assert done.returncode == 2
-    assert "partial.npz" in done.stderr
-    assert gms_fsm.Trace.load(tmp_path / "out" / "partial.npz").t[-1] > 2.9
+def test_a_failed_run_keeps_what_it_had(gms_fsm: CommandLine) -> None:
+    done = gms_fsm("paper", "-o", "out", "--force", "0.1*sqrt(3 - t)")
+    assert done.code == 2
+    assert "partial.npz" in done.err
+    assert Trace.load(Path("out", "partial.npz")).t[-1] > 2.9

@@ -15,14 +15,12 @@ import pytest
 from gms_fsm import Prescribed, simulate
 from gms_fsm.errors import GMSError, ScenarioError, TraceFileError
 from tests.helpers import ROOT, stick_slip
-from tests.scenario_files import OPEN_LOOP, CommandLine, changed, command_line, one_message
+from tests.scenario_files import OPEN_LOOP, CommandLine, changed, one_message
 
 
-@pytest.fixture
-def gms_fsm(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> CommandLine:
-    """The command line, in a folder with a good and a bad scenario, a good and a bad trace."""
+@pytest.fixture(autouse=True)
+def _files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A folder with a good and a bad scenario, a good and a bad trace."""
     monkeypatch.chdir(tmp_path)
     Path("good.toml").write_text(OPEN_LOOP)
     Path("bad.toml").write_text(changed(OPEN_LOOP, '"signed"', '"singed"'))
@@ -30,7 +28,6 @@ def gms_fsm(
     Path("escape.toml").write_text(OPEN_LOOP + '\n"\\u001b[31m[bold]\\u0007" = 1\n')
     simulate(stick_slip("signed"), Prescribed("0.3"), 2.0).save("good.npz")
     Path("bad.npz").write_bytes(Path("good.npz").read_bytes()[:-100])
-    return command_line(monkeypatch, capsys)
 
 
 MISTAKES = [
@@ -121,6 +118,7 @@ def test_help_names_it(gms_fsm: CommandLine) -> None:
     assert "--debug" in gms_fsm("--help").out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("debug", [False, True])
 def test_in_a_shell(debug: bool, tmp_path: Path) -> None:
     done = subprocess.run(

@@ -325,6 +325,7 @@ def test_save_and_load(tmp_path: Path) -> None:
     assert said[11] == "  1  fires arrest, all elements; hits: 0"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
 def test_plot(tmp_path: Path, suffix: str) -> None:
     pytest.importorskip("matplotlib")

@@ -76,6 +76,7 @@ def _wordy() -> Session:
     return Session(model, Prescribed("0.15*sin(2*pi*t/25)"), 100.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scenario", [FIG_4, PULLED])
 def test_nothing_is_wider_than_80_columns(scenario: str) -> None:
     prompts = re.compile(r"^\(t=[^)]*\) ")
@@ -155,8 +156,11 @@ def _piped(script: str, **environment: str) -> subprocess.CompletedProcess[bytes
     )
 
 
-@pytest.mark.parametrize("environment", [{}, {"PYTHONIOENCODING": "ascii"}, {"NO_COLOR": "1"}])
-@pytest.mark.parametrize("end", ["", "quit\n", "q"])
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("environment", "end"),
+    [({}, ""), ({"PYTHONIOENCODING": "ascii"}, "quit\n"), ({"NO_COLOR": "1"}, "q")],
+)
 def test_a_pipe_gets_plain_text_and_exit_code_0(environment: dict[str, str], end: str) -> None:
     done = _piped(f"goto 25\nwhy 1\n{end}", **environment)
     assert done.returncode == 0, done.stderr
@@ -167,11 +171,13 @@ def test_a_pipe_gets_plain_text_and_exit_code_0(environment: dict[str, str], end
     assert text == talk(FIG_4, "goto 25", "why 1", *([end.strip()] if end else []))
 
 
+@pytest.mark.slow
 def test_a_character_the_pipe_cannot_carry_does_not_break_it() -> None:
     done = _piped("frage nach ß und →\nprint t\n", PYTHONIOENCODING="ascii:surrogateescape")
     assert done.returncode == 0, done.stderr
     assert b"error: unknown command" in done.stdout
 
 
+@pytest.mark.slow
 def test_nothing_at_all_is_fine() -> None:
     assert _piped("").returncode == 0

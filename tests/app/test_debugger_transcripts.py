@@ -77,6 +77,7 @@ for the edges that leave slip: step, then why 2
     assert "first different transition at t = " in said
 
 
+@pytest.mark.slow
 def test_pulled_mass_story() -> None:
     said = answers(
         PULLED,

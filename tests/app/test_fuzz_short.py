@@ -1,7 +1,7 @@
 """Whatever the bytes of a text, a scenario file or a trace file, only documented errors answer.
 
 A few hundred inputs each; `make soak` tries them for minutes, with limits on time and memory. The
-inputs that once broke something stand in tests/app/test_fuzz_findings_stay_mended.py.
+inputs that once broke something stand in the test_hostile_* files.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ def test_trace_files(data: bytes) -> None:
     fuzz.one_trace_file(data)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", fuzz.BODIES)
 def test_the_bodies_reach_both_sides(name: str) -> None:
     """Long random inputs, as `make soak` makes them: some are accepted, most are refused."""

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import types
 from pathlib import Path
 
@@ -13,18 +10,7 @@ import pytest
 from gms_fsm._files import LIST
 from gms_fsm.app import lessons
 from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
-from tests.helpers import ROOT
-
-
-def command(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-c", "from gms_fsm.app.cli import main; main()", "lesson", *arguments],
-        capture_output=True,
-        text=True,
-        cwd=cwd,
-        check=False,
-        env={**os.environ, "COLUMNS": "200", "PYTHONPATH": str(ROOT)},
-    )
+from tests.scenario_files import CommandLine
 
 
 def test_there_are_eight_each_a_plain_module() -> None:
@@ -36,25 +22,26 @@ def test_there_are_eight_each_a_plain_module() -> None:
     assert len({lesson.QUESTION for lesson in lessons.LESSONS.values()}) == 8
 
 
-def test_without_a_number_they_are_listed() -> None:
-    done = command()
-    assert done.returncode == 0, done.stderr
-    lines = done.stdout.splitlines()
+def test_without_a_number_they_are_listed(gms_fsm: CommandLine) -> None:
+    done = gms_fsm("lesson")
+    assert done.code == 0, done.err
+    lines = done.out.splitlines()
     assert [line[0] for line in lines] == list("12345678")
     for line, lesson in zip(lines, lessons.LESSONS.values(), strict=True):
         assert lesson.QUESTION in line
 
 
-def test_one_is_run_and_written(tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_one_is_run_and_written(gms_fsm: CommandLine) -> None:
     pytest.importorskip("matplotlib", reason="pictures need the extra 'plots'")
     pytest.importorskip("uplot", reason="the replay page needs the extra 'replay'")
     pytest.importorskip("pygraphviz", reason="the page's chart needs Graphviz, extra 'render'")
-    done = command("7", "-o", "out", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    folder = tmp_path / "out"
+    done = gms_fsm("lesson", "7", "-o", "out")
+    assert done.code == 0, done.err
+    folder = Path("out")
     text = (folder / "lesson_7.txt").read_text()
     assert len(text.splitlines()) == 5
-    assert done.stdout.startswith(text)
+    assert done.out.startswith(text)
     assert (folder / "lesson_7.png").read_bytes().startswith(b"\x89PNG")
     assert "<svg" in (folder / "lesson_7.svg").read_text()
     page = (folder / "lesson_7.html").read_text()
@@ -62,7 +49,7 @@ def test_one_is_run_and_written(tmp_path: Path) -> None:
     for name in lessons.lesson(7).run().replayed:
         assert f"{name}: GMS" in page
     for path in set(folder.iterdir()) - {folder / LIST}:
-        assert path.name in done.stdout
+        assert path.name in done.out
 
 
 @pytest.mark.parametrize(
@@ -74,13 +61,13 @@ def test_one_is_run_and_written(tmp_path: Path) -> None:
         (["7", "-o", "file/out"], "choose another folder"),
     ],
 )
-def test_a_mistake_is_one_message(arguments: list[str], said: str, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("in the way")
-    done = command(*arguments, cwd=tmp_path)
-    assert done.returncode == 2
-    assert said in done.stderr
-    assert "Traceback" not in done.stderr + done.stdout
-    assert list(tmp_path.iterdir()) == [tmp_path / "file"]
+def test_a_mistake_is_one_message(arguments: list[str], said: str, gms_fsm: CommandLine) -> None:
+    Path("file").write_text("in the way")
+    done = gms_fsm("lesson", *arguments)
+    assert done.code == 2
+    assert said in done.err
+    assert "Traceback" not in done.err + done.out
+    assert list(Path().iterdir()) == [Path("file")]
 
 
 def test_what_is_wrong_is_said_before_anything_runs(

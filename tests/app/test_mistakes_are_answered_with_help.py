@@ -24,17 +24,8 @@ from gms_fsm.errors import OutputError, ParameterError, ScenarioError, shown
 from gms_fsm.run.simulate import Moment
 from plots import block_diagram, mermaid, render, statechart
 from plots.formats import of
-from tests.app.test_command_line import run
 from tests.helpers import pulled_mass, stick_slip
-from tests.scenario_files import OPEN_LOOP, CommandLine, command_line
-
-
-@pytest.fixture
-def gms_fsm(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> CommandLine:
-    monkeypatch.chdir(tmp_path)
-    return command_line(monkeypatch, capsys)
+from tests.scenario_files import OPEN_LOOP, CommandLine
 
 
 @pytest.fixture
@@ -177,11 +168,13 @@ def test_an_unknown_lesson_lists_the_lessons(gms_fsm: CommandLine, asked: str) -
         (("blocks", "--elements", "x"), "Invalid value"),
     ],
 )
-def test_no_prefix_of_another_library(arguments: tuple[str, ...], said: str) -> None:
-    done = run(*arguments)
-    assert done.returncode == 2
-    assert said in done.stderr
-    assert "Value error" not in done.stderr
+def test_no_prefix_of_another_library(
+    arguments: tuple[str, ...], said: str, gms_fsm: CommandLine
+) -> None:
+    done = gms_fsm(*arguments)
+    assert done.code == 2
+    assert said in done.err
+    assert "Value error" not in done.err
 
 
 @pytest.mark.parametrize(
@@ -194,13 +187,13 @@ def test_no_prefix_of_another_library(arguments: tuple[str, ...], said: str) -> 
         ("animate", "run.npz", "--start", "9"),
     ],
 )
-def test_no_bar_before_an_error(arguments: tuple[str, ...], tmp_path: Path) -> None:
+def test_no_bar_before_an_error(arguments: tuple[str, ...], gms_fsm: CommandLine) -> None:
     pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
-    simulate(stick_slip("signed"), Prescribed("0.2"), 1.0).save(tmp_path / "run.npz")
-    done = run(*arguments, cwd=tmp_path)
-    assert done.returncode == 2
-    assert done.stderr.startswith("error: "), done.stderr
-    assert done.stdout == ""
+    simulate(stick_slip("signed"), Prescribed("0.2"), 1.0).save("run.npz")
+    done = gms_fsm(*arguments)
+    assert done.code == 2
+    assert done.err.startswith("error: "), done.err
+    assert done.out == ""
 
 
 def test_no_bar_of_a_run_that_does_not_begin() -> None:

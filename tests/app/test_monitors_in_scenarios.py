@@ -17,18 +17,12 @@ from tests.scenario_files import (
     OPEN_LOOP,
     CommandLine,
     changed,
-    command_line,
     nothing_written,
     one_message,
 )
 from tests.traces.test_monitors_see_what_happens import SLOWING, memoryless
 
 MONITORS = ["abs(z) <= 0.01*s", "passivity", "coverage", "chattering"]
-
-
-@pytest.fixture
-def gms_fsm(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> CommandLine:
-    return command_line(monkeypatch, capsys)
 
 
 @pytest.fixture

@@ -20,15 +20,9 @@ from tests.scenario_files import (
     OPEN_LOOP,
     CommandLine,
     changed,
-    command_line,
     nothing_written,
     one_message,
 )
-
-
-@pytest.fixture
-def gms_fsm(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> CommandLine:
-    return command_line(monkeypatch, capsys)
 
 
 @pytest.fixture

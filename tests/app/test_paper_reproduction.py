@@ -17,6 +17,8 @@ from gms_fsm.app.paper.writing import claims_text, write
 from gms_fsm.errors import OutputError
 from gms_fsm.traces.failures import SimulationError
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:

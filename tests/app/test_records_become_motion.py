@@ -11,7 +11,7 @@ from scipy.integrate import cumulative_trapezoid
 from gms_fsm.app.records import Column, Motion, Record, motion_of, read_record
 from gms_fsm.app.units import FACTORS, convert_numbers, factor
 from gms_fsm.errors import RecordError, UnitError
-from tests.scenario_files import MEASURED, CommandLine, changed, command_line, table
+from tests.scenario_files import MEASURED, CommandLine, changed, table
 
 SI = {
     "time": Column("t", "s"),
@@ -20,11 +20,6 @@ SI = {
     "force": Column("F", "N"),
     "normal": Column("N", "N"),
 }
-
-
-@pytest.fixture
-def gms_fsm(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> CommandLine:
-    return command_line(monkeypatch, capsys)
 
 
 def record_of(**columns: np.ndarray) -> Record:
@@ -352,6 +347,7 @@ def test_without_noise_or_dwells_there_is_none() -> None:
     assert steady.standstill == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("per_cycle", [100, 1000, 5000, 50_000])
 def test_a_slow_turn_is_no_noise(per_cycle: int) -> None:
     """A clean sine never stands still, however densely it is sampled."""

@@ -189,6 +189,7 @@ def test_a_perfect_record_has_r2_of_1() -> None:
     assert (found.r2, found.rmse) == (1.0, 0.0)
 
 
+@pytest.mark.slow
 def test_a_record_worse_than_its_mean_has_a_negative_r2() -> None:
     trace, record = measured(np.zeros(TIMES.size))
     columns = {**record.columns, "force": -record.columns["force"]}

@@ -14,6 +14,8 @@ from gms_fsm.app.report import compare, measured_force, plain, run_scenario
 from gms_fsm.app.scenario import Loaded, load_scenario
 from tests.helpers import ROOT, same_bits
 
+pytestmark = pytest.mark.slow
+
 RECORD = "reciprocating_friction.tsv"
 SHIPPED = sorted((ROOT / "scenarios").glob("*.toml"))
 OPEN = [path for path in SHIPPED if path.stem != "tribometer"]

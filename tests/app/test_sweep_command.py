@@ -16,17 +16,11 @@ from tests.scenario_files import (
     OPEN_LOOP,
     CommandLine,
     changed,
-    command_line,
     nothing_written,
     one_message,
 )
 
 SWEPT = ("--over", "F_s=1:2:3", "--over", "v_s=1e-3:1e-1:3,log", "--engine", "ifelse")
-
-
-@pytest.fixture
-def gms_fsm(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> CommandLine:
-    return command_line(monkeypatch, capsys)
 
 
 @pytest.fixture

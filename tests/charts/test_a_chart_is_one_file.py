@@ -1,6 +1,6 @@
-"""One file in ``gms_fsm/charts`` is all that a new chart takes: every verb then has it.
+"""A new chart needs only one file in ``gms_fsm/charts``: every command then knows it.
 
-In a copy of the packages, in processes of their own.
+Tested in a copy of the packages, in a separate process that answers one command after another.
 """
 
 from __future__ import annotations
@@ -10,13 +10,18 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from gms_fsm import Sweep, Trace
 from tests.helpers import ROOT
+
+pytestmark = pytest.mark.slow
 
 PAGE = '''
 """Springs that yield: elastic up to a force, then plastic. The numbers are chosen by us."""
@@ -76,69 +81,90 @@ t_end = 10.0
 [output]
 figures = []
 """
-CODE = "from gms_fsm.app.cli import main; main()"
+ANSWER = """
+import contextlib, io, json, sys
+import gms_fsm
+from gms_fsm.app.cli import main
+print(json.dumps(gms_fsm.__file__), flush=True)
+for line in sys.stdin:
+    sys.argv[1:], said = json.loads(line)
+    out, err, code = io.StringIO(), io.StringIO(), 0
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        sys.stdin = io.StringIO(said)
+        try:
+            main()
+        except SystemExit as end:
+            code = end.code or 0
+    print(json.dumps([code, out.getvalue(), err.getvalue()]), flush=True)
+"""
+
+
+@dataclass(frozen=True)
+class Copy:
+    """A copy of the packages with one file more, and a process that runs it."""
+
+    folder: Path
+    process: subprocess.Popen[str]
+
+    def read(self) -> Any:
+        assert self.process.stdout is not None
+        return json.loads(self.process.stdout.readline())
+
+    def gms_fsm(self, *arguments: str, said: str = "", code: int = 0) -> str:
+        """Run a command and return what it prints; a mistake is on standard error."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(json.dumps([arguments, said]) + "\n")
+        self.process.stdin.flush()
+        ended, out, err = self.read()
+        assert ended == code, out + err
+        return out if code == 0 else err
 
 
 @pytest.fixture(scope="module")
-def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy with one file more, and a scenario beside it."""
+def copy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Copy]:
+    """A copy of the packages with one additional file, and a scenario next to it."""
     folder = tmp_path_factory.mktemp("copy")
     skip = shutil.ignore_patterns("__pycache__")
     for package in ("gms_fsm", "integrators", "plots"):
         shutil.copytree(ROOT / package, folder / package, ignore=skip)
     (folder / "gms_fsm" / "charts" / "x.py").write_text(PAGE, encoding="utf-8")
     (folder / "x.toml").write_text(SCENARIO, encoding="utf-8")
-    return folder
-
-
-def gms_fsm(home: Path, *arguments: str, said: str = "", code: int = 0) -> str:
-    """Run the copy's command line and return what it prints; a mistake is on standard error."""
-    done = subprocess.run(
-        [sys.executable, "-c", CODE, *arguments],
-        cwd=home,
-        env={**os.environ, "PYTHONPATH": str(home), "COLUMNS": "200"},
-        input=said,
-        capture_output=True,
+    with subprocess.Popen(
+        [sys.executable, "-c", ANSWER],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(folder), "COLUMNS": "200"},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
         text=True,
-        check=False,
-    )
-    assert done.returncode == code, done.stdout + done.stderr
-    return done.stdout if code == 0 else done.stderr
+    ) as process:
+        made = Copy(folder, process)
+        assert Path(made.read()).parent == folder / "gms_fsm", "the copy is what runs"
+        yield made
+        assert process.stdin is not None
+        process.stdin.close()
 
 
-def test_the_copy_is_what_runs(home: Path) -> None:
-    place = subprocess.run(
-        [sys.executable, "-c", "import gms_fsm; print(gms_fsm.__file__)"],
-        cwd=home,
-        env={**os.environ, "PYTHONPATH": str(home)},
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout
-    assert Path(place.strip()).parent == home / "gms_fsm"
-
-
-def test_chart_lists_and_draws_it(home: Path) -> None:
-    listed = gms_fsm(home, "chart", "--list")
+def test_chart_lists_and_draws_it(copy: Copy) -> None:
+    listed = copy.gms_fsm("chart", "--list")
     assert "x: yielding spring\n" in listed
     assert "  F_z      force that breaks it, N, >= F_y; one number per element\n" in listed
-    gms_fsm(home, "chart", "x", "-o", "x.mmd", "--elements", "2")
-    drawn = (home / "x.mmd").read_text(encoding="utf-8")
+    copy.gms_fsm("chart", "x", "-o", "x.mmd", "--elements", "2")
+    drawn = (copy.folder / "x.mmd").read_text(encoding="utf-8")
     assert 'title: "yielding spring"' in drawn
     assert "s2_plastic --> s1_elastic : 1 [z" in drawn
 
 
-def test_check_proves_it_within_its_rules(home: Path) -> None:
+def test_check_proves_it_within_its_rules(copy: Copy) -> None:
     pytest.importorskip("z3", reason="needs z3 (extra: check)")
-    report = gms_fsm(home, "check", "x")
+    report = copy.gms_fsm("check", "x")
     assert "assumed: k > 0, F_y > 0, v_c > 0\n" in report
     assert "0 refuted, 0 undecided" in report
-    assert "x, and as demonstrations" in " ".join(gms_fsm(home, "check", "--list").split())
+    assert "x, and as demonstrations" in " ".join(copy.gms_fsm("check", "--list").split())
 
 
-def test_run_runs_a_scenario_file_of_it(home: Path) -> None:
-    gms_fsm(home, "run", "x.toml", "-o", "out")
-    trace = Trace.load(home / "out" / "trace.npz")
+def test_run_runs_a_scenario_file_of_it(copy: Copy) -> None:
+    copy.gms_fsm("run", "x.toml", "-o", "out")
+    trace = Trace.load(copy.folder / "out" / "trace.npz")
     assert [str(edge) for edge in trace.transitions.edge[:3]] == [
         "yield_forward",
         "yield_forward",
@@ -146,7 +172,7 @@ def test_run_runs_a_scenario_file_of_it(home: Path) -> None:
     ]
     assert np.abs(trace.F_elements).max() == pytest.approx(1.0)
     assert trace.model.chart.unit("F_y") == "N"
-    summary = (home / "out" / "summary.md").read_text(encoding="utf-8")
+    summary = (copy.folder / "out" / "summary.md").read_text(encoding="utf-8")
     assert "k = [100, 50] N/m, F_y = 1 N, F_z = 9 N, v_c = 1e-06 m/s, sigma_2 = 0.5 Ns/m" in summary
 
 
@@ -159,31 +185,31 @@ def test_run_runs_a_scenario_file_of_it(home: Path) -> None:
         ("model.F_q=1", "unknown key; did you mean 'F_z'? valid here: chart, n, k, F_y, F_z, v_c"),
     ],
 )
-def test_a_mistake_in_the_file_is_named_by_its_rule(home: Path, setting: str, words: str) -> None:
-    assert words in gms_fsm(home, "run", "x.toml", "-o", "none", "--set", setting, code=2)
+def test_a_mistake_in_the_file_is_named_by_its_rule(copy: Copy, setting: str, words: str) -> None:
+    assert words in copy.gms_fsm("run", "x.toml", "-o", "none", "--set", setting, code=2)
 
 
-def test_sweep_varies_it(home: Path) -> None:
+def test_sweep_varies_it(copy: Copy) -> None:
     wanted = ("--over", "F_y=0.5:2:3", "--over", "sigma_2=0:1:2", "--engine", "machines")
-    gms_fsm(home, "sweep", "x.toml", *wanted, "-o", "swept")
-    found = Sweep.load(home / "swept" / "sweep.npz")
+    copy.gms_fsm("sweep", "x.toml", *wanted, "-o", "swept")
+    found = Sweep.load(copy.folder / "swept" / "sweep.npz")
     assert found.parameters["F_y"].tolist() == [0.5, 0.5, 1.25, 1.25, 2.0, 2.0]
     assert found.outcome.tolist() == ["ok"] * 6
     assert np.abs(found.z[:, 0]).tolist() == pytest.approx(
         np.minimum(np.abs(found.z[:, 0]), found.parameters["F_y"] / 100).tolist()
     )
-    said = gms_fsm(home, "sweep", "x.toml", "--over", "F_c=1:2:2", code=2)
+    said = copy.gms_fsm("sweep", "x.toml", "--over", "F_c=1:2:2", code=2)
     assert "k [N/m], F_y [N], F_z [N], v_c [m/s], sigma_2 [Ns/m]\n" in said
 
 
-def test_debug_steps_through_it(home: Path) -> None:
-    told = gms_fsm(home, "debug", "x.toml", said="next\nstep\nwhy 1\nquit\n")
+def test_debug_steps_through_it(copy: Copy) -> None:
+    told = copy.gms_fsm("debug", "x.toml", said="next\nstep\nwhy 1\nquit\n")
     assert "element 1: elastic -> plastic by yield_forward" in told
     assert "return_forward does not fire: v < 0 is false by 0.0" in told
 
 
-def test_code_and_the_schema_have_it(home: Path) -> None:
-    assert gms_fsm(home, "code", "x").startswith("# yielding spring, prescribed velocity\n")
-    schema = json.loads(gms_fsm(home, "schema"))
+def test_code_and_the_schema_know_it(copy: Copy) -> None:
+    assert copy.gms_fsm("code", "x").startswith("# yielding spring, prescribed velocity\n")
+    schema = json.loads(copy.gms_fsm("schema"))
     (table,) = (t for name, t in schema["$defs"].items() if name.endswith("x"))
     assert table["properties"]["F_y"]["description"].startswith("yield force, N, > 0")

@@ -16,6 +16,8 @@ from gms_fsm.app.scenario import Scenario
 from plots.formats import FORMATS
 from tests.page_blocks import ROOT, Page, agrees, blocks_of
 
+pytestmark = pytest.mark.slow
+
 for module in ("matplotlib", "numba", "pandas", "pygraphviz", "pyarrow", "uplot", "xarray", "z3"):
     pytest.importorskip(module, reason="the pages use all extras")
 

@@ -87,6 +87,7 @@ def test_the_page_has_every_error_and_no_other() -> None:
     assert sorted(named) == sorted(kind.__name__ for kind in KINDS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
 def test_a_section_says_when_shows_what_and_says_what_to_do(
     kind: type[GMSError], printed: dict[str, str]

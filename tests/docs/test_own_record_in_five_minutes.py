@@ -10,7 +10,9 @@ import pytest
 
 from gms_fsm import Trace
 from tests.helpers import ROOT
-from tests.scenario_files import CommandLine, command_line, table
+from tests.scenario_files import CommandLine, table
+
+pytest.importorskip("matplotlib", reason="the picture needs the extra 'plots'")
 
 PAGE = ROOT / "docs" / "howto" / "measured-record.md"
 
@@ -33,12 +35,6 @@ time = { column = "time [s]", unit = "s" }
 position = { column = "position [mm]", unit = "mm" }
 force = { column = "friction [N]", unit = "N" }
 """
-
-
-@pytest.fixture
-def gms_fsm(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> CommandLine:
-    pytest.importorskip("matplotlib", reason="the picture needs the extra 'plots'")
-    return command_line(monkeypatch, capsys)
 
 
 def own_table() -> str:
@@ -64,6 +60,7 @@ def test_the_scenario_here_is_the_one_of_the_page() -> None:
     assert SCENARIO in blocks
 
 
+@pytest.mark.slow
 def test_table_and_scenario_become_picture_and_summary(
     gms_fsm: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

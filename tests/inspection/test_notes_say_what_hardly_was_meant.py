@@ -8,7 +8,6 @@ from gms_fsm.app.report import run_scenario
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.inspection.notes import notes_on
 from tests.helpers import ROOT, open_loop, pulled_mass, stick_slip
-from tests.scenario_files import command_line
 
 
 def bank(k: float = 1.0, v_c: float = 1e-6) -> GMS:
@@ -69,13 +68,13 @@ def test_a_run_that_sees_them_has_no_such_note():
     assert notes(bank(), ramp) == ()
 
 
-def test_the_command_line_says_them(tmp_path, monkeypatch, capsys):
+def test_the_command_line_says_them(gms_fsm):
     path = ROOT / "scenarios" / "pulled_mass.toml"
-    done = command_line(monkeypatch, capsys)(
+    done = gms_fsm(
         "run",
         path,
         "-o",
-        tmp_path / "out",
+        "out",
         "--set",
         "model.v_c=10.0",
         "--set",

@@ -399,6 +399,7 @@ def test_a_point_that_rounding_hides_is_no_refutation() -> None:
     assert "rounding hides it" in finding.text
 
 
+@pytest.mark.slow
 def test_a_long_question_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(_prover, "PATIENCE", 0.1)
     hard = " and ".join(

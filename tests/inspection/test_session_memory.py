@@ -29,6 +29,7 @@ else:
 """
 
 
+@pytest.mark.slow
 def test_a_long_session_is_small() -> None:
     pytest.importorskip("resource")
     done = subprocess.run(

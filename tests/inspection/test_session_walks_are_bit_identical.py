@@ -18,6 +18,8 @@ from gms_fsm.systems.rigs import Rig
 from gms_fsm.traces.failures import SimulationError
 from tests.helpers import pulled_mass, same_bits
 
+pytestmark = pytest.mark.slow
+
 T_END = 6.0
 OPTIONS: list[dict[str, Any]] = [
     {},
@@ -84,7 +86,7 @@ def _poked(session: Session, z: float, state: str | None) -> dict[str, Any]:
     return {"t_start": here.t, "initial": initial}
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     models(),
     st.sampled_from(RIGS),

@@ -13,6 +13,7 @@ from gms_fsm.inspection.session import Session
 from tests.helpers import FIG4_SINE, pulled_mass, stick_slip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["Fig. 4", "pulled mass"])
 def test_every_row_and_element(case: str) -> None:
     model, rig = pulled_mass()

@@ -1,4 +1,4 @@
-"""A condition over arrays has, place by place, the truth that one evaluation at a time has."""
+"""A condition evaluated over arrays gives the same truth values as evaluated one by one."""
 
 from __future__ import annotations
 
@@ -45,9 +45,12 @@ CONDITIONS = st.recursive(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None, derandomize=True)
 @given(text=CONDITIONS, rows=st.lists(st.tuples(NUMBERS, NUMBERS, NUMBERS), min_size=1, max_size=6))
-def test_place_by_place(text: str, rows: list[tuple[float, float, float]]) -> None:
+def test_truth_values_equal_those_of_single_evaluations(
+    text: str, rows: list[tuple[float, float, float]]
+) -> None:
     tree = parse_condition(text, NAMES)
     table = np.array(rows)
     # One name shared by all elements, one of each element, one a single number.
@@ -62,7 +65,7 @@ def test_place_by_place(text: str, rows: list[tuple[float, float, float]]) -> No
 
 
 @pytest.mark.parametrize("function", [math.exp, math.sin, math.cos, math.tanh])
-def test_functions_are_those_of_python_to_the_last_bit(function: Callable[[float], float]) -> None:
+def test_functions_equal_pythons_to_the_last_bit(function: Callable[[float], float]) -> None:
     numbers = np.random.default_rng(1).uniform(-20.0, 20.0, 20_000)
     exact = np.array([function(u) for u in numbers.tolist()])
     name = function.__name__
@@ -82,7 +85,7 @@ def test_states_are_compared_by_name() -> None:
     assert (states_in(own), states_in(first)) == ({0}, {1})
 
 
-def test_ones_own_state_is_no_matter_of_guards_and_breakpoints() -> None:
+def test_guards_and_breakpoints_cannot_use_the_elements_own_state() -> None:
     for elements in (0, 2):
         with pytest.raises(ExpressionError, match="state"):
             parse_condition("state == slip", ["v"], ["stick", "slip"], elements)

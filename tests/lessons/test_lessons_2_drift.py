@@ -71,6 +71,7 @@ def test_an_element_really_slips_and_then_nothing_drifts(result: lesson.Result) 
     assert np.ptp(lasting) < 1e-9  # a spring again
 
 
+@pytest.mark.slow
 def test_lines_and_picture(result: lesson.Result) -> None:
     check_lines(result)
     check_figure(lesson, result)

@@ -29,6 +29,7 @@ def met(step: float) -> list[float]:
     return found
 
 
+@pytest.mark.slow
 def test_what_is_found_follows_from_the_grid(result: lesson.Result) -> None:
     """Four break-aways; then at a met reversal four arrests, and until 61 s four more."""
     for step, count, reversals in zip(lesson.STEPS, result.counts, result.met, strict=True):

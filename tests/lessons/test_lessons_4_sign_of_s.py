@@ -18,6 +18,7 @@ def result() -> lesson.Result:
     return lesson.run()
 
 
+@pytest.mark.slow
 def test_both_laws_are_one_for_forward_motion(result: lesson.Result) -> None:
     times = np.linspace(0.0, 12.49, 500)
     np.testing.assert_allclose(

@@ -15,6 +15,7 @@ def result() -> lesson.Result:
     return lesson.run()
 
 
+@pytest.mark.slow
 def test_the_first_loading_is_a_chain_of_chords(result: lesson.Result) -> None:
     for n, trace in result.loadings.items():
         fine = trace.refined(2000)

@@ -17,6 +17,7 @@ def result() -> lesson.Result:
     return lesson.run()
 
 
+@pytest.mark.slow
 def test_the_known_run(result: lesson.Result) -> None:
     log = result.portrait.transitions
     assert Counter(log.edge.tolist()) == {"break_away_forward": 38, "arrest": 34}

@@ -20,6 +20,7 @@ def result() -> lesson.Result:
     return lesson.run()
 
 
+@pytest.mark.slow
 def test_driven_alike_they_are_identical(result: lesson.Result) -> None:
     same_bits(result.chart, result.ifelse)
     same_bits(result.chart_once, result.ifelse_once)

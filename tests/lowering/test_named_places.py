@@ -1,7 +1,7 @@
-"""Places have names: only `gms_fsm.lowering.layout` computes where something stands.
+"""Places have names: only `gms_fsm.lowering.layout` computes positions in arrays.
 
-The state vector, what a run observes, modes and log are subscripted by what the layout returns,
-never by arithmetic on the number of elements, a first place or a position. Found on the syntax
+The state vector, the observed values, modes and log are subscripted with what the layout returns,
+never by arithmetic on the number of elements, a first place or a position. Checked on the syntax
 tree.
 """
 
@@ -25,12 +25,12 @@ SOURCES = [
     for package in ("gms_fsm", "plots")
     for path in sorted((ROOT / package).rglob("*.py"))
 ]
-SIZES, POSITIONS = {"n", "first"}, {"i", "j"}  # what places are computed from
+SIZES, POSITIONS = {"n", "first"}, {"i", "j"}  # names from which places are computed
 LAID_OUT = {"y", "dy", "y_before", "seen", "observed", "mode"}  # arrays with named places
 # The same in generated text.
 PRINTED = re.compile(r"\* n\b|\+ [ni]\b|\b(y|dy|out|mode)\[\d")
 
-# Not about the layout: the code as it stands, by file, and why.
+# Unrelated to the layout: allowed code by file, and why.
 ALLOWED = {
     "gms_fsm/app/lessons/l3_missed_window.py": {
         # The first firings of a log, as many as there are elements.
@@ -51,7 +51,7 @@ ALLOWED = {
 
 
 def _words(node: ast.AST) -> set[str]:
-    """Return the names in code; of ``model.n`` only ``n``."""
+    """Return the names in code; for ``model.n`` only ``n``."""
     owners = {id(sub.value) for sub in ast.walk(node) if isinstance(sub, ast.Attribute)}
     return {
         sub.id if isinstance(sub, ast.Name) else sub.attr.lstrip("_")
@@ -65,7 +65,7 @@ def _sums(node: ast.AST, *kinds: type[ast.operator]) -> list[ast.BinOp]:
 
 
 def _is_place(index: ast.expr) -> bool:
-    """Tell whether an index is computed from sizes."""
+    """Return whether an index is computed from sizes."""
     bounds = [b for s in ast.walk(index) if isinstance(s, ast.Slice) for b in (s.lower, s.upper)]
     behind = [b for b in _sums(index, ast.Add) if isinstance(b.left, ast.Constant)]  # 2 + i
     return bool(
@@ -76,7 +76,7 @@ def _is_place(index: ast.expr) -> bool:
 
 
 def _is_number(index: ast.expr) -> bool:
-    """Tell whether an index is a number, or the position of an element and some more."""
+    """Return whether an index is a number, or an element's position plus something."""
     if isinstance(index, ast.Tuple):  # rows first, then places
         return any(_is_number(each) for each in index.elts[1:])
     if isinstance(index, ast.Constant):
@@ -85,7 +85,7 @@ def _is_number(index: ast.expr) -> bool:
 
 
 def _adds_blocks(node: ast.BinOp) -> bool:
-    """Tell whether a sum has a multiple of n in it, or is one of sizes alone."""
+    """Return whether a sum contains a multiple of n, or only sizes."""
     sides = (node.left, node.right)
     multiples = [
         side for side in sides for product in _sums(side, ast.Mult) if "n" in _words(product)
@@ -96,7 +96,7 @@ def _adds_blocks(node: ast.BinOp) -> bool:
 
 
 def _found(text: str, *, printed: bool = True) -> Iterator[str]:
-    """Yield the code of every place that is computed in a source text."""
+    """Yield the code of every computed place in a source text."""
     tree = ast.parse(text)
     documents = {
         id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)
@@ -165,7 +165,7 @@ def test_the_search_finds_what_it_looks_for(case: str) -> None:
 
 
 @pytest.mark.parametrize("code", FINE)
-def test_the_search_leaves_the_rest_alone(code: str) -> None:
+def test_the_search_reports_nothing_else(code: str) -> None:
     assert list(_found(code)) == []
 
 
@@ -178,7 +178,7 @@ def test_no_place_is_computed_outside_the_layout(path: Path) -> None:
         assert found == ALLOWED.get(path.as_posix(), set())
 
 
-def test_all_files_that_may_are_there() -> None:
+def test_all_listed_exceptions_exist() -> None:
     assert {Path(name) for name in ALLOWED} <= set(SOURCES)
 
 
@@ -213,7 +213,7 @@ def test_texts_name_the_same_places(shared: tuple[str, ...], n: int) -> None:
     places = Places(shared, ("z", "w", "u"), n)
     for place, (name, i) in enumerate(places):
         assert eval(places.text(name), {"n": n, "i": i}) == place
-        asked = [places.asking_text(each, "k") for each in (*shared, *places.own)]
+        asked = [places.membership_text(each, "k") for each in (*shared, *places.own)]
         whose = [eval(whether, {"n": n, "k": place}) for whether, _ in asked].index(True)
         assert (*shared, *places.own)[whose] == name
         assert i is None or eval(asked[whose][1], {"n": n, "k": place}) == i
@@ -221,8 +221,8 @@ def test_texts_name_the_same_places(shared: tuple[str, ...], n: int) -> None:
     assert eval(places.size_text(2), {"n": n}) == places.size + 2
 
 
-def test_machine_code_finds_what_it_writes_into_the_log() -> None:
-    """Of a firing `integrators.loop.record` keeps y[first + i], seen[0], seen[2 + i], seen[1]."""
+def test_machine_code_finds_the_places_of_the_log() -> None:
+    """For a firing `integrators.loop.record` stores y[first + i], seen[0], seen[2 + i], seen[1]."""
     model, rig = stick_slip("signed"), pulled_mass()[1]
     layout = lower(model, rig).layout
     assert [layout.observed.index(name) for name in ("v", "F", "s")] == [0, 1, 2]

@@ -1,7 +1,7 @@
-"""The text that ``gms-fsm code`` prints is a program of its own, and computes what the engine does.
+"""The text printed by ``gms-fsm code`` is a standalone program that computes what the engine does.
 
-It runs in a fresh Python that sees neither gms-fsm nor numpy (``python -I -S``), on states of a
-run, and its flow, its choice of edges and what it observes are compared to the last bit.
+It runs in a fresh Python that sees neither gms-fsm nor numpy (``python -I -S``), on states from a
+run, and its flow, its choice of edges and its observed values are compared to the last bit.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ from gms_fsm.lowering._generated import standalone
 from gms_fsm.lowering.program import Program, lower
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
-from tests.app.test_command_line import run
 from tests.helpers import stick_slip
+from tests.scenario_files import CommandLine
 
 RIGS: dict[str, Rig] = {
     "prescribed": Prescribed(paper.VELOCITY),
     "slider": Slider(1.0, paper.FORCE),
     "pulled": PulledSlider(1.0, 2.0, 0.1),
 }
-# What a fresh process computes for each state, printed so that no bit is lost.
+# The computations of a fresh process for each state, printed without losing a bit.
 ASK = """
 import json, sys
 results = []
@@ -59,7 +59,7 @@ print(sorted(name for name in sys.modules if name.partition(".")[0] in ("numpy",
 
 
 def _states(model: Model, rig: Rig, program: Program, t_end: float) -> list[list[Any]]:
-    """Some states of a run, with the signs that hold there."""
+    """Return some states of a run, with the signs frozen there."""
     trace = simulate(model, rig, t_end)
     rows = range(0, len(trace), max(1, len(trace) // 40))
     states = []
@@ -97,17 +97,17 @@ def _compare(model: Model, rig: Rig, text: str, t_end: float) -> None:
     )
     assert done.returncode == 0, done.stderr
     numbers, modules = done.stdout.splitlines()
-    assert modules == "[]", "it stands alone"
+    assert modules == "[]", "it is standalone"
     assert json.loads(numbers) == _engine(program, states, seen)
 
 
 @pytest.mark.parametrize("rig", RIGS)
 @pytest.mark.parametrize("law", ["signed", "published"])
-def test_what_the_command_line_prints(law: Any, rig: str) -> None:
-    printed = run("code", "--law", law, "--rig", rig)
-    assert printed.returncode == 0, printed.stderr
+def test_what_the_command_line_prints(law: Any, rig: str, gms_fsm: CommandLine) -> None:
+    printed = gms_fsm("code", "--law", law, "--rig", rig)
+    assert printed.code == 0, printed.err
     model = GMS(GMSParameters.paper("stick-slip"), law=law)
-    _compare(model, RIGS[rig], printed.stdout, 30.0)
+    _compare(model, RIGS[rig], printed.out, 30.0)
 
 
 def _rough() -> ChartModel:
@@ -143,7 +143,7 @@ def _rough() -> ChartModel:
     ],
     ids=["ramps", "record", "every function", "LuGre"],
 )
-def test_texts_of_other_models(model: Model, rig: Rig, t_end: float) -> None:
+def test_printed_programs_of_other_models(model: Model, rig: Rig, t_end: float) -> None:
     _compare(model, rig, standalone(lower(model, rig).source), t_end)
 
 
@@ -157,5 +157,7 @@ def test_only_what_is_used_is_in_it() -> None:
 
 def test_a_python_function_cannot_be_printed() -> None:
     source = lower(stick_slip("signed"), Prescribed(lambda t: 0.1 * t)).source
-    with pytest.raises(ParameterError, match=r"v_signal: a Python function.*formula or as corners"):
+    with pytest.raises(
+        ParameterError, match=r"v_signal: a Python function.*expression or as corners"
+    ):
         standalone(source)

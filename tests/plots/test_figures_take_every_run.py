@@ -21,6 +21,8 @@ from plots import figures, panels
 from plots.schematic import schematic_figure
 from tests.helpers import FIG4_SINE, ROOT, non_drifting, open_loop, pulled_mass, stick_slip
 
+pytestmark = pytest.mark.slow
+
 
 def lugre() -> Trace:
     model = LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4, stribeck=Stribeck(1, 1.5, 1e-3))
@@ -71,7 +73,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Trace]:
 
 
 @pytest.mark.parametrize("kind", FIGURES)
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", [name for name in RUNS if name != "Fig. 4, signed"])
 def test_every_figure(runs: dict[str, Trace], name: str, kind: str, tmp_path: Path) -> None:
     before = dict(matplotlib.rcParams)
     figure = FIGURES[kind](runs[name])

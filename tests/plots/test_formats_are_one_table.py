@@ -24,7 +24,7 @@ from gms_fsm.errors import MissingExtraError, ParameterError
 from plots import formats
 from plots.formats import FORMATS, Format, Subject, register
 from tests.helpers import ROOT, stick_slip
-from tests.scenario_files import OPEN_LOOP, CommandLine, command_line, one_message
+from tests.scenario_files import OPEN_LOOP, CommandLine, one_message
 
 SUBJECTS: tuple[Subject, ...] = ("graph", "chart", "figure", "animation", "page")
 
@@ -32,14 +32,6 @@ SUBJECTS: tuple[Subject, ...] = ("graph", "chart", "figure", "animation", "page"
 @pytest.fixture(autouse=True)
 def _own_table(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(formats, "FORMATS", list(FORMATS))
-
-
-@pytest.fixture
-def gms_fsm(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> CommandLine:
-    monkeypatch.chdir(tmp_path)
-    return command_line(monkeypatch, capsys)
 
 
 @pytest.fixture(scope="module")
@@ -124,6 +116,7 @@ def test_a_new_format_of_pages(gms_fsm: CommandLine, trace: Trace) -> None:
     one_message(gms_fsm("replay", "t.npz", "-o", "a.txt"), "it must end in", ".html", ".new")
 
 
+@pytest.mark.slow
 def test_a_usual_format_is_written_where_nobody_chooses(gms_fsm: CommandLine, trace: Trace) -> None:
     pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
     register(new("figure", usual=True))
@@ -150,7 +143,7 @@ def test_what_a_format_lacks_is_said_and_a_graph_is_written_as_text(tmp_path: Pa
 def test_a_format_is_registered_once() -> None:
     register(new("figure"))
     register(new("page"))
-    with pytest.raises(ParameterError, match=r"there is a format \.new of the subject 'page'"):
+    with pytest.raises(ParameterError, match=r"the subject 'page' already has a format \.new"):
         register(new("page"))
 
 

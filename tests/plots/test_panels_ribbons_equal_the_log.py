@@ -97,6 +97,7 @@ def test_names_are_drawn_only_where_they_fit(run: Trace) -> None:
     assert counts[1] < counts[0]
 
 
+@pytest.mark.slow
 def test_a_run_without_transitions_is_one_span_an_element() -> None:
     run = simulate(stick_slip("signed"), open_loop(), 0.5)
     drawn = spans_of(panels.ribbons(Figure().subplots(), run))

@@ -199,6 +199,7 @@ def test_residual_against_a_run_and_a_measurement(run: Trace, ax: Axes) -> None:
     assert ax.get_yscale() == "linear"
 
 
+@pytest.mark.slow
 def test_a_long_run_is_thinned_but_keeps_extremes_and_switches() -> None:
     times = np.linspace(0.0, 100.0, 60_000)
     run = simulate(stick_slip("published"), Prescribed(FIG4_SINE), 100.0, t_eval=times)

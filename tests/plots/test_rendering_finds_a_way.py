@@ -115,6 +115,7 @@ def test_text_alone_tells_graphviz_how_to_draw(tmp_path: Path) -> None:
     assert again.read_bytes() == direct.read_bytes()
 
 
+@pytest.mark.slow
 @needs_dot
 @pytest.mark.parametrize("suffix", BEGINS)
 def test_same_graph_same_file(suffix: str, tmp_path: Path) -> None:
@@ -179,5 +180,5 @@ def test_what_is_no_graph_no_chart_or_in_no_folder_is_said(tmp_path: Path) -> No
         render("chart.svg", statechart(LUGRE))  # type: ignore[arg-type]
     with pytest.raises(ParameterError, match=r"of a model its \.chart"):
         statechart("gms")  # type: ignore[arg-type]
-    with pytest.raises(OutputError, match="make its folder first, or choose another"):
+    with pytest.raises(OutputError, match="create its folder first, or choose another"):
         render(statechart(LUGRE), tmp_path / "none" / "chart.dot")

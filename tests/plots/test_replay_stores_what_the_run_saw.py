@@ -51,6 +51,7 @@ def column(run: dict[str, Any], number: int) -> np.ndarray:
     return np.broadcast_to(values, len(run["microstep"])) if values.size == 1 else values
 
 
+@pytest.mark.slow
 @uplot
 @pytest.mark.parametrize("law", ["published", "signed"])
 def test_every_row_of_a_transition_is_there_and_explained_as_the_run_explains_it(law: str) -> None:
@@ -86,6 +87,7 @@ def test_every_row_of_a_transition_is_there_and_explained_as_the_run_explains_it
                         assert stored == pytest.approx(value, rel=1e-6, abs=0.0)
 
 
+@pytest.mark.slow
 @uplot
 def test_the_log_is_complete_and_points_at_the_rows_that_firings_made() -> None:
     trace = fig4("signed")
@@ -132,6 +134,7 @@ def test_long_runs_are_thinned_but_keep_all_transitions() -> None:
     assert len(run["microstep"]) < 1600
 
 
+@pytest.mark.slow
 @uplot
 def test_wanted_times_of_a_loaded_trace_are_not_doubled(tmp_path: Path) -> None:
     model, rig = stick_slip("signed"), Prescribed(FIG4_SINE)
@@ -154,6 +157,7 @@ def test_a_signal_that_is_not_in_the_file_leaves_the_rows_as_they_are(tmp_path: 
     assert not any(run["between"])
 
 
+@pytest.mark.slow
 @uplot
 def test_two_runs_share_one_time_and_micro_steps_stand_side_by_side() -> None:
     page = data_of(replay_html(fig4("published"), fig4("signed")))
@@ -227,6 +231,7 @@ def test_a_page_in_a_missing_folder_is_one_clear_error(tmp_path: Path) -> None:
         write_replay(tmp_path / "none" / "page.html", fig4("signed"))
 
 
+@pytest.mark.slow
 @uplot
 def test_two_runs_of_one_model_are_told_apart_by_their_names() -> None:
     coarse, fine = fig4("signed"), fig4("signed")
@@ -265,9 +270,10 @@ def test_a_chart_without_edges_and_a_bank_of_many_elements_have_pages() -> None:
 @uplot
 def test_without_graphviz_the_page_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(_replay_chart, "drawn", lambda graph, form: None)
-    assert "The chart is left out" in replay_html(fig4("signed"))
+    assert "No chart: Graphviz" in replay_html(fig4("signed"))
 
 
+@pytest.mark.slow
 @uplot
 def test_a_notebook_shows_it_in_a_sandbox(tmp_path: Path) -> None:
     shown = replay(fig4("signed"))

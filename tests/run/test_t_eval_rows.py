@@ -1,10 +1,10 @@
-"""With t_eval the rows are exactly the wanted times, right-continuous, and the run is the same."""
+"""With t_eval the rows are exactly the requested times, right-continuous; the run is the same."""
 
 import numpy as np
 import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, State, Transition, simulate
-from tests.helpers import non_drifting, open_loop, pulled_mass, stick_slip
+from tests.helpers import FASTEST, non_drifting, open_loop, pulled_mass, stick_slip
 
 CASES = {
     "open loop, signed": (stick_slip("signed"), open_loop(), 31.0),
@@ -18,10 +18,10 @@ cases = pytest.mark.parametrize("case", CASES)
 
 @pytest.mark.parametrize("options", METHODS)
 @cases
-def test_rows_are_the_wanted_times(case, options):
-    """Few times, many times, unevenly spread: the rows are these, all micro-steps 0."""
+def test_rows_are_at_the_requested_times(case, options):
+    """Few times, many times, unevenly spread: these are the rows, all with micro-step 0."""
     model, rig, T = CASES[case]
-    full = simulate(model, rig, T, **options)
+    full = simulate(model, rig, T, engine=FASTEST, **options)
     rng = np.random.default_rng(7)
     for times in (
         [T],
@@ -31,7 +31,7 @@ def test_rows_are_the_wanted_times(case, options):
         np.linspace(0, T, 2501),
         np.sort(rng.uniform(0, T, 300)),
     ):
-        trace = simulate(model, rig, T, t_eval=times, **options)
+        trace = simulate(model, rig, T, engine=FASTEST, t_eval=times, **options)
         np.testing.assert_array_equal(trace.t, times)
         assert (trace.microstep == 0).all()
         np.testing.assert_array_equal(trace.transitions, full.transitions)
@@ -40,16 +40,16 @@ def test_rows_are_the_wanted_times(case, options):
 @pytest.mark.parametrize("options", METHODS)
 @cases
 def test_a_row_on_an_event_is_the_state_after_it(case, options):
-    """Asked for the very time of a transition, the row holds the last micro-step's values."""
+    """At the exact time of a transition, the row has the values of the last micro-step."""
     model, rig, T = CASES[case]
-    full = simulate(model, rig, T, **options)
+    full = simulate(model, rig, T, engine=FASTEST, **options)
     times = np.unique(full.transitions.t)
-    trace = simulate(model, rig, T, t_eval=times, **options)
+    trace = simulate(model, rig, T, engine=FASTEST, t_eval=times, **options)
     last = np.searchsorted(full.t, times, side="right") - 1
     for name in ("x", "v", "z", "F", "F_elements", "states"):
         np.testing.assert_array_equal(getattr(trace, name), getattr(full, name)[last], name)
     just_before = np.nextafter(times, 0)
-    before = simulate(model, rig, T, t_eval=just_before, **options)
+    before = simulate(model, rig, T, engine=FASTEST, t_eval=just_before, **options)
     first = np.searchsorted(full.t, times, side="left")
     np.testing.assert_array_equal(before.states, full.states[first])
     assert (before.states != trace.states).any(axis=1).all()
@@ -60,22 +60,22 @@ def test_a_row_on_an_event_is_the_state_after_it(case, options):
 def test_rows_on_steps_are_the_steps_rows(case):
     """The times of the accepted steps give the accepted steps' values."""
     model, rig, T = CASES[case]
-    full = simulate(model, rig, T)
+    full = simulate(model, rig, T, engine=FASTEST)
     times, last = np.unique(full.t[::-1], return_index=True)
     last = len(full) - 1 - last
-    trace = simulate(model, rig, T, t_eval=times)
+    trace = simulate(model, rig, T, engine=FASTEST, t_eval=times)
     np.testing.assert_allclose(trace.z, full.z[last], rtol=0, atol=1e-14)
     np.testing.assert_array_equal(trace.states, full.states[last])
 
 
 @cases
-def test_rows_between_steps_are_as_good_as_the_steps(case):
-    """Dense output: rows inside steps keep to a run at rtol 1e-12 as closely as its steps do."""
+def test_rows_between_steps_are_as_accurate_as_the_steps(case):
+    """Dense output: rows inside steps are as close to a run at rtol 1e-12 as its steps are."""
     model, rig, T = CASES[case]
     times = np.linspace(0, T, 1501)
-    trace = simulate(model, rig, T, t_eval=times)
-    exact = simulate(model, rig, T, t_eval=times, rtol=1e-12, atol=1e-15)
-    # Rows within the error of an event's place may lie on its other side.
+    trace = simulate(model, rig, T, engine=FASTEST, t_eval=times)
+    exact = simulate(model, rig, T, engine=FASTEST, t_eval=times, rtol=1e-12, atol=1e-15)
+    # Rows within the error of an event's time may be on its other side.
     near = np.abs(times[:, None] - exact.transitions.t).min(axis=1) < 1e-4
     assert near.mean() < 0.1
     assert np.abs(trace.z - exact.z)[~near].max() < 5e-5

@@ -101,6 +101,7 @@ def test_the_check_finds_a_hidden_advice() -> None:
     assert _hiding('raise ChartError("none", advice="give one; or two")') == []
 
 
+@pytest.mark.slow
 def test_hardly_any_reason_hides_an_advice() -> None:
     found = [
         f"{path.relative_to(ROOT)}:{line}"
@@ -111,6 +112,7 @@ def test_hardly_any_reason_hides_an_advice() -> None:
     assert len(found) <= HIDDEN, found
 
 
+@pytest.mark.slow
 def test_no_place_reads_a_message() -> None:
     """What an error says is for people; programs have its fields."""
     for folder in ("gms_fsm", "plots"):

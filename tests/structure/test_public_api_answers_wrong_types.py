@@ -238,6 +238,7 @@ def _faults(entry: Entry) -> Iterator[str]:
 NAMES = [entry.name for entry in _entries(Path())]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.filterwarnings("ignore")
 def test_wrong_kinds_are_answered(
@@ -248,6 +249,7 @@ def test_wrong_kinds_are_answered(
     assert list(_faults(entry)) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in NAMES if "." not in name])
 def test_what_is_called_right_is_right(name: str, tmp_path: Path) -> None:
     """Else the wrong ones above would be refused for another reason."""

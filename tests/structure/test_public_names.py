@@ -105,6 +105,6 @@ def test_a_file_that_hides_a_package_is_named(hiding: str, tmp_path: Path) -> No
     assert done.returncode == 1
     last = done.stderr.strip().splitlines()[-1]
     assert last == (
-        f"ImportError: {place} hides the package {name!r} that gms-fsm brings; rename that file or "
+        f"ImportError: {place} hides the package {name!r} of gms-fsm; rename that file or "
         "folder, or run Python from another folder"
     )

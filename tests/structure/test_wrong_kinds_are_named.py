@@ -100,10 +100,10 @@ def test_a_model_is_made_of_a_chart(wrong: Any) -> None:
 
 @pytest.mark.parametrize("n", [True, False, 1.5, 0, "1"])
 def test_how_many_elements(n: Any) -> None:
-    said = "n is .*; a bank has a whole number of elements"
+    said = "n is .*; the number of elements must be an integer"
     _refused(ParameterError, said, lambda: ChartModel(_chart(), {"k": 1.0}, n=n))
     if n != 1.5:
-        _refused(ParameterError, "elements is .*a whole number", lambda: block_diagram(n))
+        _refused(ParameterError, "elements is .*an integer", lambda: block_diagram(n))
 
 
 @pytest.mark.parametrize("values", [None, [1.0], "k = 1"])

@@ -164,6 +164,7 @@ def test_a_session_takes_the_same_names(case: str) -> None:
         assert names_in(parse_value(name, session.names)) == {name}
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(importlib.util.find_spec("uplot") is None, reason="needs uplot-python")
 @pytest.mark.parametrize("case", ["gms", "one element"])
 def test_a_page_takes_the_same_names(case: str) -> None:

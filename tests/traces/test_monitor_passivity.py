@@ -9,6 +9,7 @@ k w**2 (F_s**2 - F_c**2) / 2; with F_s = F_c none. The published law has no such
 
 from __future__ import annotations
 
+import functools
 import math
 from pathlib import Path
 
@@ -82,6 +83,7 @@ def test_slip_at_constant_velocity(law: str, v: float, z0: float) -> None:
     assert found.deficit[0] == pytest.approx(max(0.0, -min(heat)), abs=1e-7)
 
 
+@pytest.mark.slow
 def test_over_a_run_heat_and_spring_add_up_to_what_was_taken() -> None:
     """On a fine grid of its own, by the trapezoid, from the forces of the trace."""
     model, rig = pulled_mass()
@@ -121,6 +123,7 @@ def bank(F_s: float, v_s: float, C: float) -> GMS:
     return GMS(parameters, law="signed")
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(parts=MOTIONS, C=st.floats(0.02, 1.0))
 def test_with_plain_coulomb_friction_no_element_ever_makes_energy(
@@ -134,6 +137,7 @@ def test_with_plain_coulomb_friction_no_element_ever_makes_energy(
         assert tolerance < 0.02 * max(taken, 0.01)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(parts=MOTIONS, C=st.floats(0.02, 1.0), F_s=st.floats(1.05, 2.0), v_s=st.floats(1e-3, 0.1))
 def test_a_phase_of_slip_makes_at_most_what_the_stribeck_rise_stores(
@@ -196,6 +200,7 @@ def test_a_start_in_slip_can_make_it_too() -> None:
 
 
 # --------------------------------------------------------------------------- the published law
+@pytest.mark.slow
 def test_the_published_law_makes_energy_in_fig_4() -> None:
     """2.16 J by element 1; checked on a fine grid from the forces, by the trapezoid."""
     model, rig = stick_slip("published"), Prescribed(FIG4_SINE)
@@ -243,6 +248,7 @@ def test_the_published_law_makes_energy_for_every_backward_slip(
 
 
 # --------------------------------------------------------------------------- what it applies to
+@pytest.mark.slow
 def test_lugre_is_a_spring_and_a_damper_too() -> None:
     model = LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4.0, stribeck=Stribeck(1.0, 1.5, 1e-3))
     trace = simulate(model, Prescribed("0.01*sin(t)"), 10.0, monitors="passivity")
@@ -284,6 +290,16 @@ def test_other_forces_are_not_judged(force: str, applicable: bool) -> None:
 
 
 # --------------------------------------------------------------------------- how sure it is
+@functools.cache
+def exactly(law: str) -> PassivityVerdict:
+    """The energies of the Fig. 4 run, from fine steps."""
+    model, rig = stick_slip(law), Prescribed(FIG4_SINE)
+    return passivity(
+        simulate(model, rig, 60.0, rtol=1e-10, atol=1e-13, max_step=0.01, monitors="passivity")
+    )
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["signed", "published"])
 @pytest.mark.parametrize(
     "options",
@@ -300,9 +316,7 @@ def test_other_forces_are_not_judged(force: str, applicable: bool) -> None:
 def test_the_tolerance_covers_the_error_of_the_sums(law: str, options: dict[str, object]) -> None:
     """The same energies from coarse steps, or few rows, as from fine ones, within what is said."""
     model, rig = stick_slip(law), Prescribed(FIG4_SINE)
-    fine = passivity(
-        simulate(model, rig, 60.0, rtol=1e-10, atol=1e-13, max_step=0.01, monitors="passivity")
-    )
+    fine = exactly(law)
     found = passivity(simulate(model, rig, 60.0, monitors=[Passivity(1e-3)], **options))  # type: ignore[arg-type]
     for name in ("deficit", "made"):
         for value, right, tolerance in zip(

@@ -12,11 +12,13 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from gms_fsm.language import parse_value
 from gms_fsm.traces._archives import member
 
 
+@pytest.mark.slow
 def test_four_threads_read_files_and_formulas(tmp_path: Path) -> None:
     path = tmp_path / "arrays.npz"
     np.savez(path, **{f"a{i}": np.zeros((3, 4)) for i in range(5)})

@@ -35,7 +35,7 @@ from gms_fsm import (
     Transition,
     simulate,
 )
-from gms_fsm._files import written_whole
+from gms_fsm._files import write_whole
 from gms_fsm.errors import GMSError, OutputError, SignalError, TraceFileError
 from tests.helpers import non_drifting, pulled_mass, stick_slip
 
@@ -279,7 +279,7 @@ def test_a_writer_that_fails_leaves_the_old_file_and_nothing_else(
         raise error
 
     with pytest.raises(OutputError if isinstance(error, OSError) else type(error)) as caught:
-        written_whole(path, fail)
+        write_whole(path, fail)
     if isinstance(error, OSError):
         assert "disk full" in str(caught.value)
         assert str(path) in str(caught.value)
@@ -375,6 +375,7 @@ def _damaged(content: bytes, changes: list[tuple[str, float, int]]) -> bytes:
     return bytes(data)
 
 
+@pytest.mark.slow
 @settings(max_examples=250, deadline=None)
 @given(mutations)
 def test_a_damaged_npz_loads_or_is_refused(changes: list[tuple[str, float, int]]) -> None:
@@ -382,6 +383,7 @@ def test_a_damaged_npz_loads_or_is_refused(changes: list[tuple[str, float, int]]
     _loads_or_is_refused({"run.npz": _damaged(content, changes)})
 
 
+@pytest.mark.slow
 @settings(max_examples=250, deadline=None)
 @given(mutations, st.booleans())
 def test_a_damaged_csv_loads_or_is_refused(
@@ -393,6 +395,7 @@ def test_a_damaged_csv_loads_or_is_refused(
     _loads_or_is_refused(files)
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(mutations, st.sampled_from(["rows_t", "rows_y", "rows_mode", "transitions", "header"]))
 def test_a_damaged_array_in_a_sound_archive_loads_or_is_refused(

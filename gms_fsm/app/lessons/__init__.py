@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from gms_fsm._files import output_folder, written_whole
+from gms_fsm._files import output_folder, write_whole
 from gms_fsm.app.lessons import (
     l1_hysteresis,
     l2_drift,
@@ -193,7 +193,7 @@ def teach(number: int, folder: str | Path) -> Taught:
     folder = output_folder(folder, [f"{stem}.txt", *pictures, *pages])
     result = chosen.run()
     text = ("\n".join(result.lines()) + "\n").encode()
-    files = [written_whole(folder / f"{stem}.txt", lambda file: file.write(text))]
+    files = [write_whole(folder / f"{stem}.txt", lambda file: file.write(text))]
     for kind, write in (("figure", _draw), ("replay page", _replay)):
         try:
             files += write(number, result, folder)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm._files import output_folder, written_whole
+from gms_fsm._files import output_folder, write_whole
 from gms_fsm.app.paper import FORCE, VELOCITY
 from gms_fsm.app.paper.claims import Claim, differing_numbers, force_difference, judge
 from gms_fsm.app.paper.experiments import Progress, experiments, run_one
@@ -75,7 +75,7 @@ def write(
             raise error.replaced(kept=kept).inside(name) from error.__cause__
         files += _keep(folder, name, traces[name])
     text = claims_text(traces, force, velocity)
-    claims = written_whole(folder / "claims.md", lambda file: file.write(text.encode()))
+    claims = write_whole(folder / "claims.md", lambda file: file.write(text.encode()))
     files += _draw_charts(folder)
     try:
         files += _draw_figures(folder, traces, force)
@@ -90,7 +90,7 @@ def _keep(folder: Path, name: str, trace: Trace) -> list[Path]:
     path = folder / "transitions" / f"{name}.csv"
     return [
         trace.save(folder / "traces" / f"{name}.npz"),
-        written_whole(path, lambda file: file.write(log)),
+        write_whole(path, lambda file: file.write(log)),
     ]
 
 

@@ -1,0 +1,229 @@
+"""Steps end where they must (grid, knots, wanted rows, crossings) and no step is wasted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+
+from integrators import advance as kernel
+from integrators.hybrid import Buffers, Equations, Options, buffers
+from integrators.sliding import Surfaces
+from integrators.step_size import next_factor
+from integrators.steps import ERROR_BEFORE, T_STOP, H, Motion, T
+from integrators.tableaux import DP45, RK4
+
+
+class _Run:
+    """One machine-less run of y' = slope(t, y), y(0) = 1, called by hand."""
+
+    def __init__(
+        self,
+        slope: Callable[[float, float], float] = lambda t, y: 0.0,
+        margin: Callable[[float, float], float] | None = None,
+        *,
+        t: float = 0.0,
+        step: float | None = None,
+        max_step: float = math.inf,
+        tolerance: float = 1e-6,
+        times: list[float] | None = None,
+        knots: tuple[float, ...] = (),
+        capacity: int | None = None,
+        origin: float = 0.0,
+    ) -> None:
+        self.asked: list[float] = []
+
+        def flow(t: float, y: list, mode: list, held: list, p: None, dy: list) -> None:
+            self.asked.append(t)
+            dy[0] = slope(t, y[0])
+
+        def margins(t: float, y: list, mode: list, p: None, watch: list, out: list) -> None:
+            assert margin is not None, "nothing is watched, and margins are asked for"
+            out[0] = margin(t, y[0])
+
+        equations = Equations(
+            flow=flow,
+            flow_live=flow,
+            arm=lambda *_: None,
+            margins=margins,
+            normal=lambda *_: None,
+            p=None,
+            held=0,
+            strict=[False],
+            relations=["g"],
+            surfaces=Surfaces([], [], []),
+            knots=list(knots),
+        )
+        method = RK4 if step else DP45
+        options = Options(method, step, tolerance, [tolerance], max_step, 0.0, 10**6, True, times)
+        self.b: Buffers = buffers(equations, origin, [1.0], [], 100.0, options, capacity)
+        self.motion, self.y = Motion(flow, margins, None), self.b.now.y
+        self.b.now.clock[T], self.b.now.f[0] = t, slope(t, 1.0)
+        if margin is not None:
+            w = self.b.relations
+            w.watch[0] = 1
+            w.active.append(0)
+            w.start[0] = margin(t, 1.0)
+            w.truth[0] = w.start[0] >= 0.0
+
+    def to(
+        self, t_stop: float, *, h: float = 0.1, before: float = 1.0, steps: int = 1000
+    ) -> tuple[int, float, float, float]:
+        b, clock = self.b, self.b.now.clock
+        clock[T_STOP], clock[H], clock[ERROR_BEFORE] = t_stop, h, before
+        status = kernel.advance(self.motion, b.plan, b.now, b.relations, b.out, b.scratch, steps)
+        return status, clock[T], clock[H], clock[ERROR_BEFORE]
+
+    @property
+    def rows(self) -> list[float]:
+        return self.b.out.rows_t[: self.b.out.cursor[0]]
+
+
+def test_fixed_steps_end_on_the_grid_wherever_they_begin() -> None:
+    run = _Run(step=0.25)
+    assert run.to(1.1)[:2] == (kernel.REACHED, 1.1)
+    assert run.rows == [0.25, 0.5, 0.75, 1.0, 1.1]
+    late = _Run(step=0.25, t=0.6)
+    late.to(1.25)
+    assert late.rows == [0.75, 1.0, 1.25]
+    shifted = _Run(step=0.25, t=2.1, origin=2.1)
+    shifted.to(3.0)
+    assert shifted.rows == [2.35, 2.6, 2.85, 3.0]
+
+
+@pytest.mark.parametrize("share", [0.5, 1.0])
+def test_no_sliver_is_stepped_at_either_end(share: float) -> None:
+    sliver = share * kernel.tick_at(0.125)
+    run = _Run(step=0.25, t=0.5 - sliver)
+    run.to(1.0 + sliver)
+    assert run.rows == [0.75, 1.0 + sliver]
+    adaptive = _Run()
+    adaptive.to(0.125 + sliver, h=0.125)
+    assert adaptive.rows == [0.125 + sliver]
+
+
+@pytest.mark.parametrize("step", [None, 0.25])
+def test_steps_end_on_knots_and_go_on_as_before(step: float | None) -> None:
+    run = _Run(step=step, knots=(0.0, 0.3, 0.31, 5.0), max_step=0.25)
+    run.to(1.0, h=0.25)
+    assert {0.3, 0.31, 1.0} <= set(run.rows)
+    assert 4 <= len(run.rows) <= 6
+
+
+def test_no_step_is_longer_than_the_longest_allowed() -> None:
+    run = _Run(max_step=0.3)
+    run.to(3.0)
+    assert max(b - a for a, b in zip([0.0, *run.rows], run.rows, strict=False)) <= 0.3 + 1e-12
+    assert 10 <= len(run.rows) <= 12
+
+
+def test_a_step_cut_short_by_a_stop_does_not_shorten_the_one_after_it() -> None:
+    assert _Run().to(1e-9, h=0.5)[2] == 0.5  # ten times the sliver would be 1e-8
+    assert _Run().to(0.2, h=0.5)[2] == 2.0  # but it may grow by what was learned: 10 * 0.2
+    assert _Run().to(0.5, h=0.5)[2] == 5.0
+
+
+def test_the_step_after_a_rejected_one_does_not_grow_at_once() -> None:
+    run = _Run(lambda t, y: math.inf if t > 0.3 else 1.0)
+    assert run.to(100.0, h=1.0, steps=1)[1:3] == (0.2, 0.2)  # a fifth; without error from there
+    assert run.to(100.0, h=0.05, steps=1)[2] == pytest.approx(0.5)  # but the one after that may
+
+
+def test_a_step_that_was_accepted_narrowly_is_followed_by_a_shorter_one() -> None:
+    narrow = 0
+    for i in range(60):
+        h = 0.04 + 0.001 * i
+        run = _Run(lambda t, y: math.cos(40.0 * t))
+        _, t, h_next, error = run.to(10.0, h=h, steps=1)
+        assert error <= 1.0
+        if t == h and error > 0.8:
+            narrow += 1
+            assert h_next == h * next_factor(error, 1.0, 5) < h
+    assert narrow >= 1
+
+
+def test_the_remembered_error_is_that_of_the_last_step_but_never_vanishes() -> None:
+    assert _Run().to(1.0, steps=1)[3] == 1e-4
+    run = _Run(lambda t, y: math.cos(40.0 * t))
+    assert 1e-4 < run.to(10.0, h=0.04, steps=1)[3] <= 1.0
+
+
+def test_it_comes_back_when_the_steps_or_the_rows_are_used_up() -> None:
+    run = _Run(step=0.25)
+    assert run.to(100.0, steps=3)[:2] == (kernel.FULL, 0.75)
+    assert run.to(100.0, steps=1)[:2] == (kernel.FULL, 1.0)
+    full = _Run(step=0.25, capacity=2)
+    assert full.to(100.0)[:2] == (kernel.FULL, 0.5)
+    assert full.rows == [0.25, 0.5]
+    wanted = _Run(step=0.25, times=[0.3], capacity=1)  # a row a time, however many steps
+    assert wanted.to(1.0)[:2] == (kernel.REACHED, 1.0)
+
+
+def test_rows_at_wanted_times_are_right_continuous_and_each_written_once() -> None:
+    run = _Run(lambda t, y: 2.0 * t, times=[0.0, 0.1, 0.3, 0.5, 1.0], step=0.5)
+    run.to(0.5)
+    assert run.rows == [0.0, 0.1, 0.3]
+    run.to(1.0)
+    assert run.rows == [0.0, 0.1, 0.3, 0.5]
+    for t, (y,) in zip(run.rows, run.b.out.rows_y, strict=False):
+        assert y == pytest.approx(1.0 + t * t, abs=1e-14)
+
+
+def test_a_crossing_ends_the_arc_there_with_state_and_row() -> None:
+    for step in (0.25, None):
+        run = _Run(lambda t, y: 2.0 * t, lambda t, y: y - 1.36, step=step)
+        status, t, _, _ = run.to(2.0)
+        assert (status, t) == (kernel.CROSSED, pytest.approx(0.6, abs=1e-12))
+        assert run.y[0] == pytest.approx(1.36, abs=1e-12)
+        assert run.y[0] >= 1.36
+        assert run.rows[-1] == t
+
+
+def test_rows_behind_a_crossing_wait_for_what_is_switched_there() -> None:
+    run = _Run(lambda t, y: 1.0, lambda t, y: y - 1.6, step=1.0, times=[0.5, 0.7])
+    assert run.to(1.0)[0] == kernel.CROSSED
+    assert run.rows == [0.5]
+
+
+def test_an_adaptive_step_with_an_early_crossing_is_done_again_up_to_it() -> None:
+    run = _Run(lambda t, y: math.cos(t), lambda t, y: t - 0.2)
+    _, t, _, _ = run.to(2.0, h=0.5)
+    assert t == pytest.approx(0.2, abs=1e-12)
+    assert max(run.asked) >= 0.5
+    assert max(run.asked[-6:]) <= 0.2 + 1e-12  # no stage of the step kept lies behind it
+    later = _Run(lambda t, y: 1.0, lambda t, y: t - 0.9)  # after a quiet step in the same call
+    assert later.to(2.0, h=0.1)[1] == pytest.approx(0.9, abs=1e-12)
+    assert later.rows[0] == 0.1
+    assert max(later.asked[-6:]) <= 0.9 + 1e-12
+    late = _Run(lambda t, y: math.cos(t), lambda t, y: t - 0.097)
+    late.to(2.0, h=0.1)
+    assert max(late.asked[-6:]) == 0.1  # near the step's end it is kept
+
+
+def test_between_stops_a_quiet_step_hands_its_margins_to_the_next() -> None:
+    run = _Run(lambda t, y: 1.0, lambda t, y: t - 1.1, step=0.25)
+    assert run.to(2.0)[1] == pytest.approx(1.1, abs=1e-12)
+    assert run.b.relations.start[0] == pytest.approx(-0.1)
+
+
+def test_an_infinite_slope_and_a_step_of_nothing_are_told_apart() -> None:
+    known = (kernel.REACHED, kernel.CROSSED, kernel.FULL, kernel.TOO_SMALL, kernel.NOT_FINITE)
+    assert len(set(known)) == 5
+
+    def wall(t: float, y: float) -> float:
+        return math.inf if t > 0.5 else 1.0
+
+    assert _Run(wall, step=0.3).to(1.0)[:2] == (kernel.NOT_FINITE, 0.3)
+    gap = {"slope": lambda t, y: math.nan if t > 0.5 else 1.0}
+    assert _Run(**gap, step=0.3).to(1.0)[:2] == (kernel.NOT_FINITE, 0.3)
+    for run in (_Run(wall), _Run(**gap)):
+        status, t, _, _ = run.to(1.0)
+        assert status == kernel.NOT_FINITE
+        assert t == pytest.approx(0.5, abs=1e-9)
+    # Only the slope at the step's end is infinite: no stage has that y.
+    cliff = _Run(lambda t, y: math.inf if 0.778 < y < 0.779 else -y, step=0.25)
+    assert cliff.to(1.0)[:2] == (kernel.NOT_FINITE, 0.0)
+    assert _Run(t=1.0).to(2.0, h=1e-30)[:2] == (kernel.TOO_SMALL, 1.0)
+    blind = _Run(lambda t, y: 1e200 * math.sin(1e30 * t), tolerance=1e-12, t=0.5)
+    assert blind.to(1.0)[0] == kernel.TOO_SMALL

@@ -1,0 +1,142 @@
+"""The search for a crossing finds the first change of a truth within a step, with few looks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+
+import pytest
+
+from integrators.crossings import NO_CHANGE, Path, first_change, nothing_near, watched
+from integrators.steps import Dense, Motion, Now, Scratch
+
+Margin = Callable[[float], float]
+
+
+def _first(*margins: Margin, strict: bool = False, resolution: float = 1e-12) -> tuple:
+    """Return the place in [0, 1] where a truth first changes, and how often was looked."""
+    w = watched([strict] * len(margins), 1)
+    looks = []
+
+    def fill(t: float, y: list[float], mode: list, p: None, watch: list, out: list) -> None:
+        looks.append(t)
+        for r, margin in enumerate(margins):
+            out[r] = margin(t)
+
+    for r, margin in enumerate(margins):
+        w.watch[r] = 1
+        w.active.append(r)
+        g = margin(0.0)
+        w.truth[r], w.start[r] = g > 0.0 or (g == 0.0 and not strict), g
+
+    def interpolate(_: None, theta: float, out: list[float]) -> None:
+        out[0] = theta
+
+    path = Path(Motion(fill, fill, None), [], interpolate, None, 0.0, 1.0, [1.0])
+    place = first_change(path, w, resolution)
+    looks.clear()
+    # Whatever the scratch holds of the search before.
+    assert first_change(path, w, resolution) == place
+    return place, len(looks)
+
+
+@pytest.mark.parametrize("resolution", [1e-3, 1e-6, 1e-12])
+@pytest.mark.parametrize(
+    "margin",
+    [
+        lambda t: t - 0.3,
+        lambda t: 0.3 - t,
+        lambda t: t**3 - 0.027,
+        lambda t: (t - 0.3) * (2.0 - t),
+        lambda t: -1.0 if t < 0.3 else 1e-9,
+        lambda t: 1e-9 if t < 0.3 else -1.0,
+    ],
+)
+def test_the_place_is_right_of_the_change_by_at_most_the_resolution(
+    margin: Margin, resolution: float
+) -> None:
+    place, _ = _first(margin, resolution=resolution)
+    assert (margin(place) >= 0.0) != (margin(0.0) >= 0.0)
+    assert (margin(place - 1.001 * resolution) >= 0.0) == (margin(0.0) >= 0.0)
+
+
+def test_a_straight_margin_is_found_by_its_slope_not_by_halving() -> None:
+    # End, both sides of the place, and the middle of the quiet step before it.
+    assert _first(lambda t: t - 0.3)[1] <= 4
+    assert _first(lambda t: 0.3 - t)[1] <= 6  # exactly zero is still true: once more
+    assert _first(lambda t: t - 0.3, lambda t: 0.8 - t)[1] <= 4
+
+
+def test_a_jump_is_found_by_halving_when_the_slope_misleads() -> None:
+    # Forty halvings close a bracket to 1e-12; every other guess may be the slope's.
+    assert _first(lambda t: -1.0 if t < 0.3 else 1e-9)[1] <= 90
+
+
+@pytest.mark.parametrize("middle", [0.1003, 0.3007, 0.4997, 0.62, 0.9001])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_window_of_a_256th_of_a_step_is_found_wherever_it_lies(
+    middle: float, sign: float
+) -> None:
+    half = 0.51 / 256
+    place, _ = _first(lambda t: sign * ((t - middle) ** 2 - half**2))
+    assert place == pytest.approx(middle - half, abs=1e-11)
+
+
+def test_a_margin_that_is_never_quiet_is_looked_at_in_every_512th_of_a_step_and_no_more() -> None:
+    def rough(t: float, window: float) -> float:
+        halvings = Fraction(t).denominator.bit_length() - 1
+        return 1.0 if abs(t - window) < 1e-9 else -1.0 if halvings % 2 else -1e-3
+
+    for k in range(1, 512, 2):
+        place, _ = _first(lambda t, k=k: rough(t, k / 512))
+        assert place == pytest.approx(k / 512, abs=1.1e-9)
+    assert _first(lambda t: rough(t, 2.0)) == (NO_CHANGE, 512)  # the end, and 511 between
+
+
+def test_of_two_windows_the_earlier_counts_though_the_later_is_seen_first() -> None:
+    def two(t: float) -> float:
+        return -(t - 0.18) * (t - 0.22) * (t - 0.48) * (t - 0.52)
+
+    assert _first(two)[0] == pytest.approx(0.18, abs=1e-11)
+    assert _first(lambda t: t - 0.9, two)[0] == pytest.approx(0.18, abs=1e-11)
+
+
+def test_a_window_before_the_first_place_believed_in_is_found() -> None:
+    # False position lands behind the window, at 0.59, and closes on 0.75 first.
+    assert _first(lambda t: (t - 0.39) * (t - 0.43) * (t - 0.75))[0] == pytest.approx(
+        0.39, abs=1e-11
+    )
+
+
+def test_a_margin_that_starts_or_touches_at_zero_changes_as_its_kind_says() -> None:
+    assert _first(lambda t: t)[0] == NO_CHANGE  # true at zero already
+    assert 0.0 < _first(lambda t: t, strict=True)[0] <= 1e-12
+    assert _first(lambda t: 0.0)[0] == _first(lambda t: 0.0, strict=True)[0] == NO_CHANGE
+    touching = -((0.5) ** 2)
+    assert _first(lambda t: touching + t * (1 - t))[0] == pytest.approx(0.5, abs=1e-6)
+    assert _first(lambda t: touching + t * (1 - t), strict=True)[0] == NO_CHANGE
+
+
+def test_a_far_margin_with_a_bend_is_quiet_after_one_look_inside() -> None:
+    assert _first(lambda t: -10.0 + t * (1 - t)) == (NO_CHANGE, 2)
+    assert _first(lambda t: 10.0 - t * (1 - t)) == (NO_CHANGE, 2)
+    assert _first(lambda t: -1e-3 - t * t * 0.1 - t) == (NO_CHANGE, 2)  # near, but monotone
+    assert _first(lambda t: -1e-9) == (NO_CHANGE, 2)
+
+
+def test_the_cubic_between_two_ends_is_that_of_both_slopes() -> None:
+    # y = t**3 between 1 and 3: the middle of the cubic is 8, of a line 14, and t = 2 is handed on.
+    w = watched([False], 1)
+    w.watch[0] = 1
+    w.active.append(0)
+    seen = []
+
+    def fill(t: float, y: list[float], mode: list, p: None, watch: list, out: list) -> None:
+        seen.append((t, y[0]))
+        out[0] = y[0] - 100.0
+
+    w.start[0] = 1.0 - 100.0
+    now = Now([1.0], y=[1.0], f=[3.0], mode=[], held=[], floor=[])
+    scratch = Scratch([], y_new=[27.0], f_new=[27.0], error=[], dense=Dense([], [], [], [], []))
+    assert nothing_near(Motion(fill, fill, None), now, 3.0, scratch, w)
+    assert seen == [(3.0, 27.0), (2.0, 8.0)]

@@ -1,0 +1,111 @@
+"""Printed text has the brackets that its order needs and no others; small powers are products."""
+
+from __future__ import annotations
+
+import pytest
+
+from gms_fsm.language import (
+    MATLAB_LIKE,
+    Binary,
+    Name,
+    Negative,
+    Number,
+    parse_condition,
+    parse_value,
+    product_power,
+    spell,
+)
+
+
+def test_small_powers_are_products_until_the_text_grows_too_long() -> None:
+    def power(base: str, exponent: str) -> int | None:
+        tree = parse_value(f"({base})**({exponent})", "abcdefghv")
+        assert isinstance(tree, Binary)
+        return product_power(tree.left, tree.right)
+
+    assert [power("v", e) for e in ("8", "-8", "--8", "0", "-0", "1")] == [8, -8, 8, 0, 0, 1]
+    assert [power("v", e) for e in ("9", "-9", "0.5", "v", "1 + 1")] == [None] * 5
+    eight = "a + b + c + d + e + f + g + h"
+    assert power(eight, "8") == 8  # 64 parts
+    assert power(eight + " + v", "7") == 7  # 63
+    assert power(eight + " + v", "8") is None  # 72
+    assert power("a + b + c + d + e + f + g + h + v + a + b + c + d", "5") is None  # 65
+    assert power("(a + b + c + d + e + f + g)**h", "8") == 8  # 7 + 1 parts
+    assert power(f"({eight})**v", "8") is None  # 8 + 1
+    assert power(f"({eight})**1", "8") == 8
+    assert power(f"({eight} + v)**0", "8") == 8
+    seven = "a + b + c + d + e + f + g"
+    for one in ("h", "h**1", "(h * v)**0"):  # each is one part
+        assert power(f"{seven} + {one}", "8") == 8  # 64
+        assert power(f"{eight} + {one}", "8") is None  # 72
+    assert power("(a * -b)**8", "4") == 4  # 16 * 4
+    assert power("(a * -b)**8", "-5") is None
+    assert power("(a + b)**0.5", "8") == 8  # by pow once: two parts, not eight
+    assert power("min(a, b)**-4", "8") == 8  # 2 * 4 * 8
+    assert power("min(a, b, c)**-4", "8") is None
+
+
+@pytest.mark.parametrize(
+    ("text", "python", "matlab"),
+    [
+        ("a - (b - c)", "a - (b - c)", "a - (b - c)"),
+        ("a + b - c", "a + b - c", "a + b - c"),
+        ("a + (b + c)", "a + (b + c)", "a + (b + c)"),
+        ("(a + b) * c", "(a + b) * c", "(a + b) * c"),
+        ("a / (b * c)", "a / (b * c)", "a / (b * c)"),
+        ("-(a * b)", "-(a * b)", "-(a * b)"),
+        ("-(-a)", "-(-a)", "-(-a)"),
+        ("-a * b", "-a * b", "-a * b"),
+        ("a**1", "a", "a^1"),
+        ("(a + b)**1", "a + b", "(a + b)^1"),
+        ("a**0", "1.0", "a^0"),
+        ("(a * b)**2", "a * b * (a * b)", "(a * b)^2"),
+        ("(a + b)**2", "(a + b) * (a + b)", "(a + b)^2"),
+        ("(-a)**2", "-a * -a", "(-a)^2"),
+        ("a**-2", "1.0 / (a * a)", "a^(-2)"),
+        ("c / a**2", "c / (a * a)", "c / a^2"),
+        ("a**0.5 * b", "pow(a, 0.5) * b", "a^0.5 * b"),
+        ("a**b**c", "pow(a, pow(b, c))", "a^(b^c)"),
+        ("abs(a - b)", "abs(a - b)", "|a - b|"),
+        ("exp(a) * max(a, b)", "exp(a) * max(a, b)", "exp(a) * max(a, b)"),
+        (
+            "0.1 + 1e-7 + 0.30000000000000004",
+            "0.1 + 1e-07 + 0.30000000000000004",
+            "0.1 + 1e-07 + 0.30000000000000004",
+        ),
+        ("1234567", "1234567.0", "1234567.0"),
+    ],
+)
+def test_a_value_has_no_more_and_no_fewer_brackets_than_its_order_needs(
+    text: str, python: str, matlab: str
+) -> None:
+    tree = parse_value(text, "abc")
+    assert (spell(tree), spell(tree, MATLAB_LIKE)) == (python, matlab)
+
+
+def test_a_number_below_zero_binds_like_a_sign() -> None:  # of derivatives: read are none
+    assert spell(Negative(Number(-0.5))) == "-(-0.5)"
+    assert spell(Binary("**", Name("a"), Number(-0.5)), MATLAB_LIKE) == "a^(-0.5)"
+
+
+@pytest.mark.parametrize(
+    ("text", "python", "matlab"),
+    [
+        ("a - b > c and a + b < c", "a - b > c and a + b < c", "a - b > c && a + b < c"),
+        ("not a > b and c > 0", "not a > b and c > 0.0", "!(a > b) && c > 0"),
+        ("not (a > b and c > 0)", "not (a > b and c > 0.0)", "!(a > b && c > 0)"),
+        ("not not a > b", "not not a > b", "!(!(a > b))"),
+        ("(a > b or b > c) and c > a", "(a > b or b > c) and c > a", "(a > b || b > c) && c > a"),
+        ("a > b or b > c and c > a", "a > b or b > c and c > a", "a > b || b > c && c > a"),
+        ("a > b and (b > c and c > a)", "a > b and (b > c and c > a)", "a > b && (b > c && c > a)"),
+        ("a > b or (b > c or c > a)", "a > b or (b > c or c > a)", "a > b || (b > c || c > a)"),
+        ("a + b <= -c", "a + b <= -c", "a + b <= -c"),
+        ("state(2) == slip", "state(2) == slip", "state(2) == slip"),
+        ("state != slip", "not state == slip", "!(state == slip)"),
+    ],
+)
+def test_a_condition_has_no_more_and_no_fewer_brackets_than_its_order_needs(
+    text: str, python: str, matlab: str
+) -> None:
+    tree = parse_condition(text, "abc", ["stick", "slip"], 2, own_state=True)
+    assert (spell(tree), spell(tree, MATLAB_LIKE)) == (python, matlab)

@@ -1,0 +1,142 @@
+"""A trace file that no run can have written is refused; odd ones that a run can write are read.
+
+Fuzzing found each case.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gms_fsm import Prescribed, Trace, simulate
+from gms_fsm.errors import (
+    TraceFileError,
+)
+from gms_fsm.traces.trace import dwell_times
+from tests.helpers import stick_slip
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    path = tmp_path_factory.mktemp("saved") / "run.npz"
+    simulate(stick_slip("signed"), Prescribed("0.3"), 3.0).save(path)
+    return path.read_bytes()
+
+
+def rewritten(saved: bytes, path: Path, change: Callable[[dict[str, Any]], object]) -> Path:
+    with np.load(io.BytesIO(saved)) as file:
+        arrays = dict(file)
+    change(arrays)
+    with path.open("wb") as out:
+        np.savez(out, **arrays)
+    return path
+
+
+def test_a_trace_without_rows_is_refused(saved: bytes, tmp_path: Path) -> None:
+    def empty(arrays: dict[str, Any]) -> None:
+        for name in list(arrays):
+            if name not in ("header", "transitions"):
+                arrays[name] = arrays[name][:0]
+
+    with pytest.raises(TraceFileError, match=r"run\.npz: the file has no rows"):
+        Trace.load(rewritten(saved, tmp_path / "run.npz", empty))
+
+
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [
+        ("edge", "nowhere"),
+        ("source", "slip"),
+        ("target", "x"),
+        ("t", np.nan),
+        ("t", 9e9),
+        ("t", -1.0),
+    ],
+)
+def test_a_log_that_the_chart_cannot_have_written_is_refused(
+    column: str, value: Any, saved: bytes, tmp_path: Path
+) -> None:
+    """It broke the table of dwell times, and the explanation of a row."""
+
+    def change(arrays: dict[str, Any]) -> None:
+        arrays["transitions"][column][1] = value
+
+    with pytest.raises(TraceFileError, match=r"run\.npz: the transition log|run\.npz: rows micro"):
+        Trace.load(rewritten(saved, tmp_path / "run.npz", change))
+
+
+@pytest.mark.parametrize("microstep", [-1, 9, 2**40])
+def test_microsteps_without_firings_are_refused(
+    microstep: int, saved: bytes, tmp_path: Path
+) -> None:
+    def change(arrays: dict[str, Any]) -> None:
+        arrays["rows_microstep"][-1] = microstep
+
+    with pytest.raises(TraceFileError, match="microstep"):
+        Trace.load(rewritten(saved, tmp_path / "run.npz", change))
+
+
+def test_a_trace_that_does_not_name_its_engine_can_be_sampled(saved: bytes, tmp_path: Path) -> None:
+    def change(arrays: dict[str, Any]) -> None:
+        header = json.loads(str(arrays["header"]))
+        header["settings"] = {}
+        arrays["header"] = np.array(json.dumps(header))
+
+    trace = Trace.load(rewritten(saved, tmp_path / "run.npz", change))
+    assert len(trace.sample([0.5, 1.0]).columns()["F"]) == 2
+    assert dwell_times(trace).sum() == pytest.approx(12.0)
+
+
+@pytest.mark.parametrize("value", [1e308, np.inf, np.nan])
+def test_beyond_the_largest_float_samples_are_not_finite(
+    value: float, saved: bytes, tmp_path: Path
+) -> None:
+    def change(arrays: dict[str, Any]) -> None:
+        for name in ("rows_y", "stops_y"):
+            arrays[name][1::2] = value
+            arrays[name][::2] = -value
+
+    trace = Trace.load(rewritten(saved, tmp_path / "run.npz", change))
+    sampled = trace.sample(np.linspace(0.1, 2.9, 5))
+    assert not np.isfinite(sampled.z).all()
+
+
+@pytest.mark.parametrize("name", ["header", "rows_t", "rows_y", "transitions", "observed_F"])
+def test_an_array_that_unpacks_to_a_thousand_times_its_size_is_refused(
+    name: str, saved: bytes, tmp_path: Path
+) -> None:
+    """Half a megabyte of file took half a gigabyte of memory."""
+    path, head = tmp_path / "run.npz", io.BytesIO()
+    shape, kind = ((), "<U40000000") if name == "header" else ((20_000_000,), "<f8")
+    np.lib.format.write_array_header_1_0(
+        head, {"descr": kind, "fortran_order": False, "shape": shape}
+    )
+    with (
+        zipfile.ZipFile(io.BytesIO(saved)) as old,
+        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as new,
+    ):
+        for member in old.namelist():
+            with new.open(member, "w") as file:
+                if member != f"{name}.npy":
+                    file.write(old.read(member))
+                    continue
+                file.write(head.getvalue())
+                for _ in range(160):
+                    file.write(bytes(1_000_000))
+    assert path.stat().st_size < 1_000_000
+    with pytest.raises(TraceFileError, match=rf"run\.npz: {name} unpacks to 160"):
+        Trace.load(path)
+
+
+def test_a_long_run_at_rest_is_no_such_array(tmp_path: Path) -> None:
+    """All but the times of such a trace packs a thousandfold, and it must load."""
+    trace = simulate(stick_slip("signed"), Prescribed("0"), 1.0, t_eval=np.linspace(0, 1, 300_000))
+    path = trace.save(tmp_path / "run.npz")
+    assert Trace.load(path).z.shape == (300_000, 4)
