@@ -1,4 +1,4 @@
-"""What every lesson has to keep: five lines, and a picture with nothing cut off or covered."""
+"""Checks for every lesson: five lines, and a figure with nothing cut off or covered."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gms_fsm.app.lessons import Lesson, Result
 
 
 def check_lines(result: Result) -> None:
-    """Five lines: the question, what ran and under which law, two with figures, what follows."""
+    """Check the five lines: question, runs with the law, two with measured values, conclusion."""
     lines = result.lines()
     question, run, first, second, moral = lines
     assert question.startswith("Question: ")
@@ -27,7 +27,7 @@ def check_lines(result: Result) -> None:
 
 
 def check_figure(lesson: Lesson, result: Result) -> None:
-    """Every axis has its unit, no text leaves the picture, no two texts meet."""
+    """Check that every axis has its unit, and no text is cut off or overlaps another."""
     pytest.importorskip("matplotlib", reason="pictures need the extra 'plots'")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 

@@ -170,7 +170,7 @@ def _check(axes: Sequence[Axis], known: Sequence[Parameter]) -> None:
         if name not in [each.name for each in known]:
             units = (f"{each.name} [{each.unit}]".removesuffix(" []") for each in known)
             raise ParameterError(
-                f"--over {cut(name)}: unknown name; choose from {', '.join(units)}"
+                f"--over {cut(name)}: unknown name", advice=f"choose from {', '.join(units)}"
             )
         if names.count(name) > 1:
             raise ParameterError(f"--over {name}: it is given twice", advice="give it once")

@@ -1,4 +1,4 @@
-"""Every command answers; a mistake is one message, never a traceback, and the session goes on."""
+"""Every command answers; a mistake is one message, never a traceback, and the session continues."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_the_overview_names_every_command() -> None:
         ("q", "quit"),
     ],
 )
-def test_letters_are_those_of_pdb(alias: str, name: str) -> None:
+def test_short_names_are_those_of_pdb(alias: str, name: str) -> None:
     assert ALIASES[alias] == name
 
 
@@ -147,7 +147,7 @@ def test_letters_are_those_of_pdb(alias: str, name: str) -> None:
 )
 def test_a_mistake_is_one_message(command: str, said: str) -> None:
     answer, after = answers(FIG_4, command, "print t")
-    # said on one line, or wrapped at the screen's edge
+    # printed on one line, or wrapped
     assert answer.startswith("error: ")
     assert said in " ".join(answer.split())
     assert answer.count("error:") == 1
@@ -177,19 +177,19 @@ def test_moves() -> None:
     assert "element 4: slip -> stick by arrest" in said[4]
 
 
-def test_next_says_that_there_is_no_other() -> None:
+def test_next_reports_that_there_is_no_other() -> None:
     said = answers(FIG_4, "goto 99.9", "next", "next", "next")[3]
     assert said.startswith("no transition before the end\nrow 349, t = 100 s")
 
 
-def test_until_says_where_and_whether() -> None:
+def test_until_reports_where_and_whether() -> None:
     said = answers(FIG_4, "u z1 > 0.123", "u state(1) == slip", "u z1 > 99")
     assert said[0].startswith("between rows 8 and 9, t = 2.60048553")
     assert "element 1: stick -> slip by break_away_forward" in said[1]
     assert said[2].startswith("it does not become true before the end\nrow 349, t = 100 s")
 
 
-def test_until_stays_where_it_is_true_already_and_for_good() -> None:
+def test_until_stays_if_the_condition_is_always_true() -> None:
     said = answers(FIG_4, "goto 25", "u t > 1", "s", "u t > 30", "u t > 30", "u t > 30.1")
     stays = "it is already true here and does not become true again; until stops where it becomes"
     assert " ".join(said[1].split()) == " ".join(f"{stays} true {said[0]}".split())
@@ -200,14 +200,14 @@ def test_until_stays_where_it_is_true_already_and_for_good() -> None:
     assert "t = 30.1 s" in said[5]
 
 
-def test_until_goes_on_to_where_it_becomes_true_again() -> None:
+def test_until_continues_to_where_it_becomes_true_again() -> None:
     said = answers(FIG_4, "u v > 0.1", "u v > 0.1", "u v > 0.1")
     times = [float(text.split("t = ")[1].split(" s")[0]) for text in said]
     assert times == sorted(set(times))
 
 
 @pytest.mark.parametrize("command", ["step", "step 3", "next", "continue", "until z1 > 9", "u t>1"])
-def test_at_the_end_there_is_only_back(command: str) -> None:
+def test_at_the_end_only_back_works(command: str) -> None:
     said = answers(FIG_4, "goto 100", "b arrest", command, "print t", "back", command)
     assert said[2] == "error: this is the end of the run; go back first"
     assert said[3] == "100"
@@ -234,7 +234,7 @@ def test_print_and_watch() -> None:
     assert said[8] == "no watch is set"
 
 
-def test_a_watch_that_cannot_be_computed_does_not_disturb() -> None:
+def test_a_watch_that_cannot_be_computed_does_no_harm() -> None:
     said = answers(FIG_4, "s", "watch 1 / z1", "back", "s")
     assert "watch 1: 1 / z1 = '1 / z1' cannot be computed here" in " ".join(said[2].split())
     assert "row 1" in said[3]
@@ -380,7 +380,7 @@ def test_an_empty_line_repeats_a_move_only_when_typed() -> None:
     assert made.reply("").startswith("row 6")
 
 
-def test_comments_are_passed_over() -> None:
+def test_comments_are_ignored() -> None:
     said = answers(FIG_4, "# find the row", "goto 25")
     assert said[0] == ""
     assert said[1].startswith("row 76")
@@ -423,7 +423,7 @@ def test_completion(line: str, text: str, words: list[str]) -> None:
     assert sorted(found) == sorted(words)
 
 
-def test_a_livelock_is_shown_and_can_be_left() -> None:
+def test_a_livelock_is_shown_and_can_be_stepped_back_from() -> None:
     from tests.inspection.test_session_failures_are_outcomes import both_ways
 
     made = Debugger(Session(both_ways(), Prescribed("0.15"), 20.0), "", None, io.StringIO())
@@ -438,7 +438,7 @@ def test_a_livelock_is_shown_and_can_be_left() -> None:
     assert "the run cannot continue" not in made.reply("goto 12")
 
 
-def test_a_guard_that_cannot_be_computed_is_said() -> None:
+def test_a_guard_that_cannot_be_computed_is_reported() -> None:
     from gms_fsm import Chart, ChartModel, State, Stribeck, Transition
 
     chart = Chart(

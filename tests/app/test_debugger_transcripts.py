@@ -1,4 +1,4 @@
-"""Scripted, the terminal debugger tells the story of the Fig. 4 run and of the pulled mass."""
+"""Scripts of the debugger reproduce the stories of the Fig. 4 run and of the pulled mass."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def test_pulled_mass_story() -> None:
         "compare 1 2",
         "branches",
     )
-    # It is pulled forward: of itself it never breaks away backward.
+    # It is pulled forward and never breaks away backward by itself.
     assert said[1].startswith("no breakpoint was hit\nrow 2043, t = 60 s")
     assert "arrest does not fire: |v| <= v_c is false by" in said[2]
     assert said[4].startswith("branch 1, from branch 0: v = -0.5")
@@ -134,7 +134,7 @@ def test_under_the_signed_law_it_does_arrest() -> None:
 
 
 @pytest.mark.parametrize("scenario", [FIG_4, PULLED])
-def test_every_transition_of_the_log_is_told(scenario: str) -> None:
+def test_every_transition_of_the_log_is_shown(scenario: str) -> None:
     loaded = load_scenario(SCENARIOS / f"{scenario}.toml")
     log = simulate(loaded.model, loaded.rig, **loaded.arguments).transitions
     said = answers(scenario, *["next"] * (len(log) + 1), "log 1000")
