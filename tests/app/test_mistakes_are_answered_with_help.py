@@ -155,7 +155,7 @@ def test_a_formula_may_have_one(scenario: Path) -> None:
 def test_an_unknown_lesson_lists_the_lessons(gms_fsm: CommandLine, asked: str) -> None:
     done = gms_fsm("lesson", "--", asked)
     assert done.code == 2
-    assert done.message.startswith(f"there is no lesson '{asked}'; these are there:")
+    assert done.message.startswith(f"there is no lesson '{asked}'; choose one of")
     for number, each in LESSONS.items():
         assert f"{number}  {each.TITLE}: {each.QUESTION}" in done.message
 

@@ -4,7 +4,8 @@ Heat = energy taken from the motion - rise of k z**2 / 2. In stick it grows by s
 it grows by k z (v - dz) + sigma dz v: the signed law keeps that positive while the deflection
 follows the motion, but not while a spring winds up faster than it is moved (dz > v). Then it
 creates energy, in one phase of slip at most what the rise of the Stribeck curve from F_c to F_s
-stores, k w**2 (F_s**2 - F_c**2) / 2; with F_s = F_c none. The published law has no such bound for v < 0.
+stores, k w**2 (F_s**2 - F_c**2) / 2; with F_s = F_c none. The published law has no such bound for
+v < 0.
 """
 
 from __future__ import annotations
