@@ -1,7 +1,7 @@
-"""A branch of a session: a run under way, row by row, with a cursor.
+"""A branch of a session: a run computed row by row, with a cursor.
 
-Rows once computed are kept, so going back and forward shows the same bits. A run that cannot go on
-is no exception here but an outcome of its branch.
+Computed rows are kept, so going back and forward shows the same bits. A run that cannot continue
+is not an exception here but an outcome of its branch.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gms_fsm.inspection._poking import Edits
-from gms_fsm.inspection._told import Fired
+from gms_fsm.inspection._results import Fired
 from gms_fsm.lowering.layout import LogRecord
 from gms_fsm.run.simulate import Run
 from gms_fsm.traces._between import interpolated
@@ -31,7 +31,7 @@ __all__ = ["Branch", "Row"]
 
 
 class Row(NamedTuple):
-    """A row of a branch, or a place between two of them (then of micro-step 0)."""
+    """A row of a branch, or a point between two rows (then with micro-step 0)."""
 
     t: float
     microstep: int
@@ -40,22 +40,22 @@ class Row(NamedTuple):
 
 
 class Branch:
-    """A run under way, row by row, behind an unchanged part of its parent.
+    """A run computed row by row, which follows an unchanged part of its parent.
 
     Parameters
     ----------
     run : Run
-        From where the branch begins.
+        The run, from the start of the branch.
     parent : int or None
-        Number of the branch it was poked from.
+        Number of the branch in which the poke was made.
     fork : int
-        The parent's row under the cursor then; rows 0 to fork are shared.
+        Row under the parent's cursor at that time; rows 0 to fork are shared.
     shared : Branch or None
-        The parent itself.
+        The parent branch.
     edits : Edits or None
-        What was poked; None for the run itself.
+        The changed values; None for the original run.
     begin : Row or None
-        The place of the poke, if it was between two rows: a row of this branch.
+        The point of the poke, if it was between two rows; it is a row of this branch.
     """
 
     def __init__(
@@ -70,12 +70,12 @@ class Branch:
         self.run, self.parent, self.fork, self.shared = run, parent, fork, shared
         self.edits, self.begin = edits, begin
         self.ended = False  # whether the last row is that of t_end
-        self.failure: SimulationError | None = None  # why it cannot go on
+        self.failure: SimulationError | None = None  # why it cannot continue
         self.cursor = 0
-        self.between: Row | None = None  # a located place behind the cursor
+        self.between: Row | None = None  # a located point after the cursor row
         self.offset = fork + 1 + (begin is not None)
-        self.stops: set[int] = set()  # rows at which the machines were asked
-        self.firings: list[int] = []  # rows made by firings, own part
+        self.stops: set[int] = set()  # rows at which the guards were evaluated
+        self.firings: list[int] = []  # rows made by firings in this branch
         self.pull()
 
     # ------------------------------------------------------------------ rows
@@ -83,7 +83,7 @@ class Branch:
         return self.offset + len(self.run.recorder.rows.t)
 
     def pull(self) -> bool:
-        """Compute at least one more row; return whether there is one."""
+        """Compute at least one more row, and return whether there was one."""
         before = len(self)
         with _unbroken():
             while not (self.ended or self.failure) and len(self) == before:
@@ -99,7 +99,7 @@ class Branch:
         return len(self) > before
 
     def complete(self) -> None:
-        """Compute all rows up to the end, or to where the run cannot go on."""
+        """Compute all rows to the end, or until the run cannot continue."""
         while self.pull():
             pass
 
@@ -121,11 +121,11 @@ class Branch:
 
     @property
     def here(self) -> Row:
-        """The place under the cursor."""
+        """The row or point at the cursor."""
         return self.place(self.cursor)
 
     def place(self, row: int) -> Row:
-        """Return a row; for that under the cursor the located place behind it, if there is one."""
+        """Return a row, or for the cursor row the located point after it, if there is one."""
         if row == self.cursor and self.between is not None:
             return self.between
         return self.raw(row)
@@ -135,7 +135,7 @@ class Branch:
         return bisect_right(range(len(self)), t, key=lambda row: self.raw(row).t) - 1
 
     def behind(self, row: int) -> Callable[[float], Row]:
-        """Return what gives the place at a time between a row and the next."""
+        """Return a function of time that gives points between a row and the next."""
         before, after = self.raw(row), self.raw(row + 1)
         program, mode = self.run.start.program, list(before.mode)
         ends = before.t, np.array(before.y), after.t, np.array(after.y)
@@ -146,7 +146,7 @@ class Branch:
         return place
 
     def scope(self, row: Row) -> Scope:
-        """Return the values at a row or a place by name."""
+        """Return the values at a row or point, by name."""
         start = self.run.start
         return Scope.of(start.model, start.program, row.t, row.y, row.mode)
 
@@ -158,26 +158,26 @@ class Branch:
 
     # ------------------------------------------------------------------ firings
     def log(self) -> list[LogRecord]:
-        """Return all firings so far, the shared part included."""
+        """Return all firings so far, including those of the shared part."""
         before: list[LogRecord] = []
         if self.shared is not None:
             before = [self.shared.record(row) for row in self.shared.firing_rows(self.fork + 1)]
         return before + self.run.recorder.log
 
     def firing_rows(self, end: int) -> list[int]:
-        """Return the rows before `end` that firings made."""
+        """Return the rows before `end` that were made by firings."""
         before = [] if self.shared is None else self.shared.firing_rows(min(end, self.fork + 1))
         return before + self.firings[: bisect_left(self.firings, end)]
 
     def record(self, row: int) -> LogRecord:
-        """Return the log's record of the firing that made a row."""
+        """Return the log record of the firing that made a row."""
         if row <= self.fork:
             assert self.shared is not None
             return self.shared.record(row)
         return self.run.recorder.log[bisect_left(self.firings, row)]
 
     def fired(self, row: int) -> Fired | None:
-        """Return the firing that made a row, None if none did."""
+        """Return the firing that made a row, or None."""
         if row not in self.firing_rows(row + 1)[-1:]:
             return None
         record = self.record(row)
@@ -200,7 +200,7 @@ class Branch:
 
 @contextmanager
 def _unbroken() -> Iterator[None]:
-    """Hold Ctrl-C back until the row is complete: a run that is broken off cannot go on."""
+    """Delay Ctrl-C until the row is complete, since an interrupted run cannot continue."""
     usual = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(usual):
         yield

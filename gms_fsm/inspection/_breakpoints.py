@@ -1,4 +1,4 @@
-"""Breakpoints: where a session's `proceed` stops."""
+"""Breakpoints, at which `proceed` of a session stops."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Literal
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import SessionError
-from gms_fsm.inspection._asked import source_of
+from gms_fsm.inspection._arguments import source_of
 from gms_fsm.inspection._branch import Branch
 from gms_fsm.inspection._conditions import holds_at, read
 from gms_fsm.inspection.explain import holds
@@ -21,22 +21,22 @@ KINDS: tuple[Kind, ...] = ("tested", "valid", "fires", "enter", "leave")
 
 @dataclass
 class Breakpoint:
-    """Where `Session.proceed` stops.
+    """A breakpoint, at which `Session.proceed` stops.
 
     Parameters
     ----------
     kind : {"tested", "valid", "fires", "enter", "leave"}
-        Guard of an edge asked, guard becoming true, edge taken; state entered or left.
+        Guard of an edge evaluated, guard becoming true, edge taken; state entered or left.
     name : str
-        The edge's or the state's name.
+        Name of the edge or state.
     element : int or None
-        Counted from 0; None for all.
+        Element index, from 0; None for all elements.
     condition : str
-        Must hold too; empty for none.
+        Additional condition that must hold; empty for none.
     hits : int
-        Stop at this hit, and at every one after it.
+        Stop at this hit and at every later one.
     seen : int
-        Hits so far.
+        Number of hits so far.
     """
 
     kind: Kind
@@ -50,10 +50,10 @@ class Breakpoint:
 def new_breakpoint(
     chart: Chart, kind: str, name: str, element: int | None, condition: str, hits: int
 ) -> Breakpoint:
-    """Return a breakpoint; raise a `SessionError` if kind, name or hits do not exist."""
+    """Return a breakpoint; raise `SessionError` if kind, name or hits is invalid."""
     if kind not in KINDS:
         raise SessionError(
-            f"breakpoint kind {kind!r}", advice=f"it must be one of {', '.join(KINDS)}"
+            f"unknown breakpoint kind {kind!r}", advice=f"it must be one of {', '.join(KINDS)}"
         )
     edges, states = [e.name for e in chart.transitions], [s.name for s in chart.states]
     known, what = (states, "state") if kind in ("enter", "leave") else (edges, "edge")
@@ -65,23 +65,23 @@ def new_breakpoint(
 
 
 def hits(point: Breakpoint, model: Model, branch: Branch, row: int) -> bool:
-    """Tell whether a breakpoint hits at a row.
+    """Return whether a breakpoint hits at a row.
 
     Parameters
     ----------
     point : Breakpoint
-        What is waited for.
+        The breakpoint.
     model : Model
-        What runs.
+        The simulated model.
     branch : Branch
-        What is walked.
+        The current branch.
     row : int
-        Not the first.
+        Row number, at least 1.
 
     Returns
     -------
     bool
-        Whether it happens, and the condition holds.
+        Whether the event happens and the condition holds.
     """
     elements = range(model.n) if point.element is None else (point.element,)
     if not any(_happens(point, model.chart, branch, row, i) for i in elements):
@@ -90,7 +90,7 @@ def hits(point: Breakpoint, model: Model, branch: Branch, row: int) -> bool:
 
 
 def _happens(point: Breakpoint, chart: Chart, branch: Branch, row: int, element: int) -> bool:
-    """Tell whether what a breakpoint waits for happens to an element at a row."""
+    """Return whether the event of a breakpoint happens to an element at a row."""
     if point.kind in ("fires", "enter", "leave"):
         fired = branch.fired(row)
         if fired is None or fired.element != element:
@@ -102,8 +102,8 @@ def _happens(point: Breakpoint, chart: Chart, branch: Branch, row: int, element:
     if branch.state(now, element) != source:
         return False
     if point.kind == "tested":
-        # The driver asks where an arc ends, and again after every firing. That a row was
-        # such a place is known when the next one is computed.
+        # The loop evaluates guards where an arc ends, and again after every firing. Whether this
+        # was done at a row is known once the next row has been computed.
         if row + 1 >= len(branch):
             branch.pull()
         return row in branch.stops or now.microstep > 0

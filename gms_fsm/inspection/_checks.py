@@ -1,4 +1,4 @@
-"""The five checks of a chart. What each of them states is said in `gms_fsm.inspection.prove`."""
+"""The five checks of a chart, described in `gms_fsm.inspection.prove`."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ from gms_fsm.language import (
 
 __all__ = ["chattering", "determinism", "livelock", "reachability", "stability"]
 
-MOST_CYCLES = 200  # ways back; a friction chart has a handful
-MOST_WAYS = 64  # alternatives of a guard
+MOST_CYCLES = 200  # cycles; a friction chart has a handful
+MOST_WAYS = 64  # alternatives per guard
 
 
 # --------------------------------------------------------------------------- determinism
 def determinism(prover: Prover) -> Iterator[Finding]:
-    """Check that edges of one state exclude each other, or that their order settles it."""
+    """Check that edges of one state exclude each other, or that their order decides."""
     chart = prover.chart
     for state in chart.states:
         edges = [edge.name for _, edge in chart.leaving(state.name)]
@@ -60,27 +60,27 @@ def _at_once(prover: Prover, guards: Sequence[Condition], first: str) -> Answer:
     prover.defined(reading)
     point = prover.example(names_of(*guards), *formulas)
     if point is None:
-        return Answer("proved", "never enabled at once")
-    text = f"both are enabled at once; the machine takes the earlier, {first}"
+        return Answer("proved", "never enabled at the same time")
+    text = f"both are enabled at the same time; the machine takes the earlier, {first}"
     return by_example("settled by order", text, point, enabled(guards, point))
 
 
 # --------------------------------------------------------------------------- livelock
 def livelock(prover: Prover) -> Iterator[Finding]:
-    """Check that no edge and a way back are enabled at one point."""
+    """Check that no cycle of edges is enabled at one point."""
     cycles = list(islice(_cycles(prover.chart), MOST_CYCLES + 1))
     if not cycles:
-        yield Finding("livelock", "proved", (), "no edge has a way back")
+        yield Finding("livelock", "proved", (), "the edges form no cycle")
     for cycle in cycles[:MOST_CYCLES]:
         where = tuple(name for edge in cycle for name in (edge.source, edge.name))
         yield prover.settle("livelock", where, _all_around, cycle)
     if len(cycles) > MOST_CYCLES:
-        text = f"more than {MOST_CYCLES} ways back; the others were not checked"
+        text = f"more than {MOST_CYCLES} cycles; the others were not checked"
         yield Finding("livelock", "undecided", (), text)
 
 
 def _cycles(chart: Chart) -> Iterator[tuple[Transition, ...]]:
-    """Yield every way from a state back to it that passes no state twice."""
+    """Yield every cycle of edges that passes no state twice."""
 
     def extend(path: tuple[Transition, ...], first: int) -> Iterator[tuple[Transition, ...]]:
         passed = {chart.state_index(edge.source) for edge in path}
@@ -96,7 +96,7 @@ def _cycles(chart: Chart) -> Iterator[tuple[Transition, ...]]:
 
 
 def _assigned(chart: Chart, edge: Transition) -> list[tuple[str, Value]]:
-    """Return the assignments of an edge in the order they are done."""
+    """Return the assignments of an edge in the order of execution."""
     places = (("exit", edge.source), ("action", edge.name), ("entry", edge.target))
     return [item for place in places for item in chart.assignments[place].items()]
 
@@ -126,12 +126,12 @@ def _all_around(prover: Prover, cycle: tuple[Transition, ...]) -> Answer:
         text = "all are enabled at one point: endless switching"
         return refuted(text, point, _comes_back(chart, cycle, point))
     if prover.find(*around(2)[0]) is None:
-        return Answer("proved", "what it assigns ends it before a second pass")
-    return Answer("undecided", "each pass assigns other values; no more than two were followed")
+        return Answer("proved", "the assignments end it before a second pass")
+    return Answer("undecided", "each pass assigns different values; only two passes were followed")
 
 
 def _comes_back(chart: Chart, cycle: Sequence[Transition], point: Mapping[str, float]) -> bool:
-    """Whether floats too are led around the cycle and back to the same point."""
+    """Return whether the cycle also returns to the same point in floats."""
     here = dict(point)
     for edge in cycle:
         if not enabled([chart.guards[edge.name]], here):
@@ -175,7 +175,7 @@ def _can_hold(prover: Prover, edge: Transition) -> Answer:
     prover.defined(reading)
     if prover.find(formula, *hidden) is None:
         names = ", ".join(earlier)
-        text = f"never taken: wherever its guard holds, an earlier edge goes first ({names})"
+        text = f"never taken: wherever its guard holds, an earlier edge takes precedence ({names})"
         return Answer("refuted", text)
     return Answer("proved", "its guard can hold")
 
@@ -198,25 +198,26 @@ def _in_graph(state: str, certain: set[str], possible: set[str], yes: str, no: s
 
 # --------------------------------------------------------------------------- chattering
 def chattering(prover: Prover) -> Iterator[Finding]:
-    """Check that no two flows push across a guard's surface into each other."""
+    """Check that no two flows push toward each other across a guard surface."""
     pairs = [
         (there, back)
         for there, back in combinations(prover.chart.transitions, 2)
         if there.source == back.target != there.target == back.source
     ]
     if not pairs:
-        yield Finding("chattering", "proved", (), "no two states have edges there and back")
+        yield Finding("chattering", "proved", (), "no two states have edges in both directions")
     for there, back in pairs:
         where = (there.source, there.name, back.source, back.name)
         yield prover.settle("chattering", where, _pushed, there, back)
 
 
 def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
-    """Look for a point from which each flow pushes into the guard that leaves its state.
+    """Search for a point at which each flow pushes into the guard that leaves its state.
 
-    A comparison is on its surface where its margin is zero. Each guard needs one there whose margin
-    grows under the own flow and falls under the other; its other margins must be positive, or zero
-    and growing. Zero and at rest, or the place of a jump of a flow, is not decided to first order.
+    A comparison is on its surface where its margin is zero. Each guard needs one such comparison,
+    whose margin grows under its own flow and falls under the other; its other margins must be
+    positive, or zero and growing. A margin at rest at zero, or a point where a flow jumps, is not
+    decided to first order.
     """
     chart, z3 = prover.chart, prover.z3
     if _assigned(chart, there) or _assigned(chart, back):
@@ -242,7 +243,7 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
         strict.append(z3.And(*crossed, *growing))
         loose += [z3.And(*crossed, *not_falling), z3.And(at_break, *touched, *reached)]
     if not strict:
-        return Answer("proved", "their guards never open at one place and time")
+        return Answer("proved", "their guards never become true at the same place and time")
     breaks = [*of_flows.breaks, *of_guards.breaks]
     prover.defined(of_flows)
     prover.defined(of_guards)
@@ -258,8 +259,8 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
     if of_guards.breaks:
         raise Undecided("sgn jumps in a guard")
     if prover.find(z3.Or(loose)) is not None:
-        raise Undecided("not to first order: where a flow jumps, or a margin rests at zero")
-    return Answer("proved", "on no surface do both flows push into the other's guard")
+        raise Undecided("not decided to first order: a flow jumps, or a margin stays at zero")
+    return Answer("proved", "there is no surface on which both flows push into the other's guard")
 
 
 Ways: TypeAlias = list[tuple[Requirement, ...]]
@@ -279,10 +280,11 @@ def _ways(parts: Split) -> Ways:
 
 
 def _at_one_time(prover: Prover, parts: Sequence[Requirement]) -> bool:
-    """Whether comparisons of inputs alone allow both guards.
+    """Return whether the comparisons of inputs alone allow both guards.
 
-    Inputs run alike in both states, so both guards need them at one time: ``v > v_c`` in the one
-    and ``abs(v) <= v_c`` in the other is no chattering, though both are about to change at v_c.
+    Inputs are the same in both states, so both guards must allow them at one time: ``v > v_c`` in
+    one and ``abs(v) <= v_c`` in the other is not chattering, though both are about to change at
+    v_c.
     """
     variables = {*prover.chart.variables}
     alike = [part.relation for part in parts if not names_in(part.relation) & variables]
@@ -293,7 +295,7 @@ def _at_one_time(prover: Prover, parts: Sequence[Requirement]) -> bool:
 
 
 def _moved(prover: Prover, reading: Reading, state: str) -> Duals:
-    """Return every name with its rate in a state."""
+    """Return every name with its rate of change in a state."""
     chart, symbols = prover.chart, prover.symbols
     rates = {name: prover.rates[f"d{name}/dt"] for name in chart.inputs}
     if "t" in rates:
@@ -306,7 +308,7 @@ def _moved(prover: Prover, reading: Reading, state: str) -> Duals:
 
 
 def _surface(guard: Condition, point: Mapping[str, float]) -> str:
-    """Name the surface of a guard that a point lies on."""
+    """Describe the surface of a guard on which a point lies."""
     for part in (part.comparison for way in _ways(split(guard)) for part in way):
         if evaluate(part.left, point) == evaluate(part.right, point):
             return f"{shown(part.left)} = {shown(part.right)}"
@@ -335,7 +337,7 @@ def stability(prover: Prover) -> Iterator[Finding]:
 
 def _equilibrium(prover: Prover, flow: Value, variable: str, sign: str) -> Answer:
     if others := sorted(names_in(flow) & {*prover.chart.variables} - {variable}):
-        raise Undecided(f"the flow depends on {', '.join(others)} too")
+        raise Undecided(f"the flow also depends on {', '.join(others)}")
     case = []
     if sign:
         v = prover.symbols["v"]
@@ -354,7 +356,7 @@ def _equilibrium(prover: Prover, flow: Value, variable: str, sign: str) -> Answe
     point = prover.example(names_in(flow) | {variable}, *case, rate == 0, slope > 0)
     if point is not None:
         place = _place(prover, flow, variable, case)
-        return refuted(f"unstable: {variable} runs away from {place}", point)
+        return refuted(f"unstable: {variable} moves away from {place}", point)
     if prover.find(*case, rate == 0) is None:
         return Answer("proved", f"no equilibrium: d{variable}/dt is never 0")
     if prover.find(*case, slope >= 0) is None:
@@ -365,7 +367,7 @@ def _equilibrium(prover: Prover, flow: Value, variable: str, sign: str) -> Answe
 
 
 def _place(prover: Prover, flow: Value, variable: str, case: Sequence[Any]) -> str:
-    """Name the equilibrium of a flow where a simple text does."""
+    """Describe the equilibrium of a flow, if a short text can."""
     chart = prover.chart
     names = sorted(names_in(flow) & {*chart.inputs, *chart.parameter_names} - {"v"})
     simple = ["0", *names, *(f"{a} / {b}" for a in names for b in names if a != b)]

@@ -1,4 +1,4 @@
-"""Conditions and watches over a session: read for a model, asked at a place."""
+"""Conditions and watches of a session: parsed for a model, evaluated at a row or point."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ __all__ = ["holds_at", "read", "value_of"]
 
 
 def read(model: Model, text: str) -> Condition:
-    """Read a condition such as ``"z1 > 0.3 and state(2) == slip"``."""
+    """Parse a condition such as ``"z1 > 0.3 and state(2) == slip"``."""
     states = [state.name for state in model.chart.states]
     with _numbered(model):
         return parse_condition(text, watch_names(model), states, model.n, own_state=model.n == 1)
 
 
 def holds_at(condition: Condition, branch: Branch, row: Row) -> bool:
-    """Tell whether a condition holds at a row of a branch, or a place between two."""
+    """Return whether a condition holds at a row of a branch, or at a point between two rows."""
     return holds(condition, branch.scope(row).watches())
 
 
 def value_of(model: Model, text: str, values: Mapping[str, Any]) -> float:
-    """Return the value of an expression over the names of a scope's watches."""
+    """Return the value of a watch expression, given the values of its names."""
     with _numbered(model):
         tree = parse_value(text, watch_names(model))
     try:
@@ -40,7 +40,7 @@ def value_of(model: Model, text: str, values: Mapping[str, Any]) -> float:
 
 @contextmanager
 def _numbered(model: Model) -> Iterator[None]:
-    """Say of a variable without an element's number that it needs one."""
+    """Explain that a variable without an element number needs one."""
     try:
         yield
     except ExpressionError as error:

@@ -1,4 +1,4 @@
-"""What became of the statements about a chart: findings and their report."""
+"""Results of the checks of a chart: findings and their report."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ CHECKS: tuple[Check, ...] = get_args(Check)
 
 @dataclass(frozen=True)
 class Finding:
-    """One statement about a chart, and what became of it.
+    """The result of one statement about a chart.
 
     Parameters
     ----------
     check : {"determinism", "livelock", "reachability", "chattering", "stability"}
-        What was asked.
+        The check.
     status : {"proved", "settled by order", "refuted", "undecided"}
-        The answer.
+        The result.
     where : tuple of str
-        The states and edges it is about, in the order they are passed.
+        The states and edges concerned, in order of traversal.
     text : str
-        The answer in words.
+        The result in words.
     counterexample : mapping of str to float
-        A point that refutes the statement, or at which the order settles it, name by name, exact
-        in floats; rates of inputs are called ``ds/dt``. Empty if there is none, or if no point is
+        A point that refutes the statement, or at which the order decides, by name, exact in
+        floats; rates of inputs are called ``ds/dt``. Empty if there is none, or if no point is
         needed (a state that no edge enters).
     case : str
-        What of a state is meant, for stability: ``"z for v < 0"``.
+        The case of a state concerned, for stability: ``"z for v < 0"``.
     """
 
     check: Check
@@ -59,16 +59,16 @@ class Finding:
 
 @dataclass(frozen=True)
 class Report:
-    """What was proved of a chart, what was refuted, and what stayed undecided.
+    """The statements about a chart that were proved, refuted or left undecided.
 
     Parameters
     ----------
     chart : Chart
         The chart.
     domain : tuple of str
-        What was assumed, as conditions.
+        The conditions assumed.
     findings : tuple of Finding
-        Every statement, check by check; each check has at least one.
+        All findings, check by check; at least one per check.
     """
 
     chart: Chart
@@ -77,12 +77,12 @@ class Report:
 
     @property
     def refuted(self) -> tuple[Finding, ...]:
-        """The findings that are refuted."""
+        """Findings with the status ``"refuted"``."""
         return tuple(f for f in self.findings if f.status == "refuted")
 
     @property
     def settled(self) -> tuple[Finding, ...]:
-        """The findings that the order of the edges settles."""
+        """Findings settled by the order of the edges."""
         return tuple(f for f in self.findings if f.status == "settled by order")
 
     def of(self, check: Check) -> tuple[Finding, ...]:
@@ -91,12 +91,12 @@ class Report:
         Parameters
         ----------
         check : {"determinism", "livelock", "reachability", "chattering", "stability"}
-            Which.
+            The check.
 
         Returns
         -------
         tuple of Finding
-            At least one.
+            At least one finding.
         """
         return tuple(f for f in self.findings if f.check == check)
 
@@ -106,7 +106,7 @@ class Report:
             self.chart.name,
             f"assumed: {', '.join(self.domain) or 'nothing'}",
             "over the reals, not floats; over points, not trajectories",
-            "inputs and their rates (ds/dt, dv/dt) are free, but alike in both states of a switch",
+            "inputs and their rates (ds/dt, dv/dt) are free, but equal in both states of a switch",
         ]
         for check in CHECKS:
             lines += ["", check]
@@ -116,5 +116,5 @@ class Report:
 
 
 def listed(values: Mapping[str, float]) -> str:
-    """Return numbers by name as text."""
+    """Return named numbers as text."""
     return ", ".join(f"{name} = {value!r}".removesuffix(".0") for name, value in values.items())

@@ -1,18 +1,18 @@
-"""Looking at a place of a branch: its values, and why an element's edges fire there or do not."""
+"""The values at a row or point of a branch, and why the edges of an element fire there or not."""
 
 from __future__ import annotations
 
 from gms_fsm.errors import SessionError
-from gms_fsm.inspection._asked import source_of
+from gms_fsm.inspection._arguments import source_of
 from gms_fsm.inspection._branch import Branch
-from gms_fsm.inspection._told import Here
+from gms_fsm.inspection._results import Here
 from gms_fsm.inspection.explain import Why, explain_state
 
 __all__ = ["here_at", "why_at"]
 
 
 def here_at(branch: Branch, row: int) -> Here:
-    """Return what a session says of a row; under the cursor it may be a place behind the row."""
+    """Return the values at a row, or at the located point after it, if the cursor is there."""
     place = branch.place(row)
     located = place is branch.between
     scope = branch.scope(place)
@@ -38,21 +38,21 @@ def why_at(branch: Branch, element: int, edge: str) -> Why:
     Parameters
     ----------
     branch : Branch
-        What is walked.
+        The current branch.
     element : int
-        Counted from 0.
+        Element index, from 0.
     edge : str
-        Empty for all.
+        Name of the edge; empty for all.
 
     Returns
     -------
     Why
-        On a row where the element fired: of the state it left, with the values before.
+        On a row where the element fired, edges of the state it left, with the values before.
 
     Raises
     ------
     SessionError
-        If there is no such edge, or it leaves another state.
+        If there is no such edge, or it leaves a different state.
     """
     chart, row, place = branch.run.start.model.chart, branch.cursor, branch.here
     state, left, taken = branch.state(place, element), "", ""
@@ -61,9 +61,9 @@ def why_at(branch: Branch, element: int, edge: str) -> Why:
     before = place
     if fired and fired.element == element and source in ("", fired.source):
         left, taken, before = fired.source, fired.edge, branch.raw(row - 1)
-    asked = left or state
-    if source not in ("", asked):
+    source_state = left or state
+    if source not in ("", source_state):
         raise SessionError(f"{edge} leaves {source}", advice=f"element {element + 1} is in {state}")
-    found = explain_state(chart, asked, branch.scope(before).guards(element), taken)
+    found = explain_state(chart, source_state, branch.scope(before).guards(element), taken)
     edges = tuple(each for each in found if edge in ("", each.edge.name))
     return Why(element, place.t, state, left, edges)

@@ -1,4 +1,4 @@
-"""Changing values at a place of a run: what may be changed, and the start that follows."""
+"""Changing values at a point of a run: the permitted edits, and the resulting initial values."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gms_fsm.errors import SessionError
-from gms_fsm.inspection._asked import check_element
+from gms_fsm.inspection._arguments import check_element
 from gms_fsm.systems.models import Model, parameter_names
 from gms_fsm.traces.scope import Scope
 
@@ -16,12 +16,12 @@ __all__ = ["Edits", "initial_with"]
 
 @dataclass(frozen=True)
 class Edits:
-    """What a poke changes.
+    """The changes made by a poke.
 
     Parameters
     ----------
     variables : mapping of str to mapping of int to float
-        New values of the chart's variables, each by element.
+        New values of the variables of the chart, by element.
     v : float or None
         New velocity, m/s.
     state : mapping of int to str
@@ -40,7 +40,7 @@ class Edits:
         v: float | None,
         state: Mapping[int, str] | None,
     ) -> Edits:
-        """Return edits of a model, complete; raise a `SessionError` for what it does not have."""
+        """Return checked edits; raise `SessionError` for names that the model does not have."""
         for what, given in (("variables", variables), ("state", state)):
             if given is not None and not isinstance(given, Mapping):
                 raise SessionError(
@@ -52,7 +52,7 @@ class Edits:
             if name in parameter_names(model):
                 raise SessionError(
                     f"{name} is a parameter",
-                    advice="for another value make another model and session",
+                    advice="to change it, make another model and session",
                 )
             if name not in model.chart.variables:
                 known = ", ".join(model.chart.variables)
@@ -72,7 +72,7 @@ class Edits:
         return edits
 
     def __str__(self) -> str:
-        """Such as ``z1 = 0.2, state 2 = slip``; elements count from 1."""
+        """Text such as ``z1 = 0.2, state 2 = slip``, with elements numbered from 1."""
         parts = [
             f"{name}{i + 1} = {value:.6g}"
             for name, values in self.variables.items()
@@ -85,21 +85,21 @@ class Edits:
 
 
 def initial_with(edits: Edits, here: Scope, *, prescribed: bool) -> dict[str, Any]:
-    """Return the ``initial`` of a run that goes on from a place with edits.
+    """Return the ``initial`` of a run that continues from a point with edits.
 
     Parameters
     ----------
     edits : Edits
-        What changes.
+        The changes.
     here : Scope
-        The place.
+        The values at the point.
     prescribed : bool
         Whether the rig prescribes the velocity.
 
     Returns
     -------
     dict
-        As `gms_fsm.simulate` takes it.
+        In the form accepted by `gms_fsm.simulate`.
     """
     initial: dict[str, Any] = {"x": here.x}
     for name in here.layout.y.own:

@@ -1,4 +1,4 @@
-"""Questions to the solver z3: texts as formulas over the reals, and answers with examples."""
+"""Queries to the solver z3: texts as formulas over the reals, and answers with examples."""
 
 from __future__ import annotations
 
@@ -52,29 +52,29 @@ __all__ = [
     "shown",
 ]
 
-PATIENCE = 5.0  # s, for one question to z3
-HIGHEST_DEGREE = 16  # of a text as a polynomial; beyond it z3 needs memory before it needs time
-# Numbers an example is made of where they fit: a reader should see through it.
+PATIENCE = 5.0  # s, per query to z3
+HIGHEST_DEGREE = 16  # of a text as a polynomial; above it z3 runs out of memory before time
+# Preferred numbers in an example, so that it is easy to follow.
 NICE = tuple(Fraction(number) for number in (1, -1, 2, -2, 0, 0.5, -0.5, 3, -3, 0.25, -0.25, 4, -4))
 
 
 def solver() -> Any:
-    """Return the module z3, or say how to get it."""
+    """Return the module z3; raise with installation advice if it is missing."""
     return require("z3", "check")
 
 
 # --------------------------------------------------------------------------- texts over the reals
 class Undecided(Exception):
-    """A question stays open; the text is the reason."""
+    """A query could not be decided; the message is the reason."""
 
 
 class GaveUp(Undecided):
-    """... because z3 took too long."""
+    """A query could not be decided because z3 took too long."""
 
 
 @dataclass(frozen=True)
 class Dual:
-    """A value and its slope: its one-sided rate of change where the names change at theirs."""
+    """A value and its slope: its one-sided rate of change, given the rates of the names."""
 
     value: Any
     slope: Any
@@ -87,7 +87,7 @@ Duals: TypeAlias = Mapping[str, Dual]
 
 
 class Reading:
-    """Reads the texts of one question; keeps what has to be nonzero, and where a value jumps."""
+    """Encodes the texts of one query; records denominators and the points where values jump."""
 
     def __init__(self) -> None:
         self.z3 = solver()
@@ -104,7 +104,7 @@ class Reading:
         return fold(condition, _Formulas(self, names))
 
     def margin(self, requirement: Requirement, names: Duals) -> Dual:
-        """Return the margin of a requirement: positive where it holds."""
+        """Return the margin of a requirement, positive where it holds."""
         pair = requirement.comparison
         left, right = self.value(pair.left, names), self.value(pair.right, names)
         if not requirement.holds:
@@ -113,7 +113,7 @@ class Reading:
 
 
 class _Formulas:
-    """The algebra of formulas over the reals; a value is one with its slope."""
+    """The algebra of formulas over the reals, in which a value has a slope."""
 
     def __init__(self, reading: Reading, names: Duals) -> None:
         self.reading, self.names, self.z3 = reading, names, reading.z3
@@ -148,7 +148,7 @@ class _Formulas:
         whole = integer_power(node.right)
         if whole is None:
             raise Undecided(
-                f"only whole powers up to {LARGEST_PRODUCT_POWER} are encoded: {shown(node)}"
+                f"only integer powers up to {LARGEST_PRODUCT_POWER} are encoded: {shown(node)}"
             )
         one = Dual(self.one, self.zero)
         result, factor = one, next(parts)
@@ -209,14 +209,14 @@ def _product(a: Dual, b: Dual) -> Dual:
 
 
 def shown(node: Value | Condition) -> str:
-    """Return a tree as text, cut where it is long."""
+    """Return a tree as text, shortened if it is long."""
     text = spell(node, MATLAB_LIKE)
     return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _refuse_high_degree(node: Value) -> None:
     if (degree := _degree(node)) > HIGHEST_DEGREE:
-        raise Undecided(f"a polynomial of degree {degree} is not tried: {shown(node)}")
+        raise Undecided(f"a polynomial of degree {degree} is not attempted: {shown(node)}")
 
 
 def _degree(node: Value) -> int:
@@ -243,12 +243,12 @@ class Answer:
 
 
 class Prover:
-    """A chart's names as real symbols, within the domain."""
+    """The names of a chart as real symbols, within the domain."""
 
     def __init__(self, chart: Chart, domain: Sequence[str]) -> None:
         self.chart, self.z3 = chart, solver()
         real, zero = self.z3.Real, self.z3.RealVal(0)
-        # In the order an example fixes them: constants, what comes from outside, the own state.
+        # In the order in which an example fixes them: constants, inputs, variables.
         names = (*chart.parameter_names, *chart.inputs, *chart.variables)
         self.symbols = {name: real(name) for name in names}
         self.rates = {f"d{name}/dt": real(f"d{name}/dt") for name in chart.inputs}
@@ -260,7 +260,7 @@ class Prover:
             empty = False
         if empty:
             raise ParameterError(
-                f"the domain {', '.join(domain)} holds nowhere", advice="loosen it"
+                f"the domain {', '.join(domain)} is empty", advice="loosen its conditions"
             )
 
     def _assumed(self, text: str) -> Any:
@@ -271,17 +271,17 @@ class Prover:
             raise error.at("domain") from None
         except Undecided as reason:
             raise ParameterError(
-                f"domain {text!r}: {reason}", advice="write it otherwise"
+                f"domain {text!r}: {reason}", advice="write it differently"
             ) from None
         if reading.denominators:
             raise ParameterError(
-                f"domain {text!r}: it divides",
-                advice="write it without, for example 'z > s' for 'z / s > 1'",
+                f"domain {text!r}: it contains a division",
+                advice="write it without one, for example 'z > s' for 'z / s > 1'",
             )
         return formula
 
     def find(self, *formulas: Any) -> Any:
-        """Return a model of the formulas within the domain, or None where there is none."""
+        """Return a model of the formulas within the domain, or None."""
         solver = self.z3.SolverFor("QF_NRA")
         solver.set("timeout", int(1000 * PATIENCE))
         solver.add(*self.domain, *formulas)
@@ -291,7 +291,7 @@ class Prover:
         return solver.model() if answer == self.z3.sat else None
 
     def example(self, names: frozenset[str], *formulas: Any) -> dict[str, float] | None:
-        """Return a point of the formulas, made of simple numbers that floats hold exactly."""
+        """Return a point that satisfies the formulas, of simple numbers exact in floats."""
         model = self.find(*formulas)
         if model is None:
             return None
@@ -315,7 +315,9 @@ class Prover:
             else:
                 values = {n: model.evaluate(u, model_completion=True) for n, u in wanted.items()}
                 near = ", ".join(f"{n} = {_about(_rational(u))}" for n, u in values.items())
-                raise Undecided(f"fails over the reals near {near}, at no point found in floats")
+                raise Undecided(
+                    f"fails over the reals near {near}, but no such point was found in floats"
+                )
         return found
 
     def _maybe(self, *formulas: Any) -> Any:
@@ -325,11 +327,11 @@ class Prover:
             return None
 
     def defined(self, reading: Reading, *case: Any) -> None:
-        """Leave a question open whose quotients are not all defined within the domain."""
+        """Raise `Undecided` unless all quotients are defined within the domain."""
         for denominator, text in reading.denominators:
             if self.find(*case, denominator == 0) is not None:
                 raise Undecided(
-                    f"the denominator {text} can be 0 within the domain; say what it cannot be, "
+                    f"the denominator {text} can be 0 within the domain; exclude that, "
                     f"for example domain=['{text} > 0', ...]"
                 )
 
@@ -341,7 +343,7 @@ class Prover:
         *about: object,
         case: str = "",
     ) -> Finding:
-        """Ask a question; return the answer, or the reason for having none."""
+        """Run a query and return the answer, or the reason why there is none."""
         try:
             answer = question(self, *about)
         except Undecided as reason:
@@ -359,11 +361,11 @@ def _about(value: Fraction) -> str:
     try:
         return f"{float(value):.6g}"
     except OverflowError:
-        return "beyond floats"
+        return "outside the range of floats"
 
 
 def _candidates(value: Fraction) -> Iterator[Fraction]:
-    """Yield numbers that floats hold exactly: simple ones, then ever closer to a value."""
+    """Yield numbers that are exact in floats: simple ones, then ever closer to a value."""
     yield from NICE
     for scale in (2**4, 2**10, 2**20):
         middle = round(value * scale)
@@ -380,7 +382,7 @@ def _candidates(value: Fraction) -> Iterator[Fraction]:
 
 
 def enabled(guards: Sequence[Condition], point: Mapping[str, float]) -> bool:
-    """Whether the machine itself, in floats, finds the guards true."""
+    """Return whether the guards are true in floats, as the machine evaluates them."""
     try:
         return all(evaluate(guard, point) for guard in guards)
     except (ArithmeticError, ValueError):
@@ -393,7 +395,7 @@ def refuted(text: str, point: Mapping[str, float], seen: bool = True) -> Answer:
 
 def by_example(status: Status, text: str, point: Mapping[str, float], seen: bool) -> Answer:
     if not seen:
-        raise Undecided(f"fails over the reals at {listed(point)}, but rounding hides it there")
+        raise Undecided(f"fails over the reals at {listed(point)}, but rounding hides it in floats")
     return Answer(status, text, point)
 
 

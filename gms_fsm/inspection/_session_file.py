@@ -1,4 +1,4 @@
-"""Sessions as files: what runs, the pokes, cursors, breakpoints and watches; no rows."""
+"""Session files: the system, the pokes, cursors, breakpoints and watches, without rows."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ FORMAT = "gms-fsm session 1"
 
 @dataclass(frozen=True)
 class BranchRecord:
-    """How a branch was made, and where its cursor stands.
+    """How a branch was made, and the position of its cursor.
 
     Parameters
     ----------
     parent, fork
         As in `Branch`.
     edits : Edits or None
-        What was poked; None for the run itself.
+        The changed values; None for the original run.
     cursor : int
         The row under the cursor.
     begin, between : float or None
-        s: where the poke was, and where the cursor is, if that is between two rows.
+        Times of the poke and of the cursor, s, if they are between two rows.
     """
 
     parent: int | None
@@ -61,20 +61,20 @@ class BranchRecord:
 
 @dataclass(frozen=True)
 class SessionRecord:
-    """All that makes a session again.
+    """Everything needed to restore a session.
 
     Parameters
     ----------
     model, rig, t_end, options
-        As `Session` takes them.
+        As for `Session`.
     branches : sequence of BranchRecord
-        The first is the run itself.
+        The first is the original run.
     current : int
-        The branch that is walked.
+        Number of the current branch.
     breakpoints : sequence of Breakpoint
-        With their hits so far.
+        The breakpoints, with their hits so far.
     watches : sequence of str
-        Expressions.
+        The watch expressions.
     """
 
     model: Model
@@ -90,7 +90,7 @@ class SessionRecord:
 def options_of(
     settings: Settings, t_start: float, initial: Mapping[str, Any] | None
 ) -> dict[str, Any]:
-    """Return the arguments of a session that are not at their defaults."""
+    """Return the arguments of a session that differ from their defaults."""
     usual = Settings()
     chosen = {
         each.name: getattr(settings, each.name)
@@ -103,9 +103,9 @@ def options_of(
 
 
 def write(path: Path, record: SessionRecord) -> Path:
-    """Write a session; raise a `SessionError` for what a file cannot hold."""
+    """Write a session; raise `SessionError` for anything a file cannot store."""
     if any(isinstance(signal, Function) for signal in record.rig.signals.values()):
-        raise SessionError("a signal is a Python function, which a file cannot hold")
+        raise SessionError("a signal is a Python function, which a file cannot store")
     for name, value in record.options.items():
         if not isinstance(value, str | int | float | dict | type(None)):
             raise SessionError(f"the option {name} = {value!r} cannot be written to a file")
@@ -134,7 +134,7 @@ def write(path: Path, record: SessionRecord) -> Path:
 
 
 def read(path: Path) -> SessionRecord:
-    """Read a session; whatever is wrong with the file is an error of some kind."""
+    """Read a session; a faulty file raises any kind of error."""
     data = json.loads(path.read_text(encoding="utf-8"))
     if data["format"] != FORMAT:
         raise ValueError(f"format is {data['format']!r}")
@@ -167,12 +167,12 @@ def _branch(record: Mapping[str, Any]) -> BranchRecord:
 
 
 def _by_number(values: Mapping[str, Any]) -> dict[int, Any]:
-    """Return values by element with numbers for keys, which JSON makes texts."""
+    """Return values by element, with the keys converted from JSON strings to integers."""
     return {int(element): value for element, value in values.items()}
 
 
 def _plain(value: Any) -> Any:
-    """Return arrays inside an option as lists."""
+    """Return an option with its arrays as lists."""
     if isinstance(value, Mapping):
         return {name: _plain(each) for name, each in value.items()}
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
@@ -180,14 +180,14 @@ def _plain(value: Any) -> Any:
 
 @contextmanager
 def blamed(path: Path) -> Iterator[None]:
-    """Have whatever goes wrong inside said of a file."""
+    """Raise every error of the block as an error of the file."""
     try:
         yield
     except FileNotFoundError:
         raise TraceFileError(
-            "no such file", place=str(path), advice="check its name and the folder"
+            "no such file", place=str(path), advice="check the name and the folder"
         ) from None
-    except Exception as error:  # whatever a damaged file provokes, it is the file's fault
+    except Exception as error:  # any error is the fault of the damaged file
         raise TraceFileError(
             f"not a session file, or damaged ({why(error)})", place=str(path)
         ) from None

@@ -1,4 +1,4 @@
-"""Walking a branch: forward and back by rows, by firings, to a time, to where something is true."""
+"""Moving the cursor of a branch: by rows, by firings, to a time, or until a condition is true."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from gms_fsm.errors import SessionError, shown
-from gms_fsm.inspection._asked import check_count
+from gms_fsm.inspection._arguments import check_count
 from gms_fsm.inspection._branch import Branch, Row
 from gms_fsm.traces._between import first_true
 
@@ -23,11 +23,11 @@ __all__ = [
     "walk_to",
 ]
 
-LOOKS = 16  # places between two rows at which a condition is tried
+LOOKS = 16  # points between two rows at which a condition is evaluated
 
 
 def forward(branch: Branch) -> Iterator[int]:
-    """Walk forward by rows to the end; yield the number of each new row."""
+    """Move forward by rows to the end, and yield the number of each new row."""
     branch.between = None
     while branch.cursor + 1 < len(branch) or branch.pull():
         branch.cursor += 1
@@ -43,7 +43,7 @@ def step(branch: Branch, count: int) -> None:
 
 
 def back(branch: Branch, count: int) -> None:
-    """Go back by rows; from a located place the first is the row before it."""
+    """Go back by rows; from a located point, the first is the row before it."""
     check_count(count)
     if branch.between is not None and count > 0:
         branch.between, count = None, count - 1
@@ -58,7 +58,7 @@ def next_firing(branch: Branch) -> None:
 
 
 def previous_firing(branch: Branch) -> None:
-    """Go back to the firing before, or the start."""
+    """Go back to the previous firing, or the start."""
     row = branch.cursor - (branch.between is None)
     branch.between = None
     while row > 0 and branch.raw(row).microstep == 0:
@@ -67,12 +67,12 @@ def previous_firing(branch: Branch) -> None:
 
 
 def goto(branch: Branch, t: float) -> None:
-    """Go to the last row at or before a time; a time before the start is a `SessionError`."""
+    """Go to the last row at or before a time; raise `SessionError` before the start."""
     start = branch.raw(0).t
     if not isinstance(t, float | int | np.number):
         raise SessionError("it must be a number of seconds", place="t", value=t)
     if not t >= start:
-        raise SessionError(f"t = {shown(t)} s lies before the start, {start!r} s")
+        raise SessionError(f"t = {shown(t)} s is before the start, {start!r} s")
     branch.between = None
     while branch.last.t <= t and branch.pull():
         pass
@@ -80,7 +80,7 @@ def goto(branch: Branch, t: float) -> None:
 
 
 def walk_to(branch: Branch, row: int, t: float | None) -> None:
-    """Go to a row, or to a time between it and the next, computing as far as needed."""
+    """Go to a row, or to a time between it and the next, computing rows as needed."""
     while row + (t is not None) >= len(branch) and branch.pull():
         pass
     branch.cursor = min(row, len(branch) - 1)
@@ -88,19 +88,19 @@ def walk_to(branch: Branch, row: int, t: float | None) -> None:
 
 
 def reaches(branch: Branch, holds: Callable[[Row], bool]) -> bool:
-    """Go forward to where a condition next becomes true, located between the rows.
+    """Go forward to the next point where a condition becomes true, located between rows.
 
     Parameters
     ----------
     branch : Branch
-        What is walked.
+        The current branch.
     holds : callable
-        The condition. If it is true already it must first become false.
+        The condition. If it is already true, it must first become false.
 
     Returns
     -------
     bool
-        False at the end of the run.
+        False if the end of the run was reached.
     """
     truth = holds(branch.here)
     begin = None if branch.between is None else branch.between.t  # a second `until` starts there
@@ -125,9 +125,9 @@ def reaches(branch: Branch, holds: Callable[[Row], bool]) -> bool:
 def _first_true(
     branch: Branch, row: int, begin: float | None, holds: Callable[[Row], bool], truth: bool
 ) -> tuple[Row | None, bool]:
-    """Look between a row and the next for the place where a condition becomes true.
+    """Search between a row and the next for the point where a condition becomes true.
 
-    The next row itself is left to the caller. Returns the place, and the truth reached.
+    The next row itself is left to the caller. Returns the point, and the last truth value.
     """
     before, after = branch.raw(row), branch.raw(row + 1)
     start = before.t if begin is None else begin

@@ -1,7 +1,7 @@
-"""Why an edge fired or did not: its guard, clause by clause, on a stored row.
+"""Why an edge fired or not: its guard, clause by clause, at a stored row.
 
-Computed on demand from the row with the chart's own trees, so it is what the run itself saw.
-Printed, an explanation is the text that the debugger says; there elements count from 1.
+Computed on demand from the row, with the trees of the chart, so the values are those the run saw.
+Printed, an explanation is the text of the debugger, in which elements are numbered from 1.
 """
 
 from __future__ import annotations
@@ -25,27 +25,28 @@ from gms_fsm.traces.trace import Trace
 
 __all__ = ["Clause", "Explanation", "Why", "explain", "explain_state", "holds", "values_at"]
 
-ROUNDING = 1e-8  # a margin this small beside both sides is the clock's and the floats', not physics
+ROUNDING = 1e-8  # relative to both sides; a smaller margin is due to the clock and floats
 
 
 @dataclass(frozen=True)
 class Clause:
-    """One part of a guard that has to hold.
+    """One clause of a guard.
 
     Parameters
     ----------
     text : str
-        As the chart shows it.
+        The clause as shown in the chart.
     holds : bool
-        Whether it is true.
+        Whether the clause is true.
     left, right : float
-        Both sides of a comparison; NaN for a compound clause, or one that cannot be computed.
+        Values of both sides of a comparison; NaN for a compound clause, or if they cannot be
+        computed.
     margin : float
-        How far it is on the true side (negative: on the false side); NaN for a compound clause.
+        Distance on the true side (negative on the false side); NaN for a compound clause.
     computable : bool
-        False where it has no value (1/0); it then counts as false.
+        False if the clause has no value (1/0); it then counts as false.
     unit : str
-        Of the margin, where the units of its names leave no doubt; else empty.
+        Unit of the margin, if the units of the names determine it; else empty.
     """
 
     text: str
@@ -59,23 +60,23 @@ class Clause:
 
 @dataclass(frozen=True)
 class Explanation:
-    """One edge that could be taken from the state an element is in (or has just left).
+    """One edge that leaves the state of an element, or the state it has just left.
 
     Parameters
     ----------
     edge : Transition
         The edge.
     priority : int
-        1 is asked first.
+        Order of evaluation; 1 is the first.
     clauses : tuple of Clause
-        The guard's parts.
+        The clauses of the guard.
     holds : bool
         Whether the whole guard is true.
     taken : str
-        The edge that is taken from this state: the one that led to this row, else the first whose
-        guard is true; empty for none.
+        The edge taken from this state: the one that led to this row, else the first whose guard is
+        true; empty for none.
     past : bool
-        Whether it led to this row; the values are then those before.
+        Whether it led to this row; the values are then those before the firing.
 
     Examples
     --------
@@ -98,7 +99,7 @@ class Explanation:
 
     @property
     def fired(self) -> bool:
-        """Whether it is the edge that was taken to reach this row."""
+        """Whether this edge was taken to reach the row."""
         return self.past and self.taken == self.edge.name
 
     def __str__(self) -> str:
@@ -112,17 +113,17 @@ class Why:
     Parameters
     ----------
     element : int
-        Counted from 0.
+        Element index, from 0.
     t : float
-        s.
+        Time, s.
     state : str
-        The one it is in.
+        State of the element.
     left : str
-        The one it has just left, if that is the one whose edges these are; else empty.
+        State it has just left, if the edges are those of that state; else empty.
     edges : tuple of Explanation
-        Empty if no edge leaves the state.
+        The explanations; empty if no edge leaves the state.
     sigma : mapping of str to float
-        The signs held between -1 and 1, by what is zero there.
+        The signs held between -1 and 1, keyed by the quantity that is zero.
     """
 
     element: int
@@ -144,7 +145,7 @@ class Why:
     def __str__(self) -> str:
         lines = [f"element {self.element + 1} is in {self.state} at t = {self.t:.9g} s"]
         if self.left:
-            lines.append(f"it has just left {self.left}; values are those before that")
+            lines.append(f"it has just left {self.left}; the values are those before the firing")
         lines += [f"held on {name} = 0, σ = {u:.2g}" for name, u in self.sigma.items()]
         if not self.edges:
             lines.append("no edge leaves this state")
@@ -152,21 +153,21 @@ class Why:
 
 
 def values_at(trace: Trace, row: int, element: int) -> dict[str, float]:
-    """Return every value a guard of an element can name, at a row.
+    """Return the values of all names allowed in guards of an element, at a row.
 
     Parameters
     ----------
     trace : Trace
-        A run.
+        The run.
     row : int
         Row index.
     element : int
-        Counted from 0.
+        Element index, from 0.
 
     Returns
     -------
     dict of str to float
-        t, x, v, s, the variables and the parameters.
+        t, x, v, s, the variables and the parameters, by name.
     """
     return Scope.at(trace, row).guards(element)
 
@@ -174,22 +175,22 @@ def values_at(trace: Trace, row: int, element: int) -> dict[str, float]:
 def explain(trace: Trace, row: int, element: int) -> Why:
     """Explain the edges of an element at a row, highest priority first.
 
-    On a row that a firing of this element made, the edges are those of the state it left, with the
+    On a row made by a firing of this element, the edges are those of the state it left, with the
     values before the firing, and the edge taken is marked.
 
     Parameters
     ----------
     trace : Trace
-        A run.
+        The run.
     row : int
         Row index; negative counts from the end.
     element : int
-        Counted from 0.
+        Element index, from 0.
 
     Returns
     -------
     Why
-        An `Explanation` an edge; printed, the debugger's text.
+        One `Explanation` per edge; printed, the text of the debugger.
 
     Raises
     ------
@@ -213,9 +214,9 @@ def explain(trace: Trace, row: int, element: int) -> Why:
     chart, modes = trace.model.chart, trace.modes[:, element]
     fired = _edge_taken(trace, row, element)
     before = row - 1 if fired else row
-    now, asked = (chart.states[int(modes[r])].name for r in (row, before))
-    edges = explain_state(chart, asked, values_at(trace, before, element), fired)
-    left = asked if fired else ""
+    now, source = (chart.states[int(modes[r])].name for r in (row, before))
+    edges = explain_state(chart, source, values_at(trace, before, element), fired)
+    left = source if fired else ""
     return Why(element, float(trace.t[row]), now, left, tuple(edges), trace.sigma(row))
 
 
@@ -229,9 +230,9 @@ def explain_state(
     chart : Chart
         The chart.
     state : str
-        A state's name.
+        Name of the state.
     values : mapping of str to float
-        A number for every name its guards use.
+        A value for every name in its guards.
     fired : str
         The edge that was taken, if any.
 
@@ -267,7 +268,7 @@ def _edge_taken(trace: Trace, row: int, element: int) -> str:
 
 
 def _only_slides(trace: Trace, row: int) -> bool:
-    """Tell whether a row differs from the one before by the surfaces slid on alone."""
+    """Return whether a row differs from the previous one only in the surfaces slid on."""
     same = row > 0 and trace.t[row - 1] == trace.t[row]
     return same and bool(trace.microstep[row - 1] == trace.microstep[row])
 
@@ -286,26 +287,26 @@ def _clause(chart: Chart, part: Condition, values: Mapping[str, float]) -> Claus
 
 
 def _unit(chart: Chart, part: Condition, text: str) -> str:
-    """Return the unit in which both sides of a comparison are: that of its names, if all agree."""
+    """Return the unit of both sides of a comparison: that of its names, if all agree."""
     units = {chart.unit(name) for name in names_in(part)} - {""}
     plain = not set(text) & set("*/^()")
     return units.pop() if plain and len(units) == 1 else ""
 
 
 def holds(condition: Condition, values: Mapping[str, float]) -> bool:
-    """Return a condition's truth; what cannot be computed (1/0) is not true.
+    """Return the truth of a condition; one that cannot be computed (1/0) is not true.
 
     Parameters
     ----------
     condition : Condition
         A guard or a part of one.
     values : mapping of str to float
-        A number for every name.
+        A value for every name.
 
     Returns
     -------
     bool
-        Its truth.
+        Whether the condition is true.
     """
     try:
         return bool(evaluate(condition, values))
@@ -315,13 +316,13 @@ def holds(condition: Condition, values: Mapping[str, float]) -> bool:
 
 # --------------------------------------------------------------------------- in words
 def _verdict(each: Explanation) -> str:
-    """Say in one sentence why an edge fires or does not."""
+    """Return one sentence on why an edge fires or not."""
     name = each.edge.name
     if each.fired:
         return f"{name} fired here: every clause was true."
     if each.holds:
         if each.taken != name:
-            return f"{name} does not fire: its guard is true, but {each.taken} goes first."
+            return f"{name} does not fire: its guard is true, but {each.taken} takes precedence."
         return f"{name} fires next: every clause is true."
     parts = []
     for clause in each.clauses:
@@ -332,7 +333,7 @@ def _verdict(each: Explanation) -> str:
 
 
 def _detail(each: Explanation) -> str:
-    """Show an edge's guard, a line a clause."""
+    """Return the guard of an edge, one line per clause."""
     wide = max(len(clause.text) for clause in each.clauses)
     lines = [f"  {each.priority} {each.edge.name}: {each.edge.source} -> {each.edge.target}"]
     for clause in each.clauses:

@@ -1,7 +1,7 @@
-"""What a finished run should be told about: no errors, but hardly what its user meant.
+"""Notes on a finished run: not errors, but probably not what the user meant.
 
-Units mixed up (a stroke in metres over thresholds in micrometres, a v_c above every speed), and
-arrests that the clock could not see.
+Mixed-up units (a stroke in metres with thresholds in micrometres, a v_c above every speed), and
+arrests that the clock could not resolve.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ from gms_fsm.traces.trace import Trace
 
 __all__ = ["notes_on"]
 
-FAR = 1e4  # thresholds that a stroke may have before it is worth a note
-NEAR = 1e-2  # of the smallest threshold: deflections below do not come near it
-MOST_LOOKED_AT = 1000  # rows
+FAR = 1e4  # a stroke of more thresholds than this is worth a note
+NEAR = 1e-2  # of the smallest threshold: smaller deflections are not near it
+MOST_ROWS = 1000  # rows
 
 
 def notes_on(trace: Trace) -> tuple[str, ...]:
-    """Return what stands out in a run, a sentence each.
+    """Return notes on a run, one sentence each.
 
     Parameters
     ----------
     trace : Trace
-        A run.
+        The run.
 
     Returns
     -------
     tuple of str
-        Empty for most.
+        The notes; empty for most runs.
 
     Examples
     --------
@@ -49,7 +49,7 @@ def notes_on(trace: Trace) -> tuple[str, ...]:
 
 
 def _sizes(trace: Trace) -> Iterator[str]:
-    """Compare stroke, speed and deflections with what the model distinguishes."""
+    """Compare stroke, speed and deflections with the scales of the model."""
     model, scales = trace.model, scales_of(trace.model)
     name = model.chart.variables[0]
     least = np.array(scales.variables[name])
@@ -68,25 +68,25 @@ def _sizes(trace: Trace) -> Iterator[str]:
         elif 0.0 < deflected < NEAR:
             yield (
                 f"no transition: no element comes near its threshold (largest |{name}| is "
-                f"{deflected:.2g} of it, the smallest threshold {thresholds.min():.3g}); if that "
-                f"is not meant, check the units of {_scaling(model)}motion (m)"
+                f"{deflected:.2g} of it, the smallest threshold {thresholds.min():.3g}); if this "
+                f"is not intended, check the units of {_scaling(model)}motion (m)"
             )
     elif stroke > FAR * float(thresholds.max()):
         yield (
             f"the stroke of {stroke:.3g} m is {stroke / float(thresholds.max()):.2g} times the "
-            "largest threshold: nearly all of it is gross sliding; if pre-sliding is meant, check "
-            "the unit of the motion (m)"
+            "largest threshold: nearly all of it is gross sliding; if pre-sliding is intended, "
+            "check the unit of the motion (m)"
         )
 
 
 def _scaling(model: Model) -> str:
-    """Name the parameters that say how large thresholds and forces are, with their units."""
+    """Return the parameters that scale thresholds and forces, with their units."""
     known = [each for each in parameters_of(model) if each.unit in ("N/m", "m/N")]
     return ", ".join(f"{each.name} ({each.unit})" for each in known) + (" and " if known else "")
 
 
 def _windows(trace: Trace) -> Iterator[str]:
-    """Look for windows such as |v| <= v_c that were crossed within a tick of the clock."""
+    """Search for windows such as |v| <= v_c that were crossed within one tick of the clock."""
     if trace.settings.get("events") != "located":
         return
     whole = trace.whole()
@@ -101,7 +101,7 @@ def _windows(trace: Trace) -> Iterator[str]:
             inside = whole.modes[:, i] == chart.state_index(edge.source)
             jumped = inside[:-1] & inside[1:] & (v[:-1] * v[1:] < 0.0)
             jumped &= (np.abs(v[:-1]) > c) & (np.abs(v[1:]) > c)
-            for row in (np.flatnonzero(jumped) + 1)[:MOST_LOOKED_AT].tolist():
+            for row in (np.flatnonzero(jumped) + 1)[:MOST_ROWS].tolist():
                 still = values_at(whole, row, i) | {"v": 0.0}
                 if whole.model.stribeck is not None:
                     still["s"] = float(whole.model.weights[i]) * whole.model.stribeck.F_s
@@ -109,8 +109,8 @@ def _windows(trace: Trace) -> Iterator[str]:
                     missed.append(float(t[row]))
         if missed:
             yield (
-                f"{edge.name} could not be seen {len(missed)} times, first at t = "
-                f"{min(missed):.9g} s: v passes its window within a tick of the clock; give a "
+                f"{edge.name} could not be detected {len(missed)} times, first at t = "
+                f"{min(missed):.9g} s: v passes its window within one tick of the clock; use a "
                 "larger v_c, or let the run start nearer to t = 0"
             )
 

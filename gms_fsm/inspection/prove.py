@@ -1,26 +1,27 @@
-"""Prove statements about a chart from its own guards and flows, or refute them by an example.
+"""Prove statements about a chart from its guards and flows, or refute them by an example.
 
 Theory of operation. Every text of the chart becomes a formula over the real numbers, and the solver
-z3 is asked for a point where the statement fails. *Proved* means that there is none within the
+z3 searches for a point where the statement fails. *Proved* means that there is none within the
 domain. *Refuted* comes with one such point; its numbers are exact in floats, and every guard named
-was evaluated there. *Settled by order*: two edges are enabled at once, as such a point shows, and
-the machine takes the earlier one of the chart; no fault, but another order is another model.
+was evaluated there. *Settled by order*: two edges are enabled at the same time, as such a point
+shows, and the machine takes the earlier one in the chart. This is not a fault, but a different
+order would be a different model.
 *Undecided* comes with the reason.
 
 - Over the reals, not floats: a proof says nothing about rounding.
-- Over points, not trajectories: a refuting point need not lie on the path of any run.
+- Over points, not trajectories: a refuting point need not lie on the trajectory of any run.
 - Inputs (``s``, ``v``) and their rates (``ds/dt``, ``dv/dt``) are free symbols: that s is a
   function of v is not used, so no transcendental function is needed. The rates are the same in
   both states of a switch; in closed loop dv/dt can jump with the force, which is not followed.
-- ``sgn``, ``abs``, ``min`` and ``max`` are split by case, whole powers are products. ``exp``,
+- ``sgn``, ``abs``, ``min`` and ``max`` are split by case, integer powers are products. ``exp``,
   ``sqrt``, ``sin``, ``cos``, ``tanh`` and other powers are not encoded: undecided. A quotient
-  counts only where the domain proves its denominator nonzero.
-- Priorities settle what is enabled at once, and hide edges; the other checks do not use them.
+  is accepted only if the domain proves its denominator nonzero.
+- Only determinism and reachability use the priorities of edges; the other checks do not.
 
-The checks. *determinism*: no two edges of one state are enabled at once, or their order settles
-which is taken. *livelock*: no edge and a way back are enabled at one point. *reachability*, of the
-graph and the guards alone: every state can be entered and left, every guard can hold where no
-earlier edge goes first. *chattering*: no two states whose flows cross the
+The checks. *determinism*: no two edges of one state are enabled at the same time, or their
+order decides which is taken. *livelock*: no cycle of edges is enabled at one point. *reachability*,
+from the graph and the guards alone: every state can be entered and left, and every guard can hold
+where no earlier edge takes precedence. *chattering*: no two states have flows that cross the
 surfaces of the guards between them in opposite directions, each into the other's guard (to first
 order in time; edges that assign variables are undecided). *stability*: no state has an unstable
 equilibrium, for flows linear in the variable.
@@ -42,7 +43,7 @@ __all__ = ["CHECKS", "Check", "Finding", "Report", "Status", "default_domain", "
 
 
 def default_domain(chart: Chart) -> tuple[str, ...]:
-    """Return what is assumed of a chart unless told otherwise.
+    """Return the conditions assumed of a chart by default.
 
     Parameters
     ----------
@@ -52,8 +53,8 @@ def default_domain(chart: Chart) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        For each input and parameter that its guards, flows or assignments use, the rule its value
-        has to keep (`gms_fsm.Parameter`); nothing where there is none.
+        The rule (`gms_fsm.Parameter`) of each input and parameter used in its guards, flows or
+        assignments, if it has one.
 
     Examples
     --------
@@ -74,15 +75,15 @@ def default_domain(chart: Chart) -> tuple[str, ...]:
 
 
 def prove(chart: Chart, domain: Sequence[str] | None = None) -> Report:
-    """Check a chart for every point of a domain at once.
+    """Check a chart at all points of a domain.
 
     Parameters
     ----------
     chart : Chart
-        The chart; only its own texts are read.
+        The chart; only its texts are used.
     domain : sequence of str, optional
-        Conditions on its names that are taken for granted, for example ``["s >= 0", "v_c > 0"]``.
-        Left out, `default_domain`.
+        Conditions on its names to assume, for example ``["s >= 0", "v_c > 0"]``. The default is
+        `default_domain`.
 
     Returns
     -------
@@ -94,9 +95,9 @@ def prove(chart: Chart, domain: Sequence[str] | None = None) -> Report:
     MissingExtraError
         If z3 is not installed.
     ExpressionError
-        If a condition cannot be read.
+        If a condition cannot be parsed.
     ParameterError
-        If the domain is empty, or uses what is not encoded.
+        If the domain is empty, or uses a function that is not encoded.
 
     Examples
     --------
@@ -108,7 +109,7 @@ def prove(chart: Chart, domain: Sequence[str] | None = None) -> Report:
     """
     if not hasattr(chart, "guards"):
         raise ParameterError(
-            "prove takes a Chart, of a model its .chart", place="chart", value=chart
+            "prove takes a Chart", place="chart", value=chart, advice="for a model, pass its .chart"
         )
     if domain is None:
         domain = default_domain(chart)

@@ -1,8 +1,8 @@
-"""The step-by-step core: stop a run at a guard, see why, go back, change a value, compare.
+"""Stepping through a run: stop at a guard, see why, go back, change a value, compare.
 
-No user interface here. A session holds branches; a branch is a run under way, row by row, with a
-cursor. A poke makes a new branch from the row under the cursor; the branch it came from stays as it
-is.
+This module has no user interface. A session has branches; a branch is a run computed row by row,
+with a cursor. A poke makes a new branch from the row under the cursor and leaves the old branch
+unchanged.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from typing import Any, Unpack
 from gms_fsm._arguments import checked_path
 from gms_fsm.errors import SessionError
 from gms_fsm.inspection import _breakpoints, _conditions, _session_file, _walker
-from gms_fsm.inspection._asked import check_branch, check_element, check_row, checked_settings
+from gms_fsm.inspection._arguments import check_branch, check_element, check_row, checked_settings
 from gms_fsm.inspection._branch import Branch
 from gms_fsm.inspection._breakpoints import KINDS, Breakpoint
 from gms_fsm.inspection._conditions import holds_at
 from gms_fsm.inspection._here import here_at, why_at
 from gms_fsm.inspection._poking import Edits, initial_with
+from gms_fsm.inspection._results import BranchComparison, Fired, Here, compared
 from gms_fsm.inspection._session_file import BranchRecord, SessionRecord
-from gms_fsm.inspection._told import Comparison, Fired, Here, compared
 from gms_fsm.inspection.explain import Why
 from gms_fsm.language import Condition
 from gms_fsm.run.settings import SettingOptions, Settings
@@ -31,25 +31,25 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.traces.scope import watch_names
 
-__all__ = ["KINDS", "Branch", "Breakpoint", "Comparison", "Fired", "Here", "Session"]
+__all__ = ["KINDS", "Branch", "BranchComparison", "Breakpoint", "Fired", "Here", "Session"]
 
 
 class Session:
-    """A simulation one can walk through.
+    """A simulation to step through.
 
     Parameters
     ----------
     model, rig, t_end, t_start, initial, settings, **options
-        As for `gms_fsm.simulate`; there is a row at every step, so no ``t_eval``.
+        As for `gms_fsm.simulate`, without ``t_eval``: there is a row at every step.
 
     Attributes
     ----------
     branches : list of Branch
-        The first is the run itself; each poke adds one.
+        The first is the original run; each poke adds one.
     current : int
-        Number of the branch that is walked.
+        Number of the current branch.
     breakpoints : list of Breakpoint
-        Where `proceed` stops.
+        Breakpoints at which `proceed` stops.
     watches : list of str
         Expressions shown by a user interface.
 
@@ -61,8 +61,8 @@ class Session:
     >>> session
     <Session: GMS, 4 elements, published law; prescribed velocity, to t = 100 s; at t = 0 s>
 
-    A move returns where it stopped: fields to compute with, and printed, a line to read. Elements
-    count from 0 here, and from 1 in all that is printed and in conditions.
+    A move returns the row at which it stopped, as an object that prints as readable text.
+    Elements are numbered from 0 in Python, and from 1 in printed text and in conditions.
 
     >>> here = session.next_transition()
     >>> round(here.t, 3), here.fired.element, here.fired.edge, here.states[0]
@@ -92,7 +92,7 @@ class Session:
         self.watches: list[str] = []
 
     def _run(self, t_start: float, initial: Mapping[str, Any] | None) -> Run:
-        """Return a run of this model from other values."""
+        """Return a run of this model from given values."""
         return Run(
             Start.of(
                 self.model,
@@ -115,7 +115,7 @@ class Session:
     # ------------------------------------------------------------------ where we are
     @property
     def branch(self) -> Branch:
-        """The branch that is walked."""
+        """The current branch."""
         return self.branches[self.current]
 
     @property
@@ -124,12 +124,12 @@ class Session:
         return self.at(self.branch.cursor)
 
     def at(self, row: int) -> Here:
-        """Return a row that has been computed.
+        """Return a computed row.
 
         Parameters
         ----------
         row : int
-            Its number; the row under the cursor may be a located place behind it.
+            Row number; for the cursor row, the result is the located point after it, if any.
 
         Returns
         -------
@@ -141,17 +141,17 @@ class Session:
 
     # ------------------------------------------------------------------ walking
     def step(self, count: int = 1) -> Here:
-        """Go forward by rows (micro-steps are rows of their own).
+        """Go forward by rows (each micro-step is a row).
 
         Parameters
         ----------
         count : int
-            How many.
+            Number of rows.
 
         Returns
         -------
         Here
-            Where it stopped: the last row if the run ended before.
+            The row reached: the last row if the run ended before.
         """
         _walker.step(self.branch, count)
         return self.here
@@ -162,12 +162,12 @@ class Session:
         Parameters
         ----------
         count : int
-            How many.
+            Number of rows.
 
         Returns
         -------
         Here
-            Where it stopped.
+            The row reached.
         """
         _walker.back(self.branch, count)
         return self.here
@@ -178,7 +178,7 @@ class Session:
         return self.here
 
     def prev_transition(self) -> Here:
-        """Go back to the firing before (or the start)."""
+        """Go back to the previous firing (or the start)."""
         _walker.previous_firing(self.branch)
         return self.here
 
@@ -188,7 +188,7 @@ class Session:
         Parameters
         ----------
         t : float
-            s, not before the start.
+            Time, s; not before the start.
 
         Returns
         -------
@@ -198,7 +198,7 @@ class Session:
         Raises
         ------
         SessionError
-            If the time lies before the start, or is no number.
+            If the time is before the start, or is not a number.
         """
         _walker.goto(self.branch, t)
         return self.here
@@ -206,35 +206,35 @@ class Session:
     # ------------------------------------------------------------------ conditions
     @property
     def names(self) -> list[str]:
-        """What conditions and watches can name; elements counted from 1.
+        """Names allowed in conditions and watches, with elements numbered from 1.
 
-        A single element's variables need no number.
+        Variables of a single element need no number.
         """
         return watch_names(self.model)
 
     def parse(self, text: str) -> Condition:
-        """Read a condition such as ``"z1 > 0.3 and state(2) == slip"``.
+        """Parse a condition such as ``"z1 > 0.3 and state(2) == slip"``.
 
         Parameters
         ----------
         text : str
-            In the expression language; ``s`` is the Stribeck curve at v, ``s1`` element 1's
-            threshold.
+            In the expression language; ``s`` is the Stribeck curve at v, ``s1`` the threshold
+            of element 1.
 
         Returns
         -------
         Condition
-            Checked.
+            The parsed and checked condition.
 
         Raises
         ------
         ExpressionError
-            With column and what is allowed.
+            If it cannot be parsed; the message names the column and what is allowed.
         """
         return _conditions.read(self.model, text)
 
     def values(self) -> dict[str, Any]:
-        """Return a value for every name of a condition, at the cursor."""
+        """Return the values at the cursor of all names allowed in conditions."""
         return self.branch.scope(self.branch.here).watches()
 
     def watch(self, text: str) -> float:
@@ -253,40 +253,40 @@ class Session:
         Raises
         ------
         ExpressionError
-            If it cannot be read.
+            If it cannot be parsed.
         SessionError
-            If it cannot be computed here (a division by zero).
+            If it cannot be computed here, for example because of a division by zero.
         """
         return _conditions.value_of(self.model, text, self.values())
 
     def until(self, condition: str) -> Here:
-        """Go forward to where a condition next becomes true, located between the rows.
+        """Go forward to the next point where a condition becomes true, located between rows.
 
         Parameters
         ----------
         condition : str
-            See `parse`. If it is true already it must first become false.
+            See `parse`. If it is already true, it must first become false.
 
         Returns
         -------
         Here
-            The place (``located`` is set if it lies between rows), or the end of the run.
+            The point (``located`` is set if it is between rows), or the end of the run.
         """
         self.reaches(condition)
         return self.here
 
     def reaches(self, condition: str) -> bool:
-        """Go forward as `until` does, and say whether the condition became true.
+        """Go forward as `until` does, and return whether the condition became true.
 
         Parameters
         ----------
         condition : str
-            See `parse`. If it is true already it must first become false.
+            See `parse`. If it is already true, it must first become false.
 
         Returns
         -------
         bool
-            False at the end of the run.
+            False if the end of the run was reached.
 
         Examples
         --------
@@ -314,23 +314,23 @@ class Session:
         name : str
             An edge (tested, valid, fires) or a state (enter, leave).
         element : int, optional
-            Counted from 0; all when left out.
+            Element index, from 0; all elements if omitted.
         condition : str, optional
-            Must hold too.
+            Additional condition that must hold.
         hits : int
-            Stop from this hit on.
+            Number of the first hit at which to stop.
 
         Returns
         -------
         Breakpoint
-            Also in `breakpoints`.
+            The breakpoint, which is also appended to `breakpoints`.
 
         Raises
         ------
         SessionError
-            If kind, name, element or hits do not exist.
+            If kind, name, element or hits is invalid.
         ExpressionError
-            If the condition cannot be read.
+            If the condition cannot be parsed.
         """
         chart = self.model.chart
         found = _breakpoints.new_breakpoint(chart, kind, name, element, condition, hits)
@@ -347,7 +347,7 @@ class Session:
         Returns
         -------
         (Here, Breakpoint or None)
-            Where, and which; None at the end of the run.
+            The row reached and the breakpoint; None at the end of the run.
         """
         for row in _walker.forward(self.branch):
             for point in self.breakpoints:
@@ -360,25 +360,25 @@ class Session:
     def why(self, element: int = 0, edge: str = "") -> Why:
         """Explain the edges of an element at the cursor, clause by clause.
 
-        On a row where it fired: the edges of the state it left, with the edge taken marked.
+        On a row where it fired, these are the edges of the state it left; the edge taken is marked.
 
         Parameters
         ----------
         element : int
-            Counted from 0.
+            Element index, from 0.
         edge : str, optional
-            Explain this edge alone; all when left out. On a row where the element fired it may
+            Explain only this edge; all if omitted. On a row where the element fired, the edge may
             also leave the state that was entered.
 
         Returns
         -------
         Why
-            An `Explanation` an edge, highest priority first; printed, the debugger's text.
+            One `Explanation` per edge, highest priority first; printed, the text of the debugger.
 
         Raises
         ------
         SessionError
-            If there is no such element or edge, or the edge leaves another state.
+            If there is no such element or edge, or the edge leaves a different state.
 
         Examples
         --------
@@ -405,29 +405,30 @@ class Session:
         v: float | None = None,
         state: Mapping[int, str] | None = None,
     ) -> int:
-        """Change values at the cursor and go on in a new branch; the present one stays.
+        """Change values at the cursor and continue in a new branch; the present one is kept.
 
         Parameters
         ----------
         variables : mapping of str to mapping of int to float, optional
-            New values of the chart's variables, each by element, counted from 0:
+            New values of the variables of the chart, by element index, from 0:
             ``{"z": {0: 0.1}, "w": {1: 2.0}}``.
         v : float, optional
-            New velocity, m/s; not with a prescribed one.
+            New velocity, m/s; not allowed if the velocity is prescribed.
         state : mapping of int to str, optional
             New states by element.
 
         Returns
         -------
         int
-            Number of the new branch, which is now the current one.
+            Number of the new branch, which becomes the current one.
 
         Raises
         ------
         SessionError
-            If there is nothing to change, no such variable or element, or the run is at its end.
+            If there is nothing to change, no such variable or element, or the cursor is at the
+            end of the run.
         ParameterError, ChartError
-            If a value breaks its rule.
+            If a value violates its rule.
 
         Examples
         --------
@@ -454,12 +455,12 @@ class Session:
         return self.current
 
     def switch(self, branch: int) -> Here:
-        """Walk another branch, from where its cursor is.
+        """Make another branch the current one; it keeps its cursor.
 
         Parameters
         ----------
         branch : int
-            Its number.
+            Number of the branch.
 
         Returns
         -------
@@ -475,17 +476,17 @@ class Session:
         self.current = branch
         return self.here
 
-    def compare(self, a: int | None = None, b: int | None = None) -> Comparison:
+    def compare(self, a: int | None = None, b: int | None = None) -> BranchComparison:
         """Compute two branches to their ends and compare them.
 
         Parameters
         ----------
         a, b : int, optional
-            Branch numbers; when left out the branch that this one was poked from, and this one.
+            Branch numbers; by default the parent of the current branch, and the current branch.
 
         Returns
         -------
-        Comparison
+        BranchComparison
             Transitions, and largest differences of the first variable and F.
 
         Raises
@@ -512,16 +513,16 @@ class Session:
         b = self.current if b is None else b
         a = self.branches[b].parent if a is None else a
         if a is None:
-            raise SessionError(f"branch {b} has no parent", advice="name two branches")
+            raise SessionError(f"branch {b} has no parent", advice="give two branch numbers")
         for number in (a, b):
             self.branches[number].complete()
         return compared((a, b), self.branches[a].trace(), self.branches[b].trace())
 
     # ------------------------------------------------------------------ files
     def save(self, path: str | Path) -> Path:
-        """Write the session: what runs, the pokes, cursors, breakpoints and watches.
+        """Write the session: the system, the pokes, cursors, breakpoints and watches.
 
-        Rows are not written; loading computes them again, to the same bits on the same machine.
+        Rows are not written; loading computes them again, bit-identical on the same machine.
 
         Parameters
         ----------
@@ -531,14 +532,14 @@ class Session:
         Returns
         -------
         Path
-            The file, written whole.
+            The file written.
 
         Raises
         ------
         SessionError
-            If a signal is a Python function, the method a class, or the engine your own machines.
+            If a signal is a Python function, the method a class, or the engine custom machines.
         OutputError
-            If the rig is of a class of your own, or the file cannot be written.
+            If the rig is of a custom class, or the file cannot be written.
         """
         record = SessionRecord(
             self.model,
@@ -564,12 +565,12 @@ class Session:
         Returns
         -------
         Session
-            With all branches and cursors where they were.
+            With the same branches and cursors.
 
         Raises
         ------
         TraceFileError
-            If the file is missing, damaged or something else.
+            If the file is missing, damaged or not a session file.
         """
         path = checked_path("path", path)
         with _session_file.blamed(path):
@@ -577,7 +578,7 @@ class Session:
 
     @classmethod
     def _of(cls, record: SessionRecord) -> Session:
-        """Walk to every place of a session again."""
+        """Restore a session by moving to each of its cursors again."""
         session = cls(record.model, record.rig, record.t_end, **record.options)
         for branch in record.branches:
             if branch.edits is not None:

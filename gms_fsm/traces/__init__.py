@@ -1,1 +1,1 @@
-"""What a run leaves behind: rows, transition log, files, verdicts of its monitors."""
+"""The results of a run: rows, transition log, files and monitor verdicts."""

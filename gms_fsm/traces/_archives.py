@@ -1,4 +1,4 @@
-"""Arrays out of .npz files that anybody may have made: looked at before they are unpacked."""
+"""Arrays from untrusted .npz files: their size is checked before they are unpacked."""
 
 from __future__ import annotations
 
@@ -9,21 +9,22 @@ from gms_fsm.language._parser import PARSER
 
 __all__ = ["member"]
 
-ROOM = 2**26  # bytes that any array of a file may have
-DENSEST = 200  # times: no header, column of times or log is packed tighter than this
+ROOM = 2**26  # bytes that any array in a file may have
+DENSEST = 200  # no header, time column or log is compressed by a larger factor than this
 
 
 def member(file: Any, name: str, most: int | None = None) -> Any:
-    """Read an array of an archive, if it unpacks to no more bytes than it can have.
+    """Read an array from an archive after checking its unpacked size.
 
     Parameters
     ----------
     file : numpy.lib.npyio.NpzFile
         The open archive.
     name : str
-        Of the array.
+        Name of the array.
     most : int, optional
-        Bytes it can have, as far as other arrays tell; else as many as its packed size allows.
+        Largest size in bytes, if other arrays determine it. Otherwise the limit follows from the
+        compressed size.
 
     Returns
     -------
@@ -35,7 +36,7 @@ def member(file: Any, name: str, most: int | None = None) -> Any:
     TraceFileError
         If it is too large.
     KeyError
-        If there is none.
+        If the archive has no such array.
     """
     members = {info.filename: info for info in file.zip.infolist()}
     found = members.get(name) or members[f"{name}.npy"]
@@ -43,7 +44,7 @@ def member(file: Any, name: str, most: int | None = None) -> Any:
     if found.file_size > most:
         raise TraceFileError(
             f"{name} unpacks to {found.file_size} bytes",
-            advice=f"in a file of this length it has at most {most}",
+            advice=f"a file of this length allows at most {most}",
         )
     with PARSER:
         return file[name]

@@ -1,4 +1,4 @@
-"""Between two rows of one arc: the state by interpolation, the place of a change by bisection."""
+"""States between two rows of one arc, by interpolation, and the time of a change, by bisection."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from gms_fsm.lowering.program import Program
 
 __all__ = ["first_true", "interpolated", "slopes"]
 
-HALVINGS = 60  # of a stretch between two rows
+HALVINGS = 60  # bisections between two rows
 
 
 def first_true(low: float, high: float, holds: Callable[[float], bool]) -> float:
-    """Return where a condition turns true, by bisection.
+    """Return the point at which a condition becomes true, found by bisection.
 
     Parameters
     ----------
     low, high : float
-        It is false at low and true at high; neither is asked again.
+        The condition is false at low and true at high; neither is evaluated again.
     holds : callable
         The condition.
 
     Returns
     -------
     float
-        The right end of the bracket: the condition holds there.
+        The right end of the bracket, where the condition is true.
 
     Examples
     --------
@@ -52,12 +52,14 @@ def interpolated(
     y1: FloatArray,
     t: float,
 ) -> FloatArray:
-    """Return the state at t between two rows of one arc: cubic Hermite, slopes from the flow.
+    """Return the state at t between two rows of one arc, by cubic Hermite interpolation.
+
+    The slopes come from the flow.
 
     Parameters
     ----------
     program : Program
-        Of the run.
+        Program of the run.
     mode : list of int
         Active states between the rows.
     t0, t1 : float
@@ -72,7 +74,7 @@ def interpolated(
     ndarray, shape (m,)
         The state.
     """
-    with np.errstate(all="ignore"):  # as in a run: beyond the largest float lies inf
+    with np.errstate(all="ignore"):  # as in a run, overflow gives inf
         at_start, at_end = slopes(program, mode, t0, y0, t1, y1)
         h = t1 - t0
         theta = (t - t0) / h
@@ -86,7 +88,7 @@ def interpolated(
 def slopes(
     program: Program, mode: list[int], t0: float, y0: FloatArray, t1: float, y1: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return dy/dt at two neighbouring rows of one arc, both as seen from between them.
+    """Return the one-sided dy/dt at two adjacent rows of one arc, seen from between them.
 
     Parameters
     ----------
@@ -96,9 +98,9 @@ def slopes(
     Returns
     -------
     tuple of ndarray, shape (m,)
-        At the first row and at the second.
+        Slopes at the first and at the second row.
     """
-    # Signs as they hold inside the interval; at its ends they may just be turning.
+    # The signs inside the interval; at its ends they may be about to change.
     held = armed(program, 0.5 * (t0 + t1), (0.5 * (y0 + y1)).tolist(), mode)
     at_start, at_end = (rate(program, t, y.tolist(), mode, held) for t, y in ((t0, y0), (t1, y1)))
     return at_start, at_end

@@ -1,7 +1,7 @@
-"""Traces as text (``.csv``): the header and the rows in one file, the transition log beside it.
+"""Traces as text (``.csv``): header and rows in one file, the transition log next to it.
 
-Numbers are printed so that they read back equal. The rows name their log by a stamp, so that a
-process killed between the two files leaves no mixture.
+Numbers are printed so that they read back equal. The header stores a hash of the log, so a
+process killed between writing the two files cannot leave a mismatched pair.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ __all__ = ["log_path", "log_text", "read", "write"]
 
 
 def log_path(path: Path) -> Path:
-    """Return where the log of a trace lies."""
+    """Return the path of the transition log of a trace."""
     return path.with_name(f"{path.stem}.transitions.csv")
 
 
 def log_text(log: Any) -> str:
-    """Return a transition log as CSV text; elements counted from 1, as texts do."""
+    """Return a transition log as CSV text, with elements numbered from 1."""
     names = log.dtype.names
     rows = (
         [_cell(name, value) for name, value in zip(names, record, strict=True)]
@@ -46,7 +46,7 @@ def log_text(log: Any) -> str:
 
 
 def write(path: Path, header: Header, columns: Mapping[str, NDArray[Any]], log: Any) -> Path:
-    """Write a trace and its log, both whole or neither."""
+    """Write a trace and its log, both completely or neither."""
     its_log = log_text(log)
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     head = json.loads(header.model_copy(update={"log": _stamp(its_log)}).model_dump_json())
@@ -62,8 +62,8 @@ def write(path: Path, header: Header, columns: Mapping[str, NDArray[Any]], log: 
 
 
 def read(path: Path) -> Parts:
-    """Read a trace and the log beside it."""
-    with folder_lock(path.parent, shared=True):  # rows and log of one run, not one of each
+    """Read a trace and its log."""
+    with folder_lock(path.parent, shared=True):  # rows and log must come from the same run
         with path.open(encoding="utf-8", newline="") as file:
             header = _header(path, file.readline())
             table = _read_columns(file, path, 2)
@@ -82,10 +82,10 @@ def read(path: Path) -> Parts:
 
 def _header(path: Path, line: str) -> Header:
     if not line.startswith("# {"):
-        what = "line 1 must be '# ' and the trace's header"
+        reason = "line 1 must be '# ' followed by the trace header"
         if line.startswith("t,element,"):
-            what = "this is a log of transitions; give the trace itself, .npz or .csv"
-        raise TraceFileError(what).inside(path)
+            reason = "this is a transition log; pass the trace itself (.npz or .csv)"
+        raise TraceFileError(reason).inside(path)
     return Header.model_validate_json(line[2:])
 
 
@@ -119,15 +119,15 @@ def _log(table: Mapping[str, list[str]]) -> Any:
 
 
 def _stamp(text: str) -> str:
-    """Return what tells one text from another; how its lines end does not count."""
+    """Return a short hash of a text, independent of its line endings."""
     return hashlib.sha256("\n".join(text.splitlines()).encode()).hexdigest()[:16]
 
 
 def _log_of(path: Path, stamp: str) -> str:
     """Read the text of the transition log that belongs to a trace.
 
-    Where the process was killed after the rows took their place and before the log did, the log is
-    complete under its temporary name.
+    If the process was killed after the rows were renamed and before the log was, the complete log
+    is still there under its temporary name.
     """
     log = log_path(path)
     for place in (log, *leftovers(log)):
@@ -136,8 +136,8 @@ def _log_of(path: Path, stamp: str) -> str:
         if stamp in ("", _stamp(text)):
             return text
     raise TraceFileError(
-        f"belongs to another run than {path.name}, or was changed",
-        advice="keep the two together",
+        f"it belongs to a different run than {path.name}, or it was changed",
+        advice="keep the two files together",
     ).inside(log)
 
 
@@ -159,11 +159,11 @@ def _read_columns(file: IO[str], path: Path, line: int) -> dict[str, list[str]]:
     reader = csv.reader(file)
     head = next(reader, None)
     if not head:
-        raise TraceFileError("it must name the columns", place=f"line {line}").inside(path)
+        raise TraceFileError("it must contain the column names", place=f"line {line}").inside(path)
     rows = list(reader)
     for number, row in enumerate(rows, start=line + 1):
         if len(row) != len(head):
             raise TraceFileError(
-                f"it has {len(row)} cells, the head line has {len(head)}", place=f"line {number}"
+                f"it has {len(row)} cells, but the header has {len(head)}", place=f"line {number}"
             ).inside(path)
     return {name: [row[j] for row in rows] for j, name in enumerate(head)}

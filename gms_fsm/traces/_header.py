@@ -1,4 +1,4 @@
-"""What a trace file says of the run it holds, validated when read. Reading executes nothing."""
+"""The description of a run in its trace file, validated on reading. Reading executes nothing."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class _Record(BaseModel):
 
 
 class ChartRecord(_Record):
-    """A chart's texts."""
+    """The texts of a chart."""
 
     name: str
     inputs: tuple[str, ...]
@@ -39,14 +39,14 @@ class ChartRecord(_Record):
 
     @classmethod
     def of(cls, chart: Chart) -> ChartRecord:
-        """Describe a chart; of a parameter without unit and rule only the name."""
+        """Describe a chart; a parameter without unit and rule is stored as its name only."""
         fields = {name: getattr(chart, name) for name in cls.model_fields}
         plain = [each.name if each == Parameter(each.name) else each for each in chart.parameters]
         return cls(**{**fields, "parameters": plain})
 
 
 class ModelRecord(_Record):
-    """A model's numbers."""
+    """The numbers of a model."""
 
     title: str
     n: int
@@ -58,14 +58,14 @@ class ModelRecord(_Record):
 
 
 class FormulaRecord(_Record):
-    """An expression signal."""
+    """A signal given by an expression."""
 
     kind: Literal["formula"] = "formula"
     text: str
 
 
 class CornersRecord(_Record):
-    """Ramps or a record."""
+    """A signal given by corner points: ramps or a measured record."""
 
     kind: Literal["corners"] = "corners"
     times: list[float]
@@ -74,7 +74,7 @@ class CornersRecord(_Record):
 
 
 class FunctionRecord(_Record):
-    """A Python function, which no file can hold."""
+    """A Python function, which cannot be stored in a file."""
 
     kind: Literal["function"] = "function"
 
@@ -93,7 +93,7 @@ RIGS: Mapping[type, RigKind] = {
 
 
 class RigRecord(_Record):
-    """A rig's numbers and signals."""
+    """The numbers and signals of a rig."""
 
     kind: RigKind
     numbers: dict[str, float]
@@ -101,18 +101,18 @@ class RigRecord(_Record):
 
     @property
     def prescribed(self) -> bool:
-        """Whether v is given."""
+        """Whether the velocity is prescribed."""
         return self.kind == "Prescribed"
 
 
 class Header(_Record):
-    """All of it."""
+    """The complete header of a trace file."""
 
     format: Literal["gms-fsm trace 1"] = "gms-fsm trace 1"
     model: ModelRecord
     rig: RigRecord
     settings: dict[str, str | float | dict[str, float | list[float]] | None]
-    log: str = ""  # in a CSV: the stamp of the transition log that lies beside it
+    log: str = ""  # in a CSV file: the hash of its transition log
     monitors: dict[str, Annotated[Verdict, Field(discriminator="kind")]] = {}
 
     @classmethod
@@ -123,7 +123,7 @@ class Header(_Record):
         settings: Mapping[str, Setting],
         monitors: Mapping[str, Verdict] | None = None,
     ) -> Header:
-        """Describe a run; a rig of another class than ours raises an `OutputError`."""
+        """Describe a run; a rig of a user-defined class raises `OutputError`."""
         chart = model.chart
         return cls(
             model=ModelRecord(
@@ -148,7 +148,7 @@ class Header(_Record):
         )
 
     def to_model(self) -> ChartModel:
-        """Return a model that computes the same."""
+        """Return an equivalent model."""
         record = self.model
         return ChartModel(
             Chart(**vars(record.chart)),
@@ -164,7 +164,7 @@ class Header(_Record):
         )
 
     def to_rig(self) -> Rig:
-        """Return a rig that moves the same; a Python function is replaced by one that says so."""
+        """Return an equivalent rig, in which a Python function becomes one that raises."""
         signals = {name: _signal(name, record) for name, record in self.rig.signals.items()}
         numbers = self.rig.numbers
         match self.rig.kind:
@@ -177,11 +177,11 @@ class Header(_Record):
 
 
 def _kind(rig: Rig) -> RigKind:
-    # The class itself: one of another's making may have the name of ours.
+    # Look up the class, not its name: a user's class may have the same name as ours.
     if type(rig) not in RIGS:
         raise OutputError(
-            f"the rig is a {type(rig).__qualname__}, a class of your own, which a file cannot hold",
-            advice=f"it can hold {', '.join(RIGS.values())} of gms_fsm",
+            f"the rig is a {type(rig).__qualname__}, a custom class, which cannot be saved",
+            advice=f"a file can store {', '.join(RIGS.values())} of gms_fsm",
         )
     return RIGS[type(rig)]
 
@@ -209,8 +209,8 @@ def _signal(name: str, record: FormulaRecord | CornersRecord | FunctionRecord) -
 def _lost(name: str) -> Callable[[float], float]:
     def missing(_: float) -> float:
         raise SignalError(
-            f"{name!r} was a Python function, which a trace file cannot hold",
-            advice="sample before saving, or run with t_eval",
+            f"{name!r} was a Python function, which a trace file cannot store",
+            advice="sample the trace before saving it, or run with t_eval",
         )
 
     return missing

@@ -20,7 +20,7 @@ def log_of(records: Iterable[LogRecord]) -> Any:
 
 
 def log_from(columns: Mapping[str, Any]) -> Any:
-    """Return columns of arrays, by name, as the record array of `Trace.transitions`."""
+    """Return columns, given by name, as the record array of `Trace.transitions`."""
     texts = {text for name in LOG_TEXTS for text in set(columns[name].tolist())}
     log = np.empty(len(columns["t"]), dtype=_dtype(texts))
     for name in LogRecord._fields:
@@ -29,7 +29,7 @@ def log_from(columns: Mapping[str, Any]) -> Any:
 
 
 def is_log(log: Any) -> bool:
-    """Tell whether an array from a file has the shape and the columns of a log."""
+    """Return whether an array from a file has the shape and columns of a log."""
     fields: Mapping[str, Any] = log.dtype.fields or {}
     width = int(fields["edge"][0].itemsize) // 4 if "edge" in fields else 1
     return bool(log.ndim == 1 and log.dtype == _of_width(width))

@@ -1,4 +1,4 @@
-"""Traces as NumPy archives (``.npz``): arrays of the rows, the log, and the header as JSON."""
+"""Traces as NumPy archives (``.npz``): arrays for the rows and the log, and the header as JSON."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["read", "write"]
 
 
 def write(path: Path, parts: Parts) -> Path:
-    """Write a trace, whole or not at all."""
+    """Write a trace, completely or not at all."""
     arrays = {
         **{f"rows_{name}": value for name, value in vars(parts.rows).items()},
         **{f"stops_{name}": value for name, value in vars(parts.stops).items()},
@@ -29,12 +29,12 @@ def write(path: Path, parts: Parts) -> Path:
 
 
 def read(path: Path) -> Parts:
-    """Read a trace; no array is larger than that of a trace with so many rows."""
+    """Read a trace; an array larger than the number of rows allows is rejected."""
     with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
         header = Header.model_validate_json(str(member(file, "header")))
         model, rig = header.to_model(), header.to_rig()
         layout = lower(model, rig).layout
-        width = 8 * max(layout.y.size, layout.observed.size, layout.modes)  # bytes a row
+        width = 8 * max(layout.y.size, layout.observed.size, layout.modes)  # bytes per row
         tables = {}
         for kind in ("rows", "stops"):
             t = member(file, f"{kind}_t")

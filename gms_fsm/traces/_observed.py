@@ -1,4 +1,4 @@
-"""What is observed at all rows of a run: the very numbers the run saw."""
+"""The observed quantities at all rows of a run, identical to those seen by the run."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ __all__ = ["observed_rows"]
 
 
 def observed_rows(program: Program, rows: Rows, *, compiled: bool) -> FloatArray:
-    """Observe rows.
+    """Return the observed quantities at all rows.
 
     Parameters
     ----------
     program : Program
-        Of the run.
+        Program of the run.
     rows : Rows
-        All of its rows.
+        All rows of the run.
     compiled : bool
-        Whether machine code is there to do it; the numbers are the same.
+        Whether to use machine code; the numbers are the same.
 
     Returns
     -------
@@ -43,22 +43,23 @@ def observed_rows(program: Program, rows: Rows, *, compiled: bool) -> FloatArray
 
 
 def _one_by_one(program: Program, rows: Rows) -> FloatArray:
-    # With scalar functions, as the run itself.
+    # With scalar functions, as in the run itself.
     table = np.empty((len(rows), program.layout.observed.size))
     modes = rows.mode.tolist()
     for row, (t, y) in enumerate(zip(rows.t.tolist(), rows.y.tolist(), strict=True)):
         try:
             table[row] = observe(program, t, y, modes[row])
-        except SignalError:  # the row at which a Python function failed
+        except SignalError:  # a Python function failed at this row
             table[row] = np.nan
     return table
 
 
 def _show_one_side(program: Program, rows: Rows, table: FloatArray) -> None:
-    """Observe the rows beside a slide as the arc did that they belong to.
+    """Observe the rows next to a slide with the signs held by the arc they belong to.
 
-    They lie on the surface or a rounding behind it, where the sign as it is seen is not the one
-    that was held: before a slide that of the arc before, after it that of the arc that follows.
+    These rows lie on the surface or a rounding error past it, so the sign computed from the state
+    is not the held one: before a slide it is that of the preceding arc, after it that of the
+    following arc.
     """
     t, slid = rows.t, rows.mode[:, program.layout.slides]
     turns = np.flatnonzero((np.diff(slid, axis=0) != 0).any(axis=1) & (np.diff(t) == 0.0))

@@ -1,4 +1,4 @@
-"""Errors of a run that began: each holds what was computed up to there."""
+"""Errors raised during a run; each keeps what was computed up to then."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = [
 
 
 class SimulationError(GMSError, RuntimeError):
-    """A run could not go on; `trace` holds all that was computed up to there.
+    """A run could not continue; `trace` has everything computed up to then.
 
     Parameters
     ----------
@@ -26,9 +26,9 @@ class SimulationError(GMSError, RuntimeError):
     trace : Trace
         The part of the run before the error.
     t : float, optional
-        When, s.
+        Time of the failure, s.
     place : str, optional
-        Where: an element, an edge, a signal.
+        The element, edge or signal concerned.
     advice : str, optional
         What to try.
     """
@@ -44,14 +44,14 @@ class SimulationError(GMSError, RuntimeError):
     ) -> None:
         super().__init__(reason, place=place, advice=advice)
         self.trace, self.t = trace, t
-        self.kept = ".trace"  # where the run up to there is: here, or a file
+        self.kept = ".trace"  # where the partial run is: this attribute, or a file
 
     def __str__(self) -> str:
-        return f"{self.happened}; the run up to there is kept in {self.kept}"
+        return f"{self.happened}; the run so far is kept in {self.kept}"
 
     @property
     def happened(self) -> str:
-        """The text without a word on where the run is kept, for those who show the run itself."""
+        """The message without the part that says where the run is kept."""
         scene = self.place
         if self.t is not None:
             scene = f"{scene} at t = {self.t!r} s" if scene else f"t = {self.t!r} s"
@@ -59,15 +59,15 @@ class SimulationError(GMSError, RuntimeError):
 
 
 class LivelockError(SimulationError):
-    """States switch again and again without progress of time, or of time and state."""
+    """States keep switching without progress in time, or in time and state."""
 
 
 class StepSizeError(SimulationError):
-    """The step size fell under the resolution of the clock."""
+    """The step size fell below the resolution of the clock."""
 
 
 class StepLimitError(SimulationError):
-    """The steps are used up (`max_steps`), or a stiff run would need many more than there are."""
+    """The step limit (`max_steps`) was reached, or a stiff run would need far more steps."""
 
 
 class NotFiniteError(SimulationError):
@@ -79,4 +79,4 @@ class SignalEndError(SimulationError):
 
 
 class CallbackError(SimulationError):
-    """A callback changed what it may only look at: values, or the state of an element."""
+    """A callback changed values, or the state of an element, which it may only read."""

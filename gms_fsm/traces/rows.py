@@ -17,7 +17,7 @@ __all__ = ["Rows", "column_name", "merged"]
 class Rows:
     """Times, micro-steps, states y and modes, row by row.
 
-    Modes are those of the elements, then for each surface whether the motion slides on it
+    The modes are those of the elements, then one flag per surface: whether the motion slides on it
     (`gms_fsm.lowering.layout`).
     """
 
@@ -35,17 +35,18 @@ class Rows:
 
 
 def merged(rows: Rows, stops: Rows) -> Rows:
-    """Merge two tables in time order; rows that both have are kept once.
+    """Merge two tables in time order; rows present in both are kept once.
 
     Parameters
     ----------
     rows, stops : Rows
-        Wanted times, and both sides of every stop.
+        Rows at requested times, and both sides of every stop.
 
     Returns
     -------
     Rows
-        A wanted row on an event holds the values after it: it stands behind the micro-steps.
+        The merged table. A requested row at an event has the values after the event and follows
+        its micro-steps.
     """
     if rows is stops or not len(stops):
         return rows
@@ -63,7 +64,7 @@ def merged(rows: Rows, stops: Rows) -> Rows:
 
 
 def _found_in(rows: Rows, stops: Rows) -> NDArray[np.bool_]:
-    """Tell which rows the stops have too, to the bit."""
+    """Return which rows are also among the stops, bit for bit."""
     found = np.isin(rows.t, stops.t)
     if not found.any():
         return found
@@ -79,18 +80,18 @@ def _found_in(rows: Rows, stops: Rows) -> NDArray[np.bool_]:
 
 
 def column_name(name: str, i: int) -> str:
-    """Return the column of element i in a flat table: z1, but z1_1 for a variable called z1.
+    """Return the column name of element i in a flat table: z1, but z1_1 for a variable called z1.
 
     Parameters
     ----------
     name : str
-        A quantity that each element has.
+        A quantity of the elements.
     i : int
-        Counted from 0.
+        Element index, from 0.
 
     Returns
     -------
     str
-        Counted from 1, as texts do.
+        The name, in which elements are numbered from 1.
     """
     return f"{name}{'_' if name[-1].isdigit() or name[-1] == '_' else ''}{i + 1}"

@@ -1,12 +1,12 @@
-"""What a name means on a run: the values behind guards, watches, monitors, `until` and pages.
+"""The values of names in a run, for guards, watches, monitors, `until` and replay pages.
 
-A scope holds one row of a run as numbers, or all rows as arrays. Elements count from 1 in names.
+A scope has one row of a run as numbers, or all rows as arrays. Names number elements from 1.
 
 guards       of one element: ``t, x, v, s``, its variables and parameters
 watches      ``t, x, v, F``; ``s``, the Stribeck curve at v; ``z1``, ``s1``, ``F1`` ... of one
-             element; ``state(1)``; of a single element its variables also without a number
+             element; ``state(1)``; for a model of one element its variables also without a number
 invariants   as watches, but ``s``, variables and parameters without a number are those of each
-             element: the condition has to hold for all of them
+             element, and the condition must hold for all elements
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ from gms_fsm.traces.trace import Trace
 
 __all__ = ["GuardValues", "Scope", "invariant_names", "parameter_values", "watch_names"]
 
-FORCE = "F_elements"  # what F1, F2 ... are called among what is observed
+FORCE = "F_elements"  # the observed quantity that F1, F2 ... refer to
 
 
 def watch_names(model: Model) -> list[str]:
-    """Return what conditions and watches over a run can name.
+    """Return the names allowed in conditions and watches over a run.
 
     Parameters
     ----------
     model : Model
-        What runs.
+        The simulated model.
 
     Returns
     -------
     list of str
-        Without ``state(1)``, which the expression language has by itself.
+        Without ``state(1)``, which is built into the expression language.
 
     Examples
     --------
@@ -53,12 +53,12 @@ def watch_names(model: Model) -> list[str]:
 
 
 def invariant_names(model: Model) -> list[str]:
-    """Return what an invariant can name.
+    """Return the names allowed in an invariant.
 
     Parameters
     ----------
     model : Model
-        What runs.
+        The simulated model.
 
     Returns
     -------
@@ -71,19 +71,19 @@ def invariant_names(model: Model) -> list[str]:
 
 
 def parameter_values(model: Model, element: int) -> dict[str, float]:
-    """Return the parameters of an element.
+    """Return the parameter values of an element.
 
     Parameters
     ----------
     model : Model
-        What runs.
+        The simulated model.
     element : int
-        Counted from 0.
+        Index, from 0.
 
     Returns
     -------
     dict of str to float
-        Those of the chart, by name.
+        Values by parameter name.
     """
     return {
         name: float(value if isinstance(value, float | int) else value[element])
@@ -96,11 +96,11 @@ def _curve(model: Model) -> tuple[str, ...]:
 
 
 def _numbered(model: Model) -> Mapping[str, tuple[str, int]]:
-    """Return the names of single elements' quantities, each with quantity and element."""
+    """Return the numbered names, each with its quantity and element."""
     return _all_numbered((*model.chart.variables, *_curve(model)), model.n)
 
 
-@functools.lru_cache(maxsize=64)  # `until` asks at every place it looks
+@functools.lru_cache(maxsize=64)  # `until` calls this for every state it tests
 def _all_numbered(names: tuple[str, ...], n: int) -> Mapping[str, tuple[str, int]]:
     quantities = {name: name for name in names} | {"F": FORCE}
     return {
@@ -115,17 +115,17 @@ class Scope:
     Parameters
     ----------
     model : Model
-        What runs.
+        The simulated model.
     layout : Layout
-        Where its values stand.
+        Places of the values.
     t : float or ndarray, shape (rows,)
-        s.
+        Time, s.
     y : sequence of float, or ndarray, shape (places, rows)
         The state vector.
     seen : mapping of str to float, sequence of float, or ndarrays of shape (rows,) or (n, rows)
-        ``v, F``; ``s`` and ``F_elements``, one per element; of a run under way also the rates.
+        ``v, F``; ``s`` and ``F_elements``, one per element; during a run also the rates.
     mode : sequence of int, or ndarray, shape (modes, rows)
-        Of the elements and the surfaces.
+        Modes of the elements and the surfaces.
 
     Examples
     --------
@@ -150,25 +150,25 @@ class Scope:
     def of(
         cls, model: Model, program: Program, t: float, y: list[float], mode: Sequence[int]
     ) -> Scope:
-        """Return the scope of one row of a run under way.
+        """Return the scope of the present state of a run.
 
         Parameters
         ----------
         model : Model
-            What runs.
+            The simulated model.
         program : Program
-            Its generated text.
+            Its generated program.
         t : float
-            s.
+            Time, s.
         y : list of float, shape (m,)
             State.
         mode : sequence of int, shape (modes,)
-            Of a row.
+            Modes of the elements and the surfaces.
 
         Returns
         -------
         Scope
-            Over numbers.
+            With numbers as values.
         """
         layout = program.layout
         seen = layout.observed.named(observe(program, t, y, mode))
@@ -181,14 +181,14 @@ class Scope:
         Parameters
         ----------
         trace : Trace
-            A run.
+            The run.
         row : int
             Row index; negative counts from the end.
 
         Returns
         -------
         Scope
-            Over numbers, those that the run saw.
+            With numbers as values, identical to those seen by the run.
         """
         seen = {
             "v": float(trace.v[row]),
@@ -207,12 +207,12 @@ class Scope:
         Parameters
         ----------
         trace : Trace
-            A run.
+            The run.
 
         Returns
         -------
         Scope
-            Over arrays, the rows as their last axis.
+            With arrays as values, whose last axis is the row.
         """
         seen = {"v": trace.v, "F": trace.F, "s": trace.s.T, FORCE: trace.F_elements.T}
         rows, layout = trace.rows, trace.program.layout
@@ -277,17 +277,17 @@ class Scope:
 
     # ------------------------------------------------------------------ by name
     def guards(self, element: int) -> dict[str, Any]:
-        """Return what the guards of an element can name.
+        """Return the values of the names allowed in guards of an element.
 
         Parameters
         ----------
         element : int
-            Counted from 0.
+            Index, from 0.
 
         Returns
         -------
         dict of str to float, or to ndarray, shape (rows,)
-            By name.
+            Values by name.
         """
         values = {"t": self.t, "x": self.x, "v": self.v, "s": self.s[element]}
         for name in self.layout.y.own:
@@ -295,38 +295,40 @@ class Scope:
         return values | parameter_values(self.model, element)
 
     def watches(self) -> dict[str, Any]:
-        """Return what watches can name, and the states.
+        """Return the values of the names allowed in watches, and the states.
 
         Returns
         -------
         dict of str to float, or to ndarray, shape (rows,)
-            By name; names of states under ``state(1)``, of a single element also ``state(0)``.
+            Values by name. State names are under ``state(1)``, for a single element also under
+            ``state(0)``.
         """
         values = self._shared() | self._single() | self._numbered_states()
         if self.model.stribeck is not None:
             values["s"] = self.curve
         if self.model.n == 1:
             values |= {name: self.each(name)[0] for name in self.layout.y.own}
-            values["state(0)"] = self.states[0]  # what `state == name` asks for
+            values["state(0)"] = self.states[0]  # the value of `state`
         return values
 
     def invariants(self, *, states: bool = False) -> dict[str, Any]:
-        """Return what invariants can name; over arrays only.
+        """Return the values of the names allowed in invariants; only for scopes over arrays.
 
         Parameters
         ----------
         states : bool
-            Add the states.
+            Whether to add the states.
 
         Returns
         -------
         dict of str to ndarray, shape (n, rows), (n, 1), (rows,) or ()
-            By name; names of states under ``state(1)``, of each element under ``state(0)``.
+            Values by name. State names are under ``state(1)``, those of each element under
+            ``state(0)``.
         """
         own = {name: self.each(name) for name in (*self.layout.y.own, *_curve(self.model))}
         for name, value in self.model.values.items():
             own[name] = value if np.ndim(value) == 0 else np.asarray(value)[:, np.newaxis]
-        # A chart's own name goes before a numbered one.
+        # A name defined by the chart takes precedence over a numbered one.
         values = self._single() | own | self._shared()
         if states:
             values |= self._numbered_states() | {"state(0)": self.states}
@@ -346,14 +348,14 @@ class Scope:
 
 
 class GuardValues:
-    """Puts what guards can name at hand of all elements; for asking thousands of times a second.
+    """Fast update of the values that guards can name, for all elements.
 
-    The same as `Scope.guards` but for the parameters, which do not change.
+    The same values as `Scope.guards`, without the parameters, which do not change.
 
     Parameters
     ----------
     layout : Layout
-        Where the values stand.
+        Places of the values.
     """
 
     def __init__(self, layout: Layout) -> None:
@@ -367,16 +369,16 @@ class GuardValues:
     def put(
         self, t: float, y: Sequence[float], seen: Sequence[float], into: Sequence[dict[str, Any]]
     ) -> None:
-        """Put values into one mapping per element.
+        """Store the current values in one mapping per element.
 
         Parameters
         ----------
         t : float
-            s.
+            Time, s.
         y, seen : sequence of float
-            State vector, and what is observed of it, by place.
+            State vector, and the quantities observed of it, by place.
         into : sequence of dict, length n
-            Changed in place.
+            Modified in place.
         """
         x, v = y[self._x], seen[self._v]
         for values, (threshold, variables) in zip(into, self._own, strict=True):

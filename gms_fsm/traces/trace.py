@@ -1,9 +1,9 @@
-"""A finished run: rows, micro-steps, the transition log, and what it was made from.
+"""A finished run: rows, micro-steps, the transition log, the model and the rig.
 
-m firings at one time give m + 1 rows: micro-step 0 before, then one after each firing. Where a
-slide along a surface begins or ends there is one more, at the micro-step of the row before. With
-wanted times (`t_eval`) the rows are exactly those times, right-continuous; the log is always
-complete.
+m firings at one time give m + 1 rows: micro-step 0 before the firings, then one row after each.
+Where a slide along a surface begins or ends there is one more row, with the micro-step of the row
+before it. With requested times (`t_eval`) the rows are exactly at those times, right-continuous;
+the log is always complete.
 """
 
 from __future__ import annotations
@@ -57,17 +57,17 @@ _SLIDING = np.dtype(
 
 
 def check_trace(trace: object) -> None:
-    """Raise if something that is to be drawn is no trace.
+    """Raise unless an object to be drawn is a trace.
 
     Parameters
     ----------
     trace : object
-        What was given.
+        The object.
 
     Raises
     ------
     ParameterError
-        Saying what it is and how a trace is made.
+        If it is not a trace; the message says how to make one.
     """
     if not isinstance(trace, Trace):
         raise ParameterError(
@@ -77,7 +77,7 @@ def check_trace(trace: object) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """What a simulation returns.
+    """The result of a simulation.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Trace:
     microstep : ndarray of int, shape (rows,)
     x, v : ndarray, shape (rows,), m and m/s
     z : ndarray, shape (rows, n), m
-        The chart's first variable.
+        First variable of the chart.
     states : ndarray of str, shape (rows, n)
     s : ndarray, shape (rows, n)
         Thresholds ``w_i s(v)``, m.
@@ -94,11 +94,11 @@ class Trace:
     transitions : numpy.recarray
         Records with ``t, element`` (from 0), ``edge, source, target, z, v, s, F_before, F_after``.
     model, rig
-        What ran. After `load` a generic `ChartModel`.
+        The simulated system; after `load` the model is a generic `ChartModel`.
     settings : dict
-        Method, tolerances, engine and so on.
+        Method, tolerances, engine and other settings.
     monitors : mapping of str to Verdict
-        What the monitors of the run say, by name; empty if it had none.
+        Verdicts of the monitors, by name; empty if the run had none.
 
     Examples
     --------
@@ -110,7 +110,7 @@ class Trace:
     """
 
     rows: Rows
-    stops: Rows  # both sides of every stop, kept where `rows` holds wanted times only
+    stops: Rows  # both sides of every stop; needed if `rows` has requested times only
     transitions: Any
     model: Model
     rig: Rig
@@ -150,7 +150,7 @@ class Trace:
 
     @property
     def z(self) -> FloatArray:
-        """The first variable of every element (the deflection), shape (rows, n), m."""
+        """First variable (the deflection) of every element, shape (rows, n), m."""
         return self._named(self.program.layout.variable)
 
     def variable(self, name: str) -> FloatArray:
@@ -164,7 +164,7 @@ class Trace:
         Returns
         -------
         ndarray, shape (rows, n)
-            Its values.
+            Values of the variable.
 
         Raises
         ------
@@ -215,16 +215,16 @@ class Trace:
 
     @property
     def dz(self) -> FloatArray:
-        """Rate of the first variable under the row's states, shape (rows, n), m/s."""
+        """Rate of the first variable in the states of the row, shape (rows, n), m/s."""
         return self._observed["dz"]
 
     @property
     def sliding(self) -> Any:
-        """Stretches on which a sign is held between -1 and 1 (see `integrators.sliding`).
+        """Intervals in which a sign is held between -1 and 1 (see `integrators.sliding`).
 
-        Records with ``t_start, t_end`` [s], ``surface`` (what is zero there, such as ``v``) and
-        ``sigma_start, sigma_end``, the sign held at both ends. From the rows, or where these are
-        wanted times from the stops; a run of which only the end was kept has none.
+        Records with ``t_start, t_end`` [s], ``surface`` (the quantity that is zero there, such as
+        ``v``) and ``sigma_start, sigma_end``, the sign held at both ends. They are found from the
+        rows and the stops; a run of which only the end was kept has none.
         """
         table = merged(self.rows, self.stops)
         found: list[tuple[Any, ...]] = []
@@ -233,7 +233,7 @@ class Trace:
         for k, flags in enumerate(table.mode[:, self.program.layout.slides].T):
             edges = np.flatnonzero(np.diff(np.concatenate([[0], flags, [0]])))
             for first, behind in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-                # The last row of the stretch itself: no firing or jump of a signal is behind it.
+                # The last row of the interval itself, before any firing or jump of a signal.
                 last = int(np.searchsorted(table.t, table.t[behind - 1]))
                 if last > first and table.t[last] in self.program.jumps:
                     last -= 1
@@ -244,7 +244,7 @@ class Trace:
         return np.array(found, dtype=_SLIDING).view(np.recarray)
 
     def sigma(self, row: int) -> dict[str, float]:
-        """Return the signs that are held between -1 and 1 at a row.
+        """Return the signs held between -1 and 1 at a row.
 
         Parameters
         ----------
@@ -254,7 +254,7 @@ class Trace:
         Returns
         -------
         dict of str to float
-            By what is zero there, such as ``v``; empty almost everywhere.
+            Keyed by the quantity that is zero there, such as ``v``; empty at most rows.
         """
         row = checked_integer("row", row)
         on = np.flatnonzero(self.rows.mode[row, self.program.layout.slides])
@@ -266,7 +266,7 @@ class Trace:
 
     @cached_property
     def program(self) -> Program:
-        """The generated program behind the run."""
+        """The generated program of the run."""
         return lower(self.model, self.rig)
 
     @cached_property
@@ -276,30 +276,31 @@ class Trace:
         compiled, layout = self.settings.get("engine") == "compiled", self.program.layout
         table = observed_rows(self.program, self.rows, compiled=compiled)
         seen = layout.observed.named(table.T)
-        # As in files: dz is the rate of the first variable, whatever its name.
+        # As in files, dz is the rate of the first variable, whatever its name.
         return {name: seen[layout.rate if name == "dz" else name].T for name in OBSERVED}
 
     # ------------------------------------------------------------------ sampling
     def sample(self, times: ArrayLike) -> Trace:
-        """Return the run at other times, interpolated inside arcs and never across an event.
+        """Return the run at other times, interpolated within arcs and never across an event.
 
-        Cubic Hermite between neighbouring rows, with one-sided slopes from the flow; on an event
-        the value after it. For full accuracy on a dense grid ask `simulate` for it by `t_eval`.
+        The interpolation is cubic Hermite between adjacent rows, with one-sided slopes from the
+        flow. At an event the value is the one after it. For full accuracy on a dense grid, pass
+        `t_eval` to `simulate`.
 
         Parameters
         ----------
         times : array_like, shape (m,)
-            s, within the run.
+            Times within the run, s.
 
         Returns
         -------
         Trace
-            With exactly these rows, in this order, and the same transitions.
+            With rows at exactly these times, in this order, and the same transitions.
 
         Raises
         ------
         ParameterError
-            If a time lies outside the run.
+            If a time is outside the run.
         SignalError
             If the trace comes from a file and its signal was a Python function.
         """
@@ -312,7 +313,7 @@ class Trace:
         outside = wanted[~((wanted >= table.t[0]) & (wanted <= table.t[-1]))]
         if outside.size:
             raise ParameterError(
-                f"time {shown(outside[0])} s lies outside the run, {shown(table.t[0])} to "
+                f"time {shown(outside[0])} s is outside the run, {shown(table.t[0])} to "
                 f"{shown(table.t[-1])} s"
             )
         left = np.searchsorted(table.t, wanted, side="right") - 1
@@ -326,12 +327,12 @@ class Trace:
         Parameters
         ----------
         points : int
-            How many samples over the whole run.
+            Number of samples over the whole run.
 
         Returns
         -------
         Trace
-            All rows of this trace, micro-steps included, and the samples.
+            All rows of this trace, including micro-steps, and the samples.
         """
         points = checked_integer("points", points, 1)
         even = self.sample(np.linspace(self.t[0], self.t[-1], points)).rows
@@ -340,12 +341,12 @@ class Trace:
         return replace(self, rows=rows, stops=rows, stored={})
 
     def whole(self) -> Trace:
-        """Return the run with both sides of every stop as rows, beside the wanted times.
+        """Return the run with both sides of every stop added to the requested rows.
 
         Returns
         -------
         Trace
-            This one if it has them already.
+            This trace if it already has them.
         """
         table = merged(self.rows, self.stops)
         if len(table) == len(self.rows):
@@ -367,17 +368,17 @@ class Trace:
         )
 
     def with_monitors(self, found: Mapping[str, Verdict]) -> Trace:
-        """Return the same run with what its monitors say.
+        """Return the same run with the verdicts of its monitors.
 
         Parameters
         ----------
         found : mapping of str to Verdict
-            By name.
+            Verdicts by name.
 
         Returns
         -------
         Trace
-            With all that has been computed from the rows already.
+            A copy that keeps everything already computed from the rows.
         """
         trace = replace(self, monitors=found)
         vars(trace).update({**vars(self), "monitors": found})
@@ -385,31 +386,32 @@ class Trace:
 
     # ------------------------------------------------------------------ files
     def save(self, path: str | Path) -> Path:
-        """Write the trace to ``.npz``, or to ``.csv`` with the log beside it.
+        """Write the trace to ``.npz``, or to ``.csv`` with the log in a second file.
 
-        The file is written whole or not at all. CSV numbers are printed so that they read back
-        equal; the log goes to ``<name>.transitions.csv``.
+        The file is written completely or not at all. CSV numbers are printed so that they read
+        back equal; the log is written to ``<name>.transitions.csv``.
 
         Parameters
         ----------
         path : str or Path
-            Ends in ``.npz`` or ``.csv``.
+            File name ending in ``.npz`` or ``.csv``.
 
         Returns
         -------
         Path
-            The file.
+            The file written.
 
         Raises
         ------
         OutputError
-            If the folder cannot be written, the ending is another, or the rig is of a class of
-            your own.
+            If the folder is not writable, the file name has another ending, or the rig is of a
+            custom class.
         """
         path = checked_path("path", path)
         if path.suffix not in (".npz", ".csv"):
             raise OutputError(
-                f"a trace is saved as .npz or .csv, not {path.suffix!r}", place=str(path)
+                f"the name of a trace file must end in .npz or .csv, not {path.suffix!r}",
+                place=str(path),
             )
         header = Header.of(self.model, self.rig, self.settings, self.monitors)
         if path.suffix == ".csv":
@@ -430,18 +432,19 @@ class Trace:
         Returns
         -------
         Trace
-            With equal arrays.
+            With arrays equal to those saved.
 
         Raises
         ------
         TraceFileError
-            If the file is missing, damaged, or not a trace; nothing in it is executed.
+            If the file is missing, damaged or not a trace; nothing in it is executed.
         """
         path = checked_path("path", path)
         reader = {".npz": _npz.read, ".csv": _csv.read}.get(path.suffix)
         if reader is None:
             raise TraceFileError(
-                f"a trace ends in .npz or .csv, not {path.suffix!r}", place=str(path)
+                f"the name of a trace file must end in .npz or .csv, not {path.suffix!r}",
+                place=str(path),
             )
         try:
             parts = checked(reader(path))
@@ -449,11 +452,11 @@ class Trace:
             raise (error if error.outer else error.inside(path)) from None
         except FileNotFoundError as error:
             raise TraceFileError(
-                "no such file", place=error.filename, advice="check its name and the folder"
+                "no such file", place=error.filename, advice="check the name and the folder"
             ) from None
         except Exception as error:
-            # A damaged file can fail anywhere inside zipfile, zlib, numpy, csv or pydantic, and
-            # each has errors of its own; whatever it is, it is the file's fault.
+            # A damaged file can fail anywhere inside zipfile, zlib, numpy, csv or pydantic, each
+            # with its own errors; in every case the file is at fault.
             raise TraceFileError(
                 f"damaged or incomplete trace file ({why(error)})",
                 place=str(path),
@@ -472,7 +475,7 @@ class Trace:
 
     # ------------------------------------------------------------------ tables
     def columns(self) -> dict[str, NDArray[Any]]:
-        """Return the rows as flat columns; elements are numbered from 1 in the names.
+        """Return the rows as flat columns, whose names number elements from 1.
 
         Returns
         -------
@@ -498,7 +501,7 @@ class Trace:
         return table
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the rows as a pandas DataFrame, one column a quantity and element.
+        """Return the rows as a pandas DataFrame, one column per quantity and element.
 
         Returns
         -------
@@ -513,28 +516,28 @@ class Trace:
         return require("pandas", "pandas").DataFrame(self.columns())
 
     def transitions_csv(self) -> str:
-        """Return the transition log as CSV text; elements counted from 1, as texts do.
+        """Return the transition log as CSV text, with elements numbered from 1.
 
         Returns
         -------
         str
-            With a head line.
+            With a header line.
         """
         return _csv.log_text(self.transitions)
 
 
 def dwell_times(trace: Trace) -> FloatArray:
-    """Return how long each element was in each state.
+    """Return the time each element spent in each state.
 
     Parameters
     ----------
     trace : Trace
-        A run; its transition log is complete whatever its rows are.
+        A run; its transition log is complete, whatever its rows are.
 
     Returns
     -------
     ndarray, shape (n, states), s
-        Rows add up to the run's length.
+        Each row adds up to the duration of the run.
 
     Examples
     --------
@@ -560,5 +563,5 @@ def dwell_times(trace: Trace) -> FloatArray:
 
 
 def files_of(path: Path) -> list[Path]:
-    """Return the files that a trace lies in: one, or for ``.csv`` the log beside it too."""
+    """Return the files of a trace: one, or for ``.csv`` also that of its log."""
     return [path, _csv.log_path(path)] if path.suffix == ".csv" else [path]

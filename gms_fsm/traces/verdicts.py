@@ -1,6 +1,6 @@
-"""What the monitors of a run have to say: data, kept in the trace and in its files.
+"""Verdicts of the monitors of a run, as data kept in the trace and in its files.
 
-Elements are counted from 0 in the fields, as in all arrays, and from 1 in the texts.
+Elements are numbered from 0 in the fields, as in all arrays, and from 1 in the texts.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Episode:
-    """One element that took one edge again and again.
+    """Repeated firing of one edge by one element.
 
     Parameters
     ----------
     element : int
-        Counted from 0.
+        Element index, from 0.
     edge : str
-        The edge it took most often.
+        The edge that fired most often.
     back : tuple of str
-        The other edges it took meanwhile.
+        The other edges that fired meanwhile.
     count : int
-        How often it took the edge.
+        Number of times the edge fired.
     t_first, t_last : float
         First and last time, s.
     values : dict of str to float
-        The chart's first variable, v and s at the first time.
+        First variable of the chart, v and s at the first time.
     """
 
     element: int
@@ -50,18 +50,18 @@ class Episode:
 
 @dataclass(frozen=True)
 class ChatteringVerdict:
-    """Of `gms_fsm.traces.monitors.Chattering`.
+    """Verdict of `gms_fsm.traces.monitors.Chattering`.
 
     Parameters
     ----------
     ok : bool
         Whether nothing chattered and the run did not end in a livelock.
     text : str
-        What happened, and what to try.
+        What happened and what to try.
     episodes : tuple of Episode
-        The longest of each element that chattered.
+        The longest episode of each element that chattered.
     livelock : bool
-        Whether the run ended because states switched while time stood still.
+        Whether the run ended because states switched without progress in time.
     """
 
     ok: bool
@@ -73,26 +73,26 @@ class ChatteringVerdict:
 
 @dataclass(frozen=True)
 class InvariantVerdict:
-    """Of `gms_fsm.traces.monitors.Invariant`.
+    """Verdict of `gms_fsm.traces.monitors.Invariant`.
 
     Parameters
     ----------
     ok : bool
-        Whether it held at all rows.
+        Whether the invariant held at all rows.
     text : str
-        Where it first failed, with which values.
+        Where it first failed, and with which values.
     condition : str
         The invariant.
     rows, broken : int
-        Rows looked at, and rows at which it failed (for at least one element).
+        Number of rows checked, and of rows at which it failed (for at least one element).
     t : float or None
-        Where it first failed, s: located between two rows, on the false side.
+        Time of the first failure, s, located between two rows, on the false side.
     element : int or None
-        The element, counted from 0; None if it is not about single elements.
+        Element index, from 0; None if the invariant does not refer to single elements.
     state : str
-        The element's state there.
+        State of the element at t.
     values : dict of str to float
-        The names of the condition there.
+        Values of the names in the condition at t.
     t_last : float or None
         Time of the last row at which it failed, s.
     """
@@ -112,28 +112,31 @@ class InvariantVerdict:
 
 @dataclass(frozen=True)
 class PassivityVerdict:
-    """Of `gms_fsm.traces.monitors.Passivity`; tuples have one entry per element, energies are in J.
+    """Verdict of `gms_fsm.traces.monitors.Passivity`.
+
+    Tuples have one entry per element; energies are in J.
 
     Parameters
     ----------
     ok : bool
-        Whether no element had made energy out of nothing at any time since the start.
+        Whether no element had created energy at any time since the start.
     text : str
-        Which had, when and how much.
+        Which elements created energy, when and how much.
     applicable : bool
-        Whether the chart's force is a spring's, with or without a damper; all else is empty if not.
+        Whether the force of the chart is that of a spring, with or without a damper. If not, the
+        other fields are empty.
     taken : tuple of float
-        Energy taken from the motion over the run, the integral of F_i v.
+        Energy taken from the motion during the run: the integral of F_i v.
     stored : tuple of float
-        Change of the spring's energy k z**2 / 2 over the run; what is left of `taken` is heat.
+        Change of the spring energy k z**2 / 2 during the run; the rest of `taken` is heat.
     deficit, t_deficit : tuple of float
-        The most by which what it had given and stored was more than what it had taken, and when
+        Largest excess of the energy given back and stored over the energy taken, and its time
         [s]; 0 for a passive element.
     made, made_from, made_until : tuple of float
-        The most energy it made between two times, and these times [s]. It can be more than 0 where
-        the deficit is 0: a spring that winds up by itself, after enough heat.
+        Largest energy created between two times, and these times [s]. It can be positive where the
+        deficit is 0: a spring that winds up by itself after enough heat was produced.
     tolerance : tuple of float
-        What the solver and the sums may be wrong by.
+        Uncertainty of the solver and of the sums.
     """
 
     ok: bool
@@ -152,12 +155,12 @@ class PassivityVerdict:
 
 @dataclass(frozen=True)
 class ClauseSeen:
-    """Whether a clause of a guard was true and was false, by element, in the edge's source state.
+    """Whether a guard clause was seen true and seen false in the source state of its edge.
 
     Parameters
     ----------
     edge, text : str
-        The edge, and the clause as the chart shows it.
+        Name of the edge, and the clause as shown in the chart.
     true, false : tuple of bool
         One entry per element.
     """
@@ -170,22 +173,22 @@ class ClauseSeen:
 
 @dataclass(frozen=True)
 class CoverageVerdict:
-    """Of `gms_fsm.traces.monitors.Coverage`.
+    """Verdict of `gms_fsm.traces.monitors.Coverage`.
 
     Parameters
     ----------
     ok : bool
-        Whether the elements together were everywhere.
+        Whether the elements together covered everything.
     text : str
-        Counts, and what was never seen.
+        Counts, and everything never seen.
     states : dict of str to tuple of bool
-        Whether each element was in the state.
+        Whether each element was ever in the state.
     edges : dict of str to tuple of int
-        How often each element took the edge.
+        Number of times each element took the edge.
     clauses : tuple of ClauseSeen
-        One a clause of each guard.
+        One entry per clause of each guard.
     never : tuple of str
-        What no element ever saw, in words.
+        Descriptions of what no element ever saw.
     """
 
     ok: bool

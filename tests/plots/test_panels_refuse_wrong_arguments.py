@@ -1,4 +1,4 @@
-"""A wrong window, element, time or measurement is refused with its value and the rule."""
+"""A wrong window, element, time or measurement is rejected with its value and the rule."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def run() -> Trace:
 
 
 def panels_with(argument: str) -> list[Callable[..., object]]:
-    """Return all panels that take an argument, and need no other than Axes and Trace."""
+    """Return all panels that take an argument, and otherwise need only Axes and Trace."""
     found = []
     for panel in (getattr(panels, name) for name in panels.__all__):
         taken = inspect.signature(panel).parameters
@@ -97,7 +97,7 @@ def test_differences(run: Trace) -> None:
         panels.difference(ax, np.zeros(3), np.zeros(2))
 
 
-def test_figure_3_wants_a_force_a_row(run: Trace) -> None:
+def test_figure_3_needs_one_force_per_row(run: Trace) -> None:
     with pytest.raises(ParameterError, match=r"force has shape \(2,\)"):
         figures.figure_3(run, run, run, np.zeros(2), title="")
 

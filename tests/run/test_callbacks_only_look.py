@@ -116,7 +116,7 @@ def test_a_forced_state_is_an_error_that_keeps_the_run_so_far(
         _run(machines, engine)
     text = str(caught.value)
     assert f"element 1, edge 'break_away_forward' at t = {float(first.t)!r} s" in text
-    assert text.endswith("an edge with a guard; the run up to there is kept in .trace")
+    assert text.endswith("an edge with a guard; the run so far is kept in .trace")
     trace = caught.value.trace
     assert trace.t[-1] == first.t
     assert len(trace.transitions) == 0, "the edge was not taken"

@@ -253,14 +253,14 @@ def _own_rigs() -> dict[str, Any]:
 def test_a_user_defined_rig_is_refused_with_an_explanation(kind: str, tmp_path: Path) -> None:
     rig = _own_rigs()[kind]
     told: list[object] = []
-    with pytest.raises(OutputError, match="a class of your own"):
+    with pytest.raises(OutputError, match="a custom class"):
         simulate(stick_slip("signed"), rig, 1.0, checkpoint=tmp_path / "run", progress=told.append)
     assert told == [], "before the run"
     trace = simulate(stick_slip("signed"), rig, 1.0)
     for name in ("run.npz", "run.csv"):
         with pytest.raises(OutputError, match="it can hold Prescribed, Slider, PulledSlider"):
             trace.save(tmp_path / name)
-    with pytest.raises(OutputError, match="a class of your own"):
+    with pytest.raises(OutputError, match="a custom class"):
         Session(stick_slip("signed"), rig, 1.0).save(tmp_path / "session.json")
     assert list(tmp_path.iterdir()) == []
 

@@ -1,9 +1,9 @@
-"""Monitors: what a run is watched for.
+"""Monitors: properties checked on a run.
 
-They look at the rows and the transition log once the run has ended or failed, so a run without
-monitors does nothing for them. What they see: every accepted step and both sides of every firing;
-with `t_eval` the wanted rows and both sides of every stop; with ``output="end"`` the log alone,
-which is enough for `Chattering` only.
+They are evaluated on the rows and the transition log after the run has ended or failed, so they
+cost nothing in a run without monitors. They see every accepted step and both sides of every
+firing; with `t_eval` the requested rows and both sides of every stop; with ``output="end"`` the
+log only, which suffices for `Chattering` alone.
 """
 
 from gms_fsm.traces.monitors._examining import checked, examine, watched

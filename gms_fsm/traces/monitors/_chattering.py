@@ -1,4 +1,4 @@
-"""Whether an element takes one edge again and again in a short time."""
+"""The chattering monitor: one edge of an element that fires many times within a short time."""
 
 from __future__ import annotations
 
@@ -28,26 +28,26 @@ def chattering(monitor: Chattering, trace: Trace, error: Exception | None) -> Ch
         parts.append(
             f"{elements_text([first.element])}{others} took {first.edge}"
             f"{f', and back {back},' if back else ''} {first.count} times in {span:.3g} s, from "
-            f"t = {first.t_first:.9g} s ({values_text(first.values)}): {_way_out(trace, first)}"
+            f"t = {first.t_first:.9g} s ({values_text(first.values)}): {_advice(trace, first)}"
         )
     quiet = f"no element took an edge {monitor.times} times within {monitor.within:g} s"
     return ChatteringVerdict(not parts, "; ".join(parts) or quiet, episodes, livelock)
 
 
-def _way_out(trace: Trace, episode: Episode) -> str:
+def _advice(trace: Trace, episode: Episode) -> str:
     texts = [
         f"{edge} [{trace.model.chart.guard_text(edge)}]" for edge in (episode.edge, *episode.back)
     ]
     return (
-        f"the guards {' and '.join(texts)} hold in turn; leave a gap between them, as arrest does "
-        "by |v| <= v_c, or raise v_c"
+        f"the guards {' and '.join(texts)} hold alternately; leave a gap between them, as arrest "
+        "does by |v| <= v_c, or raise v_c"
         if episode.back
-        else f"the guard {texts[0]} holds again at once; let the edge's target have another"
+        else f"the guard {texts[0]} is immediately true again; let the edge's target have another"
     )
 
 
 def _episodes(monitor: Chattering, trace: Trace) -> tuple[Episode, ...]:
-    """Return the longest episode of each element that has one."""
+    """Return the longest episode of each element that chattered."""
     log, variable = trace.transitions, trace.model.chart.variables[0]
     names, codes = np.unique(log["edge"], return_inverse=True)
     found: dict[int, tuple[int, NDArray[np.int64]]] = {}
@@ -72,7 +72,7 @@ def _episodes(monitor: Chattering, trace: Trace) -> tuple[Episode, ...]:
 
 
 def _longest(times: FloatArray, monitor: Chattering) -> tuple[int, int] | None:
-    """Return begin and end of the longest stretch in which any `times` in a row are `within`."""
+    """Return start and end of the longest run of firings, any `times` consecutive ones `within`."""
     ahead = monitor.times - 1
     if times.size <= ahead:
         return None

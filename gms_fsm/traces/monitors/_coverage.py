@@ -1,4 +1,4 @@
-"""Which states, edges and clauses of guards a run has seen."""
+"""The coverage monitor: states, edges and guard clauses that a run has exercised."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ def coverage(trace: Trace) -> CoverageVerdict:
         text += f", clauses false {_count(clause.false for clause in seen)}"
     if never:
         text += (
-            f"; never: {', '.join(never)}; a longer run, a motion both ways or other initial "
-            "values would show more"
+            f"; never: {', '.join(never)}; a longer run, motion in both directions or other "
+            "initial values would show more"
         )
     return CoverageVerdict(not never, text, states, edges, tuple(seen), tuple(never))
 
@@ -64,5 +64,5 @@ def _count(found: Iterable[Iterable[object]]) -> str:
 
 
 def _each(places: NDArray[np.bool_]) -> tuple[bool, ...]:
-    """Return for each element whether it is so at any row."""
+    """Return for each element whether a condition holds at any row."""
     return tuple(bool(found) for found in np.any(places, axis=1))

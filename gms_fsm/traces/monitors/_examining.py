@@ -1,4 +1,4 @@
-"""Monitors checked against a model, and asked about a run."""
+"""Checking monitors against a model, and evaluating them on a run."""
 
 from __future__ import annotations
 
@@ -30,27 +30,27 @@ __all__ = ["checked", "examine", "watched"]
 def checked(
     monitors: str | Iterable[str | Monitor], model: Model, output: str = "all"
 ) -> dict[str, Monitor]:
-    """Return monitors by name, after a look at every one of them.
+    """Check monitors and return them by name.
 
     Parameters
     ----------
     monitors : str or iterable of str or Monitor
-        ``"chattering"``, ``"passivity"``, ``"coverage"``, ``"all"`` of these three, or an
-        invariant's text.
+        ``"chattering"``, ``"passivity"``, ``"coverage"``, ``"all"`` for these three, or the text
+        of an invariant.
     model : Model
-        What they will watch.
+        The model to be monitored.
     output : {"all", "t_eval", "end"}
-        Rows there will be.
+        Rows that the run will have.
 
     Returns
     -------
     dict of str to Monitor
-        By name.
+        Monitors by name.
 
     Raises
     ------
     ParameterError
-        If one is unknown, given twice, or needs rows where there will be none.
+        If one is unknown, given twice, or needs rows that the run will not have.
     ExpressionError
         If an invariant cannot be read.
 
@@ -70,13 +70,13 @@ def checked(
         for monitor in ALL if each == "all" else (_monitor(each),):
             if monitor.name in found:
                 raise ParameterError(
-                    f"monitors has {shown(monitor.name)} twice", advice="give it once"
+                    f"monitors contains {shown(monitor.name)} twice", advice="give it once"
                 )
             if isinstance(monitor, Invariant):
                 read_invariant(monitor, model)
             if output == "end" and not isinstance(monitor, Chattering):
                 raise ParameterError(
-                    f"the monitor {shown(monitor.name)} looks at the rows of a run, but "
+                    f"the monitor {shown(monitor.name)} needs the rows of a run, but "
                     "output is 'end'",
                     advice="use output='all'",
                 )
@@ -89,16 +89,16 @@ def _monitor(given: str | Monitor) -> Monitor:
         return given
     if not isinstance(given, str):
         raise ParameterError(
-            f"monitors has {shown(given)}",
-            advice=f"a monitor is {', '.join(map(repr, KNOWN))}, an invariant's text, or "
+            f"monitors contains {shown(given)}",
+            advice=f"a monitor is {', '.join(map(repr, KNOWN))}, the text of an invariant, or "
             "an object of gms_fsm.traces.monitors",
         )
     word = given.strip()
     if word.isidentifier() and word not in KNOWN:
         near = difflib.get_close_matches(word[:40], KNOWN, n=1)
         raise ParameterError(
-            f"no monitor {shown(word)}",
-            advice=f"{(f'did you mean {near[0]!r}? ' if near else '')}there are "
+            f"unknown monitor {shown(word)}",
+            advice=f"{(f'did you mean {near[0]!r}? ' if near else '')}choose from "
             f"{', '.join(map(repr, KNOWN))}, 'all', and invariants such as 'abs(z) "
             "<= 2*s'",
         )
@@ -110,26 +110,26 @@ def examine(
     monitors: str | Iterable[str | Monitor],
     error: Exception | None = None,
 ) -> dict[str, Verdict]:
-    """Let monitors look at a run.
+    """Evaluate monitors on a run.
 
     Parameters
     ----------
     trace : Trace
-        A run, also one that was read from a file.
+        A run, possibly read from a file.
     monitors : str or iterable of str or Monitor
-        As `checked` takes them.
+        As for `checked`.
     error : Exception, optional
-        What ended the run.
+        The error that ended the run.
 
     Returns
     -------
     dict of str to Verdict
-        What each says, by its name.
+        Verdicts by monitor name.
 
     Raises
     ------
     ParameterError, ExpressionError
-        As `checked`.
+        As for `checked`.
 
     Examples
     --------
@@ -156,7 +156,7 @@ def examine(
 
 
 def watched(trace: Trace, monitors: Iterable[Monitor], error: Exception | None = None) -> Trace:
-    """Return a run with what its monitors say.
+    """Return a run with the verdicts of its monitors.
 
     Parameters
     ----------
@@ -166,6 +166,6 @@ def watched(trace: Trace, monitors: Iterable[Monitor], error: Exception | None =
     Returns
     -------
     Trace
-        The same, with `Trace.monitors`.
+        The same run, with `Trace.monitors`.
     """
     return trace.with_monitors(examine(trace, monitors, error))

@@ -1,4 +1,4 @@
-"""Whether a condition held at every row, and where it broke first."""
+"""The invariant monitor: whether a condition held at every row, and where it first failed."""
 
 from __future__ import annotations
 
@@ -37,20 +37,20 @@ def read_invariant(monitor: Invariant, model: Model) -> Condition:
 
 @dataclass(frozen=True)
 class _Held:
-    """An invariant read for a model."""
+    """An invariant parsed for a model."""
 
     tree: Condition
     of_elements: bool
 
     def columns(self, trace: Trace) -> dict[str, NDArray[Any]]:
-        """Return the columns it names."""
+        """Return the columns it refers to."""
         asked = states_in(self.tree)
         names = [*sorted(names_in(self.tree)), *(f"state({i})" for i in sorted(asked))]
         columns = Scope.over(trace).invariants(states=bool(asked))
         return {name: columns[name] for name in names}
 
     def at(self, trace: Trace) -> NDArray[np.bool_]:
-        """Return where it holds, shape (n, rows), or (1, rows) if it is not of elements."""
+        """Return where it holds, shape (n, rows), or (1, rows) if it does not refer to elements."""
         width = trace.n if self.of_elements else 1
         return truths(self.tree, self.columns(trace), (width, len(trace)))
 
@@ -81,9 +81,9 @@ def invariant_verdict(monitor: Invariant, trace: Trace) -> InvariantVerdict:
         state = str(place.states[0, i])
         who = f", {elements_text([i])} in {state}"
     text = (
-        f"broken first at t = {t:.9g} s{who}{f' ({values_text(values)})' if values else ''}, at "
-        f"{broken.size} of {rows} rows, last at t = {t_last:.9g} s; look there with "
-        f"`goto {t:.9g}` in gms-fsm debug, or widen the bound if this is meant"
+        f"first broken at t = {t:.9g} s{who}{f' ({values_text(values)})' if values else ''}, at "
+        f"{broken.size} of {rows} rows, last at t = {t_last:.9g} s; look at it with "
+        f"`goto {t:.9g}` in gms-fsm debug, or widen the bound if this is intended"
     )
     return InvariantVerdict(
         False,
@@ -100,7 +100,7 @@ def invariant_verdict(monitor: Invariant, trace: Trace) -> InvariantVerdict:
 
 
 def _located(invariant: _Held, trace: Trace, row: int) -> Trace:
-    """Return as one row the place where an invariant breaks, between the row before and this."""
+    """Return a one-row trace where an invariant first fails, between the previous row and this."""
     rows = trace.rows
     seen = {name: getattr(trace, name)[row : row + 1] for name in OBSERVED}
 
@@ -121,7 +121,7 @@ def _located(invariant: _Held, trace: Trace, row: int) -> Trace:
         place = there
         return True
 
-    # A trace from a file may not have its signal any more, if it was a Python function.
+    # A trace read from a file has lost a signal that was a Python function.
     with contextlib.suppress(SignalError):
         first_true(low, high, breaks)
     return place

@@ -1,4 +1,4 @@
-"""What a run can be watched for."""
+"""The kinds of monitors."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ __all__ = ["ALL", "KNOWN", "Chattering", "Coverage", "Invariant", "Monitor", "Pa
 
 @dataclass(frozen=True)
 class Chattering:
-    """An element that takes one edge, there and back, again and again in a short time.
+    """Repeated firing of one edge, back and forth, within a short time.
 
-    A run that ends in a livelock, switching while time stands still, is reported here too.
+    A run that ends in a livelock (switching without progress in time) is reported here too.
 
     Parameters
     ----------
     times : int
-        How often, at least 2.
+        Number of firings, at least 2.
     within : float
-        In how many seconds.
+        Length of the time window, s.
 
     Raises
     ------
@@ -36,47 +36,48 @@ class Chattering:
 
     def __post_init__(self) -> None:
         if not isinstance(self.times, int) or self.times < 2:
-            raise ParameterError("it must be a whole number >= 2", place="times", value=self.times)
+            raise ParameterError("it must be an integer >= 2", place="times", value=self.times)
         object.__setattr__(self, "within", checked_scalar("within", self.within, "> 0"))
 
     @property
     def name(self) -> str:
-        """Under which it is reported."""
+        """Name under which it is reported."""
         return "chattering"
 
 
 @dataclass(frozen=True)
 class Invariant:
-    """A condition that has to hold at every row.
+    """A condition that must hold at every row.
 
     Parameters
     ----------
     text : str
-        In the expression language. It can name t, x, v, F; of each element its variables (z), its
-        threshold s and its parameters, then it has to hold for every element; single elements as
-        z1, s1, F1; and ask ``state == slip`` or ``state(1) == slip``.
+        Condition in the expression language. It can use t, x, v, F; variables (z), the threshold s
+        and parameters of each element, and must then hold for every element; z1, s1, F1 for a
+        single element; and ``state == slip`` or ``state(1) == slip``.
     """
 
     text: str
 
     @property
     def name(self) -> str:
-        """Under which it is reported."""
+        """Name under which it is reported."""
         return self.text
 
 
 @dataclass(frozen=True)
 class Passivity:
-    """No element makes energy out of nothing: what it took from the motion, less what it stores.
+    """No element creates energy: the energy taken from the motion covers the energy stored.
 
-    For elements whose force is a spring's, with or without a damper: ``k * z + sigma * dz``. Heat
-    is the integral of F_i v less the rise of k z**2 / 2 since the start; it must not be negative.
+    Applies to elements whose force is that of a spring, with or without a damper:
+    ``k * z + sigma * dz``. The heat, which is the integral of F_i v minus the increase of
+    k z**2 / 2 since the start, must not be negative.
 
     Parameters
     ----------
     tolerance : float
-        The share of the energy turned over that may be missing. The uncertainty of the sums is
-        added to it.
+        Allowed energy deficit as a fraction of the energy turned over. The uncertainty of the sums
+        is added to it.
 
     Raises
     ------
@@ -91,17 +92,17 @@ class Passivity:
 
     @property
     def name(self) -> str:
-        """Under which it is reported."""
+        """Name under which it is reported."""
         return "passivity"
 
 
 @dataclass(frozen=True)
 class Coverage:
-    """Which states, edges and clauses of the guards, true and false, the run has seen."""
+    """The states, edges and guard clauses (true and false) that the run has exercised."""
 
     @property
     def name(self) -> str:
-        """Under which it is reported."""
+        """Name under which it is reported."""
         return "coverage"
 
 

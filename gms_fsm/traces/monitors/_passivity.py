@@ -1,4 +1,4 @@
-"""Whether an element gave more energy than it had taken."""
+"""The passivity monitor: whether an element gave back more energy than it had taken."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ def passivity(monitor: Passivity, trace: Trace) -> PassivityVerdict:
     if spring is None:
         force = spell(trace.model.chart.forces["F"], MATLAB_LIKE)
         return PassivityVerdict(
-            True, f"not applicable: F = {force} is not a spring's force k * z [+ sigma * dz]", False
+            True, f"not applicable: F = {force} is not a spring force k * z [+ sigma * dz]", False
         )
     k, sigma = spring
     t, z = trace.t, trace.z
-    with np.errstate(all="ignore"):  # of a run that grew without bound
+    with np.errstate(all="ignore"):  # the run may have grown without bound
         lost, doubt = _lost(trace, k, sigma)
         wound = 0.5 * k * np.diff(z**2, axis=0)
         endless = np.flatnonzero(~np.isfinite(lost + wound + doubt).all(axis=1))
         end = int(endless[0]) if endless.size else len(lost)
         lost, wound, doubt = lost[:end], wound[:end], doubt[:end]
     turnover = np.abs(lost + wound).sum(axis=0)
-    # The solver knows z no better than to its absolute tolerance.
+    # The solver knows z only to its absolute tolerance.
     allowed: Any = trace.settings["atol"]
     allowed = allowed[trace.model.chart.variables[0]] if isinstance(allowed, Mapping) else allowed
     blur = k * np.abs(z[: end + 1]).max(axis=0, initial=0.0) * np.asarray(allowed or 0.0)
@@ -66,19 +66,19 @@ def passivity(monitor: Passivity, trace: Trace) -> PassivityVerdict:
         made_until=tuple(times[until].tolist()),
         tolerance=tuple(tolerance.tolist()),
     )
-    parts = _told(verdict, trace, lost)
+    parts = _sentences(verdict, trace, lost)
     if endless.size:
         parts.append(f"values are not finite after t = {t[end]:.6g} s")
     if (doubt.sum(axis=0) > 0.01 * turnover).any():
         parts.append(
-            "the rows lie far apart for these sums: keep every step (output='all'), or take "
-            "shorter ones"
+            "the rows are too far apart for these sums: keep every step (output='all'), or use "
+            "shorter steps"
         )
     return replace(verdict, text="; ".join(parts))
 
 
 def _spring(model: Model) -> tuple[FloatArray, FloatArray] | None:
-    """Return stiffness and damping of each element, shape (n,), if that is all its force is."""
+    """Return stiffness and damping of each element, shape (n,), if its force has no other terms."""
     z, values = model.chart.variables[0], model.values
     match model.chart.forces["F"]:
         case Binary("+", Binary("*", Name(k), Name(bristle)), Binary("*", Name(sigma), Name(rate))):
@@ -92,24 +92,25 @@ def _spring(model: Model) -> tuple[FloatArray, FloatArray] | None:
     return np.full(model.n, values[k]), np.full(model.n, values.get(sigma, 0.0))
 
 
-# x and z run between two rows as the cubics that `Trace.sample` draws. The heat
-# integral of F_i v - k z dz = k z (v - dz) + sigma dz v is then a polynomial of degree 5 in time:
-# three Gauss points are exact.
+# Between two rows x and z are the cubics of `Trace.sample`. The heat
+# integral of F_i v - k z dz = k z (v - dz) + sigma dz v is then a polynomial of degree 5 in
+# time, for which three Gauss points are exact.
 GAUSS = ((0.5 - math.sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + math.sqrt(0.15), 5 / 18))
 
 
 def _lost(trace: Trace, k: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the heat made between neighbouring rows, shape (rows - 1, n), and its uncertainty."""
+    """Return the heat produced between adjacent rows, shape (rows - 1, n), and its uncertainty."""
     t, x, v = trace.t[:, np.newaxis], trace.x[:, np.newaxis], trace.v[:, np.newaxis]
     h, z, dz = np.diff(t, axis=0), trace.z, trace.dz
     lost, doubt = _heat(k, sigma, h, x[:-1], x[1:], z[:-1], z[1:], v[:-1], v[1:], dz[:-1], dz[1:])
-    # At a stop a row's rates may be those of the far side: where it counts, take them from inside.
+    # At a stop the rates of a row may be those of the far side. Where this matters, recompute them
+    # from inside the interval.
     counts = (doubt > 1e-7 * np.abs(lost).sum(axis=0)).any(axis=1) & (h[:, 0] > 0.0)
     left = np.flatnonzero(counts)
     if left.size and trace.settings["events"] == "located":
         try:
             rates = np.array([_rates(trace, row) for row in left.tolist()])
-        except SignalError:  # of a trace from a file, whose signal was a Python function
+        except SignalError:  # a trace from a file has lost a signal that was a Python function
             return lost, doubt
         right, places = left + 1, trace.program.layout.y
         v0, v1 = np.moveaxis(rates[:, :, [places.index("x")]], 1, 0)
@@ -145,7 +146,7 @@ def _heat(
         z = z0 + theta * (rise_z + (1 - theta) * (bend_z + theta * twist_z))
         heat += weight * (k * z * (moved - wound) + sigma * wound * moved * inverse)
     ends = [k * z * (v - dz) + sigma * dz * v for z, v, dz in ((z0, v0, dz0), (z1, v1, dz1))]
-    # The trapezoid's error is of order h^3, its square over the heat h^5, as the error here.
+    # The trapezoid rule has an error of O(h^3); its square over the heat is O(h^5), as here.
     rough = np.abs(heat - 0.5 * h * (ends[0] + ends[1]))
     size = np.maximum(np.abs(heat), 0.5 * h * (np.abs(ends[0]) + np.abs(ends[1])))
     share = np.divide(rough, size, out=np.zeros_like(rough), where=size > 0.0)
@@ -153,7 +154,7 @@ def _heat(
 
 
 def _rates(trace: Trace, row: int) -> tuple[FloatArray, FloatArray]:
-    """Return the slopes at a row and the next, as seen from between them."""
+    """Return the one-sided slopes at a row and the next, seen from between them."""
     rows = trace.rows
     return slopes(
         trace.program,
@@ -165,17 +166,19 @@ def _rates(trace: Trace, row: int) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def _told(verdict: PassivityVerdict, trace: Trace, lost: FloatArray) -> list[str]:
-    """Put the energies into words."""
+def _sentences(verdict: PassivityVerdict, trace: Trace, lost: FloatArray) -> list[str]:
+    """Describe the energies in words."""
     chart, tolerance = trace.model.chart, verdict.tolerance
     over = [i for i in range(trace.n) if verdict.deficit[i] > tolerance[i]]
     made = [i for i in range(trace.n) if verdict.made[i] > tolerance[i]]
-    parts = [f"no element gave more than it had taken (tolerance {max(tolerance):.2g} J)"]
+    parts = [
+        f"no element gave back more energy than it had taken (tolerance {max(tolerance):.2g} J)"
+    ]
     if over:
         i = max(over, key=lambda i: verdict.deficit[i])
         others = f" ({elements_text(j for j in over if j != i)} too)" if over[1:] else ""
         parts = [
-            f"{elements_text([i])}{others} had made {verdict.deficit[i]:.6g} J out of nothing by "
+            f"{elements_text([i])}{others} had created {verdict.deficit[i]:.6g} J by "
             f"t = {verdict.t_deficit[i]:.6g} s (tolerance {tolerance[i]:.2g} J)"
         ]
     if made:
@@ -183,12 +186,13 @@ def _told(verdict: PassivityVerdict, trace: Trace, lost: FloatArray) -> list[str
         state = chart.states[int(trace.modes[int(lost[:, i].argmin()), i])]
         z = chart.variables[0]
         parts.append(
-            f"the most made between two times: {elements_text([i])}, {verdict.made[i]:.6g} J from "
-            f"t = {verdict.made_from[i]:.6g} to {verdict.made_until[i]:.6g} s, mostly in "
-            f"{state.name}, where d{z} = {state.flow[z]} moves {z} otherwise than the motion does"
+            f"the most energy created between two times: {elements_text([i])}, "
+            f"{verdict.made[i]:.6g} J from t = {verdict.made_from[i]:.6g} to "
+            f"{verdict.made_until[i]:.6g} s, mostly in {state.name}, where "
+            f"d{z} = {state.flow[z]} moves {z} differently from the motion"
         )
     if over and chart == GMS_ELEMENT["published"]:
         parts.append(
-            "the published law does so whenever an element slips backward; try law='signed'"
+            "the published law does this whenever an element slips backward; try law='signed'"
         )
     return parts

@@ -1,4 +1,4 @@
-"""Values and elements in the texts of verdicts."""
+"""Text for values and elements in verdicts."""
 
 from __future__ import annotations
 
@@ -12,6 +12,6 @@ def values_text(values: Mapping[str, float]) -> str:
 
 
 def elements_text(numbers: Iterable[int]) -> str:
-    """Name elements, counted from 1 in texts."""
+    """Return the names of elements, numbered from 1."""
     words = [str(i + 1) for i in numbers]
     return f"element{'s' if len(words) > 1 else ''} {', '.join(words)}"

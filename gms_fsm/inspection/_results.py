@@ -1,4 +1,4 @@
-"""What a session says: fields to compute with, and printed, the debugger's text."""
+"""Results of a session: data with fields, which print as the text of the debugger."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["Comparison", "Fired", "Here", "compared"]
+__all__ = ["BranchComparison", "Fired", "Here", "compared"]
 
-SAMPLES = 2000  # common times at which two branches are compared
+SAMPLES = 2000  # number of common times at which two branches are compared
 
 
 @dataclass(frozen=True)
@@ -20,9 +20,9 @@ class Fired:
     Parameters
     ----------
     element : int
-        Counted from 0.
+        Element index, from 0.
     edge, source, target : str
-        The edge taken, the state it left and the state it entered.
+        The edge taken, the state left and the state entered.
     """
 
     element: int
@@ -36,24 +36,24 @@ class Fired:
 
 @dataclass(frozen=True)
 class Here:
-    """One row of a branch; printed, it is what the debugger says after a move.
+    """One row of a branch; printed, the text of the debugger after a move.
 
     Parameters
     ----------
     row : int
-        Its number in the branch.
+        Row number in the branch.
     t, x, v, F : float
-        s, m, m/s, N.
+        Time, s; position, m; velocity, m/s; friction force, N.
     microstep : int
-        0 before the firings of this time.
+        Micro-step; 0 before the firings at this time.
     z, s, F_elements : tuple of float
-        m, m, N; one per element (z is the chart's first variable).
+        One per element: first variable of the chart, m; threshold, m; force, N.
     states : tuple of str
-        Active states.
+        Active states, one per element.
     located : bool
-        Whether it lies between rows, where a condition became true.
+        Whether this is a point between rows, where a condition became true.
     fired : Fired or None
-        The firing that made it, if one did.
+        The firing that made the row, if any.
     """
 
     row: int
@@ -77,23 +77,23 @@ class Here:
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """Two branches against each other; printed, the debugger's text.
+class BranchComparison:
+    """A comparison of two branches; printed, the text of the debugger.
 
     Parameters
     ----------
     branches : tuple of int
-        Their numbers.
+        Numbers of the branches.
     t : float
-        Until when, s (the shorter of the two).
+        End of the compared time, s (that of the shorter branch).
     transitions : tuple of int
-        How many each has until then.
+        Number of transitions of each branch until then.
     first_difference : float or None
-        Time of the first transition that differs, s; None if none does.
+        Time of the first transition that differs, s, or None.
     variable : str
-        The chart's first.
+        First variable of the chart.
     z, F : float
-        Largest differences of this variable and of the friction force [N] on common times.
+        Largest differences of this variable and of the friction force [N] at common times.
     """
 
     branches: tuple[int, int]
@@ -118,19 +118,19 @@ class Comparison:
         )
 
 
-def compared(numbers: tuple[int, int], first: Trace, second: Trace) -> Comparison:
+def compared(numbers: tuple[int, int], first: Trace, second: Trace) -> BranchComparison:
     """Compare two branches that have been computed to their ends.
 
     Parameters
     ----------
     numbers : tuple of int
-        What they are called.
+        Numbers of the branches.
     first, second : Trace
-        Of one model.
+        Traces of the same model.
 
     Returns
     -------
-    Comparison
+    BranchComparison
         Transitions, and largest differences of the first variable and F.
     """
     t = min(float(first.t[-1]), float(second.t[-1]))
@@ -146,7 +146,7 @@ def compared(numbers: tuple[int, int], first: Trace, second: Trace) -> Compariso
             differs = float(longer.t[len(shorter)])
     times = np.linspace(float(first.t[0]), t, SAMPLES)
     p, q = first.sample(times), second.sample(times)
-    return Comparison(
+    return BranchComparison(
         numbers,
         t,
         (len(logs[0]), len(logs[1])),

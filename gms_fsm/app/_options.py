@@ -1,0 +1,46 @@
+"""Arguments and options shared by several verbs of the command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+__all__ = [
+    "INTERRUPTED",
+    "ChartName",
+    "End",
+    "Law",
+    "Overrides",
+    "ScenarioFile",
+    "Start",
+    "TraceFile",
+]
+
+INTERRUPTED = 130  # the conventional exit code after Ctrl-C
+
+ScenarioFile = Annotated[
+    Path,
+    typer.Argument(
+        help="Scenario file, for example scenarios/pulled_mass.toml.", show_default=False
+    ),
+]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="Override a key, for example --set model.law=published."),
+]
+TraceFile = Annotated[Path, typer.Argument(help="Trace file, .npz or .csv.", show_default=False)]
+Start = Annotated[float | None, typer.Option(help="Start time in s.")]
+End = Annotated[float | None, typer.Option(help="End time in s.")]
+ChartName = Annotated[
+    str, typer.Argument(help="Name of the chart; --list shows all.", show_default=False)
+]
+Law = Annotated[
+    str,
+    typer.Option(
+        help="Law of a chart that has several, such as gms; there is no default, because the laws "
+        "differ.",
+        show_default=False,
+    ),
+]

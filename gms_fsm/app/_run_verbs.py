@@ -1,0 +1,187 @@
+"""Verbs that run something: the paper's experiments, scenarios, sweeps, lessons, the debugger."""
+
+from __future__ import annotations
+
+import enum
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gms_fsm.app._console import messages, note, progress_bars
+from gms_fsm.app._options import INTERRUPTED, Overrides, ScenarioFile
+from gms_fsm.app.paper import FORCE, VELOCITY
+
+if TYPE_CHECKING:
+    from rich.progress import TaskID
+
+__all__ = [
+    "debug_command",
+    "lesson_command",
+    "paper_command",
+    "run_command",
+    "schema_command",
+    "sweep_command",
+]
+
+
+class EngineName(enum.StrEnum):
+    """Engine that executes the chart."""
+
+    compiled = "compiled"
+    machines = "machines"
+    ifelse = "ifelse"
+
+
+def paper_command(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Output folder.")] = Path("paper"),
+    force: Annotated[
+        str, typer.Option(help="Applied force of Fig. 3 in N, an expression of t (s).")
+    ] = FORCE,
+    velocity: Annotated[
+        str, typer.Option(help="Velocity of Fig. 4 in m/s, an expression of t (s).")
+    ] = VELOCITY,
+) -> None:
+    """Run the paper's two experiments; write figures, traces, logs and claims.md."""
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+
+    from gms_fsm.app.paper import writing
+
+    columns = (TextColumn("{task.description:<22}"), BarColumn(), TimeElapsedColumn())
+    with progress_bars(*columns) as bars:
+        tasks: dict[str, TaskID] = {}
+
+        def show(name: str, done: float) -> None:
+            if name not in tasks:
+                bars.start()
+                tasks[name] = bars.add_task(name, total=1.0)
+            bars.update(tasks[name], completed=done)
+
+        files = writing.write(output, force, velocity, show)
+    typer.echo(f"{len(files)} files in {output}; start with {files[0]}")
+
+
+def run_command(
+    scenario: ScenarioFile,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Output folder; out/<name> by default."),
+    ] = None,
+    overrides: Overrides = None,
+    live: Annotated[
+        bool, typer.Option("--live", help="Show the state of every element during the run.")
+    ] = False,
+    checkpoint: Annotated[
+        bool,
+        typer.Option(
+            "--checkpoint",
+            help="Save the state in the output folder once a minute; the same command resumes it.",
+        ),
+    ] = False,
+) -> None:
+    """Run a scenario; write the trace, transition log, overview figure and summary."""
+    from gms_fsm.app.live import LiveView
+    from gms_fsm.app.report import monitor_lines, run_scenario, velocity_note
+    from gms_fsm.app.scenario import load_scenario
+    from gms_fsm.inspection.notes import notes_on
+
+    loaded = load_scenario(scenario, overrides or [])
+    folder = Path("out") / scenario.stem if output is None else output
+    start, end = loaded.arguments["t_start"], loaded.arguments["t_end"]
+    try:
+        with LiveView(messages(), start, end, detail=live) as view:
+            trace, files = run_scenario(loaded, folder, view, checkpoint=checkpoint)
+    except KeyboardInterrupt as error:
+        note(str(error) or "interrupted")
+        raise typer.Exit(INTERRUPTED) from None
+    if loaded.motion is not None and (text := velocity_note(trace, loaded.motion)):
+        note(text)
+    typer.echo(f"{len(trace.transitions)} transitions; {len(files)} files in {folder}")
+    for line in monitor_lines(trace):
+        typer.echo(line)
+    for each in notes_on(trace):
+        typer.echo(f"note: {each}")
+    typer.echo(f"start with {files[0]}")
+
+
+def sweep_command(
+    scenario: ScenarioFile,
+    over: Annotated[
+        list[str],
+        typer.Option(
+            help="Parameter to vary, as name=from:to:count; append ,log for logarithmic spacing. "
+            "Repeat the option to run every combination.",
+            show_default=False,
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Output folder; out/<name>-sweep by default."),
+    ] = None,
+    overrides: Overrides = None,
+    engine: Annotated[
+        EngineName, typer.Option(help="All give the same numbers; compiled is the fastest.")
+    ] = EngineName.compiled,
+) -> None:
+    """Run a scenario over a grid of parameters; write all results and a summary table."""
+    from gms_fsm.app.scenario import load_scenario
+    from gms_fsm.app.sweeps import axis, failures, sweep_scenario
+
+    axes = [axis(text) for text in over]
+    loaded = load_scenario(scenario, overrides or [])
+    folder = Path("out") / f"{scenario.stem}-sweep" if output is None else output
+    if "monitors" in loaded.arguments:
+        note("a sweep has no monitors: run.monitors is ignored")
+    try:
+        result, files = sweep_scenario(loaded, axes, folder, engine=engine.value)
+    except KeyboardInterrupt:
+        note("interrupted; nothing was written")
+        raise typer.Exit(INTERRUPTED) from None
+    bad = int((result.outcome != "ok").sum())
+    typer.echo(
+        f"{len(result)} runs, {bad} failed, {len(result.transitions)} transitions; "
+        f"{len(files)} files in {folder}"
+    )
+    for run, message in failures(result, most=1):
+        typer.echo(f"first failure: run {run}: {message}")
+    typer.echo(f"start with {files[0]}")
+
+
+def schema_command() -> None:
+    """Print the JSON schema of scenario files, for editors."""
+    from gms_fsm.app.scenario import Scenario
+
+    typer.echo(json.dumps(Scenario.model_json_schema(), indent=2))
+
+
+def debug_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:
+    """Step through a scenario in the terminal: break, why, back, poke, compare."""
+    from gms_fsm.app.debugger import run_debugger, scenario_to_debug
+
+    raise typer.Exit(run_debugger(scenario_to_debug(scenario, overrides or [])))
+
+
+def lesson_command(
+    number: Annotated[
+        str,
+        typer.Argument(help="Number of the lesson; omit it to list all.", show_default=False),
+    ] = "",
+    output: Annotated[Path, typer.Option("--output", "-o", help="Output folder.")] = Path(
+        "lessons"
+    ),
+) -> None:
+    """Run a lesson: a figure, a replay page, and five lines with the measured values."""
+    from gms_fsm.app.lessons import listed, numbered, teach
+
+    if not number:
+        typer.echo(listed())
+        return
+    chosen = numbered(number)
+    with messages().status(f"running lesson {chosen}"):
+        taught = teach(chosen, output)
+    for line in taught.lines:
+        typer.echo(line)
+    typer.echo()
+    for path in taught.files:
+        typer.echo(str(path))

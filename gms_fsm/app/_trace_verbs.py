@@ -1,0 +1,89 @@
+"""Verbs that show a trace: figures, an animation, a replay page."""
+
+from __future__ import annotations
+
+from itertools import chain
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gms_fsm._files import output_folder, refuse_input
+from gms_fsm.app._console import progress_bars
+from gms_fsm.app._options import End, Start, TraceFile
+
+__all__ = ["animate_command", "plot_command", "replay_command"]
+
+
+def plot_command(
+    trace: TraceFile,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Output folder.")] = Path(
+        "figures"
+    ),
+    start: Start = None,
+    end: End = None,
+) -> None:
+    """Draw a run: an overview, and its break-aways in detail."""
+    from gms_fsm import Trace
+    from plots import figures, formats
+
+    run = Trace.load(trace)
+    files = [formats.files(name, "figure") for name in ("overview", "ribbons")]
+    folder = output_folder(output, chain(*files))
+    window = None
+    if start is not None or end is not None:
+        window = (
+            float(run.t[0]) if start is None else start,
+            float(run.t[-1]) if end is None else end,
+        )
+    pictures = (figures.overview(run, window=window), figures.ribbons_figure(run, window=window))
+    for figure, names in zip(pictures, files, strict=True):
+        for name in names:
+            typer.echo(str(figures.save(figure, folder / name)))
+
+
+def animate_command(
+    trace: TraceFile,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Output file, ending in {animation}.")
+    ] = Path("film.gif"),
+    frames: Annotated[int, typer.Option(help="Number of frames.")] = 200,
+    start: Start = None,
+    end: End = None,
+) -> None:
+    """Make an animation of the chart next to the force."""
+    from gms_fsm.traces.trace import Trace, files_of
+    from plots.animation import animate
+
+    refuse_input(output, *files_of(trace))
+    run = Trace.load(trace)
+    with progress_bars() as bar:
+        task = bar.add_task("frames", total=frames)
+
+        def show(done: int, _: int) -> None:
+            bar.start()
+            bar.update(task, completed=done)
+
+        film = animate(run, output, frames=frames, t_start=start, t_end=end, progress=show)
+    typer.echo(str(film))
+
+
+def replay_command(
+    trace: TraceFile,
+    other: Annotated[
+        Path | None, typer.Argument(help="Second trace, shown alongside the first.")
+    ] = None,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Output file, ending in {page}.")
+    ] = Path("replay.html"),
+    title: Annotated[str, typer.Option(help="Title of the page.")] = "",
+) -> None:
+    """Write a run as a web page in which it can be stepped through and explained."""
+    from gms_fsm.traces.trace import Trace, files_of
+    from plots import write_replay
+
+    refuse_input(output, *files_of(trace), *([] if other is None else files_of(other)))
+    second = None if other is None else Trace.load(other)
+    names = [] if other is None else [trace.stem, other.stem]
+    page = write_replay(output, Trace.load(trace), second, title=title, names=names)
+    typer.echo(str(page))
