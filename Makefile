@@ -1,19 +1,19 @@
-# Targets are the interface: each does its own set-up in .venv and then runs.
+# Each target sets up its own environment in .venv and then runs.
 #   make help    this list
 #   make paper   the paper's two experiments -> folder paper/
 #   make test    all tests
-#   make quick   those that are not slow, in less than a minute
-#   make coverage  all tests, and what of the three packages they run
+#   make quick   the tests that are not slow, in less than a minute
+#   make coverage  all tests, with the coverage of the three packages
 #   make lint    formatting, style, types, import contracts
 #   make core    the tests that are not slow, with only the required dependencies
-#   make lowest  the tests near a dependency, with the lowest versions that pyproject.toml allows
-#   make bench   speed and error against C, SciPy, CVODE and PathSim
-#   make soak    hard use: fuzzing, kills, a million transitions, 2,000 runs judged by a reference;
-#                SOAK_MINUTES=10 for each fuzzer
-#   make gallery the pictures kept under docs/, shown in docs/gallery.md
-#   make docs    the documentation -> folder site/, to be opened from disk
-#   make wheel   a wheel -> folder dist/, installed and tried where the checkout cannot be seen
-#   make clean   takes away what the others made
+#   make lowest  the tests close to a dependency, with the lowest versions that pyproject.toml allows
+#   make bench   speed and error compared with C, SciPy, CVODE and PathSim
+#   make soak    stress tests: fuzzing, kills, a million transitions, 2,000 runs checked against a
+#                reference; SOAK_MINUTES=10 for each fuzzer
+#   make gallery the pictures in docs/images, shown in docs/gallery.md
+#   make docs    the documentation -> folder site/, which can be opened from disk
+#   make wheel   a wheel -> folder dist/, installed and tested outside the checkout
+#   make clean   removes what the other targets created
 PYTHON ?= python3
 LOWEST_PYTHON ?= python3.11
 VENV ?= .venv
@@ -25,7 +25,7 @@ PIP := $(RUN)/python -m pip --disable-pip-version-check --quiet
 .DEFAULT_GOAL := test
 
 $(VENV)/bin/python:
-	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "gms-fsm needs Python 3.11 or later, this is " + sys.version.split()[0] + "; set PYTHON=python3.12, say")'
+	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "gms-fsm needs Python 3.11 or later, this is " + sys.version.split()[0] + "; set PYTHON=python3.12, for example")'
 	$(PYTHON) -m venv $(VENV)
 
 $(VENV)/all.stamp: pyproject.toml | $(VENV)/bin/python
@@ -52,7 +52,7 @@ help:
 	.venv-core/bin/python -m pip --disable-pip-version-check --quiet install -e ".[test]"
 	@touch $@
 
-# The lowest versions have wheels for the lowest Python only; uv chooses them.
+# The lowest versions have wheels only for the lowest Python; uv selects them.
 .venv-lowest/stamp: pyproject.toml
 	@command -v $(LOWEST_PYTHON) >/dev/null || { echo "make lowest needs Python 3.11; set LOWEST_PYTHON"; exit 1; }
 	$(LOWEST_PYTHON) -m venv --clear .venv-lowest
@@ -105,7 +105,7 @@ gallery: $(VENV)/all.stamp
 docs: $(VENV)/docs.stamp
 	$(RUN)/sphinx-build --quiet --fail-on-warning --keep-going -d .docs-cache/doctrees docs site
 
-# setuptools would put into the wheel what an earlier build left in build/.
+# setuptools would add leftovers of an earlier build in build/ to the wheel.
 wheel: | $(VENV)/bin/python
 	rm -rf build dist
 	$(PIP) wheel --no-deps --wheel-dir dist .

@@ -1,19 +1,19 @@
-/* What a C programmer writes by hand for exactly one model: the yardstick of compare.py.
+/* A loop written by hand in C for exactly one model: the reference of compare.py.
  *
  * Four GMS elements under the signed law. Without OPEN_LOOP a mass is pulled through a spring for
  * 60 s (72 transitions); with it v = 0.2 sin(2 pi t / 20) is given for 61 s (48 transitions).
- * Dormand-Prince 5(4), max-norm, dense output, every crossing located on it, a fresh small step
- * after each. All numbers are constants, nothing is general.
+ * Dormand-Prince 5(4), max-norm, dense output, every crossing located on it, a new small step
+ * after each. All numbers are constants; nothing is general.
  *
  *     cc -O3 -march=native -std=c99 -ffp-contract=off -shared -fPIC [-DOPEN_LOOP] c_loop.c -lm
  *
  * Stops: |z| = s of the elements that stick, |v| = v_c and v = 0 while that can matter, and
- * |v| = 6.1 v_s, where the Stribeck curve starts to bend: a long step would jump it.
+ * |v| = 6.1 v_s, where the Stribeck curve starts to change: a long step would skip it.
  */
 #include <math.h>
 #include <string.h>
 
-/* fmax and fmin mind NaN, and are calls. */
+/* fmax and fmin handle NaN and are function calls. */
 #define MAX(a, b) ((a) > (b) ? (a) : (b))
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
 
@@ -50,7 +50,7 @@ typedef struct {
     double a[4], b[4], c[4]; /* dz = a v + b - c z / S */
     int slips, pinned; /* any element in slip; any watched one with |z| >= s */
     int any_z, watch[4], zone[4];
-    double v_low, v_high; /* v is in here, ends included, as long as nothing changes */
+    double v_low, v_high; /* v stays in [v_low, v_high] as long as nothing changes */
 } Arc;
 
 typedef struct { State y, rise, bend, twist, bump; double t, h; } Dense;
@@ -100,8 +100,8 @@ static inline State at(const Dense *d, double theta)
     return plus(d->y, theta, plus(d->rise, rest, plus(d->bend, theta, y)));
 }
 
-/* Take every enabled edge, in element order (an edge taken enables no other); returns how many in
- * all so far. */
+/* Take every enabled edge, in element order (taking an edge enables no other); returns the total
+ * number so far. */
 static int fire(Arc *arc, double t, double v, const double *z, int count, double *times, int *what)
 {
     double S = stribeck(v);
@@ -120,7 +120,7 @@ static int fire(Arc *arc, double t, double v, const double *z, int count, double
     return count;
 }
 
-/* Freeze signs and states into coefficients, and choose what is watched. */
+/* Freeze signs and states into coefficients, and choose what to watch. */
 static void arm(Arc *arc, double v, const double *z)
 {
     double S = stribeck(v), sign = (v > 0.0) - (v < 0.0);
@@ -148,7 +148,7 @@ static void arm(Arc *arc, double v, const double *z)
     arc->v_high = v < 0.0 && low > 0.0 ? -low : high;
 }
 
-/* Margins of all watched comparisons; returns whether one has changed its truth. */
+/* Margins of all watched comparisons; returns whether one has changed its truth value. */
 static inline int changed(const Arc *arc, double S, double v, const double *z, double *g)
 {
     int any = !(v >= arc->v_low && v <= arc->v_high);
@@ -170,7 +170,7 @@ static inline int look(const Arc *arc, const Dense *d, double theta, double *g)
     return changed(arc, arc->any_z ? stribeck(v) : 0.0, v, y.z, g);
 }
 
-/* Look at m - 1 places between; returns the first changed one, else -1. */
+/* Check m - 1 points in between; returns the first changed one, else -1. */
 static double scan(const Arc *arc, const Dense *d, double end, int m, double *low, double *g)
 {
     double seen[6];
@@ -186,7 +186,7 @@ static double scan(const Arc *arc, const Dense *d, double end, int m, double *lo
     return -1.0;
 }
 
-/* Close the bracket down to a tick; returns its right end, where the change has happened.
+/* Shrink the bracket to one tick; returns its right end, where the change has happened.
  * g holds six margins at the left end and six at the right. */
 static double bracket(const Arc *arc, const Dense *d, double *left, double high, double tick,
                       double *g)
@@ -218,8 +218,8 @@ static double bracket(const Arc *arc, const Dense *d, double *left, double high,
     return high;
 }
 
-/* May a comparison have changed and changed back inside the step? Sure not where |v| and |z| run
- * one way: then both are largest, and s smallest, at an end. */
+/* May a comparison have changed and changed back inside the step? Not if |v| and |z| are monotonic:
+ * then both are largest, and s smallest, at an end. */
 static inline int suspicious(const Arc *arc, double h, const double *z, const double *z_new,
                              double v, double v_new, double a, double a_new, double S, double S_new)
 {
@@ -340,7 +340,7 @@ static inline int run(int rows, double *out, double *times, int *what)
                 memcpy(last, g + 6, sizeof last);
                 if (crossed) {
                     found = bracket(&arc, &d, &low, 1.0, 0.01, g);
-                    if (found < 0.9 && !redone) { /* the stages lay far behind: do it again */
+                    if (found < 0.9 && !redone) { /* the stages lay far beyond: repeat the step */
                         h *= 1.01 * found;
                         redone = 1;
                         crossed = 0;
@@ -355,7 +355,7 @@ static inline int run(int rows, double *out, double *times, int *what)
                     doubt = suspicious(&arc, low * h, y.z, y_low.z, v, v_low, a,
                                        ACCELERATION(t_low, f), S, S_low);
                 }
-                while (doubt) { /* is there one before it? */
+                while (doubt) { /* is there an earlier one? */
                     changed(&arc, S, v, y.z, g);
                     low = 0.0;
                     if ((found = scan(&arc, &d, quiet, 16, &low, g)) < 0.0) break;
@@ -388,8 +388,8 @@ static inline int run(int rows, double *out, double *times, int *what)
     return count;
 }
 
-/* End state only: out has 8 numbers (t, x, v, z1..z4, F). times, what (3 * element + edge; edges
- * forward, backward, arrest) have room for a transition each. Returns their number, or -1. */
+/* End state only: out has 8 numbers (t, x, v, z1..z4, F). times and what (3 * element + edge; edges
+ * forward, backward, arrest) get one entry per transition. Returns their number, or -1. */
 int run_end(double *out, double *times, int *what) { return run(0, out, times, what); }
 
 /* The same with evenly spaced rows: out has shape (rows, 8). */

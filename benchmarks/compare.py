@@ -1,8 +1,8 @@
-"""gms-fsm against its rivals and against a C loop written for one model, in speed and in error.
+"""Compare the speed and error of gms-fsm with other tools and with a C loop for one model.
 
-Rounds are interleaved, because machines change their speed: in each round every contestant runs,
-and is divided by the C loop's time of that round. The error is the distance from a run of gms-fsm
-at rtol 1e-12, atol 1e-15. Run it with ``make bench``, or
+Rounds are interleaved, because the speed of a computer varies: in each round every contestant runs,
+and its time is divided by that of the C loop in the same round. The error is the difference from a
+run of gms-fsm at rtol 1e-12, atol 1e-15. Run it with ``make bench``, or
 
     python benchmarks/compare.py [--quick] [--markdown] [--rounds 15] [section ...]
 """
@@ -55,7 +55,7 @@ COMPILER = ["cc", "-O3", "-march=native", "-std=c99", "-ffp-contract=off", "-sha
 
 @dataclass(frozen=True)
 class Table:
-    """A heading, columns, rows of text, and what has to be said below."""
+    """A heading, columns, rows of text, and a note below."""
 
     title: str
     head: tuple[str, ...]
@@ -85,12 +85,12 @@ class Table:
 
 
 # --------------------------------------------------------------------------- contestants
-# A rival or an extra that is not installed, no compiler.
+# A tool or an extra that is not installed, or no compiler.
 MISSING = (ImportError, MissingExtraError, ParameterError, OSError, subprocess.CalledProcessError)
 
 
 def model_and_rig(case: Case) -> tuple[GMS, Any]:
-    """Return a case in gms-fsm's words."""
+    """Return a case as a gms-fsm model and rig."""
     parameters = GMSParameters(
         case.k,
         case.sigma,
@@ -113,7 +113,7 @@ def ours(case: Case, **how: Any) -> Outcome:
 
 
 def kernel(case: Case) -> Callable[[], Outcome]:
-    """Return a call of the compiled loop without all that `simulate` does before and after."""
+    """Return a callable that runs only the compiled loop, without the rest of `simulate`."""
     model, rig = model_and_rig(case)
     start = Start.of(model, rig, case.t_end, Settings(engine="compiled", output="end"))
     made: list[CompiledRun] = []
@@ -134,7 +134,7 @@ def kernel(case: Case) -> Callable[[], Outcome]:
 
 
 def c_loop(case: Case, folder: Path) -> Callable[[Array], Outcome]:
-    """Compile the C loop; calls through ctypes."""
+    """Compile the C loop; it is called through ctypes."""
     library = folder / f"{'open' if case.signal else 'closed'}.so"
     define = ["-DOPEN_LOOP"] if case.signal else []
     source = str(Path(__file__).with_name("c_loop.c"))
@@ -158,7 +158,7 @@ def c_loop(case: Case, folder: Path) -> Callable[[Array], Outcome]:
 
 
 def contestants(case: Case, folder: Path) -> Iterator[tuple[str, bool, Callable[[], Outcome]]]:
-    """Yield name, whether with rows, and a call; the C loop first."""
+    """Yield name, whether rows are kept, and a callable; the C loop first."""
     times = np.linspace(0.0, case.t_end, ROWS)
     loop = functools.cache(functools.partial(c_loop, case, folder))
     yield C_LOOP, True, lambda: loop()(times)
@@ -181,7 +181,7 @@ def errors(found: Outcome, right: Outcome) -> tuple[str, str]:
     for i in np.unique(right.element):
         mine, true = np.flatnonzero(found.element == i), np.flatnonzero(right.element == i)
         if [found.edge[m] for m in mine] != [right.edge[m] for m in true]:
-            return f"{z:.1e} m", "other sequence"
+            return f"{z:.1e} m", "wrong sequence"
         worst = max(worst, float(np.abs(found.t[mine] - right.t[true]).max()))
     return f"{z:.1e} m", f"{worst:.1e} s"
 
@@ -210,7 +210,7 @@ def runs(case: Case, rounds: int) -> Table:
             try:
                 found = run()  # also the warm-up
             except MISSING as error:
-                left_out[name] = f" Left out: {name} ({error})."
+                left_out[name] = f" Skipped: {name} ({error})."
                 continue
             field.append((name, rows, run))
             scores[name, rows] = *errors(found, right), f"{found.t.size} of {case.transitions}"
@@ -219,7 +219,7 @@ def runs(case: Case, rounds: int) -> Table:
         for turn in range(rounds):
             for name, rows, run in field:
                 one = cost[name, rows]
-                if one < 0.3 or turn % 3 == 0:  # slow ones run in fewer rounds
+                if one < 0.3 or turn % 3 == 0:  # slow contestants run in fewer rounds
                     measured[name, rows][turn] = seconds(run, max(1, int(0.02 / one)))
     table = []
     for (name, rows), mine in measured.items():
@@ -233,18 +233,18 @@ def runs(case: Case, rounds: int) -> Table:
         table.append((name, kept, ratio, median, *scores[name, rows]))
     table.sort(key=lambda line: line[1])
     return Table(
-        f"{case.title}, rtol 1e-6; atol 1e-9, of gms-fsm its default",
-        ("", "kept", "time to C", "median", "error of z", "of times", "transitions"),
+        f"{case.title}, rtol 1e-6; atol 1e-9 (gms-fsm: default)",
+        ("", "kept", "time / C", "median", "error of z", "of times", "transitions"),
         table,
-        f"Median of {rounds} interleaved rounds (of every third for those over 0.3 s). Error: the "
-        "largest of all rows, or of the end state; rows of gms-fsm and C hold the friction too."
+        f"Median of {rounds} interleaved rounds (every third round for runs over 0.3 s). Error: "
+        "the largest over all rows, or of the end state; rows of gms-fsm and C include friction."
         + "".join(left_out.values()),
     )
 
 
 # --------------------------------------------------------------------------- how cost grows
 def bank(n: int, spread: bool) -> GMS:
-    """Return the pulled mass's bank with n equal shares, thresholds equal or spread 1 : 7."""
+    """Return the pulled mass's bank with n equal shares; thresholds equal or spread 1 : 7."""
     w = np.linspace(0.0025, 0.0175, n) if spread and n > 1 else np.full(n, 0.01)
     share = np.full(n, 1 / n)
     parameters = GMSParameters(
@@ -260,12 +260,12 @@ def bank(n: int, spread: bool) -> GMS:
 
 
 def compiled(model: GMS, t_end: float, **how: Any) -> Any:
-    """Run the pulled mass by the compiled engine."""
+    """Run the pulled mass with the compiled engine."""
     return simulate(model, PulledSlider(1.0, 2.0, 0.1), t_end, engine="compiled", **how)
 
 
 def size(rounds: int) -> Table:
-    """Cost against the number of elements."""
+    """Measure the cost as a function of the number of elements."""
     table = []
     for n in (1, 10, 100, 1_000, *([10_000] if rounds > 3 else [])):
         line = [f"{n:,}"]
@@ -276,16 +276,16 @@ def size(rounds: int) -> Table:
             line += [ms(cost), f"{count:,}"]
         table.append(tuple(line))
     return Table(
-        "Cost against the number of elements",
+        "Cost by number of elements",
         ("elements", "together", "transitions", "spread", "transitions"),
         table,
         'Pulled mass, 12 s (one break-away, one arrest), compiled, `output="end"`. Together: equal '
-        "thresholds, all elements switch at one instant. Spread: each has an instant of its own.",
+        "thresholds, all elements switch at one instant. Spread: each switches at its own instant.",
     )
 
 
 def length(rounds: int) -> Table:
-    """Cost against the length of the run."""
+    """Measure the cost as a function of the length of the run."""
     model, table = model_and_rig(PULLED_MASS)[0], []
     for t_end in (60.0, 600.0, 6000.0):
         line = [f"{t_end:,.0f} s"]
@@ -296,8 +296,8 @@ def length(rounds: int) -> Table:
             line += [ms(cost), f"{1e6 * cost / t_end:.0f} us"]
         table.append((*line, f"{count:,}"))
     return Table(
-        "Cost against the length of the run",
-        ("length", "end", "a second", "all rows", "a second", "transitions"),
+        "Cost by length of the run",
+        ("length", "end", "per second", "all rows", "per second", "transitions"),
         table,
         "Pulled mass, compiled.",
     )
@@ -313,7 +313,7 @@ def many(count: int, threads: int = 1, **options: Any) -> Sweep:
 
 
 def sweeps(rounds: int) -> Table:
-    """How many runs a second, and how many of them are wrong."""
+    """Measure how many runs per second a sweep does, and how many of them are wrong."""
     count = 1000 if rounds > 3 else 200
     right = many(count, rtol=1e-12, atol=1e-15)
     table = []
@@ -325,15 +325,15 @@ def sweeps(rounds: int) -> Table:
         table.append((f"{threads}", f"{rate:,.0f}", f"{wrong} of {count:,}", f"{failed}"))
     return Table(
         f"Sweep: {count:,} pulled masses, 60 s each, end states",
-        ("threads", "runs a second", "wrong event sequences", "failed"),
+        ("threads", "runs per second", "wrong event sequences", "failed"),
         table,
-        "k varied by 20 %, w = 1/(4k), rtol 1e-6; right is rtol 1e-12.",
+        "k varied by 20 %, w = 1/(4k), rtol 1e-6; reference: rtol 1e-12.",
     )
 
 
 # --------------------------------------------------------------------------- in child processes
 def child(task: str, **environment: str) -> dict[str, float]:
-    """Run a task of `TASKS` in a process of its own."""
+    """Run a task of `TASKS` in its own process."""
     done = subprocess.run(
         [sys.executable, __file__, "--task", task],
         env={**os.environ, **environment},
@@ -346,9 +346,9 @@ def child(task: str, **environment: str) -> dict[str, float]:
 
 
 def peak() -> float:
-    """Return the largest memory this process has had, MB; tracemalloc does not see machine code.
+    """Return the peak memory of this process, MB; tracemalloc does not see machine code.
 
-    Linux hands getrusage's figure on from the parent process, so there the kernel's own is read.
+    On Linux getrusage's value is inherited from the parent process, so the kernel's value is read.
     """
     status = Path("/proc/self/status")
     if status.exists():
@@ -365,7 +365,7 @@ def grown(run: Callable[[], object]) -> dict[str, float]:
 
 
 def first_call(law: str) -> dict[str, float]:
-    """Return how long the first compiled run takes."""
+    """Return the time of the first compiled run."""
     model = GMS(model_and_rig(PULLED_MASS)[0].parameters, law=law)  # type: ignore[arg-type]
     return {"seconds": seconds(lambda: compiled(model, 1.0))}
 
@@ -391,7 +391,7 @@ TASKS: dict[str, tuple[str, Callable[[], dict[str, float]]]] = {
 
 
 def memory(_: int) -> Table:
-    """Peak memory of processes that do one thing."""
+    """Measure the peak memory of processes that do one task each."""
     table = []
     for task in ("run_end", "run_all", "bank_end", "sweep_100", "sweep_1000"):
         found = child(task)
@@ -399,14 +399,14 @@ def memory(_: int) -> Table:
         table.append((TASKS[task][0], f"{found['before']:.0f} MB", f"{grew:.1f} MB"))
     return Table(
         "Peak memory, compiled engine",
-        ("", "warm process", "more at its peak"),
+        ("", "warm process", "increase at peak"),
         table,
-        "Pulled mass; the largest resident size of a process of its own.",
+        "Pulled mass; the largest resident size of a separate process.",
     )
 
 
 def first(_: int) -> Table:
-    """How long the first compiled call of a process takes."""
+    """Measure the first compiled call of a process."""
     with tempfile.TemporaryDirectory() as folder:
         steps = (("cold cache", "signed"), ("known chart", "signed"), ("new chart", "published"))
         table = [
@@ -417,7 +417,7 @@ def first(_: int) -> Table:
         "First compiled run of a process",
         ("", "time"),
         table,
-        "Importing numba included. Cold: nothing on disk. New chart: the engine is on disk, this "
+        "Includes importing numba. Cold: nothing is cached. New chart: the engine is cached, this "
         "chart on this rig is not.",
     )
 
@@ -434,7 +434,7 @@ SECTIONS: dict[str, Callable[[int], Table]] = {
 
 
 def machine() -> str:
-    """Return date, processor and versions in a line."""
+    """Return date, processor and versions in one line."""
     cpu = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
@@ -452,9 +452,9 @@ def machine() -> str:
 
 
 def main() -> None:
-    """Print the sections asked for, or all."""
+    """Print the requested sections, or all."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("sections", nargs="*", help=f"{', '.join(SECTIONS)}; all if left out")
+    parser.add_argument("sections", nargs="*", help=f"{', '.join(SECTIONS)}; default: all")
     parser.add_argument("--rounds", type=int, default=15)
     parser.add_argument("--quick", action="store_true", help="3 rounds, no bank of 10,000")
     parser.add_argument("--markdown", action="store_true", help="for the README")
@@ -470,7 +470,7 @@ def main() -> None:
         try:
             table = SECTIONS[name](3 if options.quick else options.rounds)
         except MISSING as error:
-            print(f"\n{name} left out: {getattr(error, 'stderr', None) or error}")
+            print(f"\n{name} skipped: {getattr(error, 'stderr', None) or error}")
             continue
         print("\n" + table.text(options.markdown), flush=True)
 

@@ -1,6 +1,6 @@
 """Live charts: 500 frames of a bank of four elements, as SVG and as a GIF.
 
-Under 15 s is asked for the SVG frames. Run it from the project's root.
+The limit for the SVG frames is 15 s. Run it from the project's root.
 """
 
 from __future__ import annotations

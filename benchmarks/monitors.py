@@ -1,7 +1,6 @@
-"""What all monitors together cost: the pulled mass, 60 s, with them and without, in turn.
+"""Cost of all monitors together: the pulled mass, 60 s, alternately with and without them.
 
-Processor time, medians of interleaved rounds; under 15 % is asked for. Run it from the project's
-root.
+Processor time, medians of interleaved rounds; the limit is 15 %. Run it from the project's root.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ MONITORS = ("all", "abs(z) <= 1.6*s")
 
 
 def run(monitors: tuple[str, ...]) -> Trace:
-    """72 transitions of four elements, 2049 rows."""
+    """Return a run with 72 transitions of four elements, 2044 rows."""
     k = np.array([40.0, 30.0, 20.0, 10.0])
     parameters = GMSParameters(
         k,
@@ -50,7 +49,7 @@ def main() -> None:
     start = time.process_time()
     examine(trace, "0 <= t and v <= 1")
     first = time.process_time() - start
-    print(f"v, s, F of all rows, which a reader of the trace needs too: {1e3 * first:.2f} ms")
+    print(f"v, s, F of all rows, also needed to read the trace: {1e3 * first:.2f} ms")
     for name in ("chattering", "passivity", "coverage", MONITORS[1]):
         times = []
         for _ in range(ROUNDS):

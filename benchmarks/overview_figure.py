@@ -1,4 +1,4 @@
-"""Pictures of a run with 100,000 rows (Fig. 4 motion, 100 s): seconds until the file is written.
+"""Time to write pictures of a run with 100,000 rows (Fig. 4 motion, 100 s).
 
 The limit is 5 s for the overview. Run it with ``python benchmarks/overview_figure.py``.
 """
@@ -38,7 +38,7 @@ def main(rounds: int = 3) -> None:
                 path = Path(folder) / f"{name}.{ending}"
                 times = []
                 for _ in range(rounds):
-                    fresh = replace(run)  # forgets the forces computed before
+                    fresh = replace(run)  # without the cached forces
                     start = time.perf_counter()
                     figures.save(draw(fresh), path)
                     times.append(time.perf_counter() - start)

@@ -1,4 +1,4 @@
-"""Size of the replay page of the Fig. 4 run, and how long a frame takes in Chromium.
+"""Size of the replay page of the Fig. 4 run, and the time per frame in Chromium.
 
 Run: ``python benchmarks/replay_page.py`` (extra ``replay``, package playwright, program chromium).
 """
@@ -15,7 +15,7 @@ from playwright.sync_api import sync_playwright
 from gms_fsm import GMS, GMSParameters, Prescribed, simulate
 from plots.replay import write_replay
 
-# Every row once; reading the layout makes the browser do it within the measured time.
+# Every row once; reading the layout forces the browser to compute it within the measured time.
 WALK = """() => {
     const times = [];
     for (let k = 0; k < data.frames.t.length; k++) {
@@ -29,7 +29,7 @@ WALK = """() => {
 
 
 def main() -> None:
-    """Print size, time to write, and time a frame: all of the run in view, and zoomed in."""
+    """Print size, writing time, and time per frame: whole run in view, and zoomed in."""
     rig = Prescribed("0.15*sin(2*pi*t/25)")
     runs = [
         simulate(GMS(GMSParameters.paper("stick-slip"), law=law), rig, 100.0)
@@ -49,7 +49,7 @@ def main() -> None:
             for zoom in ("whole run", "zoomed 16 times"):
                 times = page.evaluate(WALK)
                 middle, high = times[len(times) // 2], times[int(0.99 * len(times))]
-                print(f"  {zoom}: {middle:.1f} ms a frame (99 % below {high:.1f} ms)")
+                print(f"  {zoom}: {middle:.1f} ms per frame (99 % below {high:.1f} ms)")
                 for _ in range(4):
                     page.keyboard.press("+")
             page.close()

@@ -1,7 +1,7 @@
-"""The same two runs as users of other tools write them: SciPy, SUNDIALS, PathSim.
+"""The same two runs as users of other tools would write them: SciPy, SUNDIALS, PathSim.
 
-All three share the equations below in plain NumPy and the reading of the guards; each has its own
-way to stop at an event and to go on. None is told of the traps that gms-fsm knows of.
+All three share the equations and guards below in plain NumPy; each has its own way to stop at an
+event and to continue. None of them handles the traps that gms-fsm knows about.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Case:
     Parameters
     ----------
     title, t_end, transitions
-        Name, length [s], and how many transitions are right.
+        Name, length [s], and the correct number of transitions.
     k, sigma, C, w : ndarray, shape (n,)
         N/m, Ns/m, m/s and m/N.
     sigma_2, F_c, F_s, v_s, v_c : float
@@ -53,7 +53,7 @@ class Case:
 
     @property
     def first(self) -> int:
-        """Where z starts in y."""
+        """The index of the first z in y."""
         return 1 if self.signal else 2
 
     def start(self) -> Array:
@@ -116,7 +116,7 @@ OPEN_LOOP = Case(
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a run found.
+    """The result of a run.
 
     Attributes
     ----------
@@ -125,9 +125,9 @@ class Outcome:
     element : ndarray of int, shape (m,)
         From 0.
     edge : list of str
-        Which edge.
+        Names of the edges.
     z : ndarray, shape (rows, n), m
-        At the wanted times; where none were wanted one row, the end.
+        At the requested times; if there are none, one row, the end state.
     """
 
     t: Array
@@ -138,7 +138,7 @@ class Outcome:
 
 @dataclass(eq=False)
 class Log:
-    """Switches the elements and keeps what switched."""
+    """Switches the elements and logs the switches."""
 
     case: Case
     slips: NDArray[np.bool_] = field(init=False)
@@ -155,7 +155,7 @@ class Log:
             self.slips[i] = not self.slips[i]
 
     def outcome(self, z: Array, y: Array) -> Outcome:
-        """Return all of it, with the rows z or the end state y."""
+        """Return the result, with the rows z or the end state y."""
         t, element, edge = zip(*self.fired, strict=True)
         z = z if len(z) else y[None, self.case.first :]
         return Outcome(np.array(t), np.array(element), list(edge), z)
@@ -198,7 +198,7 @@ def scipy_by_hand(
         if upto > row:
             z[row:upto] = arc.sol(times[row:upto])[case.first :].T
             row = upto
-        if arc.status == 1:  # a root is not yet true in floating point: nudge past it
+        if arc.status == 1:  # the guard may still be false at the root: step past it
             t, y = t + 1e-12, y + 1e-12 * case.slope(t, y, slips, sign)
         log.switch(t, y)
     return log.outcome(z, y)

@@ -1,12 +1,12 @@
-"""Does a change that should change no number change one? The same runs at two commits.
+"""Check that two commits compute the same numbers, by comparing the same runs at both.
 
     python benchmarks/same_bits.py OLD [NEW] [--quick]
 
-OLD and NEW are commits; NEW is the working tree when left out. Traces, transition logs, states,
+OLD and NEW are commits; NEW defaults to the working tree. Traces, transition logs, states,
 sweeps and sessions are compared to the last bit, by sha256, array by array. The exit code is 1 if
-anything differs, runs at one of the two only, or fails. Machine code is compiled anew for both
-(extra ``fast``). The scenario with a measured record runs only where GMS_FSM_DATA names its folder.
-No hash is kept in the repository: another machine, numpy or scipy may give other last bits.
+anything differs, fails, or exists at only one of the two. Machine code is compiled anew for both
+(extra ``fast``). The scenario with a measured record runs only if GMS_FSM_DATA names its folder.
+No hashes are kept in the repository: another machine, numpy or scipy may give other last bits.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import BDF, Radau
 
-import gms_fsm as fsm  # only what it exports itself: the modules below it move
+import gms_fsm as fsm  # only its public names: modules may move between commits
 
 ROOT = Path(__file__).resolve().parents[1]
 Parts = dict[str, str]  # name of an array -> sha256
 Table = dict[str, Parts]  # name of a run -> its parts
-FAILED = "failed"  # stands alone where a run failed, with the reason
+FAILED = "failed"  # the only part of a run that failed, with the reason
 
 
 def digest(values: ArrayLike) -> str:
@@ -59,7 +59,7 @@ def _trace(trace: fsm.Trace) -> Parts:
 def _run(model: Any, rig: Any, t_end: float, **options: Any) -> Parts:
     try:
         return _trace(fsm.simulate(model, rig, t_end, **options))
-    except fsm.SimulationError as error:  # such a run counts by the part before
+    except fsm.SimulationError as error:  # compare the part before the error
         parts = {} if error.trace is None else _trace(error.trace)
         return {"error": digest(type(error).__name__)} | parts
 
@@ -132,7 +132,7 @@ def runs() -> dict[str, Callable[[], Parts]]:
     found: dict[str, Callable[[], Parts]] = {}
     for path in sorted(Path("scenarios").glob("*.toml")):
         if "\n[record]" in path.read_text(encoding="utf-8") and not os.environ.get("GMS_FSM_DATA"):
-            print(f"{path.name} is left out: GMS_FSM_DATA is not set", file=sys.stderr)
+            print(f"{path.name} is skipped: GMS_FSM_DATA is not set", file=sys.stderr)
         else:
             quick = " *" * path.stem.startswith("paper")
             found[f"scenario {path.stem}{quick}"] = partial(_scenario, path)
@@ -192,7 +192,7 @@ def child(output: Path, quick: bool) -> None:
         if name.endswith("*") or not quick:
             try:
                 table[name] = run()
-            except Exception as error:  # of any kind: the other runs go on
+            except Exception as error:  # of any kind: the other runs continue
                 table[name] = {FAILED: f"{type(error).__name__}: {error}"}
     output.write_text(json.dumps(table), encoding="utf-8")
 
@@ -213,7 +213,7 @@ def table_at(commit: str | None, quick: bool) -> Table:
 
 
 def compared(old: Table, new: Table) -> tuple[list[str], int]:
-    """Return a line for each run, and how many runs are not the same."""
+    """Return a line for each run, and the number of runs that are not the same."""
     lines, others = [], 0
     for name in sorted(old | new):
         parts, said = (old.get(name, {}), new.get(name, {})), "same"
@@ -234,7 +234,7 @@ def main() -> int:
     """Compare two commits; return the exit code."""
     parser = argparse.ArgumentParser(description="The same runs at two commits, to the last bit.")
     parser.add_argument("old", metavar="OLD", help="a commit")
-    parser.add_argument("new", metavar="NEW", nargs="?", help="a commit; else the working tree")
+    parser.add_argument("new", metavar="NEW", nargs="?", help="a commit; default: the working tree")
     parser.add_argument("--quick", action="store_true", help="about a dozen runs")
     given = parser.parse_args()
     lines, others = compared(table_at(given.old, given.quick), table_at(given.new, given.quick))

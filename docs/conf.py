@@ -1,4 +1,4 @@
-"""How Sphinx makes the site from this folder; run it with ``make docs``."""
+"""Sphinx configuration of the site; build it with ``make docs``."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ extensions = [
     "sphinx_copybutton",
 ]
 exclude_patterns = ["**/__pycache__"]
-smartquotes_action = "D"  # "dp45" is to be copied as it stands
-default_role = "py:obj"  # a name in backticks in a docstring is a link where there is such a name
+smartquotes_action = "D"  # "dp45" can be copied literally
+default_role = "py:obj"  # a name in backticks in a docstring is a link if the name exists
 
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 
 autodoc_member_order = "bysource"
-autodoc_typehints = "none"  # the docstrings name type, shape and unit
+autodoc_typehints = "none"  # the docstrings give type, shape and unit
 napoleon_google_docstring = False
 napoleon_use_param = False  # types are words here ("shape (n,), m"), not names to link
 napoleon_use_rtype = False
@@ -48,7 +48,7 @@ napoleon_custom_sections = [("Attributes", "params_style")]
 copybutton_prompt_text = r">>> |\.\.\. |\$ "
 copybutton_prompt_is_regexp = True
 
-# Nothing is loaded from elsewhere: fonts of the reader's system, formulas as MathML.
+# The site loads nothing from other hosts: system fonts, formulas as MathML.
 html_theme = "furo"
 html_title = "gms-fsm"
 html_favicon = "favicon.svg"
@@ -72,7 +72,7 @@ html_theme_options = {
 
 
 def keep_bars(*arguments: Any) -> None:
-    """Let |z| in a docstring be no substitution, and a line "s." no list that begins at s."""
+    """Escape |z| in docstrings (not a substitution) and a line "s." (not a list item)."""
     lines: list[str] = arguments[-1]
     for number, line in enumerate(lines):
         if not line.lstrip().startswith((">>>", "...")):
@@ -82,10 +82,10 @@ def keep_bars(*arguments: Any) -> None:
 
 
 def mend_ways_back(app: Sphinx, page: str, _: str, context: dict[str, Any], __: Any) -> None:
-    """Let a source page lead back to objects that are documented under a shorter name.
+    """Fix links from a source page to objects that are documented under a shorter name.
 
-    Sphinx takes one module's name for all objects of a source file, though
-    ``gms_fsm.traces.trace.Trace`` is ``gms_fsm.Trace`` in its documentation and
+    Sphinx uses one module name for all objects of a source file, but
+    ``gms_fsm.traces.trace.Trace`` is documented as ``gms_fsm.Trace`` and
     ``gms_fsm.traces.trace.dwell_times`` is not.
     """
     if not page.startswith("_modules/") or "body" not in context:
@@ -110,7 +110,7 @@ def mend_ways_back(app: Sphinx, page: str, _: str, context: dict[str, Any], __: 
 
 
 def open_to_all(_: Sphinx, __: str, ___: str, context: dict[str, Any], ____: Any) -> None:
-    """Let pictures lead to themselves in full size, and what scrolls be reached by keys."""
+    """Link pictures to themselves at full size, and make scrolling parts reachable by keyboard."""
     if "body" in context:
         wide = r'<(pre(?=>)|div(?= class="(?:math|table-wrapper)\b))'
         context["body"] = re.sub(wide, r'<\1 tabindex="0"', context["body"])
@@ -123,19 +123,19 @@ def open_to_all(_: Sphinx, __: str, ___: str, context: dict[str, Any], ____: Any
 
 
 def make_lessons(_: Sphinx) -> None:
-    """Write the lessons' pages beside their index."""
+    """Write the lessons' pages next to their index."""
     notebooks.write_all(HERE / "lessons")
 
 
 def copy_replay_pages(app: Sphinx, error: Exception | None) -> None:
-    """Put the lessons' replay pages beside their pages, as they are."""
+    """Copy the lessons' replay pages next to their pages."""
     if error is None:
         for path in (HERE / "lessons").glob("*_replay.html"):
             shutil.copy(path, Path(app.outdir) / "lessons")
 
 
 def setup(app: Sphinx) -> None:
-    """Connect what is ours."""
+    """Register our handlers."""
     mathml.register(app)
     app.add_lexer("csv", TextLexer)
     app.connect("autodoc-process-docstring", keep_bars, priority=100)  # before napoleon

@@ -1,4 +1,4 @@
-"""Make the pictures kept under docs/images; run it with ``make gallery``."""
+"""Make the pictures in docs/images; run it with ``make gallery``."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from gms_fsm import (
     simulate,
     sweep,
 )
-from gms_fsm._files import written_whole
+from gms_fsm._files import write_whole
 from gms_fsm.app.paper import FIG4_END, VELOCITY
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
@@ -73,7 +73,7 @@ def draw_charts(published: Trace, signed: Trace) -> None:
     first_alone = int((signed.transitions.element == 3).nonzero()[0][2])  # E4, backward
     row = int((signed.t == signed.transitions.t[first_alone]).nonzero()[0][-1])
     live = plots.live_statechart(signed, row=row, elements=4, values=True)
-    written_whole(FOLDER / "chart_live.svg", lambda file: file.write(live.encode()))
+    write_whole(FOLDER / "chart_live.svg", lambda file: file.write(live.encode()))
     plots.animate(signed, FOLDER / "film.gif", elements=[0], frames=50, t_end=50.0, fps=10)
 
 
@@ -102,17 +102,17 @@ STROKES = "1e-4*sin(2*pi*t/4)"  # m/s
 
 
 def draw_concepts(published: Trace) -> None:
-    """Write the pictures of the concept pages that are not among the others."""
+    """Write the pictures that only the concept pages use."""
     figures.save(element_figure(), FOLDER / "concept_element.png")
     row = int(np.flatnonzero(published.t <= 25.0)[-1])
     live = plots.live_statechart(published, row=row, elements=[0], values=True)
-    written_whole(FOLDER / "concept_guard.svg", lambda file: file.write(live.encode()))
+    write_whole(FOLDER / "concept_guard.svg", lambda file: file.write(live.encode()))
     figures.save(microstep_figure(published), FOLDER / "concept_microstep.png")
     figures.save(crossing_figure(), FOLDER / "concept_crossing.png")
 
 
 def element_figure() -> Figure:
-    """Draw one element moved to and fro: distance to the threshold, force, states."""
+    """Draw one element moved back and forth: deflection over threshold, force, states."""
     trace = simulate(GMS(ELEMENT, law="signed"), Prescribed(STROKES), 6.0)
     with rc_context(RC):
         figure = Figure(figsize=(7.2, 4.8), layout="constrained")
@@ -122,7 +122,7 @@ def element_figure() -> Figure:
         panels.force(force, trace)
         panels.ribbons(states, trace)
         for ax, title in (
-            (velocity, "a) the slider moves to and fro"),
+            (velocity, "a) the slider moves back and forth"),
             (ratio, "b) deflection over threshold"),
             (force, "c) force"),
             (states, "d) state"),
@@ -135,7 +135,7 @@ def element_figure() -> Figure:
 
 
 def microstep_figure(trace: Trace) -> Figure:
-    """Draw the force at the micro-steps of one instant, and what fires at each."""
+    """Draw the force at the micro-steps of one instant, and the edge that fires at each."""
     log = trace.transitions[:4]
     rows = np.flatnonzero(trace.t == log.t[0])
     with rc_context(RC):
@@ -143,7 +143,7 @@ def microstep_figure(trace: Trace) -> Figure:
         over_time, by_step = figure.subplots(1, 2, width_ratios=(1, 1.5))
         t = float(log.t[0])
         panels.force(over_time, trace, window=(t - 1.5, t + 1.5))
-        over_time.set_title("a) over time: one step of F")
+        over_time.set_title("a) over time: one jump of F")
         by_step.set_title(f"b) at t = {t:.4f} s: four firings, five rows")
         by_step.plot(trace.microstep[rows], trace.F[rows], "o--", color=INK, markersize=6)
         for record, number in zip(log, range(1, 5), strict=True):
@@ -170,7 +170,7 @@ def microstep_figure(trace: Trace) -> Figure:
 
 
 def crossing_figure() -> Figure:
-    """Draw a break-away that lies inside a step: found at the step's end, and located."""
+    """Draw a break-away inside a step: detected at the end of the step, and located."""
     step, rig = 0.13, Prescribed(0.2)
     model = GMS(GMSParameters.paper("stick-slip"), law="signed")
     located, once = (
@@ -183,7 +183,7 @@ def crossing_figure() -> Figure:
         figure = Figure(figsize=(7.2, 3.6), layout="constrained")
         ax = figure.subplots()
         looks = (
-            (once, VERMILION, "s--", "guards looked at once a step"),
+            (once, VERMILION, "s--", "guards checked once per step"),
             (located, BLUE, "o-", "located"),
         )
         for trace, colour, look, name in looks:
@@ -200,7 +200,7 @@ def crossing_figure() -> Figure:
         ax.axhline(0, color=LINE_GREY, linewidth=0.9, zorder=0)
         for time, text, colour, height in (
             (true, "z >= s becomes true", BLUE, 0.97),
-            (found, "it is noticed", TEXT_ORANGE, 0.62),
+            (found, "detected", TEXT_ORANGE, 0.62),
         ):
             ax.axvline(time, color=LINE_GREY, linestyle=":", linewidth=0.9, zorder=0)
             ax.annotate(
@@ -213,9 +213,7 @@ def crossing_figure() -> Figure:
                 va="top",
                 color=colour,
             )
-        ax.set(
-            xlabel="t [s]", ylabel="z − s [m]", title=f"{model.title}: fixed steps of {step:g} s"
-        )
+        ax.set(xlabel="t [s]", ylabel="z − s [m]", title=f"{model.title}: fixed step of {step:g} s")
         ax.legend(loc="lower right")
     return figure
 
@@ -262,7 +260,7 @@ def draw_howto() -> None:
 
 
 def sweep_figure() -> Figure:
-    """Draw where a pulled mass sticks and slips: arrests in 60 s over speed and v_s."""
+    """Draw the number of arrests of a pulled mass in 60 s over speed and v_s."""
     parameters = GMSParameters.from_shares(
         [0.4, 0.3, 0.2, 0.1],
         [40, 30, 20, 10],
@@ -292,7 +290,7 @@ def sweep_figure() -> Figure:
 
 
 def run(name: str) -> Trace:
-    """Run one of the scenarios."""
+    """Run one of the scenario files."""
     loaded = load_scenario(SCENARIOS / f"{name}.toml")
     return simulate(loaded.model, loaded.rig, **loaded.arguments)
 

@@ -1,4 +1,4 @@
-"""Formulas as MathML, which browsers draw themselves: no script, no font from elsewhere."""
+"""Formulas as MathML, which browsers render without scripts or external fonts."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from sphinx.application import Sphinx
 
 
 def inline(self: Any, node: nodes.Element) -> None:
-    """Write a formula in a line."""
+    """Write an inline formula."""
     self.body.append(convert(node.astext()))
     raise nodes.SkipNode
 
 
 def block(self: Any, node: nodes.Element) -> None:
-    """Write a formula on a line of its own, which scrolls where it is too wide."""
+    """Write a display formula, which scrolls if it is too wide."""
     self.body.append(f'<div class="math">{convert(node.astext(), display="block")}</div>')
     raise nodes.SkipNode
 
 
 def register(app: Sphinx) -> None:
-    """Make it the renderer ``mathml``."""
+    """Register the renderer ``mathml``."""
     app.add_html_math_renderer("mathml", (inline, None), (block, None))

@@ -1,8 +1,8 @@
 """Notebooks made from the lessons: composed with jupytext, executed, written as pages.
 
-A lesson's module stays the only place of its text and its runs. ``docs/lessons/lesson_N.py`` holds
-what a notebook adds to it, in jupytext's percent format: a slider, things to try. Each notebook is
-executed with warnings as errors, and again only when a source has changed.
+A lesson's module remains the only source of its text and its runs. ``docs/lessons/lesson_N.py``
+contains what a notebook adds, in jupytext's percent format: a slider, things to try. Each notebook
+is executed with warnings as errors, and again only when a source has changed.
 
     python docs/notebooks.py FOLDER
 """
@@ -32,17 +32,17 @@ from traitlets import Type
 
 from gms_fsm.app.lessons import LESSONS
 
-logging.getLogger("traitlets").setLevel(logging.WARNING)  # not a line for each notebook
+logging.getLogger("traitlets").setLevel(logging.WARNING)  # no line per notebook
 
 ROOT = Path(__file__).parents[1]
 MORE = ROOT / "docs" / "lessons"
-# What the notebook machinery says of itself is not ours to mend.
+# Warnings from inside the notebook packages are not ours to fix.
 OTHERS = "IPython|ipykernel|ipywidgets|jupyter|matplotlib_inline|tornado|traitlets|zmq"
 STRICT = f"""import warnings
 warnings.simplefilter("error")
 warnings.filterwarnings("ignore", module=".*({OTHERS})")"""
 VIEW = "application/vnd.jupyter.widget-view+json"
-SLIDER_NOTE = "*A slider in the notebook; this page shows where it starts.*"
+SLIDER_NOTE = "*The notebook has a slider; this page shows its initial picture.*"
 
 
 # --------------------------------------------------------------------------- composing
@@ -75,13 +75,13 @@ def composed(number: int) -> str:
         ("code", "this.figure(result)"),
         (
             "markdown",
-            f"## How it was run\n\nThis is `run()` of `{module.__name__}`:\n\n"
+            f"## The code of the runs\n\nThis is `run()` of `{module.__name__}`:\n\n"
             f"```python\n{source}```",
         ),
         (
             "markdown",
-            "## Step through it\n\nA page in which the runs are stepped, scrubbed and "
-            "explained guard by guard:",
+            "## Step through the runs\n\nA page in which you can step and scrub the runs, with "
+            "every guard explained:",
         ),
         (
             "code",
@@ -105,14 +105,14 @@ def _cell(kind: str, body: str) -> str:
 
 
 def _escaped(text: str) -> str:
-    """Return a docstring as Markdown: outside of its code a star is a star."""
+    """Return a docstring as Markdown, with stars escaped outside its code."""
     parts = re.split(r"(``.*?``)", text, flags=re.DOTALL)
     return "".join(part if i % 2 else part.replace("*", r"\*") for i, part in enumerate(parts))
 
 
 # --------------------------------------------------------------------------- executing
 class _Channel(AsyncZMQSocketChannel):
-    """Looks again every second: an asynchronous socket misses a wake-up now and then."""
+    """Polls every second: an asynchronous socket occasionally misses a wake-up."""
 
     async def get_msg(self, timeout: float | None = None) -> dict[str, Any]:
         end = math.inf if timeout is None else time.monotonic() + timeout
@@ -187,14 +187,14 @@ def _behind_sliders(notebook: Any) -> Iterator[Mapping[str, Any]]:
 
 # --------------------------------------------------------------------------- a page
 def page(notebook: Any, name: str, title: str) -> tuple[str, dict[str, bytes]]:
-    """Return a notebook as Markdown, and the pictures it shows.
+    """Return a notebook as Markdown, with its pictures.
 
     Parameters
     ----------
     notebook : NotebookNode
         Executed.
     name : str
-        Of the page, without ending.
+        Of the page, without file extension.
     title : str
         Of the lesson.
 
@@ -219,7 +219,7 @@ def page(notebook: Any, name: str, title: str) -> tuple[str, dict[str, bytes]]:
         elif "image/png" in data:
             file = f"{name}_{len(pictures) + 1}.png"
             pictures[file] = base64.b64decode(data["image/png"])
-            what = "where the slider starts" if pictures.keys() > {file} else "the runs"
+            what = "initial picture of the slider" if pictures.keys() > {file} else "the runs"
             lines.append(f"![{title}: {what}]({file})")
         else:
             lines.append(f"```text\n{data['text/plain']}\n```")
@@ -234,7 +234,7 @@ def page(notebook: Any, name: str, title: str) -> tuple[str, dict[str, bytes]]:
     replay = f"{name}_replay.html"
     opened = f'<p><a href="{replay}">Open the replay page of these runs</a></p>'
     lines = [opened if line.strip("`\n").endswith(f"text\n{replay}") else line for line in lines]
-    lines.insert(1, f"[The notebook of this page]({name}.ipynb), executed when the site was built.")
+    lines.insert(1, f"[This page as a notebook]({name}.ipynb), executed when the site was built.")
     return "\n\n".join(lines) + "\n", pictures
 
 
@@ -244,7 +244,7 @@ def write_all(folder: Path) -> None:
     Parameters
     ----------
     folder : Path
-        Where to.
+        Destination.
     """
     folder.mkdir(parents=True, exist_ok=True)
     stamps = folder / ".stamps"

@@ -10,7 +10,7 @@ from typing import Any
 
 from gms_fsm.errors import GMSError, ParameterError
 
-__all__ = ["checked_kind", "checked_path", "checked_whole", "listed"]
+__all__ = ["checked_integer", "checked_kind", "checked_path", "listed"]
 
 
 def checked_kind(name: str, value: Any, kind: type | tuple[type, ...], wanted: str) -> Any:
@@ -66,7 +66,7 @@ def checked_path(name: str, value: Any) -> Path:
     return Path(checked_kind(name, value, (str, os.PathLike), "a path, as a text or a Path"))
 
 
-def checked_whole(
+def checked_integer(
     name: str, value: Any, least: int | None = None, kind: type[GMSError] = ParameterError
 ) -> int:
     """Return an integer.
@@ -94,7 +94,7 @@ def checked_whole(
 
     Examples
     --------
-    >>> checked_whole("points", 0, 1)
+    >>> checked_integer("points", 0, 1)
     Traceback (most recent call last):
     gms_fsm.errors.ParameterError: points is 0; it must be an integer, at least 1
     """

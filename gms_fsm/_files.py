@@ -27,13 +27,13 @@ if sys.platform != "win32":  # on Windows nothing is locked, and no leftovers ar
     import fcntl
 
 __all__ = [
-    "in_turn",
+    "folder_lock",
     "leftovers",
-    "no_input",
     "output_folder",
+    "refuse_input",
     "remove_leftovers",
-    "written_together",
-    "written_whole",
+    "write_together",
+    "write_whole",
 ]
 
 LIST = ".gms-fsm-files.json"  # in an output folder: checksums of the files written there
@@ -84,7 +84,7 @@ def output_folder(path: str | Path, names: Iterable[str] = ()) -> Path:
             advice="choose another folder",
         ) from None
     remove_leftovers(folder)
-    with in_turn(folder):
+    with folder_lock(folder):
         listed = _listed(folder)
         for place in (folder / name for name in names):
             _check_place(place)
@@ -104,7 +104,7 @@ def output_folder(path: str | Path, names: Iterable[str] = ()) -> Path:
     return folder
 
 
-def no_input(path: str | Path, *inputs: Path) -> None:
+def refuse_input(path: str | Path, *inputs: Path) -> None:
     """Refuse to overwrite an input file.
 
     Parameters
@@ -121,7 +121,7 @@ def no_input(path: str | Path, *inputs: Path) -> None:
 
     Examples
     --------
-    >>> no_input("run.html", Path("run.npz"))
+    >>> refuse_input("run.html", Path("run.npz"))
     """
     for given in inputs:
         try:
@@ -137,7 +137,7 @@ def no_input(path: str | Path, *inputs: Path) -> None:
 
 
 # --------------------------------------------------------------------------- files
-def written_whole(path: Path, write: Callable[[IO[bytes]], object]) -> Path:
+def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> Path:
     """Write a file atomically through a temporary one: the result is the old file or the new one.
 
     Parameters
@@ -157,11 +157,11 @@ def written_whole(path: Path, write: Callable[[IO[bytes]], object]) -> Path:
     OutputError
         If the folder cannot be written, or the path is a device, a pipe or a folder.
     """
-    written_together({path: write})
+    write_together({path: write})
     return path
 
 
-def written_together(files: Mapping[Path, Callable[[IO[bytes]], object]]) -> None:
+def write_together(files: Mapping[Path, Callable[[IO[bytes]], object]]) -> None:
     """Write several files of one folder that belong together.
 
     All are complete before the first is renamed, and no other writer can interleave.
@@ -219,7 +219,7 @@ def remove_leftovers(folder: Path, name: str = "") -> None:
 
 
 @contextlib.contextmanager
-def in_turn(folder: Path, *, shared: bool = False) -> Iterator[None]:
+def folder_lock(folder: Path, *, shared: bool = False) -> Iterator[None]:
     """Wait until no other process renames files in a folder, and keep others out meanwhile.
 
     Parameters
@@ -255,9 +255,9 @@ def _write(files: Mapping[Path, Callable[[IO[bytes]], object]]) -> None:
                 folder.resolve() in _prepared or (folder / LIST).exists()
             )
             if listing or len(parts) > 1:
-                stack.enter_context(in_turn(folder))
+                stack.enter_context(folder_lock(folder))
             if listing:
-                _put_on_list(folder, parts)
+                _add_to_list(folder, parts)
             for path, part in parts.items():
                 os.replace(part, path)
             for follower in list(files)[1:]:
@@ -336,7 +336,7 @@ def _listed(folder: Path) -> dict[str, list[str]]:
         return {}
 
 
-def _put_on_list(folder: Path, parts: Mapping[Path, Path]) -> None:
+def _add_to_list(folder: Path, parts: Mapping[Path, Path]) -> None:
     listed = _listed(folder)
     for path, part in parts.items():
         sums = {_checksum(part)}

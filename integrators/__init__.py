@@ -22,7 +22,7 @@ from integrators.hybrid import (
     TooManySteps,
     run,
 )
-from integrators.sliding import LIVE, Functions, Held, Surfaces, look, room_to_slide, slope_on
+from integrators.sliding import LIVE, Functions, Held, Surfaces, look, sliding_scratch, slope_on
 from integrators.tableaux import BS23, DP45, EULER, HEUN, METHODS, RK4, Tableau
 
 __all__ = [
@@ -53,7 +53,7 @@ __all__ = [
     "Tableau",
     "TooManySteps",
     "look",
-    "room_to_slide",
     "run",
+    "sliding_scratch",
     "slope_on",
 ]

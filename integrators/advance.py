@@ -14,7 +14,7 @@ from integrators.crossings import (
     Watched,
     copy_margins,
     first_change,
-    nothing_near,
+    is_quiet_step,
 )
 from integrators.step_size import INFINITY, Control, error_norm, next_factor, retry_factor
 from integrators.steps import (
@@ -31,7 +31,7 @@ from integrators.steps import (
     fit_dense,
     interpolate,
     take_step,
-    weigh,
+    weighted_sum,
 )
 
 __all__ = ["Output", "Plan", "advance"]
@@ -162,13 +162,13 @@ def advance(
             return REACHED
         if most_steps <= 0 or (out.every_step and cursor[ROW] >= len(out.rows_t)):
             return FULL
-        t_new, tick = _aim(plan, clock, cursor)
+        t_new, tick = _next_end(plan, clock, cursor)
         if not t_new > t:
             return TOO_SMALL
         h = t_new - t
         cursor[STEPS] += 1
         take_step(motion, plan.method, now, t_new, scratch)
-        status = _judge(plan, now, h, tick, scratch, rejected)
+        status = _assess_step(plan, now, h, tick, scratch, rejected)
         rejected = status == REJECTED
         if rejected:
             continue
@@ -177,7 +177,7 @@ def advance(
 
         wanted = cursor[NEXT_TIME] < len(times) and times[cursor[NEXT_TIME]] < t_new
         theta = NO_CHANGE
-        near = watching and not nothing_near(motion, now, t_new, scratch, w)
+        near = watching and not is_quiet_step(motion, now, t_new, scratch, w)
         if near or wanted:
             fit_dense(plan.method, h, y, scratch)
         if near:
@@ -213,7 +213,7 @@ def advance(
             return CROSSED
 
 
-def _aim(plan: Plan, clock: Vector, cursor: list[int]) -> tuple[float, float]:
+def _next_end(plan: Plan, clock: Vector, cursor: list[int]) -> tuple[float, float]:
     """Return the end of the next step, and the significant difference of times there.
 
     It follows the grid or the controller, but not past a stop, and avoids a sliver before one.
@@ -230,7 +230,9 @@ def _aim(plan: Plan, clock: Vector, cursor: list[int]) -> tuple[float, float]:
     return t_new, tick
 
 
-def _judge(plan: Plan, now: Now, h: float, tick: float, scratch: Scratch, rejected: bool) -> int:
+def _assess_step(
+    plan: Plan, now: Now, h: float, tick: float, scratch: Scratch, rejected: bool
+) -> int:
     """Return the outcome of the attempted step of length h, and choose the next step's length."""
     control, method, clock = plan.control, plan.method, now.clock
     y_new, f_new = scratch.y_new, scratch.f_new
@@ -240,7 +242,7 @@ def _judge(plan: Plan, now: Now, h: float, tick: float, scratch: Scratch, reject
             total += abs(y_new[j]) + abs(f_new[j])
         return ACCEPTED if total < INFINITY else NOT_FINITE
     order = method.error_order
-    weigh(method.E, len(method.B), f_new, scratch.k, scratch.error)
+    weighted_sum(method.E, len(method.B), f_new, scratch.k, scratch.error)
     error = error_norm(scratch.error, h, now.y, y_new, control.rtol, now.floor)
     if not error <= 1.0:
         clock[H] = h * retry_factor(error, order)

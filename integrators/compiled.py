@@ -39,8 +39,8 @@ __all__ = [
 # Every function that `record` reaches. Those within a step are inlined: a call passes ten arrays,
 # which takes as long as their work does.
 _OF_A_STEP: tuple[Callable[..., Any], ...] = (
-    advance._aim,
-    advance._judge,
+    advance._next_end,
+    advance._assess_step,
     advance._put_wanted,
     advance.limit_after,
     advance.next_on_grid,
@@ -54,7 +54,7 @@ _OF_A_STEP: tuple[Callable[..., Any], ...] = (
     crossings.any_changed,
     crossings.copy_margins,
     crossings.first_change,
-    crossings.nothing_near,
+    crossings.is_quiet_step,
     sliding.flow_on,
     sliding.margins_on,
     step_size.error_norm,
@@ -63,7 +63,7 @@ _OF_A_STEP: tuple[Callable[..., Any], ...] = (
     steps.fit_dense,
     steps.interpolate,
     steps.take_step,
-    steps.weigh,
+    steps.weighted_sum,
 )
 # The phases of the loop are inlined too, and the writing of events: each is called from one place.
 _OF_AN_EVENT: tuple[Callable[..., Any], ...] = (
@@ -84,9 +84,9 @@ _OF_AN_EVENT: tuple[Callable[..., Any], ...] = (
 _OF_AN_ARC: tuple[Callable[..., Any], ...] = (
     advance.advance,
     crossings.listed,
-    loop._count_anew,
+    loop._reset_counts,
     loop._list,
-    loop._look_at_clock,
+    loop._reset_if_advanced,
     loop._no_progress,
     loop._often_changed,
     loop._put_modes,
@@ -231,7 +231,7 @@ def edition() -> str:
 _lock = threading.RLock()  # for numba's settings, and to compile nothing twice
 
 
-class _Kept:
+class _VerifiedCache:
     """Replaces numba's own cache, which loads files without verifying them."""
 
     cache_path = None
@@ -297,7 +297,7 @@ def _machine_code(
         gc.disable()  # compiling creates millions of objects and hardly any cyclic garbage
         try:
             dispatcher = numba.njit(nogil=True, **_OPTIONS)(function)
-            dispatcher._cache = _Kept(function, store, on_miss)
+            dispatcher._cache = _VerifiedCache(function, store, on_miss)
             dispatcher.compile(signature)
             dispatcher.disable_compile()
             return dispatcher
@@ -363,7 +363,7 @@ def compiled(name: str, function: Callable[..., None], store: Store | None) -> A
     return _machine_code(_signature(SIGNATURES[name]), function, store)
 
 
-def record(arguments: tuple[Any, ...], store: Store | None, tell: Callable[[str], None]) -> int:
+def record(arguments: tuple[Any, ...], store: Store | None, notify: Callable[[str], None]) -> int:
     """Call `integrators.loop.record` as machine code; this releases the GIL.
 
     Parameters
@@ -372,7 +372,7 @@ def record(arguments: tuple[Any, ...], store: Store | None, tell: Callable[[str]
         The function's arguments: named tuples of compiled functions, of arrays and numbers.
     store : Store, optional
         The cache for the machine code.
-    tell : callable
+    notify : callable
         Called with a text before the loop is compiled, which takes a while, and afterwards.
 
     Returns
@@ -384,7 +384,7 @@ def record(arguments: tuple[Any, ...], store: Store | None, tell: Callable[[str]
     addresses: list[Any] = [_address(function) for function in (*functions[:4], *machines)]
     flow, arm, margins, normal, *switch = addresses
     at = Functions(flow, arm, margins, normal, functions.p), Machines(*switch)
-    machine_code: Callable[..., int] = _record((*at, *others), store, tell)
+    machine_code: Callable[..., int] = _record((*at, *others), store, notify)
     return machine_code(*at, *others)
 
 
@@ -421,17 +421,17 @@ def _function_at(signature: Any) -> Any:
 _compiled_record: list[Any] = []
 
 
-def _record(arguments: tuple[Any, ...], store: Store | None, tell: Callable[[str], None]) -> Any:
+def _record(arguments: tuple[Any, ...], store: Store | None, notify: Callable[[str], None]) -> Any:
     if _compiled_record:
         return _compiled_record[0]
     with _lock:
         if not _compiled_record:
-            _compiled_record.append(_compile_record(arguments, store, tell))
+            _compiled_record.append(_compile_record(arguments, store, notify))
         return _compiled_record[0]
 
 
 def _compile_record(
-    arguments: tuple[Any, ...], store: Store | None, tell: Callable[[str], None]
+    arguments: tuple[Any, ...], store: Store | None, notify: Callable[[str], None]
 ) -> Any:
     import numba
 
@@ -460,10 +460,10 @@ def _compile_record(
         numba.types.int64(*map(numba.typeof, arguments)),
         record,
         store,
-        lambda: tell("compiling the engine, once on this machine ..."),
+        lambda: notify("compiling the engine, once on this machine ..."),
     )
     if result._cache.missed:
-        tell(f"compiled in {time.perf_counter() - start:.1f} s")
+        notify(f"compiled in {time.perf_counter() - start:.1f} s")
     return result
 
 

@@ -31,8 +31,8 @@ __all__ = [
     "Watched",
     "any_changed",
     "first_change",
+    "is_quiet_step",
     "listed",
-    "nothing_near",
     "watched",
 ]
 
@@ -148,7 +148,7 @@ def copy_margins(w: Watched, source: Vector, target: Vector) -> None:
         target[r] = source[r]
 
 
-def nothing_near(motion: Motion, now: Now, t_new: float, scratch: Scratch, w: Watched) -> bool:
+def is_quiet_step(motion: Motion, now: Now, t_new: float, scratch: Scratch, w: Watched) -> bool:
     """Return whether a whole step is quiet: most are, and then no dense output is needed.
 
     Expects ``w.start`` to contain the margins at its start; fills ``w.end`` with those at its end.

@@ -23,7 +23,7 @@ from integrators.sliding import (
     Surfaces,
     flow_on,
     margins_on,
-    room_to_slide,
+    sliding_scratch,
 )
 from integrators.step_size import Control
 from integrators.steps import Dense, Flow, Margins, Motion, Now, Scratch, T, Vector, coefficients
@@ -387,7 +387,7 @@ def buffers(
             anchor=list(y),
         ),
         relations=watched(strict, size),
-        sliding=room_to_slide(surfaces, size, equations.held, len(strict), equations.seen),
+        sliding=sliding_scratch(surfaces, size, equations.held, len(strict), equations.seen),
         out=Output(
             times=times or [],
             every_step=times is None,

@@ -254,7 +254,7 @@ def _fired(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> int:
     counts[FIRED_ONE] = 1
     counts[FRESH] = 1
     counts[PHASE] = PICK
-    _look_at_clock(now, memory)
+    _reset_if_advanced(now, memory)
     memory.switches[i] += 1
     if memory.switches[i] >= MOST_SWITCHES and _no_progress(plan, now, memory, scratch):
         counts[PHASE] = AFTER
@@ -406,15 +406,15 @@ def _finish(now: Now, counts: list[int], out: Output) -> None:
 
 
 # --------------------------------------------------------------------------- progress
-def _look_at_clock(now: Now, memory: Memory) -> None:
+def _reset_if_advanced(now: Now, memory: Memory) -> None:
     """Restart the count of switches if time has advanced since the last one."""
     t = now.clock[T]
     if t - now.clock[SWITCHED] > CLOCK_CRAWLS * abs(t):
-        _count_anew(now, memory)
+        _reset_counts(now, memory)
     now.clock[SWITCHED] = t
 
 
-def _count_anew(now: Now, memory: Memory) -> None:
+def _reset_counts(now: Now, memory: Memory) -> None:
     now.clock[ANCHOR] = now.clock[T]
     for j in range(len(now.y)):
         memory.anchor[j] = now.y[j]
@@ -435,7 +435,7 @@ def _no_progress(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> bool
         distance = error_norm(moved, 1.0, y, anchor, plan.control.rtol, now.floor)
         stands = distance <= MOST_SWITCHES * STATE_STANDS
     if not stands:
-        _count_anew(now, memory)
+        _reset_counts(now, memory)
     return stands
 
 
@@ -450,7 +450,7 @@ def _often_changed(
 ) -> bool:
     """Count the relations that have just changed; return whether one has changed too often."""
     changes, probe, surfaces = memory.changes, w.search.probe, sliding.surfaces
-    _look_at_clock(now, memory)
+    _reset_if_advanced(now, memory)
     motion.margins(now.clock[T], now.y, now.mode, motion.p, w.watch, probe)
     often = False
     for r in w.active:

@@ -30,8 +30,8 @@ __all__ = [
     "flow_on",
     "look",
     "margins_on",
-    "room_to_slide",
     "seize",
+    "sliding_scratch",
     "slope_on",
 ]
 
@@ -84,7 +84,7 @@ class Held(NamedTuple):
     sliding: Sliding
 
 
-def room_to_slide(
+def sliding_scratch(
     surfaces: Surfaces,
     size: int,
     signs: int,

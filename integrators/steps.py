@@ -173,12 +173,12 @@ def fit_dense(method: Coefficients, h: float, y: Vector, scratch: Scratch) -> No
         bends[j] = bend
         twists[j] = rise - h * f_new[j] - bend
     if len(D) > 0:
-        weigh(D, stages, f_new, k, bumps)
+        weighted_sum(D, stages, f_new, k, bumps)
         for j in range(len(y)):
             bumps[j] = h * bumps[j]
 
 
-def weigh(weights: Row, stages: int, f_new: Vector, k: list[Vector], out: Vector) -> None:
+def weighted_sum(weights: Row, stages: int, f_new: Vector, k: list[Vector], out: Vector) -> None:
     """Compute the weighted sum of all slopes of a step."""
     last, a = weights[stages], weights[0]
     first = k[0]

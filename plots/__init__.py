@@ -1,8 +1,8 @@
-"""Pictures: charts by Graphviz, figures by matplotlib.
+"""Pictures: charts drawn by Graphviz, figures drawn by matplotlib.
 
 Importing this package needs neither a Graphviz program nor matplotlib; drawing does. Figures are in
-`plots.figures`, single panels in `plots.panels` (extra ``plots``). After the import charts, models
-and traces show themselves in a notebook.
+`plots.figures`, single panels in `plots.panels` (extra ``plots``). Once it is imported, charts,
+models and traces display themselves in a notebook.
 """
 
 from __future__ import annotations
@@ -40,16 +40,17 @@ register()
 
 
 def animate(trace: Trace, path: str | Path, **options: Any) -> Path:
-    """Make an animation of the chart at work beside the force; see `plots.animation.animate`.
+    """Make an animation of the live chart next to the force; see `plots.animation.animate`.
 
     Parameters
     ----------
     trace : Trace
         The run.
     path : str or Path
-        Its ending chooses the format, as ``.gif``.
+        Its file ending selects the format, for example ``.gif``.
     **options
-        Of `plots.animation.animate`: elements, frames, t_start, t_end, fps, notation, theme.
+        Options of `plots.animation.animate`: elements, frames, t_start, t_end, fps, notation,
+        theme.
 
     Returns
     -------
@@ -67,7 +68,7 @@ def animate(trace: Trace, path: str | Path, **options: Any) -> Path:
 
 
 def overview(trace: Trace, title: str = "") -> Figure:
-    """Draw a run at a glance; see `plots.figures.overview`.
+    """Draw an overview of a run; see `plots.figures.overview`.
 
     Parameters
     ----------

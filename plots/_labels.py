@@ -1,4 +1,4 @@
-"""Texts of a drawn chart: the pieces of its labels, its counts, and the ids of its parts."""
+"""Texts of a drawn chart: pieces of labels, counts, and ids of parts."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ DOT, TRUE, FALSE, UNKNOWN = "●", "✓", "✗", "?"
 
 @dataclass(frozen=True)
 class Piece:
-    """One text of a label: Graphviz writes each as one text of the SVG, in this order.
+    """One text of a label; Graphviz writes each as one text element of the SVG, in this order.
 
     Parameters
     ----------
     text : str
-        What is written.
+        The text.
     role : str
-        What it is: ``title``, ``dot``, ``word``, ``code``, ``priority``, ``clause``, ``mark``, ...
+        ``title``, ``dot``, ``word``, ``code``, ``priority``, ``clause``, ``mark``, ...
     clause : int
-        For a clause and its mark, which clause of the guard; else -1.
+        For a clause and its mark, the number of the clause in the guard; otherwise -1.
     """
 
     text: str
@@ -44,7 +44,7 @@ class Tally:
     Parameters
     ----------
     trace : Trace
-        The run; its log is complete whatever its rows are.
+        The run; its log is complete even if its rows are not.
     """
 
     def __init__(self, trace: Trace) -> None:
@@ -70,10 +70,10 @@ class Tally:
 
 
 def wrapped(text: str) -> list[str]:
-    """Return a text as lines that are not too long."""
+    """Return a text as lines of limited length."""
     if len(text) <= LONGEST_LINE:
         return [text] if text else []
-    # An indent tells that the line goes on; a word longer than the line is not cut.
+    # Continuation lines are indented; a word longer than a line is not broken.
     return textwrap.wrap(
         text,
         LONGEST_LINE,
@@ -84,7 +84,7 @@ def wrapped(text: str) -> list[str]:
 
 
 def escape(text: str) -> str:
-    """Write a text for an HTML label: nothing in it is markup, and an indent stays."""
+    """Escape a text for an HTML label; indentation is kept."""
     core = text.strip(" ")
     words = html.escape(printable(core))
     # Graphviz 2.43 refuses a bare ] in a label; one backslash would begin an escape sequence.
@@ -99,7 +99,7 @@ def printable(text: str) -> str:
 
 
 def element_id(number: int) -> str:
-    """Return the id of an element counted from 0; ids count from 1, as pictures do.
+    """Return the id of an element, given its number from 0; ids count from 1, as pictures do.
 
     >>> element_id(0)
     'element1'
@@ -113,5 +113,5 @@ def part_id(element: str, kind: str, name: str) -> str:
     >>> part_id("element1", "state", "slip")
     'element1-state-slip'
     """
-    # Names of a chart are identifiers; whatever else came in here could be read as a port or DOT.
+    # Names in a chart are identifiers; other characters could be read as a port or as DOT syntax.
     return f"{element}-{kind}-" + re.sub(r"\W", "_", name)

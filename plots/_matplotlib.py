@@ -1,10 +1,10 @@
-"""What the pictures use of matplotlib; without it, the import says which extra brings it.
+"""The matplotlib names that the pictures use; without it, the import names the missing extra.
 
 Modules of `plots` import these names from here and not from matplotlib, so that this is the only
-place where it can be missing.
+place that handles a missing matplotlib.
 """
 
-# ruff: noqa: E402  require() stands before the imports that it is about
+# ruff: noqa: E402  require() must come before the imports that it checks
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the texts of a chart are written: as Stateflow does, or as formulas do."""
+"""Notations for the texts of a chart: as in Stateflow, or as mathematical formulas."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ __all__ = ["NOTATIONS", "Writer"]
 
 NOTATIONS = ("stateflow", "math")
 
-MATH = Spelling(" ∧ ", " ∨ ", "!", "⊤", bars=True, products=False)  # ! brackets what it negates
-# What differs between the tokens of the two notations; numbers are tokens of their own, so the
-# minus of 1e-06 is not taken for an operator.
+MATH = Spelling(" ∧ ", " ∨ ", "!", "⊤", bars=True, products=False)  # ! puts its operand in brackets
+# Tokens that differ between the two notations; numbers are separate tokens, so that the minus of
+# 1e-06 is not mistaken for an operator.
 _TOKEN = re.compile(
     r"(?P<power>\^\d+(?![\w.]))|(?P<number>\d[\d.]*(?:e[+-]?\d+)?)|(?P<name>\w+)|>=|<=|[*!-]"
 )
@@ -40,14 +40,14 @@ _GREEK = {
 
 @dataclass(frozen=True)
 class Writer:
-    """Writes the texts of a chart in one notation, always from the checked trees.
+    """Writes the texts of a chart in one notation, from the checked trees.
 
     Parameters
     ----------
     chart : Chart
-        Whose names are written.
+        The chart whose names are written.
     notation : {"stateflow", "math"}
-        How.
+        The notation.
 
     Examples
     --------
@@ -62,7 +62,7 @@ class Writer:
 
     @property
     def math(self) -> bool:
-        """Whether the notation is that of formulas."""
+        """Whether the notation is mathematical."""
         return self.notation == "math"
 
     def text(self, tree: Value | Condition) -> str:
@@ -95,12 +95,12 @@ class Writer:
 
     @property
     def words(self) -> Mapping[type, str]:
-        """Between the parts of a conjunction or an alternative."""
+        """Words between the parts of a conjunction or a disjunction."""
         spelling = MATH if self.math else MATLAB_LIKE
         return {Both: spelling.both.strip(), Either: spelling.either.strip()}
 
     def actions(self, trees: Mapping[str, Value]) -> str:
-        """Write the assignments of an edge in one line; empty if there are none."""
+        """Write the assignments of an edge on one line; empty if there are none."""
         if not trees:
             return ""
         texts = [self.assignment(name, tree) for name, tree in trees.items()]
@@ -108,7 +108,7 @@ class Writer:
 
 
 def _symbol(name: str) -> str:
-    """Write a name as formulas do: sigma_0 as σ₀."""
+    """Write a name as in formulas: sigma_0 as σ₀."""
     head, _, index = name.partition("_")
     head = _GREEK.get(head, head)
     if not index:

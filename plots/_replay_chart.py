@@ -12,18 +12,18 @@ from plots.statechart import Sheet
 
 __all__ = ["chart_svg"]
 
-MOST_CHARTS = 6  # a larger bank is shown as one chart, that of the chosen element
+MOST_CHARTS = 6  # a larger bank is shown as one chart, that of the selected element
 SVG = "http://www.w3.org/2000/svg"
 COLOURING = ("fill", "stroke", "stroke-dasharray", "stroke-width")
 
 
 def chart_svg(chart: Chart, n: int) -> str:
-    """Return the chart's SVG for restyling: its parts have roles and numbers instead of colours."""
+    """Return the chart's SVG, prepared for restyling with roles and numbers instead of colours."""
     sheet = Sheet(chart, live=True)
     numbers = range(n if n <= MOST_CHARTS else 1)
     picture = drawn(sheet.graph(numbers, bare=len(numbers) == 1), "svg")
     if picture is None:
-        return "<p>The chart is left out: no Graphviz was found when this page was written.</p>"
+        return "<p>No chart: Graphviz was not found when this page was written.</p>"
     root = ElementTree.fromstring(picture)
     for node in root.iter():
         node.tag = node.tag.removeprefix(f"{{{SVG}}}")
@@ -32,7 +32,7 @@ def chart_svg(chart: Chart, n: int) -> str:
         _give_role(node)
     root.attrib = {"viewBox": root.attrib["viewBox"]}
     groups = {group.get("id", ""): group for group in root.iter("g")}
-    groups["graph0"].remove(groups["graph0"][0])  # its ground; the page has one
+    groups["graph0"].remove(groups["graph0"][0])  # the background; the page has its own
     for number in numbers:
         element, edges = element_id(number), 0
         groups.get(element, root).attrib |= {"data-slot": str(number)}
@@ -52,7 +52,7 @@ def chart_svg(chart: Chart, n: int) -> str:
 
 
 def _give_role(node: ElementTree.Element) -> None:
-    """Replace the colours of a shape by what they mean; the page's style sheet knows the themes."""
+    """Replace the colours of a shape by their role; the page's style sheet defines the themes."""
     drawing = [node.attrib.pop(name, None) for name in COLOURING]
     if node.tag not in ("path", "polygon", "polyline", "ellipse"):
         return

@@ -1,4 +1,4 @@
-"""What a replay page stores of a run: rows, values, truths of every guard and clause, the log."""
+"""The data of a run in a replay page: rows, values, truth of every guard and clause, the log."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ MOST_ROWS, FEWEST_ROWS = 4000, 200  # rows without a transition, divided by elem
 
 
 def stored_run(trace: Trace, between: NDArray[np.bool_], frame_of: Sequence[int]) -> dict[str, Any]:
-    """Return what the page stores of a run; `frame_of` its rows on the page's common time."""
+    """Return the data of a run; `frame_of` gives the frames of its rows on the common time."""
     chart, n, pool = trace.model.chart, trace.n, _Pool()
     values = Scope.over(trace).watches()
     edges = _edges(chart)
     first = chart.variables[0]
     inner, inner_title = trace.z, "z [m]" if first == "z" else first
-    threshold = bool(edges) and "s" in chart.inputs  # without edges (LuGre) s is none
+    threshold = bool(edges) and "s" in chart.inputs  # without edges (LuGre) s is no threshold
     if threshold:
         with np.errstate(all="ignore"):
             inner, inner_title = trace.z / trace.s, f"{first} / s(v), lines at ±1"
@@ -44,7 +44,7 @@ def stored_run(trace: Trace, between: NDArray[np.bool_], frame_of: Sequence[int]
         "states": [state.name for state in chart.states],
         "edges": edges,
         "names": {
-            # 17 digits tell all times apart
+            # 17 digits distinguish all times
             name: pool.add(values[name], digits=17 if name == "t" else 7)
             for name in watch_names(trace.model)
         },
@@ -104,7 +104,7 @@ def _edges(chart: Chart) -> list[dict[str, Any]]:
 
 
 def _pieces(times: Sequence[float], mode: Sequence[int]) -> list[tuple[int, float, float]]:
-    """Return the stretches of one state: which, from when, to when."""
+    """Return the intervals of constant state: the state, begin, end."""
     starts = [row for row in range(len(mode)) if row == 0 or mode[row] != mode[row - 1]]
     ends = [*(times[row] for row in starts[1:]), times[-1]]
     return [(mode[row], times[row], end) for row, end in zip(starts, ends, strict=True)]
@@ -113,8 +113,8 @@ def _pieces(times: Sequence[float], mode: Sequence[int]) -> list[tuple[int, floa
 def _stops(mode: Sequence[int], holds: str, source: int, logged: Sequence[int]) -> list[int]:
     """Return the rows where a guard becomes true while its state is active.
 
-    Such a row comes before every firing, except where only wanted times were stored; there the
-    row that shows the firing has to do.
+    Such a row comes before every firing, except where only requested times were stored; there the
+    row that shows the firing is used.
     """
     valid = [state == source and whole == "1" for state, whole in zip(mode, holds, strict=True)]
     rows = [row for row, now in enumerate(valid) if now and not (row and valid[row - 1])]
@@ -132,7 +132,7 @@ def _log(trace: Trace, edges: Sequence[Mapping[str, Any]]) -> list[dict[str, Any
         t, name = float(record.t), str(record.edge)
         if name not in names:
             raise TraceFileError(
-                f"the transition log names an edge {name!r} that the chart has not"
+                f"the transition log names an edge {name!r} that is not in the chart"
             )
         firings[t] += 1
         row = made.get((t, firings[t]))
@@ -152,9 +152,9 @@ def _log(trace: Trace, edges: Sequence[Mapping[str, Any]]) -> list[dict[str, Any
 
 
 def common_frames(runs: Sequence[Sequence[float]]) -> dict[str, list[Any]]:
-    """Put the rows of one or two runs on one time.
+    """Put the rows of one or two runs on a common time.
 
-    Rows of one instant are told apart by their order, so that micro-steps stand beside micro-steps.
+    Rows of one instant are distinguished by their order, so that micro-steps match micro-steps.
     """
     keys: list[list[tuple[float, int]]] = []
     for times in runs:
@@ -194,7 +194,7 @@ class _Pool:
 
 
 def _rounded(value: float, digits: int) -> float | str:
-    # JSON has no words for these; the page's Number() reads them.
+    # JSON cannot express these; the page's Number() reads them.
     if value != value:
         return "NaN"
     if value in (np.inf, -np.inf):
@@ -206,8 +206,8 @@ def _rounded(value: float, digits: int) -> float | str:
 def page_rows(trace: Trace) -> tuple[Trace, NDArray[np.bool_]]:
     """Return the run with the page's rows, and which of them lie between rows of the run.
 
-    All rows of instants with transitions and their neighbours are kept; the others are thinned, or
-    samples are put between them where they are few, so that curves look smooth.
+    All rows at instants with transitions and their neighbours are kept. The others are thinned or,
+    if there are few, samples are added between them, so that curves look smooth.
     """
     trace = _with_microsteps(trace)
     wanted = max(FEWEST_ROWS, MOST_ROWS // (trace.n + 1))
@@ -219,7 +219,7 @@ def page_rows(trace: Trace) -> tuple[Trace, NDArray[np.bool_]]:
             pass  # a signal that is not in the file, or a last row that cannot be computed
         else:
             new = ~np.isin(refined.t, trace.t)
-            # Computed again, the rows of a file should be what it holds; if not, the file counts.
+            # Recomputed rows should equal those of the file; otherwise the file takes precedence.
             if np.allclose(refined.F[~new], trace.F, rtol=1e-9, equal_nan=True):
                 between, trace = new, refined
     instants = np.isin(trace.t, trace.t[trace.microstep > 0])
@@ -237,12 +237,12 @@ def page_rows(trace: Trace) -> tuple[Trace, NDArray[np.bool_]]:
 
 
 def _with_microsteps(trace: Trace) -> Trace:
-    """Return the run with both sides of every stop, also where only wanted times were stored."""
+    """Return the run with both sides of every stop, even if only requested times were stored."""
     stops = trace.stops
     if (trace.microstep > 0).any() or not (stops.microstep > 0).any():
         return trace
     rows = trace.rows
-    new = ~np.isin(rows.t, stops.t)  # at a stop its own rows tell more
+    new = ~np.isin(rows.t, stops.t)  # the rows of a stop contain more
     pairs = zip(vars(stops).values(), vars(rows.at(new)).values(), strict=True)
     table = Rows(*(np.concatenate(pair) for pair in pairs))
     table = table.at(np.argsort(table.t, kind="stable"))
@@ -278,7 +278,7 @@ def _row_truths(chart: Chart, values: Mapping[str, float]) -> dict[str, Any]:
             for told in explain_state(chart, state.name, values):
                 parts = [("01"[c.holds], c.left, c.right, c.margin) for c in told.clauses]
                 found[told.edge.name] = ("01"[told.holds], parts)
-        except (ArithmeticError, ValueError):  # the last row of a run that could not go on
+        except (ArithmeticError, ValueError):  # the last row of a failed run
             for _, edge in chart.leaving(state.name):
                 count = len(clauses(chart.guards[edge.name]))
                 found[edge.name] = ("?", [("?", np.nan, np.nan, np.nan)] * count)

@@ -1,9 +1,9 @@
-"""A run as a moving picture: the live chart beside the friction force.
+"""An animation of a run: the live chart next to the friction force.
 
-The chart is laid out once by Graphviz and painted by `plots.live_chart`; here matplotlib draws the
-painted SVG, whose few kinds of parts (paths, polygons, circles, texts) it has too. So there is one
-truth about what a row looks like, no program is called per frame, and no converter of SVG is
-needed. The chart is drawn again only when it changes; a cursor moves over the force in every frame.
+Graphviz lays out the chart once and `plots.live_chart` paints it; here matplotlib draws the painted
+SVG, which contains only paths, polygons, circles and texts. A row therefore looks the same
+everywhere, no program is called per frame, and no SVG converter is needed. The chart is redrawn
+only when it changes; a cursor moves over the force in every frame.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ from plots.style import CHART_THEMES, RC, ChartTheme
 __all__ = ["animate"]
 
 SMOOTH = 2000  # points of the force curve
-POINTS = 72.0  # an inch
+POINTS = 72.0  # per inch
 CURVE_WIDTH, CURVE_HEIGHT = 4.4, 3.4  # inches, of the force and its labels
 DPI = 100
-FASTEST = 50  # frames a second: a GIF counts in hundredths, and readers refuse a single one
-STEPS = 8  # shades of a colour along an edge; many more would be taken for one another
-WIDE = 0.88  # matplotlib's own sans serif is wider than the one the layout was made for
+FASTEST = 50  # frames per second: GIF delays are in 10 ms, and readers reject a delay of 10 ms
+STEPS = 8  # shades of a colour along an edge; more could hardly be distinguished
+WIDE = 0.88  # matplotlib's sans serif is wider than the one used for the layout
 
 
 def animate(
@@ -61,24 +61,24 @@ def animate(
     theme: str = "light",
     progress: Callable[[int, int], object] | None = None,
 ) -> Path:
-    """Write a GIF of the live chart beside F(t) with a moving cursor.
+    """Write a GIF of the live chart next to F(t) with a moving cursor.
 
     Parameters
     ----------
     trace : Trace
         The run.
     path : str or Path
-        Ends like one of the animations' formats in `plots.formats.FORMATS`, as ``.gif``. The folder
-        has to exist; a file of that name is replaced as a whole or not at all.
+        Its ending must be that of an animation format in `plots.formats.FORMATS`, such as ``.gif``.
+        The folder must exist; an existing file is replaced atomically.
     elements : int or sequence of int, optional
-        How many elements, or which ones, counted from 0; all if not given.
+        How many elements, or which ones, counted from 0; by default all.
     frames : int
-        How many, at evenly spaced times; at least 2. Neighbours without a visible difference become
-        one frame that is shown longer.
+        Number of frames, at evenly spaced times; at least 2. Consecutive frames without a visible
+        difference become one frame that is shown longer.
     t_start, t_end : float, optional
-        s, the part of the run that is shown; the whole run if not given.
+        s, the part of the run that is shown; by default the whole run.
     fps : float
-        Frames a second, at most 50.
+        Frames per second, at most 50.
     notation : {"stateflow", "math"}
         See `plots.statechart.statechart`.
     theme : {"light", "dark"}
@@ -107,14 +107,12 @@ def animate(
     ...                  Prescribed("0.2"), 3.0)
     >>> animate(trace, "run.gif", frames=1)
     Traceback (most recent call last):
-    gms_fsm.errors.ParameterError: frames is 1; it must be a whole number of at least 2
+    gms_fsm.errors.ParameterError: frames is 1; it must be an integer of at least 2
     """
     check_trace(trace)
     formats.chosen(path, "animation")
     if isinstance(frames, bool) or not isinstance(frames, int) or frames < 2:
-        raise ParameterError(
-            "it must be a whole number of at least 2", place="frames", value=frames
-        )
+        raise ParameterError("it must be an integer of at least 2", place="frames", value=frames)
     if not 0 < fps <= FASTEST:
         raise ParameterError(f"it must be above 0 and at most {FASTEST}", place="fps", value=fps)
     Sheet(trace.model.chart, notation, "TB", theme)  # refuses wrong options before any work
@@ -135,16 +133,16 @@ def animate(
 
 @dataclass(frozen=True, eq=False)
 class Movie:
-    """An animation that is ready to be written in some format.
+    """An animation that is ready to be written.
 
     Parameters
     ----------
     film : _Film
-        The picture that moves.
+        The moving picture.
     frames : int
-        How many.
+        Number of frames.
     fps : float
-        Frames a second.
+        Frames per second.
     progress : callable, optional
         Called as ``progress(done, frames)``.
     """
@@ -163,7 +161,7 @@ class Movie:
 
 
 def gif(movie: Movie) -> bytes:
-    """Return an animation as GIF, which repeats for ever.
+    """Return an animation as a GIF, which repeats forever.
 
     Parameters
     ----------
@@ -191,12 +189,12 @@ def gif(movie: Movie) -> bytes:
 
 
 class _Film:
-    """The picture that moves.
+    """The moving picture.
 
     Parameters
     ----------
     chart : LiveChart
-        Of the rows to show.
+        Chart of the rows to show.
     curve : Trace
         The same part of the run with enough points for a smooth curve.
     colours : ChartTheme
@@ -209,7 +207,7 @@ class _Film:
         tall = max(height / POINTS, CURVE_HEIGHT)
         wide = width / POINTS + CURVE_WIDTH
         self.figure = Figure(figsize=(wide, tall), dpi=DPI, facecolor=colours.paper)
-        # Half of its methods have no types.
+        # Half of its methods are untyped.
         self.canvas = cast(Any, FigureCanvasAgg(self.figure))
         box = (0, (1 - height / POINTS / tall) / 2, width / POINTS / wide, height / POINTS / tall)
         ax = self.figure.add_axes(box)
@@ -262,9 +260,9 @@ class _Film:
         return Image.fromarray(np.asarray(self.canvas.buffer_rgba())[..., :3].copy())
 
     def palette(self) -> Image.Image:
-        """Return one palette for all frames: every colour, and its shades towards the ground.
+        """Return one palette for all frames: every colour, and its shades towards the background.
 
-        Frames with palettes of their own would be larger, and their colours would flicker.
+        Separate palettes would make the file larger, and colours would flicker.
         """
         grounds = [np.array(to_rgb(c)) for c in (self.colours.paper, self.colours.active_fill)]
         colours = set(vars(self.colours).values()) - {self.colours.paper, self.colours.active_fill}
@@ -294,7 +292,7 @@ class _Part:
         self.node, self.artist = node, artist
 
     def update(self) -> None:
-        """Give the artist what the tree says now."""
+        """Update the artist from the tree."""
         get = self.node.get
         if self.node.tag == "text":
             shown = get("visibility") != "hidden"
@@ -347,7 +345,7 @@ def _artist(ax: Axes, node: ElementTree.Element, dx: float, dy: float) -> Artist
         return None
     numbers = [float(n) for n in re.findall(r"-?\d+(?:\.\d+)?", get("d") or get("points") or "")]
     points = np.array(numbers).reshape(-1, 2) + (dx, dy)
-    # Graphviz writes a path as M and then cubic curves only.
+    # Graphviz writes a path as M followed by cubic curves only.
     kind = Curve.CURVE4 if node.tag == "path" else Curve.LINETO
     codes = [Curve.MOVETO, *itertools.repeat(kind, len(points) - 1)]
     dashes = {"linestyle": (0, (5, 2))} if get("stroke-dasharray") else {}
@@ -355,7 +353,7 @@ def _artist(ax: Axes, node: ElementTree.Element, dx: float, dy: float) -> Artist
 
 
 def _font(node: ElementTree.Element) -> dict[str, Any]:
-    # The two families that come with matplotlib, so that it never searches.
+    # The two families that matplotlib ships, so that it never searches for fonts.
     size = float(node.get("font-size", "10"))
     if "Mono" in node.get("font-family", ""):
         return {"fontfamily": "DejaVu Sans Mono", "fontsize": size}

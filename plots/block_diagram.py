@@ -1,11 +1,11 @@
 """Draw the block diagram of the whole friction model, Fig. 2a of the paper, for any n.
 
-Velocity goes through the Stribeck curve into the chart of the elements; the chart gives each
-element's force F_i and deflection rate dz_i; integrators turn the rates into deflections and feed
-them back; the forces and the viscous part add up to F. All positions are fixed here, in points, so
-Graphviz only draws: an automatic layout does not keep ports and wires in order.
+The velocity enters the chart of the elements directly and through the Stribeck curve; the chart
+gives each element's force F_i and deflection rate dz_i; integrators turn the rates into deflections
+and feed them back; the forces and the viscous part add up to F. All positions are fixed here, in
+points, so Graphviz only draws: an automatic layout does not keep ports and wires in order.
 
-In the SVG, blocks have the classes ``block`` and ``integrator``, the lines the class ``wire``.
+In the SVG, blocks have the classes ``block`` and ``integrator``, and lines the class ``wire``.
 
 References
 ----------
@@ -58,7 +58,7 @@ def block_diagram(elements: int = 4) -> graphviz.Digraph:
     Parameters
     ----------
     elements : int, optional
-        How many elements the model has; they are counted from 1 in the picture.
+        Number of elements; the picture counts them from 1.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def block_diagram(elements: int = 4) -> graphviz.Digraph:
     Raises
     ------
     ParameterError
-        If `elements` is not a whole number of at least 1.
+        If `elements` is not an integer of at least 1.
 
     Examples
     --------
@@ -78,13 +78,15 @@ def block_diagram(elements: int = 4) -> graphviz.Digraph:
     """
     if isinstance(elements, bool) or not isinstance(elements, int) or elements < 1:
         raise ParameterError(
-            "a model has a whole number of elements, at least 1", place="elements", value=elements
+            "the number of elements must be an integer of at least 1",
+            place="elements",
+            value=elements,
         )
     graph = graphviz.Digraph(
         name="block diagram",
         engine="neato",
         graph_attr={
-            "layout": "neato",  # so that the DOT text alone says how it is drawn
+            "layout": "neato",  # so that the DOT text is self-contained
             "inputscale": "72",  # positions are points, not inches
             "splines": "line",
             "outputorder": "nodesfirst",
@@ -133,7 +135,7 @@ def _chart(graph: graphviz.Digraph, n: int, y_bottom: float) -> None:
 
 
 def _velocity(graph: graphviz.Digraph) -> None:
-    """Draw the input and where it goes: chart and Stribeck curve."""
+    """Draw the input and its connections to the chart and the Stribeck curve."""
     soft = {"style": "rounded,filled", "fillcolor": BLUE_TINT, "color": BLUE}
     _block(graph, "v", (X_INPUT, Y_VELOCITY), (44, 24), "<<I>v</I>>", **soft)
     _block(graph, "stribeck", (X_STRIBECK, Y_STRIBECK), (86, 40), "<<I>s</I>(<I>v</I>)>")
@@ -172,7 +174,7 @@ def _viscous_path(graph: graphviz.Digraph, x_sum: float) -> None:
 
 
 def _element(graph: graphviz.Digraph, i: int, x_sum: float, y_bottom: float, lane: float) -> None:
-    """Draw what belongs to element i: its ports, its integrator and its wires."""
+    """Draw the ports, the integrator and the wires of element i."""
     number = i + 1
     y_force, y_rate = Y_FORCE - i * ELEMENT, Y_RATE - i * ELEMENT
     y_deflection = Y_DEFLECTION - i * PORT
@@ -212,7 +214,7 @@ def _label(graph: graphviz.Digraph, name: str, at: Point, text: str, width: floa
 
 
 def _joint(graph: graphviz.Digraph, name: str, at: Point, colour: str = INK) -> None:
-    """Mark where wires end or turn, with a square of a wire's width: corners have no notch."""
+    """Draw a square of a wire's width where wires end or turn, so that corners have no notch."""
     graph.node(
         name,
         "",
@@ -236,7 +238,7 @@ def _wire(
     arrow: str = "forward",
 ) -> None:
     stops = [start, *(f"{name}-corner{k}" for k in range(1, len(corners) + 1)), end]
-    for stop, corner in zip(stops[1:], corners, strict=False):  # the last stop is no corner
+    for stop, corner in zip(stops[1:], corners, strict=False):  # the last stop is not a corner
         _joint(graph, stop, corner, colour)
     for k, (here, there) in enumerate(pairwise(stops), start=1):
         graph.edge(

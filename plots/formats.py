@@ -1,8 +1,8 @@
-"""The formats of files: what pictures and texts can be written to, by whom, and what that needs.
+"""The file formats: what pictures and texts can be written to, by which program and extra.
 
-`FORMATS` is the one list of endings. The help of the command line, `plots.render`,
+`FORMATS` is the only list of file endings. The command-line help, `plots.render`,
 `plots.figures.save`, `plots.animate`, scenario files and the messages about a wrong ending read it.
-A format is added by one row here, or by `register` from anywhere else.
+A format is added by one row here, or with `register` from anywhere else.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any, Literal, get_args
 
 from gms_fsm._arguments import checked_path
 from gms_fsm._extras import EXTRAS
-from gms_fsm._files import written_whole
+from gms_fsm._files import write_whole
 from gms_fsm.errors import ParameterError
 
 __all__ = [
@@ -36,25 +36,25 @@ Subject = Literal["graph", "chart", "figure", "animation", "page"]
 
 @dataclass(frozen=True)
 class Format:
-    """A kind of file.
+    """A file format.
 
     Parameters
     ----------
     ending : str
-        Of the file's name, for example ``".svg"``; small letters.
+        File ending, for example ``".svg"``; lower case.
     subject : {"graph", "chart", "figure", "animation", "page"}
         What is written: any Graphviz graph, the graph of a state chart only, a matplotlib figure,
         an animation, a replay page.
     kind : str
-        What the file holds, for messages, for example ``"a picture"``.
+        What the file contains, for messages, for example ``"a picture"``.
     writer : str
-        Who writes it, for example ``"Graphviz"``.
+        The program that writes it, for example ``"Graphviz"``.
     write : callable
         Takes the subject and returns the file's bytes. It may raise `MissingExtraError`.
     extra : str
-        Which extra of gms-fsm it needs; empty if none.
+        The extra of gms-fsm that it needs; empty if none.
     usual : bool
-        Whether verbs that write several pictures into a folder write this one.
+        Whether commands that write several pictures to a folder write this format.
 
     Raises
     ------
@@ -73,7 +73,9 @@ class Format:
     def __post_init__(self) -> None:
         if not isinstance(self.ending, str) or not re.fullmatch(r"\.[a-z0-9]+", self.ending):
             raise ParameterError(
-                "it must be a dot and small letters or digits", place="ending", value=self.ending
+                "it must be a dot and lower-case letters or digits",
+                place="ending",
+                value=self.ending,
             )
         for name, known in (("subject", get_args(Subject)), ("extra", ("", *EXTRAS))):
             value = getattr(self, name)
@@ -83,7 +85,7 @@ class Format:
                 )
 
 
-# --------------------------------------------------------------------------- who writes
+# --------------------------------------------------------------------------- writers
 def _graphviz(form: str) -> Callable[[Any], bytes]:
     def write(graph: Any) -> bytes:
         from plots.render import picture
@@ -125,7 +127,7 @@ def _html(page: Any) -> bytes:
 
 
 # --------------------------------------------------------------------------- the table
-# The same trace gives the same file, so that matplotlib writes no dates.
+# The same trace must give the same file, so matplotlib writes no dates.
 _svg, _pdf = _matplotlib("svg", Date=None), _matplotlib("pdf", CreationDate=None)
 FORMATS: list[Format] = [
     Format(".svg", "graph", "a picture", "Graphviz", _graphviz("svg"), "render", usual=True),
@@ -140,7 +142,7 @@ FORMATS: list[Format] = [
     Format(".gif", "animation", "an animation", "Pillow", _gif, "plots"),
     Format(".html", "page", "a replay page", "gms-fsm", _html, "replay", usual=True),
 ]
-INSTEAD = ".dot"  # what of a graph is written where there is no Graphviz
+INSTEAD = ".dot"  # written for a graph if there is no Graphviz
 
 
 def register(new: Format) -> None:
@@ -149,12 +151,12 @@ def register(new: Format) -> None:
     Parameters
     ----------
     new : Format
-        What it is and who writes it.
+        The format.
 
     Raises
     ------
     ParameterError
-        If its subject has a format of that ending.
+        If its subject already has a format with that ending.
 
     Examples
     --------
@@ -167,29 +169,29 @@ def register(new: Format) -> None:
     >>> FORMATS.remove(size)
     """
     if any((old.ending, old.subject) == (new.ending, new.subject) for old in FORMATS):
-        raise ParameterError(f"there is a format {new.ending} of the subject {new.subject!r}")
+        raise ParameterError(f"the subject {new.subject!r} already has a format {new.ending}")
     FORMATS.append(new)
 
 
 def of(*subjects: Subject) -> list[Format]:
-    """Return the formats of subjects, in the table's order."""
+    """Return the formats of subjects, in table order."""
     return [each for each in FORMATS if each.subject in subjects]
 
 
 def endings(*subjects: Subject, usual: bool = False) -> list[str]:
-    """Return the endings of subjects.
+    """Return the file endings of subjects.
 
     Parameters
     ----------
     *subjects : {"graph", "chart", "figure", "animation", "page"}
         What is written.
     usual : bool
-        Only those that are written where nobody chooses.
+        Only those that are written by default.
 
     Returns
     -------
     list of str
-        With their dots.
+        With dots.
 
     Examples
     --------
@@ -200,19 +202,19 @@ def endings(*subjects: Subject, usual: bool = False) -> list[str]:
 
 
 def files(stem: str, subject: Subject) -> list[str]:
-    """Return the names of the files that may be written where nobody chooses.
+    """Return the names of the files that may be written by default.
 
     Parameters
     ----------
     stem : str
-        Name without ending.
+        Name without file ending.
     subject : {"graph", "chart", "figure", "animation", "page"}
         What is written.
 
     Returns
     -------
     list of str
-        Of a graph also the text that is written where there is no Graphviz.
+        For a graph, including the text that is written without Graphviz.
 
     Examples
     --------
@@ -224,7 +226,7 @@ def files(stem: str, subject: Subject) -> list[str]:
 
 
 def listed(*subjects: Subject) -> str:
-    """Return the endings of subjects as a sentence has them.
+    """Return the file endings of subjects as text for a sentence.
 
     Parameters
     ----------
@@ -234,7 +236,7 @@ def listed(*subjects: Subject) -> str:
     Returns
     -------
     str
-        With what they hold, if that is not the same for all.
+        With their contents, if these differ.
 
     Examples
     --------
@@ -252,7 +254,7 @@ def listed(*subjects: Subject) -> str:
 
 
 def either(words: Sequence[str]) -> str:
-    """Return words as a sentence has them.
+    """Return words joined as in a sentence.
 
     >>> either([".png", ".svg", ".pdf"])
     '.png, .svg or .pdf'
@@ -261,12 +263,12 @@ def either(words: Sequence[str]) -> str:
 
 
 def chosen(path: str | Path, *subjects: Subject) -> Format:
-    """Return the format that a path asks for by its ending.
+    """Return the format selected by the ending of a path.
 
     Parameters
     ----------
     path : str or Path
-        Of the file; capitals do not matter.
+        Path of the file; case does not matter.
     *subjects : {"graph", "chart", "figure", "animation", "page"}
         What is written.
 
@@ -278,7 +280,7 @@ def chosen(path: str | Path, *subjects: Subject) -> Format:
     Raises
     ------
     ParameterError
-        If there is no such format; those that are there are listed.
+        If there is no such format; the message lists the available ones.
 
     Examples
     --------
@@ -296,16 +298,16 @@ def chosen(path: str | Path, *subjects: Subject) -> Format:
 
 
 def save(made: Any, path: str | Path, *subjects: Subject) -> Path:
-    """Write something to a file; the ending chooses the format.
+    """Write something to a file; the file ending selects the format.
 
     Parameters
     ----------
     made : object
         A graph, a figure, an animation or a page.
     path : str or Path
-        The folder has to exist. A file of that name is replaced as a whole or not at all.
+        The folder must exist. An existing file is replaced atomically.
     *subjects : {"graph", "chart", "figure", "animation", "page"}
-        What it is.
+        What is written.
 
     Returns
     -------
@@ -322,5 +324,5 @@ def save(made: Any, path: str | Path, *subjects: Subject) -> Path:
         If the format needs an extra that is not installed.
     """
     write = chosen(path, *subjects).write
-    # The folder is asked first: an animation takes its time.
-    return written_whole(Path(path), lambda file: file.write(write(made)))
+    # The folder is checked first, because an animation takes long.
+    return write_whole(Path(path), lambda file: file.write(write(made)))

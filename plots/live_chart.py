@@ -1,11 +1,11 @@
-"""The chart of a run at one of its rows: what is active, what could fire, what fired last.
+"""The chart of a run at one of its rows: the active state, the edges that could fire, the last one.
 
-The layout is drawn once, with room for every mark. A frame only gives known parts of that SVG other
-colours, widths, classes and texts, so hundreds of frames cost seconds.
+The layout is drawn once, with room for every mark. A frame only changes colours, widths, classes
+and texts of known parts of that SVG, so hundreds of frames take seconds.
 
-The active state has a thick border and a dot. Of the edges only those that leave it count: their
+The active state has a thick border and a dot. Only the edges that leave it have marks: their
 clauses carry ✓ or ✗. The edge that the element took last is thick; on the row of that firing it
-carries the marks that it was taken with. All else is pale.
+carries the marks with which it was taken. Everything else is pale.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from gms_fsm._arguments import checked_whole
+from gms_fsm._arguments import checked_integer
 from gms_fsm.errors import OutputError, ParameterError, shown
 from gms_fsm.inspection.explain import values_at
 from gms_fsm.language import Condition, clauses, evaluate
@@ -39,7 +39,7 @@ Marks = tuple[bool | None, ...]
 
 @dataclass(frozen=True)
 class ElementLook:
-    """What a live chart shows of one element.
+    """The appearance of one element in a live chart.
 
     Parameters
     ----------
@@ -48,12 +48,12 @@ class ElementLook:
     active : str
         The active state.
     marks : mapping of str to tuple of bool or None
-        For each edge that carries marks the truth of its clauses; None where the numbers of the row
-        do not allow to tell (the last row of a run that could not go on).
+        For each edge with marks, the truth values of its clauses; None where the numbers of the row
+        do not determine them (the last row of a failed run).
     leaving : tuple of str
         The edges that leave the active state, highest priority first.
     fired : str
-        The edge taken last, up to this row; empty if none was.
+        The last edge taken up to this row; empty if there was none.
     """
 
     element: int
@@ -71,13 +71,13 @@ class LiveChart:
     trace : Trace
         The run.
     elements : int or sequence of int, optional
-        How many elements, or which ones, counted from 0; all if not given.
+        How many elements, or which ones, counted from 0; by default all.
     notation : {"stateflow", "math"}
         See `plots.statechart.statechart`.
     theme : {"light", "dark"}
         Colours.
     values : bool
-        Write time, variables and inputs too.
+        Also write time, variables and inputs.
     direction : {"TB", "LR"}
         States from top to bottom, or from left to right.
 
@@ -136,7 +136,7 @@ class LiveChart:
         self.root.set("style", f"background:{self._sheet.colours.paper}")
         groups = {group.get("id", ""): group for group in self.root.iter("g")}
         self._parts = {i: _ElementParts(self._sheet, i, groups) for i in self.elements}
-        texts = groups["graph0"].findall("text")  # under the picture: the values, last the time
+        texts = groups["graph0"].findall("text")  # below the picture: the values, and last the time
         self._value_texts = {
             i: texts[:-1] if bare else groups[element_id(i)].findall("text")[TITLE:]
             for i in self.elements
@@ -155,7 +155,7 @@ class LiveChart:
         Returns
         -------
         int
-            The row, for `look` and `frame`; of several at one instant the last.
+            The row, for `look` and `frame`; if several rows have this time, the last.
 
         Raises
         ------
@@ -168,22 +168,22 @@ class LiveChart:
                 f"t is {shown(t)} s",
                 advice=f"it must lie within the run, {times.min():g} to {times.max():g} s",
             )
-        # Not a bisection: the rows of Trace.sample come in the order they were asked for.
+        # Not a bisection: the rows of Trace.sample are in the requested order.
         before = np.flatnonzero(times <= t)
         return int(before[np.flatnonzero(times[before] == times[before].max())[-1]])
 
     def look(self, row: int) -> tuple[ElementLook, ...]:
-        """Return what a row looks like, without drawing it.
+        """Return the appearance of a row, without drawing it.
 
         Parameters
         ----------
         row : int
-            Row index; negative counts from the end.
+            Row index; negative indices count from the end.
 
         Returns
         -------
         tuple of ElementLook
-            One an element shown.
+            One per element shown.
 
         Raises
         ------
@@ -195,7 +195,7 @@ class LiveChart:
 
     def _row(self, row: int) -> int:
         rows = len(self.trace)
-        row = checked_whole("row", row)
+        row = checked_integer("row", row)
         if not -rows <= row < rows:
             raise IndexError(f"row {row}: the trace has {rows} rows")
         return row % rows
@@ -210,7 +210,7 @@ class LiveChart:
         past = int(np.searchsorted(own, count))  # firings of this element up to here
         fired = str(trace.transitions.edge[own[past - 1]]) if past else ""
         if past and trace.microstep[row] and own[past - 1] == count - 1:
-            # This row is that firing. Its marks are those it was taken with, on the row before.
+            # This row is that firing; its marks are those of the row before.
             marks[fired] = _marks(chart.guards[fired], values_at(trace, row - 1, element))
         return ElementLook(element, state, marks, leaving, fired)
 
@@ -221,7 +221,7 @@ class LiveChart:
         Parameters
         ----------
         row : int
-            Row index; negative counts from the end. `at` finds the one of a time.
+            Row index; negative indices count from the end. `at` finds the row for a time.
 
         Returns
         -------
@@ -237,7 +237,7 @@ class LiveChart:
         return ElementTree.tostring(self.root, encoding="unicode")
 
     def paint(self, row: int) -> None:
-        """Give the tree `root` the look of a row; `frame` does this and writes the tree.
+        """Paint the tree `root` as a row; `frame` does this and writes the tree.
 
         Parameters
         ----------
@@ -256,7 +256,7 @@ class LiveChart:
             node.text = f"t = {self.trace.t[row]:.6g} s"
 
     def _value_rows(self, at: tuple[int, int] | None) -> list[Row]:
-        """Return the values of an element at a row as lines; without one, as wide as they get."""
+        """Return the values of an element at a row as lines; without a row, at maximum width."""
         if not self.values:
             return []
         numbers = {} if at is None else values_at(self.trace, *at)
@@ -281,16 +281,16 @@ def live_statechart(
     values: bool = False,
     direction: str = "TB",
 ) -> str:
-    """Draw the chart of a run at a row or a time; for many of them keep one `LiveChart`.
+    """Draw the chart of a run at a row or a time; for many frames keep one `LiveChart`.
 
     Parameters
     ----------
     trace : Trace
         The run.
     row : int, optional
-        Row index; negative counts from the end.
+        Row index; negative indices count from the end.
     t : float, optional
-        s; the last row at or before it is shown.
+        Time in s; the last row at or before it is shown.
     elements, notation, theme, values, direction
         See `LiveChart`.
 
@@ -324,10 +324,10 @@ def live_statechart(
 
 # --------------------------------------------------------------------------- reading the run
 def _log_counts(trace: Trace) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """Return for each row how many entries of the log have happened by then.
+    """Return for each row the number of log entries up to it.
 
-    m firings at one time give m + 1 rows, the first one before them; a row of a wanted time stands
-    alone and is the one after all of them.
+    m firings at one time give m + 1 rows, the first one before them; a row of a requested time is
+    a single row after all of them.
     """
     log = trace.transitions.t
     in_steps = np.isin(trace.t, trace.t[trace.microstep > 0])
@@ -348,15 +348,15 @@ def _truth(part: Condition, values: Mapping[str, float]) -> bool | None:
 
 # --------------------------------------------------------------------------- reading the SVG
 def _plain_tree(picture: bytes) -> ElementTree.Element:
-    """Read an SVG; its namespace becomes an attribute, so that tags are short and stay so."""
+    """Read an SVG; its namespace becomes an attribute, so that tags stay short."""
     root = ElementTree.fromstring(picture)
     for node in root.iter():
         node.tag = node.tag.removeprefix(f"{{{SVG}}}")
         if node.tag == "text":
-            node.set("xml:space", "preserve")  # some readers drop a blank at the beginning
+            node.set("xml:space", "preserve")  # some readers drop leading spaces
             node.attrib.pop("{http://www.w3.org/XML/1998/namespace}space", None)
     root.set("xmlns", SVG)
-    # Graphviz rounds the size up; exact, no edge of another colour is left around a dark picture.
+    # Graphviz rounds the size up; the exact size avoids a light border around a dark picture.
     width, height = root.get("viewBox", "").split()[2:]
     root.set("width", f"{width}pt")
     root.set("height", f"{height}pt")
@@ -432,7 +432,7 @@ class _ElementParts:
             if shape.get("fill") == "none":  # the border
                 shape.set("stroke", line)
                 shape.set("stroke-width", BORDER if active else "1")
-            elif shape.get("stroke") in ("none", "transparent"):  # the ground
+            elif shape.get("stroke") in ("none", "transparent"):  # the background
                 shape.set("fill", colours.active_fill if active else colours.paper)
             else:  # the line under the title
                 shape.set("stroke", line)

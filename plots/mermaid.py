@@ -1,8 +1,8 @@
-"""Write a chart as Mermaid text, which many sites and editors draw.
+"""Write a chart as Mermaid text, which many sites and editors can draw.
 
-A ``stateDiagram-v2``: what a state does is its description, an edge carries its priority, guard
-and action. Everything that Mermaid could take for its own syntax is written as ``#code;``, which it
-shows as the character.
+The result is a ``stateDiagram-v2``: the actions of a state are its description; an edge carries its
+priority, guard and action. Every character that Mermaid could read as syntax is written as
+``#code;``, which Mermaid displays as the character.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from gms_fsm.language import MATLAB_LIKE, spell
 
 __all__ = ["mermaid"]
 
-# Besides letters and digits of any script; among the others, ; and : end a text, # begins a code,
-# < and & are markup, %% a comment, {} and " have meanings of their own.
+# Allowed besides letters and digits of any script. Of the rest, ; and : end a text, # begins a
+# code, < and & are markup, %% begins a comment, {} and " have special meanings.
 PLAIN = " _.,=+*/|()[]-!^"
 
 
@@ -55,7 +55,7 @@ def mermaid(chart: Chart) -> str:
     for state in chart.states:
         name, own = state.name[:1].upper() + state.name[1:], ids[state.name]
         lines.append(f'state "{_escape(name)}" as {own}')
-        # The blank after the colon is needed: Mermaid would take ":#58;" for a style.
+        # The space after the colon is needed: Mermaid would read ":#58;" as a style.
         lines += [f"{own} : {_escape(line)}" for line in _doings(chart, state)]
     for state in chart.states:
         for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
@@ -81,7 +81,7 @@ def _doings(chart: Chart, state: State) -> Iterator[str]:
 
 
 def _id(place: int, name: str) -> str:
-    # A name alone could be a word of Mermaid, such as end or note.
+    # A bare name could be a Mermaid keyword, such as end or note.
     return f"s{place}_" + re.sub(r"[^A-Za-z0-9_]", "_", name)
 
 

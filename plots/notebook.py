@@ -1,6 +1,6 @@
-"""Charts, models and traces show themselves in a notebook once `plots` is imported.
+"""Charts, models and traces display themselves in a notebook once `plots` is imported.
 
-The core knows nothing of pictures, so the display methods are put on its classes from here.
+The core knows nothing about pictures, so this module adds the display methods to its classes.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ from plots.statechart import statechart
 
 __all__ = ["register"]
 
-MOST_ELEMENTS = 4  # a larger bank is shown as one element: all are alike
+MOST_ELEMENTS = 4  # a larger bank is shown as one element, because all have the same chart
 
 
 def chart_svg(chart: Chart) -> str | None:
-    """Return a chart as SVG, or None where there is no Graphviz (a notebook then shows text)."""
+    """Return a chart as SVG, or None without Graphviz (a notebook then shows text)."""
     picture = drawn(statechart(chart), "svg")
     return None if picture is None else picture.decode()
 
 
 def model_svg(model: Model) -> str | None:
-    """Return a model's bank of elements as SVG, or None where there is no Graphviz."""
+    """Return a model's bank of elements as SVG, or None without Graphviz."""
     picture = drawn(statechart(model.chart, model.n if model.n <= MOST_ELEMENTS else 1), "svg")
     return None if picture is None else picture.decode()
 
 
 def trace_png(trace: Trace) -> bytes | None:
-    """Return a run's overview as PNG, or None where there is no matplotlib."""
+    """Return a run's overview as PNG, or None without matplotlib."""
     try:
         from plots.figures import overview
     except MissingExtraError:
@@ -44,7 +44,7 @@ def trace_png(trace: Trace) -> bytes | None:
 
 
 def register() -> None:
-    """Put the display methods on the classes."""
+    """Add the display methods to the classes."""
     methods: tuple[tuple[type[Any], str, Any], ...] = (
         (Chart, "_repr_svg_", chart_svg),
         *((model, "_repr_svg_", model_svg) for model in (GMS, LuGre, ChartModel)),

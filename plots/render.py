@@ -1,7 +1,7 @@
-"""Write a Graphviz picture to a file, with whatever Graphviz there is.
+"""Write a Graphviz picture to a file, with the Graphviz that is available.
 
-First the program ``dot`` on PATH, then the Python package pygraphviz, whose wheels bring the
-Graphviz libraries along. Without either, the DOT text is written instead, with a warning that says
+First the program ``dot`` on PATH, then the Python package pygraphviz, whose wheels contain the
+Graphviz libraries. Without either, the DOT text is written instead, with a warning that says
 how to get pictures: a missing drawing program must not stop a computation.
 """
 
@@ -17,7 +17,7 @@ import graphviz
 
 from gms_fsm._arguments import checked_path
 from gms_fsm._extras import missing
-from gms_fsm._files import written_whole
+from gms_fsm._files import write_whole
 from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
 from plots import formats
 from plots.statechart import ChartGraph
@@ -28,25 +28,25 @@ PNG_DPI = "144"  # twice a screen point: crisp on dense displays
 
 
 def render(graph: graphviz.Digraph, path: str | Path) -> Path:
-    """Write a picture, or the text of a graph; the path's ending chooses the format.
+    """Write a picture, or the text of a graph; the file ending selects the format.
 
     Parameters
     ----------
     graph : graphviz.Digraph
         For example from `plots.statechart.statechart`.
     path : str or Path
-        Ends like one of the graphs' formats in `plots.formats.FORMATS`; some are of state charts
-        only. The folder has to exist. A file of that name is replaced as a whole or not at all.
+        Its ending must be that of a graph format in `plots.formats.FORMATS`; some formats are for
+        state charts only. The folder must exist. An existing file is replaced atomically.
 
     Returns
     -------
     Path
-        The file really written: where there is no Graphviz, the DOT text beside `path`.
+        The file actually written: without Graphviz, a DOT file next to `path`.
 
     Raises
     ------
     ParameterError
-        If the ending is another one.
+        If the file ending is not supported.
     OutputError
         If the folder cannot be written, or if Graphviz cannot draw the graph.
 
@@ -76,9 +76,9 @@ def render(graph: graphviz.Digraph, path: str | Path) -> Path:
     except MissingExtraError as error:
         path = path.with_suffix(formats.INSTEAD)
         content = formats.chosen(path, "graph").write(graph)
-        # The same words each time, so that Python says them once a run, not once a picture.
+        # The same text each time, so that Python shows it once per process, not per picture.
         warnings.warn(f"charts are written as DOT text: {error}", stacklevel=2)
-    return written_whole(path, lambda file: file.write(content))
+    return write_whole(path, lambda file: file.write(content))
 
 
 def picture(graph: graphviz.Digraph, form: str) -> bytes:
@@ -133,7 +133,7 @@ def drawn(graph: graphviz.Digraph, form: str) -> bytes | None:
     if picture is None:
         picture = _by_package(graph, form)
     if picture is not None and form == "pdf":
-        # The same chart gives the same file: the date is the only thing that would change.
+        # The same chart gives the same file: only the date would differ.
         picture = re.sub(rb"(/CreationDate \(D:)\d{14}", rb"\g<1>19700101000000", picture)
     return picture
 

@@ -1,8 +1,8 @@
-"""A run as one web page: stepped, scrubbed and explained, without a network.
+"""A run as a single web page to step, scrub and explain it, without a network.
 
-Everything the page shows is computed here and stored in it: values, active states, clause truths
-and margins. The page restyles the chart and moves cursors; it evaluates no guard. It reads one kind
-of text itself, the condition that a user types into its `until` box. The plot library
+Everything the page shows is computed here and stored in it: values, active states, truth values and
+margins of clauses. The page restyles the chart and moves cursors; it evaluates no guards. The only
+text it parses is the condition that a user types into its `until` box. The plot library
 (uPlot) is read from the installed package and written into the page with its licence.
 """
 
@@ -49,7 +49,7 @@ from plots.style import (
 __all__ = ["Replay", "replay", "replay_html", "write_replay"]
 
 HATCH_ANGLES = (None, 45, 135, 0, 90)  # of the states' ribbons, degrees
-# The licence of uPlot asks to go with every copy; the package's file names the licence only.
+# uPlot's licence must accompany every copy, but the package's file only names it.
 MIT = """\
 Permission is hereby granted, free of charge, to any person obtaining a copy of this software and
 associated documentation files (the "Software"), to deal in the Software without restriction,
@@ -69,7 +69,7 @@ CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE."""
 
 @dataclass(frozen=True)
 class Replay:
-    """A replay page; a notebook shows it in a frame that can reach nothing outside of itself.
+    """A replay page; a notebook shows it in an isolated frame.
 
     Parameters
     ----------
@@ -97,17 +97,17 @@ class Replay:
         Parameters
         ----------
         path : str or Path
-            Ends like one of the pages' formats in `plots.formats.FORMATS`, as ``.html``.
+            Its ending must be that of a page format in `plots.formats.FORMATS`, such as ``.html``.
 
         Returns
         -------
         Path
-            The file, written whole.
+            The file, written atomically.
 
         Raises
         ------
         ParameterError
-            If the ending is another one.
+            If the file ending is not supported.
         OutputError
             If the folder cannot be written.
         """
@@ -124,16 +124,16 @@ def replay(
     trace : Trace
         The run.
     other : Trace, optional
-        A second run, shown beside it on the same time.
+        A second run, shown next to it on the same time axis.
     title : str, optional
-        Of the page; the charts' names if left out.
+        Title of the page; by default the names of the models.
     names : sequence of str, optional
-        What each run is called; two runs of one model on one rig are told apart by nothing else.
+        Names of the runs; the only distinction between two runs of one model on one rig.
 
     Returns
     -------
     Replay
-        Shows itself in a notebook; ``save`` writes it to a file.
+        The page; it displays itself in a notebook, and ``save`` writes it to a file.
 
     Raises
     ------
@@ -160,24 +160,24 @@ def write_replay(
     title: str = "",
     names: Sequence[str] = (),
 ) -> Path:
-    """Write a replay page: one file that needs neither a network nor a server.
+    """Write a replay page: a single file that needs neither a network nor a server.
 
     Parameters
     ----------
     path : str or Path
-        The file; its folder has to exist, and its ending chooses the format, as ``.html``.
+        The file; its folder must exist, and its ending selects the format, such as ``.html``.
     trace, other, title, names
         See `replay`.
 
     Returns
     -------
     Path
-        The file, written whole.
+        The file, written atomically.
 
     Raises
     ------
     ParameterError
-        If there are names, but not one per run, or the ending is another one.
+        If there are names, but not one per run, or the file ending is not supported.
     MissingExtraError
         If uPlot is not installed.
     OutputError
@@ -245,7 +245,7 @@ def replay_html(
     style = _theme() + plot_style + _part("replay_page.css")
     scripts = " ".join(map(_hash, (plot_script, script)))
     parts = {
-        # Only what is written here may run: text from a trace could not, even as markup.
+        # Only the scripts written here may run; text from a trace cannot, even as markup.
         "policy": f"default-src 'none'; script-src {scripts}; style-src {_hash(style)}; "
         "base-uri 'none'; form-action 'none'",
         "style": style,
@@ -257,12 +257,12 @@ def replay_html(
         "uplot": plot_script,
         "script": script,
     }
-    # In one pass: a part that happens to contain a placeholder is left as it is.
+    # In one pass, so that placeholders inside the parts are left unchanged.
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], _part("replay_template.html"))
 
 
 def _language() -> dict[str, Any]:
-    """Return what the page has to know of the language to read a typed condition."""
+    """Return the parts of the language that the page needs to parse a typed condition."""
     binary = {op: LEVELS[op] for op in ("or", "and", *OPERATIONS, "**")}
     return {
         "levels": binary | dict.fromkeys(COMPARISONS, LEVELS["<"]),
@@ -275,8 +275,8 @@ def _language() -> dict[str, Any]:
 
 # --------------------------------------------------------------------------- the page's parts
 def _uplot() -> tuple[str, str]:
-    """Return uPlot's script and style sheet from the package that brings them."""
-    # Not imported: its own plotting functions need IPython, its files do not.
+    """Return uPlot's script and style sheet from the installed package."""
+    # Not imported: its plotting functions need IPython, its files do not.
     found = importlib.util.find_spec("uplot")
     for folder in (found.submodule_search_locations or []) if found else []:
         static = Path(folder, "static")
@@ -288,7 +288,7 @@ def _uplot() -> tuple[str, str]:
 
 
 def _text(path: Path | Traversable) -> str:
-    # The page's policy names hashes of scripts, and browsers hash them with plain line ends.
+    # The page's policy contains hashes of scripts, and browsers hash them with plain line ends.
     return path.read_text(encoding="utf-8").replace("\r\n", "\n")
 
 
@@ -321,6 +321,6 @@ def _theme() -> str:
 
 
 def _inert(data: object) -> str:
-    """Write data as JSON in which nothing can end or begin markup."""
+    """Write data as JSON that cannot be read as markup."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

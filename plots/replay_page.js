@@ -1,11 +1,11 @@
 "use strict";
-// Shows what Python computed: truths and margins of clauses are stored, no guard is evaluated here.
-// Every text of the data goes in by textContent, never as HTML.
+// Shows what Python computed: truth values and margins of clauses are stored; no guard is evaluated here.
+// All text from the data is inserted as textContent, never as HTML.
 const data = JSON.parse(document.getElementById("data").textContent);
 const $ = (query, root = document) => root.querySelector(query);
 const $$ = (query, root = document) => [...root.querySelectorAll(query)];
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-const AXIS = 62, GAP = 12; // px beside the plots, on the left and on the right
+const AXIS = 62, GAP = 12; // px to the left and to the right of the plots
 const DASHES = [[], [7, 4], [2, 3], [8, 3, 2, 3], [12, 4], [4, 2, 1, 2, 1, 2]];
 
 function make(tag, parent, text = "", attributes = {}) {
@@ -27,7 +27,7 @@ function written(u, digits = 5) {
 class Run {
   constructor(stored, place) {
     Object.assign(this, stored, { place, plots: [], looks: [] });
-    const pool = stored.pool.map((column) => column.map(Number)); // NaN and infinities are texts in JSON
+    const pool = stored.pool.map((column) => column.map(Number)); // NaN and infinities are strings in JSON
     this.get = (column, row) => pool[column][pool[column].length === 1 ? 0 : row]; // one number: constant
     this.columns = Object.fromEntries(Object.entries(stored.names).map(([name, k]) => [name, (row) => this.get(k, row)]));
     this.n = this.mode.length;
@@ -63,11 +63,11 @@ class Run {
     for (const region of $$(".region", box)) region.addEventListener("click", () => choose(Number(region.dataset.slot)));
   }
 
-  // A large bank is drawn as one chart, which shows the chosen element.
+  // A large bank is drawn as one chart, which shows the selected element.
   elementIn(slot) { return this.slots === this.n ? slot : this.chosen; }
   get chosen() { return Math.min(chosen, this.n - 1); }
 
-  // What is explained at a row: where this element has just fired, the row on which it was asked.
+  // The row to explain: if this element has just fired, the row at which its guards were checked.
   asked(element) {
     const [who, edge] = this.fired[this.row] ?? [];
     return who === element ? { fired: edge, row: this.row - 1 } : { fired: -1, row: this.row };
@@ -89,7 +89,7 @@ class Run {
     const truths = this.truth[element].map((clauses) => clauses.map((clause) => clause[row]));
     const stops = this.edges.map((_, k) => breakpoints.has(keyOf(this, element, k)));
     const look = [element, active, fired, truths, stops, chosen].join();
-    if (this.looks[slot] === look) return; // most elements look as on the row before
+    if (this.looks[slot] === look) return; // most elements look the same as on the previous row
     this.looks[slot] = look;
     for (const node of $$(`[data-slot="${slot}"]`, this.view)) {
       const { state, edge } = node.dataset, on = (name, yes) => node.classList.toggle(name, yes);
@@ -116,7 +116,7 @@ class Run {
   explain() {
     const element = this.chosen, { fired, row } = this.asked(element), body = $("tbody", this.view);
     $(".element", this.view).selectedIndex = element;
-    $(".fact", this.view).textContent = `in ${this.states[this.mode[element][this.row]]}${fired < 0 ? "" : "; as it was asked"}`;
+    $(".fact", this.view).textContent = `in ${this.states[this.mode[element][this.row]]}${fired < 0 ? "" : ", when checked"}`;
     if (this.listed !== element) this.listEdges(body, element);
     const lines = $$("tr", body);
     this.edges.forEach((edge, k) => edge.clauses.forEach((_, c) => {
@@ -126,17 +126,17 @@ class Run {
         const button = $("button", line), on = breakpoints.has(keyOf(this, element, k));
         button.setAttribute("aria-pressed", on);
         button.textContent = on ? "●" : "○";
-        $("em", line).textContent = k === fired ? "FIRED" : asked ? "" : "not asked";
+        $("em", line).textContent = k === fired ? "FIRED" : asked ? "" : "not checked";
         $("em", line).classList.toggle("fired-word", k === fired);
       }
       const sides = this.sides[element][k][c], cells = $$(".number", line);
       cells.forEach((cell, i) => { cell.textContent = edge.compound[c] ? "" : written(this.get(sides[i], row)); });
-      line.lastChild.textContent = { 1: "✓ true", 0: "✗ false" }[truth] ?? "? not known";
+      line.lastChild.textContent = { 1: "✓ true", 0: "✗ false" }[truth] ?? "? unknown";
       line.lastChild.className = truth === "1" ? "true" : "";
     }));
   }
 
-  listEdges(body, element) { // once an element, so that the focus stays in the table
+  listEdges(body, element) { // once per element, so that the focus stays in the table
     this.listed = element;
     body.replaceChildren();
     this.edges.forEach((edge, k) => edge.clauses.forEach((clause, c) => {
@@ -158,7 +158,7 @@ class Run {
   // ---------------------------------------------------------------- plots
   drawPlots() {
     const box = $(".plots", this.view), { t, rows, own } = data.frames;
-    // Where a run has no row of its own its line goes on (undefined); a value that is none is a gap.
+    // Where a run has no row, its line continues (undefined); a value that is not a number is a gap.
     const along = (run, column) => t.map((_, k) => {
       const u = run.get(column, rows[run.place][k]);
       return own[run.place][k] ? (Number.isFinite(u) ? u : null) : undefined;
@@ -199,7 +199,7 @@ class Run {
     }, [data.frames.t, ...lines.map(([u]) => u)], make("div", box, "", { role: "img", "aria-label": `${title}, over time` }));
     let down = 0;
     plot.over.addEventListener("mousedown", (event) => { down = event.clientX; });
-    plot.over.addEventListener("click", (event) => { // the end of a drag is a click too
+    plot.over.addEventListener("click", (event) => { // the end of a drag is also a click
       const t = plot.posToVal(event.offsetX, "x");
       if (Math.abs(event.clientX - down) < 4) go(data.frames.t.findLastIndex((u) => u <= t));
     });
@@ -219,7 +219,7 @@ class Run {
   fit() {
     const width = $(".plots", this.view).clientWidth;
     for (const plot of this.plots) if (plot.width !== width) plot.setSize({ width, height: plot.height });
-    // On a narrow screen only the chosen element is in view, large enough to be read.
+    // On a narrow screen only the selected element is in view, at a readable size.
     const region = this.svg && $(`.region[data-slot="${this.chosen}"]`, this.svg);
     if (!region) return;
     this.whole ??= this.svg.getAttribute("viewBox");
@@ -316,15 +316,15 @@ function proceed() {
   pause();
   const holds = readUntil(), text = $("#until").value.trim();
   for (let k = frame + 1; holds && k <= last; k++) {
-    const stop = stopsAt(k) || (holds(k) && !holds(k - 1) && `stopped: ${text} became true, first row of this page`);
+    const stop = stopsAt(k) || (holds(k) && !holds(k - 1) && `stopped: ${text} became true at this row of the page`);
     if (stop) return show(k, stop);
   }
-  return holds && show(last, breakpoints.size || text ? "the end: nothing stopped it" : "the end: no breakpoint and no condition is set");
+  return holds && show(last, breakpoints.size || text ? "end of the run: nothing stopped it" : "end of the run: no breakpoint or condition is set");
 }
 
 function zoomTo(min, max, origin = null) {
   if (zooming || !(max - min > 1e-9)) return;
-  zooming = true; // the other plots tell their new scales too
+  zooming = true; // the other plots also report their new scales
   Object.assign(view, { min, max });
   for (const run of runs) {
     for (const plot of run.plots) if (plot !== origin) plot.setScale("x", { min, max });
@@ -344,12 +344,12 @@ function setPlaying(on) {
   timer = on ? setInterval(tick, 1000 / Number($("#speed").value)) : 0;
   $("#play").setAttribute("aria-pressed", on);
   $("#play").lastChild.textContent = on ? " pause" : " play";
-  $("#say").setAttribute("aria-live", on ? "off" : "polite"); // a reader would never catch up
+  $("#say").setAttribute("aria-live", on ? "off" : "polite"); // a screen reader would not keep up
 }
 const pause = () => setPlaying(false);
 
 function tick() {
-  const stop = frame < last ? stopsAt(frame + 1) : "the end";
+  const stop = frame < last ? stopsAt(frame + 1) : "end of the run";
   if (stop) pause();
   show(frame + 1, stop);
 }

@@ -1,7 +1,7 @@
 "use strict";
-// The `until` box: a condition over stored values, in the expression language of the product. It is the only
-// text that Python has not seen. What binds how tightly, the functions and the constants are Python's, stored
-// in the page. Closures are built from checked text; nothing is ever `eval`ed, and no guard comes here.
+// The `until` box: a condition on stored values, in the expression language of gms-fsm. It is the only
+// text that Python has not seen. Precedence, functions and constants come from Python and are stored
+// in the page. Closures are built from checked text; nothing is ever passed to `eval`, and no guard is read here.
 const OPERATIONS = {
   or: (a, b) => a || b, and: (a, b) => a && b, "<": (a, b) => a < b, "<=": (a, b) => a <= b,
   ">": (a, b) => a > b, ">=": (a, b) => a >= b, "+": (a, b) => a + b, "-": (a, b) => a - b,
@@ -21,7 +21,7 @@ function parse(text, { levels, negation, sign, functions, constants }, names, st
   let next = 0;
   const here = () => tokens[next] ?? { word: "", at: end };
   const take = (words, wanted) => (words.includes(here().word) ? tokens[next++].word : wanted && fail(here().at, `expected ${wanted}`));
-  // A part is a truth or a number; brackets may hold either, so it is checked where it is used.
+  // A part is a truth value or a number; brackets may contain either, so it is checked where it is used.
   const as = (truth, part) => (Boolean(part.truth) === truth ? part.f
     : fail(part.at, truth ? "a comparison is needed, for example v > 0" : "a number is needed"));
 

@@ -1,7 +1,7 @@
-"""The paper's Fig. 1: a slider on n Maxwell elements, a spring and a damper side by side in each.
+"""The paper's Fig. 1: a slider on n Maxwell elements, each a spring and a damper in parallel.
 
-Drawn from a row of a run, the contacts are where the deflections put them: z_i is how far the
-slider has moved on since its contact lay straight under it.
+When a row of a run is drawn, the deflections give the positions of the contacts: z_i is the
+distance that the slider has moved relative to the rest position of the contact.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ from plots.style import (
 __all__ = ["schematic", "schematic_figure"]
 
 ROW = 1.35  # height of one element
-WALL = 6.0  # where the slider's face is, to which springs and dampers are fixed
-REST = 3.0  # of a spring at z = 0
-SWING = 1.4  # how far the largest deflection of a run moves a contact
+WALL = 6.0  # position of the slider's face, to which springs and dampers are attached
+REST = 3.0  # length of a spring at z = 0
+SWING = 1.4  # displacement of a contact by the largest deflection of a run
 CONTACT = 0.5  # width of a contact
-GROUND = 0.36  # how far it reaches below the middle of its row
+GROUND = 0.36  # its extent below the middle of its row
 MOST = 12  # elements
 
 STIFFNESS = {"k": r"$k_{{{}}}$", "sigma_0": r"$\sigma_0$"}
@@ -45,21 +45,21 @@ DAMPING = {"sigma": r"$\sigma_{{{}}}$", "sigma_1": r"$\sigma_1$"}
 def schematic(
     ax: Axes, trace: Trace | None = None, row: int = -1, elements: int = 4
 ) -> list[Artist]:
-    """Draw a slider on Maxwell elements, bristles deflected as in one row of a run.
+    """Draw a slider on Maxwell elements, deflected as in one row of a run.
 
-    A contact in the default state (stick) is full and sits on its peg; in another state (slip) it
-    is open, with an arrow to where it slides: the way the slider goes.
+    A contact in the default state (stick) is filled and held by a peg; in another state (slip) it
+    is open, with an arrow in the direction in which the slider moves.
 
     Parameters
     ----------
     ax : Axes
-        Where; its own axes are hidden.
+        Axes to draw on; its axis lines are hidden.
     trace : Trace, optional
-        The run. When left out the elements are drawn with symbols only, at rest.
+        The run. By default the elements are drawn at rest, with symbols only.
     row : int
         Row of the run; negative rows count from the end.
     elements : int
-        How many elements are drawn without a run; a run brings its own.
+        Number of elements drawn without a run.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def schematic(
     Raises
     ------
     ParameterError
-        If the row is not there, or there are too many elements to draw.
+        If the row does not exist, or there are too many elements to draw.
     """
     if trace is not None:
         check_trace(trace)
@@ -83,7 +83,7 @@ def schematic(
         or not -len(trace) <= row < len(trace)
     ):
         raise ParameterError(
-            f"it must be a whole number from {-len(trace)} to {len(trace) - 1}",
+            f"it must be an integer from {-len(trace)} to {len(trace) - 1}",
             place="row",
             value=row,
         )
@@ -113,9 +113,9 @@ def schematic_figure(
     row : int
         Row of the run.
     elements : int
-        How many elements are drawn without a run.
+        Number of elements drawn without a run.
     title : str
-        Of the figure; with a run the model, its law and the time are added.
+        Of the figure; with a run, the model, its law and the time are added.
 
     Returns
     -------
@@ -145,14 +145,14 @@ def _element(
     left, right = contact + CONTACT / 2 + 0.2, WALL - 0.2
     look: dict[str, Any] = {"color": colour, "linewidth": 1.3, "solid_capstyle": "round"}
     drawn: list[Artist] = []
-    # Frames that join spring and damper, at the contact and at the slider.
+    # Frames that connect spring and damper, at the contact and at the slider.
     for x, end in ((left, contact + CONTACT / 2), (right, WALL)):
         drawn += ax.plot([x, x], [bottom, top], **look)
         drawn += ax.plot([x, end], [y, y], **look)
     turns = np.linspace(left + 0.25, right - 0.25, 15)
     zigzag = top + 0.1 * np.array([0, *([1, -1] * 6), 1, 0])[: turns.size]
     drawn += ax.plot([left, *turns, right], [top, *zigzag, top], gid=f"spring {i + 1}", **look)
-    # A dashpot: a rod with its piston from the slider into a cup that is open towards it.
+    # A dashpot: a rod and piston from the slider into a cup that opens towards it.
     cup, piston = left + 0.35 * (right - left), left + 0.5 * (right - left)
     mouth = left + 0.65 * (right - left)
     strokes = (
@@ -161,7 +161,7 @@ def _element(
         [(piston, bottom), (right, bottom)],
         [(piston, bottom - 0.08), (piston, bottom + 0.08)],
     )
-    # One line with gaps, so that a damper is one part of the picture.
+    # One line with gaps, so that a damper is a single artist.
     points = [point for stroke in strokes for point in (*stroke, (np.nan, np.nan))]
     drawn += ax.plot(*np.transpose(points[:-1]), gid=f"damper {i + 1}", **look)
     names = _numbers(trace, i)
@@ -175,7 +175,7 @@ def _element(
 
 
 def _numbers(trace: Trace | None, i: int) -> tuple[str, str]:
-    """Return the texts beside spring and damper: symbols, with numbers where there is a run."""
+    """Return the texts next to spring and damper: symbols, and numbers if there is a run."""
     if trace is None:
         return STIFFNESS["k"].format(i + 1), DAMPING["sigma"].format(i + 1)
     values = trace.model.values
@@ -194,7 +194,7 @@ def _numbers(trace: Trace | None, i: int) -> tuple[str, str]:
 def _contact(
     ax: Axes, y: float, i: int, contact: float, trace: Trace | None, row: int
 ) -> list[Artist]:
-    """Draw the contact on its piece of ground, and what it does."""
+    """Draw the contact on its piece of ground, and its state."""
     ground = y - GROUND
     low, high = WALL - REST - SWING - CONTACT, WALL - REST + SWING + CONTACT
     drawn: list[Artist] = [
@@ -244,7 +244,7 @@ def _contact(
 def _deflection(
     ax: Axes, y: float, i: int, contact: float, trace: Trace | None, row: int
 ) -> list[Artist]:
-    """Draw the distance from the contact's place at rest, and its name."""
+    """Draw the distance from the contact's rest position, and its symbol."""
     rest, height = WALL - REST, y - GROUND - 0.22
     drawn: list[Artist] = [
         *ax.plot(

@@ -1,8 +1,8 @@
-"""Draw a friction chart in the manner of Stateflow.
+"""Draw a friction chart in the style of Stateflow.
 
-Everything in the picture is read from the chart: states with what they do, edges with priority,
-guard and action. A long guard is a node on its edge's path, because Graphviz places nodes without
-overlaps but labels of edges badly. Ids and classes are stable, so that the SVG can be restyled
+Everything in the picture is read from the chart: states with their actions, edges with priority,
+guard and action. A guard is a node on its edge's path, because Graphviz places nodes without
+overlaps but places edge labels badly. Ids and classes are stable, so that the SVG can be restyled
 without a new layout: class ``state``, ``guard``, ``edge``, ``default`` and ``region``, and ids such
 as ``element1-state-slip``.
 """
@@ -41,14 +41,14 @@ __all__ = ["ChartGraph", "statechart"]
 
 DIRECTIONS = {"TB": "top to bottom", "LR": "left to right"}
 
-# Points of a state's side for every edge that begins or ends there. On a shorter side the edges
-# would leave around the corners and run into each other.
+# Length in points of a state's side for every edge that begins or ends there. On a shorter side
+# the edges would leave around the corners and overlap.
 ROOM_PER_EDGE = {"TB": 45, "LR": 16}
-MARKED = "2.6"  # points, of lines that point something out
+MARKED = "2.6"  # points; width of highlighted lines
 
 
 class ChartGraph(graphviz.Digraph):  # type: ignore[misc]
-    """A picture of a state chart that knows its chart, so that it can be other text as well."""
+    """A picture of a state chart that refers to it, so that other formats can be written."""
 
     chart: Chart
 
@@ -70,25 +70,25 @@ def statechart(
     Parameters
     ----------
     chart : Chart
-        The chart; nothing else decides what is shown.
+        The chart.
     elements : int or sequence of int, optional
         How many elements, or which ones, counted from 0. They are drawn as parallel (AND) regions
-        in a grid, and the picture counts from 1; only the number 1 gives a bare chart.
+        in a grid, and the picture counts from 1; only the number 1 gives a chart without a region.
     notation : {"stateflow", "math"}
         ``z >= s && v > v_c``, or ``z ≥ s(v) ∧ v > v_c``.
     direction : {"TB", "LR"}
         States from top to bottom, or from left to right.
     theme : {"light", "dark"}
-        Colours; what they tell is told by shapes as well.
+        Colours; what they mean is also shown by shapes.
     counts : Trace, optional
-        A run of this chart: how long each element was in each state and how often it took each edge
-        are written on it; an edge never taken is dashed.
+        A run of this chart. The picture then shows how long each element was in each state and how
+        often it took each edge; an edge never taken is dashed.
     marked : iterable of str, optional
-        Names of states and edges to point out: drawn thick, with a frame around the guard.
+        Names of states and edges to highlight: drawn thick, with a frame around the guard.
     names : bool, optional
-        Whether each edge's name, which the log and the debugger use, is written over its guard.
+        Whether each edge's name, which the log and the debugger use, is written above its guard.
     note : str, optional
-        Written under the picture, line by line.
+        Text below the picture, line by line.
 
     Returns
     -------
@@ -98,7 +98,7 @@ def statechart(
     Raises
     ------
     ParameterError
-        If an option is not one of those above, `counts` is the run of another chart, or the chart
+        If an option is not one of those above, `counts` is a run of another chart, or the chart
         has no such state or edge to mark.
 
     Examples
@@ -140,7 +140,7 @@ def chosen(elements: int | Sequence[int], n: int | None = None) -> tuple[int, ..
     elements : int or sequence of int
         How many, or which.
     n : int, optional
-        How many there are.
+        How many exist.
 
     Returns
     -------
@@ -170,7 +170,7 @@ def chosen(elements: int | Sequence[int], n: int | None = None) -> tuple[int, ..
         count = _whole(elements, "elements")
         if count < 1:
             raise ParameterError(
-                "a chart has a whole number of elements, at least 1",
+                "the number of elements must be an integer of at least 1",
                 place="elements",
                 value=elements,
             )
@@ -182,10 +182,10 @@ def chosen(elements: int | Sequence[int], n: int | None = None) -> tuple[int, ..
 
 def _whole(number: object, name: str) -> int:
     try:
-        return operator.index(number)  # type: ignore[arg-type]  # that is what is tried
+        return operator.index(number)  # type: ignore[arg-type]  # may fail
     except TypeError:
         raise ParameterError(
-            "a chart has a whole number of elements, at least 1", place=name, value=number
+            "the number of elements must be an integer of at least 1", place=name, value=number
         ) from None
 
 
@@ -195,11 +195,11 @@ def one_of(name: str, value: str, allowed: Iterable[str]) -> str:
     Parameters
     ----------
     name : str
-        Of the option.
+        Name of the option.
     value : str
-        What was given.
+        The given value.
     allowed : iterable of str
-        What may be given.
+        The allowed values.
 
     Returns
     -------
@@ -209,7 +209,7 @@ def one_of(name: str, value: str, allowed: Iterable[str]) -> str:
     Raises
     ------
     ParameterError
-        If it is another one.
+        If it is not allowed.
     """
     words = tuple(allowed)
     if value not in words:
@@ -220,7 +220,7 @@ def one_of(name: str, value: str, allowed: Iterable[str]) -> str:
 
 @dataclass(frozen=True)
 class Sheet:
-    """A chart and how it is drawn.
+    """A chart and its drawing options.
 
     Parameters
     ----------
@@ -229,13 +229,13 @@ class Sheet:
     notation, direction, theme : str
         See `statechart`.
     tally : Tally, optional
-        Counts to be written on it.
+        Counts to show.
     live : bool
         Leave room for the dot of the active state and the marks of the clauses.
     marked : frozenset of str
-        States and edges to point out.
+        States and edges to highlight.
     names : bool
-        Write each edge's name over its guard.
+        Write each edge's name above its guard.
     """
 
     chart: Chart
@@ -270,13 +270,13 @@ class Sheet:
         Parameters
         ----------
         numbers : sequence of int
-            Counted from 0.
+            Numbers of the elements, from 0.
         bare : bool
-            Draw the one element without its region.
+            Draw the only element without its region.
         values : sequence of Row
-            Written under the title of each element.
+            Written below the title of each element.
         foot : str
-            Written under the picture, line by line.
+            Written below the picture, line by line.
 
         Returns
         -------
@@ -306,8 +306,8 @@ class Sheet:
         if bare:
             self._draw_element(graph, numbers[0])
             return graph
-        # Regions do not touch each other: each is laid out alone, hence all alike, and set in a
-        # grid.
+        # Regions are independent: each is laid out alone, so that all look the same, and placed in
+        # a grid.
         columns = ceil(sqrt(len(numbers)))
         order: list[int | None] = list(numbers)
         if self.direction == "TB":
@@ -401,7 +401,7 @@ class Sheet:
 
     # ----------------------------------------------------------------- labels
     def state_rows(self, state: State, number: int) -> list[Row]:
-        """Return what is written in a state's box.
+        """Return the text in a state's box.
 
         Parameters
         ----------
@@ -436,14 +436,14 @@ class Sheet:
         return rows
 
     def guard_rows(self, edge: Transition, priority: int, number: int) -> list[Row]:
-        """Return what is written on an edge, clause by clause.
+        """Return the text on an edge, clause by clause.
 
         Parameters
         ----------
         edge : Transition
             The edge.
         priority : int
-            1 is asked first.
+            1 is checked first.
         number : int
             The element, from 0.
 
@@ -465,7 +465,7 @@ class Sheet:
             if last and self.live:
                 row.append(Piece(TRUE, "mark", clause))
             if last and i + 1 < len(lines):
-                # The space is a text of its own: some readers of SVG drop one at the beginning.
+                # The space is a separate text: some SVG readers drop leading spaces.
                 row += [Piece(" ", "bracket"), Piece(self.write.words[Both], "bracket")]
             if i + 1 == len(lines):
                 row.append(Piece("]", "bracket"))
@@ -482,10 +482,10 @@ class Sheet:
         ]
 
     def _clause_lines(self, part: Condition, inside: bool) -> list[str]:
-        """Return a clause as lines: each alternative begins one, and a long text is wrapped."""
+        """Return a clause as lines: each alternative on a new line, long texts wrapped."""
         if not isinstance(part, Either):
             text = self.write.text(part)
-            # The brackets that the guard has as one text.
+            # The brackets around the guard when it is written as one text.
             return wrapped(f"({text})" if inside and isinstance(part, Both) else text)
         texts = [self.write.text(operand) for operand in part.operands]
         texts = [

@@ -1,7 +1,7 @@
-"""Colours and fonts that all pictures share.
+"""Colours and fonts of all pictures.
 
-The two accents are the blue and the vermilion of Okabe and Ito, which colour-blind readers can tell
-apart; text in a colour takes the darker twin, so that it keeps its contrast on white.
+The two accents are the blue and the vermilion of Okabe and Ito, which colour-blind readers can
+distinguish; coloured text uses a darker variant, which has enough contrast on white.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ PALE_GREY = "#B9BEC6"
 PAPER = "#FFFFFF"
 PANEL = "#F5F7FA"
 
-# Lists of names: the first one that is installed is taken.
+# Lists of names; the first installed one is used.
 SANS = "Helvetica,Arial,Liberation Sans,DejaVu Sans,sans-serif"
 MONO = "DejaVu Sans Mono,Menlo,Consolas,Liberation Mono,monospace"
 
-# Elements are told apart by colour and by dash (Okabe-Ito, readable in grey): seven colours and six
-# dashes repeat after 42 elements only.
+# Elements are distinguished by colour and by dash (Okabe-Ito, readable in grey): seven colours and
+# six dashes repeat only after 42 elements.
 ELEMENT_COLOURS = (BLUE, VERMILION, "#009E73", "#CC79A7", "#E69F00", "#56B4E9", INK)
 ELEMENT_DASHES: tuple[str | tuple[int, tuple[float, ...]], ...] = (
     "-",
@@ -44,14 +44,14 @@ STATE_FILLS = ("#CFE3F2", "#F7CDB0", "#CDEBE0", "#F1D9E7", "#FAE8C0")
 STATE_EDGES = (BLUE, VERMILION, "#009E73", "#CC79A7", "#E69F00")
 HATCHES = ("", "////", "....", "xxxx", "\\\\\\\\")
 
-RC: Any = {  # matplotlib types its keys one by one
+RC: Any = {  # matplotlib types each key separately
     "font.family": "sans-serif",
     "font.size": 9.0,
     "axes.titlesize": 9.5,
     "axes.titlelocation": "left",
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "axes.formatter.useoffset": False,  # in a zoom "-0.1934" reads better than "-1.9e-1" aside
+    "axes.formatter.useoffset": False,  # "-0.1934" is easier to read than an offset of "-1.9e-1"
     "hatch.linewidth": 0.6,
     "axes.prop_cycle": "cycler('color', ['#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00'])",
     "lines.linewidth": 1.2,
@@ -65,12 +65,12 @@ RC: Any = {  # matplotlib types its keys one by one
 
 @dataclass(frozen=True)
 class ChartTheme:
-    """Colours of a statechart; what they tell is told by shape too, so that grey paper shows it.
+    """Colours of a statechart; shapes show the same information, for printing in grey.
 
     Parameters
     ----------
     ink, soft, line, pale, paper : str
-        Lines and text, lesser text, regions, what does not matter now, and the ground.
+        Lines and text, secondary text, regions, inactive parts, and the background.
     active, active_fill : str
         The active state.
     fired, holds, fails : str

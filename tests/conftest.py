@@ -1,4 +1,4 @@
-"""Fixtures that many folders share."""
+"""Fixtures shared by several folders."""
 
 from __future__ import annotations
 

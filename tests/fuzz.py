@@ -2,8 +2,8 @@
 
 Each body is a plain function of bytes, so that hypothesis, a loop over seeds (tests/soak.py) or any
 other fuzzer can drive it. The bytes are read as choices: which valid input to start from, what to
-break in it, and by how much. What is accepted is used afterwards, because an input that gets in and
-breaks a later reader is a finding too.
+break in it, and by how much. Accepted inputs are then used, because an input that is accepted and
+breaks later code is a finding too.
 """
 
 from __future__ import annotations
@@ -59,46 +59,46 @@ from tests.scenario_files import MEASURED, OPEN_LOOP, sine_table
 
 Option = TypeVar("Option")
 
-LONGEST_MESSAGE = 4000  # characters; longer is no message
+LONGEST_MESSAGE = 4000  # characters; a longer text is not a message
 
 
 class Choices:
-    """Bytes read as choices; when they run out every choice is the first option."""
+    """Bytes read as choices; when they run out, every choice is the first option."""
 
     def __init__(self, data: bytes) -> None:
         self.data = data
         self.place = 0
 
     def byte(self) -> int:
-        """The next byte."""
+        """Return the next byte."""
         self.place += 1
         return self.data[self.place - 1] if self.place <= len(self.data) else 0
 
     def below(self, bound: int) -> int:
-        """A whole number from 0 to bound - 1."""
+        """Return an integer from 0 to bound - 1."""
         number, span = self.byte(), 256
         while span < bound:
             number, span = number * 256 + self.byte(), span * 256
         return number % bound
 
     def one_of(self, options: Sequence[Option]) -> Option:
-        """One of several."""
+        """Return one of several options."""
         return options[self.below(len(options))]
 
     def rest(self) -> bytes:
-        """All that is left."""
+        """Return all remaining bytes."""
         self.place, start = len(self.data), self.place
         return self.data[start:]
 
     @property
     def over(self) -> bool:
-        """Whether the bytes have run out."""
+        """Return whether the bytes have run out."""
         return self.place >= len(self.data)
 
 
 @contextlib.contextmanager
 def _strict() -> Iterator[None]:
-    """Turn warnings into findings; `UserWarning` speaks to the user and is meant."""
+    """Turn warnings into errors, except `UserWarning`, which is intended for the user."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         warnings.simplefilter("ignore", UserWarning)
@@ -270,7 +270,7 @@ def _nested(choices: Choices) -> str:
 
 
 def _grammatical(choices: Choices, depth: int, truth: bool) -> str:
-    """Return a text of the language, so that the readers behind the parser are met too."""
+    """Return a valid text of the language, so that code after the parser is exercised too."""
     if truth:
         kind = choices.below(5) if depth else 0
         if kind == 1:
@@ -302,7 +302,7 @@ def _grammatical(choices: Choices, depth: int, truth: bool) -> str:
 
 
 def _text(choices: Choices) -> str:
-    """One hostile or valid text."""
+    """Return a hostile or valid text."""
     how = choices.below(6)
     if how == 0:
         return choices.rest().decode("utf-8", errors="surrogateescape")
@@ -327,15 +327,15 @@ STATES = {"state(1)": "stick", "state(2)": "slip"}
 
 
 def one_expression(data: bytes) -> bool:
-    """Parse one text as a value and as a condition; use what is accepted.
+    """Parse one text as a value and as a condition; use accepted texts.
 
-    Only `ExpressionError` may answer a text, with a column inside of it. What is accepted prints to
-    a text that reads back as the same values, and every reader of trees copes with it.
+    Only `ExpressionError` may be raised, with a column inside the text. An accepted tree prints as
+    a text that parses to the same values, and every algebra can process it.
 
     Returns
     -------
     bool
-        Whether the text was accepted by either.
+        Whether the text was accepted as either.
     """
     choices = Choices(data)
     text = _text(choices)
@@ -387,7 +387,7 @@ def _use_tree(tree: Node, text: str, parse: Callable[[str], Node]) -> None:
 
 
 def _computed(tree: Node, values: dict[str, Any]) -> object:
-    """Return the value, or the kind of arithmetic that has none (see `evaluate`)."""
+    """Return the value, or the type of the arithmetic error (see `evaluate`)."""
     try:
         return evaluate(tree, values)
     except (ArithmeticError, ValueError) as error:
@@ -476,7 +476,7 @@ NASTY = [
     "normal > 4.5 N", "force > 0", "sqrt(force) > 1 N", "time < 1 h and not position > 1 mm",
     "force", "exp(1000*force) > 1", "1/force > 0", "force > 1e999", "time > 1 parsec",
 ]  # fmt: skip
-# Not hostile, only unusual: with these a file is often accepted, and its run is put to the test.
+# Not hostile, only unusual: a file with these is often accepted, and its run is tested.
 PLAIN = [
     1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 0.01, 0.1, 0.5, 1.0, 1.5, 2.0, 3.0, 10.0, 100.0, 1e3, 1e4, 1e6,
     1e9, 1e12, 0.0, "t", "0.1*sin(t)", "sgn(sin(9*t))", "1/(t - 0.1)", "sqrt(0.1 - t)", "exp(t**2)",
@@ -535,7 +535,7 @@ def _valid_scenarios() -> list[str]:
 
 
 def toml_of(value: Any, top: bool = True) -> str:
-    """Return a value, or at the top a whole table, as TOML."""
+    """Return a value, or at the top level a whole table, as TOML."""
     if top:
         return "".join(f"{json.dumps(key)} = {toml_of(v, False)}\n" for key, v in value.items())
     if isinstance(value, dict):
@@ -682,7 +682,7 @@ def _scenario_text(choices: Choices) -> bytes:
 
 @contextlib.contextmanager
 def _folder() -> Iterator[Path]:
-    """Give a folder in memory where there is one."""
+    """Return a folder in memory if there is one."""
     shm = Path("/dev/shm")
     with tempfile.TemporaryDirectory(
         prefix="gms-fsm-fuzz-", dir=shm if shm.is_dir() else None
@@ -691,10 +691,10 @@ def _folder() -> Iterator[Path]:
 
 
 def one_scenario(data: bytes) -> bool:
-    """Load one scenario file with its record; start what is accepted and run a few steps.
+    """Load one scenario file with its record; run accepted files for a few steps.
 
-    Only `ScenarioError` and `RecordError` may answer a file, and only `GMSError` its run; a run
-    that stops has kept its rows.
+    Only `ScenarioError` and `RecordError` may be raised for a file, and only `GMSError` for its
+    run; a run that fails keeps its rows.
 
     Returns
     -------
@@ -721,7 +721,7 @@ def one_scenario(data: bytes) -> bool:
         except SimulationError as error:
             _is_a_message(error)
             error.trace.t[0]
-            with contextlib.suppress(MissingExtraError):  # of the engine that the file asks for
+            with contextlib.suppress(MissingExtraError):  # of the engine selected in the file
                 error.trace.columns()
         except GMSError as error:
             _is_a_message(error)
@@ -729,12 +729,12 @@ def one_scenario(data: bytes) -> bool:
 
 
 def _start_and_run(loaded: Any) -> None:
-    """Run a few steps, as `simulate` would begin."""
+    """Run a few steps in the same way as `simulate`."""
     options = {name: value for name, value in loaded.arguments.items() if name != "monitors"}
     where = {name: options.pop(name) for name in ("t_end", "t_start", "initial") if name in options}
     if np.size(options.get("t_eval", ())) < 10_000:
         Start.of(loaded.model, loaded.rig, settings=Settings(**options), **where)
-    # With wanted times an arc goes on to the last of them, and hostile numbers make stiff runs.
+    # With requested times an arc runs to the last of them, and hostile numbers make stiff runs.
     options.pop("t_eval", None)
     settings = Settings(**options)
     run = Run(Start.of(loaded.model, loaded.rig, settings=settings, rows_at_once=20, **where))
@@ -797,7 +797,7 @@ _UNFIT = (ValueError, TypeError, OverflowError, RuntimeError)
 
 
 def _mutated_array(choices: Choices, array: Any) -> Any:
-    """Return another array in place of one of a trace's."""
+    """Return a replacement for an array of a trace."""
     how = choices.below(12)
     if array.dtype.names:  # the log
         log = array.copy()
@@ -845,7 +845,7 @@ def _mutated_npz(choices: Choices, content: bytes) -> bytes:
         return damaged(choices, content)
     with np.load(io.BytesIO(content)) as file:
         arrays = dict(file)
-    if how == 1:  # a sound archive with a damaged member
+    if how == 1:  # a valid archive with a damaged member
         name = choices.one_of(sorted(arrays))
         out = io.BytesIO()
         method = choices.one_of([zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_LZMA])
@@ -920,10 +920,10 @@ def _mutated_csv(choices: Choices, files: dict[str, bytes]) -> dict[str, bytes]:
 
 
 def one_trace_file(data: bytes) -> bool:
-    """Load one trace file; read everything of what is accepted.
+    """Load one trace file; read everything in accepted files.
 
-    Only `TraceFileError` may answer a file. What is accepted has all its columns, can be sampled,
-    explained and summed up, and saves and loads to the same again.
+    Only `TraceFileError` may be raised. An accepted trace has all its columns, can be sampled,
+    explained and summarized, and saves and loads unchanged.
 
     Returns
     -------

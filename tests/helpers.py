@@ -1,4 +1,4 @@
-"""Shared cases of the tests: the models and rigs whose results are known, and small readers."""
+"""Cases shared by the tests: models and rigs with known results, and small helper functions."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def stick_slip(law: str) -> GMS:
 
 
 def open_loop() -> Prescribed:
-    """The sine whose period no step divides."""
+    """A sine whose period is not a multiple of any step."""
     return Prescribed(SINE)
 
 
@@ -74,7 +74,7 @@ def one_element(
     sigma: float = 0.1,
     k: float = 1.0,
 ) -> GMS:
-    """One element with everything at hand."""
+    """Return a model of one element with all its numbers as arguments."""
     parameters = GMSParameters(
         [k], [sigma], [C], sigma_2=0.0, stribeck=Stribeck(F_c, F_s, v_s), v_c=v_c
     )
@@ -90,7 +90,7 @@ def same_bits(a: Trace, b: Trace) -> None:
 
 
 def event_sequence(trace: Trace) -> list[tuple[int, str]]:
-    """Which element took which edge, in order."""
+    """Return which element took which edge, in order."""
     log = trace.transitions
     return list(zip(log.element.tolist(), log.edge.tolist(), strict=True))
 
@@ -119,7 +119,7 @@ WEAR = Chart(
 
 
 def banging(gap: float) -> ChartModel:
-    """Return an element driven to and fro between two guards that are `gap` apart."""
+    """Return an element driven back and forth between two guards that are `gap` apart."""
     chart = Chart(
         "to and fro",
         inputs=("v",),
@@ -151,6 +151,6 @@ def _belt(t: float) -> float:
 
 
 def wear(n: int = 3) -> ChartModel:
-    """A bank of the chart above: three states, two variables, actions of every kind."""
+    """Return a bank of the chart above: three states, two variables, actions of every kind."""
     values = {"k": np.linspace(1, 2, n), "C": 0.3, "v_c": 1e-6, "share": np.linspace(0.5, 0.7, n)}
     return ChartModel(WEAR, values, n=n, stribeck=CURVE, weights=np.linspace(0.5, 1, n))

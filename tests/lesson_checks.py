@@ -1,4 +1,4 @@
-"""What every lesson has to keep: five lines, and a picture with nothing cut off or covered."""
+"""Checks for every lesson: five lines, and a figure with nothing cut off or covered."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gms_fsm.app.lessons import Lesson, Result
 
 
 def check_lines(result: Result) -> None:
-    """Five lines: the question, what ran and under which law, two with figures, what follows."""
+    """Check the five lines: question, runs with the law, two with measured values, conclusion."""
     lines = result.lines()
     question, run, first, second, moral = lines
     assert question.startswith("Question: ")
@@ -27,7 +27,7 @@ def check_lines(result: Result) -> None:
 
 
 def check_figure(lesson: Lesson, result: Result) -> None:
-    """Every axis has its unit, no text leaves the picture, no two texts meet."""
+    """Check that every axis has its unit, and no text is cut off or overlaps another."""
     pytest.importorskip("matplotlib", reason="pictures need the extra 'plots'")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -40,7 +40,7 @@ def check_figure(lesson: Lesson, result: Result) -> None:
     for ax in figure.axes:
         for axis in (ax.xaxis, ax.yaxis):
             label = axis.label.get_text()
-            counts = label in ("", "elements n", "switches found once a step", "elements in slip")
+            counts = label in ("", "elements n", "switches found once per step", "elements in slip")
             assert counts or "[" in label, label
         texts = [ax.title, ax._left_title, ax.xaxis.label, ax.yaxis.label, *_notes(ax)]
         boxes += [(t.get_text(), t.get_window_extent(renderer)) for t in texts if t.get_text()]

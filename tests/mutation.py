@@ -1,9 +1,9 @@
-"""Measures what the tests notice: one small change of a module at a time, then the tests near it.
+"""Mutation testing: apply one small change to a module at a time, then run the tests near it.
 
 ``python tests/mutation.py [module ...] [--sample 60] [--seed 8] [--budget seconds]``, with
 ``pip install -e ".[dev,mutation]"``. cosmic-ray makes the mutants; a copy of the repository is
-mutated, never the repository. Each mutant has a forked process, so that numpy and scipy are
-imported once. Survivors are printed as diffs.
+mutated, never the repository itself. Each mutant has a forked process, so that numpy and scipy are
+imported only once. Survivors are printed as diffs.
 """
 
 import argparse
@@ -17,8 +17,8 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PATIENCE = 4  # times the processor's time of the unchanged module: then a mutant hangs
-# Bit shifts of floats and the like die at once and would only flatter the score.
+PATIENCE = 4  # times the unchanged module's processor time: beyond this a mutant hangs
+# Bit shifts of floats and the like fail at once and would only inflate the score.
 _SIGNS = ("Eq", "NotEq", "Lt", "LtE", "Gt", "GtE")
 OPERATORS = (
     [f"ReplaceComparisonOperator_{a}_{b}" for a in _SIGNS for b in _SIGNS if a != b]
@@ -36,7 +36,7 @@ PHYSICS = [
     "physics/test_traps_sign_discontinuity",
     "physics/test_constant_velocity_closed_forms",
 ]
-NEAR = {  # module: its tests, the quickest to notice first
+NEAR = {  # module: its tests, those that detect most first
     "gms_fsm/charts/chart.py": [
         "charts/test_a_chart_cannot_be_changed",
         "charts/test_chart_refuses_contradictions",
@@ -89,8 +89,8 @@ NEAR |= {
 
 
 def mutants(source):
-    """All (operator, occurrence, line), without those inside a message that is raised."""
-    from cosmic_ray.ast import ast_nodes, get_ast  # of an extra that the tests do without
+    """Return all (operator, occurrence, line) except those inside a message that is raised."""
+    from cosmic_ray.ast import ast_nodes, get_ast  # from an extra that the tests do not need
     from cosmic_ray.plugins import get_operator
 
     tree = get_ast(source)
@@ -141,7 +141,7 @@ def measure(module, sample, seed, budget):
     source = path.read_text(encoding="utf-8")
     every = mutants(source)
     chosen = list(every)
-    random.Random(f"{seed} {module}").shuffle(chosen)  # a smaller sample is the beginning of this
+    random.Random(f"{seed} {module}").shuffle(chosen)  # a smaller sample is a prefix of a larger
     tests = [f"tests/{name}.py" for name in NEAR[module]] + [module]  # its examples
     options = ["-x", "-q", "--no-header", "-p", "no:cacheprovider", "--hypothesis-seed=0"]
     options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # of what is imported here
@@ -200,7 +200,7 @@ def main():
         import transitions  # noqa: F401
         import typer  # noqa: F401
 
-        # Not to shrink, nor to remember, what a mutant fails on.
+        # Neither shrink nor store the examples on which a mutant fails.
         phases = (hypothesis.Phase.explicit, hypothesis.Phase.generate)
         hypothesis.settings.register_profile(
             "mutation", phases=phases, database=None, max_examples=40

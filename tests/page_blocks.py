@@ -29,13 +29,13 @@ class Block:
     Parameters
     ----------
     kind : str
-        What stands behind the fence.
+        Text after the opening fence.
     body : str
-        Its lines.
+        Lines of the block.
     file : str
-        The name a comment before it gives, else empty.
+        File name from a comment before the block, else empty.
     line : int
-        Where it begins, from 1.
+        First line, from 1.
     """
 
     kind: str
@@ -45,7 +45,7 @@ class Block:
 
 
 def blocks_of(text: str) -> list[Block]:
-    """Return the blocks of a page, those that are directions to Sphinx left out."""
+    """Return the blocks of a page, without Sphinx directives."""
     return [
         Block(m["kind"], m["body"], m["file"] or "", text.count("\n", 0, m.start()) + 1)
         for m in FENCE.finditer(text)
@@ -62,8 +62,8 @@ class Page:
         shutil.copytree(ROOT / "scenarios", "scenarios")
 
     def python(self, block: Block) -> str:
-        """Execute a Python block and return what it prints."""
-        code = "\n" * (block.line) + block.body  # so that an error names the page's line
+        """Execute a Python block and return its output."""
+        code = "\n" * (block.line) + block.body  # so that errors have the line number of the page
         with contextlib.redirect_stdout(io.StringIO()) as out:
             exec(compile(code, self.name, "exec", dont_inherit=True), self.namespace)
         return out.getvalue()
@@ -100,7 +100,7 @@ def _run(arguments: list[str]) -> tuple[str, bool]:
 
 
 def _debugged(scenario: str, shown: str) -> tuple[str, bool]:
-    """Give the debugger the commands behind the prompts of a transcript."""
+    """Run the commands of a transcript in the debugger."""
     commands = re.findall(r"^\(t=[^)]*\) (.+)$", shown, re.MULTILINE)
     out = io.StringIO()
     script = io.StringIO("".join(f"{command}\n" for command in commands))
@@ -109,7 +109,7 @@ def _debugged(scenario: str, shown: str) -> tuple[str, bool]:
 
 
 def agrees(shown: str, said: str) -> bool:
-    """Return whether a page shows what was said; a line ``...`` stands for any lines."""
+    """Return whether a page shows the output; a line ``...`` matches any lines."""
     pattern = "".join(
         r"(?:.*\n)*?" if line.strip() == "..." else re.escape(line.rstrip()) + r"[ ]*\n"
         for line in shown.rstrip("\n").split("\n")

@@ -1,4 +1,4 @@
-"""Scenario files of the tests, records to go with them, and the command line in this process."""
+"""Scenario files for the tests, matching records, and the command line run in this process."""
 
 from __future__ import annotations
 
@@ -67,14 +67,14 @@ def table(columns: Iterable[str], *values: np.ndarray) -> str:
 
 
 def sine_table(rows: int = 60) -> str:
-    """Return a harmless record for MEASURED: time in s, position in mm, force in N."""
+    """Return a valid record for MEASURED: time in s, position in mm, force in N."""
     t = np.round(np.arange(rows) * 0.01, 2)
     return table(["t", "x", "F"], t, np.sin(6 * t).round(6), np.cos(6 * t).round(4))
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What the command line did."""
+    """The outcome of a command."""
 
     code: int
     out: str
@@ -82,7 +82,7 @@ class Answer:
 
     @property
     def message(self) -> str:
-        """What follows ``error:``."""
+        """The text after ``error:``."""
         return self.err.partition("error: ")[2]
 
 
@@ -98,7 +98,7 @@ def command_line(
 
     def call(*arguments: str | Path) -> Answer:
         monkeypatch.setattr(sys, "argv", ["gms-fsm", *map(str, arguments)])
-        monkeypatch.setattr("warnings.showwarning", None)  # main() sets its own; put back later
+        monkeypatch.setattr("warnings.showwarning", None)  # main() sets its own; restored later
         capsys.readouterr()
         try:
             main()
@@ -112,13 +112,13 @@ def command_line(
 
 
 def changed(text: str, old: str, new: str) -> str:
-    """Return the text with `old` replaced; `old` must be there once."""
+    """Return the text with `old` replaced; `old` must occur exactly once."""
     assert text.count(old) == 1, (text.count(old), old)
     return text.replace(old, new)
 
 
 def one_message(answer: Answer, *said: str) -> None:
-    """Assert one clear message with exit code 2 that says all of this."""
+    """Assert a single message with exit code 2 that contains all the given texts."""
     assert answer.code == 2, (answer.code, answer.err)
     assert "Traceback" not in answer.out + answer.err
     assert answer.out == ""
@@ -130,7 +130,7 @@ def one_message(answer: Answer, *said: str) -> None:
 
 
 def nothing_written(folder: Path, given: set[str]) -> None:
-    """Assert that a folder holds what was given, and at most one empty folder ``out`` more."""
+    """Assert that a folder contains only the given files, and at most an empty folder ``out``."""
     found = set(folder.rglob("*"))
     found -= {path for path in found if path.name == "out" and not list(path.iterdir())}
     assert {str(path.relative_to(folder)) for path in found} == given

@@ -1,9 +1,9 @@
-"""Hard use for minutes and hours: ``python -m tests.soak --minutes 10``, or ``make soak``.
+"""Stress tests for minutes and hours: ``python -m tests.soak --minutes 10``, or ``make soak``.
 
-The three fuzz bodies for so many minutes each, 200 kills at random moments, a run of a million
-transitions, new random runs of tests/physics/test_hard_random_runs.py and of tests/trials.py. Each
-part runs in processes of its own, under a limit of memory and with a watch on time; what is found
-is printed with the line that repeats it, and the exit code is 1.
+The three fuzz bodies for the given number of minutes each, 200 kills at random moments, a run of a
+million transitions, new random runs of tests/physics/test_hard_random_runs.py and of
+tests/trials.py. Each part runs in separate processes, with limits on memory and time; findings are
+printed with the command that repeats them, and the exit code is then 1.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 SIZES = (8, 32, 128, 512, 2048)  # bytes of an input
-SLOWEST = 60  # s that one input may take
+SLOWEST = 60  # s allowed for one input
 MEMORY = 4 * 2**30  # bytes of address space for a process
-GROWTH = 2**30  # bytes that one input, or the whole time, may add to what is used
+GROWTH = 2**30  # bytes of memory that one input, or the whole run, may add
 WARM = 2000  # inputs until everything is loaded
 
 
@@ -38,24 +38,24 @@ def input_bytes(seed: int, index: int) -> bytes:
 
 
 def _used() -> int:
-    """Return the most memory that was ever in use, bytes."""
+    """Return the peak memory use, bytes."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
 # --------------------------------------------------------------------------- a child that fuzzes
 def fuzz_here(name: str, seed: int, seconds: float, watch: Path) -> dict[str, float]:
-    """Try inputs for a while in this process; print what is found.
+    """Try inputs for a while in this process; print the findings.
 
     Parameters
     ----------
     name : str
-        Of a body in tests/fuzz.py.
+        A body in tests/fuzz.py.
     seed : int
-        Of the inputs.
+        Seed of the inputs.
     seconds : float
-        How long.
+        Duration.
     watch : Path
-        Where the index of the input in hand is written, for whoever finds this process dead.
+        File for the index of the current input, in case this process dies.
 
     Returns
     -------
@@ -108,14 +108,14 @@ def _again(name: str, seed: int, index: int) -> str:
 
 # --------------------------------------------------------------------------- the parts
 def fuzzing(name: str, seed: int, minutes: float) -> bool:
-    """Run one body in a child; return whether nothing was found."""
+    """Run one body in a child; return whether there were no findings."""
     with tempfile.TemporaryDirectory() as folder:
         watch = Path(folder) / "index"
         command = [
             *(sys.executable, "-m", "tests.soak", "--only", name, "--seed", str(seed)),
             *("--child", str(60 * minutes), "--watch", str(watch)),
         ]
-        # Machine code of hostile charts is not to be kept.
+        # Machine code of hostile charts should not be cached.
         surroundings = {**os.environ, "NUMBA_CACHE_DIR": folder}
         limit = 60 * minutes + 2 * SLOWEST + 60
         try:
@@ -196,7 +196,7 @@ def million(transitions: int) -> bool:
 def random_runs(seed: int, examples: int) -> bool:
     """Draw new random runs; hypothesis prints the one that fails, shrunk."""
     began = time.monotonic()
-    with tempfile.TemporaryDirectory() as folder:  # for machine code that nobody needs again
+    with tempfile.TemporaryDirectory() as folder:  # for machine code that is not needed again
         surroundings = {"GMS_FSM_EXAMPLES": str(examples), "NUMBA_CACHE_DIR": folder}
         done = subprocess.run(
             [
@@ -224,7 +224,7 @@ def random_runs(seed: int, examples: int) -> bool:
 
 
 def trials(seed: int, count: int) -> bool:
-    """Judge new random runs at defaults by the reference; the child prints what is wrong."""
+    """Judge new random runs with the defaults by the reference; the child prints wrong ones."""
     from tests.trials import FAMILIES
 
     began = time.monotonic()
@@ -247,9 +247,9 @@ def trials(seed: int, count: int) -> bool:
     return done.returncode == 0
 
 
-# --------------------------------------------------------------------------- all of it
+# --------------------------------------------------------------------------- all parts
 def main() -> None:
-    """Run the parts asked for; exit with 1 if anything was found."""
+    """Run the requested parts; exit with 1 if there were findings."""
     parts = ("expression", "scenario", "trace", "kill", "million", "runs", "trials")
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=10.0, help="for each of the three")

@@ -7,29 +7,30 @@ Families, all of one to six elements, thresholds as shares/k or free:
 
 ``pulled``      the pulled mass of the tests, every parameter spread over decades
 ``forced``      a mass under a force of sines or ramps
-``sines``       a prescribed velocity of sines, now and then of ramps
+``sines``       a prescribed velocity of sines, occasionally of ramps
 ``literature``  k 1e5..1e7 N/m, thresholds of micrometres, v_c 1e-7..1e-5 m/s, 0.5..100 kg
-``undamped``    any of these with sigma = 0; its outcome is told, not judged
+``undamped``    any of these with sigma = 0; its outcome is reported, not judged
 
-A part of each has the published law and is counted by itself. A trial is a pure function of
-(family, seed, index). The formulas of t come from a small pool, because each new text has to be
+Part of each family has the published law and is counted separately. A trial is a pure function of
+(family, seed, index). The formulas in t come from a small pool, because each new text has to be
 compiled; the model is drawn around them, which amounts to the same.
 
 The judge
 ---------
-The reference is our own engine at rtol 1e-12 and an atol far under thresholds and v_c
+The reference is our own engine at rtol 1e-12 and an atol far below thresholds and v_c
 (`tests.witness` checks it). A default run is *right* if its sequence of (element, edge) is the
-reference's. It is *wrong* only where the run is well conditioned: the reference keeps its sequence
-at rtol 1e-11, and when every parameter is changed by 1e-5 of itself, up or down at random, four
-times over; and no gap between switches of two elements changes by half of itself meanwhile. Why
-1e-5: the default rtol is 1e-6 a step, a run has ten to a hundred steps between two switches, so the
-solver may move a switch as far as such a change does. What differs and only keeps its sequence
-under changes of 1e-6 is *close*: no verdict, but listed. So is what differs where the reference has
-a switch that no run of that rtol can decide: two elements that switch within 1e-6 of the time of
-each other, or an arrest with |z| nearer to s than 1e-6 of it, as in steady slip, where z tends to
-s and the parameters do not matter. All else is *ill*: counted, not judged.
+reference's. It is *wrong* only if the run is well conditioned: the reference keeps its sequence
+at rtol 1e-11, and also when every parameter is changed by a relative 1e-5, up or down at random,
+four times over; and no gap between switches of two elements changes by half of itself meanwhile.
+Why 1e-5: the default rtol is 1e-6 per step, and a run has ten to a hundred steps between two
+switches, so the solver may move a switch as far as such a change does. A run that differs and keeps
+its sequence only under changes of 1e-6 is *close*: no verdict, but listed. So is one that differs
+where the reference has a switch that no run of that rtol can decide: two elements that switch
+within 1e-6 of the time of each other, or an arrest with |z| nearer to s than 1e-6 of it, as in
+steady slip, where z tends to s and the parameters do not matter. All else is *ill*: counted, not
+judged.
 
-Switching times and the state at the end are figures, not verdicts.
+Switching times and the state at the end are reported, not judged.
 """
 
 from __future__ import annotations
@@ -76,17 +77,17 @@ SPEEDS = (
     ("0.05*cos(40*t)", 0.05, 40.0),
     ("3*sin(2*t)*sin(0.37*t)", 3.0, 2.0),
 )
-PUBLISHED = 0.15  # share
-WORK = 2e4  # t_end in units of the fastest time; a reference then takes a second at most
-CALLS = 40  # of progress until a run is given up; the compiled engine calls every 20,000 steps
+PUBLISHED = 0.15  # fraction
+WORK = 2e4  # t_end in units of the fastest time; a reference then takes at most a second
+CALLS = 40  # of progress until a run is abandoned; the compiled engine calls every 20,000 steps
 NUDGES, NUDGE, SMALL_NUDGE = 4, 1e-5, 1e-6
-RTOL = 1e-6  # of the runs that are judged
-LARGE = 1e-4  # an error of the end state worth counting
+RTOL = 1e-6  # of the runs under test
+LARGE = 1e-4  # an error of the end state large enough to count
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A run, and how to get it again."""
+    """A run, and how to repeat it."""
 
     family: str
     seed: int
@@ -97,14 +98,14 @@ class Trial:
 
     @property
     def again(self) -> str:
-        """The line that repeats it."""
+        """The command that repeats it."""
         return (
             f"python -m tests.trials --family {self.family} --seed {self.seed} --index {self.index}"
         )
 
     @property
     def atol(self) -> float:
-        """Of the reference: far under all that is compared, in m and m/s."""
+        """Tolerance of the reference: far below everything compared, in m and m/s."""
         p = self.model.parameters
         return float(1e-10 * min(np.min(p.weights) * p.stribeck.F_c, p.v_c))
 
@@ -136,7 +137,7 @@ class Draw:
         return float(u) if size is None else u
 
     def chance(self, share: float) -> bool:
-        """Return True so often."""
+        """Return True with this probability."""
         return bool(self.source.random() < share)
 
     def one_of(self, choices: Sequence[Any]) -> Any:
@@ -189,7 +190,7 @@ def _fastest(model: GMS, mass: float, stiffness: float = 0.0) -> float:
 
 
 def _ramps(draw: Draw, amplitude: float, omega: float) -> tuple[list[tuple[float, float]], float]:
-    """Return ramps to and fro, and their end."""
+    """Return ramps back and forth, and their end."""
     count = int(draw.source.integers(3, 10))
     times = np.cumsum(draw.source.uniform(0.3, 1.0, count)) * math.pi / omega
     sides = (-1.0) ** np.arange(count) * draw.one_of([1, -1])
@@ -235,7 +236,7 @@ def pulled(draw: Draw, law: Any) -> tuple[GMS, PulledSlider, float]:
 
 
 def _pulled(rig: PulledSlider, model: GMS) -> tuple[PulledSlider, float]:
-    """Return a rig fast enough to slip in the time that the work allows, and an end."""
+    """Return a rig fast enough to slip within the allowed work, and an end."""
     curve = model.stribeck
     longest = WORK / _fastest(model, rig.mass, rig.stiffness)
     rig = replace(rig, speed=max(rig.speed, 3 * curve.F_s / (rig.stiffness * longest)))
@@ -294,7 +295,7 @@ def sines(draw: Draw, law: Any) -> tuple[GMS, Prescribed, float]:
 
 
 def literature(draw: Draw, law: Any) -> tuple[GMS, PulledSlider | Slider, float]:
-    """Draw numbers as they are published for machine tools: stiff, light thresholds."""
+    """Draw numbers as published for machine tools: stiff, light thresholds."""
     mass = draw.decades(-0.3, 2)
     k, weights = _elements(draw, draw.decades(5, 7))
     sigma = 2 * np.sqrt(k * mass) * draw.decades(-3, 0) * draw.decades(-0.5, 0, k.size)
@@ -327,18 +328,18 @@ class TooLong(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a run did: its switches, its end (x, v, z), or the class of error it failed with."""
+    """The result of a run: its switches, its end (x, v, z), or the class of its error."""
 
     sequence: tuple[tuple[int, str], ...]
     t: Any
     end: Any
     failed: str
     seconds: float
-    nearest: float = math.inf  # least ||z| / s - 1| of an arrest
+    nearest: float = math.inf  # smallest ||z| / s - 1| at an arrest
 
 
 def run(trial: Trial, engine: str = "compiled", **options: float) -> Outcome:
-    """Run a trial at the defaults, or with options of `simulate`."""
+    """Run a trial with the defaults, or with options of `simulate`."""
     calls, began, failed = 0, time.perf_counter(), ""
 
     def patience(_: object) -> None:
@@ -374,12 +375,12 @@ def run(trial: Trial, engine: str = "compiled", **options: float) -> Outcome:
 
 
 def reference(trial: Trial, engine: str = "compiled", rtol: float = 1e-12) -> Outcome:
-    """Run a trial as exactly as our own engine can."""
+    """Run a trial as accurately as our own engine can."""
     return run(trial, engine, rtol=rtol, atol=trial.atol)
 
 
 def nudged(trial: Trial, number: int, size: float) -> Trial:
-    """Return a trial with every parameter changed by `size` of itself, up or down."""
+    """Return a trial with every parameter changed by a relative `size`, up or down."""
     draw = Draw(zlib.crc32(trial.family.encode()), trial.seed, trial.index, number + 1)
 
     def near(value: Any) -> Any:
@@ -401,7 +402,7 @@ def nudged(trial: Trial, number: int, size: float) -> Trial:
 
 # --------------------------------------------------------------------------- judging
 def is_steady(trial: Trial, exact: Outcome, size: float, engine: str = "compiled") -> bool:
-    """Tell whether the reference keeps its sequence, and its gaps, under changes of that size."""
+    """Return whether the reference keeps its sequence and gaps under changes of that size."""
     others = [reference(trial, engine, rtol=1e-11)]
     others += [reference(nudged(trial, i, size), engine) for i in range(NUDGES)]
     elements = np.array([element for element, _ in exact.sequence])
@@ -416,7 +417,7 @@ def is_steady(trial: Trial, exact: Outcome, size: float, engine: str = "compiled
 
 
 def is_undecided(exact: Outcome) -> bool:
-    """Tell whether a switch of the reference hangs on less than the default rtol."""
+    """Return whether a switch of the reference depends on less than the default rtol."""
     elements = np.array([element for element, _ in exact.sequence])
     gaps = np.diff(exact.t)[elements[1:] != elements[:-1]]
     times = exact.t[1:][elements[1:] != elements[:-1]]
@@ -441,7 +442,7 @@ class Judged:
 
 
 def judge(trial: Trial, engine: str = "compiled", **options: float) -> Judged:
-    """Compare a run at the defaults (or with options, to test the judge) with the reference."""
+    """Compare a run with the defaults (or with options, to test the judge) with the reference."""
     default, exact = run(trial, engine, **options), reference(trial, engine)
     if exact.failed or default.failed:
         return Judged(trial, "reference failed" if exact.failed else "failed", default, exact)
@@ -464,7 +465,7 @@ def judge(trial: Trial, engine: str = "compiled", **options: float) -> Judged:
 
 
 def is_finding(judged: Judged) -> bool:
-    """Tell whether a verdict is a fault: a wrong sequence, or a run that cannot go on."""
+    """Return whether a verdict is a fault: a wrong sequence, or a run that cannot continue."""
     if judged.trial.family not in JUDGED:
         return False
     failed = judged.default.failed or judged.exact.failed
@@ -473,7 +474,7 @@ def is_finding(judged: Judged) -> bool:
 
 # --------------------------------------------------------------------------- printing
 def said(judged: Judged) -> str:
-    """Return a line about a run that is not right, and the line that repeats it."""
+    """Return a line about a run that is not right, and the command that repeats it."""
     default, exact = judged.default, judged.exact
     what = f"{judged.verdict}: {len(default.sequence)} switches, the reference has "
     what += f"{len(exact.sequence)}"
@@ -490,7 +491,7 @@ def said(judged: Judged) -> str:
 
 
 def table(found: Iterable[Judged]) -> str:
-    """Return the summary: a row a family and law."""
+    """Return the summary: one row per family and law."""
     head = (
         f"{'family':22} {'runs':>5} {'right':>6} {'wrong':>6} {'close':>6} {'ill':>5} "
         f"{'(differ)':>8} {'failed':>7} {'ref. f.':>7} {'switches':>9} {'late':>8} {'off':>8} "
@@ -519,7 +520,7 @@ def table(found: Iterable[Judged]) -> str:
 
 
 def witnessed(trial: Trial, engine: str = "compiled") -> str:
-    """Return how the reference differs from the witness; empty where it does not."""
+    """Return how the reference differs from the witness; empty if it does not."""
     from tests.witness import witness
 
     exact = reference(trial, engine)
@@ -533,7 +534,7 @@ def witnessed(trial: Trial, engine: str = "compiled") -> str:
 
 
 def details(trial: Trial, engine: str) -> str:
-    """Return all about one trial."""
+    """Return everything about one trial."""
     judged = judge(trial, engine)
     lines = [str(trial), said(judged)]
     for name, outcome in (("default", judged.default), ("reference", judged.exact)):
@@ -546,7 +547,7 @@ def details(trial: Trial, engine: str) -> str:
 
 
 def main() -> None:
-    """Judge so many runs of each family asked for."""
+    """Judge the requested number of runs in each requested family."""
     parser = argparse.ArgumentParser(description="Random runs against a reference.")
     parser.add_argument("--family", choices=FAMILIES, action="append", help="default: all")
     parser.add_argument("--count", type=int, default=100, help="runs of each family")

@@ -1,10 +1,10 @@
-"""A slow, hand-written run of a GMS bank, to check the reference of `tests.trials` by.
+"""A slow, hand-written simulation of a GMS bank, to check the reference of `tests.trials`.
 
-It shares no code with the packages: SciPy's DOP853 between places where a bit of knowledge turns
-(is v over v_c, under -v_c, of which sign; is z_i over s_i, under -s_i), guards as if-else over
-those bits, and Filippov sliding written out: v rests at 0, and sigma in [-1, 1] stands in place of
-sgn(v) so that dv/dt = 0. A bit turns at its located root and nowhere else, so that no rounding at
-a root can fire a guard twice.
+It shares no code with the packages: SciPy's DOP853 between points where a flag changes (whether v
+is above v_c, below -v_c, of which sign; whether z_i is above s_i, below -s_i), guards as if-else
+over those flags, and Filippov sliding written out: v rests at 0, and sigma in [-1, 1] replaces
+sgn(v) so that dv/dt = 0. A flag changes at its located root and nowhere else, so that no rounding
+at a root can fire a guard twice.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from gms_fsm import GMS, Prescribed, PulledSlider, Slider
 from gms_fsm.systems.signals import Corners, Formula
 
 RTOL = 1e-12
-LOOKS = 6  # at the bits, inside a step
-NOTHING, LET_GO = -1, -2  # what ended an arc, besides the bits
+LOOKS = 6  # evaluations of the flags inside a step
+NOTHING, LET_GO = -1, -2  # reasons for the end of an arc, besides the flags
 
 
 @dataclass
 class Witnessed:
-    """Transitions (t, element, edge), stretches of sliding (t, t), the end, the peak of |v|."""
+    """Transitions (t, element, edge), intervals of sliding (t, t), the end, the peak of |v|."""
 
     transitions: list[tuple[float, int, str]]
     sliding: list[tuple[float, float]]
@@ -78,7 +78,7 @@ def witness(model: GMS, rig: Prescribed | Slider | PulledSlider, t_end: float) -
         low, high = slope(t, y, -1.0)[1], slope(t, y, 1.0)[1]
         return float((low + high) / (low - high))
 
-    # What is watched: v - v_c, v + v_c, v, the rims of the dip, and z - s and z + s.
+    # Watched: v - v_c, v + v_c, v, the rims of the dip, and z - s and z + s.
     def gaps(t: float, y: np.ndarray) -> np.ndarray:
         v, z = v_of(t, y), y[2:]
         s = s_of(v)
@@ -92,7 +92,7 @@ def witness(model: GMS, rig: Prescribed | Slider | PulledSlider, t_end: float) -
     said = Witnessed([], [], 0.0, 0.0, y[2:], 0.0)
 
     def ask() -> None:
-        """Fire all that is enabled; the bits of v and z are known."""
+        """Fire everything enabled; the flags of v and z are known."""
         over, under = bits[5 : 5 + n] >= 0, bits[5 + n :] <= 0
         fast, back = bits[0] > 0, bits[1] < 0
         edges = [
@@ -143,7 +143,7 @@ def witness(model: GMS, rig: Prescribed | Slider | PulledSlider, t_end: float) -
                 if slides:
                     new[:5] = bits[:5]
                 else:
-                    bits = np.where(bits == 0, new, bits)  # began on a root: nothing has turned
+                    bits = np.where(bits == 0, new, bits)  # started on a root: nothing has changed
                 roots = {
                     int(j): _root(lambda w, j=j, path=path: gaps(w, path(w))[j], before, u)
                     for j in np.flatnonzero(new != bits)
@@ -169,5 +169,5 @@ def witness(model: GMS, rig: Prescribed | Slider | PulledSlider, t_end: float) -
 
 
 def _root(g: Callable[[float], float], a: float, b: float) -> float:
-    """Return where g changes its sign; a, where rounding hides that it had this sign before."""
+    """Return where g changes its sign; a, if rounding hides that it had this sign before."""
     return b if g(b) == 0 else a if g(a) * g(b) >= 0 else float(brentq(g, a, b, xtol=1e-18))

@@ -1,9 +1,9 @@
-"""What the notebook of lesson 1 adds: where the motion turns, as a slider."""
+"""Additions of the notebook of lesson 1: a slider for the reversal point."""
 
 # %% [markdown]
-# ## Turn a knob
+# ## Vary a parameter
 #
-# The motion goes to +20 um, back to b, and on to +30 um. Wherever b lies, the force passes again
+# The motion goes to +20 um, back to b, and on to +30 um. Wherever b is, the force passes again
 # through the point (circle) at which the inner loop began.
 
 # %%
@@ -22,7 +22,7 @@ def inner_loop(b):
     ax = figure.subplots()
     ax.plot(1e6 * trace.x, trace.F)
     ax.plot(1e6 * turn.x, turn.F, "o", markersize=9, markerfacecolor="none")
-    ax.set(xlabel="x [um]", ylabel="F [N]", title=f"turned at 20 um and at {b:g} um")
+    ax.set(xlabel="x [um]", ylabel="F [N]", title=f"reversals at 20 um and at {b:g} um")
     return figure
 
 
@@ -32,6 +32,6 @@ _ = interact(inner_loop, b=b)
 # %% [markdown]
 # ## Try
 #
-# - How far back must b lie before an element slips backward? Read it from `PARAMETERS.weights`.
-# - Give the bank one element more (`GMSParameters.from_shares`). Where does the loop change?
+# - How far back must b be before an element slips backward? Derive it from `PARAMETERS.weights`.
+# - Add an element to the bank (`GMSParameters.from_shares`). Where does the loop change?
 # - Run the same strokes with `LuGre` and look at the circle.

@@ -1,10 +1,10 @@
-"""What the notebook of lesson 2 adds: how hard it is shaken, as a slider."""
+"""Additions of the notebook of lesson 2: a slider for the amplitude of the oscillating force."""
 
 # %% [markdown]
-# ## Turn a knob
+# ## Vary a parameter
 #
-# The shake has an amplitude of 0.1 N above. LuGre's drift grows with it; the GMS bank that has
-# slipped once only swings further.
+# The force above oscillates with an amplitude of 0.1 N. LuGre's drift grows with the amplitude; the
+# GMS bank that has slipped once only oscillates with a larger stroke.
 
 # %%
 from ipywidgets import FloatSlider, interact
@@ -25,18 +25,18 @@ def shaken(amplitude):
         t, x = cycle_means(trace)
         drift = 1e3 * (x[-1] - x[0]) / (t[-1] - t[0])
         ax.plot(trace.t, 1e3 * trace.x, label=f"{name}: {drift:.2f} mm/s")
-    ax.set(xlabel="t [s]", ylabel="x [mm]", title=f"shaken by {amplitude:g} N")
+    ax.set(xlabel="t [s]", ylabel="x [mm]", title=f"force amplitude {amplitude:g} N")
     ax.legend()
     return figure
 
 
 amplitude = FloatSlider(
-    0.1, min=0, max=0.2, step=0.02, description="shake [N]", continuous_update=False
+    0.1, min=0, max=0.2, step=0.02, description="amplitude", continuous_update=False
 )
 _ = interact(shaken, amplitude=amplitude)
 
 # %% [markdown]
 # ## Try
 #
-# - At which weights w_i = c/k_i does the first element slip at all?
-# - Does LuGre drift backward if the load is taken away before the shake?
+# - At which weights w_i = c/k_i does the first element begin to slip?
+# - Does LuGre drift backward if the load is removed before the oscillation starts?

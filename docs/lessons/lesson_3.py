@@ -1,10 +1,10 @@
-"""What the notebook of lesson 3 adds: the step, as a slider."""
+"""Additions of the notebook of lesson 3: a slider for the step."""
 
 # %% [markdown]
-# ## Turn a knob
+# ## Vary a parameter
 #
-# Choose a step. Which of the 48 switches a program finds that looks at its guards once a step, is a
-# matter of luck: a smaller step is not always a better one.
+# Choose a step. How many of the 48 switches are found by a program that checks its guards once per
+# step is a matter of luck: a smaller step is not always better.
 
 # %%
 from ipywidgets import FloatSlider, interact
@@ -18,11 +18,11 @@ def with_step(ms):
     figure = Figure(figsize=(6.4, 3.4), layout="constrained")
     ax = figure.subplots()
     ax.plot(ROWS, result.located.F, color="0.6", linewidth=3, label="located")
-    ax.plot(ROWS, trace.F, linestyle="--", label="once a step")
+    ax.plot(ROWS, trace.F, linestyle="--", label="once per step")
     ax.set(xlabel="t [s]", ylabel="F [N]")
     ax.set_title(
         f"{ms:g} ms: {len(trace.transitions)} of 48 switches, "
-        f"{samples_in_window(1e-3 * ms)} of {REVERSALS.size} reversals met"
+        f"{samples_in_window(1e-3 * ms)} of {REVERSALS.size} reversals hit"
     )
     ax.legend()
     return figure
@@ -42,7 +42,7 @@ _ = interact(with_step, ms=ms)
 # %% [markdown]
 # ## Try
 #
-# - How small must a fixed step be until every reversal is met whatever its phase? Compare it with
+# - How small must a fixed step be to hit every reversal, whatever its phase? Compare it with
 #   `window_width()`.
 # - Run the same model with `method="dp45"`, `events="step"` and `max_step=1e-3`. Is an adaptive
-#   step any better at it?
+#   step any better?

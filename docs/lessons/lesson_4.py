@@ -1,9 +1,9 @@
-"""What the notebook of lesson 4 adds: things to try."""
+"""Additions of the notebook of lesson 4: things to try."""
 
 # %% [markdown]
-# ## The two laws, as they are written
+# ## The text of the two laws
 #
-# The laws are texts of a chart; nothing else differs between the two runs above.
+# The laws are texts in a chart; nothing else differs between the two runs above.
 
 # %%
 from gms_fsm.charts import SLIP_LAWS
@@ -14,7 +14,7 @@ for name, text in SLIP_LAWS.items():
 # %% [markdown]
 # ## Try
 #
-# - `gms_fsm.prove(result.published.model.chart)` needs no run to find the fault. What does it say,
+# - `gms_fsm.prove(result.published.model.chart)` finds the error without a run. What does it say,
 #   and at which point?
-# - Which share of the vanished heat belongs to each element?
-# - Halve the period of the motion. Does z_1 go further down, or less far?
+# - What is each element's share of the missing heat?
+# - Halve the period of the motion. Does z_1 decrease further, or less far?

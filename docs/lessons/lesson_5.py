@@ -1,9 +1,9 @@
-"""What the notebook of lesson 5 adds: the number of elements, as a slider."""
+"""Additions of the notebook of lesson 5: a slider for the number of elements."""
 
 # %% [markdown]
-# ## Turn a knob
+# ## Vary a parameter
 #
-# A chain of n straight pieces along the parabola, as the bank of n elements makes it.
+# A bank of n elements approximates the parabola by n line segments.
 
 # %%
 from ipywidgets import IntSlider, interact
@@ -21,7 +21,7 @@ def chain(n):
     ax = figure.subplots()
     ax.plot(1e6 * fine.x, parabola(fine.x), color="0.75", linewidth=6, label="smooth curve")
     ax.plot(1e6 * fine.x, fine.F, label=f"n = {n}")
-    ax.set(xlabel="x [um]", ylabel="F [N]", title=f"off by {100 * error:.2f} % of F_c at most")
+    ax.set(xlabel="x [um]", ylabel="F [N]", title=f"error at most {100 * error:.2f} % of F_c")
     ax.legend()
     return figure
 
@@ -31,5 +31,5 @@ _ = interact(chain, n=IntSlider(3, min=1, max=20, description="n", continuous_up
 # %% [markdown]
 # ## Try
 #
-# - How many elements until the error is below 0.1 % of F_c? Ask the formula first, then the slider.
+# - How many elements reduce the error below 0.1 % of F_c? Use the formula first, then the slider.
 # - Space the thresholds geometrically instead of evenly. What happens to the small loop?

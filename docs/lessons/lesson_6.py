@@ -1,9 +1,9 @@
-"""What the notebook of lesson 6 adds: the pulling speed, as a slider."""
+"""Additions of the notebook of lesson 6: a slider for the pulling speed."""
 
 # %% [markdown]
-# ## Turn a knob
+# ## Vary a parameter
 #
-# The same mass on the same spring, pulled from rest at another speed.
+# The same mass on the same spring, pulled from rest at a different speed.
 
 # %%
 from ipywidgets import FloatSlider, interact
@@ -30,6 +30,6 @@ _ = interact(pulled, V=V)
 # %% [markdown]
 # ## Try
 #
-# - At which speed does it stop to stick and slip? Does a stiffer spring move that speed up or down?
-# - Take the Stribeck curve away: `bank(F_s=1.0)`.
+# - At which speed does stick-slip end? Does a stiffer spring raise or lower that speed?
+# - Remove the Stribeck curve: `bank(F_s=1.0)`.
 # - With v_s = 1e-3 m/s it never comes to rest again. Why? Look at v just before break-away.

@@ -1,9 +1,9 @@
-"""What the notebook of lesson 7 adds: the frequency, as a slider."""
+"""Additions of the notebook of lesson 7: a slider for the frequency."""
 
 # %% [markdown]
-# ## Turn a knob
+# ## Vary a parameter
 #
-# The loop opens with the frequency up to about w = C/s, and closes again beyond.
+# The loop opens as the frequency rises to about w = C/s, and closes again beyond that.
 
 # %%
 import math
@@ -45,4 +45,4 @@ _ = interact(loop, w=w)
 # ## Try
 #
 # - Double C. At which frequency is the loop widest now?
-# - Which way around is the loop run through? Does it depend on the frequency?
+# - In which direction is the loop traversed? Does it depend on the frequency?

@@ -1,4 +1,4 @@
-"""The charts that ship, as the command line names and lists them."""
+"""The included charts, as named and listed by the command line."""
 
 from __future__ import annotations
 
@@ -12,56 +12,56 @@ from gms_fsm.errors import ParameterError
 __all__ = ["catalogue", "checkable", "chosen"]
 
 WIDTH = 78
-OWN = "in Python, plots.statechart(chart), prove(chart); or as a file in gms_fsm/charts"
+OWN = "in Python, use plots.statechart(chart) or prove(chart), or add a file to gms_fsm/charts"
 
 
 def chosen(verb: str, name: str, law: str) -> tuple[Entry, Chart]:
-    """Return the chart that a verb is asked for.
+    """Return the chart named on the command line.
 
     Parameters
     ----------
     verb : str
-        For the message.
+        Verb, for the message.
     name : str
-        A chart that ships.
+        Name of an included chart.
     law : str
-        What ``--law`` says; empty if it is not given.
+        Value of ``--law``; empty if it is not given.
 
     Returns
     -------
     (Entry, Chart)
-        What is listed under the name, and its chart under the law.
+        The entry of this name, and its chart for the law.
 
     Raises
     ------
     ParameterError
-        If there is no such chart, or a law is missing, unknown or not wanted.
+        If there is no such chart, or the law is missing, unknown or not applicable.
     """
     try:
         found = entry(name)
     except ParameterError as error:
-        advice = "; ".join(filter(None, (error.advice, f"for a chart of your own: {OWN}")))
+        advice = "; ".join(filter(None, (error.advice, f"for a custom chart: {OWN}")))
         raise error.replaced(advice=advice) from None
     options = " or ".join(f"--law {each}" for each in found.laws)
     if law and not options:
         others = [each.name for each in registered().values() if each.laws]
         raise ParameterError(
-            f"{verb} {name} takes no --law", advice=f"only {', '.join(others)} does"
+            f"{verb} {name} takes no --law", advice=f"only {', '.join(others)} takes one"
         )
     if options and not law:
-        raise ParameterError(f"{verb} {name} needs {options}", advice="they differ")
+        raise ParameterError(f"{verb} {name} needs {options}", advice="the laws differ")
     if law not in found.laws and options:
         raise ParameterError(f"{verb} {name} has no law {law!r}", advice=f"give {options}")
     return found, found.chart(law)
 
 
 def catalogue() -> str:
-    """Return the charts that ship, with their parameters.
+    """Return a list of the included charts, with their parameters.
 
     Returns
     -------
     str
-        For people, at most 78 columns wide where it can be.
+        Text, at most 78 columns wide where possible.
 
     Examples
     --------
@@ -73,12 +73,12 @@ def catalogue() -> str:
 
 
 def checkable() -> str:
-    """Return what a proof can be asked about, with what is wrong with the faulty ones.
+    """Return a list of the charts that can be checked, with the faults of the faulty ones.
 
     Returns
     -------
     str
-        For people.
+        Text.
     """
     sound = [_name(each) for each in registered().values() if not each.wrong]
     return f"{', '.join(sound)}, and as demonstrations:\n{_faulty()}"
@@ -93,12 +93,12 @@ def _described(each: Entry) -> Iterator[str]:
     rows = [(one.name, one.described) for one in each.parameters]
     rows.append(("numbers", each.demonstration.source))
     wide = max(len(name) for name, _ in rows)
-    for name, told in rows:
+    for name, text in rows:
         lead, rest = f"  {name:<{wide}}  ", " " * (wide + 4)
-        yield textwrap.fill(lead + told, WIDTH, subsequent_indent=rest).rstrip()
+        yield textwrap.fill(lead + text, WIDTH, subsequent_indent=rest).rstrip()
 
 
 def _faulty() -> str:
     found = [each for each in registered().values() if each.wrong]
-    told = (f"{each.name}  {each.wrong}" for each in found)
-    return "\n".join(textwrap.fill(each, WIDTH, subsequent_indent="  ") for each in told)
+    text = (f"{each.name}  {each.wrong}" for each in found)
+    return "\n".join(textwrap.fill(each, WIDTH, subsequent_indent="  ") for each in text)

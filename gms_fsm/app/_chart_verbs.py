@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gms_fsm._files import output_folder, written_whole
+from gms_fsm._files import output_folder, write_whole
 from gms_fsm.app._options import ChartName, Law
 from gms_fsm.app.paper import FORCE, VELOCITY
 
@@ -136,7 +136,7 @@ def _write_report(report: Report, folder: Path) -> list[Path]:
     stems = [f"{number}-{finding.check}" for number, finding in enumerate(found, start=1)]
     pictures = [name for stem in stems for name in formats.files(stem, "graph")]
     output_folder(folder, ["report.txt", *pictures])
-    written = [written_whole(folder / "report.txt", lambda file: file.write(text))]
+    written = [write_whole(folder / "report.txt", lambda file: file.write(text))]
     edges = report.chart.guards
     for stem, finding in zip(stems, found, strict=True):
         marked = [part for part in finding.where if part in edges] or finding.where

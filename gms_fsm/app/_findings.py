@@ -1,4 +1,4 @@
-"""What is wrong with a scenario, in one sentence: file, key, value, rule, and the nearest key."""
+"""The error in a scenario, in one sentence: file, key, value, rule, and the nearest key."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ __all__ = ["explained"]
 
 
 def explained(error: ValidationError, data: dict[str, Any]) -> str:
-    """Put the first finding of a validation into one sentence, and count the rest.
+    """Describe the first validation error in one sentence, and count the others.
 
     Parameters
     ----------
     error : ValidationError
-        What pydantic found.
+        The errors found by pydantic.
     data : dict
-        What the file says.
+        Contents of the file.
 
     Returns
     -------
@@ -29,7 +29,7 @@ def explained(error: ValidationError, data: dict[str, Any]) -> str:
         Key, value, rule, and the nearest valid key for a mistyped one.
     """
     findings = error.errors(include_url=False)
-    # An unknown key is most often the cause of a missing one: say it first.
+    # An unknown key is often the cause of a missing one, so report it first.
     first = min(findings, key=lambda f: f["type"] != "extra_forbidden")
     places = _written_key(first["loc"])
     key = cut(".".join(places))
@@ -48,8 +48,8 @@ def explained(error: ValidationError, data: dict[str, Any]) -> str:
     if kind == "union_tag_not_found":
         return f"{key}.kind is missing{more}"
     if kind == "union_tag_invalid":
-        said, allowed = first["ctx"]["discriminator"].strip("'"), first["ctx"]["expected_tags"]
-        return f"{key}.{said} = {shown(first['ctx']['tag'])}: it must be one of {allowed}{more}"
+        tag, allowed = first["ctx"]["discriminator"].strip("'"), first["ctx"]["expected_tags"]
+        return f"{key}.{tag} = {shown(first['ctx']['tag'])}: it must be one of {allowed}{more}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         return f"{key} = {shown(value)}: it must be a table, [{key}]{more}"
     text = first["msg"].removeprefix("Value error, ")
@@ -60,7 +60,7 @@ def explained(error: ValidationError, data: dict[str, Any]) -> str:
 
 
 def _elsewhere(key: str, data: dict[str, Any]) -> list[str]:
-    """Return the nearest key of another table, with its table."""
+    """Return the most similar key of another table, with its table."""
     everywhere = ("run", "initial", "output")
     tables = [name for name in Scenario.model_fields if name in data or name in everywhere]
     places = {name: f"{table}.{name}" for table in tables for name in _valid_keys([table], data)}
@@ -68,10 +68,10 @@ def _elsewhere(key: str, data: dict[str, Any]) -> list[str]:
 
 
 def _written_key(loc: tuple[int | str, ...]) -> list[str]:
-    """Return a finding's place as the user wrote it: without the tags of the forms chosen."""
+    """Return the location of an error as the user wrote it, without the tags of union members."""
     places = [str(part) for part in loc if part not in FORMS]
     if loc and loc[0] in ("model", "rig"):
-        del places[1:2]  # which model or rig
+        del places[1:2]  # the tag of the model or rig
     return places
 
 
@@ -93,14 +93,14 @@ def _valid_keys(places: list[str], data: dict[str, Any]) -> list[str]:
 
 
 def _tables_in(annotation: Any) -> list[type[BaseModel]]:
-    """Return the tables an annotation allows, inside unions and annotations too."""
+    """Return the tables allowed by an annotation, including those in unions."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [table for part in get_args(annotation) for table in _tables_in(part)]
 
 
 def _fits(option: type[BaseModel], table: dict[str, Any]) -> bool:
-    """Tell whether a table of the file is of this kind, or about this chart."""
+    """Return whether a table of the file is of this kind, or for this chart."""
     for key in ("kind", "chart"):
         if key in option.model_fields:
             return table.get(key) in get_args(option.model_fields[key].annotation)

@@ -1,8 +1,8 @@
-"""Tables of a scenario file that say which friction model runs.
+"""Tables of a scenario file that define the friction model.
 
-Their keys, units and rules are those of the charts' parameters. ``kind`` names a model of
-`gms_fsm.systems.models`, with forms of its own (columns of Table I, shares); ``chart`` names any
-chart that ships, and then the keys are its parameters.
+Their keys, units and rules are those of the parameters of the charts. ``kind`` names a model of
+`gms_fsm.systems.models`, which has additional keys (columns of Table I, shares); ``chart`` names
+any included chart, and the other keys are then its parameters.
 """
 
 from __future__ import annotations
@@ -44,17 +44,17 @@ __all__ = [
     "Table",
 ]
 
-# Tags of forms in pydantic's findings; no key of a file looks like these.
+# Tags of union members in pydantic's errors; no key of a file looks like these.
 BY_KIND, BY_CHART, ONE, LIST = "<kind>", "<chart>", "<number>", "<list>"
 
 
 class Table(BaseModel):
-    """A table of a scenario file: no key is unknown, no type is guessed."""
+    """A table of a scenario file, without unknown keys or type conversions."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
-_TOLD: Mapping[str, str] = {
+_DESCRIBED: Mapping[str, str] = {
     each.name: each.described
     for each in (*PARAMETERS, *LUGRE.parameters, SIGMA_2, WEIGHTS, *STRIBECK)
 }
@@ -72,9 +72,9 @@ Numbers = Annotated[
 class StribeckTable(Table):
     """The Stribeck curve, eq. (2)."""
 
-    F_c: float = Field(description=_TOLD["F_c"])
-    F_s: float = Field(description=_TOLD["F_s"])
-    v_s: float = Field(description=_TOLD["v_s"])
+    F_c: float = Field(description=_DESCRIBED["F_c"])
+    F_s: float = Field(description=_DESCRIBED["F_s"])
+    v_s: float = Field(description=_DESCRIBED["v_s"])
 
     def build(self) -> Stribeck:
         """Return the curve."""
@@ -82,26 +82,28 @@ class StribeckTable(Table):
 
 
 class GMSTable(Table):
-    """A GMS bank: a column of the paper's Table I, or all parameters."""
+    """A GMS model: a column of Table I of the paper, or all parameters."""
 
     kind: Literal["GMS"]
     law: Law = Field(description="slip law; there is no default")
     preset: Literal["non-drifting", "stick-slip"] | None = Field(
         None, description="column of Table I, instead of parameters"
     )
-    k: list[float] | None = Field(None, description=_TOLD["k"])
-    sigma: list[float] | None = Field(None, description=_TOLD["sigma"])
-    C: Numbers | None = Field(None, description=f"{_TOLD['C']}; with shares one number, N/s")
-    sigma_2: float | None = Field(None, description=_TOLD["sigma_2"])
-    v_c: float | None = Field(None, description=_TOLD["v_c"])
+    k: list[float] | None = Field(None, description=_DESCRIBED["k"])
+    sigma: list[float] | None = Field(None, description=_DESCRIBED["sigma"])
+    C: Numbers | None = Field(
+        None, description=f"{_DESCRIBED['C']}; with shares, one number in N/s"
+    )
+    sigma_2: float | None = Field(None, description=_DESCRIBED["sigma_2"])
+    v_c: float | None = Field(None, description=_DESCRIBED["v_c"])
     stribeck: StribeckTable | None = None
-    weights: list[float] | None = Field(None, description=_TOLD["weights"])
-    shares: list[float] | None = Field(None, description="share of friction of each element")
+    weights: list[float] | None = Field(None, description=_DESCRIBED["weights"])
+    shares: list[float] | None = Field(None, description="share of the friction of each element")
 
     @model_validator(mode="after")
     def _fits(self) -> GMSTable:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # it is said when the model is built to be used
+            warnings.simplefilter("ignore")  # the warning is issued when the model is built for use
             self.build()
         return self
 
@@ -111,7 +113,9 @@ class GMSTable(Table):
         if self.preset is not None:
             given = [name for name in own if getattr(self, name) is not None]
             if given:
-                raise ValueError(f"preset goes with weights only; take out {', '.join(given)}")
+                raise ValueError(
+                    f"preset can be combined with weights only; remove {', '.join(given)}"
+                )
             parameters = GMSParameters.paper(self.preset)
             if self.weights is not None:
                 parameters = parameters.with_weights(self.weights)
@@ -127,7 +131,7 @@ class GMSTable(Table):
         sigma = [0.0] * n if self.sigma is None else self.sigma
         if self.shares is not None:
             if isinstance(self.C, list) or self.weights is not None:
-                raise ValueError("shares go with one number C [N/s] and without weights")
+                raise ValueError("shares need C as one number [N/s], and no weights")
             assert self.C is not None
             try:
                 parameters = GMSParameters.from_shares(
@@ -144,7 +148,9 @@ class GMSTable(Table):
                 raise error.replaced(place=place) if error.place != place else error from None
         else:
             if not isinstance(self.C, list):
-                raise ValueError("C must be a list, one number [m/s] an element (or give shares)")
+                raise ValueError(
+                    "C must be a list with one number [m/s] per element (or give shares)"
+                )
             parameters = GMSParameters(
                 self.k,
                 sigma,
@@ -161,9 +167,9 @@ class LuGreTable(Table):
     """The LuGre model."""
 
     kind: Literal["LuGre"]
-    sigma_0: float = Field(description=_TOLD["sigma_0"])
-    sigma_1: float = Field(description=_TOLD["sigma_1"])
-    sigma_2: float = Field(description=_TOLD["sigma_2"])
+    sigma_0: float = Field(description=_DESCRIBED["sigma_0"])
+    sigma_1: float = Field(description=_DESCRIBED["sigma_1"])
+    sigma_2: float = Field(description=_DESCRIBED["sigma_2"])
     stribeck: StribeckTable
 
     @model_validator(mode="after")
@@ -183,11 +189,11 @@ class LuGreTable(Table):
 
 # --------------------------------------------------------------------------- any chart
 class ChartTable(Table):
-    """A chart that ships; the table of each has its parameters as further keys."""
+    """An included chart; the table of each has its parameters as further keys."""
 
     chart: str
     n: int | None = Field(
-        None, ge=1, description="number of elements; as many as the longest list has if left out"
+        None, ge=1, description="number of elements; by default the length of the longest list"
     )
 
     @model_validator(mode="after")
@@ -213,11 +219,11 @@ class ChartTable(Table):
         )
 
 
-_FIELD = "parameter_{}"  # what a parameter is called inside; pydantic has names of its own
+_FIELD = "parameter_{}"  # internal name of a parameter; pydantic reserves some names
 
 
 def _chart_table(entry: Entry) -> type[ChartTable]:
-    """Return the table of a chart: its parameters are keys."""
+    """Return the table of a chart, with its parameters as keys."""
     kind: Any = Literal[entry.name]
     fields: dict[str, Any] = {"chart": (kind, Field(description=entry.title))}
     if entry.laws:
@@ -225,17 +231,20 @@ def _chart_table(entry: Entry) -> type[ChartTable]:
         fields["law"] = (law, Field(description="there is no default"))
     for each in entry.parameters:
         numbers: Any = Numbers if each.per_element else float
-        told = each.described
-        fields[_FIELD.format(each.name)] = (numbers, Field(alias=each.name, description=told))
+        description = each.described
+        fields[_FIELD.format(each.name)] = (
+            numbers,
+            Field(alias=each.name, description=description),
+        )
     if entry.curve:
-        fields["stribeck"] = (StribeckTable, Field(description="the curve behind the input s"))
+        fields["stribeck"] = (StribeckTable, Field(description="the curve that gives the input s"))
         shared: tuple[Parameter, ...] = (SIGMA_2, WEIGHTS)
     else:
         shared = (SIGMA_2,)
     for each in shared:
         if each.name not in entry.parameter_names:
             optional: Any = (list[float] if each.per_element else float) | None
-            fields[each.name] = (optional, Field(None, description=_TOLD[each.name]))
+            fields[each.name] = (optional, Field(None, description=_DESCRIBED[each.name]))
     return create_model(f"Chart {entry.name}", __base__=ChartTable, __doc__=entry.title, **fields)
 
 

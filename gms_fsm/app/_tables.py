@@ -1,4 +1,4 @@
-"""Tables of a scenario file: every key, its type and what it says."""
+"""Tables of a scenario file: every key with its type and description."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ __all__ = [
     "SliderTable",
 ]
 
-# Tags of forms in pydantic's findings; no key of a file looks like these.
+# Tags of union members in pydantic's errors; no key of a file looks like these.
 TEXT, RAMPS, TABLE = "<text>", "<ramps>", "<table>"
 FORMS = (BY_KIND, BY_CHART, ONE, LIST, TEXT, RAMPS, TABLE)
 SCIPY_METHODS = ("RK45", "DOP853", "Radau", "BDF", "LSODA")
@@ -45,11 +45,11 @@ SCIPY_METHODS = ("RK45", "DOP853", "Radau", "BDF", "LSODA")
 
 # --------------------------------------------------------------------------- records
 class ColumnTable(Table):
-    """Where a quantity stands."""
+    """The column of a quantity."""
 
-    column: str = Field(description="head of the column")
+    column: str = Field(description="name in the header line")
     unit: str = Field(description='for example "mm"')
-    sign: Literal[1, -1] = Field(1, description="-1 turns the quantity around")
+    sign: Literal[1, -1] = Field(1, description="-1 to reverse the sign of the quantity")
 
     def build(self) -> Column:
         """Return the column."""
@@ -60,20 +60,22 @@ Delimiter = Literal["\t", ";", ",", "|", " "]
 
 
 class RecordTable(Table):
-    """A measured motion, with the force measured along with it where there is one."""
+    """A measured motion, optionally with the measured force."""
 
-    file: str = Field(description="CSV or TSV, beside the scenario or in GMS_FSM_DATA")
+    file: str = Field(description="CSV or TSV, in the folder of the scenario or in GMS_FSM_DATA")
     time: ColumnTable
     position: ColumnTable | None = None
     velocity: ColumnTable | None = None
-    force: ColumnTable | None = Field(None, description="measured friction, to compare with")
+    force: ColumnTable | None = Field(None, description="measured friction, for comparison")
     normal: ColumnTable | None = Field(None, description="normal force")
-    where: str = Field("", description='which rows count, for example "normal > 4.5 N"')
+    where: str = Field(
+        "", description='condition for the rows to use, for example "normal > 4.5 N"'
+    )
     smoothing: float | None = Field(None, ge=0, description="time constant of the spline, s")
     delimiter: Delimiter | None = None
 
     def columns(self) -> dict[str, Column]:
-        """Return the columns that are given."""
+        """Return the given columns."""
         names = ("time", "position", "velocity", "force", "normal")
         tables = {name: getattr(self, name) for name in names}
         return {name: table.build() for name, table in tables.items() if table is not None}
@@ -85,7 +87,7 @@ class SignalRecordTable(Table):
     file: str
     time: ColumnTable
     value: ColumnTable
-    where: str = Field("", description='which rows count, for example "time > 0.5 s"')
+    where: str = Field("", description='condition for the rows to use, for example "time > 0.5 s"')
     delimiter: Delimiter | None = None
 
 
@@ -108,18 +110,18 @@ _SIGNAL = "expression of t in quotes, ramps [[t, value], ...], or a record {file
 
 
 # --------------------------------------------------------------------------- rigs
-_TOLD: Mapping[str, str] = {each.name: each.described for each in PulledSlider.parameters}
+_DESCRIBED: Mapping[str, str] = {each.name: each.described for each in PulledSlider.parameters}
 
 
 class PrescribedTable(Table):
-    """Open loop: v(t) is given."""
+    """Open loop: v(t) is prescribed."""
 
     kind: Literal["prescribed"]
     velocity: SignalField = Field(description=f"m/s: {_SIGNAL}")
 
 
 class RecordedTable(Table):
-    """Open loop: the motion of the table [record]."""
+    """Open loop: v(t) is the motion of the table [record]."""
 
     kind: Literal["record"]
 
@@ -128,7 +130,7 @@ class SliderTable(Table):
     """A mass pushed by a force."""
 
     kind: Literal["slider"]
-    mass: float = Field(description=_TOLD["mass"])
+    mass: float = Field(description=_DESCRIBED["mass"])
     force: SignalField = Field(description=f"N: {_SIGNAL}")
 
 
@@ -136,19 +138,19 @@ class PulledTable(Table):
     """A mass pulled through a spring."""
 
     kind: Literal["pulled"]
-    mass: float = Field(description=_TOLD["mass"])
-    stiffness: float = Field(description=_TOLD["stiffness"])
-    speed: float = Field(description=_TOLD["speed"])
+    mass: float = Field(description=_DESCRIBED["mass"])
+    stiffness: float = Field(description=_DESCRIBED["stiffness"])
+    speed: float = Field(description=_DESCRIBED["speed"])
 
 
 # --------------------------------------------------------------------------- the run
 class OneOf:
-    """Allows these texts only, in a file and in its schema.
+    """Restricts a string to given values, in a file and in its schema.
 
     Parameters
     ----------
     *choices : str
-        What a key may say.
+        The allowed values.
     """
 
     def __init__(self, *choices: str) -> None:
@@ -157,7 +159,7 @@ class OneOf:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Return what pydantic checks."""
+        """Return the schema used by pydantic."""
         return literal_schema(list(self.choices))
 
 
@@ -167,30 +169,28 @@ _DEFAULT = Settings()
 class RunTable(Table):
     """How to integrate; keys and defaults are those of `gms_fsm.Settings`."""
 
-    t_end: float | None = Field(None, description="s; the record's end when left out")
-    t_start: float | None = Field(None, description="s; 0, or the record's start")
+    t_end: float | None = Field(None, description="s; by default the end of the record")
+    t_start: float | None = Field(None, description="s; by default 0, or the start of the record")
     method: Annotated[str, OneOf(*METHODS, *SCIPY_METHODS)] = _DEFAULT.method_name
     step: float | None = Field(_DEFAULT.step, gt=0, description="fixed step, s")
     rtol: float = Field(_DEFAULT.rtol, gt=0)
     atol: PositiveFloat | dict[str, PositiveFloat | list[PositiveFloat]] | None = Field(
         None,
-        description="absolute tolerance of all components, or by name { x, v, z }; from the "
-        "model's own scales where left out",
+        description="absolute tolerance of all components, or by name { x, v, z }; by "
+        "default from the scales of the model",
     )
-    max_step: float | None = Field(None, gt=0, description="s; no limit when left out")
-    max_steps: int = Field(
-        _DEFAULT.max_steps, ge=1, description="a run that needs more is an error"
-    )
+    max_step: float | None = Field(None, gt=0, description="s; no limit by default")
+    max_steps: int = Field(_DEFAULT.max_steps, ge=1, description="error if a run needs more")
     events: Annotated[str, OneOf(*EVENTS)] = _DEFAULT.events
     engine: Annotated[str, OneOf(*ENGINES)] = _DEFAULT.engine
     monitors: list[str] = Field(
         [],
-        description='what to watch for: "chattering", "passivity", "coverage", "all" of these, '
+        description='monitors: "chattering", "passivity", "coverage", "all" of these, '
         'and invariants such as "abs(z) <= 2*s"',
     )
 
     def options(self) -> dict[str, Any]:
-        """Return what is given of the settings, by name."""
+        """Return the given settings, by name."""
         given = self.model_dump(include={each.name for each in fields(_DEFAULT)}, exclude_none=True)
         if self.method in SCIPY_METHODS:
             given["method"] = getattr(scipy.integrate, self.method)
@@ -198,7 +198,7 @@ class RunTable(Table):
 
 
 class InitialTable(Table):
-    """Where the run starts."""
+    """Initial values."""
 
     z: list[float] | None = None
     states: list[str] | None = None
@@ -217,7 +217,7 @@ def _figure_ending(value: str) -> str:
 
 
 def _with_figure_endings(schema: dict[str, Any]) -> None:
-    """Name the endings in a schema; they are not known before somebody asks."""
+    """Add the file endings to a schema; they are only known when it is generated."""
     from plots import formats
 
     endings = [ending.removeprefix(".") for ending in formats.endings("figure")]
@@ -225,24 +225,24 @@ def _with_figure_endings(schema: dict[str, Any]) -> None:
 
 
 class OutputTable(Table):
-    """What is written."""
+    """The output files."""
 
     every: float | None = Field(
-        None, gt=0, description="rows this far apart [s]; every accepted step when left out"
+        None, gt=0, description="distance of rows [s]; by default every accepted step"
     )
     figures: list[Annotated[str, AfterValidator(_figure_ending)]] | None = Field(
         None,
-        description="endings of the overview figure; the usual ones when left out",
+        description="file endings of the overview figure; by default the usual ones",
         json_schema_extra=_with_figure_endings,
     )
-    csv: bool = Field(False, description="write the trace as CSV too")
+    csv: bool = Field(False, description="also write the trace as CSV")
 
 
 class Scenario(Table):
     """A scenario file."""
 
     title: str = ""
-    notes: str = Field("", description="said in the summary")
+    notes: str = Field("", description="text for the summary")
     model: ModelTable
     rig: Annotated[
         PrescribedTable | RecordedTable | SliderTable | PulledTable, Field(discriminator="kind")
@@ -258,7 +258,7 @@ class Scenario(Table):
             raise ValueError("rig.kind = 'record' needs a table [record]")
         if not isinstance(self.rig, RecordedTable):
             if self.record is not None:
-                raise ValueError("the table [record] goes with rig.kind = 'record'")
+                raise ValueError("the table [record] requires rig.kind = 'record'")
             if self.run.t_end is None:
-                raise ValueError("run.t_end is missing; only a record knows its own end")
+                raise ValueError("run.t_end is missing; it can be omitted only with a record")
         return self

@@ -1,4 +1,4 @@
-"""Reading TOML with care, and changing single keys of it."""
+"""Defensive reading of TOML, and changes to single keys."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ __all__ = ["override", "parsed"]
 
 LARGEST_FILE = 1_000_000  # bytes
 DEEPEST_KEY = 6  # parts
-# A key of very many parts keeps tomllib busy for hours (its work grows with their square).
+# tomllib takes quadratic time in the number of parts of a key, which can be hours.
 _ENDLESS_KEY = re.compile(
     r"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){20}"""
 )
 _TEXT_OR_COMMENT = re.compile(r""""[^"]*"?|'[^']*'?|#.*""")
-_HALF_A_NUMBER = re.compile(  # a digit on one side of the point only
+_HALF_A_NUMBER = re.compile(  # a digit on only one side of the point
     r"(?<![\w.+-])([+-]?)(?:(\d+)\.|\.(\d+))((?:[eE][+-]?\d+)?)(?![\w.])"
 )
 
@@ -39,22 +39,24 @@ def parsed(path: Path) -> dict[str, Any]:
     Raises
     ------
     ScenarioError
-        If it cannot be read, is too large, or is not TOML.
+        If the file cannot be read, is too large, or is not TOML.
     """
     try:
         with path.open("rb") as file:
             raw = file.read(LARGEST_FILE + 1)
     except FileNotFoundError:
         raise ScenarioError(
-            "no such file", place=str(path), advice="check its name and the folder"
+            "no such file", place=str(path), advice="check the name and the folder"
         ) from None
     except OSError as error:
         raise ScenarioError(
-            f"cannot be read ({error.strerror})", place=str(path), advice="give a file that can"
+            f"cannot be read ({error.strerror})", place=str(path), advice="give a readable file"
         ) from None
     if len(raw) > LARGEST_FILE:
         raise ScenarioError(
-            f"larger than {LARGEST_FILE} bytes", place=str(path), advice="records go in own files"
+            f"larger than {LARGEST_FILE} bytes",
+            place=str(path),
+            advice="keep records in separate files",
         )
     try:
         text = raw.decode("utf-8-sig")
@@ -67,17 +69,17 @@ def parsed(path: Path) -> dict[str, Any]:
         raise ScenarioError(
             f"line {line}: a key of more than 20 parts",
             place=str(path),
-            advice="no key lies this deep",
+            advice="no key is nested this deeply",
         )
     try:
         return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # a number of 5,000 digits is a ValueError
+    except (ValueError, RecursionError) as error:  # a number with 5,000 digits raises ValueError
         hint = _with_digits(text)
         raise ScenarioError(f"not valid TOML: {cut(str(error))}{hint}", place=str(path)) from None
 
 
 def _with_digits(text: str) -> str:
-    """Return advice on the first number of a text that TOML does not take: .25 or 5."""
+    """Return advice on the first number of a text that is invalid in TOML, such as .25."""
     for number, line in enumerate(text.splitlines(), start=1):
         found = _HALF_A_NUMBER.search(_TEXT_OR_COMMENT.sub("", line))
         if found:
@@ -93,14 +95,14 @@ def override(data: dict[str, Any], setting: str) -> None:
     Parameters
     ----------
     data : dict
-        Contents of a file; changed.
+        Contents of a file; modified in place.
     setting : str
-        ``"model.law=published"``: a path of keys and a TOML value; a bare word is a text.
+        ``"model.law=published"``: a key path and a TOML value; a bare word is a string.
 
     Raises
     ------
     ScenarioError
-        If the text is no such setting.
+        If the text does not have this form.
     """
     key, equals, text = setting.partition("=")
     parts = [part.strip() for part in key.split(".")]
@@ -110,11 +112,11 @@ def override(data: dict[str, Any], setting: str) -> None:
         )
     if "\n" in setting:
         line = setting.partition("\n")[0]
-        raise ScenarioError("one key and one value, on one line", place=f"--set {cut(line)}")
+        raise ScenarioError("give one key and one value, on one line", place=f"--set {cut(line)}")
     if len(parts) > DEEPEST_KEY:
-        raise ScenarioError("no key lies this deep", place=f"--set {cut(setting)}")
+        raise ScenarioError("no key is nested this deeply", place=f"--set {cut(setting)}")
     if _ENDLESS_KEY.search(text):
-        raise ScenarioError("no key lies this deep", place=f"--set {cut(setting)}")
+        raise ScenarioError("no key is nested this deeply", place=f"--set {cut(setting)}")
     try:
         value = tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:

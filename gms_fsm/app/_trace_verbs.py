@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from gms_fsm._files import no_input, output_folder
+from gms_fsm._files import output_folder, refuse_input
 from gms_fsm.app._console import progress_bars
 from gms_fsm.app._options import End, Start, TraceFile
 
@@ -55,7 +55,7 @@ def animate_command(
     from gms_fsm.traces.trace import Trace, files_of
     from plots.animation import animate
 
-    no_input(output, *files_of(trace))
+    refuse_input(output, *files_of(trace))
     run = Trace.load(trace)
     with progress_bars() as bar:
         task = bar.add_task("frames", total=frames)
@@ -82,7 +82,7 @@ def replay_command(
     from gms_fsm.traces.trace import Trace, files_of
     from plots import write_replay
 
-    no_input(output, *files_of(trace), *([] if other is None else files_of(other)))
+    refuse_input(output, *files_of(trace), *([] if other is None else files_of(other)))
     second = None if other is None else Trace.load(other)
     names = [] if other is None else [trace.stem, other.stem]
     page = write_replay(output, Trace.load(trace), second, title=title, names=names)

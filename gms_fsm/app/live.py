@@ -1,4 +1,4 @@
-"""Shows a running simulation in the terminal: the active state of every element."""
+"""Live view of a running simulation in the terminal: the active state of every element."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from gms_fsm.run.simulate import Moment
 __all__ = ["LiveView"]
 
 BETWEEN_FRAMES = 0.1  # s; drawing more often would cost more than the simulation
-BAR = 20  # characters of |z|/s = 1
+BAR = 20  # characters for |z|/s = 1
 COLOURS = ("blue", "dark_orange3", "green", "magenta", "yellow")
 
 
 class LiveView:
-    """Shows states, |z|/s as bars, v and F while a simulation runs.
+    """Shows states, |z|/s as bars, v and F during a simulation.
 
-    Use it as a context manager and hand it to ``simulate(progress=...)``.
+    Use it as a context manager and pass it to ``simulate(progress=...)``.
 
     Parameters
     ----------
     console : Console
-        Where to draw.
+        Console to draw on.
     t_start, t_end : float
-        s, for the progress bar.
+        Start and end time for the progress bar, s.
     detail : bool
-        With False only the progress bar is shown.
+        If False, show only the progress bar.
     """
 
     def __init__(self, console: Console, t_start: float, t_end: float, detail: bool) -> None:
@@ -53,7 +53,7 @@ class LiveView:
         self.live = Live(self.bar, console=console, auto_refresh=False)
 
     def __enter__(self) -> LiveView:
-        return self  # drawing begins with the first moment: no empty bar before an error
+        return self  # drawing starts with the first call: no empty bar before an error
 
     def __exit__(
         self,
@@ -63,13 +63,13 @@ class LiveView:
     ) -> None:
         if self.console.is_terminal:
             if self.latest is not None:
-                self.show(self.latest)  # the end is always drawn
+                self.show(self.latest)  # the last state is always drawn
             self.live.stop()
         elif self.detail and self.latest is not None:
-            self.console.print(self.table(self.latest))  # a log gets the end only
+            self.console.print(self.table(self.latest))  # a log gets only the last state
 
     def __call__(self, moment: Moment) -> None:
-        """Draw, if it is time to."""
+        """Draw, if enough time has passed since the last frame."""
         self.latest = moment
         if not self.console.is_terminal:
             return
@@ -87,7 +87,7 @@ class LiveView:
         self.live.update(shown, refresh=True)
 
     def table(self, moment: Moment) -> Table:
-        """Return one line an element.
+        """Return a table with one line per element.
 
         Parameters
         ----------
@@ -107,9 +107,9 @@ class LiveView:
                 self.names.append(state)
             colour = COLOURS[self.names.index(state) % len(COLOURS)]
             ratio = abs(z) / s
-            bare = math.isnan(ratio)  # without a curve there is no threshold
+            bare = math.isnan(ratio)  # no threshold without a Stribeck curve
             filled = 0 if bare else min(BAR, round(BAR * ratio))
-            # The state is a word as well as a colour, the bar a length as well as a number.
+            # Colours and bars are repeated as words and numbers.
             table.add_row(
                 f"E{i + 1}",
                 Text(state.upper() if self.names.index(state) else state, style=colour),

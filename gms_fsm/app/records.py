@@ -1,7 +1,7 @@
-"""Measured records: text tables with a column and a unit each, read into SI arrays.
+"""Measured records: text tables, read into SI arrays by column and unit.
 
-A record is believed only as far as it goes: every row must be complete and in time order, gaps are
-reported by row, and a velocity made from positions states the smoothing it was made with.
+Every row used must be complete and in time order, gaps are reported by row, and a velocity derived
+from positions comes with a note on its smoothing.
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ __all__ = ["Column", "Motion", "Record", "motion_of", "read_record"]
 QUANTITIES = ("time", "position", "velocity", "force", "normal")
 LONGEST_LINE = 100_000  # characters
 LONGEST_FILE = 5_000_000  # rows
-STRETCH = 40  # rows in which standstill is looked for
-GAP = 5.0  # intervals longer than this many median ones are reported
+STRETCH = 40  # rows per interval when searching for standstill
+GAP = 5.0  # time steps longer than this many median steps are reported
 
 
-LOADS = ("force", "normal")  # needed where a row counts; motion is needed everywhere between
-Words: TypeAlias = dict[tuple[int, str], str]  # cells that are no numbers, by row and quantity
+LOADS = ("force", "normal")  # needed only in selected rows; motion is needed in between too
+Words: TypeAlias = dict[tuple[int, str], str]  # cells that are not numbers, by row and quantity
 
 
 @dataclass(frozen=True)
 class Column:
-    """Where a quantity stands in a table.
+    """The column of a quantity in a table.
 
     Parameters
     ----------
     name : str
-        The column's head.
+        Name in the header line.
     unit : str
-        For example ``"mm"``.
+        Unit, for example ``"mm"``.
     sign : int
-        -1 to turn the quantity around.
+        -1 to reverse the sign of the quantity.
     """
 
     name: str
@@ -61,15 +61,15 @@ class Record:
     Parameters
     ----------
     path : Path
-        Where it came from.
+        The file.
     columns : mapping of str to ndarray, shape (rows,)
         ``time`` and any of ``position``, ``velocity``, ``force``, ``normal``.
     chosen : ndarray of bool, shape (rows,)
-        Rows that the selection kept; the motion runs from the first to the last of them.
+        The selected rows; the motion runs from the first to the last of them.
     first_row : int
-        Row number of the first row in the file (the head line is 1).
+        Number of the first row in the file (the header line is row 1).
     notes : tuple of str
-        What a reader should know: gaps, rows left out.
+        Notes for the user: gaps, rows left out.
     """
 
     path: Path
@@ -82,7 +82,7 @@ class Record:
         return int(self.columns["time"].size)
 
 
-@np.errstate(all="ignore")  # what overflows is refused in words
+@np.errstate(all="ignore")  # overflow is reported as an error
 def read_record(
     path: str | Path, columns: Mapping[str, Column], where: str = "", delimiter: str | None = None
 ) -> Record:
@@ -91,30 +91,30 @@ def read_record(
     Parameters
     ----------
     path : str or Path
-        The file; its first line names the columns.
+        The file; its first line has the column names.
     columns : mapping of str to Column
         For ``time`` and any of ``position``, ``velocity``, ``force``, ``normal``.
     where : str, optional
-        Which rows count, for example ``"normal > 4.5 N"``: a condition on the quantities. It is
-        looked at first: a cell in a row that does not count need not be a number.
+        Condition on the quantities that selects rows, for example ``"normal > 4.5 N"``. It is
+        evaluated first: a cell in a row that is not selected need not be a number.
     delimiter : str, optional
-        One character; tab, semicolon or comma are found out when left out.
+        One character; by default tab, semicolon or comma is detected.
 
     Returns
     -------
     Record
-        In SI units, from the first to the last row that counts; between them without the rows that
-        do not count and have no time or no place.
+        The record in SI units, from the first to the last selected row, without unselected rows
+        that have no time or no position.
 
     Raises
     ------
     RecordError
-        Naming file, row, column and what to do: no such file, not text, missing column, a cell that
-        is no number, NaN, time going backward, no row left.
+        If the file is missing or not text, a column is missing, a cell is not a finite number, time
+        decreases, or no row is selected. The message names file, row, column and what to do.
     """
     path = Path(path)
     if "time" not in columns:
-        raise RecordError("no column for 'time' is given", place=str(path))
+        raise RecordError("no column is given for 'time'", place=str(path))
     cells, words = _read_cells(path, columns, delimiter)
     values = {
         quantity: column.sign * factor(quantity, column.unit) * cells[quantity]
@@ -124,7 +124,7 @@ def read_record(
     chosen = _chosen(path, values, where, rows)
     if not chosen.any():
         raise RecordError(
-            f"no row fulfils where = {shown(where)}",
+            f"no row satisfies where = {shown(where)}",
             place=str(path),
             advice="choose another condition",
         )
@@ -139,24 +139,26 @@ def read_record(
     notes = []
     if not selected.all():
         notes.append(
-            f"{int(chosen.sum())} of {rows} rows count (where = {shown(where)}); the motion uses "
-            f"rows {first + 2} to {last + 2}"
+            f"{int(chosen.sum())} of {rows} rows are selected (where = {shown(where)}); the motion "
+            f"uses rows {first + 2} to {last + 2}"
         )
     if words:
         row, quantity = min(words, key=lambda place: place[0])
         notes.append(
-            f"{len(words)} cell(s) in rows that do not count are no numbers, the first in row "
+            f"{len(words)} cell(s) in rows that are not selected are not numbers, the first in row "
             f"{row}, column {shown(columns[quantity].name)}: {shown(words[row, quantity])}"
         )
     if last - first + 1 > numbers.size:
-        notes.append(f"{last - first + 1 - numbers.size} row(s) without time or place are left out")
+        notes.append(
+            f"{last - first + 1 - numbers.size} row(s) without time or position are left out"
+        )
     notes += _gaps(part["time"], numbers)
     return Record(path, part, chosen, int(first) + 2, tuple(notes))
 
 
 # --------------------------------------------------------------------------- reading
 def _lines(path: Path) -> Iterator[str]:
-    """Yield lines of bounded length, so that no file can fill the memory with one of them."""
+    """Yield lines of bounded length, so that a single line cannot fill the memory."""
     try:
         with path.open("rb") as file:
             number = 0
@@ -166,17 +168,17 @@ def _lines(path: Path) -> Iterator[str]:
                     raise RecordError(
                         f"line {number} is longer than {LONGEST_LINE} characters",
                         place=str(path),
-                        advice="this is not a table with one row a line",
+                        advice="this is not a table with one row per line",
                     )
                 if number > LONGEST_FILE:
                     raise RecordError(
                         f"more than {LONGEST_FILE} rows",
                         place=str(path),
-                        advice="thin it out first",
+                        advice="reduce the number of rows first",
                     )
                 if b"\0" in line:
                     raise RecordError(
-                        f"line {number} holds binary data",
+                        f"line {number} contains binary data",
                         place=str(path),
                         advice="give a text table (CSV or TSV)",
                     )
@@ -190,7 +192,7 @@ def _lines(path: Path) -> Iterator[str]:
                     ) from None
     except FileNotFoundError:
         raise RecordError(
-            "no such file", place=str(path), advice="check its name and the folder"
+            "no such file", place=str(path), advice="check the name and the folder"
         ) from None
     except OSError as error:
         raise RecordError(f"cannot be read ({error.strerror})", place=str(path)) from None
@@ -199,11 +201,13 @@ def _lines(path: Path) -> Iterator[str]:
 def _read_cells(
     path: Path, columns: Mapping[str, Column], delimiter: str | None
 ) -> tuple[dict[str, FloatArray], Words]:
-    """Return the numbers, NaN for a cell that holds none, and the words that stand there."""
+    """Return the numbers, with NaN for other cells, and the texts of those cells."""
     lines = _lines(path)
     head_line = next(lines, "")
     if not head_line.strip():
-        raise RecordError("line 1 is empty", place=str(path), advice="it must name the columns")
+        raise RecordError(
+            "line 1 is empty", place=str(path), advice="it must contain the column names"
+        )
     if delimiter is None:
         delimiter = max("\t;,", key=head_line.count)
     head = [name.strip() for name in next(csv.reader([head_line], delimiter=delimiter))]
@@ -213,7 +217,7 @@ def _read_cells(
             what = "no column" if column.name not in head else "several columns"
             advice = f"name the right one: {quantity} = {{ column = ... }}"
             if len(head) == 1:
-                advice = "if these are several columns, say what divides them: delimiter = ..."
+                advice = "if these are several columns, give their separator: delimiter = ..."
             raise RecordError(
                 f"{what} {shown(column.name)} (for {quantity})",
                 place=str(path),
@@ -227,17 +231,17 @@ def _read_cells(
         for row in csv.reader(lines, delimiter=delimiter):
             number += 1
             if not any(cell.strip() for cell in row):
-                raise RecordError(f"row {number} is empty", place=str(path), advice="take it out")
+                raise RecordError(f"row {number} is empty", place=str(path), advice="remove it")
             if len(row) != len(head):
                 raise RecordError(
-                    f"row {number} has {len(row)} cells, the head line has {len(head)}",
+                    f"row {number} has {len(row)} cells, but the header has {len(head)}",
                     place=str(path),
-                    advice="give each row as many, or say what divides the columns: delimiter = "
-                    "... (a decimal comma is not read; write a point)",
+                    advice="make them equal, or give the separator of the columns: delimiter = "
+                    "... (a decimal comma is not supported; use a point)",
                 )
             for quantity, place in places.items():
                 try:
-                    if "_" in row[place]:  # 0.0_3 is a number to Python, not to a record
+                    if "_" in row[place]:  # 0.0_3 is a number in Python, but not in a record
                         raise ValueError
                     found[quantity].append(float(row[place]))
                 except ValueError:
@@ -268,10 +272,10 @@ def _chosen(
     for name in names:
         if name not in values:
             raise RecordError(
-                f"where = {shown(where)} uses {name!r}, which has no column",
+                f"where = {shown(where)} uses {name!r}, for which no column is given",
                 place=str(path),
-                advice=f"name its column, {name} = {{ column = ..., unit = ... }}, or leave "
-                f"{name} out",
+                advice=f"give its column, {name} = {{ column = ..., unit = ... }}, or remove "
+                f"{name}",
             )
     table = zip(*(values[name].tolist() for name in names), strict=True)
     try:
@@ -294,7 +298,7 @@ def _check(
     numbers: NDArray[np.int64],
     words: Words,
 ) -> None:
-    # The motion needs every row between the first and the last; force only where it counts.
+    # The motion needs every row between the first and the last; forces only in selected rows.
     needed = {
         quantity: set(numbers[chosen if quantity in LOADS else slice(None)].tolist())
         for quantity in (part if words else ())
@@ -307,8 +311,8 @@ def _check(
             f"{shown(words[row, quantity])} is not a number (a decimal point is a "
             "point)",
             place=str(path),
-            advice="mend it, or leave the row out by where = ..., a condition that does "
-            "not hold there",
+            advice="correct it, or exclude the row with where = ..., a condition that is "
+            "false there",
         )
     for quantity, value in part.items():
         bad = np.flatnonzero(~np.isfinite(value) & (chosen | (quantity not in LOADS)))
@@ -317,8 +321,8 @@ def _check(
                 f"{_rows(numbers[bad])}, column {shown(columns[quantity].name)}: not a "
                 "finite number",
                 place=str(path),
-                advice="take the rows out, or leave them out by where = ..., a condition that "
-                "does not hold there",
+                advice="remove the rows, or exclude them with where = ..., a condition that "
+                "is false there",
             )
     time = part["time"]
     back = np.flatnonzero(np.diff(time) <= 0)
@@ -328,13 +332,13 @@ def _check(
             f"time does not increase after {_rows(numbers[back])} (row {numbers[i]}: "
             f"{float(time[i])!r} s, next: {float(time[i + 1])!r} s)",
             place=str(path),
-            advice="sort the rows and take doubles out",
+            advice="sort the rows and remove duplicates",
         )
     if time.size < 5:
         raise RecordError(
-            f"only {time.size} rows count",
+            f"only {time.size} rows are selected",
             place=str(path),
-            advice="at least 5 are needed (which rows count is said by where = ...)",
+            advice="at least 5 are needed (rows are selected with where = ...)",
         )
 
 
@@ -364,13 +368,13 @@ class Motion:
     Parameters
     ----------
     time, velocity, position : ndarray, shape (rows,)
-        s, m/s, m.
+        Time, s; velocity, m/s; position, m.
     smoothing : float
-        Time constant of the smoothing spline, s; 0 for a measured velocity taken as it is.
+        Time constant of the smoothing spline, s; 0 for a measured velocity used unchanged.
     standstill : float
-        Noise of the velocity at standstill, m/s (standard deviation); 0 if it never stands still.
+        Velocity noise at standstill, m/s (standard deviation); 0 if there is no standstill.
     notes : tuple of str
-        How the velocity was made.
+        How the velocity was obtained.
     """
 
     time: FloatArray
@@ -381,32 +385,32 @@ class Motion:
     notes: tuple[str, ...] = field(default=())
 
     def fitting_v_c(self) -> float:
-        """Return a v_c [m/s] that this record can resolve: three times its standstill noise."""
+        """Return a v_c [m/s] that this record can resolve: three times its noise at standstill."""
         if self.standstill <= 0.0:
             return 0.0
         digit = 10.0 ** math.floor(math.log10(3.0 * self.standstill))
         return float(f"{math.ceil(3.0 * self.standstill / digit) * digit:.1g}")
 
 
-@np.errstate(all="ignore")  # what overflows is refused in words
+@np.errstate(all="ignore")  # overflow is reported as an error
 def motion_of(record: Record, smoothing: float | None = None) -> Motion:
-    """Return the motion of a record; from positions by a smoothing spline.
+    """Return the motion of a record, from positions by a smoothing spline.
 
     The spline minimises ``sum (x_j - f(t_j))**2 + lambda * integral f''**2`` with ``lambda =
-    smoothing**4 / dt``: motion slower than the time constant passes, noise faster than it does not
+    smoothing**4 / dt``: motion slower than the time constant is kept, faster noise is removed
     (half amplitude at the angular frequency 1 / smoothing).
 
     Parameters
     ----------
     record : Record
-        With a column for position or velocity.
+        A record with a column for position or velocity.
     smoothing : float, optional
-        Time constant, s; four median intervals when left out (0 for a measured velocity).
+        Time constant, s; by default four median time steps (0 for a measured velocity).
 
     Returns
     -------
     Motion
-        Time, velocity and position at the record's rows.
+        Time, velocity and position at the rows of the record.
 
     Raises
     ------
@@ -424,7 +428,7 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
             f"smoothing is {shown(smoothing)} s, longer than the record ({time[-1] - time[0]:.6g} "
             "s)",
             place=str(record.path),
-            advice="give less",
+            advice="use a smaller value",
         )
     if "velocity" in record.columns:
         raw, given = record.columns["velocity"], "velocity"
@@ -436,9 +440,9 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
         raise RecordError(
             "neither a position nor a velocity column is given",
             place=str(record.path),
-            advice="name one of them: position = { column = ..., unit = ... }",
+            advice="give one of them: position = { column = ..., unit = ... }",
         )
-    # The spline is blind to the origin; without its offset the sums keep their digits.
+    # The spline does not depend on the origin; subtracting the offset avoids cancellation.
     shift = float(raw[0])
     try:
         spline = make_smoothing_spline(time, raw - shift, lam=tau**4 / interval)
@@ -446,8 +450,8 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
         raise RecordError(
             f"no smoothing spline fits the {given} column ({cut(str(error))})",
             place=str(record.path),
-            advice="look for values or times that are far out and leave their rows out by "
-            "where = ..., or set another smoothing = ... (s)",
+            advice="look for outliers in values or times and exclude their rows with "
+            "where = ..., or change smoothing = ... (s)",
         ) from None
     smooth = spline(time) + shift
     if given == "position":
@@ -456,7 +460,7 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
         notes = [
             f"velocity: derivative of a smoothing spline through the positions, time constant "
             f"{tau:.4g} s (half amplitude at {1 / (2 * np.pi * tau) if tau else math.inf:.3g} Hz); "
-            f"it leaves {rest:.2g} m (standard deviation) of the positions unexplained"
+            f"the residual of the positions is {rest:.2g} m (standard deviation)"
         ]
     else:
         velocity = smooth if tau else raw
@@ -468,22 +472,22 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
         ]
     if not np.isfinite([velocity, position]).all():
         raise RecordError(
-            f"the {given} column has values too large to make a motion of, up to "
+            f"the {given} column has values too large for a motion, up to "
             f"{float(np.abs(raw).max()):.3g} (SI)",
             place=str(record.path),
-            advice="look for cells that are far out, and leave their rows out by where = ...",
+            advice="look for outliers, and exclude their rows with where = ...",
         )
     return Motion(time, velocity, position, tau, _standstill(velocity), tuple(notes))
 
 
 def _standstill(velocity: FloatArray) -> float:
-    """Return the scatter of v about a line in stretches where it hardly moves on average."""
+    """Return the scatter of v about a line in intervals with almost no mean motion."""
     fastest = float(np.quantile(np.abs(velocity), 0.99))
     count = velocity.size // STRETCH
     if count == 0 or fastest == 0.0:
         return 0.0
     stretches = velocity[: count * STRETCH].reshape(count, STRETCH)
-    # About a line, so that a slow turn is not taken for noise.
+    # About a line, so that a slow reversal is not mistaken for noise.
     place = np.linspace(-1.0, 1.0, STRETCH)
     slope = stretches @ place / (place @ place)
     mean = stretches.mean(axis=1)
@@ -491,5 +495,5 @@ def _standstill(velocity: FloatArray) -> float:
     if not quiet.any():
         return 0.0
     scatter = (stretches - mean[:, None] - slope[:, None] * place)[quiet]
-    # The median stretch: in some of them the motion starts or ends.
+    # The median interval, because in some of them the motion starts or ends.
     return float(np.sqrt(np.median((scatter**2).sum(axis=1)) / (STRETCH - 2)))

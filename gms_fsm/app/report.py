@@ -1,4 +1,4 @@
-"""Runs a scenario and writes what a person wants to know of it."""
+"""Runs a scenario and writes its report."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm._files import no_input, output_folder, written_whole
+from gms_fsm._files import output_folder, refuse_input, write_whole
 from gms_fsm.app.records import Motion, Record
 from gms_fsm.app.scenario import Loaded
 from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, FloatArray
@@ -25,7 +25,7 @@ from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.trace import Trace, dwell_times
 
 __all__ = [
-    "Comparison",
+    "ForceComparison",
     "compare",
     "dwell_times",
     "monitor_lines",
@@ -35,17 +35,17 @@ __all__ = [
 ]
 
 
-ONE_SPEED = 2.0  # a plateau has its speeds within this factor; a sine spreads over 2.7
+ONE_SPEED = 2.0  # speeds of a plateau are within this factor; those of a sine spread over 2.7
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """A model's friction against the measured one.
+class ForceComparison:
+    """Comparison of the simulated and the measured friction force.
 
     Parameters
     ----------
     rows : int
-        How many rows count.
+        Number of selected rows.
     rmse : float
         Root mean square of the difference, N.
     r2 : float
@@ -58,19 +58,19 @@ class Comparison:
     r2: float
 
 
-def compare(trace: Trace, record: Record) -> Comparison | None:
-    """Compare a run with its record on the rows that count.
+def compare(trace: Trace, record: Record) -> ForceComparison | None:
+    """Compare a run with its record at the selected rows.
 
     Parameters
     ----------
     trace : Trace
-        A run over the record's motion.
+        A run with the motion of the record.
     record : Record
-        With a column ``force``.
+        A record with a column ``force``.
 
     Returns
     -------
-    Comparison or None
+    ForceComparison or None
         None if the record has no force.
     """
     times, measured = measured_force(record)
@@ -83,11 +83,11 @@ def compare(trace: Trace, record: Record) -> Comparison | None:
     spread = measured - measured.mean()
     total = float(spread @ spread)
     r2 = 1.0 - float(difference @ difference) / total if total > 0.0 else math.nan
-    return Comparison(times.size, float(np.sqrt(np.mean(difference**2))), r2)
+    return ForceComparison(times.size, float(np.sqrt(np.mean(difference**2))), r2)
 
 
 def measured_force(record: Record) -> tuple[FloatArray, FloatArray]:
-    """Return times [s] and forces [N] of the rows that count; empty without a force column."""
+    """Return times [s] and forces [N] of the selected rows; empty without a force column."""
     if "force" not in record.columns:
         return np.empty(0), np.empty(0)
     return record.columns["time"][record.chosen], record.columns["force"][record.chosen]
@@ -100,18 +100,18 @@ def run_scenario(
     *,
     checkpoint: bool = False,
 ) -> tuple[Trace, list[Path]]:
-    """Run a scenario and write trace, log, figure and summary.
+    """Run a scenario and write the trace, log, figure and summary.
 
     Parameters
     ----------
     loaded : Loaded
         From `gms_fsm.app.scenario.load_scenario`.
     folder : str or Path
-        Made where missing, before anything is run.
+        Output folder; created before the run if it does not exist.
     progress : callable, optional
-        Handed to `simulate`.
+        Passed to `simulate`.
     checkpoint : bool
-        Keep the state of the run in ``run.checkpoint``; a run interrupted there goes on from it.
+        Save the state of the run in ``run.checkpoint``, from which an interrupted run resumes.
 
     Returns
     -------
@@ -121,14 +121,14 @@ def run_scenario(
     Raises
     ------
     OutputError
-        If the folder cannot be written, or one of the files is there and not ours, or is read
-        here.
+        If the folder is not writable, or a file would replace one that was not written by gms-fsm
+        or that is an input.
     SimulationError
-        If the run cannot go on; its part so far is written to ``partial.npz``.
+        If the run cannot continue; the run so far is written to ``partial.npz``.
     KeyboardInterrupt
-        On Ctrl-C; the part so far is written to ``partial.npz``, and the text says so.
+        On Ctrl-C; the run so far is written to ``partial.npz``, as the message says.
     ScenarioError
-        If `simulate` refuses an argument.
+        If `simulate` rejects an argument.
     """
     output = loaded.scenario.output
     names = ["summary.md", "trace.npz", "transitions.csv", "partial.npz"]
@@ -136,7 +136,7 @@ def run_scenario(
     names += ["trace.csv", "trace.transitions.csv"] if output.csv else []
     folder = output_folder(folder, names)
     for name in names:
-        no_input(folder / name, loaded.path, *([loaded.record.path] if loaded.record else []))
+        refuse_input(folder / name, loaded.path, *([loaded.record.path] if loaded.record else []))
     try:
         trace = simulate(
             loaded.model,
@@ -150,19 +150,19 @@ def run_scenario(
         failed = error.replaced(kept=kept).inside(loaded.path)
         lines = zip(monitor_lines(error.trace), error.trace.monitors.values(), strict=True)
         for line, verdict in lines:
-            if not getattr(verdict, "livelock", False):  # it is what has just been told
+            if not getattr(verdict, "livelock", False):  # that is the error just reported
                 failed.add_note(line)
         raise failed from error.__cause__
     except GMSError as error:
         raise ScenarioError.of(error).inside(loaded.path) from None
     except KeyboardInterrupt as error:
-        part: Any = getattr(error, "trace", ())  # none before the run has begun
-        error.args = ("interrupted before the first row; nothing is written",)
+        part: Any = getattr(error, "trace", ())  # empty if the run has not started
+        error.args = ("interrupted before the first row; nothing was written",)
         if len(part):
             kept = part.save(folder / "partial.npz")
             error.args = (f"interrupted at t = {part.t[-1]:.6g} s; the run so far is in {kept}",)
         raise
-    saved = trace.save(folder / "trace.npz")  # first of all: nothing after it can lose the run
+    saved = trace.save(folder / "trace.npz")  # first, so that no later failure can lose the run
     try:
         return trace, _reported(loaded, trace, folder, saved)
     except KeyboardInterrupt as error:
@@ -171,13 +171,13 @@ def run_scenario(
 
 
 def _reported(loaded: Loaded, trace: Trace, folder: Path, saved: Path) -> list[Path]:
-    """Write what a person wants to know of a run; return all files."""
+    """Write the report of a run and return all files."""
     log = trace.transitions_csv().encode()
     text = summary_text(loaded, trace).encode()
     files = [
-        written_whole(folder / "summary.md", lambda file: file.write(text)),
+        write_whole(folder / "summary.md", lambda file: file.write(text)),
         saved,
-        written_whole(folder / "transitions.csv", lambda file: file.write(log)),
+        write_whole(folder / "transitions.csv", lambda file: file.write(log)),
     ]
     if loaded.scenario.output.csv:
         files.append(trace.save(folder / "trace.csv"))
@@ -189,7 +189,7 @@ def _reported(loaded: Loaded, trace: Trace, folder: Path, saved: Path) -> list[P
 
 
 def _figure_files(loaded: Loaded) -> list[str]:
-    """Return the names of the files that the overview is drawn to."""
+    """Return the file names of the overview figure."""
     wanted = loaded.scenario.output.figures
     if wanted is not None:
         return [f"overview.{ending}" for ending in wanted]
@@ -222,13 +222,13 @@ def summary_text(loaded: Loaded, trace: Trace) -> str:
     loaded : Loaded
         The scenario.
     trace : Trace
-        Its run.
+        The run of the scenario.
 
     Returns
     -------
     str
-        Markdown: what ran, what each element did, how it compares with the measurement, and what
-        the measurement cannot tell.
+        Markdown: the system, the activity of each element, the comparison with the measurement, and
+        the parameters that are not identifiable from it.
     """
     settings = ", ".join(
         f"{name} = {_setting(value)}" for name, value in trace.settings.items() if value is not None
@@ -256,37 +256,37 @@ def summary_text(loaded: Loaded, trace: Trace) -> str:
 
 
 def _setting(value: Setting) -> str:
-    """Show a setting; the tolerance of each component by its name."""
+    """Return a setting as text, with the tolerance of each component by name."""
     if not isinstance(value, Mapping):
         return str(value)
     return "(" + ", ".join(f"{name} {_number(np.array(u))}" for name, u in value.items()) + ")"
 
 
 def _held(trace: Trace) -> list[str]:
-    """Say where a sign was held between -1 and 1."""
+    """Return a line on the intervals in which a sign was held between -1 and 1."""
     stretches = trace.sliding
     if not len(stretches):
         return []
     seconds = float((stretches.t_end - stretches.t_start).sum())
     names = " and ".join(f"{name} = 0" for name in dict.fromkeys(stretches.surface.tolist()))
     return [
-        f"- held on {names}: {len(stretches)} times, {seconds:.4g} s in all, first at t = "
+        f"- held on {names}: {len(stretches)} times, {seconds:.4g} s in total, first at t = "
         f"{float(stretches.t_start[0]):.6g} s (a sliding mode: the sign is a number from -1 to 1)"
     ]
 
 
 def plain(text: str) -> str:
-    r"""Return a text as Markdown that shows this very text, whoever wrote it.
+    r"""Return Markdown that displays a text literally.
 
     Parameters
     ----------
     text : str
-        Of one line or several; each stays a line.
+        One line or several; the lines are kept.
 
     Returns
     -------
     str
-        Without HTML, links, pictures or anything else that Markdown makes of a text.
+        Text without HTML, links, images or other active Markdown.
 
     Examples
     --------
@@ -297,24 +297,26 @@ def plain(text: str) -> str:
     for line in text.splitlines():
         shown = "".join(c if c.isprintable() else " " for c in line).strip()
         shown = re.sub(r"[\\`*\[\]|~$#]", r"\\\g<0>", shown)
-        shown = re.sub(r"(?<![^\W_])_|_(?![^\W_])", r"\\_", shown)  # not in F_c, which is plain
+        shown = re.sub(
+            r"(?<![^\W_])_|_(?![^\W_])", r"\\_", shown
+        )  # but not in F_c, which needs none
         shown = shown.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
         lines.append(re.sub(r"^(\d*)([-+=.)])", r"\1\\\2", shown))  # a list, a rule, a heading
     return "\n".join(lines)
 
 
 def monitor_lines(trace: Trace) -> list[str]:
-    """Return what the monitors of a run say, a line each.
+    """Return the verdicts of the monitors of a run, one line each.
 
     Parameters
     ----------
     trace : Trace
-        A run.
+        The run.
 
     Returns
     -------
     list of str
-        For people; `Trace.monitors` has the numbers.
+        Lines for the user; `Trace.monitors` has the data.
     """
     return [
         f"monitor {name} ({'ok' if verdict.ok else 'not ok'}): {verdict.text}"
@@ -357,10 +359,10 @@ def _element_table(trace: Trace) -> list[str]:
 
 
 def _measurement(record: Record, motion: Motion, trace: Trace) -> list[str]:
-    lines = [f"## Against the measurement ({plain(record.path.name)})", ""]
+    lines = [f"## Comparison with the measurement ({plain(record.path.name)})", ""]
     comparison = compare(trace, record)
     if comparison is None:
-        lines.append("- the record has no force: nothing to compare with")
+        lines.append("- the record has no measured force to compare with")
     else:
         lines.append(
             f"- **R² = {comparison.r2:.4f}, RMSE = {comparison.rmse:.4g} N** on {comparison.rows} "
@@ -369,52 +371,57 @@ def _measurement(record: Record, motion: Motion, trace: Trace) -> list[str]:
     lines += [f"- {plain(note)}" for note in (*record.notes, *motion.notes)]
     doubts = what_it_cannot_tell(trace, motion)
     if doubts:
-        lines += ["", "### What this record cannot tell", "", *(f"- {doubt}" for doubt in doubts)]
+        lines += [
+            "",
+            "### Parameters not identifiable from this record",
+            "",
+            *(f"- {doubt}" for doubt in doubts),
+        ]
     return lines
 
 
 def velocity_note(trace: Trace, motion: Motion) -> str:
-    """Return a warning if v_c is lost in the velocity noise of a record, else an empty text."""
+    """Return a warning if v_c is below the velocity noise of a record, else an empty text."""
     v_c = trace.model.values.get("v_c")
     if v_c is None or motion.standstill == 0.0 or float(np.min(v_c)) >= motion.standstill:
         return ""
     return (
         f"v_c = {float(np.min(v_c)):.3g} m/s is below the velocity noise at standstill, "
-        f"{motion.standstill:.2g} m/s (standard deviation): arrests happen by chance; "
-        f"v_c = {motion.fitting_v_c():.2g} m/s would fit this record"
+        f"{motion.standstill:.2g} m/s (standard deviation): arrests occur at random; "
+        f"v_c = {motion.fitting_v_c():.2g} m/s would suit this record"
     )
 
 
 def what_it_cannot_tell(trace: Trace, motion: Motion) -> list[str]:
-    """Return what a record says nothing about, each with the reason.
+    """Return the parameters that a record does not identify, each with the reason.
 
     Parameters
     ----------
     trace : Trace
-        The run over it.
+        The run with the motion of the record.
     motion : Motion
-        Its motion.
+        The motion of the record.
 
     Returns
     -------
     list of str
-        Sentences; empty if nothing stands out.
+        Sentences; empty if nothing was found.
     """
     doubts = []
     speed = np.abs(motion.velocity)
     moving = speed[speed > 0.1 * np.quantile(speed, 0.99)]
     if not moving.size:
-        return ["anything: it never moves"]
+        return ["all parameters: there is no motion"]
     slow, fast = (float(q) for q in np.quantile(moving, [0.2, 0.95]))
     if fast < ONE_SPEED * slow:
         doubts.append(
-            f"the Stribeck curve: there is one speed only ({1e3 * slow:.2g} to {1e3 * fast:.2g} "
-            "mm/s while it moves), so F_s, v_s and sigma_2 cannot be told from F_c"
+            f"the Stribeck curve: there is only one speed ({1e3 * slow:.2g} to {1e3 * fast:.2g} "
+            "mm/s during motion), so F_s, v_s and sigma_2 cannot be distinguished from F_c"
         )
         if isinstance(trace.model, GMS):
             doubts.append(
-                "C: at constant speed an element in slip rests at z = w s(v) whatever C is; only "
-                "changes of speed during slip would show it"
+                "C: at constant speed an element in slip stays at z = w s(v) whatever C is; only "
+                "changes of speed during slip would reveal it"
             )
     note = velocity_note(trace, motion)
     if note:
@@ -424,7 +431,7 @@ def what_it_cannot_tell(trace: Trace, motion: Motion) -> list[str]:
         viscous = float(np.sum(sigma)) * fast
         if viscous < 0.01 * float(np.abs(trace.F).max()):
             doubts.append(
-                f"sigma_i: at this speed all bristle damping makes {1e3 * viscous:.2g} mN, under "
-                f"1 % of the friction"
+                f"sigma_i: at this speed the total bristle damping force is {1e3 * viscous:.2g} "
+                f"mN, less than 1 % of the friction"
             )
     return doubts

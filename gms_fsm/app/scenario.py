@@ -1,7 +1,7 @@
-"""Scenario files: a whole run as one TOML file, validated before anything happens.
+"""Scenario files: a complete run as one TOML file, validated before the run.
 
 Nothing in a scenario is executed: signals are expressions of t, ramps, or measured records, and a
-record's file must lie beside the scenario (or in the data folder named by GMS_FSM_DATA).
+record file must be in the folder of the scenario (or in the data folder named by GMS_FSM_DATA).
 """
 
 from __future__ import annotations
@@ -39,20 +39,20 @@ DATA_VARIABLE = "GMS_FSM_DATA"
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A scenario with its files read: all that `simulate` needs.
+    """A scenario with its files read, ready for `simulate`.
 
     Parameters
     ----------
     path : Path
         The scenario file.
     scenario : Scenario
-        As written.
+        The contents of the file.
     model, rig
-        What runs.
+        The system to simulate.
     arguments : mapping
-        Further arguments of `gms_fsm.simulate`, ``t_end`` included.
+        Further arguments of `gms_fsm.simulate`, including ``t_end``.
     record, motion : Record and Motion, or None
-        The measurement behind the rig, where there is one.
+        The measurement used by the rig, if any.
     """
 
     path: Path
@@ -65,7 +65,7 @@ class Loaded:
 
     @property
     def title(self) -> str:
-        """The scenario's title, or its file's name."""
+        """The title of the scenario, or its file name."""
         return self.scenario.title or self.path.stem
 
 
@@ -77,7 +77,7 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
     path : str or Path
         A TOML file.
     overrides : sequence of str
-        ``"model.law=published"``: a key path and a TOML value (a bare word is a text).
+        ``"model.law=published"``: a key path and a TOML value (a bare word is a string).
 
     Returns
     -------
@@ -87,9 +87,10 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
     Raises
     ------
     ScenarioError
-        Naming file, key, value, rule, and for a mistyped key the nearest valid one.
+        If the file is invalid; the message names file, key, value, rule, and for a mistyped key the
+        nearest valid one.
     RecordError
-        Naming file, row and column.
+        If a record is invalid; the message names file, row and column.
     """
     path = Path(path)
     data = parsed(path)
@@ -97,8 +98,8 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
         raise ScenarioError(
             "the file is empty",
             place=str(path),
-            advice="a scenario has at least the tables [model], [rig] and [run] (the "
-            "folder scenarios/ has examples, gms-fsm schema prints all keys)",
+            advice="a scenario needs at least the tables [model], [rig] and [run] (see the "
+            "examples in scenarios/; gms-fsm schema prints all keys)",
         )
     for setting in overrides:
         override(data, setting)
@@ -148,12 +149,12 @@ def _loaded(path: Path, scenario: Scenario) -> Loaded:
     assert end is not None
     start = 0.0 if start is None else start
     if scenario.output.every is not None:
-        wanted = max(0.0, (end - start) / scenario.output.every)  # t_end is checked with the rest
+        wanted = max(0.0, (end - start) / scenario.output.every)  # t_end is checked later
         if wanted > 10_000_000:
             raise ScenarioError(
-                f"output.every = {scenario.output.every} s makes {wanted:.4g} rows",
+                f"output.every = {scenario.output.every} s gives {wanted:.4g} rows",
                 place=str(path),
-                advice="take more",
+                advice="use a larger value",
             )
         count = int(wanted)
         arguments["t_eval"] = np.minimum(start + scenario.output.every * np.arange(count + 1), end)
@@ -170,7 +171,7 @@ def _loaded(path: Path, scenario: Scenario) -> Loaded:
 def _signal(path: Path, given: SignalField, key: str, quantity: str) -> SignalLike:
     if isinstance(given, SignalRecordTable):
         file = find_file(path, given.file)
-        # The value column is read as the quantity it stands for, so that units are checked.
+        # The value column is read as the quantity it represents, so that units are checked.
         columns = {"time": given.time.build(), quantity: given.value.build()}
         try:
             record = read_record(file, columns, given.where, given.delimiter)
@@ -187,14 +188,14 @@ def _signal(path: Path, given: SignalField, key: str, quantity: str) -> SignalLi
 
 
 def find_file(scenario: Path, name: str) -> Path:
-    """Return the file a scenario names: beside it, or in the data folder.
+    """Return the path of a file named in a scenario, in its folder or in the data folder.
 
     Parameters
     ----------
     scenario : Path
         The scenario file.
     name : str
-        A relative path that stays inside the folder.
+        A relative path inside the folder.
 
     Returns
     -------
@@ -204,7 +205,7 @@ def find_file(scenario: Path, name: str) -> Path:
     Raises
     ------
     ScenarioError
-        If the path leads outside, or there is no such file.
+        If the path leads outside the folder, or there is no such file.
     """
     wanted = Path(name)
     folders = [scenario.parent]
@@ -214,21 +215,21 @@ def find_file(scenario: Path, name: str) -> Path:
         try:
             place = (folder / wanted).resolve()
             there = place.is_file()
-        except (OSError, ValueError) as error:  # too long, or with a null byte
+        except (OSError, ValueError) as error:  # too long, or contains a null byte
             raise ScenarioError(
                 f"file = {shown(name)} is not a file name ({cut(str(error))})", place=str(scenario)
             ) from None
         if wanted.is_absolute() or not place.is_relative_to(folder.resolve()):
             raise ScenarioError(
-                f"file = {shown(name)} leads outside of the scenario's folder",
+                f"file = {shown(name)} is outside the folder of the scenario",
                 place=str(scenario),
-                advice="put the file beside the scenario, or in the folder named by "
+                advice="put the file next to the scenario, or in the folder named by "
                 f"{DATA_VARIABLE}",
             )
         if there:
             return folder / wanted
     looked = " and ".join(str(folder) for folder in folders)
-    hint = "" if len(folders) > 1 else f" (a data folder can be named by {DATA_VARIABLE})"
+    hint = "" if len(folders) > 1 else f" (set {DATA_VARIABLE} to name a data folder)"
     raise ScenarioError(
         f"file = {shown(name)}: no such file in {looked}{hint}", place=str(scenario)
     )

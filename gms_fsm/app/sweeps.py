@@ -1,4 +1,4 @@
-"""Sweeps of a scenario: the same run over a grid of parameters, written as files and a table."""
+"""Sweeps of a scenario: runs over a grid of parameters, written as files and a table."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm._files import no_input, output_folder, written_whole
+from gms_fsm._files import output_folder, refuse_input, write_whole
 from gms_fsm.app.report import plain
 from gms_fsm.app.scenario import Loaded
 from gms_fsm.charts.parameters import FloatArray, Parameter
@@ -29,16 +29,16 @@ LONGEST_TABLE = 100  # runs in a summary; all are in runs.csv
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """What is varied, and over which values.
+    """A parameter to vary, and its values.
 
     Parameters
     ----------
     name : str
-        Of a parameter.
+        Name of the parameter.
     values : ndarray, shape (count,)
-        In its unit.
+        Values, in the unit of the parameter.
     spacing : {"linear", "logarithmic"}
-        How they lie.
+        Spacing of the values.
     """
 
     name: str
@@ -47,23 +47,22 @@ class Axis:
 
 
 def axis(text: str) -> Axis:
-    """Read what ``--over`` says.
+    """Parse the value of ``--over``.
 
     Parameters
     ----------
     text : str
-        ``"name=from:to:count"``; with ``",log"`` behind it the values are spaced evenly in their
-        logarithm.
+        ``"name=from:to:count"``; append ``",log"`` for logarithmic spacing.
 
     Returns
     -------
     Axis
-        Name and values, both ends included.
+        The parameter and its values, including both ends.
 
     Raises
     ------
     ParameterError
-        If the text is not of this form.
+        If the text does not have this form.
 
     Examples
     --------
@@ -78,15 +77,15 @@ def axis(text: str) -> Axis:
     parts = form.split(":")
     if not (name and equals) or len(parts) != 3 or (comma and word != "log"):
         raise ParameterError(
-            "give it as name=from:to:count, for example F_s=1:2:11, or with ,log "
-            "behind it for even steps of the logarithm",
+            "give it as name=from:to:count, for example F_s=1:2:11, and append "
+            ",log for logarithmic spacing",
             place=here,
         )
     try:
         start, stop, count = float(parts[0]), float(parts[1]), int(parts[2])
     except ValueError:
         raise ParameterError(
-            "from and to must be numbers, and count a whole number", place=here
+            "from and to must be numbers, and count an integer", place=here
         ) from None
     if not (math.isfinite(start) and math.isfinite(stop)):
         raise ParameterError("from and to must be finite", place=here)
@@ -97,23 +96,23 @@ def axis(text: str) -> Axis:
     if not comma:
         return Axis(name, np.linspace(start, stop, count), "linear")
     if not (start > 0.0 and stop > 0.0):
-        raise ParameterError("with log both from and to must be > 0", place=here)
+        raise ParameterError("with log, both from and to must be > 0", place=here)
     return Axis(name, np.geomspace(start, stop, count), "logarithmic")
 
 
 def sweep_scenario(
     loaded: Loaded, axes: Sequence[Axis], folder: str | Path, *, engine: str = "compiled"
 ) -> tuple[Sweep, list[Path]]:
-    """Run a scenario over a grid of parameters and write what came of it.
+    """Run a scenario over a grid of parameters and write the results.
 
     Parameters
     ----------
     loaded : Loaded
         From `gms_fsm.app.scenario.load_scenario`.
     axes : sequence of Axis
-        At least one; every combination of their values is run, the last one varying fastest.
+        At least one; every combination of values is run, the last axis varying fastest.
     folder : str or Path
-        Made where missing, before anything is run.
+        Output folder; created before the runs if it does not exist.
     engine : {"compiled", "machines", "ifelse"}
         As in `gms_fsm.sweep`.
 
@@ -125,20 +124,20 @@ def sweep_scenario(
     Raises
     ------
     ParameterError
-        If a name is not known, or there are too many runs.
+        If a name is unknown, or there are too many runs.
     OutputError
-        If the folder cannot be written, or one of the files is there and not ours, or is read
-        here.
+        If the folder is not writable, or a file would replace one that was not written by gms-fsm
+        or that is an input.
     """
     _check(axes, _known(loaded))
     names = ["summary.md", "runs.csv", "sweep.npz"]
     folder = output_folder(folder, names)
     for name in names:
-        no_input(folder / name, loaded.path, *([loaded.record.path] if loaded.record else []))
+        refuse_input(folder / name, loaded.path, *([loaded.record.path] if loaded.record else []))
     grid = np.meshgrid(*(each.values for each in axes), indexing="ij")
     parameters = {each.name: values.ravel() for each, values in zip(axes, grid, strict=True)}
     options: dict[str, Any] = dict(loaded.arguments)
-    for name in ("engine", "monitors"):  # a sweep keeps no rows to be watched
+    for name in ("engine", "monitors"):  # a sweep keeps no rows for monitors
         options.pop(name, None)
     if loaded.scenario.output.every is None:
         options.pop("t_eval", None)
@@ -146,18 +145,18 @@ def sweep_scenario(
         options["output"] = "t_eval"
     t_end = options.pop("t_end")
     result = sweep(loaded.model, loaded.rig, t_end, parameters, engine=engine, **options)
-    saved = result.save(folder / "sweep.npz")  # first of all: nothing after it can lose the runs
+    saved = result.save(folder / "sweep.npz")  # first, so that no later failure can lose the runs
     table = _csv(result).encode()
     text = sweep_summary(loaded, axes, result, engine).encode()
     return result, [
-        written_whole(folder / "summary.md", lambda file: file.write(text)),
-        written_whole(folder / "runs.csv", lambda file: file.write(table)),
+        write_whole(folder / "summary.md", lambda file: file.write(text)),
+        write_whole(folder / "runs.csv", lambda file: file.write(table)),
         saved,
     ]
 
 
 def _known(loaded: Loaded) -> tuple[Parameter, ...]:
-    """Return what can be varied."""
+    """Return the parameters that can be varied."""
     return (*parameters_of(loaded.model), *numbers_of(loaded.rig))
 
 
@@ -170,12 +169,14 @@ def _check(axes: Sequence[Axis], known: Sequence[Parameter]) -> None:
     for name in names:
         if name not in [each.name for each in known]:
             units = (f"{each.name} [{each.unit}]".removesuffix(" []") for each in known)
-            raise ParameterError(f"--over {cut(name)}: known here are {', '.join(units)}")
+            raise ParameterError(
+                f"--over {cut(name)}: unknown name", advice=f"choose from {', '.join(units)}"
+            )
         if names.count(name) > 1:
-            raise ParameterError(f"--over {name}: it is given twice", advice="once is enough")
+            raise ParameterError(f"--over {name}: it is given twice", advice="give it once")
     runs = math.prod(each.values.size for each in axes)
     if runs > MOST_RUNS:
-        raise ParameterError(f"--over makes {runs} runs", advice=f"make fewer, at most {MOST_RUNS}")
+        raise ParameterError(f"--over gives {runs} runs", advice=f"at most {MOST_RUNS} are allowed")
 
 
 # --------------------------------------------------------------------------- what is written
@@ -196,16 +197,16 @@ def sweep_summary(loaded: Loaded, axes: Sequence[Axis], result: Sweep, engine: s
     loaded : Loaded
         The scenario.
     axes : sequence of Axis
-        What was varied.
+        The parameters varied.
     result : Sweep
-        Its runs.
+        The results.
     engine : str
-        What ran them.
+        The engine used.
 
     Returns
     -------
     str
-        Markdown: what was varied, how the runs ended, a table of the first ones.
+        Markdown: the parameters varied, the outcomes of the runs, a table of the first runs.
     """
     units = {each.name: each.unit for each in _known(loaded)}
     bad = int((result.outcome != "ok").sum())
@@ -252,14 +253,14 @@ def failures(result: Sweep, most: int = 5) -> list[tuple[int, str]]:
     Parameters
     ----------
     result : Sweep
-        A sweep.
+        The sweep.
     most : int
-        How many at most.
+        Largest number of runs to return.
 
     Returns
     -------
     list of (int, str)
-        Runs count from 0.
+        Run index, from 0, and message.
     """
     runs = np.flatnonzero(result.outcome != "ok")[:most].tolist()
     return [(run, f"{result.outcome[run]}: {result.message[run]}") for run in runs]

@@ -1,4 +1,4 @@
-"""Units that measured records come in: a small explicit table, everything inside is SI."""
+"""Units of measured records: a small explicit table of factors to SI."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def factor(quantity: str, unit: str) -> float:
     Parameters
     ----------
     quantity : {"time", "position", "velocity", "force", "normal"}
-        What is measured.
+        The quantity.
     unit : str
-        For example ``"mm"``; ``µ`` and ``μ`` are read as ``u``.
+        Unit, for example ``"mm"``; ``µ`` and ``μ`` are read as ``u``.
 
     Returns
     -------
@@ -64,29 +64,29 @@ def convert_numbers(text: str) -> str:
     Parameters
     ----------
     text : str
-        For example ``"normal > 4.5 N"``.
+        Condition, for example ``"normal > 4.5 N"``.
 
     Returns
     -------
     str
-        For example ``"normal > 4.5"``.
+        The condition with SI numbers, for example ``"normal > 4.5"``.
 
     Raises
     ------
     UnitError
-        If a word behind a number is not a unit.
+        If a word after a number is not a unit.
 
     Examples
     --------
     >>> convert_numbers("normal > 4500 mN and time < 3 min")
     'normal > 4.5     and time < 180.0'
     """
-    # Never given back once read (++): 2e3 is no 2 with the unit e3, and long digits take no time.
+    # Possessive (++): 2e3 is not 2 with the unit e3, and long digit strings do not backtrack.
     number = r"(?:\d++(?:\.\d*+)?+|\.\d++)(?:[eE][-+]?\d++)?+"
     number_unit = rf"(?<![\w.])({number})\s*+([^\W\d]\w*+(?:/s)?)"
 
     def converted(clause: str) -> str:
-        # A unit has to fit the quantity it is compared with.
+        # The unit must be one of the quantity it is compared with.
         quantities = [q for q in FACTORS if re.search(rf"\b{q}\b", clause)]
 
         def in_si(found: re.Match[str]) -> str:
@@ -94,7 +94,7 @@ def convert_numbers(text: str) -> str:
             fitting = (
                 quantities or [q for q, units in FACTORS.items() if unit in units] or ["force"]
             )
-            # As long as what it replaces, where it can be: columns in messages stay true.
+            # Padded to the length of the original if possible, so columns in messages are correct.
             return repr(value * factor(fitting[0], unit)).ljust(len(found.group(0)))
 
         return re.sub(number_unit, in_si, clause)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gms_fsm._arguments import checked_whole
+from gms_fsm._arguments import checked_integer
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError, SessionError, shown
 from gms_fsm.run.settings import SettingOptions, Settings
@@ -40,18 +40,18 @@ def checked_settings(settings: Settings | None, options: SettingOptions) -> Sett
 
 def check_count(count: int) -> None:
     """Raise `SessionError` unless the argument is a count."""
-    checked_whole("count", count, 0, SessionError)
+    checked_integer("count", count, 0, SessionError)
 
 
 def check_branch(number: int, branches: int) -> None:
     """Raise `SessionError` unless a branch has this number."""
-    if not 0 <= checked_whole("branch", number, None, SessionError) < branches:
+    if not 0 <= checked_integer("branch", number, None, SessionError) < branches:
         raise SessionError(f"no branch {number}", advice=f"there are 0 to {branches - 1}")
 
 
 def check_row(row: int, rows: int) -> None:
     """Raise `SessionError` unless this row has been computed."""
-    if not 0 <= checked_whole("row", row, None, SessionError) < rows:
+    if not 0 <= checked_integer("row", row, None, SessionError) < rows:
         raise SessionError(f"no row {row}", advice=f"rows 0 to {rows - 1} have been computed")
 
 
@@ -59,11 +59,11 @@ def check_element(element: int, model: Model) -> None:
     """Raise `SessionError` unless the model has this element."""
     whole = isinstance(element, int | np.integer) and not isinstance(element, bool)
     if not whole or not 0 <= element < model.n:
-        said = shown(element)
-        if said in [repr(edge.name) for edge in model.chart.transitions]:
-            said += f" (to name an edge, use edge={said})"
+        text = shown(element)
+        if text in [repr(edge.name) for edge in model.chart.transitions]:
+            text += f" (to name an edge, use edge={text})"
         raise SessionError(
-            f"no element {said}",
+            f"no element {text}",
             advice=f"there are 0 to {model.n - 1} (counted from 0 in Python, from 1 in text)",
         )
 

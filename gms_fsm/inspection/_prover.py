@@ -31,10 +31,10 @@ from gms_fsm.language import (
     Value,
     evaluate,
     fold,
+    integer_power,
     names_in,
     parse_condition,
     spell,
-    whole_power,
 )
 
 __all__ = [
@@ -104,7 +104,7 @@ class Reading:
         return fold(condition, _Formulas(self, names))
 
     def margin(self, requirement: Requirement, names: Duals) -> Dual:
-        """Return the margin of a requirement: positive where it holds."""
+        """Return the margin of a requirement, positive where it holds."""
         pair = requirement.comparison
         left, right = self.value(pair.left, names), self.value(pair.right, names)
         if not requirement.holds:
@@ -145,7 +145,7 @@ class _Formulas:
         return Dual(a.value / b.value, slope)
 
     def power(self, node: Binary, parts: Iterator[Dual]) -> Dual:
-        whole = whole_power(node.right)
+        whole = integer_power(node.right)
         if whole is None:
             raise Undecided(
                 f"only integer powers up to {LARGEST_PRODUCT_POWER} are encoded: {shown(node)}"

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm._files import written_whole
+from gms_fsm._files import write_whole
 from gms_fsm.errors import SessionError, TraceFileError, why
 from gms_fsm.inspection._branch import Branch
 from gms_fsm.inspection._breakpoints import Breakpoint
@@ -130,7 +130,7 @@ def write(path: Path, record: SessionRecord) -> Path:
         "watches": record.watches,
     }
     text = json.dumps(data, indent=1).encode()
-    return written_whole(path, lambda file: file.write(text))
+    return write_whole(path, lambda file: file.write(text))
 
 
 def read(path: Path) -> SessionRecord:

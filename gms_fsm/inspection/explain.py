@@ -145,7 +145,7 @@ class Why:
     def __str__(self) -> str:
         lines = [f"element {self.element + 1} is in {self.state} at t = {self.t:.9g} s"]
         if self.left:
-            lines.append(f"it has just left {self.left}; the values are those before")
+            lines.append(f"it has just left {self.left}; the values are those before the firing")
         lines += [f"held on {name} = 0, σ = {u:.2g}" for name, u in self.sigma.items()]
         if not self.edges:
             lines.append("no edge leaves this state")

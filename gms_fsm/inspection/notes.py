@@ -22,7 +22,7 @@ __all__ = ["notes_on"]
 
 FAR = 1e4  # a stroke of more thresholds than this is worth a note
 NEAR = 1e-2  # of the smallest threshold: smaller deflections are not near it
-MOST_LOOKED_AT = 1000  # rows
+MOST_ROWS = 1000  # rows
 
 
 def notes_on(trace: Trace) -> tuple[str, ...]:
@@ -101,7 +101,7 @@ def _windows(trace: Trace) -> Iterator[str]:
             inside = whole.modes[:, i] == chart.state_index(edge.source)
             jumped = inside[:-1] & inside[1:] & (v[:-1] * v[1:] < 0.0)
             jumped &= (np.abs(v[:-1]) > c) & (np.abs(v[1:]) > c)
-            for row in (np.flatnonzero(jumped) + 1)[:MOST_LOOKED_AT].tolist():
+            for row in (np.flatnonzero(jumped) + 1)[:MOST_ROWS].tolist():
                 still = values_at(whole, row, i) | {"v": 0.0}
                 if whole.model.stribeck is not None:
                     still["s"] = float(whole.model.weights[i]) * whole.model.stribeck.F_s

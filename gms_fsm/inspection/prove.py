@@ -109,7 +109,7 @@ def prove(chart: Chart, domain: Sequence[str] | None = None) -> Report:
     """
     if not hasattr(chart, "guards"):
         raise ParameterError(
-            "prove takes a Chart; for a model, pass its .chart", place="chart", value=chart
+            "prove takes a Chart", place="chart", value=chart, advice="for a model, pass its .chart"
         )
     if domain is None:
         domain = default_domain(chart)

@@ -38,7 +38,7 @@ from gms_fsm.language._normal import (
     substitute,
     turning_inside,
 )
-from gms_fsm.language._powers import LARGEST_PRODUCT_POWER, product_power, whole_power
+from gms_fsm.language._powers import LARGEST_PRODUCT_POWER, integer_power, product_power
 from gms_fsm.language._print import LEVELS, MATLAB_LIKE, PYTHON, Spelling, spell
 from gms_fsm.language._read import parse_condition, parse_value
 from gms_fsm.language._tree import (
@@ -94,6 +94,7 @@ __all__ = [
     "derivative",
     "evaluate",
     "fold",
+    "integer_power",
     "names_in",
     "parse_condition",
     "parse_value",
@@ -106,5 +107,4 @@ __all__ = [
     "states_in",
     "substitute",
     "turning_inside",
-    "whole_power",
 ]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from gms_fsm.language._functions import ROUGH
-from gms_fsm.language._powers import whole_power
+from gms_fsm.language._powers import integer_power
 from gms_fsm.language._tree import (
     Binary,
     Both,
@@ -261,7 +261,7 @@ def substitute(
         match node:
             case Call("sqrt"):
                 return node
-            case Binary("**", base, exponent) if whole_power(exponent) is None:
+            case Binary("**", base, exponent) if integer_power(exponent) is None:
                 return Binary("**", base, smooth(exponent))
             case Call(function, arguments) if function in ROUGH:
                 inner = Call(function, tuple(smooth(argument) for argument in arguments))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gms_fsm.language._tree import Binary, Name, Negative, Number, Value
 
-__all__ = ["LARGEST_PRODUCT_POWER", "product_power", "whole_power"]
+__all__ = ["LARGEST_PRODUCT_POWER", "integer_power", "product_power"]
 
 LARGEST_PRODUCT_POWER = 8  # x**8 and below are printed as products ...
 LARGEST_PRODUCT = 64  # ... unless the text would exceed this many parts
@@ -33,7 +33,7 @@ def product_power(base: Value, exponent: Value) -> int | None:
 
 
 def _fitting_power(parts: int, exponent: Value) -> int | None:
-    whole = whole_power(exponent)
+    whole = integer_power(exponent)
     return None if whole is None or abs(whole) * parts > LARGEST_PRODUCT else whole
 
 
@@ -49,7 +49,7 @@ def _parts(node: Value) -> int:
     return sum(map(_parts, node.parts))
 
 
-def whole_power(exponent: Value) -> int | None:
+def integer_power(exponent: Value) -> int | None:
     """Return the integer that an exponent stands for if it is small, else None."""
     sign = 1.0
     while isinstance(exponent, Negative):

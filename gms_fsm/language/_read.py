@@ -193,7 +193,7 @@ def _parsed(text: str) -> ast.expr:
     return body
 
 
-def _meant(name: str, known: Iterable[str]) -> str:
+def _suggestion(name: str, known: Iterable[str]) -> str:
     """Return a question that suggests the known name closest to a wrong one."""
     by_case = {each.casefold(): each for each in known}
     wanted = _ALIASES.get(name, name).casefold()
@@ -249,7 +249,7 @@ class _Reader:
                     raise self.refuse(f"the function {name!r} needs (...)", node, f"{name}(...)")
                 known = ", ".join(self.names) or "none"
                 raise self.refuse(
-                    f"unknown name {shown(name)}{_meant(name, self.names)}",
+                    f"unknown name {shown(name)}{_suggestion(name, self.names)}",
                     node,
                     f"the names {known}, and pi",
                 )
@@ -271,7 +271,7 @@ class _Reader:
     def known(self, node: ast.expr, function: str) -> None:
         if function not in NAMESPACE:
             raise self.refuse(
-                f"unknown function {shown(function)}{_meant(function, FUNCTIONS)}",
+                f"unknown function {shown(function)}{_suggestion(function, FUNCTIONS)}",
                 node,
                 "the functions " + ", ".join(FUNCTIONS),
             )

@@ -25,7 +25,7 @@ from gms_fsm.lowering._store import Store
 from gms_fsm.lowering.program import Arguments, Program
 from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
 
-__all__ = ["check_numba", "machine_code", "observe_rows", "packed", "store", "tell"]
+__all__ = ["check_numba", "machine_code", "notify", "observe_rows", "packed", "store"]
 
 Packed = tuple[FloatArray, FloatArray, FloatArray]
 _lock = threading.RLock()  # a sweep may compile from several threads
@@ -178,7 +178,7 @@ def store() -> Store | None:
     return Store.at((Path(given) if given else user_cache_path("gms-fsm")) / "machine-code")
 
 
-def tell(text: str) -> None:
+def notify(text: str) -> None:
     """Print a message about a slow step to stderr.
 
     Parameters

@@ -234,7 +234,9 @@ def _wide(argument: Any) -> Any:
     return argument
 
 
-def _quiet(function: Callable[..., float], replacement: Callable[..., Any]) -> Callable[..., Any]:
+def _without_raising(
+    function: Callable[..., float], replacement: Callable[..., Any]
+) -> Callable[..., Any]:
     """Return a function of `math` that falls back on NumPy where it would raise."""
 
     def computed(*arguments: Any) -> Any:
@@ -247,13 +249,13 @@ def _quiet(function: Callable[..., float], replacement: Callable[..., Any]) -> C
 
 
 _IEEE: Mapping[str, Callable[..., Any]] = {
-    "exp": _quiet(math.exp, np.exp),
-    "log": _quiet(math.log, np.log),
-    "sqrt": _quiet(math.sqrt, np.sqrt),
-    "sin": _quiet(math.sin, np.sin),
-    "cos": _quiet(math.cos, np.cos),
-    "tanh": _quiet(math.tanh, np.tanh),
-    "atan": _quiet(math.atan, np.arctan),
-    "asinh": _quiet(math.asinh, np.arcsinh),
-    "pow": _quiet(math.pow, np.power),
+    "exp": _without_raising(math.exp, np.exp),
+    "log": _without_raising(math.log, np.log),
+    "sqrt": _without_raising(math.sqrt, np.sqrt),
+    "sin": _without_raising(math.sin, np.sin),
+    "cos": _without_raising(math.cos, np.cos),
+    "tanh": _without_raising(math.tanh, np.tanh),
+    "atan": _without_raising(math.atan, np.arctan),
+    "asinh": _without_raising(math.asinh, np.arcsinh),
+    "pow": _without_raising(math.pow, np.power),
 }

@@ -14,7 +14,7 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.lowering.program import Program
-from integrators import Functions, Held, look, room_to_slide, slope_on
+from integrators import Functions, Held, look, sliding_scratch, slope_on
 
 __all__ = ["armed", "observe", "rate", "sigmas"]
 
@@ -116,7 +116,7 @@ def _sliding(program: Program, mode: Sequence[int], held: list[float]) -> Held:
     """Return the program restricted to the surfaces that a row slides on."""
     names = ("flow", "arm", "margins", "normal")
     flow, arm, margins, normal = (program.ieee[name] for name in names)
-    sliding = room_to_slide(
+    sliding = sliding_scratch(
         program.surfaces,
         program.layout.y.size,
         program.held,

@@ -54,7 +54,7 @@ def python(plan: Plan) -> str:
     printer = _Printer(plan)
     lines = [
         f"# {_one_line(plan.title)}",
-        "# Generated from the chart; parameters are arguments: one text for every set of them.",
+        "# Generated from the chart; parameters are arguments, so one text serves all values.",
         "",
     ]
     for bank, states in zip(plan.banks, plan.names.states, strict=True):
@@ -300,7 +300,7 @@ class _Printer(Writer):
                 body = indented(body)
             lines += body
         if not any(bank.edges for bank in self.read.banks):
-            lines = [Line("pass  # the chart has no edge")]
+            lines = [Line("pass  # the chart has no edges")]
         machine = "machine" if several else "i"
         return self.function(
             f"act(edge, {machine}, t, y, mode, p)",
@@ -382,7 +382,7 @@ class _Printer(Writer):
             )
         return self.function(
             "flow(t, y, mode, held, p, dy)",
-            "dy = dy/dt, all states frozen and all signs held.",
+            "dy = dy/dt, all states and all signs frozen.",
             lines,
             signs,
         )
@@ -404,7 +404,7 @@ class _Printer(Writer):
                 lines += self.locks_seen(bank)
         return self.function(
             "observe(t, y, mode, held, p, out)",
-            f"out = v, F, then for all elements s, F_i and the rates; a sign {LIVE} is taken live.",
+            f"out = v, F, then for all elements s, F_i and the rates; sign {LIVE} means live.",
             lines,
             "given",
         )
@@ -453,7 +453,7 @@ class _Printer(Writer):
             lines = [Line(text, every), Line("    out[j] = 0.0"), *lines]
         return self.function(
             "normal(surface, t, y, mode, p, out)",
-            "out = the gradient over y of what is zero on a surface, then its rate in t.",
+            "out = the gradient of a surface's value over y, then its rate in t.",
             lines,
             "live",
         )
@@ -517,7 +517,7 @@ class _Printer(Writer):
                 lines += self.loop(bank.index, "live", (), branches)
         return self.function(
             "arm(t, y, mode, p, held, watch)",
-            "Hold the signs and mark the comparisons that keep every false guard false.",
+            "Freeze the signs and mark the comparisons that keep every false guard false.",
             lines,
             "live",
         )
@@ -589,7 +589,7 @@ class _Printer(Writer):
                 lines += self.loop(bank.index, "live", rows)
         return self.function(
             "margins(t, y, mode, p, watch, out)",
-            "For each watched comparison left - right.",
+            "For each watched comparison, left - right.",
             lines,
             "live",
         )

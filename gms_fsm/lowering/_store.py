@@ -15,7 +15,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from gms_fsm._files import remove_leftovers, written_whole
+from gms_fsm._files import remove_leftovers, write_whole
 from gms_fsm.errors import OutputError
 
 __all__ = ["Store"]
@@ -102,7 +102,7 @@ class Store:
             Replaces an existing content atomically.
         """
         with contextlib.suppress(OutputError):
-            written_whole(
+            write_whole(
                 self.folder / name, lambda file: file.write(_checksum(name, content) + content)
             )
 

@@ -108,16 +108,16 @@ def scales_of(model: Model | Contact) -> Scales:
     Scales
         Derived from its guards, its force and its curve.
     """
-    return _scales_of(_Same(model))
+    return _scales_of(_ByIdentity(model))
 
 
 @functools.lru_cache(maxsize=64)
-def _scales_of(key: _Same[Model | Contact]) -> Scales:
+def _scales_of(key: _ByIdentity[Model | Contact]) -> Scales:
     model = key.it
     if isinstance(model, Contact) and model.model is not None:
         return scales_of(model.model)
     chart = model.chart
-    sizes = _sizes(_Same(chart))
+    sizes = _sizes(_ByIdentity(chart))
     curve, weights = None, np.ones(1)
     if not isinstance(model, Contact) and "s" in chart.inputs:
         curve, weights = model.stribeck, model.weights
@@ -227,7 +227,7 @@ class _Sizes:
     paces: Sequence[Numbers]  # relaxation rates of the variables and of v
 
 
-class _Same(Generic[T]):
+class _ByIdentity(Generic[T]):
     """A chart or a model compared by identity, because its data cannot be hashed."""
 
     def __init__(self, it: T) -> None:
@@ -237,11 +237,11 @@ class _Same(Generic[T]):
         return id(self.it)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and other.it is self.it
+        return isinstance(other, _ByIdentity) and other.it is self.it
 
 
 @functools.lru_cache(maxsize=64)
-def _sizes(key: _Same[Chart]) -> _Sizes:
+def _sizes(key: _ByIdentity[Chart]) -> _Sizes:
     chart = key.it
     states = ("x", "v", *chart.variables)
     rates = [f"d{name}" for name in chart.variables]
@@ -257,7 +257,7 @@ def _sizes(key: _Same[Chart]) -> _Sizes:
         still = {name: zero for name, zero in rest.items() if not (moving and name == "v")}
         names = f"v, {arguments}" if moving else arguments
         text = f"def number({names}):\n    return {spell(renamed(tree, still))}\n"
-        made: Numbers = load(f"scale in {chart.name}", text, {"sgn": _to_the_right})["number"]
+        made: Numbers = load(f"scale in {chart.name}", text, {"sgn": _sign_from_above})["number"]
         return made
 
     guards = chart.guards.values()
@@ -300,7 +300,7 @@ def _sizes(key: _Same[Chart]) -> _Sizes:
     return _Sizes(reach, stiffness, {name: row for name, row in follows.items() if row}, paces)
 
 
-def _to_the_right(u: float) -> float:
+def _sign_from_above(u: float) -> float:
     """Return the sign of u with sgn(0) = 1: the slope of abs(z) at 0 is 1."""
     return 1.0 if u >= 0.0 else -1.0
 

@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm._files import written_whole
+from gms_fsm._files import write_whole
 from gms_fsm.errors import CheckpointError, ParameterError, SignalError, cut, shown, why
 from gms_fsm.lowering.layout import LOG_TEXTS
 from gms_fsm.run._identity import identity
@@ -28,7 +28,7 @@ from integrators import hybrid, loop
 from integrators.advance import NEXT_KNOT, NEXT_TIME, ROW
 from integrators.steps import T
 
-__all__ = ["Keeper"]
+__all__ = ["Checkpointer"]
 
 _FORMAT = "gms-fsm checkpoint 2"
 
@@ -45,11 +45,11 @@ class Resumable(Protocol):
     def kept(self) -> dict[str, Any]:
         """Return the recorder's contents as arrays."""
 
-    def go_on_from(self, kept: dict[str, Any]) -> None:
+    def restore(self, kept: dict[str, Any]) -> None:
         """Restore what `kept` returned; the buffers are already filled."""
 
 
-class Keeper:
+class Checkpointer:
     """Saves a run's state to a file at intervals, and resumes the run from it.
 
     Parameters
@@ -97,7 +97,7 @@ class Keeper:
         state = {f"loop_{name}": u for name, u in hybrid.state_of(self.run.buffers).items()}
         kept = {f"kept_{name}": u for name, u in self.run.kept().items()}
         head: dict[str, Any] = {"format": _FORMAT, "program": _program(), "identity": self.identity}
-        written_whole(self.path, lambda file: np.savez(file, **head, **state, **kept))
+        write_whole(self.path, lambda file: np.savez(file, **head, **state, **kept))
 
     def finish(self) -> None:
         """Remove the file because the run has ended."""
@@ -141,7 +141,7 @@ class Keeper:
             )
         for name, place in places.items():
             place[:] = state[name] if isinstance(place, np.ndarray) else state[name].tolist()
-        self.run.go_on_from(kept)
+        self.run.restore(kept)
 
 
 def _program() -> str:

@@ -11,8 +11,15 @@ import numpy as np
 from gms_fsm.lowering import _compiled as compiled
 from gms_fsm.lowering.layout import LOG_NUMBERS, LOG_TEXTS
 from gms_fsm.lowering.program import equations
-from gms_fsm.run._recording import PATIENCE, Recording, check_end, check_pace, explained, meddled
-from gms_fsm.run.machines import ElementMachines, MachineEngine, Meddling
+from gms_fsm.run._recording import (
+    PATIENCE,
+    Recording,
+    check_end,
+    check_pace,
+    explained,
+    interference_error,
+)
+from gms_fsm.run.machines import ElementMachines, Interference, MachineEngine
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
@@ -63,18 +70,18 @@ class CompiledRun:
         """Return the columns for a checkpoint."""
         return self.columns.state()
 
-    def go_on_from(self, kept: dict[str, Any]) -> None:
+    def restore(self, kept: dict[str, Any]) -> None:
         """Restore what `kept` returned; the buffers are already filled."""
-        self.columns.put_back(kept)
+        self.columns.restore(kept)
         counts: Any = self.buffers.memory.counts
         t, y, mode = self.columns.latest
         if self.engine is not None:
-            self.engine.go_on_from(t, y, mode[self.start.program.layout.elements])
+            self.engine.restore(t, y, mode[self.start.program.layout.elements])
             if counts[loop.PHASE] == loop.FIRE:  # its callbacks have run, the loop has yet to fire
                 edge = self.start.model.chart.transitions[counts[loop.EDGE]]
                 self.engine.set_state(int(counts[loop.MACHINE]), edge.target)
 
-    def begin_again(self, model: Model, rig: Rig) -> None:
+    def reset(self, model: Model, rig: Rig) -> None:
         """Start over with different numbers; signals and initial values stay.
 
         Parameters
@@ -82,7 +89,7 @@ class CompiledRun:
         model, rig
             Of the same kind as the previous ones.
         """
-        self.columns.begin_again(model, rig)
+        self.columns.reset(model, rig)
 
     def advance(self) -> bool:
         """Run until a chunk of steps is complete.
@@ -109,7 +116,7 @@ class CompiledRun:
             event = record(
                 (functions, switch, b, columns.log, columns.recorded, STEPS_AT_ONCE, pause),
                 compiled.store(),
-                compiled.tell,
+                compiled.notify,
             )
         except Exception as error:
             if not start.program.callables:
@@ -143,8 +150,8 @@ class CompiledRun:
             engine.show(t, y, list(mode[start.program.layout.elements]))
         try:
             engine.trigger(int(memory.counts[loop.EDGE]), int(memory.counts[loop.MACHINE]), t)
-        except Meddling as error:
-            raise meddled(error, self.columns) from error.__cause__
+        except Interference as error:
+            raise interference_error(error, self.columns) from error.__cause__
 
 
 class Columns:
@@ -195,7 +202,7 @@ class Columns:
             self.log.stops_mode[0] = list(layout.not_sliding(start.mode))
             self.log.counts[STOPS] = 1
 
-    def begin_again(self, model: Model, rig: Rig) -> None:
+    def reset(self, model: Model, rig: Rig) -> None:
         """Empty the columns and return to the start, with the numbers of a model and a rig."""
         self.start = self.start.with_numbers(model, rig)
         self.p = compiled.packed(self.start.program.p)
@@ -230,7 +237,7 @@ class Columns:
         out = self.buffers.out
         return {**self.log._asdict(), "rows_t": out.rows_t, "rows_y": out.rows_y}
 
-    def put_back(self, state: Mapping[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Any]) -> None:
         """Restore what `state` returned."""
         self.log = loop.Log(**{name: state[name] for name in self.log._fields})
         out = self.buffers.out._replace(rows_t=state["rows_t"], rows_y=state["rows_y"])
@@ -240,18 +247,21 @@ class Columns:
         """Double the columns that are full."""
         out, log = self.buffers.out, self.log
         if out.every_step and out.cursor[ROW] + 1 >= len(out.rows_t):
-            out = out._replace(rows_t=_twice(out.rows_t), rows_y=_twice(out.rows_y))
+            out = out._replace(rows_t=_doubled(out.rows_t), rows_y=_doubled(out.rows_y))
             self.buffers = self.buffers._replace(out=out)
             log = log._replace(
-                rows_microstep=_twice(log.rows_microstep), rows_mode=_twice(log.rows_mode)
+                rows_microstep=_doubled(log.rows_microstep), rows_mode=_doubled(log.rows_mode)
             )
         if log.counts[FIRINGS] >= len(log.t):
             log = log._replace(
-                **{name: _twice(getattr(log, name)) for name in ("t", "machine", "edge", "numbers")}
+                **{
+                    name: _doubled(getattr(log, name))
+                    for name in ("t", "machine", "edge", "numbers")
+                }
             )
         if 0 < len(log.stops_t) <= log.counts[STOPS]:
             names = ("stops_t", "stops_microstep", "stops_y", "stops_mode")
-            log = log._replace(**{name: _twice(getattr(log, name)) for name in names})
+            log = log._replace(**{name: _doubled(getattr(log, name)) for name in names})
         self.log = log
 
     def interrupted(self, before: tuple[float, list[float], tuple[int, ...]]) -> None:
@@ -318,7 +328,7 @@ class Columns:
         return Trace(rows, stops, self.transitions(), start.model, start.rig, start.settings)
 
 
-def _twice(column: Any) -> Any:
+def _doubled(column: Any) -> Any:
     return np.concatenate([column, np.zeros_like(column)])
 
 

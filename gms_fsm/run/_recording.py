@@ -14,7 +14,7 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.language import rough_points
 from gms_fsm.lowering._observing import armed, rate
 from gms_fsm.lowering.layout import Layout, LogRecord
-from gms_fsm.run.machines import Meddling
+from gms_fsm.run.machines import Interference
 from gms_fsm.run.start import Start
 from gms_fsm.traces._log import log_of
 from gms_fsm.traces.failures import (
@@ -51,7 +51,7 @@ __all__ = [
     "check_end",
     "check_pace",
     "explained",
-    "meddled",
+    "interference_error",
     "scope_of",
 ]
 
@@ -65,7 +65,7 @@ class Recording(Protocol):
 
     @property
     def start(self) -> Start:
-        """The run's settings."""
+        """The model, rig and settings of the run."""
 
     @property
     def latest(self) -> tuple[float, list[float], tuple[int, ...]]:
@@ -153,7 +153,7 @@ class Recorder:
         }
         return kept | {"log": np.asarray(log_of(self.log))}
 
-    def put_back(
+    def restore(
         self, state: Mapping[str, Any], latest: tuple[float, list[float], tuple[int, ...]]
     ) -> None:
         """Restore what `state` returned, and the state reached."""
@@ -277,7 +277,7 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
     start = recorder.start
     scope = Scope.of(start.model, start.program, error.t, error.y, error.mode)
 
-    def told(i: int) -> str:
+    def described(i: int) -> str:
         s = f", s = {scope.s[i]:.6g}" if "s" in chart.inputs else ""
         return f"{chart.variables[0]} = {scope.z[i]:.6g}{s}, v = {scope.v:.6g}"
 
@@ -294,14 +294,14 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
             )
             if time > 0.0
             else (
-                f"guard [{guard}] {_way_back(chart, taken)} hold together",
+                f"guard [{guard}] {_opposite_edge(chart, taken)} hold together",
                 "make the guards exclude each other",
             )
         )
         return LivelockError(
             f"switched {len(taken)} times{f' in {time:.3g} s' if time else ''}, "
             f"last by {str(last.edge)!r} from {last.source} to {last.target} "
-            f"({told(error.machine)}): {cause}",
+            f"({described(error.machine)}): {cause}",
             trace,
             t=error.t,
             place=f"element {error.machine + 1}",
@@ -317,7 +317,7 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
     edges = ", ".join(f"{edge.name} [{edge.guard}]" for _, edge in chart.leaving(state.name))
     return LivelockError(
         f"{' and '.join(error.relations)} changed {error.times} times: "
-        f"the element is in {state.name} ({told(i)}), its flow pushes back on both sides, "
+        f"the element is in {state.name} ({described(i)}), its flow pushes back on both sides, "
         f"no edge leaves ({edges or 'it has none'}), and no value of the sign between -1 and 1 "
         f"holds it there",
         trace,
@@ -394,12 +394,12 @@ def check_pace(recording: Recording, buffers: hybrid.Buffers) -> None:
     )
 
 
-def meddled(error: Meddling, recorder: Recording) -> CallbackError:
+def interference_error(error: Interference, recorder: Recording) -> CallbackError:
     """Return an error with the trace for a callback that changed something.
 
     Parameters
     ----------
-    error : Meddling
+    error : Interference
         From the machines.
     recorder : Recording
         The recorded data.
@@ -414,7 +414,7 @@ def meddled(error: Meddling, recorder: Recording) -> CallbackError:
     )
 
 
-def _way_back(chart: Chart, taken: Any) -> str:
+def _opposite_edge(chart: Chart, taken: Any) -> str:
     """Name the other edge of an endless back and forth."""
     other = next((edge for edge in chart.transitions if edge.name == taken[-2].edge), None)
     if len(set(taken.edge.tolist())) != 2 or other is None:

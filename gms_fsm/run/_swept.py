@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gms_fsm._arguments import checked_path
 from gms_fsm._extras import require
-from gms_fsm._files import written_whole
+from gms_fsm._files import write_whole
 from gms_fsm.charts.parameters import QUANTITIES, FloatArray
 from gms_fsm.errors import OutputError, TraceFileError, cut, shown, why
 from gms_fsm.lowering.layout import LOG_NUMBERS
@@ -139,7 +139,7 @@ class Sweep:
         results |= _numbered("z", self.z) | _numbered("state", self.states)
         results |= {"transitions": self.transition_count}
         parameters = {
-            _apart(column, results): numbers
+            _distinct(column, results): numbers
             for name, values in self.parameters.items()
             for column, numbers in _numbered(name, values).items()
         }
@@ -179,7 +179,7 @@ class Sweep:
             coordinates["time"] = self.times
         taken = {*data, *coordinates}
         parameters = {
-            _apart(name, taken): (("run", "element")[: values.ndim], values)
+            _distinct(name, taken): (("run", "element")[: values.ndim], values)
             for name, values in self.parameters.items()
         }
         dataset = xarray.Dataset(parameters | data, coordinates)
@@ -218,7 +218,7 @@ class Sweep:
             arrays |= {name: getattr(self, name) for name in _SAVED}
             arrays |= {"transitions": np.asarray(self.transitions), "elements": self.z.shape[1]}
             arrays["edges"] = np.array(self.edges, dtype=np.str_)
-            return written_whole(path, lambda file: np.savez_compressed(file, **arrays))
+            return write_whole(path, lambda file: np.savez_compressed(file, **arrays))
         if path.suffix == ".parquet":
             pandas = require("pandas", "sweep")
             require("pyarrow", "sweep")
@@ -226,9 +226,9 @@ class Sweep:
                 {name: self.transitions[name] for name in LOG.names or ()}
                 | {"edge": np.array(self.edges, dtype=object)[self.transitions["edge"]]}
             )
-            beside = path.with_name(f"{path.stem}.transitions.parquet")
-            written_whole(beside, log.to_parquet)
-            return written_whole(path, self.to_dataframe().to_parquet)
+            log_path = path.with_name(f"{path.stem}.transitions.parquet")
+            write_whole(log_path, log.to_parquet)
+            return write_whole(path, self.to_dataframe().to_parquet)
         raise OutputError(
             f"a sweep is saved as .npz or .parquet, not {path.suffix!r}", place=str(path)
         )
@@ -329,6 +329,6 @@ def _numbered(name: str, values: NDArray[Any]) -> dict[str, Any]:
     return {column_name(name, i): values[:, i] for i in range(values.shape[1])}
 
 
-def _apart(name: str, taken: Collection[str]) -> str:
+def _distinct(name: str, taken: Collection[str]) -> str:
     """Return a column name for a parameter that differs from those of the results."""
     return f"parameter_{name}" if name in taken else name

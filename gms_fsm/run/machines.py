@@ -21,7 +21,7 @@ from gms_fsm.lowering.program import Arguments, Program
 from gms_fsm.systems.models import Model
 from gms_fsm.traces.scope import GuardValues, parameter_values
 
-__all__ = ["Element", "ElementMachines", "Engine", "IfElse", "Meddling"]
+__all__ = ["Element", "ElementMachines", "Engine", "IfElse", "Interference"]
 
 
 class Element:
@@ -216,7 +216,7 @@ class Engine(Protocol):
         """Take an edge."""
 
 
-class Meddling(Exception):
+class Interference(Exception):
     """A callback changed something it may only read; the run turns this into a user's error."""
 
     def __init__(self, reason: str, place: str, t: float) -> None:
@@ -239,7 +239,7 @@ class MachineEngine:
         self.states = [""] * len(mode)
         self.set_states(mode)
 
-    def go_on_from(self, t: float, y: list[float], mode: Sequence[int]) -> None:
+    def restore(self, t: float, y: list[float], mode: Sequence[int]) -> None:
         """Put every element where it was when a run was interrupted."""
         self.set_states(mode)
         self.show(t, y, list(mode))  # possibly between two firings of a set
@@ -285,7 +285,7 @@ class MachineEngine:
 
         Raises
         ------
-        Meddling
+        Interference
             If a callback changed these values, or a state.
         """
         row, elements = self.chart.transitions[edge], self.machines.elements
@@ -295,11 +295,11 @@ class MachineEngine:
         try:
             fired = getattr(elements[machine], row.name)()
         except MachineError as error:
-            raise Meddling(
+            raise Interference(
                 f"a callback changed a state ({error.value}); {ONLY_LOOK}", place, t
             ) from error
         if not fired:
-            raise Meddling(
+            raise Interference(
                 "the edge was enabled, but a callback changed the element's values before "
                 f"it fired; {ONLY_LOOK}",
                 place,
@@ -308,7 +308,7 @@ class MachineEngine:
         self.states[machine] = row.target
         for i, (element, state) in enumerate(zip(elements, self.states, strict=True)):
             if element.state != state:
-                raise Meddling(
+                raise Interference(
                     f"a callback put element {i + 1} into state {shown(element.state)}, "
                     f"but the chart has it in {state!r}; {ONLY_LOOK}",
                     place,

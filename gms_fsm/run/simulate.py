@@ -10,7 +10,7 @@ import integrators
 from gms_fsm._arguments import checked_kind, checked_path
 from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.lowering.program import equations
-from gms_fsm.run._checkpoint import Keeper
+from gms_fsm.run._checkpoint import Checkpointer
 from gms_fsm.run._compiled_run import CompiledRun
 from gms_fsm.run._recording import (
     PATIENCE,
@@ -19,9 +19,9 @@ from gms_fsm.run._recording import (
     check_end,
     check_pace,
     explained,
-    meddled,
+    interference_error,
 )
-from gms_fsm.run.machines import ElementMachines, IfElse, MachineEngine, Meddling
+from gms_fsm.run.machines import ElementMachines, IfElse, Interference, MachineEngine
 from gms_fsm.run.settings import RunOptions, SettingOptions, Settings
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
@@ -145,7 +145,7 @@ def simulate(
     start = Start.of(model, rig, t_end, chosen, t_start=t_start, initial=initial)
     watching = checked(monitors, model, start.output).values() if monitors else ()
     run = CompiledRun(start, machines) if chosen.engine == "compiled" else Run(start, machines)
-    keeper = None if path is None else Keeper(run, path, checkpoint_every)
+    keeper = None if path is None else Checkpointer(run, path, checkpoint_every)
     try:
         while run.advance():
             if keeper is not None:
@@ -201,13 +201,13 @@ class Run:
         """Return the recorder's contents for a checkpoint."""
         return self.recorder.state()
 
-    def go_on_from(self, kept: dict[str, Any]) -> None:
+    def restore(self, kept: dict[str, Any]) -> None:
         """Restore what `kept` returned; the buffers are already filled."""
         now = self.buffers.now
         t, y = now.clock[T], list(now.y)
-        self.recorder.put_back(kept, (t, y, hybrid.modes_of(self.buffers)))
+        self.recorder.restore(kept, (t, y, hybrid.modes_of(self.buffers)))
         if self.engine is not None:
-            self.engine.go_on_from(t, list(y), now.mode)
+            self.engine.restore(t, list(y), now.mode)
 
     def advance(self) -> bool:
         """Advance to the next event.
@@ -236,8 +236,8 @@ class Run:
             if self.buffers.out.cursor[ROW]:
                 recorder.take(hybrid.take_rows(self.buffers))
             raise
-        except Meddling as error:
-            raise meddled(error, recorder) from error.__cause__
+        except Interference as error:
+            raise interference_error(error, recorder) from error.__cause__
         if event is None:
             check_end(recorder)
             return False

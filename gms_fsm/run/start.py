@@ -130,7 +130,7 @@ class Start:
         if not isinstance(method, str) and min(tolerances) == 0.0:
             raise ParameterError(
                 f"method {method.__name__} needs an absolute tolerance, and the chart "
-                "gives no scale for every component",
+                "gives no scale for some component",
                 advice="give one, for example atol=1e-9, or by name atol={'x': 1e-9}",
             )
         options = Options(
@@ -146,7 +146,7 @@ class Start:
             rows_at_once,
         )
         last = _covered(system, t_start, t_end)
-        program = _watchful(program, system, t_start, last)
+        program = _with_waking_times(program, system, t_start, last)
         y, mode = _initial(system, program, {} if initial is None else initial)
         kept: dict[str, Setting] = {
             "method": chosen.method_name,
@@ -275,7 +275,7 @@ def _component(layout: Layout, key: object, owner: str) -> str:
     return layout.keys[key]
 
 
-def _watchful(program: Program, system: System, t_start: float, t_end: float) -> Program:
+def _with_waking_times(program: Program, system: System, t_start: float, t_end: float) -> Program:
     """Return the program with the times at which its formulas start to change as knots."""
     times = {
         time

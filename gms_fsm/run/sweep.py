@@ -94,7 +94,7 @@ def sweep(
     >>> result.outcome.tolist(), result.transition_count.tolist()
     (['ok', 'ok'], [4, 4])
     """
-    begin = _Begin(t_end, t_start, initial, _chosen(settings, options))
+    begin = _Common(t_end, t_start, initial, _chosen(settings, options))
     if begin.settings.engine == "compiled":
         check_numba()
     begin.start(model, rig)  # errors common to all runs are raised once, here
@@ -111,14 +111,14 @@ def sweep(
         shown = stack.enter_context(_bar(runs, progress))
         waiting: dict[Future[list[_Result]], range] = {}
         try:
-            with _undisturbed():
+            with _interrupts_deferred():
                 for chunk in chunks:
                     part = {key: array[chunk.start : chunk.stop] for key, array in values.items()}
                     try:
                         task = executor.submit(_run_chunk, model, rig, begin, part, name)
                     except Exception as error:
                         if not isinstance(error, BrokenExecutor):  # broken by an earlier task
-                            error = _NotSent(f"{type(error).__name__}: {error}")
+                            error = _NotDelivered(f"{type(error).__name__}: {error}")
                         task = Future()
                         task.set_exception(error)
                     waiting[task] = chunk
@@ -206,7 +206,7 @@ class _Result:
 
 
 @dataclass(frozen=True)
-class _Begin:
+class _Common:
     """What all runs of a sweep have in common."""
 
     t_end: float
@@ -240,7 +240,7 @@ def _chosen(settings: Settings | None, options: SettingOptions) -> Settings:
 def _run_chunk(
     model: Model,
     rig: Rig,
-    begin: _Begin,
+    begin: _Common,
     part: Mapping[str, FloatArray],
     _sweep: str,
 ) -> list[_Result]:
@@ -254,7 +254,7 @@ def _run_chunk(
         try:
             its_model, its_rig = with_values(model, values), with_numbers(rig, values)
             if compiled is not None:  # the same buffers and machine code, different numbers
-                compiled.begin_again(its_model, its_rig)
+                compiled.reset(its_model, its_rig)
                 run = compiled
             elif begin.settings.engine == "compiled":
                 run = compiled = CompiledRun(begin.start(its_model, its_rig))
@@ -289,7 +289,7 @@ def _result(run: Run | CompiledRun | None, outcome: str, message: str) -> _Resul
     return _Result(outcome, message, end, log, rows)
 
 
-class _NotSent(Exception):
+class _NotDelivered(Exception):
     """A task did not reach a worker: something in it cannot be pickled."""
 
 
@@ -297,7 +297,7 @@ def _results(future: Future[list[_Result]], count: int) -> list[_Result]:
     """Return the results of a task; a lost task gives rows that say so."""
     try:
         return future.result()
-    except _NotSent as error:
+    except _NotDelivered as error:
         message = (
             f"the run could not be sent to a worker ({cut(str(error))}); give signals as "
             "expressions in t or as arrays, or use threads (executor=None)"
@@ -371,7 +371,7 @@ def _threads() -> ThreadPoolExecutor:
 
 
 @contextlib.contextmanager
-def _undisturbed() -> Iterator[None]:
+def _interrupts_deferred() -> Iterator[None]:
     """Defer Ctrl-C: in the middle of `submit` it would leave the executor's lock locked."""
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -17,7 +17,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm._files import in_turn, leftovers, written_together
+from gms_fsm._files import folder_lock, leftovers, write_together
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import TraceFileError
 from gms_fsm.lowering.layout import LOG_NUMBERS, LOG_TEXTS, Layout
@@ -53,7 +53,7 @@ def write(path: Path, header: Header, columns: Mapping[str, NDArray[Any]], log: 
     head = json.loads(header.model_copy(update={"log": _stamp(its_log)}).model_dump_json())
     cells = ([_cell("", value) for value in row] for row in rows)
     text = f"# {json.dumps(head)}\n" + _text(columns, cells)
-    written_together(
+    write_together(
         {
             path: lambda file: file.write(text.encode()),
             log_path(path): lambda file: file.write(its_log.encode()),
@@ -64,7 +64,7 @@ def write(path: Path, header: Header, columns: Mapping[str, NDArray[Any]], log: 
 
 def read(path: Path) -> Parts:
     """Read a trace and its log."""
-    with in_turn(path.parent, shared=True):  # rows and log must come from the same run
+    with folder_lock(path.parent, shared=True):  # rows and log must come from the same run
         with path.open(encoding="utf-8", newline="") as file:
             header = _header(path, file.readline())
             table = _read_columns(file, path, 2)

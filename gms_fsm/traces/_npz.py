@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gms_fsm._files import written_whole
+from gms_fsm._files import write_whole
 from gms_fsm.lowering.program import lower
 from gms_fsm.traces._archives import member
 from gms_fsm.traces._header import Header
@@ -25,7 +25,7 @@ def write(path: Path, parts: Parts) -> Path:
         "transitions": np.asarray(parts.log),
         "header": np.array(parts.header.model_dump_json()),
     }
-    return written_whole(path, lambda file: np.savez_compressed(file, **arrays))
+    return write_whole(path, lambda file: np.savez_compressed(file, **arrays))
 
 
 def read(path: Path) -> Parts:

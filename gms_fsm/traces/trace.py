@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gms_fsm._arguments import checked_path, checked_whole
+from gms_fsm._arguments import checked_integer, checked_path
 from gms_fsm._extras import require
 from gms_fsm.charts.parameters import FloatArray, as_numbers
 from gms_fsm.errors import (
@@ -179,7 +179,9 @@ class Trace:
         model: Any = self.system.contact(bank.name)
         chosen = replace(self, model=model, transitions=mine, which=bank.name)
         # What the rows were computed to stays.
-        kept = {key: vars(self)[key] for key in ("program", "_seen") if key in vars(self)}
+        kept: dict[str, Any] = {
+            key: vars(self)[key] for key in ("program", "_seen") if key in vars(self)
+        }
         vars(chosen).update(kept)
         return chosen
 
@@ -212,10 +214,10 @@ class Trace:
             next(b.x for b in self._system.bodies if b.v == name)
         )
         modes = self.rows.mode.tolist()
-        rows = zip(self.t.tolist(), self.rows.y.tolist(), modes, strict=True)
-        held = [armed(self.program, t, y, mode) for t, y, mode in rows]
-        rows = zip(self.t.tolist(), self.rows.y.tolist(), modes, held, strict=True)
-        return np.array([rate(self.program, *row)[place] for row in rows])
+        program, found = self.program, []
+        for t, y, mode in zip(self.t.tolist(), self.rows.y.tolist(), modes, strict=True):
+            found.append(rate(program, t, y, mode, armed(program, t, y, mode))[place])
+        return np.array(found)
 
     @property
     def _system(self) -> System:
@@ -371,7 +373,7 @@ class Trace:
         dict of str to float
             Keyed by the quantity that is zero there, such as ``v``; empty at most rows.
         """
-        row = checked_whole("row", row)
+        row = checked_integer("row", row)
         on = np.flatnonzero(self.rows.mode[row, self.program.layout.slides])
         return {self.program.surface_names[k]: self._sigma(self.rows, row, int(k)) for k in on}
 
@@ -455,7 +457,7 @@ class Trace:
         Trace
             All rows of this trace, including micro-steps, and the samples.
         """
-        points = checked_whole("points", points, 1)
+        points = checked_integer("points", points, 1)
         even = self.sample(np.linspace(self.t[0], self.t[-1], points)).rows
         inner = ~np.isin(even.t, self.t)
         rows = merged(even.at(inner), self.rows)

@@ -1,6 +1,6 @@
-"""Composite figures: the paper's Fig. 3 and 4, a run at a glance, ribbons and cascades.
+"""Composite figures: the paper's Fig. 3 and 4, overview of a run, ribbons and cascades.
 
-Figures are made without pyplot: no global state, no display.
+Figures are made without pyplot, so there is no global state and no display.
 """
 
 from __future__ import annotations

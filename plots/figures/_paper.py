@@ -1,4 +1,4 @@
-"""Figures of several runs: the paper's Fig. 3 and 4, laws side by side, differences."""
+"""Figures of several runs: the paper's Fig. 3 and 4, comparison of laws, differences."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def figure_3(
     limit: float | None = None,
     window: Window | None = None,
 ) -> Figure:
-    """Draw Fig. 3: the applied force, and F against x by chart, if-else and LuGre.
+    """Draw Fig. 3: the applied force, and F against x for chart, if-else and LuGre.
 
     Parameters
     ----------
@@ -44,9 +44,9 @@ def figure_3(
     phases : sequence of (str, float)
         Names and end times [s] of the parts of the experiment.
     limit : float, optional
-        Where the axis of F ends [N]; a higher peak is written beside it.
+        Upper end of the F axis [N]; a higher peak is given as text.
     window : (float, float), optional
-        From when to when, s.
+        Time interval to show, s.
 
     Returns
     -------
@@ -56,12 +56,12 @@ def figure_3(
     Raises
     ------
     ParameterError
-        If there is not one force a row, or the window is not a part of the runs.
+        If there is not one force per row, or the window is not within the runs.
     """
     if np.shape(force) != chart.t.shape:
         raise ParameterError(
             f"force has shape {np.shape(force)}",
-            advice=f"it must have one value a row of the chart run, shape {chart.t.shape}",
+            advice=f"it must have one value per row of the chart run, shape {chart.t.shape}",
         )
     with rc_context(RC):
         figure = Figure(figsize=(9.0, 6.2), layout="constrained")
@@ -105,16 +105,16 @@ def figure_4(
     window: Window | None = None,
     elements: Sequence[int] | None = None,
 ) -> Figure:
-    """Draw Fig. 4: velocity, deflections and forces by chart, if-else and LuGre.
+    """Draw Fig. 4: velocity, deflections and forces for chart, if-else and LuGre.
 
     Parameters
     ----------
     chart, ifelse, lugre : Trace
         The three runs.
     window : (float, float), optional
-        From when to when, s.
+        Time interval to show, s.
     elements : sequence of int, optional
-        Whose deflections, counted from 0; all when left out.
+        Elements whose deflections are shown, counted from 0; by default all.
 
     Returns
     -------
@@ -159,9 +159,9 @@ def compare_laws(
     runs : mapping of str to Trace
         Column titles and runs.
     window : (float, float), optional
-        From when to when, s.
+        Time interval to show, s.
     elements : sequence of int, optional
-        Which elements, counted from 0; all when left out.
+        Which elements, counted from 0; by default all.
 
     Returns
     -------
@@ -218,12 +218,12 @@ def residuals(
     title : str
         Of the figure.
     log : bool
-        Draw their sizes on a logarithmic axis.
+        Draw their magnitudes on a logarithmic axis.
 
     Returns
     -------
     Figure
-        One panel a run.
+        One panel per run.
     """
     with rc_context(RC):
         figure = Figure(figsize=(9.0, 2.4 * len(runs) + 0.4), layout="constrained")

@@ -1,4 +1,4 @@
-"""What figures share: titles, letters, legends, and the part of a long run that they show."""
+"""Common parts of figures: titles, panel letters, legends, and the time interval shown."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from plots.panels._shown import Window
 
 
 def head(trace: Trace, title: str) -> str:
-    """Return the title of a figure: what it is given, the model and its law."""
+    """Return the title of a figure: the given title, the model and its law."""
     return f"{title}: {trace.model.title}" if title else trace.model.title
 
 
 def letter_panels(axes: Sequence[Axes], names: Sequence[str]) -> None:
     """Name the panels of a figure: a), b), ..."""
     for number, (ax, name) in enumerate(zip(axes, names, strict=True)):
-        # Above the labels of the marks, where there are any.
+        # Above the labels of the marks, if there are any.
         ax.set_title(f"{chr(ord('a') + number)}) {name}", pad=16 if ax.texts else 6)
 
 
 def legend_above(ax: Axes) -> None:
-    """Put the legend beside the title, where no curve is."""
+    """Put the legend next to the title, where there are no curves."""
     ax.legend(
         loc="lower right",
         bbox_to_anchor=(1, 1),
@@ -37,7 +37,7 @@ def legend_above(ax: Axes) -> None:
 
 
 def element_legend(figure: Figure, *axes: Axes) -> None:
-    """Explain elements and states under the figure, each once."""
+    """Add one legend of elements and states below the figure."""
     found = [ax.get_legend_handles_labels() for ax in axes]
     entries = {name: handle for pair in found for handle, name in zip(*pair, strict=True)}
     figure.legend(
@@ -50,14 +50,14 @@ def element_legend(figure: Figure, *axes: Axes) -> None:
 
 
 def one_time_axis(column: Sequence[Axes]) -> None:
-    """Let the lowest panel of a column tell the time for all."""
+    """Label the time axis only in the lowest panel of a column."""
     for ax in column[:-1]:
         ax.set_xlabel("")
         ax.tick_params(labelbottom=False)
 
 
 def last_cycles(trace: Trace) -> Window:
-    """Return what of the time is shown: all of a short run, the last three cycles of a long one."""
+    """Return the time interval to show: a short run whole, the last three cycles of a long one."""
     quiet = 0.05 * np.nanmax(np.abs(trace.v))
     signs = np.sign(trace.v) * (np.abs(trace.v) > quiet)
     moving = np.flatnonzero(signs)

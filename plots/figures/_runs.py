@@ -1,4 +1,4 @@
-"""Figures of one run: at a glance, its ribbons, one cascade of break-aways."""
+"""Figures of one run: an overview, its ribbons, one cascade of break-aways."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from plots.style import BLUE, PALE_GREY, RC, VERMILION
 
 __all__ = ["Measured", "cascade_figure", "overview", "ribbons_figure"]
 
-MOST_SPANS = 30  # an element: more states than that are not read side by side
+MOST_SPANS = 30  # per element: more states are not readable side by side
 
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """A measured friction beside a run.
+    """A measured friction to compare with a run.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Measured:
     Raises
     ------
     ParameterError
-        If they are not equally long flat lists, or times go backward.
+        If they are not one-dimensional with the same length, or times go backward.
     """
 
     t: NDArray[np.float64]
@@ -54,10 +54,10 @@ class Measured:
         if len(shapes[0]) != 1 or len(set(shapes)) > 1 or shapes[0] == (0,):
             raise ParameterError(
                 f"t, x and F of a measurement have the shapes {shapes}",
-                advice="they must be equally long flat lists, not empty",
+                advice="they must be one-dimensional, equally long and not empty",
             )
         if not (np.diff(self.t) >= 0).all():
-            raise ParameterError("t of a measurement goes backward", advice="times must grow")
+            raise ParameterError("t of a measurement goes backward", advice="times must increase")
 
 
 def overview(
@@ -68,21 +68,21 @@ def overview(
     window: Window | None = None,
     elements: Sequence[int] | None = None,
 ) -> Figure:
-    """Draw a run at a glance: motion, force, states, hysteresis, friction against velocity.
+    """Draw an overview of a run: motion, force, states, hysteresis, friction against velocity.
 
     Parameters
     ----------
     trace : Trace
         The run.
     measured : Measured, optional
-        Drawn beside the model.
+        Drawn together with the model.
     title : str
         Of the figure; the model and its law are added.
     window : (float, float), optional
-        From when to when, s. When left out: on the right the whole run, on the left the last three
+        Time interval, s. Default: on the right the whole run, on the left the last three
         cycles of a long one.
     elements : sequence of int, optional
-        Whose states, counted from 0; all when left out.
+        Elements whose states are shown, counted from 0; by default all.
 
     Returns
     -------
@@ -154,28 +154,28 @@ def ribbons_figure(
     within: float = CASCADE,
     title: str = "",
 ) -> Figure:
-    """Draw what a run does, why, and in which order: ribbons, a cascade, portraits.
+    """Draw what happens in a run, why, and in which order: ribbons, a cascade, portraits.
 
     Parameters
     ----------
     trace : Trace
         The run.
     around : float, optional
-        Which break-away the middle column zooms at, s; see `plots.panels.cascade_window`.
+        The break-away that the middle column shows, s; see `plots.panels.cascade_window`.
     window : (float, float), optional
-        Of the left and right columns, s. When left out the whole run; where its states would be too
-        many to read, the last three cycles on the left.
+        Of the left and right columns, s. By default the whole run; if it has too many states to
+        read, the last three cycles on the left.
     elements : sequence of int, optional
-        Which elements, counted from 0; all when left out.
+        Which elements, counted from 0; by default all.
     within : float
-        How near to each other break-aways make one cascade, s.
+        Largest time between break-aways of one cascade, s.
     title : str
         Of the figure; the model and its law are added.
 
     Returns
     -------
     Figure
-        Left: v, z / s, F and states over time. Middle: the zoom (left out if nothing ever breaks
+        Left: v, z / s, F and states over time. Middle: the zoom (omitted if nothing ever breaks
         away and `around` is not given). Right: F against v and x.
     """
     limits = checked_window(trace, window)
@@ -183,7 +183,7 @@ def ribbons_figure(
     if crowded:
         limits = last_cycles(trace)
     part = shown(trace, limits)
-    # Rather a cascade that the left column shows too.
+    # Prefer a cascade that the left column also shows.
     zoom = panels.cascade_window(part if around is None else trace, around, within=within)
     if zoom is None and window is None:
         zoom = panels.cascade_window(trace, around, within=within)
@@ -207,7 +207,9 @@ def ribbons_figure(
         axes = left + right
         second = "first variable"
         if "s" in trace.model.chart.inputs:
-            second = "threshold ratio" if panels.has_threshold(trace) else "deflection over s(v)"
+            second = (
+                "deflection / threshold" if panels.has_threshold(trace) else "deflection / s(v)"
+            )
         names = ["velocity", second, "friction", "active states"]
         if limits[0] > trace.t[0] and crowded:
             names = [f"{name}, last {limits[1] - limits[0]:.3g} s" for name in names]
@@ -238,7 +240,7 @@ def cascade_figure(
     within: float = CASCADE,
     title: str = "",
 ) -> Figure:
-    """Draw one cascade of break-aways: velocity, margins, the steps of F, the order of slipping.
+    """Draw one cascade of break-aways: velocity, margins, the jumps of F, the order of slipping.
 
     Parameters
     ----------
@@ -247,9 +249,9 @@ def cascade_figure(
     around, within : float, optional
         Which break-away, s; see `plots.panels.cascade_window`.
     window : (float, float), optional
-        From when to when instead, s.
+        Time interval to show instead, s.
     elements : sequence of int, optional
-        Which elements, counted from 0; all when left out.
+        Which elements, counted from 0; by default all.
     title : str
         Of the figure; the model and its law are added.
 
@@ -288,6 +290,6 @@ def _zoom_names(zoom: Window) -> list[str]:
     return [
         f"velocity, {factor * width:.3g} {unit} at t = {middle:.5g} s",
         "margin to the threshold",
-        "steps of F (open: before, full: after)",
+        "jumps of F (open: before, filled: after)",
         "order of slipping",
     ]

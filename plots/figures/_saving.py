@@ -15,24 +15,24 @@ __all__ = ["picture", "save"]
 
 
 def save(figure: Figure, path: str | Path) -> Path:
-    """Write a figure; the ending chooses the format.
+    """Write a figure; the file ending selects the format.
 
     Parameters
     ----------
     figure : Figure
         What.
     path : str or Path
-        Ends like one of the figures' formats in `plots.formats.FORMATS`.
+        Its ending must be that of a figure format in `plots.formats.FORMATS`.
 
     Returns
     -------
     Path
-        The file, written whole.
+        The file, written atomically.
 
     Raises
     ------
     ParameterError
-        If the ending is another one.
+        If the file ending is not supported.
     OutputError
         If the folder cannot be written.
     """
@@ -49,12 +49,12 @@ def picture(figure: Figure, form: str, metadata: Mapping[str, None]) -> bytes:
     form : str
         A format of matplotlib, for example ``"png"``.
     metadata : mapping of str to None
-        What matplotlib leaves out, such as the date.
+        Metadata that matplotlib omits, such as the date.
 
     Returns
     -------
     bytes
-        The same for the same trace, whenever it is drawn.
+        Identical for identical traces.
     """
     buffer = BytesIO()
     with rc_context(RC):
@@ -63,9 +63,10 @@ def picture(figure: Figure, form: str, metadata: Mapping[str, None]) -> bytes:
 
 
 def _named_clips(svg: bytes) -> bytes:
-    """Return an SVG with its clips numbered, so that the same trace gives the same file.
+    """Return an SVG with its clip paths numbered, so that the same trace gives the same file.
 
-    matplotlib names them by a hash of their corners, which the layout finds to 13 digits only.
+    matplotlib names them by a hash of their corners, but the layout is reproducible only to 13
+    digits.
     """
     names: dict[bytes, bytes] = {}
 

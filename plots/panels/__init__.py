@@ -1,11 +1,11 @@
 """Single panels: each takes an Axes and a Trace, draws, and returns its artists.
 
-They share three arguments. ``window = (t0, t1)`` [s] zooms: the run is sampled anew inside it.
-``elements`` chooses elements, counted from 0 (labels count from 1). ``log`` asks for a logarithmic
+They share three arguments. ``window = (t0, t1)`` [s] zooms: the run is sampled again inside it.
+``elements`` selects elements, counted from 0 (labels count from 1). ``log`` requests a logarithmic
 axis where one makes sense. Times of switches and the forces on both sides of them come from the
-transition log, which is complete even where the rows are not.
+transition log, which is complete even if the rows are not.
 
-A panel stands in the module of its family, and in ``__all__`` there.
+A panel is defined in the module of its family and listed in ``__all__`` there.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What all panels draw alike: curves, looks of elements, axes."""
+"""Common parts of panels: curves, element styles, axes."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from plots.style import ELEMENT_COLOURS, ELEMENT_DASHES
 
 Artists = list[Artist]
 
-VECTOR_ROWS = 6_000  # longer curves are pixels inside an SVG or PDF, which keeps the file small
+VECTOR_ROWS = 6_000  # longer curves are rasterized in an SVG or PDF, which keeps the file small
 
 
 def first_variable(trace: Trace, values: NDArray[np.float64]) -> tuple[float, str]:
-    """Return factor and title of the chart's first variable, with its unit where it is known."""
+    """Return factor and title of the chart's first variable, with its unit if it is known."""
     name = trace.model.chart.variables[0]
     known = trace.model.chart.unit(name)
     if not known:
@@ -36,12 +36,12 @@ def element_look(i: int) -> dict[str, Any]:
 
 
 def draw_curve(ax: Axes, x: NDArray[np.float64], y: NDArray[np.float64], **look: Any) -> Artists:
-    """Draw a line; a very long one as pixels."""
+    """Draw a line; a very long one is rasterized."""
     return list(ax.plot(x, y, rasterized=x.size > VECTOR_ROWS, **look))
 
 
 def time_axis(ax: Axes, begin: float, end: float) -> None:
-    """Label the time axis; in a very narrow window ticks count from a moment inside it."""
+    """Label the time axis; in a very narrow window, ticks are relative to a time inside it."""
     ax.set_xlabel("t [s]")
     width = end - begin
     if not width > 0:
@@ -60,7 +60,7 @@ def time_axis(ax: Axes, begin: float, end: float) -> None:
 
 
 def log_axis(ax: Axes, values: NDArray[np.float64], axis: str) -> None:
-    """Make an axis logarithmic, over six decades at most: v passes through zero at reversals."""
+    """Make an axis logarithmic, over at most six decades: v passes through zero at reversals."""
     positive = values[np.isfinite(values) & (values > 0)]
     top = float(positive.max()) if positive.size else 1.0
     low = max(float(positive.min()) if positive.size else 0.1, 1e-6 * top)

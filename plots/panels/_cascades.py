@@ -1,4 +1,4 @@
-"""Panels of break-aways: where a cascade is, its marks, its margins, the steps of F."""
+"""Panels of break-aways: the time of a cascade, its marks, its margins, the jumps of F."""
 
 from __future__ import annotations
 
@@ -24,25 +24,25 @@ from plots.style import INK, LINE_GREY, TEXT_GREY
 
 __all__ = ["cascade", "cascade_window", "margins", "marks"]
 
-CASCADE = 0.02  # s: break-aways this near to each other make one cascade
-RESOLVED = 1e-4  # s: at least this far apart they are drawn one by one
+CASCADE = 0.02  # s: largest time between break-aways of one cascade
+RESOLVED = 1e-4  # s: break-aways at least this far apart are drawn separately
 
 
 def cascade_window(
     trace: Trace, around: float | None = None, *, within: float = CASCADE
 ) -> Window | None:
-    """Return the zoom that shows a cascade of break-aways.
+    """Return the time interval of a cascade of break-aways.
 
     Parameters
     ----------
     trace : Trace
         The run.
     around : float, optional
-        The break-away nearest to this time, s. When left out: the first that has another one after
-        it within `within`, at a time of its own rather than at the same instant; if there is none,
-        the first break-away.
+        Select the break-away nearest to this time, s. By default the first that is followed by
+        another one within `within`, preferably not at the same instant; if there is none, the first
+        break-away.
     within : float
-        How near to each other break-aways make one cascade, s.
+        Largest time between break-aways of one cascade, s.
 
     Returns
     -------
@@ -85,7 +85,7 @@ def cascade_window(
 
 
 def _in_window(trace: Trace, window: Window, chosen: Sequence[int]) -> Any:
-    """Return the log's records in a window, of the chosen elements."""
+    """Return the log's records of the chosen elements in a window."""
     log = trace.transitions
     return log[(log.t >= window[0]) & (log.t <= window[1]) & np.isin(log.element, chosen)]
 
@@ -103,20 +103,20 @@ def marks(
     Parameters
     ----------
     ax : Axes
-        Where.
+        Axes to draw on.
     trace : Trace
-        What.
+        The run.
     window : (float, float), optional
-        From when to when, s.
+        Time interval to show, s.
     elements : sequence of int, optional
-        All when left out.
+        Which elements, counted from 0; by default all.
     labels : bool
-        Write ``E1`` and so on above the axes; labels that would meet are joined.
+        Write ``E1`` and so on above the axes; labels that would overlap are joined.
 
     Returns
     -------
     list of Artist
-        One line a transition, then the labels.
+        One line per transition, then the labels.
     """
     begin, end = checked_window(trace, window)
     log = _in_window(trace, (begin, end), checked_elements(trace, elements))
@@ -169,25 +169,25 @@ def margins(
     window: Window | None = None,
     elements: Sequence[int] | None = None,
 ) -> Artists:
-    """Draw what each element has left until its threshold, 1 - |z| / s; zero is the threshold.
+    """Draw the relative margin of each element to its threshold, 1 - |z| / s.
 
     Parameters
     ----------
     ax : Axes
-        Where.
+        Axes to draw on.
     trace : Trace
-        What.
+        The run.
     window : (float, float), optional
-        From when to when, s; a cascade (see `cascade_window`) when left out.
+        Time interval, s; by default a cascade (see `cascade_window`).
     elements : sequence of int, optional
-        All when left out.
+        Which elements, counted from 0; by default all.
 
     Returns
     -------
     list of Artist
-        One line an element, the line at zero, a set of dots for each element that switches (there),
-        then the marks. For a chart without edges, or without the input s, a note only: it has no
-        threshold.
+        One line per element, the line at zero, one set of dots per element that switches (at its
+        switches), then the marks. For a chart without edges, or without the input s, there is no
+        threshold, and only a note is drawn.
     """
     chosen = checked_elements(trace, elements)
     if not has_threshold(trace):
@@ -242,25 +242,25 @@ def cascade(
     elements: Sequence[int] | None = None,
     within: float = CASCADE,
 ) -> Artists:
-    """Draw the steps of F at a break-away, with both one-sided values of every step.
+    """Draw the jumps of F at a break-away, with both one-sided values of every jump.
 
     Parameters
     ----------
     ax : Axes
-        Where.
+        Axes to draw on.
     trace : Trace
-        What.
+        The run.
     around, within : float, optional
         Which cascade; see `cascade_window`. A run without break-aways is drawn whole.
     window : (float, float), optional
-        From when to when, s, instead.
+        Time interval to show instead, s.
     elements : sequence of int, optional
-        Whose steps are marked; all when left out.
+        Elements whose jumps are marked; by default all.
 
     Returns
     -------
     list of Artist
-        The line; the values before (open dots); the values after (full dots); then the marks.
+        The line; the values before (open dots); the values after (filled dots); then the marks.
     """
     chosen = checked_elements(trace, elements)
     if window is None:

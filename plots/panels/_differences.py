@@ -1,4 +1,4 @@
-"""Panels of how far forces are apart: of two runs, or of a run and a measurement."""
+"""Panels of differences between forces: of two runs, or of a run and a measurement."""
 
 from __future__ import annotations
 
@@ -43,15 +43,15 @@ def difference(
     Parameters
     ----------
     ax : Axes
-        Where.
+        Axes to draw on.
     times : ndarray, shape (m,), s
-        When.
+        Times.
     values : ndarray, shape (m,), N
-        What.
+        Differences.
     floor : float
-        N; on a logarithmic axis smaller values are drawn here.
+        N; on a logarithmic axis, smaller values are drawn at this value.
     log : bool
-        Draw its size on a logarithmic axis.
+        Draw its magnitude on a logarithmic axis.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def difference(
     if np.shape(times) != np.shape(values) or np.ndim(times) != 1 or not np.size(times):
         raise ParameterError(
             f"times has shape {np.shape(times)}, the difference {np.shape(values)}",
-            advice="they must be equally long flat lists, not empty",
+            advice="they must be one-dimensional, equally long and not empty",
         )
     if log:
         ax.set(yscale="log")
@@ -82,23 +82,23 @@ def residual(
     window: Window | None = None,
     log: bool = True,
 ) -> Artists:
-    """Draw how far the friction of a run is from another run's, or from a measurement.
+    """Draw the difference between the friction of a run and that of another run or a measurement.
 
     Parameters
     ----------
     ax : Axes
-        Where.
+        Axes to draw on.
     trace : Trace
         The run.
     reference : Trace or Measured
-        What it is compared with. A trace is compared at even times and at its own transitions, a
+        The reference. A trace is compared at evenly spaced times and at its transitions, a
         measurement at its times.
     floor : float
-        N; on a logarithmic axis smaller values are drawn here.
+        N; on a logarithmic axis, smaller values are drawn at this value.
     window : (float, float), optional
-        From when to when, s.
+        Time interval to show, s.
     log : bool
-        Draw its size on a logarithmic axis.
+        Draw its magnitude on a logarithmic axis.
 
     Returns
     -------
@@ -108,7 +108,7 @@ def residual(
     Raises
     ------
     ParameterError
-        If the two have no time in common.
+        If the two do not overlap in time.
     """
     begin, end = checked_window(trace, window)
     first, last = max(begin, float(reference.t[0])), min(end, float(reference.t[-1]))

@@ -1,4 +1,4 @@
-"""Panels over time: velocity, force, deflections, and how near these are to their thresholds."""
+"""Panels over time: velocity, force, deflections, and deflections relative to thresholds."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ def velocity(ax: Axes, trace: Trace, *, window: Window | None = None, log: bool 
     Parameters
     ----------
     ax : Axes
-        Where.
+        Axes to draw on.
     trace : Trace
-        What.
+        The run.
     window : (float, float), optional
-        From when to when, s.
+        Time interval to show, s.
     log : bool
         Draw |v| on a logarithmic axis.
 
@@ -71,13 +71,13 @@ def force(
     Parameters
     ----------
     ax : Axes
-        Where.
+        Axes to draw on.
     trace : Trace
-        What.
+        The run.
     window : (float, float), optional
-        From when to when, s.
+        Time interval to show, s.
     elements : sequence of int, optional
-        Elements whose own forces F_i are drawn too; none when left out.
+        Elements whose forces F_i are also drawn; by default none.
 
     Returns
     -------
@@ -103,23 +103,23 @@ def deflections(
     window: Window | None = None,
     elements: Sequence[int] | None = None,
 ) -> Artists:
-    """Draw z_i(t) of every element, or whatever the chart's first variable is.
+    """Draw z_i(t) of every element, or the chart's first variable if it has another name.
 
     Parameters
     ----------
     ax : Axes
-        Where.
+        Axes to draw on.
     trace : Trace
-        What.
+        The run.
     window : (float, float), optional
-        From when to when, s.
+        Time interval to show, s.
     elements : sequence of int, optional
-        All when left out.
+        Which elements, counted from 0; by default all.
 
     Returns
     -------
     list of Artist
-        One line an element.
+        One line per element.
     """
     chosen = checked_elements(trace, elements)
     part = shown(trace, window)
@@ -141,25 +141,25 @@ def ratio(
     window: Window | None = None,
     elements: Sequence[int] | None = None,
 ) -> Artists:
-    """Draw how near each element is to its threshold: z_i / s_i(v), with lines at +1 and -1.
+    """Draw the deflection of each element over its threshold, z_i / s_i(v), with lines at ±1.
 
     A chart without edges has no threshold: its z / s(v) is drawn with its unit, without the lines.
 
     Parameters
     ----------
     ax : Axes
-        Where.
+        Axes to draw on.
     trace : Trace
-        What.
+        The run.
     window : (float, float), optional
-        From when to when, s.
+        Time interval to show, s.
     elements : sequence of int, optional
-        All when left out.
+        Which elements, counted from 0; by default all.
 
     Returns
     -------
     list of Artist
-        One line an element, then the lines at +1 and -1.
+        One line per element, then the lines at +1 and -1.
     """
     chosen = checked_elements(trace, elements)
     part = shown(trace, window)

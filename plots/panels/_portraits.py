@@ -24,11 +24,11 @@ def _by_slipping(
     default = trace.model.chart.state_index(trace.model.chart.default_state.name)
     away = (trace.modes[:, chosen] != default).sum(axis=1)
     points = np.column_stack([x, trace.F])
-    # A piece holds its colour from row to row; the next one begins where it ends.
+    # A piece has one colour; the next piece begins where it ends.
     cuts = np.concatenate([[0], np.flatnonzero(np.diff(away)) + 1, [len(points)]])
     pieces = [points[a : b + 1] for a, b in pairwise(cuts)]
     count = len(chosen)
-    # From light green to dark violet: the more elements slip, the darker, in grey too.
+    # From light green to dark violet: the more elements slip, the darker, also in grey.
     shades = ListedColormap(colormaps["viridis_r"](np.linspace(0.18, 1.0, count + 1)))
     lines = LineCollection(
         pieces,
@@ -48,7 +48,7 @@ def _by_slipping(
 
 
 def slip_bar(lines: LineCollection, trace: Trace, axes: Axes | Sequence[Axes]) -> None:
-    """Add the colour bar of a portrait; a chart without edges needs none.
+    """Add the colour bar of a portrait; a chart without edges does not need one.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def slip_bar(lines: LineCollection, trace: Trace, axes: Axes | Sequence[Axes]) -
     trace : Trace
         The run.
     axes : Axes or sequence of Axes
-        Beside which.
+        Axes next to which the bar is placed.
     """
     chart = trace.model.chart
     if not chart.transitions:
@@ -90,15 +90,15 @@ def portrait(
     Parameters
     ----------
     ax : Axes
-        Where.
+        Axes to draw on.
     trace : Trace
-        What.
+        The run.
     window : (float, float), optional
-        From when to when, s.
+        Time interval to show, s.
     elements : sequence of int, optional
-        Which elements are counted; all when left out.
+        Elements that are counted; by default all.
     log : bool
-        Draw over |v| on a logarithmic axis.
+        Draw against |v| on a logarithmic axis.
     bar : bool
         Add a colour bar.
 
@@ -136,22 +136,22 @@ def hysteresis(
     Parameters
     ----------
     ax : Axes
-        Where; x is shown from where the run starts.
+        Axes to draw on; x is relative to the start of the run.
     trace : Trace
-        What.
+        The run.
     phases : sequence of (str, float), optional
-        Names and end times [s] of parts drawn in colours of their own; one part when left out.
+        Names and end times [s] of parts drawn in separate colours; by default one part.
     window : (float, float), optional
-        From when to when, s.
+        Time interval to show, s.
     elements : sequence of int, optional
-        Which elements are counted with `slipping`; all when left out.
+        Elements that are counted with `slipping`; by default all.
     slipping : bool
         Colour as in `portrait`, instead of phases.
 
     Returns
     -------
     list of Artist
-        One line a phase, or the collection of lines.
+        One line per phase, or the collection of lines.
     """
     chosen = checked_elements(trace, elements)
     part = shown(trace, window)

@@ -1,4 +1,4 @@
-"""What of a run is drawn: its rows, a window, elements, and the units that they read well in."""
+"""The part of a run that is drawn: its rows, time window, elements, and suitable units."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ __all__ = ["has_threshold", "shown"]
 Window = tuple[float, float]
 
 SCALES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
-SMOOTH = 2000  # points a curve
+SMOOTH = 2000  # points per curve
 MOST_ROWS = 20_000  # a longer run is thinned
 
 
 def has_threshold(trace: Trace) -> bool:
-    """Tell whether s(v) is a threshold of the chart: it is an input, and there are edges.
+    """Return whether s(v) is a threshold of the chart: it is an input, and there are edges.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def has_threshold(trace: Trace) -> bool:
     Returns
     -------
     bool
-        Without it neither |z|/s = 1 nor a margin to it means anything.
+        If False, neither |z|/s = 1 nor a margin to it has a meaning.
     """
     return "s" in trace.model.chart.inputs and bool(trace.model.chart.transitions)
 
@@ -41,26 +41,26 @@ def has_threshold(trace: Trace) -> bool:
 def shown(trace: Trace, window: Window | None = None) -> Trace:
     """Return the rows worth drawing.
 
-    Rows that lie far apart get samples between them, so that curves are smooth. Of a very long run
-    the lowest and highest values of every short stretch are kept, and all rows at which a state
-    changes: what is left out could not be seen.
+    Samples are added between rows that are far apart, so that curves are smooth. A very long run is
+    reduced to the lowest and highest values in every short interval and all rows at which a state
+    changes; the omitted rows would not be visible.
 
     Parameters
     ----------
     trace : Trace
         The run.
     window : (float, float), optional
-        From when to when, s; the whole run when left out.
+        Time interval, s; by default the whole run.
 
     Returns
     -------
     Trace
-        With these rows, and the whole transition log.
+        Trace with these rows, and the whole transition log.
 
     Raises
     ------
     ParameterError
-        If the window is not a part of the run.
+        If the window is not within the run.
 
     Examples
     --------
@@ -85,7 +85,7 @@ def shown(trace: Trace, window: Window | None = None) -> Trace:
                 rows = trace.sample(wanted).stops  # all rows, both sides of every stop, the samples
                 trace = replace(trace, rows=rows, stops=rows, stored={})
                 sampled = True
-            except SignalError:  # read from a file, driven by a Python function: the rows must do
+            except SignalError:  # from a file, driven by a Python function: use the rows alone
                 pass
     low = int(np.searchsorted(trace.t, begin))
     high = int(np.searchsorted(trace.t, end, side="right"))
@@ -98,7 +98,7 @@ def shown(trace: Trace, window: Window | None = None) -> Trace:
 
 
 def _picked(trace: Trace, keep: NDArray[np.intp], *, known: bool) -> Trace:
-    """Return the trace with some of its rows; forces that are known are handed on."""
+    """Return the trace with some of its rows; known forces are passed on."""
     rows = trace.rows.at(keep)
     names = OBSERVED if known else ()
     stored = {name: getattr(trace, name)[keep] for name in names}
@@ -127,7 +127,7 @@ def checked_window(trace: Trace, window: Window | None) -> Window:
     Raises
     ------
     ParameterError
-        If it is not two times, the earlier one first, that overlap the run; if there is no run.
+        If it is not two increasing times that overlap the run, or if there is no run.
     """
     check_trace(trace)
     first, last = float(trace.t[0]), float(trace.t[-1])
@@ -152,7 +152,7 @@ def checked_elements(trace: Trace, elements: Iterable[int] | None) -> list[int]:
     Raises
     ------
     ParameterError
-        If one is not there, is named twice, or none is named.
+        If one does not exist or is listed twice, or the list is empty.
     """
     if elements is None:
         return list(range(trace.n))
@@ -169,7 +169,7 @@ def checked_elements(trace: Trace, elements: Iterable[int] | None) -> list[int]:
     ):
         raise ParameterError(
             f"elements is {written(elements)}",
-            advice=f"it must be a list of different whole numbers from 0 to {trace.n - 1} "
+            advice=f"it must be a list of different integers from 0 to {trace.n - 1} "
             "(labels count from 1)",
         )
     return [int(i) for i in chosen]
@@ -180,12 +180,12 @@ def is_number(value: object) -> bool:
 
 
 def scaled(values: NDArray[np.float64], unit: str) -> tuple[float, str]:
-    """Return the factor and the unit in which values read well.
+    """Return the factor and the prefixed unit that suit the values.
 
     Parameters
     ----------
     values : ndarray
-        In the unit.
+        Values in this unit.
     unit : str
         For example ``"m/s"``.
 

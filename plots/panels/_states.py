@@ -1,4 +1,4 @@
-"""The panel of active states: ribbons, like those of a logic analyser."""
+"""The panel of active states: ribbons, as in a logic analyser."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ __all__ = ["ribbons"]
 
 
 class _SpanName(Text):
-    """A state's name inside its span, drawn only where it fits.
+    """A state's name inside its span, drawn only if it fits.
 
-    Whether it does is known when the picture is drawn, and may change when a window is resized.
+    Whether it fits is known only when the picture is drawn, and may change on resizing.
     """
 
     def __init__(self, ax: Axes, begin: float, end: float, height: float, name: str) -> None:
@@ -69,7 +69,7 @@ def spans(trace: Trace, i: int, window: Window) -> Iterator[tuple[str, float, fl
     Yields
     ------
     (str, float, float)
-        States that lasted no time are left out.
+        States of zero duration are omitted.
     """
     log = trace.transitions[trace.transitions.element == i]
     first = log.source[0] if log.size else trace.model.chart.states[trace.modes[0, i]].name
@@ -86,24 +86,24 @@ def ribbons(
     window: Window | None = None,
     elements: Sequence[int] | None = None,
 ) -> Artists:
-    """Draw the active state of every element as a ribbon, like a logic analyser.
+    """Draw the active state of every element as a ribbon, as in a logic analyser.
 
     Parameters
     ----------
     ax : Axes
-        Where.
+        Axes to draw on.
     trace : Trace
-        What.
+        The run.
     window : (float, float), optional
-        From when to when, s.
+        Time interval to show, s.
     elements : sequence of int, optional
-        All when left out.
+        Which elements, counted from 0; by default all.
 
     Returns
     -------
     list of Artist
-        One collection per state and element; then the names, each of which shows where it fits;
-        then a band for each stretch on which a sign is held, such as on v = 0.
+        One collection per state and element; then the names, each drawn only if it fits; then a
+        band for each interval in which a sign is held, for example on v = 0.
     """
     chosen = checked_elements(trace, elements)
     begin, end = checked_window(trace, window)
@@ -126,7 +126,7 @@ def ribbons(
                     rasterized=len(mine) > VECTOR_ROWS // 20,
                 )
             )
-        # A name never fits into less than a hundredth of the axis.
+        # A name never fits into less than one hundredth of the axis.
         wide = [span for span in found if span[2] - span[1] > 0.01 * (end - begin)]
         names += [_SpanName(ax, a, b, row + 1.0, name) for name, a, b in wide]
     ax.set(
@@ -140,7 +140,7 @@ def ribbons(
 
 
 def _held_bands(ax: Axes, trace: Trace, window: Window) -> Artists:
-    """Mark the stretches along a surface; microseconds wide, they show as a line."""
+    """Mark the intervals on a surface; if only microseconds long, they appear as a line."""
     drawn: dict[str, Artists] = {}
     for stretch in trace.sliding:
         begin, end = max(window[0], float(stretch.t_start)), min(window[1], float(stretch.t_end))

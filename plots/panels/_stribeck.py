@@ -1,4 +1,4 @@
-"""The panel of the Stribeck curve, beside the run and what was measured."""
+"""The panel of the Stribeck curve, with the run and measured points."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ def stribeck(
 ) -> Artists:
     """Draw the Stribeck curve, the run's steady sliding, and measured points.
 
-    Steady sliding are the rows at which no deflection changes by more than a hundredth of v; there
+    Steady sliding means rows at which no deflection changes faster than a hundredth of v; there
     the friction of elements whose shares add up to one is ``s(v) + sigma_2 |v|``.
 
     Parameters
     ----------
     ax : Axes
-        Where.
+        Axes to draw on.
     trace : Trace
-        Its model's curve, its rows.
+        The run; its model's curve and its rows are drawn.
     measured : (array_like, array_like), optional
         Velocities [m/s] and friction [N], each of shape (m,).
     window : (float, float), optional
-        From when to when the run counts, s.
+        Time interval from which rows are taken, s.
     log : bool
-        Logarithmic axis of |v|.
+        Use a logarithmic axis for |v|.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def stribeck(
     model, part = trace.model, shown(trace, window)
     if model.stribeck is None:
         raise ParameterError(
-            "its chart has no input s, and so no Stribeck curve to draw", place=model.title
+            "its chart has no input s, and therefore no Stribeck curve to draw", place=model.title
         )
     points = None if measured is None else checked_points(measured)
     speeds = np.abs(part.v)
@@ -77,7 +77,7 @@ def stribeck(
         markersize=5,
         color=STATE_FILLS[0],
         markeredgewidth=0,
-        label="run, sliding steadily",
+        label="run, steady sliding",
         rasterized=True,
         zorder=1,
     )
@@ -99,12 +99,12 @@ def stribeck(
 
 
 def checked_points(measured: tuple[ArrayLike, ArrayLike]) -> tuple[Any, Any]:
-    """Return the sizes of measured velocities and forces.
+    """Return the magnitudes of measured velocities and forces.
 
     Raises
     ------
     ParameterError
-        If they are not two flat lists of finite numbers, equally long.
+        If they are not two one-dimensional lists of finite numbers of equal length.
     """
     try:
         v, F = (np.abs(np.asarray(values, dtype=np.float64)) for values in measured)
@@ -115,7 +115,7 @@ def checked_points(measured: tuple[ArrayLike, ArrayLike]) -> tuple[Any, Any]:
     if not good:
         raise ParameterError(
             f"measured is {written(measured)}",
-            advice="it must be two equally long flat lists of finite numbers: velocities "
-            "[m/s] and friction [N]",
+            advice="it must be two one-dimensional lists of finite numbers of equal length: "
+            "velocities [m/s] and friction [N]",
         )
     return v, F

@@ -1,6 +1,6 @@
-"""A broken record gets one message naming file, row, column, value and rule; nothing is written.
+"""A broken record gives one message with file, row, column, value and rule; nothing is written.
 
-Exit code 2, no traceback; only a record that ends before the run does keeps the part it covers.
+Exit code 2, no traceback. Only a record that ends before the run keeps the part it covers.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ EVEN = np.arange(60) * 0.01
 
 
 def row(number: int, text: str) -> bytes:
-    """Return the good table with one row replaced; the head line is row 1."""
+    """Return the good table with one row replaced; the header is row 1."""
     return "\n".join([*LINES[: number - 1], text, *LINES[number:]]).encode() + b"\n"
 
 
-# what is broken -> the record's bytes, and what the message must say besides the file
+# fault -> bytes of the record, and what the message must contain besides the file
 CONTENTS: dict[str, tuple[bytes, tuple[str, ...]]] = {
     # cells
     "text in a number column": (
@@ -91,8 +91,8 @@ CONTENTS: dict[str, tuple[bytes, tuple[str, ...]]] = {
     "no head line": (GOOD.partition("\n")[2].encode(), ("no column 't'", "'0.0'")),
     "units in the second line": (row(2, "s,mm,N"), ("row 2", "column 't'", "'s'", "number")),
     # sizes
-    "an empty file": (b"", ("line 1 is empty", "name the columns")),
-    "an empty first line": (b"\n" + GOOD.encode(), ("line 1 is empty", "name the columns")),
+    "an empty file": (b"", ("line 1 is empty", "column names")),
+    "an empty first line": (b"\n" + GOOD.encode(), ("line 1 is empty", "column names")),
     "a head line only": (b"t,x,F\n", ("0 row(s)", "at least")),
     "one row": (b"t,x,F\n0,0,0\n", ("1 row(s)", "at least")),
     "four rows": (b"t,x,F\n0,0,0\n1,1,1\n2,2,2\n3,3,3\n", ("4 rows", "at least 5")),
@@ -111,7 +111,7 @@ CONTENTS: dict[str, tuple[bytes, tuple[str, ...]]] = {
     "an archive": (b"PK\x03\x04\x14\0\x06\0", ("line 1", "binary")),
 }
 
-# what is broken -> (old, new) text of the scenario, and what the message must say
+# fault -> (old, new) text of the scenario, and what the message must contain
 TABLES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     "an unknown unit": (
         ('"mm"', '"furlong"'),
@@ -231,7 +231,9 @@ def test_a_broken_table(broken: str, gms_fsm: CommandLine, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("broken", TABLES)
-def test_a_wrong_word_about_a_good_table(broken: str, gms_fsm: CommandLine, tmp_path: Path) -> None:
+def test_a_wrong_setting_for_a_good_table(
+    broken: str, gms_fsm: CommandLine, tmp_path: Path
+) -> None:
     (old, new), said = TABLES[broken]
     folder = tmp_path / "inside"
     folder.mkdir()
@@ -254,7 +256,7 @@ def test_a_link_out_of_the_folder_is_not_followed(gms_fsm: CommandLine, tmp_path
     assert not (folder / "out").exists()
 
 
-def test_the_data_folder_is_looked_into(
+def test_the_data_folder_is_searched(
     gms_fsm: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     data = tmp_path / "data"
@@ -294,8 +296,8 @@ def test_a_record_that_ends_before_the_run_keeps_its_part(
     np.testing.assert_array_equal(part.t, [float(line.split(",")[0]) for line in LINES[1:]])
 
 
-def test_a_force_that_never_changes_is_no_accident(gms_fsm: CommandLine, tmp_path: Path) -> None:
-    """R² has no meaning then; the run is as good as ever."""
+def test_a_constant_force_is_accepted(gms_fsm: CommandLine, tmp_path: Path) -> None:
+    """R² is undefined then; the run is still valid."""
     (tmp_path / "scenario.toml").write_text(MEASURED)
     (tmp_path / "own.csv").write_text(table(["t", "x", "F"], EVEN, np.sin(6 * EVEN), 0 * EVEN))
     answer = gms_fsm("run", tmp_path / "scenario.toml", "-o", tmp_path / "out")
@@ -304,10 +306,8 @@ def test_a_force_that_never_changes_is_no_accident(gms_fsm: CommandLine, tmp_pat
 
 
 @pytest.mark.parametrize("force", [True, False])
-def test_a_motion_that_stands_still_is_no_accident(
-    force: bool, gms_fsm: CommandLine, tmp_path: Path
-) -> None:
-    """Refused with a message or run, but never half of both."""
+def test_a_motion_at_rest_does_not_crash(force: bool, gms_fsm: CommandLine, tmp_path: Path) -> None:
+    """Either rejected with a message, or run."""
     text = MEASURED if force else changed(MEASURED, 'force = { column = "F", unit = "N" }\n', "")
     (tmp_path / "scenario.toml").write_text(text)
     (tmp_path / "own.csv").write_text(table(["t", "x", "F"], EVEN, 0 * EVEN + 1, EVEN))
@@ -328,7 +328,7 @@ def test_five_rows_are_enough(gms_fsm: CommandLine, tmp_path: Path) -> None:
 
 
 def test_one_message_is_one_line(gms_fsm: CommandLine, monkeypatch: pytest.MonkeyPatch) -> None:
-    """However narrow the terminal is."""
+    """Even in a narrow terminal."""
     monkeypatch.setenv("COLUMNS", "80")
     Path("scenario.toml").write_text(MEASURED)
     Path("own.csv").write_bytes(row(5, "0.03,abc,1"))
@@ -337,5 +337,5 @@ def test_one_message_is_one_line(gms_fsm: CommandLine, monkeypatch: pytest.Monke
     assert answer.out == ""
     assert answer.err.splitlines() == [
         "error: own.csv: row 5, column 'x': 'abc' is not a number (a decimal point is a point); "
-        "mend it, or leave the row out by where = ..., a condition that does not hold there"
+        "correct it, or exclude the row with where = ..., a condition that is false there"
     ]

@@ -1,6 +1,6 @@
-"""A broken scenario file gets one message that names file, key, value and rule; nothing is written.
+"""A broken scenario file gives one message with file, key, value and rule; nothing is written.
 
-Exit code 2, no traceback. Only a run that fails on its way keeps its part, as a whole file.
+Exit code 2, no traceback. Only a run that fails midway keeps its rows so far, in a complete file.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ RIG = OPEN_LOOP[OPEN_LOOP.index("[rig]") : OPEN_LOOP.index("[run]")]
 SHARES = ("C = [0.1, 0.1]", "C = 2.0\nshares = [0.5, 0.5]")
 PAPER = '[model]\nkind = "GMS"\nlaw = "signed"\npreset = "stick-slip"\n'
 
-# what is broken -> (old text, new text), and what the message must say besides the file
+# fault -> (old text, new text), and what the message must contain besides the file
 CHANGES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     # keys
     "a typo of a table": (("[rig]", "[rgi]"), ("rgi", "unknown key", "'rig'")),
@@ -157,7 +157,7 @@ CHANGES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
         ("initial", "'v'", "0.1", "prescribes"),
     ),
     # forms of parameters
-    "preset and parameters": ((MODEL, PAPER + "v_c = 1e-6\n"), ("[model] preset", "take out v_c")),
+    "preset and parameters": ((MODEL, PAPER + "v_c = 1e-6\n"), ("[model] preset", "remove v_c")),
     "shares that are not everything": (
         (SHARES[0], "C = 2.0\nshares = [0.5, 0.4]"),
         ("[model]", "shares", "0.9", "add up to 1"),
@@ -172,7 +172,7 @@ CHANGES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     ),
     "shares with a list of C": (
         (SHARES[0], "C = [0.1, 0.1]\nshares = [0.5, 0.5]"),
-        ("[model] shares", "one number C"),
+        ("[model] shares", "C as one number"),
     ),
     "one C for all": (("C = [0.1, 0.1]", "C = 2.0"), ("[model] C", "list", "shares")),
     # signals
@@ -210,7 +210,7 @@ CHANGES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     "a key 3000 tables deep": (("[run]", f"{'a.' * 3000}b = 1\n[run]"), ()),
 }
 
-# files that are no scenario at all
+# files that are not scenarios
 BYTES: dict[str, tuple[bytes, tuple[str, ...]]] = {
     "an empty file": (b"", ("the file is empty",)),
     "only a comment": (b"# later\n", ("the file is empty",)),
@@ -236,7 +236,7 @@ def test_a_wrong_key_or_value(broken: str, gms_fsm: CommandLine, tmp_path: Path)
 
 
 @pytest.mark.parametrize("broken", BYTES)
-def test_a_file_that_is_no_scenario(broken: str, gms_fsm: CommandLine, tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_scenario(broken: str, gms_fsm: CommandLine, tmp_path: Path) -> None:
     content, said = BYTES[broken]
     (tmp_path / "broken.toml").write_bytes(content)
     answer = gms_fsm("run", tmp_path / "broken.toml", "-o", tmp_path / "out")
@@ -252,7 +252,7 @@ def test_a_file_of_1_GB_is_not_read(gms_fsm: CommandLine, tmp_path: Path) -> Non
     nothing_written(tmp_path, {"huge.toml"})
 
 
-def test_a_scenario_that_is_not_there_or_a_folder(gms_fsm: CommandLine, tmp_path: Path) -> None:
+def test_a_missing_scenario_or_a_folder(gms_fsm: CommandLine, tmp_path: Path) -> None:
     one_message(gms_fsm("run", tmp_path / "gone.toml"), "gone.toml", "no such file")
     one_message(gms_fsm("run", tmp_path), str(tmp_path), "cannot be read")
     nothing_written(tmp_path, set())
@@ -299,7 +299,7 @@ def test_an_earlier_result_survives_a_broken_file(gms_fsm: CommandLine, tmp_path
         ("0.1/(t - 0.5)", 0.4, "step size"),
     ],
 )
-def test_a_run_that_fails_on_its_way_keeps_its_part(
+def test_a_run_that_fails_midway_keeps_its_part(
     velocity: str, reached: float, why: str, gms_fsm: CommandLine, tmp_path: Path
 ) -> None:
     (tmp_path / "fails.toml").write_text(changed(OPEN_LOOP, "0.1*sin(t)", velocity))
@@ -336,7 +336,7 @@ def process(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_the_program_itself_says_one_line(tmp_path: Path) -> None:
+def test_the_program_prints_one_line(tmp_path: Path) -> None:
     (tmp_path / "broken.toml").write_text(changed(OPEN_LOOP, "v_c = 1e-6", "vc = 1e-6"))
     done = process("run", "broken.toml", cwd=tmp_path)
     assert done.returncode == 2
@@ -360,7 +360,7 @@ def test_the_message_begins_its_own_line_after_the_progress_bar(
 
 
 @pytest.mark.filterwarnings("default:published law")
-def test_a_warning_of_a_scenario_is_said_once(gms_fsm: CommandLine) -> None:
+def test_a_warning_of_a_scenario_is_printed_once(gms_fsm: CommandLine) -> None:
     text = changed(OPEN_LOOP, '"signed"', '"published"')
     Path("warns.toml").write_text(changed(text, "F_s = 1.5", "F_s = 1.0"))
     answer = gms_fsm("run", "warns.toml", "-o", "out")

@@ -1,4 +1,4 @@
-"""``gms-fsm check`` prints what is proved or not; its exit code tells a script what is refuted."""
+"""``gms-fsm check`` prints its findings; the exit code tells a script whether any is refuted."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def graphviz() -> None:
         (("gms", "--law", "signed"), 0, "19 proved, 0 settled by order, 0 refuted, 0 undecided"),
         (("gms", "--law", "published"), 1, "18 proved, 0 settled by order, 1 refuted, 0 undecided"),
         (("lugre",), 0, "7 proved, 0 settled by order, 0 refuted, 0 undecided"),
-        # undecided is no refutation
+        # undecided is not a refutation
         (
             ("gms", "--law", "signed", "--domain", "s >= 0", "--domain", "v_c > 0"),
             0,
@@ -47,7 +47,7 @@ def graphviz() -> None:
         ),
     ],
 )
-def test_the_exit_code_is_1_where_something_is_refuted(
+def test_the_exit_code_is_1_if_something_is_refuted(
     gms_fsm: CommandLine, arguments: tuple[str, ...], code: int, last: str
 ) -> None:
     z3()
@@ -73,15 +73,15 @@ def test_every_broken_reading_is_caught(gms_fsm: CommandLine, name: str) -> None
     assert caught == {EXPECTED[name]}
 
 
-def test_a_domain_replaces_the_usual_one(gms_fsm: CommandLine) -> None:
+def test_a_domain_replaces_the_default(gms_fsm: CommandLine) -> None:
     z3()
     answer = gms_fsm("check", "broken:arms", "--domain", "s > 0", "--domain", "C > 0")
     assert "assumed: s > 0, C > 0\n" in answer.out
     arms = "stick, break_away_forward, break_away_backward"
-    assert f"proved     {arms}: never enabled at once" in answer.out
+    assert f"proved     {arms}: never enabled at the same time" in answer.out
 
 
-def test_the_list_names_everything_and_says_what_is_wrong(gms_fsm: CommandLine) -> None:
+def test_the_list_names_all_charts_and_describes_the_faults(gms_fsm: CommandLine) -> None:
     answer = gms_fsm("check", "--list")
     assert (answer.code, answer.err) == (0, "")
     said = " ".join(answer.out.split())
@@ -132,7 +132,7 @@ def test_without_z3_the_message_names_the_extra(
 
 # --------------------------------------------------------------------------- marked charts
 def classes(path: Path) -> dict[str, set[str]]:
-    """The classes of each named part of an SVG."""
+    """Return the classes of each named part of an SVG."""
     return {
         node.get("id", ""): set(node.get("class", "").split())
         for node in ElementTree.parse(path).iter()
@@ -170,9 +170,7 @@ def test_charts_are_drawn_with_the_edges_marked(gms_fsm: CommandLine, tmp_path: 
     assert "s = 0, z = 0" in said
 
 
-def test_where_a_state_is_at_fault_the_state_is_marked(
-    gms_fsm: CommandLine, tmp_path: Path
-) -> None:
+def test_a_faulty_state_is_marked(gms_fsm: CommandLine, tmp_path: Path) -> None:
     graphviz()
     gms_fsm("check", "gms", "--law", "published", "-o", tmp_path)
     assert marked(tmp_path / "1-stability.svg") == {"element1-state-slip"}

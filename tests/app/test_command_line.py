@@ -1,4 +1,4 @@
-"""The command line does its verbs, and answers a mistake with one message and exit code 2."""
+"""The command line executes its verbs, and reports a mistake with one message and exit code 2."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_a_mistake_is_one_message_and_exit_code_2(
     assert done.err.count("error:") <= 1
 
 
-def test_a_failed_run_keeps_what_it_had(gms_fsm: CommandLine) -> None:
+def test_a_failed_run_keeps_its_rows(gms_fsm: CommandLine) -> None:
     done = gms_fsm("paper", "-o", "out", "--force", "0.1*sqrt(3 - t)")
     assert done.code == 2
     assert "partial.npz" in done.err

@@ -1,4 +1,4 @@
-"""The drawing verbs of the command line write what they say, and refuse what they cannot read."""
+"""The drawing verbs of the command line write the files they name, and reject unreadable ones."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """A user's mistake is one message and exit code 2; with ``--debug`` it is a traceback with causes.
 
-``--debug`` may stand before or behind the verb.
+``--debug`` is accepted before or after the verb.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from tests.scenario_files import OPEN_LOOP, CommandLine, changed, one_message
 
 @pytest.fixture(autouse=True)
 def _files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A folder with a good and a bad scenario, a good and a bad trace."""
+    """Return a folder with a valid and an invalid scenario, and a valid and an invalid trace."""
     monkeypatch.chdir(tmp_path)
     Path("good.toml").write_text(OPEN_LOOP)
     Path("bad.toml").write_text(changed(OPEN_LOOP, '"signed"', '"singed"'))
@@ -76,8 +76,8 @@ def test_with_debug_the_error_comes_through(
             gms_fsm(*with_debug)
 
 
-def test_usage_is_the_shells_business(gms_fsm: CommandLine) -> None:
-    """A verb or an option that is not there: usage and exit code 2, with --debug too."""
+def test_usage_errors_are_unchanged(gms_fsm: CommandLine) -> None:
+    """An unknown verb or option: usage and exit code 2, with --debug too."""
     for arguments in (("nonsense",), ("run",), ("run", "good.toml", "--nonsense")):
         for debug in ((), ("--debug",)):
             answer = gms_fsm(*debug, *arguments)
@@ -86,18 +86,18 @@ def test_usage_is_the_shells_business(gms_fsm: CommandLine) -> None:
             assert "Traceback" not in answer.err
 
 
-def test_debug_changes_nothing_where_all_is_well(gms_fsm: CommandLine) -> None:
+def test_debug_changes_nothing_on_success(gms_fsm: CommandLine) -> None:
     plain, debug = gms_fsm("code", "--law", "signed"), gms_fsm("code", "--law", "signed", "--debug")
     assert plain.code == debug.code == 0
     assert plain.out == debug.out
 
 
-def test_behind_two_dashes_it_is_an_argument(gms_fsm: CommandLine) -> None:
+def test_after_two_dashes_it_is_an_argument(gms_fsm: CommandLine) -> None:
     one_message(gms_fsm("run", "--", "--debug"), "--debug: no such file")
 
 
-def test_causes_are_shown_that_a_message_keeps_to_itself(gms_fsm: CommandLine) -> None:
-    """Behind "damaged trace file" stands what zipfile said."""
+def test_the_traceback_shows_causes_that_the_message_omits(gms_fsm: CommandLine) -> None:
+    """The cause of "damaged trace file" is the error of zipfile."""
     pytest.importorskip("matplotlib", reason="needs the extra plots")
     with pytest.raises(TraceFileError) as caught:
         gms_fsm("plot", "bad.npz", "--debug")
@@ -108,7 +108,7 @@ def test_causes_are_shown_that_a_message_keeps_to_itself(gms_fsm: CommandLine) -
     assert "singed" in str(caught_scenario.value.__context__)
 
 
-def test_a_message_does_not_command_the_terminal(gms_fsm: CommandLine) -> None:
+def test_a_message_contains_no_terminal_codes(gms_fsm: CommandLine) -> None:
     answer = gms_fsm("run", "escape.toml")
     one_message(answer, r"\x1b[31m[bold]\x07")
     assert "\x1b[31m" not in answer.message

@@ -1,4 +1,4 @@
-"""Every command answers; a mistake is one message, never a traceback, and the session goes on."""
+"""Every command answers; a mistake is one message, never a traceback, and the session continues."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_the_overview_names_every_command() -> None:
         ("q", "quit"),
     ],
 )
-def test_letters_are_those_of_pdb(alias: str, name: str) -> None:
+def test_short_names_are_those_of_pdb(alias: str, name: str) -> None:
     assert ALIASES[alias] == name
 
 
@@ -67,7 +67,7 @@ def test_letters_are_those_of_pdb(alias: str, name: str) -> None:
     ("command", "said"),
     [
         ("stpe", "did you mean step?"),
-        ("xyzzy", "help lists them"),
+        ("xyzzy", "help lists all commands"),
         ("step many", "'many' is not an integer; usage: step [N]"),
         ("step 0", "usage: step [N]"),
         ("step -3", "is not an integer"),
@@ -75,7 +75,7 @@ def test_letters_are_those_of_pdb(alias: str, name: str) -> None:
         ("step 99999999999999999999", "is not an integer"),
         ("next 3", "next takes no argument"),
         ("goto", "usage: goto T, for example: goto 25"),
-        ("goto yesterday", "'yesterday' is no time"),
+        ("goto yesterday", "'yesterday' is not a time"),
         ("goto -1", "is before the start"),
         ("goto nan", "is before the start"),
         ("until", "a condition is missing; usage: until CONDITION"),
@@ -85,12 +85,12 @@ def test_letters_are_those_of_pdb(alias: str, name: str) -> None:
         ("why 0", "no element 0"),
         (
             "why one",
-            "'one' is no edge; there are break_away_forward, break_away_backward, arrest; "
+            "'one' is not an edge; there are break_away_forward, break_away_backward, arrest; "
             "usage: why [ELEMENT] [EDGE], for example: why 2 break_away_forward",
         ),
-        ("why 1 arest", "'arest' is no edge"),
-        ("why arrest 1", "'arrest 1' is no edge"),
-        ("why 1.5", "'1.5' is no edge"),
+        ("why 1 arest", "'arest' is not an edge"),
+        ("why arrest 1", "'arrest 1' is not an edge"),
+        ("why 1.5", "'1.5' is not an edge"),
         ("why 99999999999", "is not an integer; usage: why [ELEMENT] [EDGE]"),
         ("why arrest", "arrest leaves slip; element 1 is in stick"),
         ("why 2 Arrest", "arrest leaves slip; element 2 is in stick"),
@@ -107,13 +107,13 @@ def test_letters_are_those_of_pdb(alias: str, name: str) -> None:
         ("print sgn", "the function 'sgn' needs (...)"),
         ("unwatch 1", "there is no number 1; there are 0"),
         ("break arest", "edges: break_away_forward"),
-        ("break fired arrest", "is no breakpoint; usage: break"),
+        ("break fired arrest", "is not a breakpoint; usage: break"),
         ("break fires slip", "no edge 'slip'"),
         ("break enter arrest", "no state 'arrest'"),
         ("break arrest element 7", "no element 7"),
         ("break arrest if z9 > 1", "unknown name 'z9'"),
         ("break arrest hits 0", "at least 1"),
-        ("break arrest if", "is no breakpoint"),
+        ("break arrest if", "is not a breakpoint"),
         ("clear", "is not an integer"),
         ("clear 3", "there is no number 3"),
         ("poke", "nothing to poke"),
@@ -139,7 +139,7 @@ def test_letters_are_those_of_pdb(alias: str, name: str) -> None:
         ("save no/folder/here.json", "cannot write"),
         ("load", "a file name is missing"),
         ("load nothing.json", "no such file"),
-        ("help nonsense", "no command 'nonsense'"),
+        ("help nonsense", "unknown command 'nonsense'"),
         ("quit now", "quit takes no argument"),
         ("log 0", "usage: log [N]"),
         ("where now", "takes no argument"),
@@ -147,7 +147,7 @@ def test_letters_are_those_of_pdb(alias: str, name: str) -> None:
 )
 def test_a_mistake_is_one_message(command: str, said: str) -> None:
     answer, after = answers(FIG_4, command, "print t")
-    # said on one line, or wrapped at the screen's edge
+    # printed on one line, or wrapped
     assert answer.startswith("error: ")
     assert said in " ".join(answer.split())
     assert answer.count("error:") == 1
@@ -177,21 +177,21 @@ def test_moves() -> None:
     assert "element 4: slip -> stick by arrest" in said[4]
 
 
-def test_next_says_that_there_is_no_other() -> None:
+def test_next_reports_that_there_is_no_other() -> None:
     said = answers(FIG_4, "goto 99.9", "next", "next", "next")[3]
     assert said.startswith("no transition before the end\nrow 349, t = 100 s")
 
 
-def test_until_says_where_and_whether() -> None:
+def test_until_reports_where_and_whether() -> None:
     said = answers(FIG_4, "u z1 > 0.123", "u state(1) == slip", "u z1 > 99")
     assert said[0].startswith("between rows 8 and 9, t = 2.60048553")
     assert "element 1: stick -> slip by break_away_forward" in said[1]
     assert said[2].startswith("it does not become true before the end\nrow 349, t = 100 s")
 
 
-def test_until_stays_where_it_is_true_already_and_for_good() -> None:
+def test_until_stays_if_the_condition_is_always_true() -> None:
     said = answers(FIG_4, "goto 25", "u t > 1", "s", "u t > 30", "u t > 30", "u t > 30.1")
-    stays = "it is true here already and does not become true again; until waits for it to become"
+    stays = "it is already true here and does not become true again; until stops where it becomes"
     assert " ".join(said[1].split()) == " ".join(f"{stays} true {said[0]}".split())
     assert said[2].startswith("row 77")
     assert "t = 30 s" in said[3]
@@ -200,14 +200,14 @@ def test_until_stays_where_it_is_true_already_and_for_good() -> None:
     assert "t = 30.1 s" in said[5]
 
 
-def test_until_goes_on_to_where_it_becomes_true_again() -> None:
+def test_until_continues_to_where_it_becomes_true_again() -> None:
     said = answers(FIG_4, "u v > 0.1", "u v > 0.1", "u v > 0.1")
     times = [float(text.split("t = ")[1].split(" s")[0]) for text in said]
     assert times == sorted(set(times))
 
 
 @pytest.mark.parametrize("command", ["step", "step 3", "next", "continue", "until z1 > 9", "u t>1"])
-def test_at_the_end_there_is_only_back(command: str) -> None:
+def test_at_the_end_only_back_works(command: str) -> None:
     said = answers(FIG_4, "goto 100", "b arrest", command, "print t", "back", command)
     assert said[2] == "error: this is the end of the run; go back first"
     assert said[3] == "100"
@@ -231,10 +231,10 @@ def test_print_and_watch() -> None:
     assert said[5] == "  watch 1: z1 / s1 = 0\n  watch 2: state(2) == slip = false"
     assert "  watch 1: z1 / s1 = -1.51743" in said[6]
     assert said[7] == "  watch 1: state(2) == slip = false"
-    assert said[8] == "nothing is watched"
+    assert said[8] == "no watch is set"
 
 
-def test_a_watch_that_cannot_be_computed_does_not_disturb() -> None:
+def test_a_watch_that_cannot_be_computed_does_no_harm() -> None:
     said = answers(FIG_4, "s", "watch 1 / z1", "back", "s")
     assert "watch 1: 1 / z1 = '1 / z1' cannot be computed here" in " ".join(said[2].split())
     assert "row 1" in said[3]
@@ -261,7 +261,7 @@ def test_breakpoints() -> None:
     assert said[3] == "breakpoint 1: fires arrest, element 2"
     assert said[4] == "breakpoint 2: enter slip, element 3, if v < 0, from hit 2 on"
     assert said[5] == "breakpoint 3: tested break_away_forward, all elements"
-    assert said[6].splitlines()[1].endswith("from hit 2 on; seen 0")
+    assert said[6].splitlines()[1].endswith("from hit 2 on; hits: 0")
     assert len(said[7].splitlines()) == 2
     assert said[8].startswith("breakpoint 1")
     assert "t = 12.4999735 s" in said[8]
@@ -322,7 +322,7 @@ def test_save_and_load(tmp_path: Path) -> None:
     assert "row 77, t = 24.9999735 s" in said[9]
     assert "watch 1: z1 = 0" in said[9]
     assert "> 1  " in said[10]
-    assert said[11] == "  1  fires arrest, all elements; seen 0"
+    assert said[11] == "  1  fires arrest, all elements; hits: 0"
 
 
 @pytest.mark.slow
@@ -380,7 +380,7 @@ def test_an_empty_line_repeats_a_move_only_when_typed() -> None:
     assert made.reply("").startswith("row 6")
 
 
-def test_comments_are_passed_over() -> None:
+def test_comments_are_ignored() -> None:
     said = answers(FIG_4, "# find the row", "goto 25")
     assert said[0] == ""
     assert said[1].startswith("row 76")
@@ -423,22 +423,22 @@ def test_completion(line: str, text: str, words: list[str]) -> None:
     assert sorted(found) == sorted(words)
 
 
-def test_a_livelock_is_shown_and_can_be_left() -> None:
+def test_a_livelock_is_shown_and_can_be_stepped_back_from() -> None:
     from tests.inspection.test_session_failures_are_outcomes import both_ways
 
     made = Debugger(Session(both_ways(), Prescribed("0.15"), 20.0), "", None, io.StringIO())
     said = made.reply("goto 20")
-    assert "the run cannot go on: element 2 at t = 6.66666" in said
-    assert "go back, look, or poke something to go on in another branch" in said
-    assert "the run cannot go on" in made.reply("where")
-    assert "it cannot go on" in made.reply("branches")
+    assert "the run cannot continue: element 2 at t = 6.66666" in said
+    assert "go back and look, or poke a value to continue in a new branch" in said
+    assert "the run cannot continue" in made.reply("where")
+    assert "it cannot continue" in made.reply("branches")
     assert "fired here" in made.reply("why 2")
     assert made.reply("back 3").startswith("row ")
     assert made.reply("poke z2=0").startswith("branch 1")
-    assert "the run cannot go on" not in made.reply("goto 12")
+    assert "the run cannot continue" not in made.reply("goto 12")
 
 
-def test_a_guard_that_cannot_be_computed_is_said() -> None:
+def test_a_guard_that_cannot_be_computed_is_reported() -> None:
     from gms_fsm import Chart, ChartModel, State, Stribeck, Transition
 
     chart = Chart(
@@ -454,5 +454,5 @@ def test_a_guard_that_cannot_be_computed_is_said() -> None:
     made = Debugger(Session(model, Prescribed("1"), 1.0), "", None, io.StringIO())
     assert "cannot be computed here" in made.reply("why")
     assert " ?" in made.reply("where")
-    assert "the run cannot go on" in made.reply("step")
-    assert "the run cannot go on" in made.reply("where")
+    assert "the run cannot continue" in made.reply("step")
+    assert "the run cannot continue" in made.reply("where")

@@ -1,4 +1,4 @@
-"""On a chart of one's own the debugger speaks its names: variables, states, edges, elements."""
+"""With a custom chart the debugger uses its names of variables, states and edges."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SCENARIOS = ROOT / "scenarios"
 
 
 def contact(n: int = 1) -> ChartModel:
-    """Three states, two variables; w wears off while the contact moves."""
+    """Three states, two variables; w decays while the contact moves."""
     chart = Chart(
         "warming contact",
         ("v", "s"),
@@ -40,7 +40,7 @@ def contact(n: int = 1) -> ChartModel:
 
 
 def own(n: int = 1, t_end: float = 8.0) -> Debugger:
-    """Return a debugger on that contact, moved to and fro."""
+    """Return a debugger on that contact, moved back and forth."""
     session = Session(contact(n), Prescribed("0.2*sin(t)"), t_end)
     return Debugger(session, "", io.StringIO(), io.StringIO())
 
@@ -54,7 +54,7 @@ def test_it_greets_without_a_scenario(title: str) -> None:
     assert said[: bool(title)] == [title] * bool(title)
     assert said[bool(title) :][:3] == [
         "warming contact; prescribed velocity, to t = 8 s",
-        "help shows the commands, where shows everything, quit leaves.",
+        "help lists the commands, where shows everything, quit exits.",
         "(t=0.0000 s) next",
     ]
 
@@ -96,7 +96,7 @@ def test_help_without_a_threshold_or_an_edge() -> None:
         assert help_of(name, made.session).examples
         assert "error:" not in made.reply(f"help {name}")
     assert "no edge leaves this state" in made.reply("why")
-    assert made.reply("why go").startswith("error: 'go' is no edge; there are none")
+    assert made.reply("why go").startswith("error: 'go' is not an edge; there are none")
     assert made.reply("where").splitlines()[2].split() == [
         "el",
         "state",
@@ -137,7 +137,7 @@ def test_a_single_element_needs_no_number() -> None:
     assert made.session.watch("w1") == pytest.approx(0.3)
 
 
-def test_with_more_elements_the_number_is_asked_for() -> None:
+def test_with_several_elements_a_number_is_required() -> None:
     made = own(2)
     for command in ("print w", "watch 2*w", "until w > 0", "b arrest if w > 0", "poke z1=w"):
         assert "unknown name 'w'; for element 1 write w1; allowed:" in " ".join(
@@ -146,7 +146,7 @@ def test_with_more_elements_the_number_is_asked_for() -> None:
     assert "for element 1" not in made.reply("print q")
 
 
-def test_where_has_a_column_a_variable() -> None:
+def test_where_has_one_column_per_variable() -> None:
     made = own(2)
     made.reply("poke w2=0.125")
     said = made.reply("where").splitlines()
@@ -167,7 +167,7 @@ def test_where_has_a_column_a_variable() -> None:
     assert [line.index("1:n") for line in said[3:5]] == [said[2].index("edges")] * 2
 
 
-def test_where_puts_edges_that_have_no_room_on_a_line_of_their_own() -> None:
+def test_where_puts_edges_without_room_on_a_separate_line() -> None:
     names = ("a", "b", "c", "d")
     flows = dict.fromkeys(names, "v")
     edges = tuple(Transition(f"e{i}", "on", "off", guard=f"a > {i} and b > 9") for i in range(1, 5))
@@ -195,22 +195,24 @@ def test_why_takes_an_edge() -> None:
     assert said.splitlines()[1] == "break_away does not fire: |z| >= s is false by 0.2 m."
     assert made.reply("why let_go") == "error: let_go leaves rising; element 1 is in static"
     assert made.reply("why 2 let_go") == "error: let_go leaves rising; element 2 is in static"
-    assert "'let' is no edge; there are break_away, let_go, arrest" in made.reply("why 1 let")
+    assert "'let' is not an edge; there are break_away, let_go, arrest" in made.reply("why 1 let")
 
 
-def test_after_a_firing_why_says_how_to_ask_for_the_new_state() -> None:
+def test_after_a_firing_why_says_how_to_explain_the_new_state() -> None:
     made = own(2)
     assert "element 1: static -> rising by break_away" in made.reply("next")
     said = made.reply("why").splitlines()
-    assert said[1] == "it has just left static; the values are those before"
+    assert said[1] == "it has just left static; the values are those before the firing"
     assert said[2] == "break_away fired here: every clause was true."
-    assert said[-1] == "step, then why: the edges that leave rising"
-    new = made.reply("why let_go")  # asked for by name, it is there at once
+    assert said[-1] == "for the edges that leave rising: step, then why"
+    new = made.reply("why let_go")  # given by name, it is shown immediately
     assert new.splitlines()[1] == "let_go does not fire: w > 0.5 is false by 0.5."
     assert "just left" not in new
     assert "step, then" not in made.reply("why break_away")
     made.reply("element 2")
-    assert made.reply("why 1").splitlines()[-1] == "step, then why 1: the edges that leave rising"
+    assert (
+        made.reply("why 1").splitlines()[-1] == "for the edges that leave rising: step, then why 1"
+    )
     made.reply("step")
     assert "let_go does not fire" in made.reply("why 1")
 
@@ -274,7 +276,7 @@ def test_capitals_matter_where_only_they_differ() -> None:
     [
         (
             "mine.py",
-            "mine.py is Python; debug takes a scenario (.toml); for a model of your own: "
+            "mine.py is a Python file; debug takes a scenario (.toml); for a custom model use "
             "Debugger(Session(model, rig, t_end)).run(), see docs/howto/debugging.md",
         ),
         (
@@ -289,7 +291,7 @@ def test_capitals_matter_where_only_they_differ() -> None:
         ),
     ],
 )
-def test_another_file_is_sent_to_where_it_belongs(name: str, said: str) -> None:
+def test_other_files_are_rejected_with_advice(name: str, said: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         scenario_to_debug(name)
     assert str(caught.value) == said

@@ -1,4 +1,4 @@
-"""Scripted, the terminal debugger tells the story of the Fig. 4 run and of the pulled mass."""
+"""Scripts of the debugger reproduce the stories of the Fig. 4 run and of the pulled mass."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_fig_4_story() -> None:
     expected = """\
 Stick-slip (paper, Fig. 4)
 GMS, 4 elements, published law; prescribed velocity, to t = 100 s
-help shows the commands, where shows everything, quit leaves.
+help lists the commands, where shows everything, quit exits.
 (t=0.0000 s) break fires break_away_backward element 2
 breakpoint 1: fires break_away_backward, element 2
 (t=0.0000 s) continue
@@ -57,7 +57,7 @@ row 52, t = 20.140677 s, micro-step 1: v = -0.140931 m/s, F = -1.2408 N
   element 2: stick -> slip by break_away_backward
 (t=20.1407 s) why 2
 element 2 is in slip at t = 20.140677 s
-it has just left stick; the values are those before
+it has just left stick; the values are those before the firing
 break_away_forward did not fire: z >= s is false by 0.8 m and v > v_c is false
   by 0.141 m/s.
 break_away_backward fired here: every clause was true.
@@ -67,7 +67,7 @@ break_away_backward fired here: every clause was true.
   2 break_away_backward: stick -> slip
     true   z <= -s   left -0.4        right -0.4        margin 0 (rounding)
     true   v < -v_c  left -0.14093    right -1e-06      margin +0.141 m/s
-step, then why 2: the edges that leave slip
+for the edges that leave slip: step, then why 2
 (t=20.1407 s) back 10
 """
     assert said.startswith(expected)
@@ -96,8 +96,8 @@ def test_pulled_mass_story() -> None:
         "compare 1 2",
         "branches",
     )
-    # It is pulled forward: of itself it never breaks away backward.
-    assert said[1].startswith("no breakpoint hit\nrow 2043, t = 60 s")
+    # It is pulled forward and never breaks away backward by itself.
+    assert said[1].startswith("no breakpoint was hit\nrow 2043, t = 60 s")
     assert "arrest does not fire: |v| <= v_c is false by" in said[2]
     assert said[4].startswith("branch 1, from branch 0: v = -0.5")
     assert said[5].startswith("breakpoint 1: fires break_away_backward, element 2")
@@ -134,7 +134,7 @@ def test_under_the_signed_law_it_does_arrest() -> None:
 
 
 @pytest.mark.parametrize("scenario", [FIG_4, PULLED])
-def test_every_transition_of_the_log_is_told(scenario: str) -> None:
+def test_every_transition_of_the_log_is_shown(scenario: str) -> None:
     loaded = load_scenario(SCENARIOS / f"{scenario}.toml")
     log = simulate(loaded.model, loaded.rig, **loaded.arguments).transitions
     said = answers(scenario, *["next"] * (len(log) + 1), "log 1000")

@@ -1,7 +1,7 @@
-"""Whatever the bytes of a text, a scenario file or a trace file, only documented errors answer.
+"""Any bytes as a text, scenario file or trace file raise only documented errors.
 
 A few hundred inputs each; `make soak` tries them for minutes, with limits on time and memory. The
-inputs that once broke something stand in the test_hostile_* files.
+inputs that once broke something are in the test_hostile_* files.
 """
 
 from __future__ import annotations
@@ -36,6 +36,6 @@ def test_trace_files(data: bytes) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", fuzz.BODIES)
 def test_the_bodies_reach_both_sides(name: str) -> None:
-    """Long random inputs, as `make soak` makes them: some are accepted, most are refused."""
+    """Long random inputs, as `make soak` makes them: some are accepted, most are rejected."""
     answers = [fuzz.BODIES[name](random.Random(f"{i}").randbytes(128)) for i in range(150)]
     assert 3 <= sum(answers) <= 120

@@ -1,6 +1,6 @@
 """Help needs none of the libraries that compute, read scenario files or draw.
 
-By the names of modules and not by time: `gms-fsm --help` takes as long as what it imports.
+Checked by module names and not by time: `gms-fsm --help` takes as long as its imports.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ print(json.dumps([said.getvalue(), sorted({name.partition(".")[0] for name in sy
 
 
 def loaded(*arguments: str) -> tuple[str, set[str]]:
-    """Return what a command prints, and the packages that it has imported."""
+    """Return the output of a command, and the packages that it has imported."""
     done = subprocess.run(
         [sys.executable, "-c", CODE, json.dumps(arguments)],
         cwd=ROOT,
@@ -51,6 +51,6 @@ def test_help_lists_every_verb() -> None:
         assert f" {verb} " in said
 
 
-def test_what_a_verb_imports_is_seen() -> None:
+def test_imports_of_a_verb_are_detected() -> None:
     _, names = loaded("code", "--law", "signed")
     assert "numpy" in names

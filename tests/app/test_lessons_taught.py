@@ -1,4 +1,4 @@
-"""`gms-fsm lesson` lists eight lessons, and writes text, picture and replay page of one."""
+"""`gms-fsm lesson` lists eight lessons, and writes the text, figure and replay page of one."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_a_mistake_is_one_message(arguments: list[str], said: str, gms_fsm: Comm
     assert list(Path().iterdir()) == [Path("file")]
 
 
-def test_what_is_wrong_is_said_before_anything_runs(
+def test_a_mistake_is_reported_before_anything_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(lessons.l7_frictional_lag, "run", lambda: pytest.fail("it was run"))

@@ -1,4 +1,4 @@
-"""The live view shows states, |z|/s, v and F, and draws at most ten frames a second."""
+"""The live view shows states, |z|/s, v and F, and draws at most ten frames per second."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.helpers import open_loop, pulled_mass, stick_slip
 
 
 class Clock:
-    """A clock that goes on by a fixed time whenever it is read."""
+    """A clock that advances by a fixed time whenever it is read."""
 
     def __init__(self, tick: float) -> None:
         self.now, self.tick, self.reads = 100.0, tick, 0
@@ -32,7 +32,7 @@ def screen() -> Console:
 
 
 class Counted(LiveView):
-    """Counts what it is asked and what it draws."""
+    """Counts calls and frames."""
 
     asked = drawn = 0
 
@@ -66,7 +66,7 @@ def test_frames_are_bounded_by_the_elapsed_time(
     assert view.drawn <= view.asked
 
 
-def test_a_standing_clock_gives_one_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_stopped_clock_gives_one_frame(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = Clock(0.0)
     monkeypatch.setattr("gms_fsm.app.live.time.monotonic", clock)
     view = Counted(screen(), 0.0, 20.0, detail=True)
@@ -78,7 +78,7 @@ def test_a_standing_clock_gives_one_frame(monkeypatch: pytest.MonkeyPatch) -> No
 def test_a_frame_that_takes_long_does_not_call_for_the_next(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The pause is counted from the end of a frame, else a slow terminal eats the whole run."""
+    """The pause is counted from the end of a frame; otherwise a slow terminal slows the run."""
     clock = Clock(0.02)
     monkeypatch.setattr("gms_fsm.app.live.time.monotonic", clock)
 
@@ -126,7 +126,7 @@ def test_the_view_changes_nothing_of_the_run() -> None:
 
 # --------------------------------------------------------------------------- what is shown
 class Last:
-    """Draws one table of the moment that is the last before a time."""
+    """Draws one table, for the last moment before a time."""
 
     def __init__(self, until: float) -> None:
         self.until, self.text, self.seen = until, "", {}

@@ -1,7 +1,7 @@
-"""A mistake at the command line or in a call is answered with what helps, and with nothing else.
+"""A mistake on the command line or in a call is answered with helpful advice and nothing else.
 
-The key that was meant, the formats there are, the lessons there are, the number as it should be
-written; no other library's prefix, no empty line of a progress bar, no number in numpy's spelling.
+The intended key, the available formats and lessons, the correct form of a number; no prefix of
+another library, no empty line of a progress bar, no number in NumPy notation.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def test_the_key_of_another_table_is_named(scenario: Path, given: str, meant: st
         load_scenario(scenario, [given])
 
 
-def test_a_key_of_a_table_that_is_not_there_is_not_meant(scenario: Path) -> None:
+def test_a_key_of_an_absent_table_is_not_suggested(scenario: Path) -> None:
     with pytest.raises(ScenarioError, match="unknown key; valid here: "):
         load_scenario(scenario, ["smoothing=3"])  # of [record]
 
@@ -155,7 +155,7 @@ def test_a_formula_may_have_one(scenario: Path) -> None:
 def test_an_unknown_lesson_lists_the_lessons(gms_fsm: CommandLine, asked: str) -> None:
     done = gms_fsm("lesson", "--", asked)
     assert done.code == 2
-    assert done.message.startswith(f"there is no lesson '{asked}'; these are there:")
+    assert done.message.startswith(f"there is no lesson '{asked}'; choose one of")
     for number, each in LESSONS.items():
         assert f"{number}  {each.TITLE}: {each.QUESTION}" in done.message
 
@@ -244,7 +244,7 @@ def _calls(trace: Trace, late: Any) -> dict[str, Any]:
     session = Session(trace.model, trace.rig, 3.0)
     calls: dict[str, Any] = {
         "frames|t_start is 20.0": lambda: _animate(trace, late),
-        "t = -20.0 s lies before": lambda: session.goto(-late),
+        "t = -20.0 s is before": lambda: session.goto(-late),
         "name is 20.0": lambda: trace.variable(late),
         "elements is 20.0": lambda: statechart(LUGRE, late),
     }

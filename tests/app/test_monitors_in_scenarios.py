@@ -1,4 +1,4 @@
-"""A scenario asks for monitors; gms-fsm run prints and writes what they say, and exits with 0."""
+"""A scenario selects monitors; gms-fsm run prints and writes their verdicts, and exits with 0."""
 
 from __future__ import annotations
 
@@ -32,9 +32,7 @@ def path(tmp_path: Path) -> Path:
     return file
 
 
-def test_what_they_say_is_printed_and_written(
-    gms_fsm: CommandLine, path: Path, tmp_path: Path
-) -> None:
+def test_verdicts_are_printed_and_written(gms_fsm: CommandLine, path: Path, tmp_path: Path) -> None:
     done = gms_fsm("run", path, "-o", tmp_path / "out")
     assert done.code == 0
     trace = Trace.load(tmp_path / "out" / "trace.npz")
@@ -50,14 +48,16 @@ def test_what_they_say_is_printed_and_written(
         assert f"- {line}\n" in summary
 
 
-def test_without_monitors_nothing_is_said(gms_fsm: CommandLine, path: Path, tmp_path: Path) -> None:
+def test_without_monitors_nothing_is_printed(
+    gms_fsm: CommandLine, path: Path, tmp_path: Path
+) -> None:
     done = gms_fsm("run", path, "-o", tmp_path / "out", "--set", "run.monitors=[]")
     assert done.code == 0
     assert "monitor " not in done.out
     assert "onitor" not in (tmp_path / "out" / "summary.md").read_text()
 
 
-def test_the_arguments_of_simulate_hold_them(path: Path) -> None:
+def test_the_arguments_of_simulate_include_them(path: Path) -> None:
     given = load_scenario(path).arguments["monitors"]
     assert given[0] == Invariant("abs(z) <= 0.01*s")
     assert len(given) == 4
@@ -86,14 +86,16 @@ def test_a_wrong_one_is_one_message(
     nothing_written(tmp_path, {"given.toml"})
 
 
-def test_a_run_that_fails_tells_them_too(gms_fsm: CommandLine, path: Path, tmp_path: Path) -> None:
+def test_a_run_that_fails_reports_them_too(
+    gms_fsm: CommandLine, path: Path, tmp_path: Path
+) -> None:
     done = gms_fsm("run", path, "-o", tmp_path / "out", "--set", "rig.velocity=0.1*sqrt(0.5 - t)")
     one_message(done, "not finite", "partial.npz", "monitor passivity (ok)", "monitor coverage")
     assert list(Trace.load(tmp_path / "out" / "partial.npz").monitors) == MONITORS
 
 
-def test_a_livelock_is_told_once(path: Path, tmp_path: Path) -> None:
-    """The scenario's own models have none: a chart takes their place."""
+def test_a_livelock_is_reported_once(path: Path, tmp_path: Path) -> None:
+    """The models of scenario files have none, so a custom chart replaces them."""
     loaded = load_scenario(path, ["run.monitors=['all']"])
     loaded = replace(loaded, model=memoryless([0.5]), rig=SLOWING)
     loaded.arguments["t_end"] = 10.0

@@ -1,7 +1,7 @@
-"""No command writes over its own input, over a device or pipe, or over a file that is not ours.
+"""No command overwrites its own input, a device or pipe, or a file that gms-fsm did not write.
 
-What is refused is refused in one message with exit code 2, and what was there stays. In a folder of
-output, ours is what was written there by gms-fsm and has not been changed since. Temporary files
+It is rejected with one message and exit code 2, and the existing file is kept. In an output folder,
+a file is ours if gms-fsm wrote it and it has not been changed since. Temporary files
 have random names, follow no link, and are removed if their process is gone, and only then.
 """
 
@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import Prescribed, Trace, simulate
-from gms_fsm._files import LIST, output_folder, remove_leftovers, written_whole
+from gms_fsm._files import LIST, output_folder, remove_leftovers, write_whole
 from gms_fsm.app.cli import main
 from gms_fsm.errors import GMSError, OutputError
 from tests.helpers import ROOT, same_bits, stick_slip
@@ -35,7 +35,7 @@ MARK = f"{7:016x}"
 def refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> Callable[..., str]:
-    """Run a command that must be refused; return what it says."""
+    """Run a command that must be rejected; return its message."""
     monkeypatch.chdir(tmp_path)
 
     def run(*arguments: str) -> str:
@@ -75,7 +75,7 @@ def trace(tmp_path: Path) -> Trace:
 # --------------------------------------------------------------------------- an input
 @pytest.mark.parametrize("verb", ["replay", "animate"])
 @pytest.mark.parametrize("output", ["t.npz", "./t.npz", "link", "hard"])
-def test_the_input_is_no_output(
+def test_the_input_cannot_be_the_output(
     verb: str, output: str, refused: Callable[..., str], trace: Trace
 ) -> None:
     if verb == "animate":
@@ -88,7 +88,7 @@ def test_the_input_is_no_output(
 
 
 @pytest.mark.parametrize("output", ["t.csv", "t.transitions.csv", "t.npz"])
-def test_no_file_of_either_input_is_an_output(
+def test_no_file_of_either_input_can_be_the_output(
     output: str, refused: Callable[..., str], trace: Trace
 ) -> None:
     refused("replay", "t.npz", "t.csv", "-o", output)
@@ -96,12 +96,14 @@ def test_no_file_of_either_input_is_an_output(
     same_bits(Trace.load("t.npz"), trace)
 
 
-def test_the_record_of_a_run_is_no_output(refused: Callable[..., str], tmp_path: Path) -> None:
-    """Also if gms-fsm has written it."""
+def test_the_record_of_a_run_cannot_be_the_output(
+    refused: Callable[..., str], tmp_path: Path
+) -> None:
+    """Even if gms-fsm has written it."""
     rows = [f"{t:.3f},{np.sin(t):.6f},{np.cos(t):.6f}\n" for t in np.arange(0, 3, 0.01)]
     record = "t,x,F\n" + "".join(rows)
     out = output_folder("out")
-    written_whole(out / "trace.csv", lambda file: file.write(record.encode()))
+    write_whole(out / "trace.csv", lambda file: file.write(record.encode()))
     text = MEASURED.replace('"own.csv"', '"out/trace.csv"')
     Path("mine.toml").write_text(text.replace("figures = []", "figures = []\ncsv = true"))
     assert "trace.csv: is an input here" in refused("run", "mine.toml", "-o", "out")
@@ -123,7 +125,7 @@ def test_the_record_of_a_run_is_no_output(refused: Callable[..., str], tmp_path:
         "overview.svg",
     ],
 )
-def test_a_run_does_not_write_over_a_file_of_ones_own(
+def test_a_run_does_not_overwrite_a_users_file(
     name: str, refused: Callable[..., str], scenario: str
 ) -> None:
     place = Path("mine") / name
@@ -136,7 +138,7 @@ def test_a_run_does_not_write_over_a_file_of_ones_own(
     assert list(place.parent.iterdir()) == [place]
 
 
-def test_its_own_files_are_written_anew_but_changed_ones_are_not(
+def test_its_own_files_are_rewritten_but_changed_ones_are_not(
     refused: Callable[..., str], scenario: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for end in ("t_end=1.0", "t_end=1.5", "t_end=1.0"):
@@ -159,7 +161,7 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("case", OTHERS)
-def test_no_command_writes_over_a_file_of_ones_own(
+def test_no_command_overwrites_a_users_file(
     case: str, refused: Callable[..., str], trace: Trace
 ) -> None:
     if case == "figures":
@@ -172,7 +174,7 @@ def test_no_command_writes_over_a_file_of_ones_own(
     assert place.read_text() == "years of work"
 
 
-def test_a_report_is_not_written_over_a_file_of_ones_own(
+def test_a_report_does_not_overwrite_a_users_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("z3", reason="needs the extra check")
@@ -188,7 +190,7 @@ def test_a_kill_between_list_and_file_does_no_harm(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = output_folder(tmp_path / "out", ["a"])
-    written_whole(folder / "a", lambda file: file.write(b"first"))
+    write_whole(folder / "a", lambda file: file.write(b"first"))
     replace = os.replace
 
     class Killed(BaseException):
@@ -202,7 +204,7 @@ def test_a_kill_between_list_and_file_does_no_harm(
     for content in (b"second", b"third"):
         monkeypatch.setattr(os, "replace", dies_at_the_file)
         with pytest.raises(Killed):
-            written_whole(folder / "a", lambda file, content=content: file.write(content))
+            write_whole(folder / "a", lambda file, content=content: file.write(content))
         monkeypatch.setattr(os, "replace", replace)
         assert output_folder(folder, ["a"]) == folder
         assert (folder / "a").read_bytes() == b"first"
@@ -211,7 +213,7 @@ def test_a_kill_between_list_and_file_does_no_harm(
 @pytest.mark.parametrize("text", ["", "[]", "{", '{"a": 3}', '{"a": null}'])
 def test_a_damaged_list_makes_every_file_the_users(text: str, tmp_path: Path) -> None:
     folder = output_folder(tmp_path / "out")
-    written_whole(folder / "a", lambda file: file.write(b"ours"))
+    write_whole(folder / "a", lambda file: file.write(b"ours"))
     (folder / LIST).write_text(text)
     with pytest.raises(OutputError, match="was not written by gms-fsm"):
         output_folder(folder, ["a"])
@@ -240,7 +242,7 @@ def _folder(path: Path) -> None:
 @pytest.mark.parametrize(
     ("verb", "name"), [("chart", "x.mmd"), ("blocks", "x.dot"), ("replay", "x.html")]
 )
-def test_nothing_but_a_file_is_replaced_by_a_file(
+def test_only_a_file_is_replaced_by_a_file(
     verb: str, name: str, make: Callable[[Path], None], refused: Callable[..., str], trace: Trace
 ) -> None:
     if verb == "replay":
@@ -267,12 +269,12 @@ def test_a_pipe_in_a_folder_is_seen_before_the_run(
 
 
 # --------------------------------------------------------------------------- temporary files
-def test_names_are_not_to_be_guessed_and_no_link_is_followed(
+def test_temporary_names_are_random_and_no_link_is_followed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen: list[str] = []
     for _ in range(2):
-        written_whole(
+        write_whole(
             tmp_path / "a", lambda _: seen.extend(path.name for path in tmp_path.glob(".a.*"))
         )
     assert len(set(seen)) == len(seen) == 2
@@ -281,14 +283,12 @@ def test_names_are_not_to_be_guessed_and_no_link_is_followed(
     monkeypatch.setattr("secrets.token_hex", lambda _: MARK)
     (tmp_path / f".a.{MARK}.gms-fsm-part").symlink_to(victim)
     with pytest.raises(OutputError):
-        written_whole(tmp_path / "a", lambda file: file.write(b"new"))
+        write_whole(tmp_path / "a", lambda file: file.write(b"new"))
     assert victim.read_text() == "precious"
 
 
-@pytest.mark.parametrize(
-    "start", [output_folder, lambda folder: written_whole(folder / "a.npz", id)]
-)
-def test_what_the_killed_left_is_removed_at_the_next_start(
+@pytest.mark.parametrize("start", [output_folder, lambda folder: write_whole(folder / "a.npz", id)])
+def test_files_of_killed_processes_are_removed_at_the_next_start(
     start: Callable[[Path], object], tmp_path: Path
 ) -> None:
     ours = tmp_path / f".a.npz.{MARK}.gms-fsm-part"
@@ -300,16 +300,16 @@ def test_what_the_killed_left_is_removed_at_the_next_start(
     assert all(path.read_text() == "half of" for path in others)
 
 
-def test_of_a_living_process_nothing_is_removed(tmp_path: Path) -> None:
+def test_files_of_a_live_process_are_kept(tmp_path: Path) -> None:
     code = """
 import sys, time
 from pathlib import Path
-from gms_fsm._files import written_whole
+from gms_fsm._files import write_whole
 def write(file):
     file.write(b"whole")
     print("begun", flush=True)
     sys.stdin.readline()
-written_whole(Path(sys.argv[1]), write)
+write_whole(Path(sys.argv[1]), write)
 """
     child = subprocess.Popen(
         [sys.executable, "-c", code, str(tmp_path / "a")],
@@ -322,7 +322,7 @@ written_whole(Path(sys.argv[1]), write)
     assert child.stdout.readline() == "begun\n"
     remove_leftovers(tmp_path)
     output_folder(tmp_path)
-    written_whole(tmp_path / "a", lambda file: file.write(b"another"))
+    write_whole(tmp_path / "a", lambda file: file.write(b"another"))
     assert len(list(tmp_path.glob(".a.*"))) == 1
     child.communicate("\n")
     assert child.returncode == 0
@@ -330,8 +330,8 @@ written_whole(Path(sys.argv[1]), write)
     assert list(tmp_path.glob(".a.*")) == []
 
 
-def test_what_only_has_such_a_name_is_left_alone(tmp_path: Path) -> None:
-    """A pipe would block who opens it, a link leads elsewhere."""
+def test_other_things_with_such_a_name_are_left_alone(tmp_path: Path) -> None:
+    """Opening a pipe would block, and a link leads elsewhere."""
     victim = tmp_path / "victim"
     victim.write_text("precious")
     os.mkfifo(tmp_path / f".a.{MARK}.gms-fsm-part")

@@ -1,4 +1,4 @@
-"""What --set says replaces the file's value, the schema knows every key, nothing is executed."""
+"""--set replaces values of the file, the schema has every key, and nothing is executed."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_the_last_of_two_counts_and_many_work_together(path: Path) -> None:
     assert "published" in loaded.model.title
 
 
-def test_an_override_can_mend_a_file(path: Path) -> None:
+def test_an_override_can_correct_a_file(path: Path) -> None:
     path.write_text(changed(OPEN_LOOP, "t_end = 1.0", ""))
     with pytest.raises(ScenarioError, match=r"run\.t_end is missing"):
         load_scenario(path)
@@ -218,7 +218,7 @@ def test_the_schema_names_every_key_and_no_other(schema: dict[str, Any]) -> None
     assert schema["additionalProperties"] is False
 
 
-def test_every_reference_of_the_schema_leads_somewhere(schema: dict[str, Any]) -> None:
+def test_every_reference_of_the_schema_resolves(schema: dict[str, Any]) -> None:
     def references(part: Any) -> list[str]:
         if isinstance(part, dict):
             own = [part["$ref"]] if isinstance(part.get("$ref"), str) else []
@@ -234,7 +234,7 @@ def test_every_reference_of_the_schema_leads_somewhere(schema: dict[str, Any]) -
         assert reference.removeprefix("#/$defs/") in schema["$defs"], reference
 
 
-def test_the_schema_says_what_must_be_chosen(schema: dict[str, Any]) -> None:
+def test_the_schema_marks_required_keys(schema: dict[str, Any]) -> None:
     gms = schema["$defs"]["GMSTable"]
     assert set(gms["required"]) == {"kind", "law"}
     assert gms["properties"]["law"]["enum"] == ["signed", "published"]
@@ -292,7 +292,7 @@ PROGRAMS = [
 
 @pytest.mark.parametrize("program", PROGRAMS)
 @pytest.mark.parametrize("key", ["rig.velocity", "record.where"])
-def test_a_program_in_a_scenario_is_refused_and_never_run(
+def test_a_program_in_a_scenario_is_rejected_and_never_run(
     program: str, key: str, gms_fsm: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -1,4 +1,4 @@
-"""`gms-fsm paper` writes all it promises, and its claims are measured, not known by heart."""
+"""`gms-fsm paper` writes all promised files, and its claims are measured, not hard-coded."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     files = write(place, progress=lambda name, done: seen.setdefault(name, []).append(done))
     assert files[0] == place / "claims.md"
     assert all(path.is_file() for path in files)
-    for name, steps in seen.items():  # a bar that runs backward or never ends is no progress
+    for name, steps in seen.items():  # a bar must not run backward, and must end
         assert steps == sorted(steps), name
         assert steps[-1] == pytest.approx(1.0), name
     return place
@@ -68,7 +68,7 @@ def cells(folder: Path, claim: str) -> list[str]:
         (
             "spikes at the transitions",
             r"42 of 50 transitions lost",
-            "holds only with guards looked",
+            "holds only with guards evaluated",
         ),
         ("residual of about 1e-4 N", r"\|dF\\\| \d\.\de-0\d N", "differs: identical under one"),
     ],
@@ -81,7 +81,7 @@ def test_every_claim_has_a_measured_figure_and_a_verdict(
     assert re.fullmatch(rf"\*\*{verdict}.*\*\*", judged), judged
 
 
-def test_claims_say_what_we_chose_and_how_far_the_engines_agree(folder: Path) -> None:
+def test_claims_state_our_choices_and_how_far_the_engines_agree(folder: Path) -> None:
     text = (folder / "claims.md").read_text()
     assert paper.FORCE in text
     assert paper.VELOCITY in text
@@ -97,7 +97,7 @@ def test_claims_say_what_we_chose_and_how_far_the_engines_agree(folder: Path) ->
     assert (holds, condition) == (text.count("| **holds** |"), text.count("| **holds only"))
 
 
-def test_figures_are_whole_and_small(folder: Path) -> None:
+def test_figures_are_complete_and_small(folder: Path) -> None:
     names = [
         "fig3",
         "fig3_slipping",
@@ -140,7 +140,7 @@ def test_traces_and_logs_are_there_and_agree(folder: Path) -> None:
     np.testing.assert_array_equal(chart.F, ifelse.F)
 
 
-def test_a_folder_that_cannot_be_written_is_said_before_anything_runs(tmp_path: Path) -> None:
+def test_an_unwritable_folder_is_reported_before_anything_runs(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     begun: list[str] = []
     with pytest.raises(OutputError, match="choose another folder"):
@@ -160,8 +160,8 @@ def test_a_run_that_fails_leaves_the_runs_before_it(tmp_path: Path) -> None:
     assert Trace.load(tmp_path / "traces" / "fig3_chart.npz").t[-1] == paper.FIG3_END
 
 
-def test_own_signals_are_used_and_not_judged() -> None:
+def test_custom_signals_are_used_and_not_assessed() -> None:
     text = claims_text(run("0.1*t", "0.1*sin(t)"), "0.1*t", "0.1*sin(t)")
     assert "F_a = 0.1*t" in text
-    assert "Not judged" in text
+    assert "Not assessed" in text
     assert "| claim |" not in text

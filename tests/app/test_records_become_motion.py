@@ -1,4 +1,4 @@
-"""A measured table becomes a motion in SI units, and says how: rows, gaps, smoothing, noise."""
+"""A measured table becomes a motion in SI units, with notes on rows, gaps, smoothing and noise."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def test_numbers_in_a_condition_are_converted(text: str, expected: str) -> None:
 
 
 # --------------------------------------------------------------------------- reading
-def test_sign_turns_a_quantity_around(tmp_path: Path) -> None:
+def test_sign_reverses_a_quantity(tmp_path: Path) -> None:
     text = table(["t", "F"], np.arange(6.0), np.arange(6.0) - 2)
     record = read(tmp_path, text, force=Column("F", "mN", sign=-1))
     np.testing.assert_allclose(record.columns["force"], -1e-3 * (np.arange(6.0) - 2))
@@ -135,7 +135,7 @@ def test_sign_turns_a_quantity_around(tmp_path: Path) -> None:
 @pytest.mark.parametrize("delimiter", [",", ";", "\t"])
 @pytest.mark.parametrize("ending", ["\n", "\r\n"])
 @pytest.mark.parametrize("bom", [b"", b"\xef\xbb\xbf"])
-def test_tables_come_in_many_spellings(
+def test_tables_come_in_many_formats(
     delimiter: str, ending: str, bom: bytes, tmp_path: Path
 ) -> None:
     lines = ["t [s]|x, in mm" if delimiter != "," else 't [s]|"x, in mm"']
@@ -201,7 +201,7 @@ def test_bad_rows_can_be_left_out_at_the_ends_only_for_the_motion(tmp_path: Path
     assert len(read(tmp_path, text, "1 s <= time <= 18 s", **columns)) == 18
 
 
-def test_force_may_be_missing_between_the_rows_that_count(tmp_path: Path) -> None:
+def test_force_may_be_missing_between_selected_rows(tmp_path: Path) -> None:
     force = FORCE.copy()
     force[10] = np.nan
     text = table(["t", "x", "F"], T, T, force)
@@ -220,7 +220,7 @@ def test_gaps_are_noted_with_row_numbers(tmp_path: Path) -> None:
     record = read(tmp_path, table(["t", "x"], t, t), position=SI["position"])
     (note,) = record.notes
     assert "2 gap(s)" in note
-    assert "rows 21, 31" in note  # the head line is row 1
+    assert "rows 21, 31" in note  # the header is row 1
     assert "1.01 s" in note
     cut = read(tmp_path, table(["t", "x"], t, t), "time > 0.095 s", position=SI["position"])
     assert "rows 21, 31" in " ".join(cut.notes)
@@ -233,7 +233,7 @@ def test_an_even_record_has_no_notes(tmp_path: Path) -> None:
 
 # --------------------------------------------------------------------------- velocity
 def amplitude(values: np.ndarray, pure: np.ndarray) -> float:
-    """Gain of a filtered sine, away from the ends of the record."""
+    """Return the gain of a filtered sine, away from the ends of the record."""
     inner = slice(len(pure) // 8, -len(pure) // 8)
     return float((values[inner] @ pure[inner]) / (pure[inner] @ pure[inner]))
 
@@ -251,7 +251,7 @@ def test_the_smoothing_spline_halves_the_amplitude_where_it_says(tau: float, shi
         assert amplitude(motion.velocity, rate) == pytest.approx(gain, abs=2e-3)
 
 
-def test_the_note_states_time_constant_frequency_and_what_is_left() -> None:
+def test_the_note_states_time_constant_frequency_and_residual() -> None:
     rng = np.random.default_rng(1)
     t = np.arange(4000) * 0.005
     noise = 2e-6 * rng.standard_normal(t.size)
@@ -259,11 +259,11 @@ def test_the_note_states_time_constant_frequency_and_what_is_left() -> None:
     (note,) = motion_of(record_of(time=t, position=position), 0.02).notes
     assert "time constant 0.02 s" in note
     assert "7.96 Hz" in note  # 1 / (2 pi 0.02 s)
-    left = float(note.partition("leaves ")[2].split()[0])
+    left = float(note.partition("positions is ")[2].split()[0])
     assert left == pytest.approx(2e-6, rel=0.15)
 
 
-def test_left_out_the_smoothing_is_four_intervals() -> None:
+def test_the_default_smoothing_is_four_intervals() -> None:
     t = np.arange(400) * 0.005
     motion = motion_of(record_of(time=t, position=1e-3 * np.sin(t)))
     assert motion.smoothing == pytest.approx(0.02)
@@ -293,7 +293,7 @@ def test_without_smoothing_the_spline_goes_through_the_positions() -> None:
     np.testing.assert_allclose(motion.velocity[5:-5], 8e-3 * np.cos(8 * t)[5:-5], atol=1e-6)
 
 
-def test_a_measured_velocity_is_taken_as_it_is() -> None:
+def test_a_measured_velocity_is_used_unchanged() -> None:
     rng = np.random.default_rng(2)
     t = np.cumsum(rng.uniform(0.005, 0.015, 300))
     velocity = rng.standard_normal(t.size)
@@ -315,19 +315,19 @@ def test_a_measured_velocity_can_be_smoothed_and_says_so() -> None:
 
 
 @pytest.mark.parametrize("smoothing", [-1.0, float("nan")])
-def test_a_senseless_smoothing_is_refused(smoothing: float) -> None:
+def test_an_invalid_smoothing_is_rejected(smoothing: float) -> None:
     with pytest.raises(RecordError, match="smoothing"):
         motion_of(record_of(time=T, position=T), smoothing)
 
 
-def test_a_record_without_motion_is_refused() -> None:
+def test_a_record_without_motion_is_rejected() -> None:
     with pytest.raises(RecordError, match=r"made\.csv.*position.*velocity"):
         motion_of(record_of(time=T, force=T))
 
 
 # --------------------------------------------------------------------------- standstill
 def dwelling(noise: float, top: float = 1e-3) -> Motion:
-    """Back and forth with dwells between, white noise on the velocity."""
+    """Return a motion back and forth with dwells, and white noise on the velocity."""
     rng = np.random.default_rng(5)
     cycle = np.repeat([top, 0.0, -top, 0.0], 200)
     velocity = np.tile(cycle, 6)
@@ -349,7 +349,7 @@ def test_without_noise_or_dwells_there_is_none() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("per_cycle", [100, 1000, 5000, 50_000])
-def test_a_slow_turn_is_no_noise(per_cycle: int) -> None:
+def test_a_slow_reversal_is_not_noise(per_cycle: int) -> None:
     """A clean sine never stands still, however densely it is sampled."""
     phase = 2 * np.pi * np.arange(4 * per_cycle) / per_cycle
     motion = motion_of(record_of(time=0.001 * np.arange(phase.size), velocity=np.sin(phase)))
@@ -390,14 +390,14 @@ def test_the_command_line_warns_of_a_v_c_below_the_noise(
     done = gms_fsm("run", _noisy_scenario(tmp_path, "1e-6"), "-o", tmp_path / "out")
     assert done.code == 0, done.err
     assert done.err.count("v_c = 1e-06 m/s is below the velocity noise") == 1
-    suggested = f"v_c = {dwelling(5e-6).fitting_v_c():.2g} m/s would fit"
+    suggested = f"v_c = {dwelling(5e-6).fitting_v_c():.2g} m/s would suit"
     assert suggested in done.err
     summary = (tmp_path / "out" / "summary.md").read_text()
     assert suggested in summary
-    assert "What this record cannot tell" in summary
+    assert "Parameters not identifiable from this record" in summary
 
 
-def test_the_suggested_v_c_is_not_warned_of(gms_fsm: CommandLine, tmp_path: Path) -> None:
+def test_the_suggested_v_c_causes_no_warning(gms_fsm: CommandLine, tmp_path: Path) -> None:
     v_c = repr(dwelling(5e-6).fitting_v_c())
     done = gms_fsm("run", _noisy_scenario(tmp_path, v_c), "-o", tmp_path / "out")
     assert done.code == 0, done.err

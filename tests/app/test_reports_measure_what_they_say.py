@@ -1,4 +1,4 @@
-"""Dwell times, counts, R², RMSE and doubts of a report follow from the run and the record alone."""
+"""Dwell times, counts, R², RMSE and notes of a report follow from the run and the record."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_dwell_times_equal_the_ribbons_drawn(case: str) -> None:
 
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("rows", [2, 7, 500])
-def test_dwell_times_do_not_depend_on_the_rows_asked_for(case: str, rows: int) -> None:
+def test_dwell_times_do_not_depend_on_the_requested_rows(case: str, rows: int) -> None:
     trace = run(case)
     times = np.linspace(1.0, trace.t[-1] - 1.0, rows)  # neither the start nor the end is a row
     few = run(case, t_eval=times)
@@ -149,7 +149,7 @@ NOISE = 0.05 * np.random.default_rng(11).standard_normal(TIMES.size)
 
 
 def speed(t: np.ndarray) -> np.ndarray:
-    """A motion that breaks all elements away, both ways."""
+    """A motion that breaks away all elements in both directions."""
     return 1e-3 * np.sin(2 * np.pi * t / 2.5)
 
 
@@ -157,7 +157,7 @@ RIG = Prescribed(Corners(TIMES, speed(TIMES), held=False))
 
 
 def measured(noise: np.ndarray, chosen: np.ndarray | None = None) -> tuple[Trace, Record]:
-    """Return a run over a record's motion, and the record: its force is the model's plus noise."""
+    """Return a run with the motion of a record, and the record: force of the model plus noise."""
     trace = simulate(MODEL, RIG, 10.0, t_eval=TIMES, rtol=1e-9, atol=1e-12)
     assert len(trace.transitions) > 20
     columns = {"time": TIMES, "velocity": speed(TIMES), "force": trace.F + noise}
@@ -199,7 +199,7 @@ def test_a_record_worse_than_its_mean_has_a_negative_r2() -> None:
     assert found.r2 < 0.0
 
 
-def test_only_chosen_rows_count() -> None:
+def test_only_selected_rows_are_compared() -> None:
     chosen = (TIMES > 1.0) & (np.arange(TIMES.size) % 3 != 0)
     trace, record = measured(np.where(chosen, NOISE, 1e6), chosen)
     found = compare(trace, record)
@@ -313,16 +313,16 @@ def doubts(model: Model, over: Motion) -> str:
     return "\n".join(what_it_cannot_tell(trace, over))
 
 
-def test_one_speed_cannot_tell_the_stribeck_curve_nor_C() -> None:
+def test_one_speed_identifies_neither_the_stribeck_curve_nor_C() -> None:
     said = doubts(MODEL, ONE_SPEED)
     assert "Stribeck" in said
     assert "F_s, v_s and sigma_2" in said
-    assert "one speed only (1 to 1 mm/s" in said
+    assert "only one speed (1 to 1 mm/s" in said
     assert "C:" in said
 
 
 @pytest.mark.parametrize("over", [MANY_SPEEDS, SINE], ids=["stairs", "sine"])
-def test_many_speeds_can(over: Motion) -> None:
+def test_many_speeds_identify_them(over: Motion) -> None:
     said = doubts(MODEL, over)
     assert "Stribeck" not in said
     assert "C:" not in said
@@ -336,7 +336,7 @@ def test_lugre_has_no_C_to_doubt() -> None:
 
 
 @pytest.mark.parametrize(("sigma", "seen"), [(0.0, False), (1e-3, False), (100.0, True)])
-def test_a_damping_too_small_to_be_seen_is_said(sigma: float, seen: bool) -> None:
+def test_damping_too_small_to_be_seen_is_reported(sigma: float, seen: bool) -> None:
     p = MODEL.parameters
     parameters = GMSParameters(
         p.k, [sigma] * 3, p.C, sigma_2=0.0, stribeck=p.stribeck, v_c=p.v_c, weights=p.weights
@@ -344,21 +344,21 @@ def test_a_damping_too_small_to_be_seen_is_said(sigma: float, seen: bool) -> Non
     assert ("sigma_i" not in doubts(GMS(parameters, law="signed"), MANY_SPEEDS)) is seen
 
 
-def test_a_v_c_below_the_noise_is_said_and_one_above_is_not() -> None:
+def test_a_v_c_below_the_noise_is_reported_and_one_above_is_not() -> None:
     rng = np.random.default_rng(2)
     noisy = motion(ONE_SPEED.velocity + 5e-6 * rng.standard_normal(ONE_SPEED.velocity.size))
     rig = Prescribed(Corners(noisy.time, noisy.velocity, held=False))
     trace = simulate(MODEL, rig, float(noisy.time[-1]))
     note = velocity_note(trace, noisy)
     assert "v_c = 1e-06 m/s is below" in note
-    assert f"v_c = {noisy.fitting_v_c():.2g} m/s would fit" in note
+    assert f"v_c = {noisy.fitting_v_c():.2g} m/s would suit" in note
     assert note in what_it_cannot_tell(trace, noisy)
     assert velocity_note(trace, ONE_SPEED) == ""
     lugre = LuGre(sigma_0=1e4, sigma_1=1.0, sigma_2=0.4, stribeck=Stribeck(1, 1.5, 1e-3))
     assert velocity_note(simulate(lugre, rig, 1.0), noisy) == ""
 
 
-def test_a_motion_that_never_moves_is_no_accident() -> None:
+def test_a_motion_at_rest_is_reported() -> None:
     still = motion(np.zeros(100))
     rig = Prescribed(Corners(still.time, still.velocity, held=False))
     trace = simulate(MODEL, rig, float(still.time[-1]))

@@ -23,7 +23,7 @@ TRANSITIONS = {"paper_fig3_non_drifting": 0, "pulled_mass": 72, "stribeck_sweep"
 
 
 def data_folder() -> Path:
-    """Return where the public record lies, or skip."""
+    """Return the folder of the public record, or skip."""
     named = os.environ.get("GMS_FSM_DATA")
     for folder in ([Path(named)] if named else []) + [ROOT.parent / "shared" / "data"]:
         if (folder / RECORD).is_file():
@@ -37,7 +37,7 @@ def _figures() -> None:
 
 
 def check_report(loaded: Loaded, trace: Trace, files: list[Path], folder: Path) -> str:
-    """Assert what every report has; return the summary."""
+    """Check what every report contains; return the summary."""
     assert {*files, folder / LIST} == set(folder.iterdir())
     assert files[0] == folder / "summary.md"
     names = {path.name for path in files}
@@ -91,7 +91,7 @@ def test_a_second_run_replaces_the_first_by_the_same(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
-def test_figures_and_csv_come_as_asked_for(ending: str, tmp_path: Path) -> None:
+def test_figures_and_csv_are_written_as_requested(ending: str, tmp_path: Path) -> None:
     path = ROOT / "scenarios" / "stribeck_sweep.toml"
     wanted = [f'output.figures=["{ending}"]', "output.csv=true", "output.every=0.5"]
     trace, files = run_scenario(load_scenario(path, wanted), tmp_path)
@@ -104,7 +104,7 @@ def test_figures_and_csv_come_as_asked_for(ending: str, tmp_path: Path) -> None:
 
 
 def test_without_figures_nothing_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """So that a run without matplotlib need not warn of a figure that nobody wants."""
+    """So that a run without matplotlib does not warn of an unwanted figure."""
     drawn: list[object] = []
     monkeypatch.setattr("plots.figures.overview", lambda *given, **_: drawn.append(given))
     loaded = load_scenario(ROOT / "scenarios" / "stribeck_sweep.toml", ["output.figures=[]"])
@@ -154,18 +154,18 @@ def test_the_tribometer_explains_the_measurement(
     assert "time constant 0.02 s" in summary
 
 
-def test_the_tribometer_says_what_its_record_cannot_tell(
+def test_the_tribometer_lists_parameters_not_identifiable_from_its_record(
     tribometer: tuple[Loaded, Trace, list[Path]],
 ) -> None:
     summary = tribometer[2][0].read_text(encoding="utf-8")
-    doubts = summary.partition("### What this record cannot tell")[2]
+    doubts = summary.partition("### Parameters not identifiable from this record")[2]
     for said in ("Stribeck", "F_s, v_s and sigma_2", "C:", "sigma_i"):
         assert said in doubts, said
-    assert "velocity noise" not in doubts  # the scenario's v_c lies above it
+    assert "velocity noise" not in doubts  # the v_c of the scenario is above it
 
 
 def test_the_tribometer_shows_its_loops(tribometer: tuple[Loaded, Trace, list[Path]]) -> None:
-    """The overview has the measured loops and the model's in one panel."""
+    """The overview has the measured loops and those of the model in one panel."""
     pytest.importorskip("matplotlib", reason="the figure needs the extra 'plots'")
     loaded, trace, files = tribometer
     (picture,) = [path for path in files if path.name == "overview.png"]

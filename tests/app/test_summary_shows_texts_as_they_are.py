@@ -1,7 +1,7 @@
-"""Whatever stands in a scenario's title and notes, or in a file's name, summary.md shows that text.
+"""Titles and notes of a scenario, and file names, are displayed literally by summary.md.
 
-It makes no HTML, link, picture, heading, list or table of it: a summary is read in a browser, and a
-scenario may come from anybody.
+They do not become HTML, links, pictures, headings, lists or tables, because a summary is read in a
+browser, and a scenario may come from anyone.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ NASTY = [
 
 
 def _shown(markdown: str) -> tuple[str, set[str]]:
-    """Return the text a browser shows, spaces aside, and the tags it comes in."""
+    """Return the text displayed by a browser, without spaces, and its tags."""
     reader = pytest.importorskip("markdown_it", reason="needs the extra docs")
     page = reader.MarkdownIt("commonmark", {"html": True}).enable(["table", "strikethrough"])
     rendered = page.render(markdown)
@@ -78,7 +78,7 @@ def test_a_heading_and_an_item_too(text: str) -> None:
     assert _shown(f"- {plain(line)}") == (line, {"ul", "li"})
 
 
-def test_control_codes_and_turned_writing_do_not_pass() -> None:
+def test_control_codes_and_bidirectional_marks_are_removed() -> None:
     assert plain("a\x1b[31mb\u202ec\x00d") == r"a \[31mb c d"
 
 

@@ -1,4 +1,4 @@
-"""``gms-fsm sweep`` runs a scenario over a grid; its files hold what Python's `sweep` returns."""
+"""``gms-fsm sweep`` runs a scenario over a grid; its files contain what `sweep` returns."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_the_table_and_the_summary_show_every_run(
     assert summary.count("| ok |") == 9
 
 
-def test_a_long_table_is_cut_and_says_where_the_rest_is(
+def test_a_long_table_is_cut_and_names_the_full_file(
     gms_fsm: CommandLine, path: Path, tmp_path: Path
 ) -> None:
     over = ("--over", "F_s=1:2:101", "--engine", "ifelse", "--set", "run.t_end=0.01")
@@ -77,7 +77,7 @@ def test_a_long_table_is_cut_and_says_where_the_rest_is(
     assert len((tmp_path / "out" / "runs.csv").read_text().splitlines()) == 102
 
 
-def test_a_run_that_fails_is_a_row_and_said(
+def test_a_run_that_fails_is_a_row_and_reported(
     gms_fsm: CommandLine, path: Path, tmp_path: Path
 ) -> None:
     over = ("--over", "F_s=0.5:1.5:2", "--engine", "ifelse")
@@ -90,7 +90,7 @@ def test_a_run_that_fails_is_a_row_and_said(
     assert f"- run 0: {said}" in summary
 
 
-def test_rows_are_kept_where_the_scenario_asks_for_them(
+def test_rows_are_kept_if_the_scenario_requests_them(
     gms_fsm: CommandLine, path: Path, tmp_path: Path
 ) -> None:
     path.write_text(changed(OPEN_LOOP, "figures = []", "figures = []\nevery = 0.25"))
@@ -101,16 +101,14 @@ def test_rows_are_kept_where_the_scenario_asks_for_them(
     assert found.rows["z"].shape == (2, 5, 2)
 
 
-def test_monitors_are_left_out_and_that_is_said(
-    gms_fsm: CommandLine, path: Path, tmp_path: Path
-) -> None:
+def test_monitors_are_ignored_with_a_note(gms_fsm: CommandLine, path: Path, tmp_path: Path) -> None:
     over = ("--over", "F_s=1:2:2", "--engine", "ifelse", "--set", 'run.monitors=["all"]')
     done = gms_fsm("sweep", path, *over, "-o", tmp_path / "out")
     assert done.code == 0
     assert "note: a sweep has no monitors: run.monitors is ignored" in done.err
 
 
-def test_the_files_lie_beside_those_of_a_run(
+def test_the_files_are_kept_apart_from_those_of_a_run(
     gms_fsm: CommandLine, path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -127,11 +125,11 @@ def test_the_files_lie_beside_those_of_a_run(
         (("=1:2:3",), ("name=from:to:count",)),
         (("F_s=1:2:3,lin",), ("--over F_s=1:2:3,lin", ",log")),
         (("F_s=a:2:3",), ("numbers",)),
-        (("F_s=1:2:3.5",), ("whole number",)),
+        (("F_s=1:2:3.5",), ("an integer",)),
         (("F_s=1:inf:3",), ("finite",)),
         (("F_s=1:2:1",), ("count is 1", "between 2 and")),
         (("F_s=0:2:3,log",), ("> 0",)),
-        (("F_q=1:2:3",), ("--over F_q", "known here are k [N/m], sigma [Ns/m]", "v_s [m/s]")),
+        (("F_q=1:2:3",), ("--over F_q", "choose from k [N/m], sigma [Ns/m]", "v_s [m/s]")),
         (("F_s=1:2:3", "F_s=1:2:3"), ("--over F_s", "twice")),
         (("F_s=1:2:2000", "v_s=1:2:2000"), ("4000000 runs",)),
     ],

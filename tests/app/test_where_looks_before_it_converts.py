@@ -1,6 +1,6 @@
-"""A cell in a row that ``where`` leaves out need not be a number, and what helps is named.
+"""A cell in a row excluded by ``where`` need not be a number, and the message says so.
 
-Instruments write units under the heads, words where a sensor was off, and remarks at the end.
+Instruments write units below the header, words where a sensor was off, and remarks at the end.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ ROWS = [f"{0.01 * i:.2f},{0.5 * i:.1f},{i % 7}" for i in range(20)]  # rows 2 to
 
 
 def _read(tmp_path: Path, changes: dict[int, str], where: str = "") -> Record:
-    """Read the table with some rows changed; the head line is row 1."""
+    """Read the table with some rows changed; the header is row 1."""
     lines = ["t,x,F", *ROWS]
     for number, text in changes.items():
         lines[number - 1] = text
@@ -29,7 +29,7 @@ def _read(tmp_path: Path, changes: dict[int, str], where: str = "") -> Record:
     return read_record(path, COLUMNS, where)
 
 
-def test_units_under_the_heads(tmp_path: Path) -> None:
+def test_units_below_the_header(tmp_path: Path) -> None:
     record = _read(tmp_path, {2: "s,mm,N"}, "time >= 0 s")
     assert (len(record), record.first_row) == (19, 3)
     np.testing.assert_array_equal(
@@ -45,7 +45,7 @@ def test_words_before_and_after(tmp_path: Path) -> None:
     assert all(np.isfinite(column).all() for column in record.columns.values())
 
 
-def test_the_force_may_be_a_word_where_it_does_not_count(tmp_path: Path) -> None:
+def test_the_force_may_be_a_word_in_excluded_rows(tmp_path: Path) -> None:
     record = _read(tmp_path, {10: "0.08,4.0,overload"}, "force < 100 N")
     assert len(record) == 20
     assert np.flatnonzero(~record.chosen).tolist() == [8]
@@ -53,12 +53,12 @@ def test_the_force_may_be_a_word_where_it_does_not_count(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("cell", ["lost", "nan", "inf", ""])
-def test_a_row_without_a_place_between_rows_that_count(tmp_path: Path, cell: str) -> None:
+def test_a_row_without_a_position_between_selected_rows(tmp_path: Path, cell: str) -> None:
     record = _read(tmp_path, {10: f"0.08,{cell},1"}, "time < 0.075 s or time > 0.085 s")
     assert len(record) == 19
     assert 0.08 not in record.columns["time"]
     assert record.chosen.all()
-    assert any("1 row(s) without time or place" in note for note in record.notes)
+    assert any("1 row(s) without time or position" in note for note in record.notes)
 
 
 def test_row_numbers_stay_those_of_the_file(tmp_path: Path) -> None:
@@ -80,15 +80,15 @@ def test_row_numbers_stay_those_of_the_file(tmp_path: Path) -> None:
         ({10: "0.08,nan,1"}, "", "row 10, column 'x': not a finite number"),
     ],
 )
-def test_in_a_row_that_counts_it_is_an_error_that_names_the_way_out(
+def test_in_a_selected_row_it_is_an_error_with_advice(
     tmp_path: Path, changes: dict[int, str], where: str, said: str
 ) -> None:
-    with pytest.raises(RecordError, match=rf"{said}.*leave .* out by where = \.\.\., a condition"):
+    with pytest.raises(RecordError, match=rf"{said}.*exclude .* with where = \.\.\., a condition"):
         _read(tmp_path, changes, where)
 
 
-def test_the_way_out_that_is_named_is_one(tmp_path: Path) -> None:
-    """Each of these is refused with the advice, and runs when it is followed."""
+def test_the_advice_works(tmp_path: Path) -> None:
+    """Each of these is rejected with advice, and runs when the advice is followed."""
     for text in ("0.08,lost,1", "0.08,nan,1", "0.08,1,off"):
         with pytest.raises(RecordError, match=r"row 10.*where = "):
             _read(tmp_path, {10: text})

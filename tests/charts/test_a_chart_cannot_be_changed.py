@@ -1,4 +1,4 @@
-"""A chart is data: no part of it can be exchanged, and it compares as it was written."""
+"""A chart is data: no part of it can be replaced, and it compares by its texts."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_no_part_of_a_chart_can_be_exchanged_afterwards() -> None:
             setattr(part, attribute, "another")
 
 
-def test_a_chart_shows_and_compares_what_was_written_not_what_was_parsed() -> None:
+def test_charts_are_shown_and_compared_by_text_not_by_tree() -> None:
     chart = _chart()
     assert "guards=" not in repr(chart)
     assert "flows=" not in repr(chart)

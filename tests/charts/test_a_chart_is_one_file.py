@@ -1,6 +1,6 @@
-"""One file in ``gms_fsm/charts`` is all that a new chart takes: every verb then has it.
+"""A new chart needs only one file in ``gms_fsm/charts``: every command then knows it.
 
-In a copy of the packages, in a process of its own that answers one command after the other.
+Tested in a copy of the packages, in a separate process that answers one command after another.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ for line in sys.stdin:
 
 @dataclass(frozen=True)
 class Copy:
-    """A copy of the packages with one file more, and a process that runs it."""
+    """A copy of the packages with one additional file, and a process that runs it."""
 
     folder: Path
     process: subprocess.Popen[str]
@@ -111,7 +111,7 @@ class Copy:
         return json.loads(self.process.stdout.readline())
 
     def gms_fsm(self, *arguments: str, said: str = "", code: int = 0) -> str:
-        """Run a command and return what it prints; a mistake is on standard error."""
+        """Run a command and return its output; `said` is its standard input."""
         assert self.process.stdin is not None
         self.process.stdin.write(json.dumps([arguments, said]) + "\n")
         self.process.stdin.flush()
@@ -122,7 +122,7 @@ class Copy:
 
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Copy]:
-    """A copy with one file more, and a scenario beside it."""
+    """A copy of the packages with one additional file, and a scenario next to it."""
     folder = tmp_path_factory.mktemp("copy")
     skip = shutil.ignore_patterns("__pycache__")
     for package in ("gms_fsm", "integrators", "plots"):
@@ -208,7 +208,7 @@ def test_debug_steps_through_it(copy: Copy) -> None:
     assert "return_forward does not fire: v < 0 is false by 0.0" in told
 
 
-def test_code_and_the_schema_have_it(copy: Copy) -> None:
+def test_code_and_the_schema_know_it(copy: Copy) -> None:
     assert copy.gms_fsm("code", "x").startswith("# yielding spring, prescribed velocity\n")
     schema = json.loads(copy.gms_fsm("schema"))
     (table,) = (t for name, t in schema["$defs"].items() if name.endswith("x"))

@@ -1,6 +1,6 @@
 """A chart without the input s has no Stribeck curve: none is invented, offered, printed or saved.
 
-Whatever shows thresholds copes: they are NaN in the trace and absent where people read.
+Code that shows thresholds copes: they are NaN in the trace and omitted in texts for people.
 """
 
 from __future__ import annotations
@@ -118,13 +118,13 @@ def test_engines_agree(model: ChartModel, trace: Trace, engine: str) -> None:
 
 
 @pytest.mark.parametrize("ending", ["npz", "csv"])
-def test_files_say_so_too(trace: Trace, ending: str, tmp_path: Path) -> None:
+def test_files_contain_no_curve(trace: Trace, ending: str, tmp_path: Path) -> None:
     read = Trace.load(trace.save(tmp_path / f"run.{ending}"))
     assert read.model.stribeck is None
     same_bits(read, trace)
 
 
-def test_conditions_do_not_know_s(model: ChartModel, tmp_path: Path) -> None:
+def test_conditions_cannot_use_s(model: ChartModel, tmp_path: Path) -> None:
     session = Session(model, RIG, 5.0)
     session.next_transition()
     assert session.names == ["t", "x", "v", "F", "z1", "z2", "F1", "F2"]
@@ -139,7 +139,7 @@ def test_conditions_do_not_know_s(model: ChartModel, tmp_path: Path) -> None:
     assert again.here.t == session.here.t
 
 
-def test_what_people_read_names_no_curve(trace: Trace) -> None:
+def test_texts_for_people_mention_no_curve(trace: Trace) -> None:
     assert _parameters(trace) == "k = [1, 2], F_c = 0.1, sigma_2 = 0 Ns/m"
     for text in (str(trace), *(verdict.text for verdict in trace.monitors.values())):
         assert "nan" not in text
@@ -167,11 +167,11 @@ def test_pictures(trace: Trace, tmp_path: Path) -> None:
         (figures.overview, figures.ribbons_figure, figures.cascade_figure)
     ):
         figures.save(draw(trace), tmp_path / f"{number}.png")
-    with pytest.raises(ParameterError, match="a latch: its chart has no input s, and so no"):
+    with pytest.raises(ParameterError, match="a latch: its chart has no input s, and therefore no"):
         panels.stribeck(Figure().subplots(), trace)
 
 
-def test_the_replay_page_has_no_s(trace: Trace) -> None:
+def test_the_replay_page_omits_s(trace: Trace) -> None:
     pytest.importorskip("uplot", reason="the page needs the extra 'replay'")
     from plots.replay import replay_html
 

@@ -1,4 +1,4 @@
-"""A chart that contradicts itself is refused when it is built, and building it runs nothing.
+"""An inconsistent chart is refused when it is built, and building it runs nothing.
 
 The message names the chart, the place (state, edge, output), what is wrong and what would be
 allowed; an unreadable text is shown with its column and its owner.
@@ -25,7 +25,7 @@ BACK = Transition("back", "slip", "stick", guard="abs(v) <= v_c")
 
 
 def chart(**changes: Any) -> Chart:
-    """A sound chart, with changes."""
+    """Return a valid chart with changes."""
     sound: dict[str, Any] = {
         "name": "rubber",
         "inputs": ("v", "s"),
@@ -39,16 +39,16 @@ def chart(**changes: Any) -> Chart:
 
 
 def edge(**changes: Any) -> dict[str, Any]:
-    """The sound chart's edges with the first one changed."""
+    """Return the valid chart's edges with the first one changed."""
     return {"transitions": (dataclasses.replace(GO, **changes), BACK)}
 
 
 def state(**changes: Any) -> dict[str, Any]:
-    """The sound chart's states with the second one changed."""
+    """Return the valid chart's states with the second one changed."""
     return {"states": (STICK, dataclasses.replace(SLIP, **changes))}
 
 
-def test_the_sound_chart_is_accepted_and_knows_its_parts() -> None:
+def test_the_valid_chart_is_accepted_with_its_parts() -> None:
     sound = chart()
     assert sound.default_state.name == "stick"
     assert [sound.state_index(name) for name in ("stick", "slip")] == [0, 1]
@@ -59,12 +59,12 @@ def test_the_sound_chart_is_accepted_and_knows_its_parts() -> None:
         sound.name = "other"  # type: ignore[misc]
 
 
-def test_a_state_asked_for_by_a_wrong_name_is_refused_with_the_right_ones() -> None:
+def test_an_unknown_state_is_refused_with_the_known_ones() -> None:
     with pytest.raises(ChartError, match=r"'rubber' has no state 'slide'.*'stick', 'slip'"):
         chart().state_index("slide")
 
 
-def test_an_edge_asked_for_by_a_wrong_name_is_refused_with_the_right_ones() -> None:
+def test_an_unknown_edge_is_refused_with_the_known_ones() -> None:
     for name in ("slide", None, ["go"]):
         with pytest.raises(ChartError, match=r"'rubber' has no edge .*'go', 'back'"):
             chart().guard_text(name)
@@ -165,7 +165,7 @@ def test_a_contradiction_is_refused_with_its_place(
 
 @pytest.mark.parametrize("name", sorted(RESERVED))
 @pytest.mark.parametrize("kind", ["parameter", "variable", "state", "edge"])
-def test_names_the_machinery_uses_are_reserved(name: str, kind: str) -> None:
+def test_names_used_by_the_generated_code_are_reserved(name: str, kind: str) -> None:
     changes = {
         "parameter": {"parameters": ("k", "C", "v_c", name)},
         "variable": {
@@ -216,7 +216,7 @@ def test_an_unreadable_text_is_shown_with_its_owner_and_column(
 
 
 @pytest.mark.parametrize("text", [None, 3, b"v", ["v"]])
-def test_what_is_no_text_is_refused(text: Any) -> None:
+def test_values_other_than_text_are_refused(text: Any) -> None:
     for changes in (edge(guard=text), state(flow={"z": text}), {"outputs": {"F": text}}):
         with pytest.raises(ExpressionError, match="expected a text"):
             chart(**changes)
@@ -248,7 +248,7 @@ def test_sequences_become_tuples_and_texts_cannot_be_changed_afterwards() -> Non
     assert built.outputs["F"] == spell(built.forces["slip", "F"])
 
 
-def test_a_name_is_as_unicode_as_python_allows() -> None:
+def test_names_may_contain_the_unicode_that_python_allows() -> None:
     built = chart(
         parameters=("k", "C", "v_c", "\u03c3"),
         outputs={"F": "\u03c3 * z"},

@@ -1,7 +1,7 @@
-"""The GMS chart is the one of the paper: its states, edges, guards, and both slip laws.
+"""The GMS chart is the paper's: its states, edges, guards, and both slip laws.
 
 The oracle is written by hand from the table of the paper's chart (Fig. 2b), over a grid of
-(z, s, v) that holds every boundary; chart, machines and generated if-else have to agree with it.
+(z, s, v) that contains every boundary; chart, machines and generated if-else must agree with it.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ GRID = [
 
 
 def oracle(state: str, z: float, s: float, v: float) -> str | None:
-    """The edge that is taken, by hand from the paper."""
+    """Return the edge that is taken, derived by hand from the paper."""
     if state == "stick":
         if z >= s and v > V_C:
             return "break_away_forward"
@@ -90,7 +90,7 @@ def test_the_truth_table(law: str, state: str) -> None:
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("weight", S)
 def test_machines_and_generated_text_have_the_same_truth_table(law: str, weight: float) -> None:
-    # The dip is so narrow that s is `weight` at every v of the grid but v = 0 and its neighbours.
+    # The dip is so narrow that s is `weight` at every v of the grid except near v = 0.
     parameters = GMSParameters(
         [1.0],
         [0.0],

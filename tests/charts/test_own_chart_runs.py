@@ -1,4 +1,4 @@
-"""A chart of your own runs like the shipped ones: its texts say everything, whatever its names.
+"""A user's chart runs like the built-in ones: its texts determine everything, whatever its names.
 
 Three states, two variables, actions on entry, exit and edges, `or` and `not` in guards, corners in
 flows: machines and generated if-else agree to the last bit, and both with the closed form.
@@ -29,7 +29,7 @@ from tests.helpers import CURVE, same_bits, wear
 
 
 def both(model: ChartModel, rig: Rig, t_end: float, **options: Any) -> Trace:
-    """Run under machines and under if-else; they must agree to the last bit."""
+    """Run with machines and with if-else; they must agree to the last bit."""
     one, other = (
         simulate(model, rig, t_end, engine=engine, **options) for engine in ("machines", "ifelse")
     )
@@ -42,7 +42,7 @@ def both(model: ChartModel, rig: Rig, t_end: float, **options: Any) -> Trace:
 def element(
     flow: str, *, n: int = 1, force: str = "z", parameters: dict[str, Any] | None = None
 ) -> ChartModel:
-    """One state, one flow."""
+    """Return an element with one state and one flow."""
     parameters = parameters or {}
     chart = Chart(
         "one",
@@ -74,7 +74,7 @@ def test_three_states_and_two_variables(rig: Rig, options: dict[str, Any]) -> No
             assert 0 < slipped <= 0.3 * 40
 
 
-def test_events_by_step_agree_too() -> None:
+def test_events_at_steps_agree_too() -> None:
     trace = both(wear(), Prescribed("0.3*sin(2*pi*t/17)"), 20.0, events="step", step=1e-2)
     assert {"yield_", "tear"} <= set(trace.transitions.edge.tolist())
 
@@ -112,7 +112,7 @@ def test_an_arrest_resets_in_stateflows_order() -> None:
 
 
 def test_a_bouncing_reset_meets_its_closed_form() -> None:
-    # z' = 1; at z = 1 back to 0: a sawtooth, through a self-loop.
+    # z' = 1; at z = 1 z returns to 0: a sawtooth, through a self-loop.
     chart = Chart(
         "sawtooth",
         (),
@@ -159,19 +159,19 @@ def test_or_and_not_fire_where_they_become_true() -> None:
 
 # --------------------------------------------------------------------------- corners and jumps
 def _waves(t: float) -> float:
-    """The integral of |sin| from 0 to t."""
+    """Return the integral of |sin| from 0 to t."""
     whole, rest = divmod(t, math.pi)
     return 2.0 * whole + 1.0 - math.cos(rest)
 
 
 def _triangle(t: float) -> float:
-    """The integral of sgn(sin) from 0 to t."""
+    """Return the integral of sgn(sin) from 0 to t."""
     rest = t % (2 * math.pi)
     return rest if rest <= math.pi else 2 * math.pi - rest
 
 
 def _capped(t: float) -> float:
-    """The integral of min(sin, 1/2) from 0 to t < pi."""
+    """Return the integral of min(sin, 1/2) from 0 to t < pi."""
     a = math.pi / 6
     if t <= a:
         return 1.0 - math.cos(t)
@@ -194,14 +194,14 @@ def _capped(t: float) -> float:
         ("abs(sgn(v)) + abs(-abs(v))", 10.0, lambda t: t + _waves(t)),
     ],
 )
-def test_corners_of_a_flow_are_met_exactly(flow: str, t_end: float, exact: Any) -> None:
+def test_steps_end_exactly_on_corners_of_a_flow(flow: str, t_end: float, exact: Any) -> None:
     times = np.linspace(0.0, t_end, 41)
     trace = both(element(flow), Prescribed("sin(t)"), t_end, t_eval=times, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(trace.z[:, 0], [exact(t) for t in times], atol=2e-8)
 
 
 def test_corners_in_an_elements_own_variable() -> None:
-    # z' = 1 - c |z|, z(0) = -1: exponentials of either sign that join at z = 0.
+    # z' = 1 - c |z|, z(0) = -1: exponentials on either side that join at z = 0.
     rates = np.array([0.5, 0.25])
     times = np.linspace(0.0, 8.0, 33)
     trace = both(
@@ -220,7 +220,7 @@ def test_corners_in_an_elements_own_variable() -> None:
         np.testing.assert_allclose(trace.z[:, i], np.where(times < t0, before, after), atol=2e-8)
 
 
-def test_corners_of_the_signal_are_met_exactly() -> None:
+def test_steps_end_exactly_on_corners_of_a_signal() -> None:
     times = np.linspace(0.0, 10.0, 41)
     for text in ("abs(sin(t))", "max(sin(t), -sin(t))", "sgn(sin(t)) * sin(t)"):
         trace = both(element("v"), Prescribed(text), 10.0, t_eval=times, rtol=1e-9, atol=1e-12)

@@ -1,7 +1,7 @@
-"""A parameter that breaks its rule is refused; the message names it, its value and the rule.
+"""A parameter that violates its rule is refused; the message names it, its value and the rule.
 
-And the parameters that are right are the paper's: Table I to the last digit, shares of friction
-that add up in steady slip, arrays nobody can change afterwards.
+Valid parameters match the paper: Table I to the last digit, shares of friction that add up in
+steady slip. Their arrays cannot be changed afterwards.
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ BROKEN: list[tuple[Callable[..., object], dict[str, Any], list[str]]] = [
     (lugre, {"sigma_1": -1}, ["sigma_1 is -1.0", ">= 0"]),
     (lugre, {"sigma_2": NAN}, ["sigma_2 is nan", "finite"]),
     (lugre, {"stribeck": 3}, ["stribeck is 3", "Stribeck"]),
-    # one's own chart
+    # user-defined chart
     (own, {"n": 0}, ["n is 0", "at least 1"]),
     (own, {"n": -1}, ["n is -1", "at least 1"]),
     (own, {"n": 2.5}, ["n is 2.5"]),
@@ -189,7 +189,7 @@ def test_a_missing_value_of_a_chart_is_named() -> None:
         ChartModel(gms_element("signed"), {"k": 1, "sigma": 0}, n=1, stribeck=CURVE)
 
 
-def test_a_wrong_length_is_not_blamed_on_a_parameter_the_chart_has_not() -> None:
+def test_a_wrong_length_does_not_blame_a_parameter_the_chart_lacks() -> None:
     with pytest.raises(ParameterError, match=r"q has 3 entries") as caught:
         ChartModel(ONLY_Q, {"q": np.ones(3)}, n=2, stribeck=CURVE)
     assert "2" in str(caught.value)
@@ -210,7 +210,7 @@ def test_a_wrong_length_is_not_blamed_on_a_parameter_the_chart_has_not() -> None
         (("k", {"rule": "> k"}), "its rule names 'k', which is not another parameter"),
     ],
 )
-def test_a_rule_that_is_none_is_refused(parameters: tuple[str, dict[str, Any]], words: str) -> None:
+def test_an_invalid_rule_is_refused(parameters: tuple[str, dict[str, Any]], words: str) -> None:
     name, changes = parameters
     with pytest.raises(ChartError, match=words):
         with_parameters(lambda: (Parameter(name, **changes), "h"))
@@ -240,7 +240,7 @@ def test_published_law_without_a_dip_warns_and_the_signed_one_does_not() -> None
 
 
 def test_the_curve_is_eq_2() -> None:
-    with pytest.MonkeyPatch.context() as patch:  # what it computes is its text
+    with pytest.MonkeyPatch.context() as patch:  # it evaluates its text
         patch.setattr(Stribeck, "text", "F_c + v_s * v")
         assert float(CURVE(2.0)) == 1.002
     for v in (0.0, 1e-4, -1e-3, 2e-3, -0.5):
@@ -249,7 +249,7 @@ def test_the_curve_is_eq_2() -> None:
     assert CURVE(CURVE.dip) - CURVE.F_c < 1e-16
 
 
-def test_the_curve_is_to_the_bit_what_a_run_computes() -> None:
+def test_the_curve_equals_what_a_run_computes_to_the_bit() -> None:
     trace = simulate(GMS(bank(), law="signed"), Prescribed("2e-3*sin(t)"), 7.0)
     assert len(np.unique(trace.s[:, 0])) > 10
     assert (CURVE(trace.v) == trace.s[:, 0]).all()

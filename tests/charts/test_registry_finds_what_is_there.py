@@ -1,6 +1,6 @@
-"""What lies in the folder of charts is found, and what does not fit there is said.
+"""The charts in the folder are found, and files that do not fit there are reported.
 
-Each chart that ships has numbers that run, and run alike on two engines.
+Each built-in chart has numbers that run, with the same result on two engines.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def every() -> list[tuple[str, str]]:
     return [(name, law) for name, each in registered().items() for law in each.laws or ("",)]
 
 
-def test_the_charts_that_ship_are_found() -> None:
+def test_the_built_in_charts_are_found() -> None:
     assert entry("lugre").chart() is LUGRE
     assert [entry("gms").chart(law) for law in LAWS] == [GMS_ELEMENT[law] for law in LAWS]
     for name, broken in BROKEN.items():
@@ -80,12 +80,12 @@ def test_a_law_is_chosen_where_there_are_several_and_only_there(
         entry(name).chart(law)
 
 
-def test_an_unknown_name_is_answered_with_the_known_ones() -> None:
+def test_an_unknown_name_is_refused_with_the_known_ones() -> None:
     with pytest.raises(ParameterError, match=r"name is 'dahl'; it must be one of .*gms.*lugre"):
         entry("dahl")
 
 
-# --------------------------------------------------------------------------- what does not fit
+# --------------------------------------------------------------------------- invalid entries
 def chart(*parameters: Parameter | str, inputs: tuple[str, ...] = ("v",)) -> Chart:
     return Chart("c", inputs, ("z",), parameters, (gms_fsm.State("a", {"z": "v"}),), (), {"F": "z"})
 
@@ -114,7 +114,7 @@ def test_an_entry_that_does_not_fit_is_refused(arguments: Any, words: str) -> No
 # --------------------------------------------------------------------------- files
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder whose modules count as charts that ship."""
+    """A folder whose modules count as built-in charts."""
     monkeypatch.setattr(gms_fsm.charts, "__path__", [*gms_fsm.charts.__path__, str(tmp_path)])
     before = set(sys.modules)
     registered.cache_clear()
@@ -138,13 +138,13 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         ),
     ],
 )
-def test_a_file_that_is_no_page_of_charts_is_named(text: str, words: str, folder: Path) -> None:
+def test_an_invalid_file_is_named(text: str, words: str, folder: Path) -> None:
     (folder / "odd.py").write_text(text)
     with pytest.raises(ChartError, match=f"^gms_fsm/charts/{words}"):
         registered()
 
 
-def test_a_module_without_charts_is_passed_over(folder: Path) -> None:
+def test_a_module_without_charts_is_skipped(folder: Path) -> None:
     (folder / "helpers_of_mine.py").write_text("HALF = 0.5\n")
     assert "lugre" in registered()
 

@@ -1,4 +1,4 @@
-"""The debugger's transcript in the README is what the debugger says."""
+"""The transcript in the README equals the output of the debugger."""
 
 from __future__ import annotations
 

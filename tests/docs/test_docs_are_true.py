@@ -1,4 +1,4 @@
-"""Every code block of the documentation runs, and shows what comes out.
+"""Every code block of the documentation runs and shows its actual output.
 
 A page is run from top to bottom: Python in one namespace, sessions with ``gms-fsm``, files that the
 page names, all in a temporary folder. CONTRIBUTING.md explains the notation.
@@ -66,7 +66,7 @@ def test_page(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def _part_of_a_scenario(text: str) -> None:
-    """A part of a scenario fits into one that ships."""
+    """Check that a part of a scenario fits into an included one."""
     whole = tomllib.loads((ROOT / "scenarios/pulled_mass.toml").read_text(encoding="utf-8"))
     for name, table in tomllib.loads(text).items():
         whole[name] = whole.get(name, {}) | table if isinstance(table, dict) else table
@@ -74,7 +74,7 @@ def _part_of_a_scenario(text: str) -> None:
 
 
 def _shell(line: str, where: str) -> None:
-    """A shell line sets things up, with extras and make targets that exist; it is not run."""
+    """Check that the extras and make targets in a shell line exist, without running it."""
     command = line.partition("#")[0].split()
     while "=" in command[0]:  # PYTHON=python3.12 make test
         del command[0]

@@ -1,4 +1,4 @@
-"""The site is built without a warning, and whoever reads it asks nobody but it."""
+"""The site is built without warnings, and its pages load nothing from other sites."""
 
 from __future__ import annotations
 
@@ -66,11 +66,11 @@ class Links(HTMLParser):
 
 
 def outside(address: str) -> bool:
-    """Whether an address leaves the site."""
+    """Return whether an address leaves the site."""
     return re.match(r"(?:[a-z]+:)?//", address) is not None
 
 
-def test_built_strictly_and_asks_nobody(tmp_path: Path) -> None:
+def test_the_strict_build_passes_and_pages_load_nothing_external(tmp_path: Path) -> None:
     site = tmp_path / "site"
     done = subprocess.run(
         [

@@ -1,4 +1,4 @@
-"""Every link and picture of README, docs and CONTRIBUTING leads somewhere, anchors included."""
+"""All links, anchors and pictures of README, docs and CONTRIBUTING exist."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TEXTS = [
 ]
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 CODE = re.compile(r"^```.*?^```$", re.DOTALL | re.MULTILINE)
-# Made when the site is built, from docs/lessons/lesson_N.py.
+# Generated from docs/lessons/lesson_N.py.
 MADE = re.compile(r"docs/lessons/(lesson_\d)\.md$")
 OUTSIDE = (
     "https://arxiv.org/",
@@ -53,7 +53,7 @@ def test_links(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", TEXTS, ids=lambda path: str(path.relative_to(ROOT)))
-def test_files_that_are_named_exist(path: Path) -> None:
+def test_named_files_exist(path: Path) -> None:
     names = r"`((?:benchmarks|docs|gms_fsm|integrators|plots|scenarios|tests)/[\w./-]+\.\w+)`"
     for name in re.findall(names, prose(path)):
         if not re.search(r"lN_name|lesson_N", name):
@@ -61,7 +61,7 @@ def test_files_that_are_named_exist(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", TEXTS, ids=lambda path: str(path.relative_to(ROOT)))
-def test_modules_that_are_named_exist(path: Path) -> None:
+def test_named_modules_exist(path: Path) -> None:
     for name in re.findall(r"`((?:gms_fsm|integrators|plots)(?:\.\w+)+)`", prose(path)):
         place = ROOT.joinpath(*name.split("."))
         last = name.rpartition(".")[2]

@@ -1,8 +1,8 @@
-"""docs/errors.md has every error, each with an example that the code really says, and what to do.
+"""docs/errors.md has every error, each with a real example and advice.
 
-There is one hierarchy with one root, and the classes of it are also what Python would have raised.
-tests/docs/test_docs_are_true.py runs the page's blocks and compares what they print; here is
-checked that there is one for every class, and that none of the extras is needed to run them.
+There is one hierarchy with one root, and its classes also derive from fitting built-in exceptions.
+tests/docs/test_docs_are_true.py runs the blocks of the page and compares their output; this
+module checks that every class has one, and that no extra is needed to run them.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ KINDS = [kind for kind in _all(GMSError) if kind.__module__ in HOMES]
 
 @pytest.fixture(scope="module")
 def printed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """Run the page; return what each section's blocks print, as shown."""
+    """Run the page; return the output of the blocks of each section, as shown."""
     found: dict[str, str] = {}
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(tmp_path_factory.mktemp("page"))
@@ -63,7 +63,7 @@ def _section(line: int) -> str:
 
 
 def test_every_error_has_one_root() -> None:
-    """Whatever class stands in the module, and whatever exception elsewhere in the package."""
+    """Every class in the module, and every exception elsewhere in the package."""
     own = [
         kind for home in (errors, failures) for _, kind in inspect.getmembers(home, inspect.isclass)
     ]
@@ -77,7 +77,7 @@ def test_every_error_has_one_root() -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
-def test_an_error_is_also_what_python_would_have_raised(kind: type[GMSError]) -> None:
+def test_an_error_is_also_a_fitting_builtin_exception(kind: type[GMSError]) -> None:
     usual = [base for base in kind.__mro__ if base.__module__ == builtins.__name__]
     assert usual[0] is not Exception
 
@@ -89,7 +89,7 @@ def test_the_page_has_every_error_and_no_other() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
-def test_a_section_says_when_shows_what_and_says_what_to_do(
+def test_a_section_has_cause_example_and_advice(
     kind: type[GMSError], printed: dict[str, str]
 ) -> None:
     section = SECTIONS[kind.__name__]

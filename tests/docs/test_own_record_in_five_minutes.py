@@ -1,4 +1,4 @@
-"""An own table of positions and the scenario of the how-to page become a picture and a summary."""
+"""A custom table of positions and the scenario of the how-to page give a figure and a summary."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ force = { column = "friction [N]", unit = "N" }
 
 
 def own_table() -> str:
-    """Return 12 s of a stage that goes back and forth by 0.5 mm, and the friction it met.
+    """Return 12 s of a stage that moves back and forth by 0.5 mm, with its friction force.
 
-    The friction is that of Maxwell slip elements, here by the stop operator, row by row.
+    The friction is that of Maxwell slip elements, computed with the stop operator, row by row.
     """
     t = np.arange(2400) * 0.005
     position = 0.5e-3 * np.sin(2 * np.pi * t / 4)

@@ -26,7 +26,7 @@ def test_the_blocks_run_in_their_order(
     assert "break_away" in (tmp_path / "chart.svg").read_text(encoding="utf-8")
 
 
-def test_what_is_printed_is_what_stands_below_and_needs_no_extra(
+def test_the_output_is_the_one_shown_and_needs_no_extra(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     shown = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", TEXT, re.DOTALL)
@@ -47,7 +47,7 @@ def test_make_targets_of_the_readme_exist() -> None:
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/gallery.md"])
-def test_pictures_and_links_lead_somewhere(page: str) -> None:
+def test_pictures_and_links_exist(page: str) -> None:
     place = ROOT / page
     links = re.findall(r"\]\(([^)#]+)", place.read_text(encoding="utf-8"))
     assert links

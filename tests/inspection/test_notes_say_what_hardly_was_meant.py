@@ -1,4 +1,4 @@
-"""A run whose sizes do not fit its model, or whose arrests the clock could not see, gets a note."""
+"""A run whose scales do not fit its model, or with arrests too fast for the clock, gets a note."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from tests.helpers import ROOT, open_loop, pulled_mass, stick_slip
 
 
 def bank(k: float = 1.0, v_c: float = 1e-6) -> GMS:
-    """Return two elements with thresholds of some micrometres at k = 1."""
+    """Return two elements with thresholds of a few micrometres at k = 1."""
     p = GMSParameters.from_shares(
         [0.5, 0.5], [k * 4e5, k * 2e5], C=20.0, v_c=v_c, stribeck=Stribeck(2.0, 2.4, 1e-3)
     )
@@ -43,7 +43,7 @@ def test_a_v_c_above_every_speed():
 
 
 def test_a_stiffness_in_newtons_per_millimetre():
-    """The thresholds are then millimetres, and a stroke of micrometres comes nowhere near."""
+    """The thresholds are then millimetres, and a stroke of micrometres does not come near them."""
     (note,) = notes(bank(k=1e-3), "4e-6*sin(t)")
     assert note.startswith("no transition: no element comes near its threshold")
     assert "units of k (N/m)" in note
@@ -51,7 +51,7 @@ def test_a_stiffness_in_newtons_per_millimetre():
 
 @pytest.mark.parametrize("output", [{}, {"t_eval": np.linspace(0.0, 10.0, 11)}])
 def test_arrests_within_a_tick_of_the_clock(output):
-    """v_c / |dv/dt| is under the clock's resolution: the window is passed within a tick."""
+    """v_c / |dv/dt| is below the clock resolution: the window is passed within one tick."""
     (note,) = notes(bank(v_c=1e-22), "1e-5*sin(t)", **output)
     assert note.startswith("arrest could not be detected ")
     assert "first at t = 3.14159" in note
@@ -63,12 +63,12 @@ def test_a_velocity_that_jumps_over_the_window():
     assert "first at t = 5 s" in note
 
 
-def test_a_run_that_sees_them_has_no_such_note():
+def test_a_run_that_resolves_them_has_no_such_note():
     ramp = [(0.0, 1e-5), (5.0, 1e-5), (5.1, -1e-5), (10.0, -1e-5)]
     assert notes(bank(), ramp) == ()
 
 
-def test_the_command_line_says_them(gms_fsm):
+def test_the_command_line_prints_them(gms_fsm):
     path = ROOT / "scenarios" / "pulled_mass.toml"
     done = gms_fsm(
         "run",

@@ -1,8 +1,8 @@
-"""On random charts every counterexample is real, and no point contradicts what is proved.
+"""On random charts every counterexample is real, and no point contradicts a proof.
 
-Counterexamples are put into the guards and flows of the chart; what is proved is attacked with
-every point of a grid that holds the numbers the guards are made of, and with random points. The
-grid is of short binary fractions, so that floats compute these guards exactly.
+Counterexamples are inserted into the guards and flows of the chart; proofs are tested at every
+point of a grid that contains the numbers in the guards, and at random points. The grid consists of
+short binary fractions, for which floats compute these guards exactly.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def edges_of(chart: Chart, where: Sequence[str]) -> list[Transition]:
 def passes(
     chart: Chart, cycle: Sequence[Transition], point: Mapping[str, float]
 ) -> Iterator[dict[str, float]]:
-    """Go around while the guards let us; yield the values after each pass."""
+    """Go around the cycle while the guards allow it; yield the values after each pass."""
     here = dict(point)
     while True:
         for edge in cycle:
@@ -98,7 +98,7 @@ def goes_on(chart: Chart, cycle: Sequence[Transition], point: Mapping[str, float
 
 
 def shown(chart: Chart, finding: Finding, point: Mapping[str, float]) -> bool:
-    """Whether a point contradicts a statement."""
+    """Return whether a point contradicts a statement."""
     edges = edges_of(chart, finding.where)
     if finding.check == "determinism":
         return len(edges) == 2 and all(evaluate(chart.guards[e.name], point) for e in edges)
@@ -118,7 +118,7 @@ def in_domain(point: Mapping[str, float]) -> bool:
 
 
 def taken(chart: Chart, name: str, point: Mapping[str, float]) -> bool:
-    """Whether a machine in the edge's source state takes it at a point."""
+    """Return whether a machine in the source state of an edge takes it at a point."""
     (edge,) = edges_of(chart, [name])
     for _, each in chart.leaving(edge.source):
         if evaluate(chart.guards[each.name], point):
@@ -135,7 +135,7 @@ def count_of(found: Report, seen: Counter[tuple[str, str]]) -> None:
         assert bool(finding.counterexample) <= (finding.status in SHOWN)
 
 
-def test_refuted_is_shown_and_proved_is_not_broken() -> None:
+def test_refutations_are_confirmed_and_proofs_are_not_contradicted() -> None:
     seen: Counter[tuple[str, str]] = Counter()
 
     @settings(max_examples=80, deadline=None, derandomize=True)
@@ -200,7 +200,7 @@ def on_surface(surface: Value) -> Iterator[dict[str, float]]:
 
 
 def pushed(chart: Chart, surface: Value, point: Mapping[str, float]) -> bool:
-    """Whether each flow leads from the surface into the guard that leaves its state."""
+    """Return whether each flow leads from the surface into the guard that leaves its state."""
     moments = [after(chart, name, point) for name in ("first", "second")]
     sides = [moment["z"] - evaluate(surface, moment) for moment in moments]
     return (
@@ -213,7 +213,7 @@ def pushed(chart: Chart, surface: Value, point: Mapping[str, float]) -> bool:
     )
 
 
-def test_chattering_is_shown_by_a_short_step_of_each_flow() -> None:
+def test_chattering_is_confirmed_by_a_short_step_of_each_flow() -> None:
     seen: Counter[tuple[str, str]] = Counter()
 
     @settings(max_examples=80, deadline=None, derandomize=True)

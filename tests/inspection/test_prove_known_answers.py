@@ -1,6 +1,6 @@
-"""What is known of the GMS element's guards, and of their broken readings, is what is found.
+"""The known properties of the GMS guards, and of their faulty readings, are found.
 
-Every counterexample is put back into the chart's own guards and flows.
+Every counterexample is checked with the guards and flows of the chart.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ STEP = 2.0**-20  # s; exact in floats
 
 
 def report(name: str) -> Report:
-    """The report on a broken reading, in the domain where its fault shows."""
+    """Return the report on a faulty reading, in the domain where its fault shows."""
     return prove(BROKEN[name].chart, BROKEN[name].domain)
 
 
 def passes(found: Report, *checks: Check) -> None:
-    """Assert that nothing is refuted or open in these checks."""
+    """Assert that nothing is refuted or undecided in these checks."""
     for check in checks:
         assert {f.status for f in found.of(check)} == {"proved"}, check
 
 
 def only(found: Report, check: Check) -> Finding:
-    """The only thing refuted, which is of this check."""
+    """Return the only refuted finding, which belongs to this check."""
     (finding,) = found.refuted
     assert finding.check == check
     return finding
@@ -48,7 +48,7 @@ def both_hold(chart: Chart, edges: tuple[str, str], point: Mapping[str, float]) 
 
 
 def after_a_moment(chart: Chart, state: str, point: Mapping[str, float]) -> dict[str, float]:
-    """A short step with the flow of a state; inputs move at the rates of the example."""
+    """Take a short step with the flow of a state; inputs change at the rates of the example."""
     rates = {name: float(evaluate(chart.flows[state, name], point)) for name in chart.variables}
     rates |= {name: point.get(f"d{name}/dt", 0.0) for name in chart.inputs}
     return {name: value + STEP * rates.get(name, 0.0) for name, value in point.items()}
@@ -141,7 +141,7 @@ def test_memoryless_guards_chatter_while_s_rises() -> None:
         assert not evaluate(found.chart.guards[edge], other)
 
 
-def test_with_s_equal_0_both_arms_hold_unless_the_velocity_tells_them_apart() -> None:
+def test_with_s_equal_0_both_arms_hold_unless_the_velocity_separates_them() -> None:
     arms = ("break_away_forward", "break_away_backward")
     found = report("arms")
     assert found.refuted == ()
@@ -151,7 +151,7 @@ def test_with_s_equal_0_both_arms_hold_unless_the_velocity_tells_them_apart() ->
     assert finding.counterexample == {"s": 0, "z": 0}
     assert both_hold(found.chart, arms, finding.counterexample)
     passes(prove(found.chart), "determinism")  # s > 0
-    # The paper's own arms ask for v > v_c and v < -v_c as well: they never hold at once.
+    # The paper's arms also require v > v_c and v < -v_c, so they never hold at the same time.
     passes(prove(gms_element("published"), ["s >= 0", "v_c > 0"]), "determinism")
     passes(prove(gms_element("published"), []), "livelock")
     loose = prove(gms_element("published"), ["s >= 0"])  # v_c < 0 allowed
@@ -160,7 +160,7 @@ def test_with_s_equal_0_both_arms_hold_unless_the_velocity_tells_them_apart() ->
     assert both_hold(loose.chart, arms, point)
 
 
-def test_each_broken_reading_says_what_is_wrong() -> None:
+def test_each_faulty_reading_describes_its_fault() -> None:
     for name, broken in BROKEN.items():
         found = report(name)
         finding = (found.refuted or found.settled)[0]
@@ -188,7 +188,7 @@ def states(one: str = "v", two: str = "-z") -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("flow", ["C * tanh(v)", "exp(-z)", "v - sin(z)", "sqrt(s)", "z ** 0.5"])
-def test_what_is_not_encoded_is_undecided_and_said(flow: str) -> None:
+def test_what_is_not_encoded_is_undecided_with_a_reason(flow: str) -> None:
     found = prove(chart(back="z < s", **states(two=flow)))
     passes(found, "determinism", "livelock", "reachability")
     (chattering,) = found.of("chattering")
@@ -199,7 +199,7 @@ def test_what_is_not_encoded_is_undecided_and_said(flow: str) -> None:
         assert not finding.counterexample
 
 
-def test_a_guard_that_is_not_encoded_leaves_open_what_rests_on_it() -> None:
+def test_a_guard_that_is_not_encoded_leaves_dependent_statements_undecided() -> None:
     found = prove(chart(go="exp(z) > s"))
     open_ = {(f.check, f.where) for f in found.findings if f.status == "undecided"}
     assert open_ == {
@@ -211,7 +211,7 @@ def test_a_guard_that_is_not_encoded_leaves_open_what_rests_on_it() -> None:
     }
 
 
-def test_a_quotient_counts_only_where_its_denominator_is_not_0() -> None:
+def test_a_quotient_is_accepted_only_with_a_nonzero_denominator() -> None:
     assert prove(chart(go="z / s >= 1")).of("livelock")[0].status == "proved"
     (finding,) = prove(chart(go="z / v >= 1")).of("livelock")
     assert finding.status == "undecided"
@@ -220,7 +220,7 @@ def test_a_quotient_counts_only_where_its_denominator_is_not_0() -> None:
     assert prove(chart(go="z / v >= 1"), ["v > 0", "s > 0"]).of("livelock")[0].status == "refuted"
 
 
-def test_what_is_enabled_at_once_says_which_edge_is_taken_and_a_model_is_no_chart() -> None:
+def test_edges_enabled_together_name_the_one_taken_and_a_model_is_not_a_chart() -> None:
     (finding,) = prove(BROKEN["arms"].chart, BROKEN["arms"].domain).settled
     assert "the machine takes the earlier, break_away_forward" in finding.text
     with pytest.raises(ParameterError, match=r"prove takes a Chart; for a model, pass its \.chart"):
@@ -249,7 +249,7 @@ def test_flows_chatter_where_they_meet_head_on(one: str, two: str, status: str) 
         ("v >= 0 and v <= 0", "1 + sgn(v)", "sgn(v) - 1"),  # both flows jump there
     ],
 )
-def test_what_first_order_cannot_tell_is_undecided(guard: str, one: str, two: str) -> None:
+def test_what_first_order_cannot_decide_is_undecided(guard: str, one: str, two: str) -> None:
     pair = tuple(State(n, {"z": flow, "w": "0"}) for n, flow in (("one", one), ("two", two)))
     both = chart(f"z >= 1 and {guard}", f"z < 1 and {guard}", variables=("z", "w"), states=pair)
     (finding,) = prove(both).of("chattering")
@@ -317,7 +317,7 @@ def test_order_settles_which_edge_is_taken_and_can_hide_one() -> None:
     assert both_hold(found.chart, ("far", "near"), finding.counterexample)
     assert str(finding).startswith("settled by order  one, far, near: both are enabled")
     assert "1 settled by order, 0 refuted" in str(found)
-    # The other way round the nearer one goes first wherever the far one could.
+    # In the other order the nearer one takes precedence wherever the far one could fire.
     hidden = prove(chart(transitions=(second, first, back)))
     assert [f.where for f in hidden.settled] == [("one", "near", "far")]
     dead = only(hidden, "reachability")
@@ -369,7 +369,7 @@ def test_an_edge_from_a_state_to_itself_livelocks() -> None:
     passes(prove(chart(transitions=reset)), "livelock")
 
 
-def test_flows_that_are_not_linear_or_hang_together_are_undecided() -> None:
+def test_nonlinear_or_coupled_flows_are_undecided() -> None:
     for flow, words in (("v * abs(z)", "not linear"), ("-sgn(z)", "not linear")):
         finding = prove(chart(**states(two=flow))).of("stability")[-1]
         assert finding.status == ("proved" if finding.case.endswith("= 0") else "undecided")

@@ -1,4 +1,4 @@
-"""A run that cannot go on is an outcome: look at it, step back from it, poke it and go on."""
+"""A run that cannot continue is an outcome: inspect it, step back, poke it and continue."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.helpers import stick_slip
 
 
 def both_ways() -> ChartModel:
-    """Element 2 breaks away at z = 1 and is arrested there at once, again and again."""
+    """Element 2 breaks away at z = 1 and is arrested there immediately, again and again."""
     law = gms_element("signed")
     edges = (
         Transition("go", "stick", "slip", guard="z >= s and v > v_c"),
@@ -29,7 +29,7 @@ def both_ways() -> ChartModel:
     return ChartModel(chart, values, n=2, weights=[2.0, 1.0], stribeck=Stribeck(1.0, 1.5, 1e-3))
 
 
-def test_a_livelock_can_be_looked_at_stepped_back_from_and_poked() -> None:
+def test_a_livelock_can_be_inspected_stepped_back_from_and_poked() -> None:
     model, rig = both_ways(), Prescribed("0.15")
     with pytest.raises(LivelockError) as caught:
         simulate(model, rig, 20.0)
@@ -87,7 +87,7 @@ def test_a_run_that_cannot_even_start_has_its_first_row(guard: str) -> None:
     assert session.step().t == 0.0
 
 
-def test_a_flow_that_leaves_the_numbers() -> None:
+def test_a_flow_that_is_not_finite() -> None:
     chart = Chart(
         "singular", ("v",), ("z",), ("k",), (State("on", {"z": "z * z"}),), (), {"F": "k * z"}
     )
@@ -105,13 +105,13 @@ def test_a_flow_that_leaves_the_numbers() -> None:
 
 
 @pytest.mark.parametrize("option", [{"t_eval": [0.0, 1.0]}, {"progress": print}, {"engine": None}])
-def test_options_that_do_not_go_with_a_session(option: Any) -> None:
+def test_options_that_a_session_does_not_support(option: Any) -> None:
     with pytest.raises(ParameterError, match="session"):
         Session(stick_slip("signed"), Prescribed("0.1"), 1.0, **option)
 
 
 @pytest.mark.parametrize("count", [-1, -5])
-def test_a_negative_count_is_refused(count: int) -> None:
+def test_a_negative_count_is_rejected(count: int) -> None:
     session = Session(stick_slip("signed"), Prescribed("0.1"), 1.0)
     session.step(3)
     for walk in (session.step, session.back):
@@ -121,7 +121,7 @@ def test_a_negative_count_is_refused(count: int) -> None:
 
 
 @pytest.mark.parametrize("t", [-1.0, float("nan")])
-def test_a_time_before_the_start_is_refused(t: float) -> None:
+def test_a_time_before_the_start_is_rejected(t: float) -> None:
     with pytest.raises(SessionError, match="before the start"):
         Session(stick_slip("signed"), Prescribed("0.1"), 1.0).goto(t)
 

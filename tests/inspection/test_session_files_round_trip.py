@@ -31,7 +31,7 @@ def _walked() -> Session:
     return session
 
 
-def test_everything_comes_back(tmp_path: Path) -> None:
+def test_everything_is_restored(tmp_path: Path) -> None:
     session = _walked()
     loaded = Session.load(session.save(tmp_path / "walk.json"))
     assert (loaded.current, loaded.watches) == (1, ["z1 / s1"])
@@ -68,7 +68,7 @@ def test_saved_twice_is_the_same_file(tmp_path: Path) -> None:
         "title = 'a scenario'",
     ],
 )
-def test_something_else_is_refused(text: str, tmp_path: Path) -> None:
+def test_other_files_are_rejected(text: str, tmp_path: Path) -> None:
     path = tmp_path / "odd.json"
     path.write_text(text)
     with pytest.raises(TraceFileError, match=r"odd\.json"):
@@ -94,7 +94,7 @@ DAMAGE: list[tuple[str, Any]] = [
 
 
 @pytest.mark.parametrize(("key", "value"), DAMAGE, ids=[f"{k}={v}"[:50] for k, v in DAMAGE])
-def test_a_damaged_file_is_refused_when_it_is_read(key: str, value: Any, tmp_path: Path) -> None:
+def test_a_damaged_file_is_rejected_on_reading(key: str, value: Any, tmp_path: Path) -> None:
     path = Session(stick_slip("signed"), Prescribed(FIG4_SINE), 5.0).save(tmp_path / "s.json")
     data = json.loads(path.read_text())
     path.write_text(json.dumps(data | {key: value}))
@@ -103,7 +103,7 @@ def test_a_damaged_file_is_refused_when_it_is_read(key: str, value: Any, tmp_pat
 
 
 @pytest.mark.parametrize("key", ["header", "t_end", "options", "branches", "current"])
-def test_a_missing_part_is_refused(key: str, tmp_path: Path) -> None:
+def test_a_missing_part_is_rejected(key: str, tmp_path: Path) -> None:
     path = _walked().save(tmp_path / "s.json")
     data = json.loads(path.read_text())
     del data[key]
@@ -119,7 +119,7 @@ def test_a_missing_file_and_a_folder(tmp_path: Path) -> None:
         Session.load(tmp_path)
 
 
-def test_what_a_file_cannot_hold(tmp_path: Path) -> None:
+def test_what_a_file_cannot_store(tmp_path: Path) -> None:
     function = Session(stick_slip("signed"), Prescribed(lambda t: 0.1), 1.0)
     radau = Session(stick_slip("signed"), Prescribed("0.1"), 1.0, method=scipy.integrate.Radau)
     for session in (function, radau):

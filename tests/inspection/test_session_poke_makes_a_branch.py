@@ -1,4 +1,4 @@
-"""A poke changes what it names and nothing else, in a branch that leaves its parent as it was."""
+"""A poke changes only what it names, in a new branch that leaves its parent unchanged."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_the_branch_is_the_run_from_there() -> None:
     assert own.t[here.row + 1 :].tolist() == alone.t.tolist()
 
 
-def test_the_parent_stays_and_goes_on() -> None:
+def test_the_parent_is_kept_and_can_continue() -> None:
     session = _open_loop()
     session.goto(30.0)
     parent = session.branch
@@ -159,7 +159,7 @@ def test_compare() -> None:
         ({"v": 0.1}, ParameterError, "prescribes the velocity"),
     ],
 )
-def test_a_wrong_poke_is_refused_and_makes_no_branch(
+def test_an_invalid_poke_is_rejected_and_makes_no_branch(
     edits: Any, error: type[Exception], said: str
 ) -> None:
     session = _open_loop()
@@ -168,7 +168,7 @@ def test_a_wrong_poke_is_refused_and_makes_no_branch(
     assert (len(session.branches), session.current) == (1, 0)
 
 
-def test_at_the_end_there_is_nothing_to_go_on_with() -> None:
+def test_at_the_end_a_poke_is_rejected() -> None:
     session = _open_loop()
     session.goto(100.0)
     with pytest.raises(SessionError, match="the end of the run"):
@@ -191,7 +191,7 @@ def test_no_such_branch(branch: int) -> None:
         ({"variables": {"F_s": {0: 2.0}}}, "F_s is a parameter; to change it, make another"),
     ],
 )
-def test_what_cannot_be_poked_is_said(poked: dict[str, Any], words: str) -> None:
+def test_the_message_says_why_something_cannot_be_poked(poked: dict[str, Any], words: str) -> None:
     session = Session(stick_slip("signed"), open_loop(), 5.0)
     with pytest.raises(SessionError) as caught:
         session.poke(**poked)

@@ -1,4 +1,4 @@
-"""Printed, a session, its places and its explanations are the debugger's text."""
+"""A session, its rows and its explanations print as the text of the debugger."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ def _both() -> tuple[Session, Debugger]:
 
 
 def _one_line(text: str) -> str:
-    """Undo the wrapping at the screen's edge."""
+    """Undo the line wrapping."""
     return " ".join(text.split())
 
 
-def test_why_prints_as_the_debugger_says_it() -> None:
+def test_why_prints_the_text_of_the_debugger() -> None:
     session, debugger = _both()
     for _ in range(20):
         for element in range(4):
-            said = debugger.reply(f"why {element + 1}").partition("\nstep, then why")[0]
+            said = debugger.reply(f"why {element + 1}").partition("\nfor the edges that leave")[0]
             assert _one_line(str(session.why(element))) == _one_line(said)
             for each in session.why(element):
                 verdict, *detail = str(each).split("\n")
@@ -45,19 +45,19 @@ def test_so_does_explain_on_a_trace() -> None:
     assert str(explain(trace, -1, 1)) == str(session.why(1))
 
 
-def test_the_first_element_is_asked_if_none_is_named() -> None:
+def test_the_first_element_is_the_default() -> None:
     session, _ = _both()
     assert session.why() == session.why(0)
     assert session.why().element == 0
 
 
-def test_a_place_prints_as_the_debugger_says_it() -> None:
+def test_a_row_prints_the_text_of_the_debugger() -> None:
     session, debugger = _both()
     for command in ("step", "next", "next", "until z1 > 0.1", "prev", "goto 25", "prev"):
         assert debugger.reply(command) == str(session.here)
 
 
-def test_a_firing_can_be_read() -> None:
+def test_a_firing_is_readable() -> None:
     session, _ = _both()
     assert session.here.fired is None
     here = session.next_transition()
@@ -93,7 +93,7 @@ def test_one_edge_alone() -> None:
         ("arrest", "arrest leaves slip; element 1 is in stick"),
     ],
 )
-def test_an_edge_that_is_not_there(edge: str, said: str) -> None:
+def test_an_unknown_edge(edge: str, said: str) -> None:
     session, _ = _both()
     with pytest.raises(SessionError, match=said):
         session.why(0, edge)

@@ -1,4 +1,4 @@
-"""Ctrl-C stops a session between two rows; afterwards it goes on to the same bits."""
+"""Ctrl-C stops a session between two rows; afterwards it continues bit-identically."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_an_interrupted_move_can_be_repeated(move: Callable[[Session], object]) 
 
 
 @pytest.mark.parametrize("command", ["continue", "goto 100", "run", "until z1 > 99", "step 9999"])
-def test_the_debugger_returns_to_its_prompt_where_it_got_to(command: str) -> None:
+def test_the_debugger_returns_to_its_prompt_at_the_row_reached(command: str) -> None:
     session = Session(stick_slip("published"), Prescribed(_velocity(40.0)), 100.0)
     out = io.StringIO()
     assert Debugger(session, "", io.StringIO(f"{command}\n{command}\nprint t\n"), out).run() == 0

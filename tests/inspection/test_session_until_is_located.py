@@ -35,7 +35,7 @@ def test_a_velocity_is_located_to_the_clock() -> None:
     assert here.v < -0.05 <= here.v + 1e-15
 
 
-def test_it_stops_just_behind_the_crossing_never_before() -> None:
+def test_it_stops_just_after_the_crossing_never_before() -> None:
     session = _stuck()
     here = session.until("z1 > 0.1")
     assert session.watch("z1") > 0.1
@@ -60,7 +60,7 @@ def test_a_second_condition_starts_from_the_located_place() -> None:
     assert not session.here.located
 
 
-def test_never_is_the_end_of_the_run() -> None:
+def test_a_condition_that_never_holds_ends_at_the_end_of_the_run() -> None:
     session = _stuck()
     here = session.until("z1 > 5")
     assert (here.t, here.located, session.branch.ended) == (6.0, False, True)
@@ -86,7 +86,7 @@ def test_what_cannot_be_computed_is_not_true() -> None:
     "text",
     ["z9 > 0", "z1", "state(1) == slide", "z1 == 0.1", "", "__import__('os')", "state(9) == slip"],
 )
-def test_a_wrong_condition_is_refused_and_nothing_moves(text: str) -> None:
+def test_an_invalid_condition_is_rejected_without_moving(text: str) -> None:
     session = Session(stick_slip("signed"), Prescribed("0.1"), 1.0)
     with pytest.raises(ExpressionError):
         session.until(text)

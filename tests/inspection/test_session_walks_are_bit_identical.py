@@ -1,4 +1,4 @@
-"""Back and forward shows the same bits, branches never change their parent, rows are simulate()'s.
+"""Moving back and forth shows the same bits, parents never change, rows equal those of simulate().
 
 Random walks of step, back, next, prev, goto, until, switch and poke on random small models.
 """
@@ -75,7 +75,7 @@ def _simulated(model: GMS, rig: Rig, options: dict[str, Any]) -> tuple[Trace, st
 
 
 def _poked(session: Session, z: float, state: str | None) -> dict[str, Any]:
-    """Poke element 1; return the initial values of a run of its own."""
+    """Poke element 1; return the initial values of an equivalent separate run."""
     here: Here = session.here
     initial: dict[str, Any] = {"x": here.x, "z": [z, *here.z[1:]], "states": list(here.states)}
     if session.rig.acceleration is not None:

@@ -1,4 +1,4 @@
-"""A signal that jumps is met exactly: its left value before, its right value after, full order."""
+"""At a jump of a signal its left value is used before, its right value after, at full order."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_force_step_keeps_the_order_of_the_method() -> None:
     assert errors[1] < errors[0] / 12
 
 
-def test_wanted_time_on_a_jump_is_right_continuous() -> None:
+def test_a_requested_time_on_a_jump_is_right_continuous() -> None:
     ramps = [(0, 0.1), (1, 0.1), (1, -0.3), (3, -0.3)]
     trace = simulate(one_element("signed"), Prescribed(ramps), 2.0, t_eval=[0.5, 1.0, 2.0])
     assert trace.v.tolist() == [0.1, -0.3, -0.3]

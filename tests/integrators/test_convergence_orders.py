@@ -24,7 +24,7 @@ def fitted_slope(steps: np.ndarray, errors: np.ndarray) -> float:
 
 @pytest.mark.parametrize("method", ORDERS)
 def test_order_on_smooth_flow(method):
-    """A slider on sticking elements is a forced linear oscillator; its matrix exponential knows."""
+    """A slider on sticking elements is a forced linear oscillator: exact by matrix exponential."""
     # v_s is so wide that the run never leaves the dip: no stop cuts a step.
     parameters = GMSParameters(
         [3.0, 5.0], [0.1, 0.2], [1.0, 1.0], sigma_2=0.1, stribeck=Stribeck(9.0, 9.5, 10.0), v_c=1e-6
@@ -52,7 +52,7 @@ def test_order_on_smooth_flow(method):
 
 @pytest.mark.parametrize("method", ORDERS)
 def test_order_across_a_break_away(method):
-    """The break-away lies at the share 0.37 of its step for all step sizes."""
+    """The break-away is at the fraction 0.37 of its step for all step sizes."""
     F_c, C = 1.0, 1.0
     parameters = GMSParameters(
         [1.0], [0.1], [C], sigma_2=0.0, stribeck=Stribeck(F_c, 1.5, 1e-3), v_c=1e-6

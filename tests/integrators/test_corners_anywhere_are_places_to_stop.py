@@ -1,7 +1,7 @@
-"""Corners and jumps in outputs and in a rig's equation are stopped at, as those in flows are.
+"""Steps end on corners and jumps in outputs and in a rig's equation, just as on those in flows.
 
-A run with `F = "F_c * sgn(v)"` came to t = 0.015 of 5 s and kept gigabytes; a corner in a rig's
-text cost the method its order.
+Before, a run with `F = "F_c * sgn(v)"` reached t = 0.015 of 5 s and recorded gigabytes; a corner in
+a rig's text cost the method its order.
 """
 
 import numpy as np
@@ -29,7 +29,7 @@ def force(text: str, **parameters: float) -> ChartModel:
 
 
 class Buffer:
-    """A mass that meets a spring at x = gap; the chart has a parameter `gap` of its own."""
+    """A mass that meets a spring at x = gap; the chart has its own parameter `gap`."""
 
     title = "mass and buffer"
     acceleration = "(push - stiffness * max(x - gap, 0) - F) / mass"
@@ -46,7 +46,7 @@ def needs(engine):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_buffer_in_a_rigs_equation_is_met_exactly(engine):
+def test_steps_end_exactly_on_a_buffer_in_a_rigs_equation(engine):
     """Free flight at 1 m/s, half a swing of 10 rad/s in the spring, flight back."""
     trace = simulate(
         force("0 * gap", gap=7.0),
@@ -98,7 +98,7 @@ def test_in_open_loop_the_jump_of_a_force_is_a_row():
     assert trace.t[row + 1] == pytest.approx(np.pi / 2, abs=1e-12)
 
 
-def test_names_of_chart_and_rig_are_kept_apart():
+def test_names_of_chart_and_rig_are_kept_separate():
     """A chart's own mass is not the rig's, neither in a corner of one nor of the other."""
     model = force("abs(z - mass)", mass=0.4)
     program = lower(model, Slider(2.0, "1"))

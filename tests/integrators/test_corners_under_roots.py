@@ -1,7 +1,7 @@
 """A corner under a root or a fractional power is crossed: z is the integral of v, computed by quad.
 
-With the sign of the corner held through the step, abs(u) goes below zero behind it, where a root is
-not defined.
+With the sign at the corner frozen through the step, abs(u) would become negative beyond it, where a
+root is not defined.
 """
 
 import math

@@ -1,7 +1,7 @@
-"""A pulse that fills a small part of a run is met, wherever it lies, with no max step set.
+"""A pulse that fills a small part of a run is found, wherever it lies, without a maximum step.
 
-A step is judged by what its few stages see. A formula that rests lets the steps grow, and one of
-them went over the whole pulse: x was 0.010 m instead of 0.060 m.
+A step is judged by its few stages. A formula at rest lets the steps grow, and one of them jumped
+over the whole pulse: x was 0.010 m instead of 0.060 m.
 """
 
 import numpy as np
@@ -30,7 +30,7 @@ SPRING = ChartModel(
 @pytest.mark.parametrize("engine", ["ifelse", "compiled"])
 @pytest.mark.parametrize("share", [0.02, 0.005, 0.001])
 @pytest.mark.parametrize("place", [0.137, 0.5, 0.9123])
-def test_the_pulse_is_met_wherever_it_lies(share, place, engine):
+def test_the_pulse_is_found_wherever_it_is(share, place, engine):
     if engine == "compiled":
         pytest.importorskip("numba", reason="needs the extra fast")
     t_end, push = 100.0, 1.0
@@ -54,8 +54,8 @@ def test_a_bank_of_elements_moves_as_far_as_with_small_steps():
 
 
 @pytest.mark.parametrize("text", ["sin(t)", "0.2*t", "3", "1e-5*exp(t/5)", "sqrt(3 - t)"])
-def test_formulas_that_never_rest_get_no_places(text):
-    """Their runs are the same to the bit as without this."""
+def test_formulas_that_never_rest_get_no_knots(text):
+    """Their runs are bit for bit the same as without this."""
     assert waking_times(parse_value(text, ["t"]), 0.0, 10.0) == ()
 
 
@@ -68,7 +68,7 @@ def test_several_pulses_are_all_marked():
         assert inside.min() < place - 2 * width < place + 2 * width < inside.max()
 
 
-def test_a_velocity_pulse_is_met_too():
+def test_a_velocity_pulse_is_found_too():
     model, _ = pulled_mass()
     text = "0.5 * exp(-((t - 31.234) / 0.1)**2)"
     assert simulate(model, Prescribed(text), 60.0).x[-1] == pytest.approx(

@@ -21,7 +21,7 @@ def assert_same_run(trace, reference, t_bound, z_bound):
 @pytest.mark.parametrize("law", ["signed", "published"])
 @solvers
 def test_open_loop(solver, law):
-    """One whole wave of the sine under both laws: the sequence of our own tight run."""
+    """One full wave of the sine under both laws: the sequence of our own tight run."""
     model, rig = stick_slip(law), open_loop()
     reference = simulate(model, rig, 21.0, rtol=1e-12, atol=1e-15)
     trace = simulate(model, rig, 21.0, method=solver, rtol=1e-8, atol=1e-11)
@@ -41,8 +41,8 @@ def test_pulled_mass(solver):
 
 
 @solvers
-def test_a_step_leads_the_solver_over_the_grid(solver):
-    """With step=h each grid point is among the rows, the end included."""
+def test_with_a_step_the_solver_follows_the_grid(solver):
+    """With step=h each grid point is among the rows, including the end."""
     h, T = 0.13, 6.0
     trace = simulate(stick_slip("signed"), open_loop(), T, method=solver, step=h)
     grid = np.append(np.arange(0.0, T, h), T)
@@ -52,7 +52,7 @@ def test_a_step_leads_the_solver_over_the_grid(solver):
 
 
 @solvers
-def test_wanted_times(solver):
+def test_requested_times(solver):
     """t_eval gives exactly these rows, and the log of the run without it."""
     model, rig = stick_slip("published"), open_loop()
     options = {"method": solver, "rtol": 1e-8, "atol": 1e-11}

@@ -1,4 +1,4 @@
-"""Steps end where they must (grid, knots, wanted rows, crossings) and no step is wasted."""
+"""Steps end where they must (grid, knots, requested rows, crossings) and no step is wasted."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from integrators.tableaux import DP45, RK4
 
 
 class _Run:
-    """One machine-less run of y' = slope(t, y), y(0) = 1, called by hand."""
+    """A run of y' = slope(t, y), y(0) = 1, without machines, called directly."""
 
     def __init__(
         self,
@@ -39,7 +39,7 @@ class _Run:
             dy[0] = slope(t, y[0])
 
         def margins(t: float, y: list, mode: list, p: None, watch: list, out: list) -> None:
-            assert margin is not None, "nothing is watched, and margins are asked for"
+            assert margin is not None, "nothing is watched, but margins are requested"
             out[0] = margin(t, y[0])
 
         equations = Equations(
@@ -104,7 +104,7 @@ def test_no_sliver_is_stepped_at_either_end(share: float) -> None:
 
 
 @pytest.mark.parametrize("step", [None, 0.25])
-def test_steps_end_on_knots_and_go_on_as_before(step: float | None) -> None:
+def test_steps_end_on_knots_and_continue_as_before(step: float | None) -> None:
     run = _Run(step=step, knots=(0.0, 0.3, 0.31, 5.0), max_step=0.25)
     run.to(1.0, h=0.25)
     assert {0.3, 0.31, 1.0} <= set(run.rows)
@@ -120,17 +120,17 @@ def test_no_step_is_longer_than_the_longest_allowed() -> None:
 
 def test_a_step_cut_short_by_a_stop_does_not_shorten_the_one_after_it() -> None:
     assert _Run().to(1e-9, h=0.5)[2] == 0.5  # ten times the sliver would be 1e-8
-    assert _Run().to(0.2, h=0.5)[2] == 2.0  # but it may grow by what was learned: 10 * 0.2
+    assert _Run().to(0.2, h=0.5)[2] == 2.0  # but it may grow from the tried length: 10 * 0.2
     assert _Run().to(0.5, h=0.5)[2] == 5.0
 
 
 def test_the_step_after_a_rejected_one_does_not_grow_at_once() -> None:
     run = _Run(lambda t, y: math.inf if t > 0.3 else 1.0)
-    assert run.to(100.0, h=1.0, steps=1)[1:3] == (0.2, 0.2)  # a fifth; without error from there
-    assert run.to(100.0, h=0.05, steps=1)[2] == pytest.approx(0.5)  # but the one after that may
+    assert run.to(100.0, h=1.0, steps=1)[1:3] == (0.2, 0.2)  # a fifth; no error from there on
+    assert run.to(100.0, h=0.05, steps=1)[2] == pytest.approx(0.5)  # but the next one may grow
 
 
-def test_a_step_that_was_accepted_narrowly_is_followed_by_a_shorter_one() -> None:
+def test_a_narrowly_accepted_step_is_followed_by_a_shorter_one() -> None:
     narrow = 0
     for i in range(60):
         h = 0.04 + 0.001 * i
@@ -149,14 +149,14 @@ def test_the_remembered_error_is_that_of_the_last_step_but_never_vanishes() -> N
     assert 1e-4 < run.to(10.0, h=0.04, steps=1)[3] <= 1.0
 
 
-def test_it_comes_back_when_the_steps_or_the_rows_are_used_up() -> None:
+def test_it_returns_when_the_steps_or_the_rows_are_used_up() -> None:
     run = _Run(step=0.25)
     assert run.to(100.0, steps=3)[:2] == (kernel.FULL, 0.75)
     assert run.to(100.0, steps=1)[:2] == (kernel.FULL, 1.0)
     full = _Run(step=0.25, capacity=2)
     assert full.to(100.0)[:2] == (kernel.FULL, 0.5)
     assert full.rows == [0.25, 0.5]
-    wanted = _Run(step=0.25, times=[0.3], capacity=1)  # a row a time, however many steps
+    wanted = _Run(step=0.25, times=[0.3], capacity=1)  # one row per time, however many steps
     assert wanted.to(1.0)[:2] == (kernel.REACHED, 1.0)
 
 
@@ -180,34 +180,34 @@ def test_a_crossing_ends_the_arc_there_with_state_and_row() -> None:
         assert run.rows[-1] == t
 
 
-def test_rows_behind_a_crossing_wait_for_what_is_switched_there() -> None:
+def test_rows_after_a_crossing_wait_for_the_switch() -> None:
     run = _Run(lambda t, y: 1.0, lambda t, y: y - 1.6, step=1.0, times=[0.5, 0.7])
     assert run.to(1.0)[0] == kernel.CROSSED
     assert run.rows == [0.5]
 
 
-def test_an_adaptive_step_with_an_early_crossing_is_done_again_up_to_it() -> None:
+def test_an_adaptive_step_with_an_early_crossing_is_repeated_up_to_it() -> None:
     run = _Run(lambda t, y: math.cos(t), lambda t, y: t - 0.2)
     _, t, _, _ = run.to(2.0, h=0.5)
     assert t == pytest.approx(0.2, abs=1e-12)
     assert max(run.asked) >= 0.5
-    assert max(run.asked[-6:]) <= 0.2 + 1e-12  # no stage of the step kept lies behind it
+    assert max(run.asked[-6:]) <= 0.2 + 1e-12  # no stage of the accepted step lies beyond it
     later = _Run(lambda t, y: 1.0, lambda t, y: t - 0.9)  # after a quiet step in the same call
     assert later.to(2.0, h=0.1)[1] == pytest.approx(0.9, abs=1e-12)
     assert later.rows[0] == 0.1
     assert max(later.asked[-6:]) <= 0.9 + 1e-12
     late = _Run(lambda t, y: math.cos(t), lambda t, y: t - 0.097)
     late.to(2.0, h=0.1)
-    assert max(late.asked[-6:]) == 0.1  # near the step's end it is kept
+    assert max(late.asked[-6:]) == 0.1  # near the step's end the step is kept
 
 
-def test_between_stops_a_quiet_step_hands_its_margins_to_the_next() -> None:
+def test_between_stops_a_quiet_step_passes_its_margins_to_the_next() -> None:
     run = _Run(lambda t, y: 1.0, lambda t, y: t - 1.1, step=0.25)
     assert run.to(2.0)[1] == pytest.approx(1.1, abs=1e-12)
     assert run.b.relations.start[0] == pytest.approx(-0.1)
 
 
-def test_an_infinite_slope_and_a_step_of_nothing_are_told_apart() -> None:
+def test_an_infinite_slope_and_a_zero_step_are_distinguished() -> None:
     known = (kernel.REACHED, kernel.CROSSED, kernel.FULL, kernel.TOO_SMALL, kernel.NOT_FINITE)
     assert len(set(known)) == 5
 

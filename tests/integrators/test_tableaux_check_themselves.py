@@ -1,7 +1,7 @@
-"""A Butcher tableau with a wrong coefficient cannot be built, and those shipped are right.
+"""A Butcher tableau with a wrong coefficient cannot be built, and the built-in ones are correct.
 
-Beyond the checks the tableaux make themselves, the fifth-order conditions, the error weights and
-the dense-output weights are checked here against the theory (Hairer, Norsett & Wanner II).
+Beyond the tableaux's own checks, the fifth-order conditions, the error weights and the
+dense-output weights are checked here against the theory (Hairer, Norsett & Wanner II).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The search for a crossing finds the first change of a truth within a step, with few looks."""
+"""The search finds the first change of a truth value within a step, with few evaluations."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from fractions import Fraction
 
 import pytest
 
-from integrators.crossings import NO_CHANGE, Path, first_change, nothing_near, watched
+from integrators.crossings import NO_CHANGE, Path, first_change, is_quiet_step, watched
 from integrators.steps import Dense, Motion, Now, Scratch
 
 Margin = Callable[[float], float]
 
 
 def _first(*margins: Margin, strict: bool = False, resolution: float = 1e-12) -> tuple:
-    """Return the place in [0, 1] where a truth first changes, and how often was looked."""
+    """Return the point in [0, 1] where a truth value first changes, and the number of probes."""
     w = watched([strict] * len(margins), 1)
     looks = []
 
@@ -35,7 +35,7 @@ def _first(*margins: Margin, strict: bool = False, resolution: float = 1e-12) ->
     path = Path(Motion(fill, fill, None), [], interpolate, None, 0.0, 1.0, [1.0])
     place = first_change(path, w, resolution)
     looks.clear()
-    # Whatever the scratch holds of the search before.
+    # Whatever the scratch space contained before the search.
     assert first_change(path, w, resolution) == place
     return place, len(looks)
 
@@ -61,9 +61,9 @@ def test_the_place_is_right_of_the_change_by_at_most_the_resolution(
 
 
 def test_a_straight_margin_is_found_by_its_slope_not_by_halving() -> None:
-    # End, both sides of the place, and the middle of the quiet step before it.
+    # The end, both sides of the point, and the middle of the quiet step before it.
     assert _first(lambda t: t - 0.3)[1] <= 4
-    assert _first(lambda t: 0.3 - t)[1] <= 6  # exactly zero is still true: once more
+    assert _first(lambda t: 0.3 - t)[1] <= 6  # exactly zero is still true: one more probe
     assert _first(lambda t: t - 0.3, lambda t: 0.8 - t)[1] <= 4
 
 
@@ -82,7 +82,7 @@ def test_a_window_of_a_256th_of_a_step_is_found_wherever_it_lies(
     assert place == pytest.approx(middle - half, abs=1e-11)
 
 
-def test_a_margin_that_is_never_quiet_is_looked_at_in_every_512th_of_a_step_and_no_more() -> None:
+def test_a_margin_that_is_never_quiet_is_evaluated_512_times_per_step() -> None:
     def rough(t: float, window: float) -> float:
         halvings = Fraction(t).denominator.bit_length() - 1
         return 1.0 if abs(t - window) < 1e-9 else -1.0 if halvings % 2 else -1e-3
@@ -90,7 +90,7 @@ def test_a_margin_that_is_never_quiet_is_looked_at_in_every_512th_of_a_step_and_
     for k in range(1, 512, 2):
         place, _ = _first(lambda t, k=k: rough(t, k / 512))
         assert place == pytest.approx(k / 512, abs=1.1e-9)
-    assert _first(lambda t: rough(t, 2.0)) == (NO_CHANGE, 512)  # the end, and 511 between
+    assert _first(lambda t: rough(t, 2.0)) == (NO_CHANGE, 512)  # the end, and 511 in between
 
 
 def test_of_two_windows_the_earlier_counts_though_the_later_is_seen_first() -> None:
@@ -101,15 +101,15 @@ def test_of_two_windows_the_earlier_counts_though_the_later_is_seen_first() -> N
     assert _first(lambda t: t - 0.9, two)[0] == pytest.approx(0.18, abs=1e-11)
 
 
-def test_a_window_before_the_first_place_believed_in_is_found() -> None:
-    # False position lands behind the window, at 0.59, and closes on 0.75 first.
+def test_a_window_before_the_first_candidate_is_found() -> None:
+    # False position lands after the window, at 0.59, and converges to 0.75 first.
     assert _first(lambda t: (t - 0.39) * (t - 0.43) * (t - 0.75))[0] == pytest.approx(
         0.39, abs=1e-11
     )
 
 
 def test_a_margin_that_starts_or_touches_at_zero_changes_as_its_kind_says() -> None:
-    assert _first(lambda t: t)[0] == NO_CHANGE  # true at zero already
+    assert _first(lambda t: t)[0] == NO_CHANGE  # already true at zero
     assert 0.0 < _first(lambda t: t, strict=True)[0] <= 1e-12
     assert _first(lambda t: 0.0)[0] == _first(lambda t: 0.0, strict=True)[0] == NO_CHANGE
     touching = -((0.5) ** 2)
@@ -117,7 +117,7 @@ def test_a_margin_that_starts_or_touches_at_zero_changes_as_its_kind_says() -> N
     assert _first(lambda t: touching + t * (1 - t), strict=True)[0] == NO_CHANGE
 
 
-def test_a_far_margin_with_a_bend_is_quiet_after_one_look_inside() -> None:
+def test_a_distant_curved_margin_is_quiet_after_one_evaluation() -> None:
     assert _first(lambda t: -10.0 + t * (1 - t)) == (NO_CHANGE, 2)
     assert _first(lambda t: 10.0 - t * (1 - t)) == (NO_CHANGE, 2)
     assert _first(lambda t: -1e-3 - t * t * 0.1 - t) == (NO_CHANGE, 2)  # near, but monotone
@@ -125,7 +125,7 @@ def test_a_far_margin_with_a_bend_is_quiet_after_one_look_inside() -> None:
 
 
 def test_the_cubic_between_two_ends_is_that_of_both_slopes() -> None:
-    # y = t**3 between 1 and 3: the middle of the cubic is 8, of a line 14, and t = 2 is handed on.
+    # y = t**3 between 1 and 3: the cubic's midpoint is 8, a line's is 14, and t = 2 is passed on.
     w = watched([False], 1)
     w.watch[0] = 1
     w.active.append(0)
@@ -138,5 +138,5 @@ def test_the_cubic_between_two_ends_is_that_of_both_slopes() -> None:
     w.start[0] = 1.0 - 100.0
     now = Now([1.0], y=[1.0], f=[3.0], mode=[], held=[], floor=[])
     scratch = Scratch([], y_new=[27.0], f_new=[27.0], error=[], dense=Dense([], [], [], [], []))
-    assert nothing_near(Motion(fill, fill, None), now, 3.0, scratch, w)
+    assert is_quiet_step(Motion(fill, fill, None), now, 3.0, scratch, w)
     assert seen == [(3.0, 27.0), (2.0, 8.0)]

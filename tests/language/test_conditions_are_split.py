@@ -1,4 +1,4 @@
-"""A condition is split into its comparisons, and a value into the places where it turns."""
+"""A condition is split into its comparisons, and a value's corners are separated from it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gms_fsm.language import (
 )
 
 
-def _literals(text: str, holds: bool = True) -> Any:
+def _requirements(text: str, holds: bool = True) -> Any:
     def told(part: Any) -> Any:
         if isinstance(part, Requirement):
             return spell(part.relation)
@@ -24,24 +24,24 @@ def _literals(text: str, holds: bool = True) -> Any:
     return told(split(parse_condition(text, "abc"), holds))
 
 
-def test_splitting_knows_both_ways_of_every_comparison() -> None:
+def test_splitting_handles_both_directions_of_every_comparison() -> None:
     for op, not_op in ((">", "<="), (">=", "<"), ("<", ">="), ("<=", ">")):
-        assert _literals(f"a {op} b") == f"a {op} b"
-        assert _literals(f"a {op} b", holds=False) == f"a {not_op} b"
-        assert _literals(f"not a {op} b") == f"a {not_op} b"
+        assert _requirements(f"a {op} b") == f"a {op} b"
+        assert _requirements(f"a {op} b", holds=False) == f"a {not_op} b"
+        assert _requirements(f"not a {op} b") == f"a {not_op} b"
         mirrored = op.translate(str.maketrans("<>", "><"))
         word = "both" if op[0] == "<" else "either"
-        assert _literals(f"abs(a) {op} b") == (word, f"a {op} b", f"a {mirrored} -b")
-        assert _literals(f"b {mirrored} abs(a)") == (word, f"a {op} b", f"a {mirrored} -b")
-        assert _literals(f"abs(abs(a)) {op} b") == _literals(f"abs(a) {op} b")
+        assert _requirements(f"abs(a) {op} b") == (word, f"a {op} b", f"a {mirrored} -b")
+        assert _requirements(f"b {mirrored} abs(a)") == (word, f"a {op} b", f"a {mirrored} -b")
+        assert _requirements(f"abs(abs(a)) {op} b") == _requirements(f"abs(a) {op} b")
 
 
-def test_splitting_flattens_like_in_like_and_turns_words_under_negation() -> None:
+def test_splitting_flattens_nesting_and_swaps_words_under_negation() -> None:
     text = "a > b and (b > c and (c > a or abs(a) > c))"
-    assert _literals(text) == ("both", "a > b", "b > c", ("either", "c > a", "a > c", "a < -c"))
+    assert _requirements(text) == ("both", "a > b", "b > c", ("either", "c > a", "a > c", "a < -c"))
     turned = ("either", "a <= b", "b <= c", ("both", "c <= a", "a <= c", "a >= -c"))
-    assert _literals(text, holds=False) == turned
-    assert _literals(f"not ({text})") == turned
+    assert _requirements(text, holds=False) == turned
+    assert _requirements(f"not ({text})") == turned
 
 
 def test_a_corner_against_zero_turns_where_the_other_side_does() -> None:

@@ -1,4 +1,4 @@
-"""A derivative is the slope of its value, written with nothing that could be left out."""
+"""A derivative is the slope of its value, printed without superfluous terms."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_a_derivative_is_the_slope(text: str, name: str) -> None:
 
 
 @pytest.mark.parametrize("function", SEVERAL)
-def test_on_the_corner_itself_it_is_the_mean_of_both_sides(function: str) -> None:
+def test_on_a_corner_the_derivative_is_the_mean_of_both_sides(function: str) -> None:
     found = derivative(parse_value(f"{function}(3 * a, 5 * b)", "ab"), "a")
     assert found is not None
     assert evaluate(found, {"a": 5.0, "b": 3.0}) == 1.5
@@ -88,20 +88,20 @@ def test_on_the_corner_itself_it_is_the_mean_of_both_sides(function: str) -> Non
         ("C * (sgn(v) - z / s)", "z", "C * -(1.0 / s)"),
     ],
 )
-def test_nothing_is_written_that_could_be_left_out(text: str, name: str, expected: str) -> None:
+def test_superfluous_terms_are_omitted(text: str, name: str, expected: str) -> None:
     found = derivative(parse_value(text, ["a", "b", "c", "C", "v", "z", "s"]), name)
     assert found is not None
     assert spell(found) == expected
 
 
-def test_what_the_name_is_not_in_is_no_hindrance() -> None:
+def test_parts_without_the_name_do_not_matter() -> None:
     found = derivative(parse_value("b**c + a", "abc"), "a")
     assert found is not None
     assert spell(found) == "1.0"
     assert derivative(parse_value("b**a + a", "abc"), "a") is None
 
 
-def test_abs_has_the_slope_of_its_side_and_none_on_its_corner() -> None:
+def test_abs_has_the_slope_of_its_side_and_zero_on_its_corner() -> None:
     found = derivative(parse_value("abs(a)", "a"), "a")
     assert found is not None
     assert [evaluate(found, {"a": a}) for a in (-2.0, 0.0, 2.0)] == [-1.0, 0.0, 1.0]

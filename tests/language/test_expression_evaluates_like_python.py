@@ -1,8 +1,8 @@
-"""A tree evaluates to the very bits that Python computes from its printed text.
+"""A tree evaluates bit for bit to what Python computes from its printed text.
 
 `evaluate(tree)` equals Python's own value of ``spell(tree, PYTHON)`` to the last bit, including
-which error is raised; printing, reading and printing again changes nothing; and `split` says the
-same as the condition it splits, on the boundary too.
+which error is raised; printing, parsing and printing again changes nothing; and `split` agrees with
+the condition it splits, also on the boundary.
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ def _outcome_of_text(text: str, point: Mapping[str, float]) -> str:
 @pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(any_values, points)
-def test_a_value_is_what_python_computes_from_its_text(
+def test_a_value_equals_what_python_computes_from_its_text(
     tree: Value, point: dict[str, float]
 ) -> None:
     assert _outcome_of_tree(tree, point) == _outcome_of_text(spell(tree, PYTHON), point)
@@ -128,7 +128,7 @@ def test_a_value_is_what_python_computes_from_its_text(
 @pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(conditions, points)
-def test_a_condition_is_what_python_decides_from_its_text(
+def test_a_condition_equals_what_python_decides_from_its_text(
     tree: Condition, point: dict[str, float]
 ) -> None:
     assert _outcome_of_tree(tree, point) == _outcome_of_text(spell(tree, PYTHON), point)
@@ -176,7 +176,7 @@ def test_a_product_stays_short() -> None:
         tree = parse_value(text, NAMES)
     except ExpressionError:
         return
-    assert len(spell(tree)) < 20_000, "eight times longer with every level: it never ends"
+    assert len(spell(tree)) < 20_000, "otherwise eight times longer with every level: endless"
 
 
 # --------------------------------------------------------------------------- spell, read, spell
@@ -186,11 +186,11 @@ def test_a_product_stays_short() -> None:
 @example(parse_value("(-((a**8)**3))**3", NAMES), {"a": 1.1, "b": 0.0, "c": 0.0})
 @example(parse_value(f"(({'+'.join('a' * 30)})**0)**3", NAMES), {"a": 1.1, "b": 0.0, "c": 0.0})
 @example(parse_value("((a**-8)**8)**b", NAMES), {"a": 1.1, "b": 0.5, "c": 0.0})
-def test_printing_reading_printing_changes_no_value(tree: Value, point: dict[str, float]) -> None:
+def test_printing_and_parsing_preserve_values(tree: Value, point: dict[str, float]) -> None:
     text = spell(tree)
     try:
         again = parse_value(text, NAMES)
-    except ExpressionError as error:  # the products of a power may be longer than a text may be
+    except ExpressionError as error:  # the product for a power may exceed the longest text
         assume("nested too deeply" not in error.reason and len(text) <= 10_000)
         raise
     assert spell(again) == text
@@ -201,9 +201,7 @@ def test_printing_reading_printing_changes_no_value(tree: Value, point: dict[str
 @pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(conditions, points)
-def test_printing_reading_printing_changes_no_condition(
-    tree: Condition, point: dict[str, float]
-) -> None:
+def test_printing_and_parsing_preserve_conditions(tree: Condition, point: dict[str, float]) -> None:
     text = spell(tree)
     try:
         again = parse_condition(text, NAMES)
@@ -233,7 +231,7 @@ def test_printing_reading_printing_changes_no_condition(
         ("abs(a-b)", "abs(a - b)", "|a - b|"),
     ],
 )
-def test_no_more_brackets_than_needed(text: str, python: str, matlab: str) -> None:
+def test_no_superfluous_parentheses(text: str, python: str, matlab: str) -> None:
     tree = parse_value(text, NAMES)
     assert spell(tree, PYTHON) == python
     assert spell(tree, MATLAB_LIKE) == matlab
@@ -275,7 +273,7 @@ def _requirements(part: Split) -> list[Requirement]:
 @pytest.mark.slow
 @settings(max_examples=400, deadline=None)
 @given(tame_conditions, near, st.booleans())
-def test_split_says_the_same_as_the_condition(
+def test_split_agrees_with_the_condition(
     condition: Condition, point: dict[str, float], holds: bool
 ) -> None:
     parts = split(condition, holds)
@@ -298,7 +296,7 @@ def test_a_relation_and_its_opposite_share_one_comparison(one: str, other: str) 
     assert (first.holds == second.holds) == one.startswith("not")
 
 
-def test_strict_and_not_strict_are_two_comparisons() -> None:
+def test_strict_and_non_strict_comparisons_differ() -> None:
     assert split(parse_condition("a < b", NAMES)) == Requirement(
         Comparison(Name("a"), Name("b"), strict=False), holds=False
     )
@@ -331,7 +329,7 @@ def test_a_chain_reads_as_its_links() -> None:
 
 @settings(max_examples=50, deadline=None)
 @given(near)
-def test_two_absolute_values_split_and_end(point: dict[str, float]) -> None:
+def test_splitting_two_absolute_values_terminates(point: dict[str, float]) -> None:
     condition = parse_condition("abs(a) <= abs(b)", NAMES)
     parts = split(condition)
     assert _truth(parts, point) == evaluate(condition, point)
@@ -346,5 +344,5 @@ def test_nested_absolute_values_do_not_multiply() -> None:
     assert len(found) <= 24, "twice as many with every level: 40 levels never end"
 
 
-def test_the_sign_of_what_is_no_number_is_zero() -> None:
+def test_the_sign_of_nan_is_zero() -> None:
     assert [sgn(u) for u in (math.nan, 0.0, -0.0, 5e-324, -5e-324)] == [0.0, 0.0, 0.0, 1.0, -1.0]

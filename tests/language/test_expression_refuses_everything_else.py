@@ -1,7 +1,7 @@
 """A text outside the expression language is refused with its column, and nothing is ever executed.
 
-Columns count characters from 1 and point at where the offending construct begins; a text that ends
-too early is refused one column behind its end. Only `ExpressionError` leaves the parser, whatever
+Columns count characters from 1 and point at the start of the offending construct; for a text that
+ends too early, the column is one past its end. Only `ExpressionError` leaves the parser, whatever
 the text, and no text makes Python execute, import or open anything.
 """
 
@@ -61,7 +61,7 @@ NO_VALUES = [
     ("1 + ~v", 5, FOREIGN, GRAMMAR),
     ("...", 1, FOREIGN, GRAMMAR),
     ("await v", 1, FOREIGN, GRAMMAR),
-    # constants that are no finite real numbers
+    # constants that are not finite real numbers
     ("'a'", 1, FOREIGN, GRAMMAR),
     ("1 + 'a'", 5, FOREIGN, GRAMMAR),
     ("b'a'", 1, FOREIGN, GRAMMAR),
@@ -75,7 +75,7 @@ NO_VALUES = [
     ("-1e999", 2, "too large", "finite"),
     ("v + " + "9" * 400, 5, "too large", "finite"),
     ("0x" + "f" * 400, 1, "too large", "finite"),
-    # wrong kind
+    # wrong type
     ("z < s", 1, NUMBER_WANTED, GRAMMAR),
     ("1 + (z < s)", 6, NUMBER_WANTED, GRAMMAR),
     ("z == s", 1, NUMBER_WANTED, GRAMMAR),
@@ -104,7 +104,7 @@ NO_VALUES = [
     ("v + \u20ac + u", 5, "cannot be read", GRAMMAR),
     ("v \u2212 z", 3, FOREIGN, "- instead"),  # a typographer's minus
     ("v + \ud800", 5, "cannot be read", GRAMMAR),  # half a surrogate pair
-    # what is not even Python
+    # not even Python
     ("", 1, "empty", GRAMMAR),
     (" \t\n", 1, "empty", GRAMMAR),
     ("v # comment", 3, "unexpected '#'", GRAMMAR),
@@ -170,7 +170,7 @@ def _refused(parse: Callable[..., object], text: str) -> ExpressionError:
 
 
 @pytest.mark.parametrize(("text", "column", "reason", "allowed"), NO_VALUES)
-def test_a_text_that_is_no_value_is_refused_where_it_goes_wrong(
+def test_an_invalid_value_is_refused_with_its_column(
     text: str, column: int, reason: str, allowed: str
 ) -> None:
     error = _refused(parse_value, text)
@@ -181,7 +181,7 @@ def test_a_text_that_is_no_value_is_refused_where_it_goes_wrong(
 
 
 @pytest.mark.parametrize(("text", "column", "reason", "allowed"), NO_CONDITIONS)
-def test_a_text_that_is_no_condition_is_refused_where_it_goes_wrong(
+def test_an_invalid_condition_is_refused_with_its_column(
     text: str, column: int, reason: str, allowed: str
 ) -> None:
     error = _refused(parse_condition, text)
@@ -191,13 +191,13 @@ def test_a_text_that_is_no_condition_is_refused_where_it_goes_wrong(
 
 
 @pytest.mark.parametrize("text", [row[0] for row in NO_VALUES])
-def test_a_reason_speaks_of_the_text_not_of_pythons_syntax_tree(text: str) -> None:
+def test_messages_refer_to_the_text_not_to_pythons_syntax_tree(text: str) -> None:
     words = set(_refused(parse_value, text).reason.replace("'", " ").split())
     classes = {name for name, kind in vars(ast).items() if isinstance(kind, type)}
     assert {word for word in words & classes if word[0].isupper()} == set()
 
 
-def test_the_caret_stands_under_the_column_even_in_a_long_text() -> None:
+def test_the_caret_is_under_the_column_even_in_a_long_text() -> None:
     for lead in (3, 200):
         text = "v" + "+v" * 2 + " " * lead + "+ \u00e9"
         error = _refused(parse_value, text)
@@ -205,13 +205,13 @@ def test_the_caret_stands_under_the_column_even_in_a_long_text() -> None:
         assert shown[len(caret) - 1] == "\u00e9"
 
 
-def test_line_breaks_are_spaces_and_columns_run_on() -> None:
+def test_line_breaks_count_as_spaces_for_columns() -> None:
     assert spell(parse_value("v\n  + z", NAMES)) == "v + z"
     assert _refused(parse_value, "v\n + u").column == 6
 
 
 @pytest.mark.parametrize("given_instead", [None, 5, b"v", ["v"], object()])
-def test_what_is_no_text_is_refused(given_instead: object) -> None:
+def test_values_other_than_text_are_refused(given_instead: object) -> None:
     for parse in (parse_value, parse_condition):
         with pytest.raises(ExpressionError, match="expected a text, got"):
             parse(given_instead, NAMES)
@@ -238,7 +238,7 @@ def test_too_deep_or_too_long_is_refused(text: str) -> None:
 
 @pytest.mark.parametrize("function", ["min", "max"])
 @pytest.mark.parametrize("count", [3, 50, 500, 3000])
-def test_many_arguments_are_refused_or_can_be_read_by_everyone(function: str, count: int) -> None:
+def test_many_arguments_are_refused_or_handled_by_every_reader(function: str, count: int) -> None:
     try:
         tree = parse_value(f"{function}({','.join(['v'] * count)})", NAMES)
     except ExpressionError:
@@ -251,7 +251,7 @@ def test_many_arguments_are_refused_or_can_be_read_by_everyone(function: str, co
 
 
 @pytest.mark.parametrize("text", ["1if v else z", "z*0x1or v", "1and v < z", "z > 1and v > 0"])
-def test_no_warning_of_python_reaches_the_user(text: str) -> None:
+def test_no_python_warning_reaches_the_user(text: str) -> None:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         for parse in (parse_value, parse_condition):
@@ -267,7 +267,7 @@ _ACTS = {"exec", "import", "open", "os.system", "subprocess.Popen"}
 
 
 def _hook(event: str, _: object) -> None:
-    # An audit hook cannot be taken off again; it sleeps while `_watching` is no thread's number.
+    # An audit hook cannot be removed; it is inactive while `_watching` is not a thread's number.
     if get_ident() == _watching and event in {
         "exec",
         "import",
@@ -320,7 +320,7 @@ TEXTS = st.one_of(
 @example("\N{DIGIT ONE}\N{ARABIC-INDIC DIGIT ONE}")
 @example("1__0")
 @example("\ufeffv")
-def test_only_expression_errors_escape_whatever_the_text(text: str) -> None:
+def test_only_expression_errors_are_raised_whatever_the_text(text: str) -> None:
     for parse in (parse_value, parse_condition):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SyntaxWarning)
@@ -384,7 +384,7 @@ def test_hostile_text_creates_nothing(text: str, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_watch_itself_sees_execution(tmp_path: Path) -> None:
+def test_the_audit_hook_detects_execution(tmp_path: Path) -> None:
     with pytest.raises(AssertionError), nothing_executed():
         (tmp_path / "canary").touch()
     with pytest.raises(AssertionError), nothing_executed():
@@ -395,7 +395,7 @@ def test_the_watch_itself_sees_execution(tmp_path: Path) -> None:
     ("text", "meant"),
     [("sign(v)", "sgn"), ("Abs(v)", "abs"), ("F_Y * v", "F_y"), ("vc", "v_c"), ("q", None)],
 )
-def test_the_nearest_name_is_asked_for(text: str, meant: str | None) -> None:
+def test_the_nearest_name_is_suggested(text: str, meant: str | None) -> None:
     with pytest.raises(ExpressionError) as caught:
         parse_value(text, ["v", "v_c", "F_y"])
     question = f"(did you mean {meant!r}?)"

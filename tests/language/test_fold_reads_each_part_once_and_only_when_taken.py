@@ -1,4 +1,4 @@
-"""`fold` gives each node to the operation of its kind, and folds a part only when it is taken."""
+"""`fold` passes each node to the operation for its kind, and folds a part only when requested."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from gms_fsm.language import (
 
 
 class _Same:
-    """Builds every node anew from its parts, and writes down which operation did it."""
+    """Rebuilds every node from its parts, and records the operation used."""
 
     def __init__(self) -> None:
         self.called: list[str] = []
@@ -60,7 +60,7 @@ class _Same:
         return again
 
 
-def test_each_kind_of_node_has_its_operation_and_parts_come_before_their_node() -> None:
+def test_each_kind_of_node_has_its_operation_and_parts_precede_nodes() -> None:
     text = "not -a**2 > b * 3 and (state(1) == slip or max(a, b) > c)"
     tree = parse_condition(text, "abc", ["slip"], 1)
     algebra = _Same()
@@ -74,7 +74,7 @@ def test_each_kind_of_node_has_its_operation_and_parts_come_before_their_node() 
 
 
 @pytest.mark.parametrize("kind", [Both, Either])
-def test_what_an_operation_does_not_take_is_not_read(kind: type[Both | Either]) -> None:
+def test_parts_that_an_operation_does_not_request_are_not_folded(kind: type[Both | Either]) -> None:
     class First(_Same):
         def _first(self, node: Node, parts: Iterator[Any]) -> Any:
             return next(parts)
@@ -87,7 +87,7 @@ def test_what_an_operation_does_not_take_is_not_read(kind: type[Both | Either]) 
     assert algebra.called == ["name", "number", "relation"]
 
 
-def test_and_and_or_stop_where_python_stops() -> None:
+def test_and_and_or_short_circuit_as_in_python() -> None:
     point = {"v": 1.0, "z": 0.0}
     for text, truth in (("v > 0 or 1 / z > 1", True), ("v < 0 and 1 / z > 1", False)):
         assert evaluate(parse_condition(text, "vz"), point) is truth

@@ -1,6 +1,6 @@
-"""A formula of any shape is read, or refused, in bounded time and with a short message.
+"""A formula of any shape is parsed, or refused, in bounded time and with a short message.
 
-Fuzzing found each case. Work is counted in calls, so that no clock decides.
+Fuzzing found each case. Work is measured in calls rather than time.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ LONG = "x" * 50_000
 
 
 def calls_of(work: Callable[[], object]) -> int:
-    """Return how many Python functions were called; give up at a million."""
+    """Return the number of Python function calls; give up at a million."""
     count = 0
 
     def look(_frame: Any, what: str, _argument: Any) -> None:
         nonlocal count
         count += what == "call"
-        assert count < 1_000_000, "work without end"
+        assert count < 1_000_000, "unbounded work"
 
     sys.setprofile(look)
     try:
@@ -39,7 +39,7 @@ def calls_of(work: Callable[[], object]) -> int:
 
 @pytest.mark.parametrize("power", ["2", "8", "9", "0.5", "-3"])
 def test_powers_of_powers_cost_no_more_than_their_length(power: str) -> None:
-    """They once doubled the work with each level: 50 levels would have taken years."""
+    """The work once doubled with each level: 50 levels would have taken years."""
     text = "(" * 50 + "v" + f")**{power}" * 50
 
     def read() -> None:
@@ -52,7 +52,7 @@ def test_powers_of_powers_cost_no_more_than_their_length(power: str) -> None:
 
 
 def test_exponents_count_as_part_of_what_is_multiplied() -> None:
-    """64 copies of a power whose exponent holds 64 copies of a power ...: a line made gigabytes."""
+    """64 copies of a power whose exponent has 64 copies of a power ...: a line made gigabytes."""
     text = "v"
     for _ in range(9):
         text = f"((v**({text} + z))**8)**8"
@@ -83,7 +83,7 @@ def test_a_long_name_does_not_make_a_long_message(text: str) -> None:
 
 @pytest.mark.parametrize("name", ["a\0b", "a\nb", "<>", '"""', "\u202e"])
 def test_any_name_of_a_chart_can_be_run(name: str) -> None:
-    """Python takes no null character in a file name, which the generated text is given."""
+    """Python accepts no null character in a file name, which the generated text is given."""
     states = State("a", {"z": "v"}), State("b", {"z": "0"})
     edge = Transition("e", "a", "b", "z >= s")
     chart = Chart(name, ("v", "s"), ("z",), (), states, (edge,), {"F": "z"})
@@ -102,7 +102,7 @@ def test_any_name_of_a_chart_can_be_run(name: str) -> None:
     ids=["chain", "row", "groups"],
 )
 def test_hundreds_of_comparisons_are_refused(text: str) -> None:
-    """The program that watches each of them on its own was too deep for Python to compile."""
+    """The program that watches each of them separately was too deep for Python to compile."""
     with pytest.raises(ExpressionError, match="too many comparisons"):
         parse_condition(text, ["z", "s", "v"])
 

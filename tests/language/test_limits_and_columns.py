@@ -1,4 +1,4 @@
-"""The limits of a text are exact, and a refusal points at the column in the text as written."""
+"""The limits of a text are exact, and an error points at the column in the text as written."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_the_longest_text_has_ten_thousand_characters() -> None:
 def test_the_deepest_tree_has_sixty_levels() -> None:
     assert parse_value("-" * 59 + "v", "v")
     assert "nested" in str(_refused("-" * 60 + "v", "v"))
-    deep = _refused("-" * 9_000 + "v", "v")  # too deep for Python itself
+    deep = _refused("-" * 9_000 + "v", "v")  # too deep even for Python
     assert ("nested" in deep.reason, deep.column) == (True, 1)
     assert parse_condition("not " * 58 + "v > 1", "v")
     with pytest.raises(ExpressionError, match="nested"):
@@ -46,14 +46,14 @@ def test_min_takes_fifty_arguments_folded_from_the_left_as_deep_as_any_tree_may_
     assert "at most 50" in str(_refused("max(" + "v, " * 50 + "v)", "v"))
     assert parse_value("-" * 10 + "max(" + "v, " * 49 + "v)", "v")  # 10 + 1 + 48 + 1 levels
     assert "nested" in str(_refused("-" * 11 + "max(" + "v, " * 49 + "v)", "v"))
-    for several in (2, 3, 4, 5, 6):  # a fold may jump over the deepest level, and is noticed
+    for several in (2, 3, 4, 5, 6):  # a fold may skip the deepest level, and is still detected
         nested = "v"
         for _ in range(59 // (several - 1)):
             nested = f"min({nested}{', v' * (several - 1)})"
         assert parse_value(nested, "v")
         over = f"min({nested}{', v' * (several - 1)})"
         assert "nested" in str(_refused(over, "v"))
-    # The last argument lies at the top of the fold, the first two at its bottom.
+    # The last argument is at the top of the fold, the first two at its bottom.
     assert parse_value("max(" + "v, " * 49 + "-" * 58 + "v)", "v")
     assert "nested" in str(_refused("max(" + "v, " * 49 + "-" * 59 + "v)", "v"))
     assert parse_value("max(v, " + "-" * 10 + "v, " + "v, " * 47 + "v)", "v")
@@ -94,7 +94,7 @@ def test_pow_takes_two_arguments() -> None:
         assert "two arguments" in str(_refused(f"pow({arguments})", "a", "b"))
 
 
-def test_what_counts_as_a_mark_that_cannot_be_read() -> None:
+def test_which_marks_cannot_be_read() -> None:
     assert "half a character" in str(_refused("v + \ud800", "v"))
     assert "half a character" in str(_refused("v + \udfff", "v"))
     assert "half a character" not in str(_refused("v + \ue000", "v"))
@@ -102,7 +102,7 @@ def test_what_counts_as_a_mark_that_cannot_be_read() -> None:
     assert "unexpected ';'" in str(_refused("v;", "v"))
 
 
-def test_a_state_is_asked_for_by_a_number_from_one_and_by_equality() -> None:
+def test_states_are_referred_to_by_number_from_one_and_by_equality() -> None:
     known: dict[str, Any] = {"states": ["slip"], "elements": 2}
     assert parse_condition("state(1) == slip", "v", **known) == InState(1, "slip")
     assert parse_condition("state(2) != slip", "v", **known) == Not(InState(2, "slip"))

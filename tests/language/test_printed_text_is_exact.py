@@ -1,4 +1,4 @@
-"""Printed text has the brackets that its order needs and no others; small powers are products."""
+"""Printed text has exactly the parentheses that it needs; small powers are products."""
 
 from __future__ import annotations
 
@@ -76,14 +76,12 @@ def test_small_powers_are_products_until_the_text_grows_too_long() -> None:
         ("1234567", "1234567.0", "1234567.0"),
     ],
 )
-def test_a_value_has_no_more_and_no_fewer_brackets_than_its_order_needs(
-    text: str, python: str, matlab: str
-) -> None:
+def test_values_have_exactly_the_parentheses_they_need(text: str, python: str, matlab: str) -> None:
     tree = parse_value(text, "abc")
     assert (spell(tree), spell(tree, MATLAB_LIKE)) == (python, matlab)
 
 
-def test_a_number_below_zero_binds_like_a_sign() -> None:  # of derivatives: read are none
+def test_a_negative_number_binds_like_a_sign() -> None:  # of derivatives: read are none
     assert spell(Negative(Number(-0.5))) == "-(-0.5)"
     assert spell(Binary("**", Name("a"), Number(-0.5)), MATLAB_LIKE) == "a^(-0.5)"
 
@@ -104,7 +102,7 @@ def test_a_number_below_zero_binds_like_a_sign() -> None:  # of derivatives: rea
         ("state != slip", "not state == slip", "!(state == slip)"),
     ],
 )
-def test_a_condition_has_no_more_and_no_fewer_brackets_than_its_order_needs(
+def test_conditions_have_exactly_the_parentheses_they_need(
     text: str, python: str, matlab: str
 ) -> None:
     tree = parse_condition(text, "abc", ["stick", "slip"], 2, own_state=True)

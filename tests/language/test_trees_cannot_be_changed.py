@@ -1,4 +1,4 @@
-"""A tree and the ways to print it are frozen: what one reader has, no other can change."""
+"""A tree and its spellings are frozen: no reader can change what another one uses."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Lesson 1: a bank of Maxwell elements closes its inner loops, and one LuGre bristle does not.
+"""Lesson 1: Maxwell elements close their inner loops, and one LuGre bristle does not.
 
-Held against element-wise stops (z moves with x between -s and s) and LuGre's exponentials.
+Compared with element-wise stops (z moves with x between -s and s) and LuGre's exponentials.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from gms_fsm.app.lessons import l1_hysteresis as lesson
 from tests.lesson_checks import check_figure, check_lines
 
 PATH = [0.0, *lesson.TURNS]
-WINDOW = 1e-9  # m: the way within |v| <= v_c at a reversal, v_c**2 / (2 * 5e-4 m/s2)
+WINDOW = 1e-9  # m: the distance within |v| <= v_c at a reversal, v_c**2 / (2 * 5e-4 m/s2)
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def result() -> lesson.Result:
 
 
 def stops(x: np.ndarray) -> np.ndarray:
-    """Force of springs that let go at s_i = 0.25/k_i, moved along the positions x."""
+    """Return the force of springs that slip at s_i = 0.25/k_i, moved along the positions x."""
     k, z, F = lesson.K, np.zeros(4), []
     for step in np.diff(x, prepend=0.0):
         z = np.clip(z + step, -0.25 / k, 0.25 / k)
@@ -38,7 +38,7 @@ def test_the_run_follows_the_stops(result: lesson.Result) -> None:
     assert result.masing_error < lesson.K.sum() * WINDOW
 
 
-def test_elements_let_go_at_their_thresholds(result: lesson.Result) -> None:
+def test_elements_slip_at_their_thresholds(result: lesson.Result) -> None:
     np.testing.assert_allclose(result.let_go, 0.25 / lesson.K, rtol=0, atol=WINDOW)
 
 
@@ -51,14 +51,14 @@ def test_the_turning_points_are_where_they_should_be(result: lesson.Result) -> N
     )
 
 
-def test_old_reversal_points_are_met_again_and_wiped_out(result: lesson.Result) -> None:
+def test_old_reversal_points_are_met_again_and_forgotten(result: lesson.Result) -> None:
     assert np.abs(result.misses).max() < 1e-6
     after = np.linspace(result.back[1], result.turn_times[-1] - lesson.RAMP, 50)
-    beyond_A = result.gms.sample(after)  # as if it had never been anywhere
+    beyond_A = result.gms.sample(after)  # as if the inner loops had not happened
     assert np.abs(beyond_A.F - lesson.first_loading(beyond_A.x)).max() < 1e-4
 
 
-def test_lugre_misses_them_as_its_exponentials_say(result: lesson.Result) -> None:
+def test_lugre_misses_them_as_its_exponentials_predict(result: lesson.Result) -> None:
     """With F_s = F_c and no damping the bristle is rate-independent: dz/dx = 1 -+ sigma_0 z/F_c."""
     sigma_0 = lesson.K.sum()
 
@@ -79,7 +79,7 @@ def test_lugre_misses_them_as_its_exponentials_say(result: lesson.Result) -> Non
 
 
 def test_the_loss_is_that_of_the_two_loops(result: lesson.Result) -> None:
-    """An element that lets go at s loses 4 k s (a - s) in a loop of amplitude a > s."""
+    """An element that slips at s dissipates 4 k s (a - s) in a loop of amplitude a > s."""
     k, s = lesson.K, 0.25 / lesson.K
     A, B, C, D, _ = lesson.TURNS
     outer, inner = (A - B) / 2, (C - D) / 2

@@ -1,6 +1,6 @@
 """Lesson 2: LuGre drifts under a shaken load; GMS does not, with springs only and with real slip.
 
-Held against SciPy for LuGre, and the closed form of the linear oscillator for Table I.
+Compared with SciPy for LuGre, and the closed form of the linear oscillator for Table I.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def F_a(t: float) -> float:
     return ramps + (0.1 * math.sin(4 * math.pi * (t - 4)) if t > 4 else 0.0)
 
 
-def test_lugre_drifts_as_scipy_says(result: lesson.Result) -> None:
+def test_lugre_drifts_as_in_scipy(result: lesson.Result) -> None:
     def flow(t, y):
         _, v, z = y
         s = 1.0 + 0.5 * math.exp(-((v / 1e-3) ** 2))
@@ -59,7 +59,7 @@ def test_table_I_is_a_linear_oscillator(result: lesson.Result) -> None:
     assert np.abs(result.springs.z / result.springs.s).max() < 0.01  # far from any threshold
 
 
-def test_an_element_really_slips_and_then_nothing_drifts(result: lesson.Result) -> None:
+def test_an_element_slips_and_then_nothing_drifts(result: lesson.Result) -> None:
     log = result.slipping.transitions
     assert log.edge.tolist() == ["break_away_forward", "arrest"]
     assert log.element.tolist() == [0, 0]

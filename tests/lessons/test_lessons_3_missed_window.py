@@ -1,6 +1,6 @@
-"""Lesson 3: guards looked at once a step find a reversal only where a sample lies in |v| <= v_c.
+"""Lesson 3: guards evaluated once per step find a reversal only if a sample is in |v| <= v_c.
 
-Which ones they find is foretold from the grid alone; after a missed one z is one exponential.
+The grid alone predicts which ones they find; after a missed one z is a single exponential.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ def result() -> lesson.Result:
 
 
 def met(step: float) -> list[float]:
-    """Reversals at which a multiple of the step lies in the window."""
+    """Return the reversals with a multiple of the step in the window."""
     found = []
     for turn in (10.0, 20.0, 30.0, 40.0, 50.0, 60.0):
         ticks = [step * (round(turn / step) + i) for i in (-1, 0, 1)]
@@ -30,8 +30,8 @@ def met(step: float) -> list[float]:
 
 
 @pytest.mark.slow
-def test_what_is_found_follows_from_the_grid(result: lesson.Result) -> None:
-    """Four break-aways; then at a met reversal four arrests, and until 61 s four more."""
+def test_the_switches_found_follow_from_the_grid(result: lesson.Result) -> None:
+    """Four break-aways; then at a reversal that is hit four arrests, and until 61 s four more."""
     for step, count, reversals in zip(lesson.STEPS, result.counts, result.met, strict=True):
         turns = met(step)
         assert reversals == len(turns)
@@ -52,17 +52,17 @@ def test_located_finds_all_with_the_same_steps(result: lesson.Result) -> None:
     assert 0 < result.late <= lesson.STEP
 
 
-def test_a_missed_reversal_slips_on_with_the_wrong_sign(result: lesson.Result) -> None:
+def test_after_a_missed_reversal_it_slips_with_the_wrong_sign(result: lesson.Result) -> None:
     """From 10 to 20 s element 1 goes from +s to -s as exp(-C t / s) instead of sticking."""
     expected = -0.4 + 0.8 * math.exp(-0.1 * 10 / 0.4)
     assert result.once.z[result.once.t == 20.0, 0] == pytest.approx(expected, abs=0.01)
-    # Located, z sticks and follows x: from +0.4 down by as much, then it slips at -0.4.
+    # With located switches z sticks and follows x from +0.4 to -0.4, where it slips.
     assert result.located.z[result.located.t == 20.0, 0] == pytest.approx(-0.4, abs=0.01)
     assert result.z_error > 0.5
     assert result.F_error > 1.0
 
 
-def test_the_window_is_as_wide_as_said() -> None:
+def test_the_window_has_the_stated_width() -> None:
     grid = np.linspace(10 - 3e-5, 10 + 3e-5, 600_001)
     inside = grid[np.abs(0.2 * np.sin(math.pi * grid / 10)) <= 1e-6]
     assert np.ptp(inside) == pytest.approx(lesson.window_width(), rel=1e-4)

@@ -1,6 +1,6 @@
-"""Lesson 4: with s(v) unsigned for v < 0 the model makes energy; the signed law nearly does not.
+"""Lesson 4: with s(v) unsigned for v < 0 the model creates energy; the signed law hardly does.
 
-The heat is found a second way, as the sum of what the sliders and the dampers turn into heat.
+The heat is computed in a second way, as the sum of the heat of the sliders and the dampers.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ def result() -> lesson.Result:
 
 
 @pytest.mark.slow
-def test_both_laws_are_one_for_forward_motion(result: lesson.Result) -> None:
+def test_both_laws_agree_for_forward_motion(result: lesson.Result) -> None:
     times = np.linspace(0.0, 12.49, 500)
     np.testing.assert_allclose(
         result.published.sample(times).z, result.signed.sample(times).z, rtol=0, atol=1e-9
     )
 
 
-def test_z_runs_away_as_the_eigenvalue_says(result: lesson.Result) -> None:
+def test_z_diverges_as_the_eigenvalue_predicts(result: lesson.Result) -> None:
     """After its break-away at -s: z = s + (z0 - s) exp(+C t / s), until the Stribeck dip."""
     log = result.published.transitions
     first = log[(log.element == 0) & (log.edge == "break_away_backward")][0]
@@ -44,7 +44,7 @@ def test_signed_z_stays_at_its_threshold(result: lesson.Result) -> None:
 
 
 def dissipated(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
-    """Heat by sliders, k z (v - dz), and by dampers, sigma dz v + sigma_2 v^2."""
+    """Return the heat by sliders, k z (v - dz), and by dampers, sigma dz v + sigma_2 v^2."""
     fine, p = trace.refined(lesson.POINTS), lesson.PARAMETERS
     sliders = (p.k * fine.z * (fine.v[:, None] - fine.dz)).sum(axis=1)
     dampers = (p.sigma * fine.dz * fine.v[:, None]).sum(axis=1) + p.sigma_2 * fine.v**2
@@ -64,11 +64,11 @@ def test_the_balance_closes(result: lesson.Result, law: str) -> None:
 def test_heat_vanishes_under_the_published_law(result: lesson.Result) -> None:
     assert result.vanished[0] > 10
     energy = result.published_energy
-    assert energy.stored[-1] > energy.work[-1]  # more than was ever put in
+    assert energy.stored[-1] > energy.work[-1]  # more than was ever supplied
     assert energy.heat.min() < -1
 
 
-def test_the_signed_law_makes_a_little_in_the_stribeck_dip_only(result: lesson.Result) -> None:
+def test_the_signed_law_creates_a_little_only_in_the_stribeck_dip(result: lesson.Result) -> None:
     assert 0 < result.vanished[1] < 0.01
     assert result.outside_dip[1] == pytest.approx(0.0, abs=1e-9)
 

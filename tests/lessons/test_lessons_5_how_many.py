@@ -1,4 +1,4 @@
-"""Lesson 5: n elements miss a parabola by F_c/(4 n^2), and lose nothing in a loop none slips in."""
+"""Lesson 5: n elements approximate a parabola to F_c/(4 n^2); without slip a loop loses nothing."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_its_error_is_a_quarter_over_n_squared(result: lesson.Result) -> None:
     np.testing.assert_allclose(result.errors, expected, rtol=1e-3)
 
 
-def test_a_loop_loses_what_its_slipping_elements_lose(result: lesson.Result) -> None:
+def test_a_loop_loses_the_energy_of_its_slipping_elements(result: lesson.Result) -> None:
     """4 k s (a - s) for each element with s < a."""
     a = lesson.SMALL
     for n, loss in zip(lesson.COUNTS, result.losses, strict=True):
@@ -44,7 +44,7 @@ def test_a_loop_loses_what_its_slipping_elements_lose(result: lesson.Result) -> 
 
 def test_the_smooth_loop_is_masings() -> None:
     a = lesson.SMALL
-    # Upper less lower branch: F_a - 2 f((a - x)/2) falling lies under -F_a + 2 f((a + x)/2).
+    # Area between the rising branch -F_a + 2 f((a + x)/2) and the falling F_a - 2 f((a - x)/2).
     area, _ = quad(
         lambda x: (
             2 * float(lesson.parabola((a + x) / 2))

@@ -1,4 +1,4 @@
-"""Lesson 6: a pulled mass waits for a length over V and slips for a time of its own."""
+"""Lesson 6: a pulled mass waits for a length divided by V; its slip time hardly depends on V."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_waits_are_a_length_over_the_speed_and_slips_are_not(result: lesson.Resu
     assert np.ptp(lengths) < 0.06 * lengths.mean()
     assert result.slips.max() / result.slips.min() < 1.5
     assert (np.diff(result.waits + result.slips) < 0).all()
-    # Between swings of the free mass on its spring, half a period and a whole one.
+    # Between oscillations of the free mass on its spring, half a period and a whole one.
     free = 2 * np.pi * np.sqrt(lesson.MASS / lesson.STIFFNESS)
     assert 0.5 * free < result.slips.min()
     assert result.slips.max() < 1.2 * free
@@ -41,14 +41,14 @@ def test_the_wait_stretches_the_spring_from_the_stop_to_stiction(result: lesson.
     for V, cycle in zip(lesson.SPEEDS, result.cycles, strict=True):
         assert cycle.pull_at_slip == pytest.approx(lesson.F_s, rel=0.04)
         assert cycle.pull_at_stop < lesson.F_c
-        # K (V wait - creep) = rise of the pull; it creeps under the softest element's threshold.
+        # K (V wait - creep) = rise of the pull; the mass creeps below the lowest threshold.
         stretched = (cycle.pull_at_slip - cycle.pull_at_stop) / lesson.STIFFNESS
         creep = V * cycle.wait - stretched
         assert -0.01 < creep < lesson.F_s / 4 / lesson.K.min()
 
 
 def test_over_a_cycle_pull_and_friction_balance(result: lesson.Result) -> None:
-    """Momentum is the same at both ends of a cycle: the mean of pull less friction is zero."""
+    """Momentum is the same at both ends of a cycle: the mean of pull minus friction is zero."""
     trace = result.portrait
     log = trace.transitions
     ends = log.t[(log.element == 3) & (log.edge == "break_away_forward")][-2:]
@@ -58,7 +58,9 @@ def test_over_a_cycle_pull_and_friction_balance(result: lesson.Result) -> None:
     assert np.abs(net).max() > 0.2
 
 
-def test_it_slides_on_without_a_falling_friction_or_when_pulled_fast(result: lesson.Result) -> None:
+def test_it_keeps_sliding_without_falling_friction_or_when_pulled_fast(
+    result: lesson.Result,
+) -> None:
     assert set(result.rests.values()) == {0}
     trace = simulate(
         lesson.bank(), PulledSlider(lesson.MASS, lesson.STIFFNESS, lesson.TOO_FAST), lesson.END

@@ -1,6 +1,6 @@
-"""Lesson 7: friction lags, the loop widens with the frequency up to w = C/s, and closes beyond.
+"""Lesson 7: friction lags, the loop widens with the frequency up to w = C/s, and closes above that.
 
-With shares of one C all elements have one z/s, so the whole bank is dF/dt = C (1 - F/s(v)).
+With shares of one C all elements have one z/s, so the whole model is dF/dt = C (1 - F/s(v)).
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ def s(v):
 
 
 @pytest.mark.parametrize("w", lesson.OMEGAS)
-def test_the_bank_is_one_lag_of_first_order(result: lesson.Result, w: float) -> None:
+def test_the_model_is_a_first_order_lag(result: lesson.Result, w: float) -> None:
     loop = result.loops[w]
 
     def flow(t, F):
         return lesson.C * (1 - F / s(1e-3 * (1.5 + math.cos(w * t))))
 
-    # From any start: after a second it is forgotten, exp(-50 / 1.5) of it is left.
+    # The initial transient has decayed by exp(-50 / 1.5) after a second.
     run = solve_ivp(
         flow,
         (loop.t[0] - 1.0, loop.t[-1]),
@@ -45,7 +45,7 @@ def test_the_bank_is_one_lag_of_first_order(result: lesson.Result, w: float) -> 
     np.testing.assert_allclose(loop.F - 0.4 * loop.v, run.y[0], rtol=0, atol=2e-5)
 
 
-def test_more_friction_on_the_way_up_and_wider_at_the_three_frequencies(
+def test_friction_is_higher_while_accelerating_at_the_three_frequencies(
     result: lesson.Result,
 ) -> None:
     assert (result.widths > 0).all()
@@ -54,7 +54,7 @@ def test_more_friction_on_the_way_up_and_wider_at_the_three_frequencies(
     assert one < ten < twenty_five
 
 
-def test_the_slow_loop_is_as_wide_as_the_delay_says(result: lesson.Result) -> None:
+def test_the_slow_loop_has_the_width_predicted_by_the_delay(result: lesson.Result) -> None:
     """F = s - (s/C) ds/dt for slow changes: width 2 (s/C) |s'(v)| w SWING at the mean speed."""
     v = 1.5e-3
     slope = 0.5 * 2 * v / 1e-6 * math.exp(-((v / 1e-3) ** 2))
@@ -62,7 +62,7 @@ def test_the_slow_loop_is_as_wide_as_the_delay_says(result: lesson.Result) -> No
     assert result.widths[0] == pytest.approx(expected, rel=0.02)
 
 
-def test_the_loop_is_widest_near_C_over_s_and_closes_beyond(result: lesson.Result) -> None:
+def test_the_loop_is_widest_near_C_over_s_and_closes_above(result: lesson.Result) -> None:
     widest = int(result.widths.argmax())
     assert 0.7 < lesson.OMEGAS[widest] * 1.2 / lesson.C < 1.3
     assert (np.diff(result.widths[: widest + 1]) > 0).all()
@@ -70,7 +70,7 @@ def test_the_loop_is_widest_near_C_over_s_and_closes_beyond(result: lesson.Resul
     assert result.widths[-1] < 0.2 * result.widths[widest]
 
 
-def test_every_element_slips_all_along(result: lesson.Result) -> None:
+def test_every_element_slips_throughout(result: lesson.Result) -> None:
     for loop in result.loops.values():
         assert (loop.states == "slip").all()
 

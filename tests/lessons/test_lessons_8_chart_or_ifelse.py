@@ -1,6 +1,6 @@
-"""Lesson 8: chart and if-else agree bit for bit when driven alike; a late look makes the residual.
+"""Lesson 8: chart and if-else code agree bit for bit; late guard evaluation causes the residual.
 
-The spike and what is left after it are foretold from the lateness.
+The spike and the residual after it are predicted from the delay.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def result() -> lesson.Result:
 
 
 @pytest.mark.slow
-def test_driven_alike_they_are_identical(result: lesson.Result) -> None:
+def test_with_the_same_driver_they_are_identical(result: lesson.Result) -> None:
     same_bits(result.chart, result.ifelse)
     same_bits(result.chart_once, result.ifelse_once)
     assert result.differ[0] == result.differ_once[0] == 0
@@ -39,25 +39,25 @@ def test_the_spike_is_the_step_of_F(result: lesson.Result) -> None:
     assert measured == pytest.approx(spike, rel=1e-3)
 
 
-def test_what_is_left_is_in_proportion_to_the_lateness(result: lesson.Result) -> None:
+def test_the_residual_is_proportional_to_the_delay(result: lesson.Result) -> None:
     assert (result.late > 0).all()
     assert (result.late <= lesson.STEPS).all()
     np.testing.assert_allclose(result.left, lesson.predicted(result.late, result.chart), rtol=0.01)
-    # About v late sum k: the way it was stretched too far, in all springs.
+    # About v late sum k: the excess deflection of all springs.
     first = result.chart.transitions[0]
     rough = first.v * result.late * 4 * 0.7
     assert (result.left < rough).all()
     assert (result.left > 0.9 * rough).all()
 
 
-def test_the_papers_size_takes_a_later_switch_than_its_step_allows(result: lesson.Result) -> None:
+def test_the_papers_residual_needs_a_later_switch_than_its_step(result: lesson.Result) -> None:
     assert lesson.PAPER_STEP < result.late_for_the_papers < 4e-3
     assert np.median(result.between(0.0, 4.9)) < 1e-5
     plateau = np.median(result.between(5.0, 12.4))
     assert 2e-5 < plateau < 5e-4
 
 
-def test_looked_at_once_a_step_the_arrests_are_missed(result: lesson.Result) -> None:
+def test_evaluated_once_per_step_the_arrests_are_missed(result: lesson.Result) -> None:
     assert set(result.ifelse_once.transitions.edge) == {"break_away_forward"}
     assert (result.chart.transitions.edge == "arrest").any()
     assert result.between(13.0, lesson.END).max() > 1.0

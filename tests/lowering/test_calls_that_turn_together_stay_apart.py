@@ -1,4 +1,4 @@
-"""Claim: two calls that turn at the same place are each computed, whatever they are called."""
+"""Two calls that turn at the same point are each computed, whatever their names."""
 
 from __future__ import annotations
 

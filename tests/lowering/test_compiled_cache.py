@@ -1,8 +1,8 @@
-"""Machine code is kept on disk, and whatever happens to it there costs time and nothing else.
+"""Machine code is cached on disk, and damage to the cache costs time and nothing else.
 
-Another process does not compile again; two may start at once; an unwritable folder or a damaged
-file is survived, down to a single wrong bit; changed source has another name; programs that were
-compiled in different processes are never taken for each other. Without numba the words say what to
+Another process does not compile again; two may start at the same time; an unwritable folder or a
+damaged file is tolerated, down to a single wrong bit; changed source has another name; programs
+compiled in different processes are never confused. Without numba, the message says what to
 install, and the machines run.
 """
 
@@ -34,7 +34,7 @@ numba = pytest.importorskip("numba", reason="needs the extra fast")
 
 NOTE = "gms-fsm: compiling the engine, once on this machine"
 
-# A whole run, by both engines. A new machine pays some 10 s for it, most of it for the loop.
+# A whole run, by both engines. On a new machine this takes some 10 s, most of it for the loop.
 RUN = """
     from gms_fsm import GMS, GMSParameters, Prescribed, simulate
     model = GMS(GMSParameters.paper("stick-slip"), law="signed")
@@ -45,7 +45,7 @@ RUN = """
     assert one.transitions.tobytes() == other.transitions.tobytes()
     print("equal", len(one.transitions))
 """
-# One function of one program: a second. The velocities are such that a mix-up is seen.
+# One function of one program: a second. The velocities are chosen so that a mix-up is visible.
 ROWS = """
     import sys
     import numpy as np
@@ -70,7 +70,7 @@ def _start(code: str, *arguments: str, **environment: str) -> subprocess.Popen[s
     return subprocess.Popen(
         [sys.executable, "-W", "error", "-c", textwrap.dedent(code), *arguments],
         cwd=ROOT,
-        env={**os.environ, "NUMBA_OPT": "0", **environment},  # half of the time to compile
+        env={**os.environ, "NUMBA_OPT": "0", **environment},  # halves the compilation time
         text=True,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -78,7 +78,7 @@ def _start(code: str, *arguments: str, **environment: str) -> subprocess.Popen[s
 
 
 def _ended(process: subprocess.Popen[str]) -> tuple[str, str]:
-    """Return what a process said, on both channels; it must have ended well."""
+    """Return a process's output on both streams; it must have ended successfully."""
     out, err = process.communicate()
     assert process.returncode == 0, err
     return out, err
@@ -97,7 +97,7 @@ def _kept(folder: Path) -> set[Path]:
 # --------------------------------------------------------------------------- once on this machine
 @pytest.fixture(scope="module")
 def warm(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """A new cache folder after a first run, and what this said on the side."""
+    """A new cache folder after a first run, and what that run wrote to standard error."""
     folder = tmp_path_factory.mktemp("cache")
     out, err = _ended(_start(RUN, NUMBA_CACHE_DIR=str(folder)))
     assert out == "equal 24\n"
@@ -125,7 +125,7 @@ def test_the_next_process_does_not_compile_again(warm: tuple[Path, str]) -> None
 
 
 def test_a_damaged_cache_only_costs_time(warm: tuple[Path, str]) -> None:
-    """Every file of it: garbage, or cut short. The loop, which takes 10 s, is only looked at."""
+    """Every file of it is garbage, or truncated. The loop is not compiled again (10 s)."""
     folder, _ = warm
     for turn, path in enumerate(sorted(_kept(folder))):
         content = path.read_bytes()
@@ -138,8 +138,8 @@ def test_a_damaged_cache_only_costs_time(warm: tuple[Path, str]) -> None:
     assert "Traceback" not in err
 
 
-def test_a_wrong_bit_anywhere_is_found_before_the_code_is_loaded(warm: tuple[Path, str]) -> None:
-    """Unfound, every fifth of them ends the process. Each process here has one in each file."""
+def test_a_wrong_bit_anywhere_is_detected_before_the_code_is_loaded(warm: tuple[Path, str]) -> None:
+    """Undetected, one in five crashes the process. Each process here has one in each file."""
     folder, source = warm[0], random.Random(14)
     whole = _kept(folder)
     for _ in range(3):
@@ -148,7 +148,7 @@ def test_a_wrong_bit_anywhere_is_found_before_the_code_is_loaded(warm: tuple[Pat
             _flip(path, source)
         assert _ended(_start(RUN, NUMBA_CACHE_DIR=str(folder))) == ("equal 24\n", "")
         assert _kept(folder) == set(whole)
-        assert all(Store(path.parent).get(path.name) for path in whole), "all are made anew"
+        assert all(Store(path.parent).get(path.name) for path in whole), "all are recreated"
 
 
 # --------------------------------------------------------------------------- damage of every kind
@@ -159,7 +159,7 @@ def _forget_all() -> None:
 
 @pytest.fixture
 def observe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], Any]]:
-    """Compile one function of a program as a new process would, with a cache of its own; try it."""
+    """Return a function that compiles and tries one function, as a new process would."""
     monkeypatch.setattr(compiled, "store", lambda: Store.at(tmp_path))
     program = lower(stick_slip("signed"), Prescribed("0.1*t"))
     y, mode = [0.1, 0.2, 0.3, 0.2, 0.1], [0, 1, 0, 1]
@@ -208,14 +208,14 @@ def _another_kind(path: Path) -> None:
 
 
 def _another_name(path: Path) -> None:
-    """What is whole, but was kept for another function."""
+    """A complete file that was stored for another function."""
     Store(path.parent).put("other", b"content")
     path.write_bytes((path.parent / "other").read_bytes())
     (path.parent / "other").unlink()
 
 
 def _unreadable(path: Path) -> None:
-    """What was put there whole, by somebody whose bytes mean something else."""
+    """A complete file whose content has another meaning."""
     Store(path.parent).put(path.name, b"something else")
 
 
@@ -223,7 +223,7 @@ DAMAGES = [_flipped, _truncated, _empty, _garbage, _another_name, _unreadable]
 
 
 @pytest.mark.parametrize("damage", [*DAMAGES, _another_kind])
-def test_a_damaged_file_is_survived(
+def test_a_damaged_file_is_tolerated(
     damage: Callable[[Path], None], observe: Callable[[], Any], tmp_path: Path
 ) -> None:
     observe()
@@ -233,7 +233,7 @@ def test_a_damaged_file_is_survived(
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_cache_is_made_anew(
+def test_a_damaged_cache_is_rebuilt(
     damage: Callable[[Path], None], observe: Callable[[], Any], tmp_path: Path
 ) -> None:
     """It costs the time once, not each time."""
@@ -256,8 +256,8 @@ def test_a_folder_that_cannot_be_written_only_costs_time(tmp_path: Path) -> None
 
 
 # --------------------------------------------------------------------------- no mix-up
-def test_programs_compiled_in_different_processes_are_told_apart(tmp_path: Path) -> None:
-    """Each is the first that its process compiles; a third loads both and uses both again."""
+def test_programs_compiled_in_different_processes_are_not_confused(tmp_path: Path) -> None:
+    """Each is the first that its process compiles; a third process loads and uses both twice."""
     velocities = "0.1*t", "0.2*sin(t)"
     for velocity in velocities:
         _rows(tmp_path, velocity)
@@ -270,7 +270,7 @@ def test_the_names_are_the_same_in_every_process(tmp_path: Path) -> None:
     for seed in ("0", "1", "random"):
         out, _ = _ended(_start(ROWS, "0.1*t", NUMBA_CACHE_DIR=str(tmp_path), PYTHONHASHSEED=seed))
         assert out == "equal\n"
-    assert len(_kept(tmp_path)) == 2  # the program's observe, and what calls it for each row
+    assert len(_kept(tmp_path)) == 2  # the program's observe, and its caller for each row
 
 
 # --------------------------------------------------------------------------- changed source
@@ -293,7 +293,7 @@ def _changes(patch: pytest.MonkeyPatch) -> dict[str, Callable[[], None]]:
     }
 
 
-def test_changed_source_is_another_edition() -> None:
+def test_changed_source_changes_the_edition() -> None:
     usual = machine.edition()
     found = {"nothing": usual}
     with pytest.MonkeyPatch.context() as patch:
@@ -306,13 +306,13 @@ def test_changed_source_is_another_edition() -> None:
     assert machine.edition() == usual
 
 
-def test_another_edition_signature_option_or_numba_is_kept_under_another_name(
+def test_another_edition_signature_option_or_numba_changes_the_name(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     from numba.core.registry import cpu_target
 
     def name(signature: Any = "iifVIP", function: Any = _other) -> str:
-        return machine._Kept(function, None, machine._silent)._name(
+        return machine._VerifiedCache(function, None, machine._silent)._name(
             signature, cpu_target.target_context
         )
 
@@ -332,7 +332,7 @@ def test_another_edition_signature_option_or_numba_is_kept_under_another_name(
     assert name() == found[0]
 
 
-def test_a_digest_follows_code_and_constants_but_not_the_place() -> None:
+def test_a_digest_depends_on_code_and_constants_but_not_on_the_file() -> None:
     def function(text: str) -> Callable[..., Any]:
         names: dict[str, Any] = {}
         exec(compile(text, "<one>", "exec"), names)
@@ -354,8 +354,8 @@ def test_a_digest_follows_code_and_constants_but_not_the_place() -> None:
 
 
 # --------------------------------------------------------------------------- several threads
-def test_settings_of_numba_are_as_they_were_whoever_compiles() -> None:
-    """Many threads compile at once; the user's own numba functions must not notice."""
+def test_compiling_leaves_numbas_settings_unchanged() -> None:
+    """Many threads compile at once; the user's own numba functions must not be affected."""
     code = """
         import threading
         import numba
@@ -417,7 +417,9 @@ WITHOUT = """
 
 
 @pytest.mark.parametrize("absent", [["numba"], ["platformdirs"]])
-def test_without_the_extra_the_words_say_what_to_install(absent: list[str], tmp_path: Path) -> None:
+def test_without_the_extra_the_message_says_what_to_install(
+    absent: list[str], tmp_path: Path
+) -> None:
     trace = simulate(stick_slip("signed"), open_loop(), 3.0, engine="compiled")
     path = trace.save(tmp_path / "compiled.npz")
     out, err = _ended(_start(WITHOUT.format(absent=absent), str(path)))
@@ -426,7 +428,7 @@ def test_without_the_extra_the_words_say_what_to_install(absent: list[str], tmp_
     for line in said:
         for word in (absent[0], "not installed", "gms-fsm[fast]", "engine='machines'"):
             assert word in line
-    assert loaded == f"{float(trace.F[-1])} 1", "what was computed with it is read without it"
+    assert loaded == f"{float(trace.F[-1])} 1", "results computed with it are readable without it"
     assert err == ""
 
 

@@ -1,7 +1,7 @@
-"""The generated program is text a person can read, search, and step through with a debugger.
+"""The generated program is text that a person can read, search, and step through with a debugger.
 
-It holds the guards as the chart writes them and no number of the user's; a traceback through it
-shows its lines; `inspect` finds its source.
+It contains the guards as the chart writes them and no values chosen by the user; a traceback
+through it shows its lines; `inspect` finds its source.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ LUGRE = LuGre(sigma_0=1234.5, sigma_1=31.625, sigma_2=4.125, stribeck=Stribeck(1
 
 
 def odd_numbers(n: int, seed: int) -> GMS:
-    """A bank whose parameters are like no number a program needs."""
+    """A bank whose parameters differ from every number that a program contains."""
     random = np.random.default_rng(seed)
     parameters = GMSParameters(
         *random.uniform(0.1, 0.9, (3, n)),
@@ -60,7 +60,7 @@ def _numbers(source: str) -> set[float]:
 
 
 @pytest.mark.parametrize(("model", "rig"), CASES)
-def test_guards_stand_in_it_as_the_chart_writes_them(model: Model, rig: Rig) -> None:
+def test_guards_appear_as_in_the_chart(model: Model, rig: Rig) -> None:
     source = lower(model, rig).source
     for edge in model.chart.transitions:
         assert spell(model.chart.guards[edge.name]) == edge.guard
@@ -71,7 +71,7 @@ def test_guards_stand_in_it_as_the_chart_writes_them(model: Model, rig: Rig) -> 
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_flows_stand_in_it_as_the_chart_writes_them(law: str) -> None:
+def test_flows_appear_as_in_the_chart(law: str) -> None:
     source = lower(stick_slip(law), open_loop()).source
     rate = {
         "published": "dz = sgn_v * C[i] * (1.0 - z / s)",
@@ -90,7 +90,7 @@ def test_one_text_serves_every_parameter_set_and_every_number_of_elements() -> N
     assert len(texts) == 1
 
 
-def test_no_number_of_the_users_is_in_the_text() -> None:
+def test_no_user_value_is_in_the_text() -> None:
     model, rig = odd_numbers(4, seed=3), Slider(0.7351, [(0.123, 0.456), (0.789, 0.987)])
     p = model.parameters
     theirs = {
@@ -154,7 +154,7 @@ def test_a_traceback_shows_the_line_that_failed() -> None:
 
 
 def _stepped(program: Program, name: str, *arguments: Any) -> list[str]:
-    """Run a function under a tracer, as a debugger does, and return the lines it saw."""
+    """Run a function under a tracer, as a debugger does, and return the lines visited."""
     filename, seen = program.functions[name].__code__.co_filename, []
 
     def tracer(frame: FrameType, event: str, _: Any) -> Any:
@@ -182,7 +182,7 @@ def test_a_debugger_steps_through_a_decision() -> None:
     assert "" not in seen
 
 
-def test_names_that_would_end_a_comment_or_a_string_stay_inside() -> None:
+def test_names_cannot_end_a_comment_or_a_string() -> None:
     chart = gms_element("signed")
     hostile = 'x\nimport os  # """ \\ \r\u2028raise SystemExit'
     renamed = dataclasses.replace(chart, name=hostile)
@@ -194,7 +194,7 @@ def test_names_that_would_end_a_comment_or_a_string_stay_inside() -> None:
     assert source.splitlines()[0].startswith("# x import os")
 
 
-def test_powers_are_products_and_fractions_are_no_integers() -> None:
+def test_powers_are_products_and_fractions_are_not_integers() -> None:
     chart = Chart(
         "cubic",
         ("v",),

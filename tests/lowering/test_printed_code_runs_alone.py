@@ -1,7 +1,7 @@
-"""The text that ``gms-fsm code`` prints is a program of its own, and computes what the engine does.
+"""The text printed by ``gms-fsm code`` is a standalone program that computes what the engine does.
 
-It runs in a fresh Python that sees neither gms-fsm nor numpy (``python -I -S``), on states of a
-run, and its flow, its choice of edges and what it observes are compared to the last bit.
+It runs in a fresh Python that sees neither gms-fsm nor numpy (``python -I -S``), on states from a
+run, and its flow, its choice of edges and its observed values are compared to the last bit.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ RIGS: dict[str, Rig] = {
     "slider": Slider(1.0, paper.FORCE),
     "pulled": PulledSlider(1.0, 2.0, 0.1),
 }
-# What a fresh process computes for each state, printed so that no bit is lost.
+# The computations of a fresh process for each state, printed without losing a bit.
 ASK = """
 import json, sys
 results = []
@@ -59,7 +59,7 @@ print(sorted(name for name in sys.modules if name.partition(".")[0] in ("numpy",
 
 
 def _states(model: Model, rig: Rig, program: Program, t_end: float) -> list[list[Any]]:
-    """Some states of a run, with the signs that hold there."""
+    """Return some states of a run, with the signs frozen there."""
     trace = simulate(model, rig, t_end)
     rows = range(0, len(trace), max(1, len(trace) // 40))
     states = []
@@ -97,7 +97,7 @@ def _compare(model: Model, rig: Rig, text: str, t_end: float) -> None:
     )
     assert done.returncode == 0, done.stderr
     numbers, modules = done.stdout.splitlines()
-    assert modules == "[]", "it stands alone"
+    assert modules == "[]", "it is standalone"
     assert json.loads(numbers) == _engine(program, states, seen)
 
 
@@ -143,7 +143,7 @@ def _rough() -> ChartModel:
     ],
     ids=["ramps", "record", "every function", "LuGre"],
 )
-def test_texts_of_other_models(model: Model, rig: Rig, t_end: float) -> None:
+def test_printed_programs_of_other_models(model: Model, rig: Rig, t_end: float) -> None:
     _compare(model, rig, standalone(lower(model, rig).source), t_end)
 
 

@@ -1,7 +1,7 @@
-"""A generated function reads just the names that it uses: what the plan says is what is printed.
+"""A generated function reads exactly the names that it uses: the plan agrees with the printed text.
 
-The plan finds them from the trees, the printer writes the text; here the text's own syntax tree is
-asked whether the two agree.
+The plan derives them from the trees, the printer writes the text; this test compares both using the
+text's own syntax tree.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from tests.helpers import stick_slip
 
 
 def own(flow: str, force: str) -> ChartModel:
-    """Return a model with names of the rig's and of the text's, two variables and one state."""
+    """Return a model with names from the rig and from the text, two variables and one state."""
     chart = Chart(
         "own",
         ("t", "x", "v", "s"),
@@ -45,7 +45,7 @@ RIGS = {
     "pushed": Slider(1.0, [(0, 0), (1, 1)]),
     "pulled": PulledSlider(1.0, 2.0, 0.1),
 }
-TOGETHER = {"shared", "own", "tables"}  # unpacked from one tuple, whichever is wanted
+TOGETHER = {"shared", "own", "tables"}  # unpacked from one tuple, whichever is needed
 SUPPLIED = {*NAMESPACE, "len", "range", "nan", "piecewise_linear", "piecewise_slope", "v_signal"}
 
 
@@ -60,7 +60,7 @@ def assigned_and_used(node: ast.AST) -> tuple[set[str], set[str]]:
 
 
 def disagreements(source: str) -> list[tuple[str, set[str]]]:
-    """Return for each function the names read in vain, or used without being read."""
+    """Return for each function the names read but not used, or used without being read."""
     module = ast.parse(source)
     known = set(SUPPLIED)
     for each in module.body:
@@ -82,7 +82,7 @@ def disagreements(source: str) -> list[tuple[str, set[str]]]:
 
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("rig", RIGS)
-def test_what_is_read_is_used_and_the_other_way_round(model: str, rig: str) -> None:
+def test_names_are_read_exactly_if_used(model: str, rig: str) -> None:
     assert disagreements(lower(MODELS[model], RIGS[rig]).source) == []
 
 

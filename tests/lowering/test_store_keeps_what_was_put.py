@@ -1,7 +1,7 @@
-"""A store gives back what was put into it, to the last bit, or nothing; whoever uses it at once.
+"""A store returns exactly what was put into it, or nothing, even with several users at once.
 
-One bit anywhere is found, in name, checksum and content. What it finds damaged it removes, so that
-it is made anew. It does not know what the bytes are.
+Every wrong bit is detected, in name, checksum and content. Damaged files are removed, so that they
+are recreated. The store does not interpret its contents.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def store(tmp_path: Path) -> Store:
     return made
 
 
-def test_every_single_bit_is_looked_at(store: Store) -> None:
+def test_every_single_bit_is_checked(store: Store) -> None:
     store.put("one", CONTENT)
     path = store.folder / "one"
     whole = path.read_bytes()
@@ -39,26 +39,26 @@ def test_every_single_bit_is_looked_at(store: Store) -> None:
 
 
 @pytest.mark.parametrize("length", [0, 1, 31, 32, 33, 331])
-def test_what_is_cut_short_is_not_whole(store: Store, length: int) -> None:
+def test_a_truncated_file_is_refused(store: Store, length: int) -> None:
     store.put("one", CONTENT)
     path = store.folder / "one"
     path.write_bytes(path.read_bytes()[:length])
     assert store.get("one") is None
 
 
-def test_nothing_is_something_too(store: Store) -> None:
+def test_empty_content_can_be_stored(store: Store) -> None:
     assert store.get("none") is None
     store.put("none", b"")
     assert store.get("none") == b""
 
 
-def test_a_file_does_not_stand_for_another(store: Store) -> None:
+def test_a_file_cannot_replace_another(store: Store) -> None:
     store.put("one", CONTENT)
     (store.folder / "one").rename(store.folder / "two")
     assert store.get("two") is None
 
 
-def test_a_full_disk_keeps_nothing_and_says_nothing(
+def test_on_a_full_disk_nothing_is_stored_or_raised(
     store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*_: object) -> None:
@@ -70,7 +70,7 @@ def test_a_full_disk_keeps_nothing_and_says_nothing(
     assert list(store.folder.iterdir()) == []
 
 
-def test_threads_that_write_and_read_at_once_see_whole_things(store: Store) -> None:
+def test_concurrent_readers_see_only_complete_content(store: Store) -> None:
     contents = [bytes([number]) * 100_000 for number in range(3)]
     store.put("one", contents[0])
     wrong: list[int] = []

@@ -1,6 +1,6 @@
 """By default every component has a tolerance from the model's own scales, and from nothing else.
 
-The cases ended wrong, without a word, with one absolute tolerance for all components.
+With one absolute tolerance for all components, these cases gave wrong results without warning.
 """
 
 import numpy as np
@@ -86,8 +86,8 @@ def test_without_guards_the_scale_is_the_deflection_that_carries_the_friction():
         ("t > 3", 0.0),
     ],
 )
-def test_charts_of_ones_own_have_the_scales_of_their_guards(guard, scale):
-    """How far from 0 a comparison turns, by its slope; one that turns at 0 has none."""
+def test_user_defined_charts_have_the_scales_of_their_guards(guard, scale):
+    """How far from 0 a comparison turns, by its slope; one that turns at 0 has no scale."""
     chart = Chart(
         "own",
         inputs=("t", "v"),
@@ -99,12 +99,12 @@ def test_charts_of_ones_own_have_the_scales_of_their_guards(guard, scale):
     )
     scales = scales_of(ChartModel(chart, {"k": 100.0}))
     assert scales.variables["z"] == pytest.approx((scale,))
-    assert scales.x == pytest.approx(scale / 2.0)  # x follows z at half its pace
+    assert scales.x == pytest.approx(scale / 2.0)  # x follows z at half its rate
 
 
 @pytest.mark.parametrize("length", [1.0, 1e-6, 1e6])
 def test_a_component_without_a_scale_is_measured_by_its_own_size(length):
-    """A spring and a mass: v and x by their largest values, whatever the unit."""
+    """A spring and a mass: v and x are measured by their largest values, whatever the unit."""
     spring = Chart(
         "spring",
         inputs=("x",),
@@ -148,12 +148,12 @@ def test_a_tolerance_may_be_a_number_or_given_by_name():
         ("fine", "atol is 'fine'; it must be a number"),
     ],
 )
-def test_what_is_no_tolerance_is_refused(atol, says):
+def test_an_invalid_tolerance_is_refused(atol, says):
     with pytest.raises(ParameterError, match=says):
         simulate(pulled_mass()[0], PulledSlider(1.0, 2.0, 0.1), 1.0, atol=atol)
 
 
-def test_a_foreign_solver_asks_for_a_tolerance_where_there_is_no_scale():
+def test_a_scipy_solver_requires_a_tolerance_for_components_without_scale():
     """SciPy's own error norm divides by it."""
     from scipy.integrate import RK45
 
@@ -174,7 +174,7 @@ def test_a_foreign_solver_asks_for_a_tolerance_where_there_is_no_scale():
 
 @pytest.mark.parametrize("engine", ["ifelse", "compiled"])
 def test_each_run_of_a_sweep_has_the_tolerances_of_its_own_model(engine):
-    """Its buffers serve one run after the other."""
+    """The same buffers serve one run after the other."""
     pytest.importorskip("numba", reason="needs the extra fast")
     p = pulled_mass()[0].parameters
     weights = np.array([1e-6 * p.weights, p.weights])
@@ -209,7 +209,7 @@ def test_a_scenario_takes_both_forms(tmp_path):
     from gms_fsm.app.scenario import load_scenario
 
     path = ROOT / "scenarios" / "pulled_mass.toml"
-    assert load_scenario(path).arguments["atol"] is None
+    assert "atol" not in load_scenario(path).arguments
     assert load_scenario(path, ["run.atol=1e-8"]).arguments["atol"] == 1e-8
     named = load_scenario(path, ["run.atol={ v = 1e-9, z = [1e-9, 1e-9, 1e-9, 1e-9] }"])
     assert named.arguments["atol"] == {"v": 1e-9, "z": [1e-9] * 4}

@@ -1,7 +1,7 @@
-"""simulate agrees with an oracle of the guards and flows written by hand, on random small models.
+"""simulate agrees with a hand-written oracle of the guards and flows, on random small models.
 
-The oracle is plain Python if-else: elements one by one (in open loop they do not meet), sticking
-in closed form, slipping by SciPy's DOP853 between all places where anything changes its form.
+The oracle is plain Python if-else: elements one by one (in open loop they are independent),
+sticking in closed form, slipping by SciPy's DOP853 between all points where the equations change.
 """
 
 import math
@@ -23,7 +23,7 @@ V_C = 1e-4
 
 
 def pieces(times, speeds, v_s):
-    """Cut the ramps where v passes v_c, 0 or a mark of the Stribeck dip; all cuts are exact."""
+    """Cut the ramps where v passes v_c, 0 or a landmark of the Stribeck dip; all cuts are exact."""
     marks = [m * v_s for m in (0.5, 1, 1.5, 2, 3, 4.5, 6.5)]
     levels = [0.0] + [sign * u for u in (V_C, *marks) for sign in (1, -1)]
     cuts = set(times)
@@ -104,7 +104,7 @@ def bank(law, C, weights, F_c, F_s, v_s, times, speeds):
 
 @st.composite
 def cases(draw):
-    """Draw gentle numbers; the odd fractions keep ties (v resting on a level) out of the draw."""
+    """Draw moderate numbers; the odd fractions avoid ties (v resting on a level)."""
 
     def number(low, high):
         return low + (high - low) * (draw(st.integers(1, 998)) + 0.382) / 1000
@@ -124,7 +124,7 @@ def cases(draw):
     }
 
 
-# No shrinking: the oracle is slow, and the example as drawn says as much.
+# No shrinking: the oracle is slow, and the example as drawn is just as informative.
 @settings(
     max_examples=50,
     deadline=None,
@@ -136,7 +136,7 @@ def cases(draw):
 def test_same_events_same_deflections(case):
     """The same sequence of (element, edge), times to 1e-6, z to 1e-6."""
     events, z = bank(**case)
-    # A case where a millionth of the threshold decides is no test of either side.
+    # A case decided by a millionth of the threshold tests neither side.
     for nudge in (1 - 1e-6, 1 + 1e-6):
         near, _ = bank(**case | {"weights": [w * nudge for w in case["weights"]]})
         assume([e[1:] for e in near] == [e[1:] for e in events])
@@ -165,8 +165,8 @@ def test_same_events_same_deflections(case):
     np.testing.assert_allclose(trace.z[-1], z, rtol=0, atol=1e-6 * max(1.0, np.abs(z).max()))
 
 
-def test_the_oracle_meets_all_edges():
-    """The comparison is about something: a known case takes all three edges."""
+def test_the_oracle_takes_all_edges():
+    """The comparison is meaningful: a known case takes all three edges."""
     events, _ = bank(
         "signed",
         [0.1, 0.3],
@@ -184,8 +184,8 @@ def test_the_oracle_meets_all_edges():
     }
 
 
-def test_a_break_away_beside_a_reversal_is_met_in_one_long_step():
-    """While it sticks z is a parabola, so steps are as long as they like; s has a narrow peak."""
+def test_a_break_away_near_a_reversal_is_found_in_one_long_step():
+    """While it sticks, z is a parabola, so steps have any length; s has a narrow peak."""
     case = {
         "law": "signed",
         "C": [0.17100516],

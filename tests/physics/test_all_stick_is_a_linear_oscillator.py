@@ -1,4 +1,4 @@
-"""While every element sticks the slider is a linear oscillator, and Fig. 3 is one from end to end.
+"""While every element sticks, the slider is a linear oscillator, and Fig. 3 is one throughout.
 
 m x'' + (sum sigma_i + sigma_2) x' + (sum k_i) x = F_a(t): a ramp up, a ramp down and a sine on a
 constant, each solved by a matrix exponential.
@@ -53,7 +53,7 @@ def test_fig_3_is_the_closed_form(law):
     np.testing.assert_allclose(trace.F, K * x + D * v, rtol=0, atol=1e-9)
 
 
-def test_default_tolerances_keep_a_micrometre():
+def test_default_tolerances_are_accurate_to_1e_8_m():
     """At rtol 1e-6, atol 1e-9 the run stays within 1e-8 m of the closed form."""
     model, _ = non_drifting("signed")
     times = np.linspace(0.0, 30.0, 301)
@@ -61,8 +61,8 @@ def test_default_tolerances_keep_a_micrometre():
     assert np.abs(trace.x - closed_form(times)[0]).max() < 1e-8
 
 
-def test_the_band_of_x_is_the_known_one():
-    """In every cycle x runs between 1.769 and 2.732 mm: the spring does not drift."""
+def test_x_stays_in_the_known_range():
+    """In every cycle x oscillates between 1.769 and 2.732 mm: the spring does not drift."""
     model, rig = non_drifting("published")
     for first in (10.0, 29.0):
         times = np.linspace(first, first + 1.0, 2001)

@@ -1,6 +1,6 @@
 """All lengths, forces or times of a run times 2^e, -40 <= e <= 20: the same sequence of switches.
 
-And the same bits but for the factors: a power of two changes no digit.
+The bits are also the same except for the factors: a power of two changes no digit.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def test_shipped_scenarios(shipped: Case, axis: str) -> None:
 
 @pytest.mark.parametrize("length", [1e-6, 1e-9, 2.0**-30])
 def test_pulled_mass_of_any_size(length: float) -> None:
-    """A factor that is no power of two rounds, and still makes 72 transitions."""
+    """A factor that is not a power of two rounds, and still gives 72 transitions."""
     model, rig = pulled_mass()
     case = scaled(Case(model, rig, {"t_end": 60.0}), length=length)
     assert len(case.run(engine_for(rig)).transitions) == 72
@@ -79,7 +79,7 @@ def test_pulled_mass_of_any_size(length: float) -> None:
     ],
 )
 def test_fixed_steps_scale_to_the_bit(axis: str, rig: Rig) -> None:
-    """Without tolerances there is nothing to set but the units: `scaled` has them right."""
+    """Without tolerances only the units matter: `scaled` has them right."""
     model, _ = pulled_mass()
     lugre = LuGre(sigma_0=40.0, sigma_1=1.0, sigma_2=0.4, stribeck=Stribeck(1.0, 1.5, 0.05))
     for each in (model, lugre):
@@ -90,8 +90,8 @@ def test_fixed_steps_scale_to_the_bit(axis: str, rig: Rig) -> None:
         assert other_bits(scaled(case, **by).run("ifelse"), case.run("ifelse"), **by) == []
 
 
-def test_a_wrong_unit_is_seen() -> None:
-    """The comparison is about something: a stiffness that is not scaled changes the bits."""
+def test_a_wrong_unit_is_detected() -> None:
+    """The comparison is meaningful: a stiffness that is not scaled changes the bits."""
     model, rig = pulled_mass()
     case = Case(model, rig, {"method": "rk4", "step": 0.01, "t_end": 9.0, "events": "step"})
     by = factors("length", -7)

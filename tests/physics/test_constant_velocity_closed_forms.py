@@ -16,7 +16,7 @@ from tests.helpers import event_sequence, one_element
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 METHODS = [{"method": "dp45"}, {"method": "bs23"}, {"method": DOP853}]
 F_c, F_s, v_s, C, sigma = 1.0, 1.5, 0.05, 0.4, 0.3
-# Far outside of the Stribeck dip, and inside it, where s lies between F_c and F_s.
+# Far outside the Stribeck dip, and inside it, where s is between F_c and F_s.
 VELOCITIES = [0.3, -0.3, 0.04, -0.04]
 
 

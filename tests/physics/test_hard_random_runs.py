@@ -1,9 +1,9 @@
-"""Random charts, parameters, signals and steps keep the laws that every run keeps.
+"""Random charts, parameters, signals and steps satisfy the invariants of every run.
 
-Time does not go back; rows and log tell one story; no guard is overdue; the signed law is mirror
+Time does not go backward; rows and log agree; no guard is overdue; the signed law is mirror
 symmetric; pieces of constant v are closed forms to 1e-9; the engines agree to the bit; and a run
-that cannot go on says so by a `GMSError` that holds the part before. GMS_FSM_EXAMPLES asks for more
-examples, drawn anew, as tests/soak.py does.
+that cannot continue raises a `GMSError` that has the part before. GMS_FSM_EXAMPLES requests more
+examples, drawn at random, as tests/soak.py does.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ HAS_NUMBA = bool(importlib.util.find_spec("numba"))
 
 
 def hard(examples: int, most: int = 10**9) -> Any:
-    """Settings: a fixed set of examples, or new ones as GMS_FSM_EXAMPLES says, at most so many."""
+    """Return settings: fixed examples, or GMS_FSM_EXAMPLES new ones, but not more than `most`."""
     return settings(
         max_examples=min(EXAMPLES, most) or examples,
         derandomize=not EXAMPLES,
@@ -57,11 +57,11 @@ def hard(examples: int, most: int = 10**9) -> Any:
 
 
 def rounded(low: float, high: float) -> st.SearchStrategy[float]:
-    """Numbers of three digits, evenly spread; they land on boundaries now and then."""
+    """Numbers with three digits, evenly spread; they occasionally fall on boundaries."""
     return st.integers(0, 1000).map(lambda i: float(f"{low + (high - low) * i / 1000:.3g}"))
 
 
-# --------------------------------------------------------------------------- what is run
+# --------------------------------------------------------------------------- strategies
 FLOWS = [
     "v",
     "0",
@@ -161,7 +161,7 @@ def banks(draw: st.DrawFn, law: str | None = None) -> GMS:
 
 @st.composite
 def ramps(draw: st.DrawFn, jumps: bool = False) -> list[tuple[float, float]]:
-    """Corners of a velocity or a force; with `jumps` some of them vertical."""
+    """Corners of a velocity or a force; with `jumps`, some segments are vertical."""
     waits = draw(st.lists(rounded(0.05, 2), min_size=2, max_size=6))
     times = np.concatenate([[0.0], np.cumsum(waits)]).tolist()
     corners = [(t, draw(rounded(-0.6, 0.6))) for t in times]
@@ -201,7 +201,7 @@ def signals(draw: st.DrawFn) -> Any:
 
 @st.composite
 def rigs(draw: st.DrawFn) -> Any:
-    """Open loop mostly."""
+    """Mostly open loop."""
     kind = draw(st.sampled_from([0, 0, 0, 1, 2]))
     mass = draw(rounded(0.2, 3))
     if kind == 1:
@@ -232,15 +232,15 @@ def options(draw: st.DrawFn) -> dict[str, Any]:
     return found
 
 
-# --------------------------------------------------------------------------- the laws of any run
+# --------------------------------------------------------------------------- invariants of any run
 def a_message(error: GMSError) -> None:
-    """Assert that an error says something, in a few lines."""
+    """Assert that an error has a text of a few lines."""
     assert str(error).strip()
     assert len(str(error)) < 2000
 
 
 def attempt(model: Any, rig: Any, t_end: float, **given: Any) -> tuple[Trace, str]:
-    """Run; return the trace, also of a run that stops, and the kind of its end."""
+    """Run; return the trace, even of a run that stops, and how it ended."""
     try:
         # Some of these charts chatter, fast but above every tolerance.
         return simulate(model, rig, t_end, max_steps=30_000, **given), "end"
@@ -250,7 +250,7 @@ def attempt(model: Any, rig: Any, t_end: float, **given: Any) -> tuple[Trace, st
 
 
 def onto_or_off_a_surface(trace: Trace) -> Any:
-    """Tell which rows show that a slide begins or ends: at the micro-step of the row before."""
+    """Return the rows at which sliding begins or ends: at the micro-step of the previous row."""
     changes = (np.diff(trace.rows.mode[:, trace.n :], axis=0) != 0).any(axis=1)
     return np.concatenate([[False], changes])
 
@@ -286,7 +286,7 @@ def rows_and_log_agree(trace: Trace) -> None:
 
 
 def guards_say_so(trace: Trace) -> None:
-    """A firing's guard was true, no guard before it in its state was."""
+    """A firing's guard was true, and no guard with higher priority in its state was."""
     for row in np.flatnonzero((trace.microstep > 0) & ~onto_or_off_a_surface(trace)).tolist():
         i = int(np.flatnonzero(trace.modes[row] != trace.modes[row - 1])[0])
         edges = explain(trace, row, i)
@@ -296,7 +296,7 @@ def guards_say_so(trace: Trace) -> None:
 
 
 def nothing_is_overdue(trace: Trace) -> None:
-    """Where the run went on, no edge was enabled."""
+    """Where the run continued, no edge was enabled."""
     last_at_a_time = np.flatnonzero(np.diff(trace.t) > 0)
     for row in last_at_a_time.tolist():
         for i in range(trace.n):
@@ -312,7 +312,7 @@ def _asked(trace: Trace, row: int, i: int) -> list[Explanation]:
 
 
 def lawful(trace: Trace, end: str, t_end: float, located: bool) -> None:
-    """Assert all that every run keeps."""
+    """Assert all invariants of a run."""
     rows_and_log_agree(trace)
     guards_say_so(trace)
     if located:
@@ -326,7 +326,7 @@ def lawful(trace: Trace, end: str, t_end: float, located: bool) -> None:
 
 
 def fired(trace: Trace) -> None:
-    """Tell the statistics how many transitions there were."""
+    """Report the number of transitions to the statistics."""
     count = len(trace.transitions)
     event(f"transitions: {count if count < 3 else '3 or more' if count < 10 else '10 or more'}")
 
@@ -347,10 +347,10 @@ def test_random_banks(model: GMS, rig: Any, given: dict[str, Any], t_end: float)
 
 @hard(60)
 @given(banks(), rigs(), options(), st.data())
-def test_wanted_times_change_nothing(
+def test_requested_times_change_nothing(
     model: GMS, rig: Any, given: dict[str, Any], data: st.DataObject
 ) -> None:
-    """With rows at wanted times, or none at all, the log is the same to the bit."""
+    """With rows at requested times, or none at all, the log is the same to the bit."""
     whole, end = attempt(model, rig, 3.0, **given)
     times = data.draw(st.lists(rounded(0, 3), min_size=1, max_size=9, unique=True).map(sorted))
     for more in ({"t_eval": times}, {"output": "end"}):
@@ -382,7 +382,7 @@ def test_machines_and_ifelse_agree_on_random_charts(
 def test_compiled_agrees_on_random_banks(
     model: GMS, corners: Any, given: dict[str, Any], pushed: bool
 ) -> None:
-    """Ramps and parameters are arguments of the machine code, so this compiles only twice a law."""
+    """Ramps and parameters are arguments of the machine code: compiled only twice per law."""
     rig = Slider(1.0, corners) if pushed else Prescribed(corners)
     one, end = attempt(model, rig, 3.0, **given)
     other, end_too = attempt(model, rig, 3.0, **given, engine="compiled")
@@ -451,7 +451,7 @@ class Exact:
         return self.w * float(self.stribeck(v))
 
     def go(self, start: float, end: float, v: float) -> None:
-        """Go through one piece."""
+        """Advance over one piece."""
         t = start
         for _ in range(3):  # at most two switches in a piece
             wait, edge = self.next_switch(v)
@@ -465,7 +465,7 @@ class Exact:
         raise AssertionError("three switches under one velocity")
 
     def next_switch(self, v: float) -> tuple[float, str]:
-        """Return when the next edge is taken, if v stays, and which."""
+        """Return the time and name of the next edge, if v stays."""
         s = self.s(v)
         if self.state == "stick":
             if abs(v) <= self.v_c:
@@ -481,7 +481,7 @@ class Exact:
         return s / self.C * math.log(abs(self.z) / s), "arrest"
 
     def flow(self, wait: float, v: float) -> float:
-        """Return z after a while in the present state."""
+        """Return z after a time in the present state."""
         if self.state == "stick":
             return self.z + v * wait
         s, sign = self.s(v), (v > 0) - (v < 0)
@@ -492,7 +492,7 @@ class Exact:
 
 @st.composite
 def pieces(draw: st.DrawFn, law: str) -> tuple[list[float], list[float]]:
-    """Times and velocities; the published law is left where it is stable."""
+    """Times and velocities; the published law is used only where it is stable."""
     waits = draw(st.lists(rounded(0.1, 3), min_size=1, max_size=5))
     speed = rounded(0.05, 0.8) | st.just(0.0)
     if law == "signed":
@@ -542,7 +542,7 @@ def test_pieces_of_constant_velocity_are_closed_forms(data: st.DataObject, law: 
     fired(trace)
 
 
-# --------------------------------------------------------------------------- refused
+# --------------------------------------------------------------------------- wrong arguments
 @hard(80)
 @given(
     chart_models() | banks(),
@@ -574,12 +574,12 @@ def test_pieces_of_constant_velocity_are_closed_forms(data: st.DataObject, law: 
     ),
     st.floats() | st.just(0.3),
 )
-def test_arguments_that_make_no_sense_are_refused_in_words(
+def test_meaningless_arguments_are_refused_with_an_explanation(
     model: Any, rig: Any, nonsense: dict[str, Any], t_end: float
 ) -> None:
-    """Whatever stands there: it runs, or a `GMSError` says what is wrong."""
+    """Whatever the argument: it runs, or a `GMSError` says what is wrong."""
     steps = [u for u in (nonsense.get("step"), nonsense.get("max_step")) if isinstance(u, float)]
-    assume(not any(0 < u < 1e-3 for u in steps))  # a fine grid is no mistake, only slow
+    assume(not any(0 < u < 1e-3 for u in steps))  # a fine grid is not wrong, only slow
     assume(
         not any(
             isinstance(nonsense.get(u), float) and 0 < nonsense[u] < 1e-10 for u in ("rtol", "atol")

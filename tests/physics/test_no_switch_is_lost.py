@@ -1,6 +1,6 @@
-"""A run with located events finds every switch, with no step prescribed.
+"""A run with located events finds every switch without a prescribed step.
 
-Looking at the guards only at step ends (``events="step"``) does not: it is luck which ones it sees.
+Evaluating the guards only at step ends (``events="step"``) does not: which ones it finds is luck.
 """
 
 from collections import Counter
@@ -49,7 +49,7 @@ def test_rk4_with_a_step_that_does_not_divide_the_period_finds_them_too(law, ref
 
 
 @pytest.mark.slow
-def test_looking_at_step_ends_loses_most_of_them(law, reference):
+def test_evaluating_guards_at_step_ends_loses_most_switches(law, reference):
     """With a step of 1.003 ms no sample falls into |v| <= v_c: 4 switches, z wrong by 0.5 m."""
     trace = simulate(
         stick_slip(law), open_loop(), T, method="rk4", step=1.003e-3, events="step", t_eval=TIMES
@@ -59,7 +59,7 @@ def test_looking_at_step_ends_loses_most_of_them(law, reference):
 
 
 @pytest.mark.slow
-def test_looking_at_step_ends_is_luck(law, reference):
+def test_evaluating_guards_at_step_ends_is_luck(law, reference):
     """With a step of 1.0001 ms all are found, because the grid happens to land on v = 0.
 
     10 s are 9999.0001 of those steps, so each reversal has a sample within 6 steps/10,000, where

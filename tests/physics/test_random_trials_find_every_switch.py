@@ -1,6 +1,6 @@
 """Random runs at defaults take every edge that the reference at rtol 1e-12 takes, in its order.
 
-What is judged, and how, is said in `tests.trials`; tests/soak.py judges thousands.
+`tests.trials` explains what is judged, and how; tests/soak.py judges thousands.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ def test_no_switch_is_lost_or_made_up(family: str) -> None:
     found = [judge(trial(family, 14, index)) for index in range(COUNT)]
     assert [said(judged) for judged in found if is_finding(judged)] == []
     steady = sum(judged.verdict == "right" for judged in found)
-    assert steady > 0.8 * COUNT, "the family is too ill-conditioned to say anything"
+    assert steady > 0.8 * COUNT, "the family is too ill-conditioned for a conclusion"
     assert sum(len(judged.exact.sequence) for judged in found) > 10 * COUNT
 
 
-def test_the_judge_sees_a_coarse_run() -> None:
-    """At rtol 1e-2 runs are wrong, so that the judge can fail one."""
+def test_the_judge_detects_a_coarse_run() -> None:
+    """At rtol 1e-2 runs are wrong, so the judge can fail one."""
     found = [judge(trial("pulled", 14, index), rtol=1e-2, atol=1e-3) for index in range(10)]
     wrong = [judged for judged in found if judged.verdict == "wrong"]
     assert wrong
@@ -36,14 +36,14 @@ def test_the_judge_sees_a_coarse_run() -> None:
 
 
 def test_a_switch_at_the_very_end_is_not_judged() -> None:
-    """Where a billionth of t_end decides, no solver is to blame."""
+    """If a billionth of t_end decides, no solver is to blame."""
     whole = trial("pulled", 14, 0)
     last = replace(whole, t_end=float(reference(whole).t[-1]) * (1 + 1e-9))
     assert judge(last).verdict in ("ill", "close")
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_a_trial_can_be_had_again(family: str) -> None:
+def test_a_trial_can_be_repeated(family: str) -> None:
     """It depends on family, seed and index, and on each of them."""
     assert str(trial(family, 1, 7)) == str(trial(family, 1, 7))
     assert len({str(trial(family, seed, index)) for seed in (1, 2) for index in (7, 8)}) == 4

@@ -1,4 +1,4 @@
-"""Under the signed law the negated input gives the negated answer: (v, z, F) -> (-v, -z, -F)."""
+"""Under the signed law the negated input gives the negated response: (v, z, F) -> (-v, -z, -F)."""
 
 import numpy as np
 import pytest
@@ -93,7 +93,7 @@ def cases(draw):
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(cases())
 def test_random_ramps_and_parameters(case):
-    """Any parameters, any ramps, dwells and values on a boundary included."""
+    """Any parameters, any ramps, including dwells and values on a boundary."""
     model, times, speeds = case
     runs = [
         simulate(model, Prescribed(list(zip(times, sign * speeds, strict=True))), times[-1])

@@ -1,6 +1,6 @@
-"""Where both sides push back onto v = 0 a run goes on along it, with the sign that keeps it there.
+"""Where both sides push back onto v = 0, a run slides along it, with the sigma that keeps it there.
 
-An element that slips with |z| >= s while v changes sign cannot arrest; sgn(v) then chatters, and
+An element that slips with |z| >= s while v changes sign cannot arrest; sgn(v) then chattered, and
 the run ended in a livelock error.
 """
 
@@ -86,7 +86,7 @@ def test_the_engines_agree_to_the_last_bit():
         same_bits(one, simulate(BANK, PUSHED, 0.6, engine=engine))
 
 
-def test_finer_tolerances_move_the_slide_by_as_little_as_the_rest():
+def test_finer_tolerances_move_sliding_as_little_as_the_rest():
     coarse, fine = (simulate(BANK, PUSHED, 0.4, engine="ifelse", rtol=r) for r in (1e-6, 1e-10))
     for name in ("t_start", "t_end", "sigma_start", "sigma_end"):
         assert coarse.sliding[name][0] == pytest.approx(fine.sliding[name][0], rel=1e-4)
@@ -111,7 +111,7 @@ def test_a_mass_on_coulomb_friction_waits_for_its_spring(engine):
 
 
 def test_it_comes_to_rest_and_stays():
-    """Pushed once: decelerated by F_c / m, it stops after v^2 / 2 and is held for ever."""
+    """Pushed once: decelerated by F_c / m, it stops after v^2 / 2 and is held there."""
     trace = simulate(coulomb(), Slider(1.0, "0"), 5.0, initial={"v": 2.0})
     (slide,) = trace.sliding
     assert slide.t_start == pytest.approx(2.0, abs=1e-12)
@@ -121,7 +121,7 @@ def test_it_comes_to_rest_and_stays():
     assert trace.F[-1] == 0.0
 
 
-def test_it_turns_round_without_a_stop_where_the_push_is_stronger():
+def test_a_stronger_push_reverses_the_mass_without_a_stop():
     trace = simulate(coulomb(), Slider(1.0, "-3"), 3.0, initial={"v": 1.0})
     assert len(trace.sliding) == 0
     assert trace.v[-1] == pytest.approx(-2.0 * (3.0 - 0.25), abs=1e-9)
@@ -130,7 +130,7 @@ def test_it_turns_round_without_a_stop_where_the_push_is_stronger():
 @pytest.mark.parametrize(
     "text", ["max(v, 0) + F_c * sgn(v)", "min(0, v) + F_c * sgn(v)", "F_c * sgn(v) + 0.3 * abs(v)"]
 )
-def test_other_corners_at_the_same_place_do_not_hinder_it(text):
+def test_other_corners_at_the_same_place_do_not_interfere(text):
     trace = simulate(coulomb(text), Slider(1.0, "0.5"), 5.0, initial={"v": 1.0})
     assert len(trace.sliding) == 1
     assert trace.v[-1] == 0.0
@@ -138,7 +138,7 @@ def test_other_corners_at_the_same_place_do_not_hinder_it(text):
 
 
 def test_a_flow_that_is_not_linear_in_the_sign_is_combined_from_both_sides():
-    """F = 1 or -1/4 by the side: sigma is (2 F_a - 3/4) / (5/4), and F is F_a."""
+    """F = 1 or -1/4 depending on the side: sigma is (2 F_a - 3/4) / (5/4), and F is F_a."""
     model = coulomb("F_c * (sgn(v) + 0.6 * sgn(v) * sgn(v)) / 1.6")
     trace = simulate(model, Slider(1.0, "0.5"), 3.0)
     (slide,) = trace.sliding
@@ -176,7 +176,7 @@ def test_a_mass_rides_on_a_belt_along_a_surface_that_moves(engine, w, place):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_elements_come_to_rest_on_surfaces_of_their_own(engine):
+def test_elements_come_to_rest_on_their_own_surfaces(engine):
     """dz = -C sgn(z) reaches 0 in a finite time, each element by itself, two of them together."""
     chart = Chart(
         "runs down",
@@ -201,8 +201,8 @@ def test_elements_come_to_rest_on_surfaces_of_their_own(engine):
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("guard", ["v >= 0 and z > 4", "abs(v) <= 0 and z > 4", "v <= 0 and z > 4"])
 @pytest.mark.parametrize("v0", [2.0, 1.7, -1.7, 0.3])
-def test_guards_that_compare_with_the_surface_are_asked_on_it(guard, v0, engine):
-    """A rounding beside it another comparison keeps them false, and they were not looked at."""
+def test_guards_that_compare_with_the_surface_are_evaluated_on_it(guard, v0, engine):
+    """A rounding error off it another comparison keeps them false; they were not evaluated."""
     chart = Chart(
         "waits",
         inputs=("v",),
@@ -218,8 +218,8 @@ def test_guards_that_compare_with_the_surface_are_asked_on_it(guard, v0, engine)
 
 
 @pytest.mark.parametrize("v0", np.linspace(0.31, 2.9, 30))
-def test_the_force_beside_a_slide_is_that_of_the_arc(v0):
-    """Not that of the sign as it looks on the surface: no dip of F_c on either side."""
+def test_the_force_next_to_sliding_is_that_of_the_arc(v0):
+    """Not that of the sign evaluated on the surface: no dip of F_c on either side."""
     trace = simulate(coulomb(), Slider(1.0, [(0, 0), (4, 0), (5, 3)]), 6.0, initial={"v": v0})
     (slide,) = trace.sliding
     assert (trace.F[trace.t <= slide.t_start - 1e-12] == 1.0).all()
@@ -256,8 +256,8 @@ def test_twenty_elements_slide_at_once():
     assert (trace.z[-1] == 0.0).all()
 
 
-# --------------------------------------------------------------------------- where it is seen
-def test_files_keep_it(tmp_path):
+# --------------------------------------------------------------------------- where it shows
+def test_files_store_sliding(tmp_path):
     trace = simulate(BANK, PUSHED, 0.4, engine="ifelse")
     for name in ("a.npz", "a.csv"):
         back = Trace.load(trace.save(tmp_path / name))
@@ -266,8 +266,8 @@ def test_files_keep_it(tmp_path):
         assert np.array_equal(back.F, trace.F)
 
 
-def test_files_from_before_there_were_slides_are_read(tmp_path):
-    """Their rows have no flags of surfaces: no motion along one."""
+def test_older_files_without_sliding_are_read(tmp_path):
+    """Their rows have no flags of surfaces, which means no sliding."""
     trace = simulate(BANK, PUSHED, 0.3, engine="ifelse")
     assert len(trace.sliding) == 0
     path = trace.save(tmp_path / "a.npz")
@@ -280,7 +280,7 @@ def test_files_from_before_there_were_slides_are_read(tmp_path):
 
 
 @pytest.mark.parametrize("engine", ["ifelse", "compiled"])
-def test_wanted_times_and_samples_lie_on_it(engine):
+def test_requested_times_and_samples_lie_on_the_surface(engine):
     whole = simulate(BANK, PUSHED, 0.4, engine=needs(engine))
     slide = whole.sliding[0]
     times = np.linspace(slide.t_start, slide.t_end, 7)[1:-1]
@@ -292,7 +292,7 @@ def test_wanted_times_and_samples_lie_on_it(engine):
     assert len(simulate(BANK, PUSHED, 0.4, engine=engine, output="end").sliding) == 0
 
 
-def test_why_says_so():
+def test_why_explains_sliding():
     trace = simulate(coulomb(), PulledSlider(1.0, 2.0, 0.1), 10.0)
     row = int(np.flatnonzero(trace.t > 3.0)[0])
     sigma = 2.0 * 0.1 * trace.t[row]
@@ -301,7 +301,7 @@ def test_why_says_so():
     assert f"held on v = 0, σ = {sigma:.2g}" in str(why)
 
 
-def test_a_session_walks_over_it():
+def test_a_session_steps_over_sliding():
     session = Session(BANK, PUSHED, 0.4)
     session.proceed()
     rows = session.branch.trace()
@@ -311,8 +311,8 @@ def test_a_session_walks_over_it():
     assert session.at(int(first)).v == 0.0
 
 
-def test_a_checkpoint_within_it_goes_on_bit_for_bit(tmp_path):
-    from gms_fsm.run._checkpoint import Keeper
+def test_a_checkpoint_during_sliding_resumes_bit_for_bit(tmp_path):
+    from gms_fsm.run._checkpoint import Checkpointer
     from gms_fsm.run.simulate import Run
     from gms_fsm.run.start import Start
 
@@ -321,10 +321,10 @@ def test_a_checkpoint_within_it_goes_on_bit_for_bit(tmp_path):
     while not any(run.recorder.latest[2][3:]):
         run.advance()
     run.advance()
-    keeper = Keeper(run, tmp_path / "run.check", 0.0)
+    keeper = Checkpointer(run, tmp_path / "run.check", 0.0)
     keeper.look()
     other = Run(start)
-    Keeper(other, tmp_path / "run.check", 1e9)
+    Checkpointer(other, tmp_path / "run.check", 1e9)
     while other.advance():
         pass
     while run.advance():
@@ -333,7 +333,7 @@ def test_a_checkpoint_within_it_goes_on_bit_for_bit(tmp_path):
 
 
 @pytest.mark.parametrize("method", [RK45, Radau])
-def test_solvers_of_scipy_slide_too(method):
+def test_scipy_solvers_slide_too(method):
     trace = simulate(BANK, PUSHED, 0.4, method=method)
     assert trace.sliding.t_start[0] == pytest.approx(0.3322785, abs=3e-6)
     assert len(trace.transitions) == 4

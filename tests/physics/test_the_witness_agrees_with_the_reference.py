@@ -1,7 +1,7 @@
 """The reference of the random trials is checked by a witness that shares no code with it.
 
-The witness itself is held to two cases whose outcome was found by others: a carriage that never
-breaks away, and a mass that is held on v = 0 for a tenth of a millisecond.
+The witness itself is checked on two cases with independently known outcomes: a carriage that never
+breaks away, and a mass that is held at v = 0 for a tenth of a millisecond.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def test_a_carriage_that_never_breaks_away() -> None:
     agrees(CARRIAGE)
 
 
-def test_a_mass_held_on_standstill() -> None:
+def test_a_mass_held_at_standstill() -> None:
     seen = witness(HELD.model, HELD.rig, HELD.t_end)
     assert len(seen.transitions) == 14
     ((begin, end),) = seen.sliding

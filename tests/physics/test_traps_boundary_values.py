@@ -1,4 +1,4 @@
-"""Values on a boundary are ordinary: each case has one answer, stated here.
+"""Values on a boundary are ordinary: each case has one result, stated here.
 
 F_s = F_c, a start on z = s with v around v_c, and a record that dwells at v = 0.
 """
@@ -19,7 +19,7 @@ LAWS = ["signed", "published"]
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize("speed", [0.0, 0.5, 1.0, 2.0, -1.0, -2.0])
 def test_start_on_the_threshold(side, speed, law):
-    """z = s (or -s): it breaks away at once if v > v_c outward, and sticks on otherwise."""
+    """z = s (or -s): it breaks away at once if v > v_c outward, and keeps sticking otherwise."""
     v = side * speed * V_C
     model = one_element(law)
     s = float(model.stribeck(v))
@@ -103,7 +103,7 @@ DWELL = [(0, 0.5), (1, 0), (6, 0), (7, 0.5), (9, 0.5)]
 
 
 def test_a_dwell_while_an_element_slips_signed():
-    """z > s at v = 0: sgn(0) = 0 lets z sink by exp(-C t / s) until |z| < s, then it arrests."""
+    """z > s at v = 0: sgn(0) = 0 lets z decay by exp(-C t / s) until |z| < s, then it arrests."""
     C, z0 = 0.5, 2.5
     trace = simulate(
         one_element("signed", C=C),
@@ -125,7 +125,7 @@ def test_a_dwell_while_an_element_slips_signed():
 
 
 def test_a_dwell_while_an_element_slips_published():
-    """Published: with sgn(0) = 0 the deflection stands still at v = 0 and cannot arrest."""
+    """Published: with sgn(0) = 0 the deflection is constant at v = 0 and cannot arrest."""
     trace = simulate(
         one_element("published", C=0.5),
         Prescribed(DWELL),
@@ -140,10 +140,10 @@ def test_a_dwell_while_an_element_slips_published():
 
 
 def test_the_published_law_with_equal_thresholds_warns():
-    """F_s = F_c: eq. (1) rests exactly on |z| = s, so |z| < s never comes; signed is fine."""
+    """F_s = F_c: eq. (1) rests exactly on |z| = s, so |z| < s never occurs; signed is fine."""
     with pytest.warns(UserWarning, match="never arrests"):
         model = one_element("published", F_s=1.0)
     trace = simulate(model, Prescribed([(0, 0.5), (3, 0.5), (4, 0), (6, 0)]), 6.0)
     assert event_sequence(trace) == [(0, "break_away_forward")]
     assert trace.z[-1, 0] == pytest.approx(1.0, abs=1e-9)
-    one_element("signed", F_s=1.0)  # no warning, or the test would end here
+    one_element("signed", F_s=1.0)  # a warning would end the test here

@@ -28,7 +28,7 @@ def code(source):
 
 @pytest.mark.parametrize("law", ["signed", "published"])
 def test_no_power_is_left_in_the_text(law):
-    """The Stribeck curve of eq. (2) holds a square; its generated text a product."""
+    """The Stribeck curve of eq. (2) contains a square; its generated text a product."""
     source = code(lower(stick_slip(law), open_loop()).source)
     assert "v / v_s * (v / v_s)" in source
     assert "**" not in source

@@ -1,6 +1,6 @@
-"""States are frozen inside a step, Runge-Kutta stages included, and sticking makes no stops.
+"""States are frozen within a step, including Runge-Kutta stages, and sticking causes no stops.
 
-Beside it the naive Runge-Kutta step that lets its stages switch loses its order.
+For comparison: a naive Runge-Kutta step whose stages may switch loses its order.
 """
 
 import math
@@ -35,7 +35,7 @@ def naive_rk4(h, T):
 
 
 def test_stages_that_switch_cost_the_order():
-    """rk4 over a break-away inside a step: ours is exact to h^4, the naive one is not."""
+    """rk4 over a break-away inside a step: ours is accurate to h^4, the naive one is not."""
     for steps in (7, 11, 17):
         h = 3.0 / steps
         ours = simulate(
@@ -52,8 +52,8 @@ def test_stages_that_switch_cost_the_order():
 
 @pytest.mark.parametrize("case", ["open loop", "pulled mass"])
 @pytest.mark.parametrize("method", ["dp45", "rk4"])
-def test_the_flow_sees_one_mode_a_step(case, method):
-    """Every call of the flow between two firings carries the same modes."""
+def test_the_flow_sees_one_mode_per_step(case, method):
+    """Every call of the flow between two firings has the same modes."""
     model, rig = pulled_mass() if case == "pulled mass" else (stick_slip("signed"), open_loop())
     program = lower(model, rig)
     modes: list[tuple[int, ...]] = []
@@ -93,7 +93,7 @@ def test_the_flow_sees_one_mode_a_step(case, method):
             firings += 1
         elif isinstance(event, integrators.Arc):
             arcs += 1
-            assert set(modes) <= {event.mode[:4]}  # behind them stand the surfaces
+            assert set(modes) <= {event.mode[:4]}  # followed by the surfaces' flags
         if not isinstance(event, integrators.Stop):
             modes.clear()
     assert firings > 10
@@ -109,7 +109,7 @@ def test_sticking_makes_no_stops_at_reversals(law, amplitude):
     signal = f"{amplitude}*sin(2*pi*t + 0.3)"
     trace = simulate(stick_slip(law), Prescribed(signal), T, t_eval=[T])
     assert len(trace.transitions) == 0
-    # The naive way stops three times in each of 40 passages. Landmarks of s(v) may be stops,
-    # the smallest of them is a fair part of v_s = 1e-3 m/s.
+    # The naive way stops three times in each of 40 passages. Landmarks of s(v) may be stops;
+    # the smallest of them is a considerable fraction of v_s = 1e-3 m/s.
     stop_v = amplitude * np.sin(2 * np.pi * trace.stops.t[1:] + 0.3)
     assert np.abs(stop_v).min(initial=np.inf) > 10e-6

@@ -1,7 +1,7 @@
-"""Steps never grow past half a period of the input, though a sliding element gives no reason.
+"""Steps never exceed half a period of the input, though a sliding element does not limit them.
 
 A sliding element rests at z = s. x, the integral of v, is a state under error control and keeps
-the steps short; a solver that carries z alone strides over reversals.
+the steps short; a solver that integrates z alone steps over reversals.
 """
 
 import math
@@ -17,7 +17,7 @@ F_c, F_s, v_s, C, A, T = 0.4, 1.5, 1e-3, 0.1, 0.2, 20.0
 WAVES = 12
 
 
-def test_a_solver_without_x_strides_over_reversals():
+def test_a_solver_without_x_steps_over_reversals():
     """z alone, slip law with events at v = 0: SciPy misses reversals in twelve waves."""
 
     def slip(t, z):

@@ -1,6 +1,6 @@
-"""The jump of sgn(v) in the slip flow costs no order: steps end on it and the sign is held.
+"""The jump of sgn(v) in the slip flow costs no order: steps end on it and the sign is frozen.
 
-Beside it the naive Runge-Kutta loop that evaluates sgn in its stages falls back to order 1.
+For comparison: a naive Runge-Kutta loop that evaluates sgn in its stages falls back to order 1.
 """
 
 import math
@@ -45,7 +45,7 @@ def ours(**options):
 
 
 def test_fixed_steps_keep_order_four():
-    """Our rk4 is exact to 1e-6 at once and gains with h^4; the naive one is wrong by 1e-2."""
+    """Our rk4 is accurate to 1e-6 at once and gains with h^4; the naive one is wrong by 1e-2."""
     steps = [2 / 7, 2 / 13, 2 / 25, 2 / 49]
     errors = np.array([abs(ours(method="rk4", step=h).z[-1, 0] - EXACT) for h in steps])
     assert errors.max() < 1e-5
@@ -56,8 +56,8 @@ def test_fixed_steps_keep_order_four():
 
 
 @pytest.mark.parametrize("options", [{}, {"method": "bs23"}])
-def test_adaptive_steps_do_not_dig(options):
-    """Adaptive runs stop once at the reversal instead of shrinking their steps upon it."""
+def test_adaptive_steps_do_not_shrink_toward_the_reversal(options):
+    """Adaptive runs stop once at the reversal instead of shrinking their steps toward it."""
     trace = ours(**options)
     assert abs(trace.z[-1, 0] - EXACT) < 2e-6
     assert len(trace) < 200

@@ -1,7 +1,7 @@
-"""Elements that break away at one instant fire as one set, in element order, as micro-steps.
+"""Elements that break away at the same instant fire as one set, in element order, as micro-steps.
 
-m firings give m + 1 rows of one time with one-sided forces. The naive way, one firing a stop and
-then on with the watched relations, loses the others: their comparison is already true.
+m firings give m + 1 rows at one time with one-sided forces. The naive way, one firing per stop
+and then continuing, loses the others: their comparison is already true.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ SIGMA = np.array([0.3, 0.4, 0.5, 0.6])
 
 
 def naive_break_aways(T, h=1e-3):
-    """Fire the first enabled element at each change of truth of z_i >= s; return how many fire."""
+    """Fire the first enabled element at each change of z_i >= s; return how many fire."""
     z, slipping, fired = np.zeros(4), np.zeros(4, dtype=bool), 0
     truth = z >= 0.4
     for j in range(round(T / h)):
@@ -42,7 +42,7 @@ def test_four_at_once(law, engine):
     np.testing.assert_array_equal(rows, np.arange(rows[0], rows[0] + 5))
     for m, row in enumerate(rows):
         assert trace.states[row].tolist() == ["slip"] * m + ["stick"] * (4 - m)
-    # z and x do not move; F steps by sigma_i (dz_slip - v) one element after the other.
+    # z and x do not move; F steps by sigma_i (dz_slip - v), one element after the other.
     assert np.ptp(trace.z[rows], axis=0).tolist() == [0.0] * 4
     dz_slip = np.array([0.1, 0.05, 0.025, 1e-4]) * (1 - trace.z[rows[0]] / trace.s[rows[0]])
     np.testing.assert_allclose(

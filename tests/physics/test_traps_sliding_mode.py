@@ -1,8 +1,8 @@
-"""A sliding mode at v = 0 is followed as its closed form says; the naive loop chatters.
+"""A sliding mode at v = 0 follows its closed form; the naive loop chatters.
 
-An element in slip with z <= -s cannot arrest; its force pushes v back to zero from both sides. On
-v = 0 the force is the applied one, so sigma dz/dt = F_a - k z: z tends to F_a / k like
-exp(-k t / sigma), and the sign held is sigma = (dz/dt) / (C (1 - z / s)).
+An element in slip with z <= -s cannot arrest; its force pushes v back to zero from both sides. At
+v = 0 the force equals the applied one, so sigma dz/dt = F_a - k z: z tends to F_a / k like
+exp(-k t / sigma), and the sign is replaced by sigma = (dz/dt) / (C (1 - z / s)).
 """
 
 import math
@@ -47,8 +47,8 @@ def test_the_naive_loop_chatters():
         {"method": "rk4", "step": 1e-3},
     ],
 )
-def test_it_slides_as_the_closed_form_does(options):
-    """It comes to v = 0 after 38 ms and never leaves: |z| stays above s."""
+def test_sliding_follows_the_closed_form(options):
+    """It reaches v = 0 after 38 ms and never leaves: |z| stays above s."""
     model, rig, start = case("published")
     trace = simulate(model, rig, 20.0, initial=start, **options)
     (slide,) = trace.sliding
@@ -65,8 +65,8 @@ def test_it_slides_as_the_closed_form_does(options):
     assert slide.sigma_end == pytest.approx(rate[-1] / (C * (1 - z[-1] / F_s)), abs=1e-12)
 
 
-def test_it_leaves_where_the_push_outgrows_both_sides():
-    """F_a falls until the side v < 0 lets go: sigma reaches -1, and v goes on below zero."""
+def test_it_leaves_when_the_push_exceeds_both_sides():
+    """F_a falls until the side v < 0 releases: sigma reaches -1, and v becomes negative."""
     model, _, start = case("published")
     trace = simulate(model, Slider(1.0, f"{F_a} - 5*t"), 5.0, initial=start)
     (slide,) = trace.sliding
@@ -76,7 +76,7 @@ def test_it_leaves_where_the_push_outgrows_both_sides():
 
 
 def test_below_the_threshold_it_arrests():
-    """The same rig with |z| < s at the reversal arrests and goes on."""
+    """The same rig with |z| < s at the reversal arrests and continues."""
     model, _, start = case("published")
     start |= {"z": [-1.2]}
     trace = simulate(model, Slider(1.0, -1.2 * k), 5.0, initial=start)

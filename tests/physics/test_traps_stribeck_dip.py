@@ -1,7 +1,7 @@
-"""The Stribeck dip, a few milliseconds around a reversal, is integrated and not jumped.
+"""The Stribeck dip, a few milliseconds around a reversal, is integrated and not stepped over.
 
-z at the arrest carries the trace of the dip. Solvers that know of no dip jump it whatever their
-tolerance; a run with default tolerances and no longest step has it right.
+z at the arrest carries the effect of the dip. Solvers that do not know of it step over it whatever
+their tolerance; a run with default tolerances and no maximum step is correct.
 """
 
 import math
@@ -15,7 +15,7 @@ from tests.helpers import event_sequence, one_element
 
 
 def z_at_arrest(F_c, F_s, v_s, C, A, T):
-    """Return z where v = A sin(2 pi t / T) has fallen to v_c, for slip since long before.
+    """Return z where v = A sin(2 pi t / T) has fallen to v_c, after slipping for a long time.
 
     The linear flow dz = C (1 - z/s) from z = F_c, by its integral formula:
     z = F_c + integral of g(t) exp(-G(t)) dt with u = z - F_c, du = C (1 - F_c/s) - C u / s.
@@ -35,7 +35,7 @@ def z_at_arrest(F_c, F_s, v_s, C, A, T):
     return F_c + quad(integrand, start, end, epsabs=1e-13)[0]
 
 
-# Table I's first element; then dips that are shorter against everything else in the run.
+# Table I's first element; then dips that are shorter relative to everything else in the run.
 CASES = {
     "Table I, element 1": (0.4, 1.5, 1e-3, 0.1, 0.2, 20.0),
     "fast pass": (0.16, 1.26, 1.3e-3, 0.57, 1.7, 10.0),
@@ -58,22 +58,22 @@ def located(case, **options):
 
 @cases
 @pytest.mark.parametrize("method", ["dp45", "bs23"])
-def test_default_tolerances_see_the_dip(case, method):
+def test_default_tolerances_resolve_the_dip(case, method):
     """rtol 1e-6, atol 1e-9, no longest step: z is right to 2e-5 m."""
     exact = z_at_arrest(*case)
-    assert exact - case[0] > 1e-5  # the dip leaves a trace
+    assert exact - case[0] > 1e-5  # the dip has an effect
     assert abs(located(case, method=method) - exact) < 2e-5
 
 
 @cases
-def test_tight_tolerances_see_the_dip(case):
+def test_tight_tolerances_resolve_the_dip(case):
     """rtol 1e-10: z is right to 1e-8 m."""
     assert abs(located(case, rtol=1e-10, atol=1e-13) - z_at_arrest(*case)) < 1e-8
 
 
 @pytest.mark.parametrize("solver", ["RK45", "LSODA"])
-def test_a_solver_without_the_stop_jumps_it(solver):
-    """SciPy's solvers, with the sign held but no stop at the dip, are wrong by more than 1e-3 m."""
+def test_a_solver_without_the_stop_steps_over_it(solver):
+    """SciPy's solvers, with the sign frozen but no stop at the dip, are wrong by over 1e-3 m."""
     case = CASES["Table I, element 1"]
     F_c, F_s, v_s, C, A, T = case
 
@@ -90,11 +90,11 @@ def test_a_solver_without_the_stop_jumps_it(solver):
     assert abs(located(case) - exact) < 2e-5
 
 
-def test_the_old_step_jumps_it():
-    """A step that was right before the dip passes it in one stride: the start must be small.
+def test_the_previous_step_length_steps_over_it():
+    """A step that was right before the dip passes it in one go: the first one must be small.
 
     At |v| = 6.1 v_s the sliding element is at rest (z = s), so a controller that keeps its old
-    step of a second or so has no reason to look at the dip of 0.1 s.
+    step of a second or so has no reason to resolve the dip of 0.1 s.
     """
     case = CASES["Table I, element 1"]
     F_c, F_s, v_s, C, A, T = case

@@ -1,7 +1,7 @@
-"""A relation that is true for a while inside one step is found, and the earliest one first.
+"""A relation that is true for a while inside one step is found, the earliest one first.
 
-On hand-made steps (the state is the fraction theta itself, the margins are functions of it) and in
-whole runs. The naive way, a sign change between the ends of the step, sees nothing of the window.
+Tested on hand-made steps (the state is the fraction theta itself, the margins are functions of it)
+and in whole runs. The naive way, a sign change between the ends of the step, misses the window.
 """
 
 import numpy as np
@@ -40,12 +40,12 @@ def located(*functions, t=0.0, h=1.0, strict=None):
 
 
 def naive(*functions):
-    """Return whether any margin has another sign at the step's end."""
+    """Return whether any margin has a different sign at the step's end."""
     return any((f(0.0) >= 0) != (f(1.0) >= 0) for f in functions)
 
 
 def hump(a, b):
-    """Return a parabola that is positive between a and b only."""
+    """Return a parabola that is positive only between a and b."""
     return lambda x: -(x - a) * (x - b)
 
 
@@ -63,14 +63,14 @@ def test_a_window_inside_the_step(a, b, sign):
     assert located(margin, strict=[sign < 0]) == pytest.approx(a, abs=1e-13)
 
 
-def test_a_peak_below_zero_is_no_crossing():
+def test_a_peak_below_zero_is_not_a_crossing():
     """The parabola comes near but stays false."""
     assert located(lambda x: -((x - 0.5) ** 2) - 1e-9) == NO_CHANGE
     assert located(lambda x: -1 - x) == NO_CHANGE
 
 
-def test_the_right_end_is_kept():
-    """At the place returned the relation has changed; one tick before it has not."""
+def test_the_right_end_is_returned():
+    """At the returned point the relation has changed; one tick before it has not."""
     for c in (0.1, 1 / 3, 0.7123, 0.999):
         theta = located(lambda x, c=c: x - c)
         assert theta >= c
@@ -92,7 +92,7 @@ def test_a_margin_that_starts_at_zero_does_not_fire_again():
 def test_a_window_before_a_later_change(a, b, late):
     """The first relation is true and false again, the second stays true from `late` on.
 
-    The second one is what the step's end shows; before it the first must be looked for again.
+    The step's end shows only the second one; the search must continue before it for the first.
     """
     expected = min(a, late)
     assert located(hump(a, b), lambda x: x - late) == pytest.approx(expected, abs=1e-13)
@@ -116,7 +116,7 @@ def test_random_windows_and_lines(a, width, late, steepness):
 
 
 # F_c, F_s, v_s, corners of v, z(0). While |v| < 6.1 v_s there is no landmark, and a sticking
-# element takes long steps. z passes -s before the reversal; at the reversal s rises over |z| again.
+# element takes long steps. z passes -s before the reversal; at the reversal s exceeds |z| again.
 WINDOWS = [
     (0.29, 0.38, 0.052, [(0, -0.24), (2.7, 0.14)], -0.14),
     (0.18, 0.38, 0.062, [(0, -0.19), (2.8, 0.19)], -0.1),
@@ -129,7 +129,7 @@ WINDOWS = [
 @pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"rtol": 1e-10, "atol": 1e-13}, {"method": "bs23"}])
 @pytest.mark.parametrize("window", WINDOWS)
-def test_a_break_away_that_a_long_step_steps_over(window, options):
+def test_a_break_away_inside_a_long_step_is_found(window, options):
     """Steps of up to a second in stick: the break-away and its arrest are the fine run's."""
     F_c, F_s, v_s, ramps, z0 = window
     model, rig = one_element("signed", F_c=F_c, F_s=F_s, v_s=v_s, C=0.1), Prescribed(ramps)

@@ -1,7 +1,7 @@
 """v passes |v| <= v_c in microseconds, and no arrest is stepped over.
 
-Shown beside the naive ways: guards looked at only at step ends, the zero of one composed margin,
-and a root of a margin taken for a place where the guard is true.
+Compared with the naive ways: guards evaluated only at step ends, the zero of one composed margin,
+and a root of a margin taken for a point where the guard is true.
 """
 
 import math
@@ -54,13 +54,13 @@ def test_step_ends_step_over_the_window():
     switches, z = guards_at_step_ends(1.003e-3, 13.0)
     assert switches == 1
     assert abs(z - located.z[-1, 0]) > 0.05
-    # Not the Euler step is to blame: with samples in the window the same loop is right.
+    # The Euler step is not to blame: with samples in the window the same loop is right.
     switches, z = guards_at_step_ends(1e-3, 13.0)
     assert switches == 2
     assert abs(z - located.z[-1, 0]) < 5e-3
 
 
-def test_a_composed_margin_has_no_sign_to_see():
+def test_a_composed_margin_shows_no_sign_change():
     """SciPy's event search on min(v_c - |v|, s - |z|) sees no arrest at any tolerance."""
 
     def slip(t, z):

@@ -1,4 +1,4 @@
-"""An animation shows the run: as many frames as asked for, each with its row's chart and cursor.
+"""An animation has the requested number of frames, each with the chart and cursor of its row.
 
 The chart is laid out once, whatever the number of frames, and drawn again only where it changes.
 """
@@ -84,7 +84,7 @@ def test_the_active_state_moves_with_the_run(tmp_path: Path) -> None:
     before, after = frames(path)
 
     def centre(picture: Image.Image) -> float:
-        """Height of the border of the active state."""
+        """Return the height of the border of the active state."""
         wanted = tuple(round(255 * part) for part in to_rgb(colours.active))
         width, height = picture.size
         rows = [
@@ -95,7 +95,7 @@ def test_the_active_state_moves_with_the_run(tmp_path: Path) -> None:
         ]
         return sum(rows) / len(rows)
 
-    assert centre(after) > centre(before) + 50  # slip lies under stick
+    assert centre(after) > centre(before) + 50  # slip is below stick
     assert count(after, colours.fired) > count(before, colours.fired) + 40  # the edge
 
 
@@ -124,7 +124,7 @@ def test_one_layout_serves_all_frames(tmp_path: Path, monkeypatch: pytest.Monkey
     ("options", "message"),
     [
         ({"path": "run.mp4"}, r"path is 'run\.mp4'; it must end in \.gif"),
-        ({"frames": 1}, "frames is 1; it must be a whole number of at least 2"),
+        ({"frames": 1}, "frames is 1; it must be an integer of at least 2"),
         ({"frames": 2.5}, r"frames is 2\.5"),
         ({"frames": True}, "frames is True"),
         ({"fps": 0}, "fps is 0; it must be above 0 and at most 50"),
@@ -138,7 +138,7 @@ def test_one_layout_serves_all_frames(tmp_path: Path, monkeypatch: pytest.Monkey
         ({"elements": [7]}, r"elements is \[7\].*the run has 4"),
     ],
 )
-def test_wrong_options_are_refused(
+def test_wrong_options_are_rejected(
     options: dict[str, Any], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)

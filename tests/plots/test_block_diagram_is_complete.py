@@ -1,4 +1,4 @@
-"""The block diagram connects what Fig. 2a connects, for any n, and nothing lies on anything else.
+"""The block diagram connects what Fig. 2a connects, for any n, without overlaps.
 
 Checked on the drawn SVG: the wires are followed from block to block, and must be exactly those of
 the paper: v to the chart, the Stribeck curve and the viscous part; each element's rate through an
@@ -43,7 +43,7 @@ class Wire:
         return _box([self.start, self.end])
 
     def covers(self, other: Wire) -> bool:
-        """Say whether both run side by side, too close to be told apart."""
+        """Return whether both run in parallel, too close to be distinguished."""
         for along, across in ((0, 1), (1, 0)):
             mine, its = sorted((self.box[along::2], other.box[along::2]))
             shared = min(mine[1], its[1]) - its[0]
@@ -54,7 +54,7 @@ class Wire:
 
 @dataclass(frozen=True)
 class Diagram:
-    """What the SVG shows."""
+    """The contents of the SVG."""
 
     boxes: dict[str, tuple[float, float, float, float]]
     classes: dict[str, set[str]]
@@ -125,7 +125,7 @@ def draw(tmp_path: Path) -> Draw:
 
 
 def connections(diagram: Diagram) -> set[tuple[str, str]]:
-    """Follow every wire through branch and corners to where it arrives with an arrow."""
+    """Follow every wire through branches and corners to its arrowhead."""
     next_pieces: dict[str, list[Wire]] = {}
     for wire in diagram.wires:
         next_pieces.setdefault(wire.tail, []).append(wire)
@@ -203,7 +203,7 @@ def test_ports_sit_on_the_edge_of_their_block(n: int, draw: Draw) -> None:
 
 
 @pytest.mark.parametrize("n", SIZES)
-def test_nothing_lies_on_anything_else(n: int, draw: Draw) -> None:
+def test_nothing_overlaps(n: int, draw: Draw) -> None:
     diagram = draw(n)
     blocks = {name: diagram.boxes[name] for name in diagram.blocks()}
     assert not [
@@ -229,6 +229,6 @@ def test_feedback_lines_never_cross(n: int, draw: Draw) -> None:
 
 
 @pytest.mark.parametrize("elements", [0, -1, 2.5])
-def test_a_model_of_no_elements_is_refused(elements: int) -> None:
+def test_a_model_without_elements_is_rejected(elements: int) -> None:
     with pytest.raises(ParameterError, match=f"elements is {elements}.*at least 1"):
         block_diagram(elements)

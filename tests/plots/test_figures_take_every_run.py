@@ -30,7 +30,7 @@ def lugre() -> Trace:
 
 
 def broken_off() -> Trace:
-    """A run that could not go on: its last row may hold no forces."""
+    """A run that could not continue: its last row may have no forces."""
     rig = Prescribed(lambda t: 0.1 if t < 1.0 else float("nan"))
     with pytest.raises(SimulationError) as error:
         simulate(stick_slip("signed"), rig, 2.0)
@@ -38,7 +38,7 @@ def broken_off() -> Trace:
 
 
 def from_a_file(folder: Path) -> Trace:
-    """A run that cannot be sampled anew: its signal was a Python function."""
+    """A run that cannot be resampled: its signal was a Python function."""
     rig = Prescribed(lambda t: 0.2 * np.sin(2 * np.pi * t / 20))
     return Trace.load(simulate(stick_slip("signed"), rig, 20.0).save(folder / "a.npz"))
 
@@ -131,7 +131,7 @@ def test_a_crowded_run_is_shown_from_its_last_cycles() -> None:
     assert "last" in figure.axes[0].get_title(loc="left")
 
 
-def test_a_measurement_lies_beside_the_model(runs: dict[str, Trace]) -> None:
+def test_a_measurement_is_shown_with_the_model(runs: dict[str, Trace]) -> None:
     run = runs["Fig. 4, signed"]
     part = panels.shown(run)
     measured = figures.Measured(part.t, part.x, part.F + 0.1)
@@ -165,7 +165,7 @@ print("matplotlib.pyplot" in sys.modules)
     assert done.stdout.strip() == "False"
 
 
-def test_the_zoom_lies_in_the_window_that_is_asked_for(runs: dict[str, Trace]) -> None:
+def test_the_zoom_is_inside_the_requested_window(runs: dict[str, Trace]) -> None:
     for window in ((3.0, 7.0), (30.0, 40.0)):
         figure = figures.ribbons_figure(runs["Fig. 4, published"], window=window)
         (margins,) = (ax for ax in figure.axes if ax.get_title(loc="left")[:2] == "f)")

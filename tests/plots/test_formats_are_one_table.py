@@ -1,4 +1,4 @@
-"""One table says which files pictures are written to; one new row works wherever files are named.
+"""One table defines the file formats; a new row works wherever files are named.
 
 Command line and its help, `plots.render`, figures, scenario files and their schema, the debugger,
 animations and replay pages, and every message about a wrong ending.
@@ -40,7 +40,7 @@ def trace() -> Trace:
 
 
 def new(subject: Subject, **fields: Any) -> Format:
-    """Return a format that writes the kind of what it is given."""
+    """Return a format that writes the type of its input."""
 
     def write(made: object) -> bytes:
         return type(made).__name__.encode()
@@ -117,7 +117,7 @@ def test_a_new_format_of_pages(gms_fsm: CommandLine, trace: Trace) -> None:
 
 
 @pytest.mark.slow
-def test_a_usual_format_is_written_where_nobody_chooses(gms_fsm: CommandLine, trace: Trace) -> None:
+def test_a_usual_format_is_written_by_default(gms_fsm: CommandLine, trace: Trace) -> None:
     pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
     register(new("figure", usual=True))
     trace.save("t.npz")
@@ -128,7 +128,7 @@ def test_a_usual_format_is_written_where_nobody_chooses(gms_fsm: CommandLine, tr
     assert Path("out/ribbons.new").read_text() == "Figure"
 
 
-def test_what_a_format_lacks_is_said_and_a_graph_is_written_as_text(tmp_path: Path) -> None:
+def test_a_missing_extra_is_reported_and_a_graph_is_written_as_text(tmp_path: Path) -> None:
     def write(_: object) -> bytes:
         raise MissingExtraError("the writer is away")
 
@@ -143,7 +143,7 @@ def test_what_a_format_lacks_is_said_and_a_graph_is_written_as_text(tmp_path: Pa
 def test_a_format_is_registered_once() -> None:
     register(new("figure"))
     register(new("page"))
-    with pytest.raises(ParameterError, match=r"there is a format \.new of the subject 'page'"):
+    with pytest.raises(ParameterError, match=r"the subject 'page' already has a format \.new"):
         register(new("page"))
 
 
@@ -153,7 +153,7 @@ def test_an_ending_is_a_dot_and_small_letters(ending: Any) -> None:
         new("figure", ending=ending)
 
 
-def test_subject_and_extra_are_known_ones() -> None:
+def test_subject_and_extra_are_known() -> None:
     with pytest.raises(ParameterError, match=r"subject is 'film'; it must be one of 'graph', "):
         new("film")  # type: ignore[arg-type]
     with pytest.raises(ParameterError, match=r"extra is 'fats'; it must be one of '', 'plots', "):
@@ -166,7 +166,7 @@ MENTIONED = re.compile(rf"(?<![\w.])({'|'.join(re.escape(e.ending) for e in FORM
 
 
 def lists_of_endings(text: str) -> Iterator[str]:
-    """Yield the places of a module's code that name several endings, docstrings too."""
+    """Yield the places in a module that name several endings, including docstrings."""
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             if len(set(MENTIONED.findall(node.value))) > 1:
@@ -183,7 +183,7 @@ def lists_of_endings(text: str) -> Iterator[str]:
     [p for room in ("gms_fsm", "plots") for p in sorted((ROOT / room).rglob("*.py"))],
     ids=lambda path: str(path.relative_to(ROOT)),
 )
-def test_nobody_else_lists_endings(path: Path) -> None:
+def test_no_other_module_lists_endings(path: Path) -> None:
     found = list(lists_of_endings(path.read_text(encoding="utf-8")))
     assert bool(found) == (path == ROOT / "plots" / "formats.py"), found
 
@@ -196,7 +196,7 @@ def test_a_list_is_found() -> None:
     assert not list(lists_of_endings('x = "a.png", "b.png", ".png", "svg"[0]'))
 
 
-def test_pages_name_endings_that_are_there() -> None:
+def test_pages_name_existing_endings() -> None:
     pages = [*(ROOT / "docs").rglob("*.md"), ROOT / "README.md"]
     said = [
         ending

@@ -1,7 +1,7 @@
-"""A live chart shows a row of the run: what is active, what could fire, what fired last.
+"""A live chart shows a row of the run: active states, edges that could fire, the last firing.
 
 The claim is checked on the SVG that is handed out, against `explain` and the log: one active state
-an element, marks on the edges that leave it and on no others, the last edge of the log thick. One
+per element, marks on the edges that leave it and on no others, the last edge of the log thick. One
 layout serves all frames.
 """
 
@@ -69,7 +69,7 @@ def classes(group: Group) -> set[str]:
 
 
 def marks(guard: Group) -> list[str]:
-    """The marks that can be seen on an edge."""
+    """Return the visible marks of an edge."""
     return [
         text.text or ""
         for text in guard.iter("text")
@@ -94,7 +94,7 @@ def last_fired(trace: Trace, row: int, element: int) -> str:
 
 
 def some_rows(trace: Trace) -> list[int]:
-    """Every row around a firing, and some between."""
+    """Return every row around a firing, and some between."""
     near = {
         row + step
         for row in range(len(trace))
@@ -106,7 +106,7 @@ def some_rows(trace: Trace) -> list[int]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_look_is_what_the_log_and_the_explanation_say(name: str) -> None:
+def test_the_look_agrees_with_the_log_and_the_explanation(name: str) -> None:
     trace, chart = run(name), live(name)
     edges = {edge.name: edge for edge in trace.model.chart.transitions}
     fired_rows = 0
@@ -247,12 +247,12 @@ def test_at_is_the_last_row_at_or_before_a_time() -> None:
 
 
 @pytest.mark.parametrize("t", [-0.1, 45.1, math.nan, math.inf])
-def test_a_time_outside_is_refused(t: float) -> None:
+def test_a_time_outside_is_rejected(t: float) -> None:
     with pytest.raises(ParameterError, match=r"t is .* within the run, 0 to 45 s"):
         live("bank").at(t)
 
 
-def test_wrong_options_are_refused() -> None:
+def test_wrong_options_are_rejected() -> None:
     trace = run("bank")
     with pytest.raises(ParameterError, match=r"elements is \[4\].*the run has 4, counted from 0"):
         LiveChart(trace, [4])
@@ -279,7 +279,7 @@ def test_without_graphviz_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) ->
         LiveChart(run("one"))
 
 
-def test_a_graphviz_that_writes_other_texts_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_graphviz_with_unexpected_output_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     real = plots.live_chart.picture
 
     def other(graph: object, form: str) -> bytes:
@@ -302,7 +302,7 @@ def test_program_and_package_give_the_same_look(monkeypatch: pytest.MonkeyPatch)
         ]
 
 
-def test_a_guard_that_cannot_be_computed_is_marked_so() -> None:
+def test_a_guard_that_cannot_be_computed_is_marked() -> None:
     from gms_fsm.charts.chart import Chart, State, Transition
 
     chart = Chart(

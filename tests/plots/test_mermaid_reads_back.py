@@ -1,7 +1,7 @@
-"""The Mermaid text of a chart is read back by Mermaid's own parser as the very same chart.
+"""The Mermaid text of a chart is read back by the Mermaid parser as the same chart.
 
 Mermaid runs in node. ``GMS_FSM_MERMAID`` names a folder where it is installed, or will be by the
-first run: 180 MB are not fetched unasked.
+first run: 180 MB are not downloaded without being requested.
 """
 
 from __future__ import annotations
@@ -41,7 +41,10 @@ WORDS = Chart(
     outputs={"F": "style"},
 )
 CHARTS = [*GMS_ELEMENT.values(), LUGRE, THREE_STATES, FIVE_STATES, HOSTILE, WORDS]
-PACKAGES = ("mermaid@11", "jsdom@26")  # mermaid cleans texts with a DOM, which node has not
+PACKAGES = (
+    "mermaid@11",
+    "jsdom@26",
+)  # mermaid sanitizes texts with a DOM, which node does not have
 
 READER = """
 import { JSDOM } from 'jsdom';
@@ -65,7 +68,7 @@ console.log(JSON.stringify(found));
 
 
 def parsed(texts: list[str]) -> list[dict[str, Any]]:
-    """Hand texts to Mermaid."""
+    """Parse texts with Mermaid."""
     folder = os.environ.get("GMS_FSM_MERMAID")
     if not folder:
         pytest.skip("GMS_FSM_MERMAID names no folder for Mermaid's own parser")
@@ -132,7 +135,7 @@ def expected(chart: Chart) -> tuple[list[list[str]], list[tuple[int, int, str]]]
 
 @pytest.fixture
 def hostile(monkeypatch: pytest.MonkeyPatch) -> Chart:
-    """A chart with names that no chart would take."""
+    """Return a chart with invalid names."""
     monkeypatch.setattr(gms_fsm.charts.chart, "_check_name", lambda *_: None)
     bad = 'a"\n[*] --> evil: <b>&#x41;; %%{init}%% \u2028 --'
     return Chart(
@@ -165,7 +168,7 @@ def test_mermaid_itself_reads_the_same_chart(hostile: Chart) -> None:
 
 
 @pytest.mark.parametrize("chart", CHARTS, ids=lambda chart: chart.states[0].name)
-def test_what_mermaid_could_misread_is_a_code(chart: Chart) -> None:
+def test_characters_that_mermaid_could_misread_are_escaped(chart: Chart) -> None:
     head, body = mermaid(chart).split("stateDiagram-v2\n")
     assert head.startswith('---\ntitle: "')
     assert head.count("\n") == 3
@@ -179,7 +182,7 @@ def test_what_mermaid_could_misread_is_a_code(chart: Chart) -> None:
         assert text in texts
 
 
-def test_names_that_no_chart_would_take(hostile: Chart) -> None:
+def test_invalid_names(hostile: Chart) -> None:
     lines = mermaid(hostile).splitlines()
     assert len(lines) == 8
     assert not [line for line in lines[4:] if "evil:" in line or "%%" in line]

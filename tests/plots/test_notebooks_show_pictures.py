@@ -51,7 +51,7 @@ def test_without_graphviz_a_notebook_falls_back_to_text(monkeypatch: pytest.Monk
     assert notebook.model_svg(stick_slip("signed")) is None
 
 
-def test_the_core_alone_shows_no_pictures() -> None:
+def test_gms_fsm_alone_shows_no_pictures() -> None:
     """The methods come with `plots`, not with `gms_fsm`."""
     code = (
         "import gms_fsm as g; assert not hasattr(g.Chart, '_repr_svg_'); "

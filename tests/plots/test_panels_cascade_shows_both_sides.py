@@ -32,7 +32,7 @@ def labels(artists: list[object]) -> list[str]:
     return [a.get_text() for a in artists if isinstance(a, Annotation)]
 
 
-def test_the_first_cascade_that_can_be_told_apart_is_found(run: Trace) -> None:
+def test_the_first_resolvable_cascade_is_found(run: Trace) -> None:
     window = panels.cascade_window(run)
     assert window is not None
     log = in_window(run, window)

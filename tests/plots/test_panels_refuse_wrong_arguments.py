@@ -1,4 +1,4 @@
-"""A wrong window, element, time or measurement is refused with its value and the rule."""
+"""A wrong window, element, time or measurement is rejected with its value and the rule."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def run() -> Trace:
 
 
 def panels_with(argument: str) -> list[Callable[..., object]]:
-    """Return all panels that take an argument, and need no other than Axes and Trace."""
+    """Return all panels that take an argument, and otherwise need only Axes and Trace."""
     found = []
     for panel in (getattr(panels, name) for name in panels.__all__):
         taken = inspect.signature(panel).parameters
@@ -75,7 +75,7 @@ def test_within(run: Trace, within: object) -> None:
     "measured", [([1.0], [1.0, 2.0]), ([], []), ([1.0], [np.nan]), (["a"], [1.0]), 3.0], ids=str
 )
 def test_measured_points(run: Trace, measured: object) -> None:
-    with pytest.raises(ParameterError, match=r"measured is .* equally long"):
+    with pytest.raises(ParameterError, match=r"measured is .* of equal length"):
         panels.stribeck(Figure().subplots(), run, measured)  # type: ignore[arg-type]
 
 
@@ -97,7 +97,7 @@ def test_differences(run: Trace) -> None:
         panels.difference(ax, np.zeros(3), np.zeros(2))
 
 
-def test_figure_3_wants_a_force_a_row(run: Trace) -> None:
+def test_figure_3_needs_one_force_per_row(run: Trace) -> None:
     with pytest.raises(ParameterError, match=r"force has shape \(2,\)"):
         figures.figure_3(run, run, run, np.zeros(2), title="")
 
@@ -109,7 +109,7 @@ def test_formats(run: Trace, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("row", [10_000, -10_000, 1.5, True, None], ids=str)
 def test_rows_of_a_schematic(run: Trace, row: object) -> None:
-    with pytest.raises(ParameterError, match=r"row is .* whole number from"):
+    with pytest.raises(ParameterError, match=r"row is .* integer from"):
         schematic.schematic(Figure().subplots(), run, row)  # type: ignore[arg-type]
 
 

@@ -1,4 +1,4 @@
-"""State ribbons are the transition log, span by span, with names where they fit."""
+"""State ribbons equal the transition log, span by span, with names where they fit."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def run(request: pytest.FixtureRequest) -> Trace:
 
 
 def by_hand(run: Trace, i: int, t0: float, t1: float) -> list[tuple[str, float, float]]:
-    """What state element i is in, when: read off the log in the plainest way."""
+    """Return the states of element i over time, read from the log in the simplest way."""
     spans, name, since = [], "stick", 0.0
     for record in run.transitions:
         if record.element == i:
@@ -98,7 +98,7 @@ def test_names_are_drawn_only_where_they_fit(run: Trace) -> None:
 
 
 @pytest.mark.slow
-def test_a_run_without_transitions_is_one_span_an_element() -> None:
+def test_a_run_without_transitions_is_one_span_per_element() -> None:
     run = simulate(stick_slip("signed"), open_loop(), 0.5)
     drawn = spans_of(panels.ribbons(Figure().subplots(), run))
     assert drawn == [[(0.0, 0.5)], []] * 4

@@ -1,4 +1,4 @@
-"""Every panel draws the numbers of the run, with units, and keeps window, elements and log."""
+"""Every panel draws the numbers of the run with units, and respects window, elements and log."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ def drawn(line: object) -> tuple[np.ndarray, np.ndarray]:
 
 
 def holds_all(x: np.ndarray, y: np.ndarray, xs: np.ndarray, ys: np.ndarray) -> bool:
-    """Whether every point (xs, ys) is among (x, y)."""
+    """Return whether every point (xs, ys) is among (x, y)."""
     return set(zip(xs.tolist(), ys.tolist(), strict=True)) <= set(
         zip(x.tolist(), y.tolist(), strict=True)
     )
 
 
-def test_velocity_and_force_hold_every_row(run: Trace, ax: Axes) -> None:
+def test_velocity_and_force_contain_every_row(run: Trace, ax: Axes) -> None:
     (line,) = panels.velocity(ax, run)
     assert holds_all(*drawn(line), run.t, run.v)
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("t [s]", "v [m/s]")
@@ -81,7 +81,7 @@ def test_lugre_has_no_threshold(lugre: Trace, ax: Axes) -> None:
     assert "no threshold:\nthis chart has no edges" in note.get_text()
 
 
-def test_a_chart_that_does_not_know_s_is_not_held_against_it(ax: Axes) -> None:
+def test_a_chart_without_s_has_no_threshold_line(ax: Axes) -> None:
     stop = Chart(
         "stop",
         ("v",),
@@ -94,7 +94,7 @@ def test_a_chart_that_does_not_know_s_is_not_held_against_it(ax: Axes) -> None:
     trace = simulate(ChartModel(stop, {"k": 2.0}), Prescribed("0.4"), 2.0)
     (line,) = panels.ratio(ax, trace)
     assert drawn(line)[1].max() == pytest.approx(0.5)
-    assert ax.get_ylabel() == "d"  # perhaps no deflection, and no metres
+    assert ax.get_ylabel() == "d"  # it may not be a deflection in metres
     (line,) = panels.deflections(Figure().subplots(), trace)
     assert line.get_label() == "d1"
     beside = figures.compare_laws({"one": trace, "two": trace})
@@ -151,7 +151,7 @@ def test_portrait_counts_slipping_elements(run: Trace, ax: Axes) -> None:
     assert bar.get_ylabel() == "elements in slip"
     (pieces,) = panels.portrait(ax, run, elements=[3], bar=False)
     assert set(pieces.get_array()) == {0, 1}
-    # At a row each piece starts with, the count is that of the row.
+    # At the first row of each piece, the count is that of the row.
     part = panels.shown(run)
     starts = {
         tuple(path.vertices[0]): n
@@ -214,7 +214,7 @@ def test_a_long_run_is_thinned_but_keeps_extremes_and_switches() -> None:
     assert len(panels.shown(run, (10.0, 10.5))) < 3000
 
 
-def test_rows_of_an_asked_for_grid_get_their_switches_back() -> None:
+def test_rows_of_a_requested_grid_include_the_switches() -> None:
     model, rig = pulled_mass()
     run = simulate(model, rig, 20.0, t_eval=[0.0, 10.0, 20.0])
     part = panels.shown(run)

@@ -1,7 +1,7 @@
-"""A picture is written with whatever Graphviz there is, and as DOT text where there is none.
+"""A picture is written with any available Graphviz, or as DOT text if there is none.
 
-The chain is: program ``dot`` on PATH, package pygraphviz, DOT text with a warning. Whatever goes
-wrong on the way is one of this package's errors, and no half-written file is left behind.
+The chain is: program ``dot`` on PATH, package pygraphviz, DOT text with a warning. Every
+failure is an error of this package, and no incomplete file is left behind.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ def test_png_has_two_pixels_per_point(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["chart.jpg", "chart", "chart.svgz", ".svg", "chart.svg.bak"])
-def test_another_suffix_is_refused(name: str, tmp_path: Path) -> None:
+def test_another_suffix_is_rejected(name: str, tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"\.svg, \.png, \.pdf .* \.dot, \.gv"):
         render(GRAPHS["chart"], tmp_path / name)
     assert not list(tmp_path.iterdir())
@@ -159,7 +159,7 @@ def test_failed_write_leaves_no_trace(tmp_path: Path) -> None:
 
 
 @needs_dot
-def test_program_failing_is_an_error_with_its_words(tmp_path: Path) -> None:
+def test_program_failing_is_an_error_with_its_message(tmp_path: Path) -> None:
     old = tmp_path / "chart.svg"
     old.write_text("the picture of yesterday")
     broken = graphviz.Digraph(body=["a [label=<<B>x</I>>]"])
@@ -175,7 +175,7 @@ def test_package_failing_is_an_error(tmp_path: Path, no_program: None) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_what_is_no_graph_no_chart_or_in_no_folder_is_said(tmp_path: Path) -> None:
+def test_wrong_objects_and_missing_folders_are_reported(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="first the graph"):
         render("chart.svg", statechart(LUGRE))  # type: ignore[arg-type]
     with pytest.raises(ParameterError, match=r"of a model its \.chart"):

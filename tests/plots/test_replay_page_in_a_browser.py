@@ -1,4 +1,4 @@
-"""The replay page works in a real browser: every control, by mouse and keyboard, and nothing leaks.
+"""The replay page works in a browser: all controls by mouse and keyboard, no outside requests.
 
 Each page is opened from disk. A request to anywhere else, a message on the console or an error in a
 script fails the test that caused it.
@@ -90,7 +90,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 @pytest.fixture
 def open_page(browser: Browser, pages: dict[str, Path]) -> Iterator[Open]:
-    """Open a page; at the end nothing may have been asked for, and nothing complained of."""
+    """Open a page; at the end there must be no requests and no console messages."""
     contexts, wrong = [], []
 
     def opened(page: str | Path = "one", size: str = "desk", **options: Any) -> Page:
@@ -126,7 +126,7 @@ def window(page: Page) -> tuple[float, float]:
 
 
 def wait(page: Page, condition: str) -> None:
-    """Wait until a condition holds; Playwright's own way to wait needs `eval` within the page."""
+    """Wait until a condition holds; the wait function of Playwright needs `eval` in the page."""
     for _ in range(500):
         if page.evaluate(condition):
             return
@@ -205,7 +205,7 @@ def test_the_transition_list_goes_there(open_page: Open) -> None:
     assert "element 4 slip → stick (arrest)" in said(page)
 
 
-def test_playing_moves_and_is_quiet_and_space_stops_it(open_page: Open) -> None:
+def test_playing_moves_silently_and_space_stops_it(open_page: Open) -> None:
     page = open_page()
     page.locator("#speed").select_option("60")
     page.locator("body").click(position={"x": 5, "y": 5})
@@ -231,7 +231,7 @@ def test_playing_stops_at_the_end(open_page: Open) -> None:
     page.keyboard.press("ArrowLeft")
     page.click("#play")
     wait(page, "timer === 0")
-    assert "the end" in said(page)
+    assert "end of the run" in said(page)
 
 
 def test_reduced_motion_plays_slowly(open_page: Open) -> None:
@@ -273,7 +273,7 @@ def test_the_table_explains_the_chosen_element(open_page: Open) -> None:
     assert lines.nth(0).locator("em").inner_text() == "FIRED"
     page.keyboard.press("3")  # still sticks: its guard is true and not yet taken
     assert page.locator(".element").input_value() == "3"
-    assert page.locator("tbody em").all_inner_texts() == ["", "", "not asked"]
+    assert page.locator("tbody em").all_inner_texts() == ["", "", "not checked"]
     assert page.locator("tbody tr").nth(0).locator("td").last.inner_text() == "✓ true"
 
 
@@ -307,7 +307,7 @@ def test_a_breakpoint_by_click_stops_where_its_guard_becomes_true(open_page: Ope
     guard.click()
     assert guard.get_attribute("aria-pressed") == "false"
     page.keyboard.press("c")
-    assert "the end: no breakpoint" in said(page)
+    assert "end of the run: no breakpoint" in said(page)
 
 
 def test_breakpoints_by_keyboard_on_the_guard_and_in_the_table(open_page: Open) -> None:
@@ -351,7 +351,7 @@ def test_until_stops_on_the_first_row_where_it_holds(open_page: Open) -> None:
     assert page.evaluate("runs[0].mode[1][frame]") == 1
     page.fill("#until", "t > 1e9")
     page.press("#until", "Enter")
-    assert "the end: nothing stopped it" in said(page)
+    assert "end of the run: nothing stopped it" in said(page)
     page.fill("#until", "c -")
     assert frame(page) == int(page.locator("#scrubber").get_attribute("max") or 0)
     page.press("#until", "Escape")
@@ -375,7 +375,7 @@ CANNOT_BE_READ = [
 ]
 
 
-def test_what_until_cannot_read_is_said_with_its_column(open_page: Open) -> None:
+def test_until_reports_a_syntax_error_with_its_column(open_page: Open) -> None:
     page = open_page()
     for text, column, reason in CANNOT_BE_READ:
         page.fill("#until", text)
@@ -387,7 +387,7 @@ def test_what_until_cannot_read_is_said_with_its_column(open_page: Open) -> None
 
 
 def test_until_reads_what_the_expression_language_reads(open_page: Open) -> None:
-    """Same texts accepted, same texts refused, same truths, as far as rounding goes."""
+    """Same texts accepted, same texts rejected, same truths, up to rounding."""
     page, trace = open_page(), fig4("published")
     session = Session(trace.model, trace.rig, 1.0)
     texts = [
@@ -483,7 +483,7 @@ def test_until_reads_what_the_expression_language_reads(open_page: Open) -> None
     assert accepted > 20
 
 
-def test_until_refuses_spellings_of_numbers_that_only_python_has(open_page: Open) -> None:
+def test_until_rejects_number_formats_that_only_python_has(open_page: Open) -> None:
     page = open_page()
     for text in ("F > 1_000", "F > 0x10"):
         page.fill("#until", text)
@@ -609,7 +609,7 @@ def test_a_hostile_name_is_shown_and_not_run(open_page: Open, tmp_path: Path) ->
     assert page.locator("img").count() == 0
 
 
-def test_numbers_that_are_none_are_said_in_words(open_page: Open, tmp_path: Path) -> None:
+def test_values_that_are_not_numbers_are_shown_as_words(open_page: Open, tmp_path: Path) -> None:
     trace = fig4("signed")
     stored = {name: np.array(values) for name, values in trace._observed.items()}
     stored["F"][:3] = math.nan, math.inf, -math.inf
@@ -655,7 +655,9 @@ def test_the_sandboxed_frame_of_a_notebook_works(open_page: Open, tmp_path: Path
         ("two", "phone", "dark"),
     ],
 )
-def test_axe_finds_no_barrier(open_page: Open, name: str, size: str, scheme: str) -> None:
+def test_axe_finds_no_accessibility_problem(
+    open_page: Open, name: str, size: str, scheme: str
+) -> None:
     page = open_page(name, size, color_scheme=scheme)
     page.locator(".guard").first.click()
     page.locator("details summary").click()
@@ -743,6 +745,6 @@ def test_a_frame_of_the_fig_4_run_takes_less_than_50_ms(open_page: Open) -> None
             return times;
         }"""
     )
-    # The middle one: other programs of the machine may interrupt some.
+    # The median, because other programs may interrupt some frames.
     assert len(times) >= 100
     assert float(np.median(times)) < 50.0

@@ -1,4 +1,4 @@
-"""The data of a replay page are the run's own values, truths and margins, and they are only data.
+"""The data of a replay page are the values, truths and margins of the run, and they are only data.
 
 No browser is needed here; `test_replay_page_in_a_browser.py` drives the page.
 """
@@ -107,7 +107,7 @@ def test_the_log_is_complete_and_points_at_the_rows_that_firings_made() -> None:
 def test_a_breakpoint_stops_before_every_firing(law: str) -> None:
     (run,) = data_of(replay_html(fig4(law)))["runs"]
     for entry in run["log"]:
-        # The guard became true at the latest on the row on which it was asked.
+        # The guard became true at the latest on the row where it was evaluated.
         stops = run["stops"][entry["element"]][entry["edge"]]
         mode = run["mode"][entry["element"]]
         stop = max(row for row in stops if row < entry["row"])
@@ -115,7 +115,7 @@ def test_a_breakpoint_stops_before_every_firing(law: str) -> None:
 
 
 @uplot
-def test_the_page_of_fig_4_is_small_and_whole() -> None:
+def test_the_page_of_fig_4_is_small_and_complete() -> None:
     page = replay_html(fig4("published"), title="Fig. 4")
     assert len(page.encode()) < 1_000_000
     assert "Permission is hereby granted" in page
@@ -136,7 +136,7 @@ def test_long_runs_are_thinned_but_keep_all_transitions() -> None:
 
 @pytest.mark.slow
 @uplot
-def test_wanted_times_of_a_loaded_trace_are_not_doubled(tmp_path: Path) -> None:
+def test_requested_times_of_a_loaded_trace_are_not_duplicated(tmp_path: Path) -> None:
     model, rig = stick_slip("signed"), Prescribed(FIG4_SINE)
     trace = simulate(model, rig, 100.0, t_eval=np.linspace(0.0, 100.0, 201))
     fresh = data_of(replay_html(trace))
@@ -200,7 +200,7 @@ def test_a_hostile_name_stays_a_text() -> None:
 
 
 @uplot
-def test_numbers_that_are_none_are_told_apart() -> None:
+def test_nan_and_infinities_are_distinguished() -> None:
     trace = fig4("signed")
     stored = {name: np.array(values) for name, values in trace._observed.items()}
     stored["F"][:3] = np.nan, np.inf, -np.inf
@@ -212,7 +212,7 @@ def test_numbers_that_are_none_are_told_apart() -> None:
 
 
 @uplot
-def test_a_run_that_could_not_go_on_has_a_page() -> None:
+def test_a_failed_run_has_a_page() -> None:
     with pytest.raises(SimulationError) as stopped:
         simulate(stick_slip("signed"), Prescribed("0.1*sqrt(2 - t)"), 5.0)
     (run,) = data_of(replay_html(stopped.value.trace))["runs"]
@@ -233,7 +233,7 @@ def test_a_page_in_a_missing_folder_is_one_clear_error(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @uplot
-def test_two_runs_of_one_model_are_told_apart_by_their_names() -> None:
+def test_two_runs_of_one_model_are_distinguished_by_their_names() -> None:
     coarse, fine = fig4("signed"), fig4("signed")
     runs = data_of(replay_html(coarse, fine, names=["coarse", "fine"]))["runs"]
     assert [run["title"].partition(":")[0] for run in runs] == ["coarse", "fine"]
@@ -245,7 +245,7 @@ def test_two_runs_of_one_model_are_told_apart_by_their_names() -> None:
 
 
 @uplot
-def test_a_log_with_an_edge_of_another_chart_is_refused() -> None:
+def test_a_log_with_an_edge_of_another_chart_is_rejected() -> None:
     trace = fig4("signed")
     log = trace.transitions.copy()
     log.edge[0] = "warp"
@@ -254,7 +254,7 @@ def test_a_log_with_an_edge_of_another_chart_is_refused() -> None:
 
 
 @uplot
-def test_a_chart_without_edges_and_a_bank_of_many_elements_have_pages() -> None:
+def test_a_chart_without_edges_and_a_model_of_many_elements_have_pages() -> None:
     rig = Prescribed(FIG4_SINE)
     lugre = LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=0.4, stribeck=Stribeck(1, 1.5, 0.05))
     (run,) = data_of(replay_html(simulate(lugre, rig, 10.0)))["runs"]
@@ -268,9 +268,9 @@ def test_a_chart_without_edges_and_a_bank_of_many_elements_have_pages() -> None:
 
 
 @uplot
-def test_without_graphviz_the_page_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_graphviz_the_page_has_a_note(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(_replay_chart, "drawn", lambda graph, form: None)
-    assert "The chart is left out" in replay_html(fig4("signed"))
+    assert "No chart: Graphviz" in replay_html(fig4("signed"))
 
 
 @pytest.mark.slow

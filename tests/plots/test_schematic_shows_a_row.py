@@ -1,4 +1,4 @@
-"""The schematic shows one row: contacts where the deflections put them, open where they slip."""
+"""The schematic shows one row: contacts follow the deflections, and are open where they slip."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_symbols_without_a_run() -> None:
     assert wanted <= set(texts(drawn))
 
 
-def test_contacts_stand_where_the_deflections_put_them(run: Trace) -> None:
+def test_contact_positions_follow_the_deflections(run: Trace) -> None:
     for row in (0, 400, -1):
         drawn = schematic.schematic(Figure().subplots(), run, row)
         centres = [c.get_x() + c.get_width() / 2 for c in parts(drawn, "contact")]  # type: ignore[attr-defined]
@@ -50,7 +50,7 @@ def test_contacts_stand_where_the_deflections_put_them(run: Trace) -> None:
         np.testing.assert_allclose(shift, expected, atol=1e-12)
 
 
-def test_sticking_contacts_are_full_and_slipping_ones_open(run: Trace) -> None:
+def test_sticking_contacts_are_filled_and_slipping_ones_open(run: Trace) -> None:
     slipping = (run.states == "slip").sum(axis=1)
     row = int(np.flatnonzero(slipping == 2)[5])
     drawn = schematic.schematic(Figure().subplots(), run, row)

@@ -71,7 +71,7 @@ def test_counts_are_those_of_the_run(name: str, direction: str, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("name", RUNS)
-def test_the_tally_is_the_reports(name: str) -> None:
+def test_the_counts_equal_those_of_the_report(name: str) -> None:
     trace = simulate(*RUNS[name])
     np.testing.assert_allclose(Tally(trace).dwell, dwell_times(trace), rtol=1e-12, atol=1e-12)
     some = trace.sample([trace.t[-1] / 2, trace.t[-1] / 3])  # the log is complete all the same
@@ -84,12 +84,12 @@ def test_a_chart_without_counts_has_none() -> None:
     assert "active" not in source
 
 
-def test_one_of_a_bank_is_named_and_one_alone_is_not(tmp_path: Path) -> None:
+def test_one_of_several_elements_is_named_and_a_single_one_is_not(tmp_path: Path) -> None:
     assert "element1" in drawn(simulate(*RUNS["bank"]), 1, tmp_path)
     assert "element1" not in drawn(simulate(*RUNS["one"]), 1, tmp_path)
 
 
-def test_another_chart_and_missing_elements_are_refused() -> None:
+def test_another_chart_and_missing_elements_are_rejected() -> None:
     trace = simulate(*RUNS["bank, one way"])
     with pytest.raises(ParameterError, match="counts is a run of the chart 'GMS element, signed"):
         statechart(LUGRE, counts=trace)

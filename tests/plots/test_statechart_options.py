@@ -1,7 +1,7 @@
-"""Notation, direction, theme and choice of elements change how a chart looks, never what it says.
+"""Notation, direction, theme and choice of elements change the look of a chart, not its content.
 
-Texts of the math notation come from the same trees; whatever a guard holds, every notation and
-theme draws it whole; a wrong option is refused with its value and what is allowed.
+Texts of the math notation come from the same trees; every notation and theme draws any
+guard completely; a wrong option is rejected with its value and what is allowed.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def test_every_look_shows_the_whole_hostile_chart(
 
 
 @pytest.mark.parametrize(("notation", "direction", "theme"), LOOKS)
-def test_names_that_no_chart_would_take(
+def test_invalid_names(
     notation: str, direction: str, theme: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(gms_fsm.charts.chart, "_check_name", lambda *_: None)  # let them through
@@ -171,7 +171,7 @@ def test_elements_are_chosen_from_0_and_shown_from_1(tmp_path: Path) -> None:
     assert shown["element4"].box.left < shown["element1"].box.left
     assert [group for group in shown.values() if group.id == "element4-state-slip"]
     assert chosen(range(2)) == (0, 1)
-    one = drawn(statechart(SIGNED, [2]), tmp_path)  # which one has to be told
+    one = drawn(statechart(SIGNED, [2]), tmp_path)  # the element must be named
     assert one["element3"].texts == ["Element3", "AND 3"]
 
 
@@ -183,7 +183,7 @@ def test_direction_turns_the_layout(tmp_path: Path) -> None:
         assert (stick.bottom < slip.top) == (not across)
 
 
-def test_wrong_options_are_refused() -> None:
+def test_wrong_options_are_rejected() -> None:
     for name, allowed in (
         ("notation", "'stateflow' or 'math'"),
         ("direction", "'TB' or 'LR'"),
@@ -192,11 +192,11 @@ def test_wrong_options_are_refused() -> None:
         with pytest.raises(ParameterError, match=f"{name} is 'other'; it must be {allowed}"):
             statechart(LUGRE, **{name: "other"})  # type: ignore[arg-type]
     for elements in ([], [0, 0], [-1], [0, 1.5], "01", None):
-        with pytest.raises(ParameterError, match=r"elements is .*; (it must be|a chart has)"):
+        with pytest.raises(ParameterError, match=r"elements is .*; (it must be|the number of)"):
             statechart(LUGRE, elements)  # type: ignore[arg-type]
 
 
-def test_names_of_edges_are_written_when_asked_for(tmp_path: Path) -> None:
+def test_names_of_edges_are_shown_on_request(tmp_path: Path) -> None:
     shown = {"".join(box.texts) for box in drawn(statechart(SIGNED), tmp_path).values()}
     named = {"".join(box.texts) for box in drawn(statechart(SIGNED, names=True), tmp_path).values()}
     for edge in SIGNED.transitions:

@@ -1,6 +1,6 @@
 """The picture of a chart shows every state, edge, guard, priority, default dot and region.
 
-The claim is checked on the drawn SVG, by where things are: an edge counts only if its first half
+The claim is checked on the drawn SVG, by geometry: an edge counts only if its first half
 begins at its source, its second half ends with an arrow at its target, and both meet its guard.
 """
 
@@ -92,7 +92,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Box:
-    """The smallest upright rectangle around some points."""
+    """The axis-aligned bounding box of some points."""
 
     left: float
     top: float
@@ -184,7 +184,7 @@ def of_class(drawn: dict[str, Drawn], name: str) -> set[str]:
 
 
 @pytest.mark.parametrize(("chart", "elements"), CASES)
-def test_every_state_says_what_it_does(chart: Chart, elements: int, draw: Draw) -> None:
+def test_every_state_shows_its_flow(chart: Chart, elements: int, draw: Draw) -> None:
     drawn = draw(chart, elements)
     expected = set()
     for element in range(1, elements + 1):
@@ -205,7 +205,7 @@ def test_every_state_says_what_it_does(chart: Chart, elements: int, draw: Draw) 
 
 
 @pytest.mark.parametrize(("chart", "elements"), CASES)
-def test_every_guard_is_whole(chart: Chart, elements: int, draw: Draw) -> None:
+def test_every_guard_is_complete(chart: Chart, elements: int, draw: Draw) -> None:
     drawn = draw(chart, elements)
     expected = set()
     for element in range(1, elements + 1):
@@ -263,14 +263,16 @@ def test_every_element_has_a_default_dot(chart: Chart, elements: int, draw: Draw
 
 
 @pytest.mark.parametrize(("chart", "elements"), CASES)
-def test_nothing_lies_on_anything_else(chart: Chart, elements: int, draw: Draw) -> None:
+def test_nothing_overlaps(chart: Chart, elements: int, draw: Draw) -> None:
     drawn = draw(chart, elements)
     solid = [drawn[name] for name in of_class(drawn, "state") | of_class(drawn, "guard")]
     assert not [(a.id, b.id) for a, b in combinations(solid, 2) if a.box.meets(b.box)]
 
 
 @pytest.mark.parametrize(("elements", "rows"), [(2, 1), (4, 2), (5, 2), (12, 3)])
-def test_a_bank_is_a_grid_of_parallel_regions(elements: int, rows: int, draw: Draw) -> None:
+def test_several_elements_are_a_grid_of_parallel_regions(
+    elements: int, rows: int, draw: Draw
+) -> None:
     drawn = draw(GMS_ELEMENT["signed"], elements)
     regions = [drawn[f"element{element}"] for element in range(1, elements + 1)]
     assert of_class(drawn, "region") == {region.id for region in regions}
@@ -290,9 +292,7 @@ def test_one_element_has_no_region_and_lugre_no_edges(draw: Draw) -> None:
     assert of_class(drawn, "edge") == {"element1-default-edge"}
 
 
-def test_hostile_names_are_shown_and_not_obeyed(
-    draw: Draw, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_hostile_names_are_shown_literally(draw: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gms_fsm.charts.chart, "_check_name", lambda *_: None)  # let them through
     bad_state = 'slip</B></TD></TR></TABLE>>]; "evil:n" [label=<<B>\\N" & \x01[x] \\'
     bad_edge = 'a"]; evil -> evil [x="'
@@ -318,6 +318,6 @@ def test_hostile_names_are_shown_and_not_obeyed(
 
 
 @pytest.mark.parametrize("elements", [0, -3, 1.5])
-def test_a_chart_of_no_elements_is_refused(elements: int) -> None:
+def test_a_chart_without_elements_is_rejected(elements: int) -> None:
     with pytest.raises(ParameterError, match=f"elements is {elements}.*at least 1"):
         statechart(LUGRE, elements)

@@ -1,7 +1,7 @@
-"""A run's memory is its transition log: under 1,000 bytes a transition, and nothing for its steps.
+"""A run's memory is its transition log: under 1,000 bytes per transition, and none for its steps.
 
-With ``output="end"`` nothing else grows, however long the run. Twenty thousand transitions here;
-tests/soak.py runs a million and looks at what the operating system says.
+With ``output="end"`` nothing else grows, however long the run. This test runs twenty thousand
+transitions; tests/soak.py runs a million and checks what the operating system reports.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ compiled = pytest.param(
 
 
 def run(engine: str, transitions: int, **options: float) -> Trace:
-    """Run so many periods that at least so many transitions fire; keep the end only."""
+    """Run enough periods for at least the given number of transitions; keep only the end."""
     periods = -(-transitions // EACH_PERIOD) + 1
     return simulate(
         stick_slip("signed"),
@@ -45,7 +45,7 @@ def run(engine: str, transitions: int, **options: float) -> Trace:
 
 
 def peak(engine: str, transitions: int, **options: float) -> tuple[int, Trace]:
-    """Return the most memory [bytes] that Python and NumPy held, and the run."""
+    """Return the peak memory [bytes] of Python and NumPy, and the run."""
     tracemalloc.start()
     try:
         trace = run(engine, transitions, **options)
@@ -56,7 +56,7 @@ def peak(engine: str, transitions: int, **options: float) -> tuple[int, Trace]:
 
 @pytest.mark.parametrize(("engine", "transitions"), [compiled, ("ifelse", 400), ("machines", 200)])
 def test_memory_grows_with_the_log_only(engine: str, transitions: int) -> None:
-    run(engine, EACH_PERIOD)  # what is loaded once does not count
+    run(engine, EACH_PERIOD)  # memory for one-time loading does not count
     few, first = peak(engine, transitions // 4)
     many, second = peak(engine, transitions)
     assert len(second.transitions) >= transitions
@@ -75,8 +75,8 @@ def test_ten_times_the_steps_take_no_more_memory(engine: str) -> None:
 
 
 @pytest.mark.parametrize(("engine", "transitions"), [compiled, ("ifelse", 2000)])
-def test_every_period_is_like_the_last(engine: str, transitions: int) -> None:
-    """Late transitions are as good as early ones: same order, same phase, same values."""
+def test_every_period_equals_the_last(engine: str, transitions: int) -> None:
+    """Late transitions are as accurate as early ones: same order, same phase, same values."""
     log = run(engine, transitions).transitions
     first, last = log[EACH_PERIOD : 2 * EACH_PERIOD], log[-EACH_PERIOD:]
     assert first.edge.tolist() == last.edge.tolist()
@@ -87,10 +87,10 @@ def test_every_period_is_like_the_last(engine: str, transitions: int) -> None:
     assert np.abs(phase).max() < 1e-3
 
 
-# --------------------------------------------------------------------------- in a process alone
+# --------------------------------------------------------------------------- in a separate process
 @dataclass(frozen=True)
 class Figures:
-    """What a run took."""
+    """Resources used by a run."""
 
     transitions: int
     seconds: float
@@ -98,7 +98,7 @@ class Figures:
 
 
 def in_a_child(engine: str, transitions: int) -> Figures:
-    """Run in a process of its own and ask the operating system what it used."""
+    """Run in a separate process and query the operating system for its resources."""
     code = f"from {__name__} import measured; measured({engine!r}, {transitions})"
     done = subprocess.run(
         [sys.executable, "-c", code],
@@ -117,14 +117,14 @@ def measured(engine: str, transitions: int) -> None:
     began = time.perf_counter()
     trace = run(engine, transitions)
     seconds = time.perf_counter() - began
-    with Path("/proc/self/status").open() as file:  # the child's own, not what it was forked from
+    with Path("/proc/self/status").open() as file:  # of the child, not of its parent
         (line,) = [line for line in file if line.startswith("VmHWM")]
     print(len(trace.transitions), seconds, 1024 * int(line.split()[1]))
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
-def test_the_operating_system_agrees() -> None:
+def test_the_operating_system_reports_the_same() -> None:
     few, many = in_a_child("ifelse", 64), in_a_child("ifelse", 1600)
     assert many.transitions >= 1600
-    # Pages come in fours of kilobytes and heaps in more: a megabyte is within the noise.
+    # Memory comes in pages and heaps in larger blocks: a megabyte is within the noise.
     assert many.peak - few.peak < BYTES_A_FIRING * many.transitions + 2**21

@@ -1,4 +1,4 @@
-"""A run continued from its own last row is the run that was never cut."""
+"""A run continued from its own last row equals the uninterrupted run."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ CASES = {
 
 
 def last_row(trace):
-    """Return what `initial` takes, from the last row."""
+    """Return the last row in the form that `initial` takes."""
     values = {"z": trace.z[-1], "states": trace.states[-1].tolist(), "x": trace.x[-1]}
     return values if trace.rig.acceleration is None else values | {"v": trace.v[-1]}
 
@@ -26,7 +26,7 @@ def last_row(trace):
 @pytest.mark.parametrize("share", [0.31, 0.5, 0.77])
 @pytest.mark.parametrize("case", CASES)
 def test_continued(case, share):
-    """z, x, v, states and the joined log are those of the whole run."""
+    """z, x, v, states and the joined log equal those of the whole run."""
     model, rig, T = CASES[case]
     whole = simulate(model, rig, T, **TIGHT)
     first = simulate(model, rig, share * T, **TIGHT)
@@ -52,7 +52,7 @@ def test_cut_on_a_transition():
 
 
 def test_without_the_states_it_is_another_run():
-    """The cut carries the states too: a continuation that forgets them goes elsewhere."""
+    """The cut carries the states too: a continuation without them takes another course."""
     model, rig, _ = CASES["open loop, signed"]
     first = simulate(model, rig, 7.0, **TIGHT)
     assert (first.states[-1] == "slip").all()

@@ -1,7 +1,7 @@
 """A callback that changes a parameter or a state is refused, by both engines that call it.
 
-The run integrates with the model's parameters and follows the chart's edges; what a callback set
-otherwise would be asked for and not located, or would put the machines and the rows apart.
+The run integrates with the model's parameters and follows the chart's edges; other changes by a
+callback would not be located, or would make the machines and the rows disagree.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def test_parameters_are_read_only_before_a_run_too(model: GMS) -> None:
         machines.elements[1].v_c = 1.0  # type: ignore[attr-defined]
 
 
-def test_a_class_may_name_a_parameter_and_the_model_has_the_last_word(model: GMS) -> None:
+def test_an_element_class_may_define_a_parameter_but_the_model_decides(model: GMS) -> None:
     class Own(Element):
         def __init__(self) -> None:
             self.k = -1.0
@@ -105,7 +105,7 @@ def _nested_trigger(event: Any) -> None:
         (_nested_trigger, "a callback changed a state .*break_away_forward from state slip"),
     ],
 )
-def test_a_forced_state_is_an_error_with_the_run_up_to_there(
+def test_a_forced_state_is_an_error_that_keeps_the_run_so_far(
     model: GMS, engine: str, force: Callable[[Any], None], said: str
 ) -> None:
     whole = simulate(model, open_loop(), 20.0)
@@ -123,7 +123,7 @@ def test_a_forced_state_is_an_error_with_the_run_up_to_there(
     assert trace.t.tolist() == whole.t[: len(trace)].tolist()
 
 
-def test_a_state_forced_between_firings_is_found_at_the_next_one(model: GMS) -> None:
+def test_a_state_forced_between_firings_is_detected_at_the_next_one(model: GMS) -> None:
     machines = ElementMachines(model)
 
     def meddle(_: object) -> None:

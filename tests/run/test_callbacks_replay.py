@@ -1,8 +1,8 @@
-"""Machines of the user's own see of a compiled run what they see of their own.
+"""A user's own machines see the same in a replayed compiled run as when they run themselves.
 
 `simulate(..., engine="compiled", machines=...)` fires every edge through `transitions` too: each
-callback runs once a firing, in the log's order, with the values the machines engine shows, and the
-machines end in the states of the last row. The run is the same to the last bit.
+callback runs once per firing, in the log's order, with the values the machines engine shows, and
+the machines end in the states of the last row. The run is the same to the last bit.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ PLACES = ("prepare_event", "before_state_change", "after_state_change", "finaliz
 
 
 def _watched(model: Model, kind: type[Element] = Element) -> tuple[ElementMachines, list[Call]]:
-    """Machines with a note of every callback at every place, and the notes."""
+    """Return machines that record every callback at every place, and the records."""
     machines, calls = ElementMachines(model, kind), []
     variables, parameters = model.chart.variables, model.chart.parameter_names
 
@@ -86,7 +86,7 @@ def _watched(model: Model, kind: type[Element] = Element) -> tuple[ElementMachin
 
 
 def _both(case: str, **options: Any) -> tuple[Trace, list[Call]]:
-    """Run the machines engine and the compiled one with a replay; compare; return one."""
+    """Run the machines engine and the compiled one with a replay; compare and return one run."""
     model, rig, t_end = CASES[case]
     own, wanted = _watched(model)
     replayed, calls = _watched(model)
@@ -101,7 +101,7 @@ def _both(case: str, **options: Any) -> tuple[Trace, list[Call]]:
 @pytest.mark.slow
 @pytest.mark.parametrize("options", OPTIONS)
 @pytest.mark.parametrize("case", CASES)
-def test_every_callback_sees_what_it_would_have_seen(case: str, options: str) -> None:
+def test_every_callback_sees_the_same_values(case: str, options: str) -> None:
     trace, calls = _both(case, **OPTIONS[options])
     log = trace.transitions
     assert len(log) > 0
@@ -112,8 +112,8 @@ def test_every_callback_sees_what_it_would_have_seen(case: str, options: str) ->
     assert len(calls) == 6 * len(log)
 
 
-def test_the_values_are_those_of_the_log() -> None:
-    """v, s and z of the instant before the firing, for the first of a set at least."""
+def test_the_values_equal_those_in_the_log() -> None:
+    """v, s and z at the instant before the firing, at least for the first of a set."""
     trace, calls = _both("open loop")
     for r, call in zip(trace.transitions, [c for c in calls if c[0] == "on_exit"], strict=True):
         name, element, state, t, _, v, s, z = call[1:9]
@@ -161,7 +161,7 @@ def test_the_second_firing_at_one_time_sees_what_the_first_assigned() -> None:
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_machines_end_in_the_states_of_the_last_row_and_start_anew(case: str) -> None:
+def test_machines_end_in_the_states_of_the_last_row_and_restart_cleanly(case: str) -> None:
     model, rig, t_end = CASES[case]
     machines = ElementMachines(model)
     for fraction in (0.6, 0.2, 1.0):
@@ -192,10 +192,10 @@ def test_every_element_starts_in_its_own_state() -> None:
         initial=initial,
     )
     assert [e.state for e in machines.elements] == states
-    assert calls == [], "being put into the initial state is no firing"
+    assert calls == [], "setting the initial state is not a firing"
 
 
-def test_elements_of_a_class_of_ones_own() -> None:
+def test_elements_of_a_user_defined_class() -> None:
     @dataclass(eq=False)
     class Counting(Element):
         hits: int = 0
@@ -223,9 +223,9 @@ def test_more_firings_than_the_columns_hold_at_first() -> None:
     same_bits(trace, simulate(model, rig, 25.0, engine="compiled"))
 
 
-# --------------------------------------------------------------------------- one truth
+# --------------------------------------------------------------------------- the chart decides
 @pytest.mark.parametrize("error", [ZeroDivisionError, ValueError, KeyError, KeyboardInterrupt])
-def test_an_error_of_a_callback_reaches_the_user_as_it_is(error: type[BaseException]) -> None:
+def test_an_error_in_a_callback_reaches_the_user_unchanged(error: type[BaseException]) -> None:
     model = stick_slip("signed")
     seen: dict[str, list[float]] = {}
     for engine in ("machines", "compiled"):
@@ -253,12 +253,12 @@ def test_a_callback_that_changes_the_values_before_the_guard_is_refused() -> Non
         event.model.v = 0.0
 
     machines.machine.prepare_event = [stop]
-    said = r"element 1, edge 'break_away_forward' at t = .*changed the element's values.*only look"
+    said = r"element 1, edge 'break_away_forward' at t = .*changed the element's values.*only read"
     with pytest.raises(CallbackError, match=said):
         simulate(machines.model, open_loop(), 20.0, engine="compiled", machines=machines)
 
 
-def test_what_a_callback_writes_afterwards_does_not_reach_the_run() -> None:
+def test_values_written_by_a_callback_after_the_guard_do_not_affect_the_run() -> None:
     machines = ElementMachines(stick_slip("signed"))
 
     def scribble(event: Any) -> None:
@@ -282,7 +282,7 @@ def test_a_machine_given_another_edge_or_condition_is_refused() -> None:
             simulate(model, open_loop(), 20.0, engine="compiled", machines=machines)
 
 
-def test_a_livelock_was_seen_by_the_callbacks_too() -> None:
+def test_callbacks_run_up_to_a_livelock_too() -> None:
     sound = gms_element("signed")
     edges = (
         Transition("break_away", "stick", "slip", guard="abs(z) >= s and abs(v) <= v_c"),
@@ -312,11 +312,11 @@ def test_a_livelock_was_seen_by_the_callbacks_too() -> None:
 def test_machines_of_another_model_are_refused() -> None:
     machines = ElementMachines(one_element("signed"))
     for engine in ("machines", "compiled"):
-        with pytest.raises(ParameterError, match="another model"):
+        with pytest.raises(ParameterError, match="different model"):
             simulate(stick_slip("signed"), open_loop(), 20.0, engine=engine, machines=machines)
 
 
-def test_machines_where_there_is_no_use_for_them_are_refused() -> None:
+def test_unused_machines_are_refused() -> None:
     model = GMS(one_element("signed").parameters, law="signed")
     machines = ElementMachines(model)
     with pytest.raises(ParameterError, match=r"'ifelse' uses no machines.*leave machines"):

@@ -1,7 +1,7 @@
-"""User callbacks run exactly once per firing, with the values of that instant at hand.
+"""User callbacks run exactly once per firing, with access to the values at that instant.
 
 Nothing is called between firings; the machines end in the states of the last row; and the chart
-stays the only truth: a machine that was given other edges or conditions is refused.
+remains the only source of switching: a machine with other edges or conditions is refused.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def test_machine_wide_callbacks_run_once_per_firing(model: GMS, place: str) -> N
 
 
 @pytest.mark.parametrize("place", ["prepare", "before", "after"])
-def test_callbacks_of_one_edge_run_at_its_firings_only(model: GMS, place: str) -> None:
+def test_callbacks_of_an_edge_run_only_when_it_fires(model: GMS, place: str) -> None:
     machines, calls = ElementMachines(model), []
     (edge,) = machines.machine.get_transitions("arrest", "slip", "stick")
     edge.add_callback(place, _note(place, calls))
@@ -170,7 +170,7 @@ def test_a_run_without_firings_calls_nothing(model: GMS) -> None:
     assert calls == []
 
 
-def test_at_the_call_the_rows_before_are_not_yet_past(model: GMS) -> None:
+def test_callbacks_run_before_later_rows_are_computed(model: GMS) -> None:
     machines, times = ElementMachines(model), []
     machines.machine.on_enter_slip(lambda event: times.append(event.model.t))
     trace = simulate(model, open_loop(), T_END, engine=machines, t_eval=[0.0, T_END])
@@ -178,7 +178,7 @@ def test_at_the_call_the_rows_before_are_not_yet_past(model: GMS) -> None:
     assert times == trace.transitions.t[slips].tolist()
 
 
-def test_watching_changes_nothing(model: GMS) -> None:
+def test_callbacks_that_only_read_change_nothing(model: GMS) -> None:
     machines = ElementMachines(model)
     machines.machine.on_enter_slip(lambda event: None)
     same_bits(
@@ -186,7 +186,7 @@ def test_watching_changes_nothing(model: GMS) -> None:
     )
 
 
-def test_machines_end_in_the_states_of_the_last_row_and_start_anew(model: GMS) -> None:
+def test_machines_end_in_the_states_of_the_last_row_and_restart_cleanly(model: GMS) -> None:
     machines = ElementMachines(model)
     for t_end in (7.0, 3.0, T_END):
         trace = simulate(model, open_loop(), t_end, engine=machines)
@@ -208,11 +208,11 @@ def test_every_element_starts_in_its_own_state(model: GMS) -> None:
     )
     assert trace.states[0].tolist() == states
     assert trace.z[0].tolist() == [0.0, 0.1, 0.2, 0.3]
-    assert calls == [], "being put into the initial state is no firing"
+    assert calls == [], "setting the initial state is not a firing"
 
 
-# --------------------------------------------------------------------------- one truth
-def test_a_condition_of_the_users_is_refused(model: GMS) -> None:
+# --------------------------------------------------------------------------- the chart decides
+def test_a_user_condition_is_refused(model: GMS) -> None:
     for target in (True, False):
         machines = ElementMachines(model)
         (edge,) = machines.machine.get_transitions("arrest", "slip", "stick")
@@ -231,7 +231,7 @@ def test_a_condition_of_the_users_is_refused(model: GMS) -> None:
         ("break_away_forward", "slip", "slip"),
     ],
 )
-def test_an_edge_of_the_users_is_refused(model: GMS, trigger: str, source: str, dest: str) -> None:
+def test_a_user_edge_is_refused(model: GMS, trigger: str, source: str, dest: str) -> None:
     machines = ElementMachines(model)
     machines.machine.add_transition(trigger, source, dest)
     with pytest.raises(ChartError, match=trigger):
@@ -260,13 +260,13 @@ def test_a_callback_that_changes_the_values_before_the_guard_is_refused(model: G
         event.model.v = 0.0
 
     machines.machine.prepare_event = [stop]
-    said = r"element 1, edge 'break_away_forward' at t = .*changed the element's values.*only look"
+    said = r"element 1, edge 'break_away_forward' at t = .*changed the element's values.*only read"
     with pytest.raises(CallbackError, match=said) as caught:
         simulate(model, open_loop(), 20.0, engine=machines)
     assert len(caught.value.trace) > 1
 
 
-def test_what_a_callback_writes_afterwards_does_not_reach_the_run(model: GMS) -> None:
+def test_values_written_by_a_callback_after_the_guard_do_not_affect_the_run(model: GMS) -> None:
     machines = ElementMachines(model)
 
     def scribble(event: Any) -> None:
@@ -279,7 +279,7 @@ def test_what_a_callback_writes_afterwards_does_not_reach_the_run(model: GMS) ->
 
 
 @pytest.mark.parametrize("error", [ZeroDivisionError, ValueError, KeyError])
-def test_an_error_of_a_callback_reaches_the_user_as_it_is(
+def test_an_error_in_a_callback_reaches_the_user_unchanged(
     model: GMS, error: type[Exception]
 ) -> None:
     machines = ElementMachines(model)
@@ -294,11 +294,11 @@ def test_an_error_of_a_callback_reaches_the_user_as_it_is(
 
 
 def test_machines_of_another_model_are_refused(model: GMS) -> None:
-    with pytest.raises(ParameterError, match="another model"):
+    with pytest.raises(ParameterError, match="different model"):
         simulate(model, open_loop(), 20.0, engine=ElementMachines(one_element("signed")))
 
 
 @pytest.mark.parametrize("kind", [dict, Element(), "Element", None])
-def test_what_is_no_element_class_is_refused(model: GMS, kind: Any) -> None:
+def test_a_class_that_is_not_an_element_is_refused(model: GMS, kind: Any) -> None:
     with pytest.raises(ParameterError, match="class derived from Element"):
         ElementMachines(model, kind)

@@ -1,7 +1,7 @@
-"""Guards without memory end a run in an error that names the element, also if several chatter.
+"""Guards without memory end a run in an error that names the element, even if several chatter.
 
-Two machines that chatter together move the clock on by some ticks each time; a run that went on
-like that would never end.
+Two machines that chatter together advance the clock by a few ticks each time; without the error,
+such a run would never end.
 """
 
 import pytest
@@ -14,7 +14,7 @@ from tests.traces.test_monitors_see_what_happens import SLOWING, memoryless
 @pytest.mark.parametrize("engine", ["machines", "ifelse", "compiled"])
 @pytest.mark.parametrize(("weights", "element", "t"), [([0.5], 1, 2.8799), ([0.5, 0.4], 2, 2.1626)])
 def test_the_error_names_the_element_and_says_that_it_chatters(weights, element, t, engine):
-    """Which of the two counts is full first, that of the guard or of the machine, is no matter."""
+    """Whether the guard's or the machine's count fills up first does not matter."""
     if engine == "compiled":
         pytest.importorskip("numba", reason="needs the extra fast")
     with pytest.raises(LivelockError) as caught:
@@ -35,7 +35,7 @@ def test_the_error_names_the_element_and_says_that_it_chatters(weights, element,
     assert "sliding mode" not in text
 
 
-def test_what_it_did_before_is_not_counted():
+def test_earlier_switches_are_not_counted():
     """At the start it arrests, seconds before it chatters."""
     with pytest.raises(LivelockError) as caught:
         simulate(memoryless([0.5]), SLOWING, 10.0, initial={"states": ["slip"]})

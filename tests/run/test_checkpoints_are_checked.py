@@ -1,8 +1,8 @@
-"""A checkpoint is refused unless this program wrote it, for these functions, with possible numbers.
+"""A checkpoint is refused unless this program wrote it, for these functions, with possible values.
 
 The same Python function means the same code, constants, defaults, enclosed values and globals, in
-any process; where that cannot be told the run is refused before it starts. Compiled code would take
-a wrong number for a place in memory, so each is looked at; nothing is unpacked that is too large.
+any process; if that cannot be determined, the run is refused before it starts. Compiled code would
+use an invalid number as a memory address, so each is checked; nothing too large is unpacked.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ ENGINES = [
 
 @pytest.fixture(autouse=True)
 def _short_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have a compiled run come back often enough to be interrupted."""
+    """Make a compiled run return often enough to be interrupted."""
     monkeypatch.setattr("gms_fsm.run._compiled_run.STEPS_AT_ONCE", 60)
 
 
 def begun(path: Path, rig: Any, engine: str = "machines", **options: Any) -> None:
-    """Leave the checkpoint of a run that was interrupted on its way."""
+    """Create the checkpoint of a run interrupted on its way."""
 
     def stop(moment: Any) -> None:
         if moment.t > 11.0:
@@ -114,7 +114,7 @@ def test_another_function_is_refused(pair: str, tmp_path: Path) -> None:
     assert not path.exists()
 
 
-def test_a_function_made_anew_is_the_same(tmp_path: Path) -> None:
+def test_a_recreated_function_is_the_same(tmp_path: Path) -> None:
     path = tmp_path / "run.checkpoint"
     begun(path, Prescribed(_louder(0.2)))
     goes_on(path, Prescribed(_louder(0.2)))
@@ -128,10 +128,8 @@ def test_another_value_of_a_global_is_another_function(monkeypatch: pytest.Monke
 
 @pytest.mark.parametrize("own", [types.ModuleType("settings_of_mine"), type("Settings", (), {})])
 @pytest.mark.parametrize("others", [0, 400])
-def test_another_value_in_a_module_or_class_of_ones_own_is_another_function(
-    own: Any, others: int
-) -> None:
-    """Also where the names are many, and their numbers long."""
+def test_another_value_in_a_user_module_or_class_is_another_function(own: Any, others: int) -> None:
+    """Even if the names are many, and their numbers long."""
     own.level, names = 0.2, {"own": own}
     many = "".join(f"    t = t + name{i}\n" for i in range(others))
     names |= {f"name{i}": 0.0 for i in range(others)}
@@ -141,7 +139,7 @@ def test_another_value_in_a_module_or_class_of_ones_own_is_another_function(
     assert identity(names["call"]) != before
 
 
-def test_a_function_of_a_package_under_way_is_known_by_its_code_not_by_its_version(
+def test_a_function_of_an_editable_package_is_identified_by_its_code(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.syspath_prepend(tmp_path)
@@ -217,7 +215,7 @@ UNKNOWN = {
 
 
 @pytest.mark.parametrize("kind", UNKNOWN)
-def test_a_function_that_cannot_be_known_again_is_refused_before_the_run(
+def test_a_function_that_cannot_be_identified_is_refused_before_the_run(
     kind: str, tmp_path: Path
 ) -> None:
     path, rig = tmp_path / "run.checkpoint", Prescribed(UNKNOWN[kind])
@@ -229,7 +227,7 @@ def test_a_function_that_cannot_be_known_again_is_refused_before_the_run(
 
 
 @pytest.mark.slow
-def test_a_function_compiled_by_numba_is_known_by_its_text(tmp_path: Path) -> None:
+def test_a_function_compiled_by_numba_is_identified_by_its_text(tmp_path: Path) -> None:
     numba = pytest.importorskip("numba", reason="needs the extra fast")
     path = tmp_path / "run.checkpoint"
     begun(path, Prescribed(numba.njit(_louder(0.2))), "compiled")
@@ -238,31 +236,31 @@ def test_a_function_compiled_by_numba_is_known_by_its_text(tmp_path: Path) -> No
     goes_on(path, Prescribed(numba.njit(_louder(0.2))), "compiled")
 
 
-# --------------------------------------------------------------------------- rigs of one's own
+# --------------------------------------------------------------------------- user-defined rigs
 class _Own:
     title, acceleration, numbers = "mine", "(F_a - F) / mass", {"mass": 1.0}
     signals = Slider(1.0, "0.2 * t").signals
 
 
 def _own_rigs() -> dict[str, Any]:
-    """One with a name of its own, one with the name of ours, one derived from ours."""
+    """Return rigs with a name of their own, with a built-in rig's name, and derived from one."""
     namesake = type("Slider", (_Own,), {"acceleration": "(2 * F_a - F) / mass"})
     derived = type("Slider", (Slider,), {"acceleration": "(2 * F_a - F) / mass"})
     return {"own": _Own(), "namesake": namesake(), "derived": derived(1.0, "0.2 * t")}
 
 
 @pytest.mark.parametrize("kind", ["own", "namesake", "derived"])
-def test_a_rig_of_ones_own_is_refused_in_words(kind: str, tmp_path: Path) -> None:
+def test_a_user_defined_rig_is_refused_with_an_explanation(kind: str, tmp_path: Path) -> None:
     rig = _own_rigs()[kind]
     told: list[object] = []
-    with pytest.raises(OutputError, match="a class of your own"):
+    with pytest.raises(OutputError, match="a custom class"):
         simulate(stick_slip("signed"), rig, 1.0, checkpoint=tmp_path / "run", progress=told.append)
     assert told == [], "before the run"
     trace = simulate(stick_slip("signed"), rig, 1.0)
     for name in ("run.npz", "run.csv"):
         with pytest.raises(OutputError, match="it can hold Prescribed, Slider, PulledSlider"):
             trace.save(tmp_path / name)
-    with pytest.raises(OutputError, match="a class of your own"):
+    with pytest.raises(OutputError, match="a custom class"):
         Session(stick_slip("signed"), rig, 1.0).save(tmp_path / "session.json")
     assert list(tmp_path.iterdir()) == []
 
@@ -273,7 +271,7 @@ def test_another_version_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     with monkeypatch.context() as patch:
         patch.setattr("gms_fsm._version.__version__", "0.0.7")
         begun(path, open_loop())
-    with pytest.raises(CheckpointError, match=r"begun by gms-fsm 0\.0\.7 .* this is gms-fsm "):
+    with pytest.raises(CheckpointError, match=r"started by gms-fsm 0\.0\.7 .* this is gms-fsm "):
         goes_on(path, open_loop())
     with monkeypatch.context() as patch:
         patch.setattr("integrators.compiled.edition", lambda: "another loop")
@@ -281,12 +279,12 @@ def test_another_version_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
             goes_on(path, open_loop())
 
 
-def test_a_checkpoint_of_another_format_is_of_another_program(tmp_path: Path) -> None:
+def test_a_checkpoint_of_another_format_belongs_to_another_program(tmp_path: Path) -> None:
     path = tmp_path / "run.checkpoint"
     begun(path, open_loop())
     arrays = _arrays(path)
     _write(path, {"format": np.array("gms-fsm checkpoint 1"), "identity": arrays["identity"]})
-    with pytest.raises(CheckpointError, match="begun by an older gms-fsm"):
+    with pytest.raises(CheckpointError, match="started by an older gms-fsm"):
         goes_on(path, open_loop())
 
 
@@ -304,10 +302,10 @@ def _write(path: Path, arrays: dict[str, Any]) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("options", [{}, {"t_eval": np.linspace(0, 25, 333)}], ids=["all", "eval"])
-def test_every_whole_number_and_every_shape_is_looked_at(
+def test_every_integer_and_every_shape_is_checked(
     engine: str, options: dict[str, Any], tmp_path: Path
 ) -> None:
-    """Each array in turn: far out of range, one row short, one axis more, another kind."""
+    """Each array in turn: far out of range, one row short, one axis more, another type."""
     path = tmp_path / "run.checkpoint"
     begun(path, open_loop(), engine, **options)
     whole = _arrays(path)
@@ -336,9 +334,7 @@ def test_every_whole_number_and_every_shape_is_looked_at(
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("place", ["PHASE", "MACHINE", "EDGE", "JUMP", "ACTIVE", "TAKEN"])
-def test_each_number_that_is_a_place_is_in_its_range(
-    place: str, engine: str, tmp_path: Path
-) -> None:
+def test_each_index_is_checked_against_its_range(place: str, engine: str, tmp_path: Path) -> None:
     path = tmp_path / "run.checkpoint"
     begun(path, open_loop(), engine)
     whole = _arrays(path)
@@ -346,12 +342,12 @@ def test_each_number_that_is_a_place_is_in_its_range(
         counts = whole["loop_counts"].copy()
         counts[getattr(loop, place)] = value
         _write(path, {**whole, "loop_counts": counts})
-        with pytest.raises(CheckpointError, match="outside of"):
+        with pytest.raises(CheckpointError, match="not within"):
             goes_on(path, open_loop(), engine)
 
 
 @pytest.mark.slow
-def test_what_unpacks_to_more_than_the_file_is_not_unpacked(tmp_path: Path) -> None:
+def test_data_that_unpacks_to_more_than_the_file_is_not_unpacked(tmp_path: Path) -> None:
     path = tmp_path / "run.checkpoint"
     begun(path, open_loop())
     whole = _arrays(path)
@@ -363,7 +359,7 @@ def test_what_unpacks_to_more_than_the_file_is_not_unpacked(tmp_path: Path) -> N
         goes_on(path, open_loop())
 
 
-def test_an_interrupted_run_with_a_function_goes_on_bit_for_bit(tmp_path: Path) -> None:
+def test_an_interrupted_run_with_a_function_continues_bit_for_bit(tmp_path: Path) -> None:
     path, rig = tmp_path / "run.checkpoint", Prescribed(_louder(0.2))
     begun(path, rig)
     trace = simulate(stick_slip("signed"), rig, 25.0, checkpoint=path)

@@ -1,4 +1,4 @@
-"""A run interrupted anywhere and continued from its checkpoint equals the run left alone."""
+"""A run interrupted anywhere and continued from its checkpoint equals the uninterrupted run."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from gms_fsm import ElementMachines, Prescribed, Trace, simulate
 from gms_fsm.app.report import run_scenario
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.errors import CheckpointError, OutputError, ParameterError
-from gms_fsm.run._checkpoint import Keeper
+from gms_fsm.run._checkpoint import Checkpointer
 from tests.helpers import ROOT, open_loop, pulled_mass, same_bits, stick_slip
 
 ENGINES = [
@@ -36,11 +36,11 @@ ENGINES = [
 
 
 class Interrupted(Exception):
-    """Stands for a lost machine."""
+    """Represents a lost machine."""
 
 
 def interrupted(path: Path, after: int, *arguments: Any, **options: Any) -> Trace | None:
-    """Run until the progress has been told `after` times; None if it was interrupted there."""
+    """Run until `progress` has been called `after` times; None if interrupted there."""
     told = itertools.count(1)
 
     def stop(_: object) -> None:
@@ -66,7 +66,7 @@ def interrupted(path: Path, after: int, *arguments: Any, **options: Any) -> Trac
     ],
     ids=["all", "t_eval", "end", "rk4", "step"],
 )
-def test_interrupted_again_and_again(
+def test_repeated_interruptions_change_nothing(
     engine: str, options: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("gms_fsm.run._compiled_run.STEPS_AT_ONCE", 60)
@@ -85,7 +85,7 @@ def test_interrupted_again_and_again(
 
 
 @pytest.mark.parametrize("engine", ["machines", "compiled"])
-def test_machines_of_ones_own_go_on_in_their_states(engine: str, tmp_path: Path) -> None:
+def test_user_machines_continue_in_their_states(engine: str, tmp_path: Path) -> None:
     if engine == "compiled":
         pytest.importorskip("numba", reason="needs the extra fast")
     model = stick_slip("signed")
@@ -108,7 +108,7 @@ def test_machines_of_ones_own_go_on_in_their_states(engine: str, tmp_path: Path)
 
 
 @pytest.mark.slow
-def test_a_killed_process_goes_on(tmp_path: Path) -> None:
+def test_a_killed_process_can_be_resumed(tmp_path: Path) -> None:
     """SIGKILL at some moment; the next process ends with the bits of an undisturbed run."""
     script = tmp_path / "long.py"
     script.write_text(
@@ -180,7 +180,7 @@ def test_a_damaged_checkpoint_is_refused(damage: str, tmp_path: Path) -> None:
         simulate(stick_slip("signed"), open_loop(), 25.0, checkpoint=path)
 
 
-def test_a_scipy_solver_cannot_be_kept(tmp_path: Path) -> None:
+def test_a_scipy_solver_cannot_be_checkpointed(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="history"):
         simulate(
             stick_slip("signed"),
@@ -191,22 +191,24 @@ def test_a_scipy_solver_cannot_be_kept(tmp_path: Path) -> None:
         )
 
 
-def test_a_folder_that_is_not_there_is_said_before_the_run(tmp_path: Path) -> None:
+def test_a_missing_folder_is_reported_before_the_run(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="cannot write"):
         simulate(stick_slip("signed"), open_loop(), 5.0, checkpoint=tmp_path / "no" / "file")
 
 
-def test_it_is_written_as_often_as_asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_checkpoints_are_written_at_the_requested_interval(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     saved = []
-    save = Keeper.save
-    monkeypatch.setattr(Keeper, "save", lambda keeper: (saved.append(0), save(keeper))[1])
+    save = Checkpointer.save
+    monkeypatch.setattr(Checkpointer, "save", lambda keeper: (saved.append(0), save(keeper))[1])
     path = tmp_path / "run.checkpoint"
     simulate(stick_slip("signed"), open_loop(), 25.0, checkpoint=path, checkpoint_every=1e6)
     assert len(saved) == 1  # at the start
 
 
 @pytest.mark.slow
-def test_the_command_line_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_line_resumes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """`gms-fsm run --checkpoint`, interrupted, then the same command again."""
     loaded = load_scenario(ROOT / "scenarios" / "pulled_mass.toml", [])
     told = itertools.count(1)

@@ -1,7 +1,7 @@
-"""engine="compiled" gives what engine="machines" gives, to the last bit, failures included.
+"""engine="compiled" gives the same as engine="machines", to the last bit, including failures.
 
-Rows, micro-steps, states, thresholds, forces, rates, both sides of every stop and the transition
-log; and where a run cannot go on the same error, in the same words, with the same part kept.
+Compared are rows, micro-steps, states, thresholds, forces, rates, both sides of every stop and the
+transition log; if a run fails, the same error with the same text and the same recorded part.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ from tests.helpers import ROOT
 
 # --------------------------------------------------------------------------- comparing
 def _bits(name: str, a: np.ndarray, b: np.ndarray) -> None:
-    """Assert equal patterns of bits: 0.0 is not -0.0; a NaN is a NaN, whatever its payload."""
+    """Assert equal bit patterns: 0.0 is not -0.0; a NaN is a NaN, whatever its payload."""
     assert a.dtype == b.dtype, name
     assert a.shape == b.shape, name
     if a.dtype == np.float64:
@@ -102,7 +102,7 @@ def _run(model: Model, rig: Rig, arguments: Mapping[str, Any]) -> tuple[Trace | 
 
 
 def both(model: Model, rig: Rig, t_end: float, **options: Any) -> tuple[Trace, str]:
-    """Run both engines, compare; return one trace and the error, empty for none."""
+    """Run both engines and compare; return one trace and the error, or an empty text."""
     (one, said), (other, too) = (
         _run(model, rig, {"t_end": t_end, "engine": engine, **options})
         for engine in ("machines", "compiled")
@@ -115,13 +115,13 @@ def both(model: Model, rig: Rig, t_end: float, **options: Any) -> tuple[Trace, s
 
 
 def agreed(model: Model, rig: Rig, t_end: float, **options: Any) -> Trace:
-    """Run both engines to the end, compare, return one trace."""
+    """Run both engines to the end and compare; return one trace."""
     trace, said = both(model, rig, t_end, **options)
     assert not said
     return trace
 
 
-# --------------------------------------------------------------------------- what is shipped
+# --------------------------------------------------------------------------- shipped scenarios
 def _data_folder() -> Path | None:
     for folder in (os.environ.get("GMS_FSM_DATA"), ROOT.parent / "shared" / "data"):
         if folder and (Path(folder) / "reciprocating_friction.tsv").is_file():
@@ -131,7 +131,7 @@ def _data_folder() -> Path | None:
 
 @pytest.mark.slow
 def test_every_shipped_scenario(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In one process one after the other: programs of one kind must not be taken for another."""
+    """One after the other in one process: programs of one kind must not be confused."""
     folder = _data_folder()
     paths = sorted((ROOT / "scenarios").glob("*.toml"))
     if folder is None:
@@ -153,7 +153,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "dp45": {},
     "bs23": {"method": "bs23"},
     "tight": {"rtol": 1e-10, "atol": 1e-13},
-    "loose": {"rtol": 1, "atol": 1},  # whole numbers
+    "loose": {"rtol": 1, "atol": 1},  # integers
     "max_step": {"max_step": 1e-2},
     "dp45 on a grid": {"step": 1e-2},
     "euler": {"method": "euler", "step": 5.003e-3},
@@ -182,7 +182,7 @@ def test_every_method(case: str, options: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("options", FEW)
 @pytest.mark.parametrize("case", CASES)
-def test_wanted_rows_and_the_end_alone(case: str, options: str) -> None:
+def test_requested_rows_and_only_the_end(case: str, options: str) -> None:
     trace = agreed(*CASES[case], 12.0, **OPTIONS[options], t_eval=T_EVAL)
     np.testing.assert_array_equal(trace.t, T_EVAL)
     assert len(trace.stops) > len(trace.transitions) > 0
@@ -233,7 +233,7 @@ def test_initial_values() -> None:
 # --------------------------------------------------------------------------- signals
 @dataclass(frozen=True, eq=False)
 class TwoForces:
-    """A rig of the user's own: two signals, a number, time and place in its equation."""
+    """A user-defined rig with two signals, a number, time and position in its equation."""
 
     first: Any
     second: Any
@@ -354,7 +354,7 @@ def test_random_banks_open_loop(model: GMS, method: str, level: float, events: s
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(_banks(), METHODS, st.floats(0.5, 5.0), st.sampled_from(["all", "end"]))
 def test_random_banks_closed_loop(model: GMS, method: str, stiffness: float, output: str) -> None:
-    """The published law slides now and then: both alike."""
+    """The published law slides occasionally: both engines alike."""
     step = None if method in ("dp45", "bs23") else 7.3e-3
     both(
         model,
@@ -382,7 +382,7 @@ def test_any_number_of_elements(n: int) -> None:
     assert set(trace.transitions.element.tolist()) == set(range(n))
 
 
-# --------------------------------------------------------------------------- charts of one's own
+# --------------------------------------------------------------------------- user-defined charts
 SWINGING, PULLED = Prescribed("0.3*sin(2*pi*t/17)"), PulledSlider(1, 2, 0.1)
 
 
@@ -423,7 +423,7 @@ def test_a_reset_in_stateflows_order() -> None:
 
 
 def _function(text: str) -> ChartModel:
-    """A chart whose force is a function of z."""
+    """Return a chart whose force is a function of z."""
     chart = Chart("f", ("v",), ("z",), (), (State("on", {"z": "0"}),), (), {"F": text})
     return ChartModel(chart, {}, n=1, stribeck=CURVE)
 
@@ -472,7 +472,7 @@ FUNCTIONS = [
 
 @pytest.mark.parametrize("text", FUNCTIONS)
 def test_every_function_at_many_places(text: str) -> None:
-    """Compilers like to make 8**z an exp2 and z**0.5 a sqrt, whose last bits are others."""
+    """Compilers turn 8**z into exp2 and z**0.5 into sqrt, which differ in the last bits."""
     values = _argument_values()
     program = lower(_function(text), Prescribed("0"))
     y = np.column_stack([np.zeros(len(values)), values])
@@ -601,7 +601,7 @@ FAILURES: dict[str, tuple[type[SimulationError], Model, Rig, float, dict[str, An
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", FAILURES)
-def test_failures_are_the_same_to_the_word(case: str) -> None:
+def test_failures_have_identical_messages(case: str) -> None:
     error, model, rig, t_end, options = FAILURES[case]
     whole, said = both(model, rig, t_end, **options)
     kind, _, text = said.partition(": ")
@@ -617,8 +617,8 @@ def test_failures_are_the_same_to_the_word(case: str) -> None:
 
 
 @pytest.mark.parametrize("case", FAILURES)
-def test_failures_keep_the_state_they_got_to(case: str) -> None:
-    """With output="end" what is kept is the last row that all rows would have."""
+def test_failures_keep_the_state_reached(case: str) -> None:
+    """With output="end" the recorded row is the last one that output="all" would record."""
     _, model, rig, t_end, options = FAILURES[case]
     arguments = {"t_end": t_end, "engine": "compiled", **options}
     whole, said = _run(model, rig, arguments)
@@ -643,14 +643,14 @@ def test_an_infinite_side_of_a_guard(guard: str) -> None:
     assert set(trace.transitions.t.tolist()) == {0.0}
 
 
-def test_an_infinite_force_is_kept_as_it_is() -> None:
+def test_an_infinite_force_is_recorded_unchanged() -> None:
     chart = Chart("loud", ("v",), ("z",), (), (State("on", {"z": "v"}),), (), {"F": "1 / (1 - z)"})
     model = ChartModel(chart, {}, n=1, stribeck=CURVE)
     trace = agreed(model, Prescribed("1"), 2.0, initial={"z": [1.0]})
     assert np.isinf(trace.F[0])
 
 
-def test_a_solver_of_scipy_is_not_compiled() -> None:
+def test_scipy_solvers_are_not_compiled() -> None:
     scipy_integrate = pytest.importorskip("scipy.integrate")
     with pytest.raises(
         ParameterError, match=r"'compiled' runs the built-in methods.*RK45.*'machines'"

@@ -1,8 +1,8 @@
-"""A Python function of t drives a compiled run too, where numba can compile it.
+"""A Python function of t can drive a compiled run, if numba can compile it.
 
-The trace is then that of the machines engine to 1e-12. A function that cannot be compiled is
-refused by the signal's name before anything runs; one that raises ends the run in words, with the
-part before it kept.
+The trace then equals that of the machines engine to 1e-12. A function that cannot be compiled is
+refused by the signal's name before anything runs; one that raises ends the run with an explanation,
+and the part before it is kept.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Signal = Callable[[float], float]
 TABLE = np.array([0.1, 0.2, -0.2, 0.3])
 
 
-# --------------------------------------------------------------------------- that compile
+# --------------------------------------------------------------------------- compilable
 def _of_numpy(t: float) -> float:
     return 0.2 * np.sin(2 * np.pi * t / 20) + np.interp(t, TABLE.cumsum(), TABLE) * 0.1
 
@@ -91,7 +91,7 @@ def _close(a: Trace, b: Trace) -> None:
     ],
     ids=lambda function: getattr(function, "__name__", ""),
 )
-def test_what_numba_can_compile_gives_the_same_trace(function: Signal) -> None:
+def test_compilable_functions_give_the_same_trace(function: Signal) -> None:
     model, rig = stick_slip("signed"), Prescribed(function)
     traces = [simulate(model, rig, 9.0, engine=engine) for engine in ("machines", "compiled")]
     _close(*traces)
@@ -111,8 +111,8 @@ def test_a_function_that_pushes_a_slider() -> None:
     assert len(traces[0].transitions) > 0
 
 
-def test_functions_of_one_text_are_not_taken_for_each_other() -> None:
-    """Closures share their code and their name; what they enclose is read anew."""
+def test_functions_with_the_same_text_are_not_confused() -> None:
+    """Closures share their code and their name; their enclosed values are read each time."""
     model = stick_slip("signed")
     levels = 0.3, 0.5
     found = [
@@ -123,7 +123,7 @@ def test_functions_of_one_text_are_not_taken_for_each_other() -> None:
     assert len(found[0]) != len(found[1]) or (found[0].F != found[1].F).any()
 
 
-def test_nothing_is_kept_on_disk_of_a_function_that_may_change(
+def test_functions_that_may_change_are_not_cached_on_disk(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(compiled, "store", lambda: Store.at(tmp_path))
@@ -134,7 +134,7 @@ def test_nothing_is_kept_on_disk_of_a_function_that_may_change(
     assert [path.name for path in tmp_path.iterdir() if path.match("flow*")]
 
 
-# --------------------------------------------------------------------------- that do not
+# --------------------------------------------------------------------------- not compilable
 class _Callable:
     def __call__(self, t: float) -> float:
         return 0.1
@@ -184,7 +184,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("kind", REFUSED)
-def test_what_numba_cannot_compile_is_refused_by_its_name(kind: str) -> None:
+def test_functions_that_numba_cannot_compile_are_refused_by_name(kind: str) -> None:
     rigs: dict[str, Rig] = {"v": Prescribed(REFUSED[kind]), "F_a": Slider(1.0, REFUSED[kind])}
     for name, rig in rigs.items():
         with pytest.raises(SignalError) as caught:
@@ -192,7 +192,7 @@ def test_what_numba_cannot_compile_is_refused_by_its_name(kind: str) -> None:
         for word in (f"signal {name!r}", "numba cannot compile", "engine='machines'", "expression"):
             assert word in str(caught.value)
         assert str(caught.value).isprintable()
-        assert "Failed in nopython" not in str(caught.value), "which says nothing"
+        assert "Failed in nopython" not in str(caught.value), "which explains nothing"
         assert not isinstance(caught.value, SimulationError)
 
 
@@ -202,7 +202,7 @@ def test_a_sweep_refuses_it_in_every_row() -> None:
     assert all("signal 'v'" in text for text in result.message)
 
 
-# --------------------------------------------------------------------------- that raise
+# --------------------------------------------------------------------------- raising
 def _too_late(t: float) -> float:
     if t > 7.0:
         raise ValueError("too late")
@@ -222,7 +222,7 @@ def _out_of_bounds(t: float) -> float:
     ids=["raise", "index"],
 )
 @pytest.mark.parametrize("rows", [{}, {"t_eval": np.linspace(0, 20, 201)}], ids=["all", "t_eval"])
-def test_what_raises_ends_the_run_and_keeps_what_was_before(
+def test_functions_that_raise_end_the_run_and_keep_the_part_before(
     function: Signal, words: tuple[str, ...], rows: dict[str, Any]
 ) -> None:
     model, rig = stick_slip("signed"), Prescribed(function)
@@ -238,8 +238,8 @@ def test_what_raises_ends_the_run_and_keeps_what_was_before(
     assert 0.1 < kept[0].t[-1] < 7.0
 
 
-def test_with_the_end_only_time_and_state_belong_together() -> None:
-    """The run raises amid steps; what is kept is a state that was reached at the time beside it."""
+def test_with_only_the_end_recorded_time_and_state_match() -> None:
+    """The run raises within steps; the recorded state was reached at the recorded time."""
     with pytest.raises(SimulationError) as caught:
         simulate(
             stick_slip("signed"),
@@ -285,7 +285,7 @@ def test_in_a_sweep_it_is_the_outcome_of_its_run() -> None:
     "function", [lambda t: 0.1 * math.sqrt(2.0 - t), lambda t: math.exp(400 * (t - 2.0))]
 )
 def test_a_function_that_leaves_its_domain(function: Signal) -> None:
-    """Python raises there and machine code gets NaN or infinity; both runs end before it."""
+    """There Python raises and machine code yields NaN or infinity; both runs end before it."""
     model, rig = stick_slip("signed"), Prescribed(function)
     with pytest.raises(SimulationError) as ours:
         simulate(model, rig, 10.0)

@@ -1,4 +1,4 @@
-"""The machine of an element has its own number, parameters and values, and asks edges in order."""
+"""An element's machine has its own index, parameters and values, and tests edges in order."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gms_fsm.run.machines import Element, ElementMachines, Guard
 from tests.helpers import pulled_mass, stick_slip
 
 
-def test_an_element_knows_its_number_and_its_own_parameters_as_floats() -> None:
+def test_an_element_has_its_index_and_its_parameters_as_floats() -> None:
     machines = ElementMachines(stick_slip("signed"))
     assert [e.index for e in machines.elements] == [0, 1, 2, 3]
     k = machines.model.values["k"]
@@ -26,7 +26,7 @@ def test_an_element_knows_its_number_and_its_own_parameters_as_floats() -> None:
     assert {type(e.k) for e in machines.elements} == {float} == {type(machines.elements[0].v_c)}
 
 
-def test_a_guard_says_its_text_and_answers_an_event_as_it_answers_an_element() -> None:
+def test_a_guard_shows_its_text_and_accepts_an_event_or_an_element() -> None:
     guard = Guard("leave", parse_condition("z >= s", "zs"))
     assert repr(guard) == "<guard z >= s>"
     for z, truth in ((0.9, False), (1.0, True)):
@@ -79,7 +79,7 @@ def test_of_two_edges_enabled_at_once_the_earlier_is_taken(engine: Any, first: s
     assert [str(edge) for edge in trace.transitions.edge] == [first]
 
 
-def test_an_element_shows_the_values_of_the_moment_it_is_asked_at() -> None:
+def test_an_element_shows_the_values_of_the_present_moment() -> None:
     model, rig = pulled_mass()
     seen = []
 
@@ -96,7 +96,7 @@ def test_an_element_shows_the_values_of_the_moment_it_is_asked_at() -> None:
         assert x == trace.x[trace.t == t][0]
 
 
-def test_an_element_shows_every_variable_of_its_own() -> None:
+def test_an_element_shows_all_its_variables() -> None:
     chart = Chart(
         "two",
         ("v",),

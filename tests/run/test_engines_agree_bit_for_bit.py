@@ -18,7 +18,7 @@ from tests.helpers import (
 
 
 def both(model, rig, t_end, **options):
-    """Run both engines, compare, return one trace."""
+    """Run both engines and compare; return one trace."""
     machines, ifelse = (
         simulate(model, rig, t_end, engine=engine, **options) for engine in ("machines", "ifelse")
     )

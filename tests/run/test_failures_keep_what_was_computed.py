@@ -1,7 +1,7 @@
-"""A run that cannot go on says what happened and what to try, and keeps what it had.
+"""A run that cannot continue says what happened and what to try, and keeps its results so far.
 
 Before a run every argument is checked: the message has the value and the rule. During a run the
-error carries the rows and transitions up to there in ``.trace``.
+error carries the rows and transitions up to that point in ``.trace``.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def test_a_wrong_argument_is_refused_with_its_value_and_rule(
 
 
 @pytest.mark.parametrize("argument", ["step", "max_step"])
-def test_steps_under_the_resolution_of_the_clock_are_refused(argument: str) -> None:
+def test_steps_below_the_resolution_of_the_clock_are_refused(argument: str) -> None:
     class TooMany(Exception):
         pass
 
@@ -195,13 +195,13 @@ def test_guards_that_hold_both_ways_are_a_livelock(engine: str, rows: Any) -> No
     np.testing.assert_allclose(trace.transitions.t, t, atol=1e-9)
 
 
-def test_once_a_step_the_same_chart_flips_but_time_goes_on() -> None:
+def test_with_events_at_steps_the_same_chart_flips_but_time_advances() -> None:
     trace = simulate(BOTH_WAYS, Prescribed("0.15"), 8.0, events="step", step=0.01)
     assert trace.t[-1] == 8.0
     assert len(trace.transitions) > 50
 
 
-def test_a_self_loop_that_never_turns_false_is_a_livelock() -> None:
+def test_a_self_loop_whose_guard_stays_true_is_a_livelock() -> None:
     model = _broken(Transition("again", "stick", "stick", guard="z >= s"))
     error = _failed(LivelockError, model, Prescribed("0.5"), 5.0)
     for word in ("element 2", "'again'", "from stick to stick", "z >= s"):
@@ -209,8 +209,8 @@ def test_a_self_loop_that_never_turns_false_is_a_livelock() -> None:
 
 
 def test_a_surface_whose_slope_is_not_known_is_a_livelock_of_its_comparison() -> None:
-    # A belt moved by a Python function: v is pushed onto it from both sides, and to ride on it the
-    # run would have to know how fast its speed changes.
+    # A belt moved by a Python function: v is pushed onto it from both sides, and to follow it the
+    # run would have to know its acceleration.
     chart = Chart("free", ("v",), ("z",), ("k",), (State("on", {"z": "0"}),), (), {"F": "k * z"})
     with pytest.raises(LivelockError) as caught:
         simulate(ChartModel(chart, {"k": 0.0}), FunctionBelt(), 2.0, initial={"v": 1.0})
@@ -247,7 +247,7 @@ def _singular(flow: str, n: int = 2) -> ChartModel:
 def test_a_flow_that_escapes_to_infinity_is_a_step_size_error(
     options: dict[str, Any], rows: Any
 ) -> None:
-    # z' = z^2, z(0) = 1: z = 1/(1 - t) leaves the numbers at t = 1.
+    # z' = z^2, z(0) = 1: z = 1/(1 - t) diverges at t = 1.
     error = _failed(
         SimulationError,
         _singular("z * z"),
@@ -313,7 +313,7 @@ def test_a_guard_that_cannot_be_computed_is_a_simulation_error(guard: str, engin
 def test_an_infinite_side_of_a_guard_compares_as_ieee_arithmetic_does(
     guard: str, engine: str
 ) -> None:
-    """Python raises in 1/0 and exp(1e4); the engines agree to take them for infinity."""
+    """Python raises for 1/0 and exp(1e4); the engines agree to treat them as infinity."""
     model = _broken(Transition("go", "stick", "slip", guard=guard))
     trace = simulate(model, Prescribed("0.1"), 1.0, engine=engine)
     assert set(trace.transitions.t.tolist()) == {0.0}
@@ -356,7 +356,7 @@ def test_a_kept_trace_can_be_saved(tmp_path: Any) -> None:
         np.testing.assert_array_equal(loaded.z, error.trace.z)
 
 
-def test_a_stop_from_the_progress_callback_is_the_users_own() -> None:
+def test_an_exception_from_the_progress_callback_is_passed_on() -> None:
     class Enough(Exception):
         pass
 
@@ -374,7 +374,7 @@ def test_a_stop_from_the_progress_callback_is_the_users_own() -> None:
 
 
 @pytest.mark.slow
-def test_a_heavy_run_near_the_edge_of_the_parameters_fails_in_words_or_ends() -> None:
+def test_a_run_at_extreme_parameters_ends_or_fails_with_a_message() -> None:
     for k in (1e-8, 1e8):
         parameters = GMSParameters(
             [k], [0.0], [1.0], sigma_2=0.0, stribeck=Stribeck(1e-6, 1e6, 1e-9), v_c=1e-12
@@ -408,7 +408,7 @@ def test_initial_states_and_positions_are_the_first_row() -> None:
 @pytest.mark.parametrize(
     "velocity", ["0.1*sqrt(3 - t)", "0.1*exp(-t)*sqrt(3 - t)", "exp(800*(t - 2.9))"]
 )
-def test_a_trial_step_too_far_does_not_end_the_run_early(velocity: str) -> None:
+def test_a_trial_step_outside_the_domain_does_not_end_the_run(velocity: str) -> None:
     """Python's sqrt, / and exp raise where IEEE arithmetic has no number; the run goes up to it."""
     with pytest.raises(SimulationError) as caught:
         simulate(stick_slip("published"), Prescribed(velocity), 10.0)
@@ -432,7 +432,9 @@ def test_a_flow_that_is_not_finite_is_named_with_its_element() -> None:
     ],
     ids=["text for a model", "text for a rig", "the wrong way round"],
 )
-def test_what_is_no_model_or_no_rig_is_refused(model: Any, rig: Any, words: list[str]) -> None:
+def test_arguments_that_are_not_a_model_or_a_rig_are_refused(
+    model: Any, rig: Any, words: list[str]
+) -> None:
     with pytest.raises(ParameterError) as caught:
         simulate(model, rig, 1.0)
     for word in words:

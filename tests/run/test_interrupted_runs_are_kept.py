@@ -1,5 +1,5 @@
-"""Ctrl-C loses no run: what was computed is in `.trace` of the KeyboardInterrupt, and on disk by
-the command line, wherever it strikes.
+"""Ctrl-C loses no run: the results so far are in `.trace` of the KeyboardInterrupt, and the command
+line writes them to disk, whenever it occurs.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ OPTIONS = {"all": {}, "t_eval": {"t_eval": np.linspace(0, 25, 333)}}
 
 
 def begins(whole: Trace, part: Trace) -> None:
-    """Assert that a part is how the whole run begins, to the bit, and whole in itself."""
+    """Assert that a part is complete in itself and equals the beginning of the whole run."""
     count = len(part)
     for name in ("t", "microstep", "x", "v", "z", "F", "states"):
         np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[:count], name)
@@ -50,7 +50,7 @@ def begins(whole: Trace, part: Trace) -> None:
 
 @pytest.mark.parametrize("options", OPTIONS)
 @pytest.mark.parametrize("engine", ENGINES)
-def test_what_was_computed_is_in_trace(
+def test_the_results_so_far_are_in_trace(
     engine: str, options: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("gms_fsm.run._compiled_run.STEPS_AT_ONCE", 60)
@@ -71,7 +71,7 @@ def test_what_was_computed_is_in_trace(
 
 
 @pytest.mark.parametrize("call", [1, 7, 8, 100, 1001, 1500])
-def test_a_strike_within_a_step_keeps_the_steps_before(call: int) -> None:
+def test_ctrl_c_within_a_step_keeps_the_previous_steps(call: int) -> None:
     """No arc has ended yet: a run that takes an hour for its first 500 steps is not lost."""
     calls = itertools.count(1)
 
@@ -85,12 +85,12 @@ def test_a_strike_within_a_step_keeps_the_steps_before(call: int) -> None:
         simulate(stick_slip("signed"), Prescribed(velocity), 3.0, max_step=0.01)
     part: Trace = caught.value.trace  # type: ignore[attr-defined]
     count = len(part)
-    assert count >= call // 8 - 1  # evaluations a step
+    assert count >= call // 8 - 1  # evaluations per step
     np.testing.assert_array_equal(part.rows.y, whole.rows.y[:count])
 
 
 @pytest.mark.parametrize("options", OPTIONS)
-def test_a_strike_between_any_two_lines_of_the_recorder_leaves_a_whole_trace(
+def test_ctrl_c_between_any_two_lines_of_the_recorder_leaves_a_complete_trace(
     options: str, tmp_path: Path
 ) -> None:
     whole = simulate(*pulled_mass(), 25.0, **OPTIONS[options])
@@ -129,7 +129,7 @@ LONG = OPEN_LOOP.replace("t_end = 1.0", "t_end = 1e8\nmax_steps = 1_000_000_000"
 
 
 @pytest.mark.parametrize("engine", ["machines", "compiled"])
-def test_the_command_line_keeps_it_and_says_so_in_a_line(engine: str, tmp_path: Path) -> None:
+def test_the_command_line_keeps_the_results_and_says_so(engine: str, tmp_path: Path) -> None:
     if engine == "compiled":
         pytest.importorskip("numba", reason="needs the extra fast")
         load = load_scenario(_file(tmp_path, OPEN_LOOP), ["run.engine=compiled"])

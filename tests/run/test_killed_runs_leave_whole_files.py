@@ -1,8 +1,8 @@
-"""A process killed at any moment leaves the old file or a complete new one, and nothing in the way.
+"""A process killed at any moment leaves the old file or a complete new one, and no obstacles.
 
-Writers write two known things in turns, again and again, and are killed with SIGKILL at a random
-moment; then every file is the one thing or the other, to the last bit. What a kill leaves besides
-is named ``.<file>.<random>.gms-fsm-part`` and is gone after the next run. A dozen kills here, 200
+Writers write two known contents alternately, again and again, and are killed with SIGKILL at a
+random moment; then every file is the one or the other, to the last bit. Other leftovers of a kill
+are named ``.<file>.<random>.gms-fsm-part`` and are gone after the next run. A dozen kills here, 200
 in tests/soak.py.
 """
 
@@ -28,7 +28,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import Prescribed, Sweep, Trace, simulate, sweep
-from gms_fsm._files import LIST, leftovers, written_together, written_whole
+from gms_fsm._files import LIST, leftovers, write_together, write_whole
 from gms_fsm.app.cli import main
 from gms_fsm.errors import OutputError
 from gms_fsm.inspection.session import Session
@@ -42,7 +42,7 @@ pytestmark = [
 ]
 
 
-# --------------------------------------------------------------------------- who writes what
+# --------------------------------------------------------------------------- writers
 @functools.cache
 def _traces() -> tuple[Trace, Trace]:
     """Return two runs that differ in every row and in the number of transitions."""
@@ -153,7 +153,7 @@ def _write_checkpoint(folder: Path, turn: int) -> None:
 
 
 def _look_checkpoint(folder: Path) -> None:
-    """What was interrupted goes on to the very same end."""
+    """The interrupted run continues to exactly the same end."""
     same_bits(Trace.load(folder / "run.npz"), _whole())
     left = folder / "run.checkpoint"
     same_bits(simulate(*pulled_mass(), **CLOSED, checkpoint=left), _whole())
@@ -162,16 +162,16 @@ def _look_checkpoint(folder: Path) -> None:
 
 @dataclass(frozen=True)
 class Writer:
-    """Writes one of two known things; looks whether one of them is there.
+    """Writes one of two known contents; checks that one of them is there.
 
     Parameters
     ----------
     write : callable
         ``write(folder, turn)`` with turn 0 or 1.
     look : callable
-        ``look(folder)`` fails unless every file is whole.
+        ``look(folder)`` fails unless every file is complete.
     span : float
-        Within so many seconds the kill comes.
+        Time in s within which the kill occurs.
     """
 
     write: Callable[[Path, int], None]
@@ -196,11 +196,11 @@ WRITERS = {
 SHARES = (0.03, 0.47), (0.21, 0.83)  # of a writer's span, for one writer and the next
 
 
-# --------------------------------------------------------------------------- the killed
-# Forking the process of the tests, with its threads, is asking for trouble; so one process is
-# started for it, which loads everything and then forks a writer for each line it reads.
+# --------------------------------------------------------------------------- child processes
+# Forking the test process, which has threads, would be unsafe; so one process is started for it,
+# which loads everything and then forks a writer for each line it reads.
 def nursery() -> None:
-    """Fork a writer for each line ``name<TAB>folder``, print its number, wait until it is gone."""
+    """Fork a writer for each line ``name<TAB>folder``, print its number, wait until it ends."""
     with contextlib.redirect_stdout(io.StringIO()):
         _expected_logs()
     _traces(), _sweeps()
@@ -228,7 +228,7 @@ def _nursery() -> subprocess.Popen[str]:
 
 
 def end_nursery() -> None:
-    """End the process that forks writers, if there is one."""
+    """End the process that forks writers, if it exists."""
     if _nursery.cache_info().currsize:
         process = _nursery()
         process.communicate()
@@ -237,21 +237,21 @@ def end_nursery() -> None:
 
 
 def kill_and_look(name: str, share: float, folder: Path) -> list[str]:
-    """Let a writer overwrite what is there, kill it, and look.
+    """Let a writer overwrite existing files, kill it, and check the files.
 
     Parameters
     ----------
     name : str
-        Of a writer.
+        The name of a writer.
     share : float
-        When the kill comes, as a share of the writer's span.
+        The time of the kill, as a fraction of the writer's span.
     folder : Path
         An empty folder.
 
     Returns
     -------
     list of str
-        Names of what the kill left besides.
+        Names of the files that the kill left behind.
     """
     writer, process = WRITERS[name], _nursery()
     writer.write(folder, 0)
@@ -267,7 +267,7 @@ def kill_and_look(name: str, share: float, folder: Path) -> list[str]:
     writer.look(folder)
     left = sorted(name for name in known if name.startswith(".") and name != LIST)
     assert [name for name in left if not PARTS.fullmatch(name)] == []
-    writer.write(folder, 1)  # the next run goes about its work as if nothing had been
+    writer.write(folder, 1)  # the next run works as if nothing had happened
     writer.look(folder)
     assert {path.name for path in folder.rglob(".*")} <= {LIST}
     return left
@@ -293,12 +293,12 @@ def test_killed_at_some_moment(name: str, share: float, tmp_path: Path) -> None:
 def test_rows_and_log_of_a_csv_belong_together_even_if_killed_between_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The worst moment for two files: one has taken its place, the other has not."""
+    """The worst moment for two files: one has been renamed, the other has not."""
     first, second = _traces()
     path = first.save(tmp_path / "run.csv")
 
     class Killed(BaseException):
-        """Stands for SIGKILL: nothing is tidied up."""
+        """Represents SIGKILL: nothing is cleaned up."""
 
     replace, unlink = os.replace, Path.unlink
     count = itertools.count(1)
@@ -316,7 +316,7 @@ def test_rows_and_log_of_a_csv_belong_together_even_if_killed_between_them(
     monkeypatch.setattr(Path, "unlink", unlink)
     assert len(leftovers(tmp_path / "run.transitions.csv")) == 1
     same_bits(Trace.load(path), second)
-    first.save(path)  # and the next one is not confused by what was left
+    first.save(path)  # and the next one is not confused by the leftovers
     same_bits(Trace.load(path), first)
 
 
@@ -352,15 +352,15 @@ def test_leftovers_are_those_of_the_file_alone(tmp_path: Path) -> None:
     assert [path.name for path in leftovers(tmp_path / "a.csv")] == names[:1]
 
 
-def test_files_written_together_are_all_old_if_one_cannot_be_written(tmp_path: Path) -> None:
+def test_if_one_of_several_files_cannot_be_written_all_keep_the_old_content(tmp_path: Path) -> None:
     paths = [tmp_path / "one", tmp_path / "two"]
     for path in paths:
-        written_whole(path, lambda file: file.write(b"old"))
+        write_whole(path, lambda file: file.write(b"old"))
 
     def fails(_: object) -> None:
         raise OSError("disk full")
 
     with pytest.raises(OutputError, match="disk full"):
-        written_together({paths[0]: lambda file: file.write(b"new"), paths[1]: fails})
+        write_together({paths[0]: lambda file: file.write(b"new"), paths[1]: fails})
     assert [path.read_bytes() for path in paths] == [b"old", b"old"]
     assert len(list(tmp_path.iterdir())) == 2

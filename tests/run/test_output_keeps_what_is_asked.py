@@ -1,6 +1,6 @@
-"""output= decides which rows are kept and nothing else: "all", the times of t_eval, or the end.
+"""output= decides only which rows are recorded: "all", the times in t_eval, or the end.
 
-The transition log is complete in each, with every engine; what contradicts itself is refused.
+The transition log is complete in each case, with every engine; contradictions are refused.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ every_method = pytest.mark.parametrize("method", METHODS)
 
 @pytest.fixture(params=["machines", "ifelse", "compiled"])
 def engine(request: pytest.FixtureRequest) -> str:
-    """Each engine; the compiled one where its extra is installed."""
+    """Each engine; the compiled one only if its extra is installed."""
     if request.param == "compiled":
         pytest.importorskip("numba", reason="needs the extra fast")
     return str(request.param)
@@ -76,7 +76,7 @@ def test_the_end_is_the_last_of_all_rows(case: str, method: str, engine: str) ->
 @pytest.mark.slow
 @every_method
 @every_case
-def test_wanted_rows_and_no_others(case: str, method: str, engine: str) -> None:
+def test_only_requested_rows_are_recorded(case: str, method: str, engine: str) -> None:
     model, rig, t_end = CASES[case]
     options = METHODS[method] | {"engine": engine}
     whole = simulate(model, rig, t_end, **options)
@@ -87,7 +87,7 @@ def test_wanted_rows_and_no_others(case: str, method: str, engine: str) -> None:
     assert not trace.microstep.any()
     np.testing.assert_array_equal(trace.transitions, whole.transitions)
     _same_row(_row(whole, -1) | {"microstep": np.array(0)}, _row(trace, -1))
-    if method != "by step":  # there an edge is taken behind the step's end
+    if method != "by step":  # that one takes an edge after the step's end
         on_event = np.searchsorted(whole.t, events, side="right") - 1
         for name in ("x", "z", "F", "states"):
             np.testing.assert_array_equal(
@@ -96,7 +96,7 @@ def test_wanted_rows_and_no_others(case: str, method: str, engine: str) -> None:
             )
 
 
-def test_without_output_it_is_what_the_arguments_say(engine: str) -> None:
+def test_the_default_output_depends_on_t_eval(engine: str) -> None:
     model, rig, t_end = CASES["open loop"]
 
     def shapes(**options: Any) -> tuple[int, int, int]:
@@ -109,8 +109,8 @@ def test_without_output_it_is_what_the_arguments_say(engine: str) -> None:
     assert shapes(output="end")[0] == 1
 
 
-def test_both_sides_of_every_stop_are_kept_beside_wanted_rows(engine: str) -> None:
-    """So that samples between far rows do not go across a switch or a jump."""
+def test_both_sides_of_every_stop_are_recorded_with_requested_rows(engine: str) -> None:
+    """So that samples between distant rows do not cross a switch or a jump."""
     model, rig, t_end = CASES["jumps"]
     trace = simulate(model, rig, t_end, t_eval=[0.0, t_end], engine=engine)
     stops = trace.stops
@@ -127,7 +127,7 @@ def test_both_sides_of_every_stop_are_kept_beside_wanted_rows(engine: str) -> No
 
 
 @pytest.mark.parametrize("rows", [[0.0], [31.0], [15.5], np.linspace(0, 31, 4001)])
-def test_few_and_many_wanted_rows(rows: Any, engine: str) -> None:
+def test_few_and_many_requested_rows(rows: Any, engine: str) -> None:
     model, rig, t_end = CASES["open loop"]
     trace = simulate(model, rig, t_end, t_eval=rows, engine=engine)
     assert trace.t.tolist() == list(rows)
@@ -172,8 +172,8 @@ def test_contradictions_are_refused(
         assert word in str(caught.value)
 
 
-def test_progress_is_told_of_a_run_that_keeps_its_end_only() -> None:
-    """The last it is told of lies before the end, in time order, with finite values."""
+def test_progress_is_reported_for_a_run_that_records_only_its_end() -> None:
+    """The last reported moment is before the end, in order of time, with finite values."""
     seen: list[tuple[float, float]] = []
     simulate(
         *CASES["pulled mass"],
@@ -196,7 +196,7 @@ def test_progress_is_told_of_a_run_that_keeps_its_end_only() -> None:
         ("step", {"t_eval": [0.0, 45.0]}),
     ],
 )
-def test_a_long_compiled_run_comes_up_for_air(events: str, options: dict[str, Any]) -> None:
+def test_a_long_compiled_run_checks_for_ctrl_c(events: str, options: dict[str, Any]) -> None:
     pytest.importorskip("numba", reason="needs the extra fast")
     seen: list[float] = []
     simulate(
@@ -210,5 +210,5 @@ def test_a_long_compiled_run_comes_up_for_air(events: str, options: dict[str, An
         progress=lambda moment: seen.append(moment.t),
         **options,
     )
-    assert seen, "45,000 steps without a look at the keyboard"
+    assert seen, "45,000 steps without checking for Ctrl-C"
     assert seen == sorted(seen)

@@ -1,4 +1,4 @@
-"""Claim: one `Settings` object means the same to simulate, sessions and sweeps."""
+"""One `Settings` object means the same to simulate, sessions and sweeps."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_simulate_a_session_and_a_sweep_run_alike() -> None:
 
 
 @pytest.mark.parametrize("options", [{"step": 0.02}, {"method": "heun"}, {"engine": "machines"}])
-def test_an_option_stands_before_the_settings(options: dict[str, Any]) -> None:
+def test_an_option_overrides_the_settings(options: dict[str, Any]) -> None:
     one = simulate(MODEL, RIG, 6.0, settings=FIXED, **options)
     other = simulate(MODEL, RIG, 6.0, settings=dataclasses.replace(FIXED, **options))
     np.testing.assert_array_equal(one.z, other.z)

@@ -1,7 +1,7 @@
-"""A sweep file is refused unless it holds what a sweep of so many runs has, and no more.
+"""A sweep file is refused unless it contains exactly what a sweep of so many runs has.
 
-Shapes, kinds and numbers that are places are looked at; nothing is unpacked that is too large; a
-file of another format is named as such.
+Shapes, types and indices are checked; nothing too large is unpacked; a file of another format is
+identified as such.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from tests.helpers import pulled_mass
 
 @pytest.fixture(scope="module")
 def arrays(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """A file of three runs, one of which cannot start, with rows."""
+    """Return the arrays of a file with rows and three runs, one of which cannot start."""
     values = {"F_c": [1.0, 0.9, -1.0], "k": np.full((3, 4), 25.0)}
     made = sweep(*pulled_mass(), 8.0, values, engine="ifelse", output="t_eval", t_eval=[0.0, 8.0])
     assert len(made.transitions) > 4
@@ -37,7 +37,7 @@ def _load(arrays: dict[str, Any], folder: Path) -> Sweep:
     return Sweep.load(path)
 
 
-def test_the_whole_file_is_read(arrays: dict[str, Any], tmp_path: Path) -> None:
+def test_an_unchanged_file_is_read(arrays: dict[str, Any], tmp_path: Path) -> None:
     assert len(_load(arrays, tmp_path)) == 3
     assert arrays["program"] == gms_fsm.__version__
 
@@ -64,9 +64,7 @@ NAMES = [
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_shape_and_kind_is_looked_at(
-    name: str, arrays: dict[str, Any], tmp_path: Path
-) -> None:
+def test_every_shape_and_type_is_checked(name: str, arrays: dict[str, Any], tmp_path: Path) -> None:
     assert set(NAMES) | {"format", "program", "elements"} == set(arrays)
     array = arrays[name]
     changes = [array[np.newaxis], np.full(array.shape, 7), None]
@@ -75,14 +73,14 @@ def test_every_shape_and_kind_is_looked_at(
     for changed in changes:
         others = {other: value for other, value in arrays.items() if other != name}
         if changed is None and name.startswith("parameter_"):
-            continue  # a sweep of the other one
+            continue  # valid for another sweep
         with pytest.raises(TraceFileError, match=r"runs\.npz: not a sweep, or damaged"):
             _load(others | ({} if changed is None else {name: changed}), tmp_path)
 
 
 @pytest.mark.parametrize("place", ["run", "element", "edge"])
 @pytest.mark.parametrize("value", [-1, 1000])
-def test_the_log_names_only_what_is_there(
+def test_the_log_refers_only_to_existing_runs_elements_and_edges(
     place: str, value: int, arrays: dict[str, Any], tmp_path: Path
 ) -> None:
     log = arrays["transitions"].copy()
@@ -91,12 +89,12 @@ def test_the_log_names_only_what_is_there(
         _load(arrays | {"transitions": log}, tmp_path)
 
 
-def test_runs_stand_in_their_order(arrays: dict[str, Any], tmp_path: Path) -> None:
+def test_runs_are_in_order(arrays: dict[str, Any], tmp_path: Path) -> None:
     with pytest.raises(TraceFileError, match="runs not in order"):
         _load(arrays | {"transitions": arrays["transitions"][::-1]}, tmp_path)
 
 
-def test_without_runs_or_parameters_it_is_none(arrays: dict[str, Any], tmp_path: Path) -> None:
+def test_a_sweep_file_needs_runs_and_parameters(arrays: dict[str, Any], tmp_path: Path) -> None:
     own = [name for name in arrays if name.startswith("parameter_")]
     with pytest.raises(TraceFileError, match="no parameter"):
         _load({name: array for name, array in arrays.items() if name not in own}, tmp_path)
@@ -107,7 +105,7 @@ def test_without_runs_or_parameters_it_is_none(arrays: dict[str, Any], tmp_path:
 
 
 @pytest.mark.parametrize("name", ["t", "z", "message", "states", "rows_z", "transitions"])
-def test_what_unpacks_to_more_than_a_sweep_has_is_not_unpacked(
+def test_data_that_unpacks_to_more_than_a_sweep_has_is_not_unpacked(
     name: str, arrays: dict[str, Any], tmp_path: Path
 ) -> None:
     bomb = np.zeros(20_000_000)

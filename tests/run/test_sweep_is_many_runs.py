@@ -1,7 +1,7 @@
 """A sweep is many runs: each row is, to the last bit, what simulate() gives for its parameters.
 
-Whatever happens to one run is its row's outcome and ends no other; the order is that of the
-parameters wherever the runs ran; and what is kept does not grow with the length of the runs.
+Whatever happens to one run is the outcome in its row and ends no other; the order is that of the
+parameters wherever the runs were executed; and memory does not grow with the length of the runs.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ from tests.helpers import non_drifting, open_loop, pulled_mass, stick_slip
 ENGINES = ("compiled", "machines", "ifelse")
 K = np.array([40.0, 30.0, 20.0, 10.0])
 RNG = np.random.default_rng(5)
-inside = sys.modules[sweep.__module__]  # the module; its name is the function's
+inside = sys.modules[sweep.__module__]  # the module; its name refers to the function
 
 
 @pytest.fixture(params=ENGINES)
 def engine(request: pytest.FixtureRequest) -> str:
-    """Each engine; the compiled one where its extra is installed."""
+    """Each engine; the compiled one only if its extra is installed."""
     if request.param == "compiled":
         pytest.importorskip("numba", reason="needs the extra fast")
     return str(request.param)
@@ -168,7 +168,7 @@ def test_each_row_is_a_run(case: str, options: dict[str, Any], engine: str) -> N
 
 
 def test_more_runs_than_a_task_holds_and_more_firings_than_a_column() -> None:
-    """Buffers are used again by the next run of a task; what the run before left does not show."""
+    """Buffers are reused by the next run of a task; nothing of the previous run shows."""
     pytest.importorskip("numba", reason="needs the extra fast")
     model, _ = pulled_mass()
     rig = Prescribed("0.3*sin(20*t)")
@@ -188,8 +188,8 @@ def test_more_runs_than_a_task_holds_and_more_firings_than_a_column() -> None:
     assert 0 <= counts[1] < counts[2] < counts[0]
 
 
-# --------------------------------------------------------------------------- what is varied
-def test_a_charts_own_parameter_goes_before_a_shared_one_of_its_name() -> None:
+# --------------------------------------------------------------------------- parameters
+def test_a_charts_own_parameter_takes_precedence_over_a_shared_one() -> None:
     chart = Chart(
         "own Coulomb",
         ("v",),
@@ -207,7 +207,7 @@ def test_a_charts_own_parameter_goes_before_a_shared_one_of_its_name() -> None:
     assert other.weights.tolist() == [1.0, 1.0]
 
 
-def test_one_number_goes_to_all_elements() -> None:
+def test_one_number_applies_to_all_elements() -> None:
     model, rig = pulled_mass()
     level = np.array([20.0, 30.0])
     wide = np.repeat(level[:, None], 4, axis=1)
@@ -298,7 +298,7 @@ def test_lugre_has_no_weights() -> None:
         ({"initial": {"q": 1}}, "'q'"),
     ],
 )
-def test_what_is_wrong_for_all_is_said_once(options: dict[str, Any], words: str) -> None:
+def test_errors_common_to_all_runs_are_raised_once(options: dict[str, Any], words: str) -> None:
     with pytest.raises(ParameterError) as caught:
         sweep(*pulled_mass(), 1.0, {"F_s": [1.5]}, **({"engine": "machines"} | options))
     assert words in str(caught.value)
@@ -306,7 +306,7 @@ def test_what_is_wrong_for_all_is_said_once(options: dict[str, Any], words: str)
 
 # --------------------------------------------------------------------------- failures
 def _fragile() -> ChartModel:
-    """Livelocks where v_c is above the speed; its flow is infinite where k is 1."""
+    """Livelocks if v_c is above the speed; its flow is infinite if k is 1."""
     sound = gms_element("signed")
     chart = Chart(
         "fragile",
@@ -324,7 +324,7 @@ def _fragile() -> ChartModel:
     return ChartModel(chart, values, n=2, stribeck=Stribeck(1.0, 1.5, 1e-3), weights=[2, 1])
 
 
-def test_a_run_that_fails_is_a_row_and_ends_no_other(engine: str) -> None:
+def test_a_failed_run_is_a_row_and_does_not_end_the_others(engine: str) -> None:
     good = {"F_c": 1.0, "v_c": 0.01, "k": 2.0}
     wrong: list[dict[str, float]] = [
         {},
@@ -382,7 +382,7 @@ def test_a_run_that_fails_is_a_row_and_ends_no_other(engine: str) -> None:
     assert repr(result) == "<Sweep: 11 runs over F_c, v_c, k; 6 failed, 100 transitions>"
 
 
-def test_a_run_that_fails_amid_steps_says_where_it_got_to(engine: str) -> None:
+def test_a_run_that_fails_between_steps_reports_where(engine: str) -> None:
     rig = Slider(1.0, "0.1*sqrt(3 - t)")
     result = sweep(stick_slip("signed"), rig, 10.0, {"mass": [1.0, 2.0]}, engine=engine)
     assert result.outcome.tolist() == ["NotFiniteError"] * 2
@@ -428,7 +428,7 @@ def _same(one: Sweep, other: Sweep) -> None:
 
 
 class Backwards(Executor):
-    """Runs a task when its result is wanted, the last one first."""
+    """Runs a task when its result is requested, the last one first."""
 
     def __init__(self) -> None:
         self.tasks: list[tuple[Future[Any], Callable[[], Any]]] = []
@@ -463,7 +463,7 @@ def _die(*_: Any) -> None:
 
 
 class Deadly(Executor):
-    """A process pool whose worker dies over the third task."""
+    """A process pool whose worker dies in the third task."""
 
     def __init__(self, pool: Executor) -> None:
         self.pool, self.count = pool, 0
@@ -474,7 +474,7 @@ class Deadly(Executor):
 
 
 @pytest.mark.slow
-def test_processes_and_one_that_is_killed() -> None:
+def test_process_pools_and_a_killed_worker() -> None:
     model, rig = pulled_mass()
     sets = _sets(8)
     usual = sweep(model, rig, 3.0, sets, engine="machines")
@@ -488,12 +488,12 @@ def test_processes_and_one_that_is_killed() -> None:
         np.testing.assert_array_equal(hurt.F[:2], usual.F[:2])
         assert np.isnan(hurt.F[2:]).all()
         assert hurt.transition_count[2:].sum() == 0
-        # A pool that is broken from the start makes rows too.
+        # A pool that is broken from the start gives rows too.
         dead = sweep(model, rig, 3.0, sets, executor=pool, engine="machines")
         assert dead.outcome.tolist() == ["BrokenProcessPool"] * 8
 
 
-def test_what_cannot_be_sent_to_a_process_is_a_row_that_says_so() -> None:
+def test_a_run_that_cannot_be_sent_to_a_process_is_a_row_that_says_so() -> None:
     with _pool(1) as pool:
         result = sweep(
             stick_slip("signed"),
@@ -511,7 +511,7 @@ def test_what_cannot_be_sent_to_a_process_is_a_row_that_says_so() -> None:
 
 # --------------------------------------------------------------------------- Ctrl-C
 def _interrupting(after: int) -> Any:
-    """A progress display that presses Ctrl-C."""
+    """Return a progress display that raises Ctrl-C."""
 
     @contextmanager
     def bar(runs: int, progress: bool | None) -> Iterator[Callable[[int], None]]:
@@ -545,11 +545,11 @@ def test_ctrl_c_leaves_no_threads_running(place: str, monkeypatch: pytest.Monkey
         sweep(*pulled_mass(), 10.0, _sets(60), engine="ifelse")
     assert set(threading.enumerate()) <= before
     count = len(begun)
-    assert 2 <= count < 40, "what had not begun is not begun"
+    assert 2 <= count < 40, "pending tasks are not started"
     assert len(begun) == count
 
 
-def test_progress_is_shown_where_it_is_wanted(capsys: pytest.CaptureFixture[str]) -> None:
+def test_progress_is_shown_on_request(capsys: pytest.CaptureFixture[str]) -> None:
     sets = {"F_s": np.linspace(1, 2, 6)}
     sweep(*pulled_mass(), 1.0, sets, engine="ifelse", progress=True)
     assert "6/6" in capsys.readouterr().err
@@ -559,10 +559,10 @@ def test_progress_is_shown_where_it_is_wanted(capsys: pytest.CaptureFixture[str]
         assert said.out + said.err == ""
 
 
-# --------------------------------------------------------------------------- handing on
+# --------------------------------------------------------------------------- tables and files
 @pytest.fixture(scope="module")
 def mixed() -> Sweep:
-    """Two runs that end, one that cannot start; rows, wide and narrow parameters."""
+    """Return two runs that end and one that cannot start; rows, wide and narrow parameters."""
     return sweep(
         *pulled_mass(),
         8.0,
@@ -573,7 +573,7 @@ def mixed() -> Sweep:
     )
 
 
-def test_a_dataframe_has_one_row_a_run(mixed: Sweep) -> None:
+def test_a_dataframe_has_one_row_per_run(mixed: Sweep) -> None:
     pytest.importorskip("pandas", reason="needs the extra pandas")
     frame = mixed.to_dataframe()
     assert frame.index.name == "run"
@@ -615,7 +615,7 @@ def test_a_dataset_has_dimensions_and_units(mixed: Sweep) -> None:
     assert "F" not in bare
 
 
-def test_parameters_that_are_called_like_results_are_kept_apart() -> None:
+def test_parameters_with_names_of_results_are_kept_separate() -> None:
     names = ("transitions", "outcome", "time", "run", "element", "z1", "state1", "x_end")
     chart = Chart(
         "names",
@@ -696,7 +696,7 @@ def test_files_that_cannot_be_written_or_read_say_so(mixed: Sweep, tmp_path: Pat
 # --------------------------------------------------------------------------- many
 @pytest.mark.slow
 def test_no_sequence_of_two_hundred_depends_on_the_tolerance() -> None:
-    """72 transitions each, more or less: the same elements by the same edges in the same order."""
+    """About 72 transitions each: the same elements by the same edges in the same order."""
     pytest.importorskip("numba", reason="needs the extra fast")
     k = K * np.random.default_rng(0).uniform(0.8, 1.2, (200, 4))
     loose, tight = (
@@ -713,7 +713,7 @@ def test_no_sequence_of_two_hundred_depends_on_the_tolerance() -> None:
 
 @pytest.mark.slow
 def test_memory_grows_with_the_results_only() -> None:
-    """A run's steps are not kept: at most its firings twice, while they are put together."""
+    """A run's steps are not recorded: at most its firings twice, while they are assembled."""
     pytest.importorskip("numba", reason="needs the extra fast")
     model, rig = pulled_mass()
 

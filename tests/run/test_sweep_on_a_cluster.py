@@ -1,6 +1,6 @@
 """A sweep on a Dask cluster of processes survives a killed worker: every result arrives once.
 
-What kills its worker each time it is tried is a row that says so, and so is what cannot be sent.
+A run that kills its worker each time gives a row that says so, and so does one that cannot be sent.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def test_a_killed_worker_costs_no_result(cluster: Any, monkeypatch: pytest.Monke
     def taken(self: _Collected, chunk: range, results: Any) -> None:
         arrived.extend(chunk)
         take(self, chunk, results)
-        if not killed and len(arrived) >= RUNS // 4:  # in mid-run
+        if not killed and len(arrived) >= RUNS // 4:  # part of the way through
             killed.append(cluster.workers[0].process.pid)
             os.kill(killed[0], signal.SIGKILL)
 
@@ -86,7 +86,7 @@ def test_a_killed_worker_costs_no_result(cluster: Any, monkeypatch: pytest.Monke
 
 
 class Deadly(Executor):
-    """Sends a task that ends its worker in place of the third."""
+    """Replaces the third task by one that ends its worker."""
 
     def __init__(self, cluster: Executor) -> None:
         self.cluster, self.count = cluster, 0
@@ -99,7 +99,7 @@ class Deadly(Executor):
 
 
 @quiet
-def test_what_kills_every_worker_is_a_row_that_says_so() -> None:
+def test_a_run_that_kills_every_worker_is_a_row_that_says_so() -> None:
     dask = pytest.importorskip("dask", reason="needs the extra cluster")
     pytest.importorskip("numba", reason="needs the extra fast")
     model, rig = pulled_mass()
@@ -120,7 +120,7 @@ def test_what_kills_every_worker_is_a_row_that_says_so() -> None:
         again = sweep(model, rig, 12.0, sets(8), executor=executor)
     lost = far.outcome != "ok"
     assert lost[2]
-    assert lost.sum() < 4, "what waited beside it may be lost with it, no more"
+    assert lost.sum() < 4, "pending runs next to it may be lost with it, but no more"
     assert set(far.outcome[lost]) == {"KilledWorker"}
     assert all("the worker failed" in text for text in far.message[lost])
     assert np.isnan(far.F[lost]).all()
@@ -151,4 +151,4 @@ def test_a_signal_that_cannot_be_sent_is_a_row_that_says_so(cluster: Any) -> Non
         assert text.endswith(
             "give signals as expressions in t or as arrays, or use threads (executor=None)"
         )
-    assert set(found.outcome) == {"ok"}, "the cluster is none the worse for it"
+    assert set(found.outcome) == {"ok"}, "the cluster is not affected"

@@ -1,4 +1,4 @@
-"""With t_eval the rows are exactly the wanted times, right-continuous, and the run is the same."""
+"""With t_eval the rows are exactly the requested times, right-continuous; the run is the same."""
 
 import numpy as np
 import pytest
@@ -18,8 +18,8 @@ cases = pytest.mark.parametrize("case", CASES)
 
 @pytest.mark.parametrize("options", METHODS)
 @cases
-def test_rows_are_the_wanted_times(case, options):
-    """Few times, many times, unevenly spread: the rows are these, all micro-steps 0."""
+def test_rows_are_at_the_requested_times(case, options):
+    """Few times, many times, unevenly spread: these are the rows, all with micro-step 0."""
     model, rig, T = CASES[case]
     full = simulate(model, rig, T, engine=FASTEST, **options)
     rng = np.random.default_rng(7)
@@ -40,7 +40,7 @@ def test_rows_are_the_wanted_times(case, options):
 @pytest.mark.parametrize("options", METHODS)
 @cases
 def test_a_row_on_an_event_is_the_state_after_it(case, options):
-    """Asked for the very time of a transition, the row holds the last micro-step's values."""
+    """At the exact time of a transition, the row has the values of the last micro-step."""
     model, rig, T = CASES[case]
     full = simulate(model, rig, T, engine=FASTEST, **options)
     times = np.unique(full.transitions.t)
@@ -69,13 +69,13 @@ def test_rows_on_steps_are_the_steps_rows(case):
 
 
 @cases
-def test_rows_between_steps_are_as_good_as_the_steps(case):
-    """Dense output: rows inside steps keep to a run at rtol 1e-12 as closely as its steps do."""
+def test_rows_between_steps_are_as_accurate_as_the_steps(case):
+    """Dense output: rows inside steps are as close to a run at rtol 1e-12 as its steps are."""
     model, rig, T = CASES[case]
     times = np.linspace(0, T, 1501)
     trace = simulate(model, rig, T, engine=FASTEST, t_eval=times)
     exact = simulate(model, rig, T, engine=FASTEST, t_eval=times, rtol=1e-12, atol=1e-15)
-    # Rows within the error of an event's place may lie on its other side.
+    # Rows within the error of an event's time may be on its other side.
     near = np.abs(times[:, None] - exact.transitions.t).min(axis=1) < 1e-4
     assert near.mean() < 0.1
     assert np.abs(trace.z - exact.z)[~near].max() < 5e-5

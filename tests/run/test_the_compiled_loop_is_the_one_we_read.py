@@ -1,7 +1,7 @@
 """`integrators.loop.record`, run by Python over the compiled engine's arrays, gives the same rows.
 
-So the loop that fills the columns is right as it is read, whatever a compiler makes of it; that the
-compiler makes the same of it is the claim of test_compiled_is_bit_identical.py.
+So the loop that fills the columns is correct as source, whatever a compiler makes of it; that the
+compiled code does the same is the claim of test_compiled_is_bit_identical.py.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ TIMES = np.linspace(0.0, 20.0, 41)
 
 @pytest.fixture
 def read(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let engine="compiled" run the text."""
+    """Make engine="compiled" run the Python source."""
     module = gms_fsm.lowering._compiled
     monkeypatch.setattr(module, "machine_code", lambda program, name: program.ieee[name])
     monkeypatch.setattr(module, "store", lambda: None)
@@ -56,7 +56,7 @@ def test_the_same_rows_and_the_same_log(case, options, read):
         np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name))
 
 
-def test_it_slides_along_the_same_rows(read):
+def test_sliding_gives_the_same_rows(read):
     model = one_element("published", F_c=1.0, F_s=1.5, v_s=0.05, C=0.1, sigma=5.0, k=1.0)
     start = {"z": [-2.5], "states": ["slip"], "v": 0.05}
     runs = [
@@ -68,7 +68,7 @@ def test_it_slides_along_the_same_rows(read):
         np.testing.assert_array_equal(*(getattr(run.rows, name) for run in runs))
 
 
-def test_what_ends_a_run_ends_it_at_the_same_place(read):
+def test_failures_end_the_run_at_the_same_point(read):
     model, rig = memoryless([0.5, 0.4]), SLOWING
     scenes = []
     for engine in ("compiled", "ifelse"):

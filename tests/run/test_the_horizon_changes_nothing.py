@@ -1,6 +1,6 @@
-"""How long a run is to be does not change what it computes before: its ticks are those of t.
+"""The planned length of a run does not change its results: the resolution of time depends on t.
 
-Its resolution was that of t_end: another horizon moved forces by 5e-8 N.
+It once depended on t_end: another horizon changed forces by 5e-8 N.
 """
 
 import numpy as np
@@ -19,13 +19,13 @@ def test_a_longer_horizon_gives_the_same_bits_up_to_the_shorter(longer, engine):
     for model, rig in cases:
         short = simulate(model, rig, 15.0, engine=engine)
         far = simulate(model, rig, min(longer, 60.0), engine=engine)
-        if longer > 60.0:  # far away in time, but not run to there
+        if longer > 60.0:  # distant in time, but never reached
             from gms_fsm.traces.failures import StepLimitError
 
             with pytest.raises(StepLimitError) as caught:
                 simulate(model, rig, longer, engine=engine, max_steps=len(short) + 200)
             far = caught.value.trace
-        count = len(short) - 2  # the last step is cut to the end
+        count = len(short) - 2  # the last step is cut at the end
         assert count > 30
         for name in ("t", "v", "x", "z", "F"):
             assert np.array_equal(getattr(short, name)[:count], getattr(far, name)[:count])

@@ -1,6 +1,6 @@
-"""An error is its fields: the text is made from them, and no place in the code puts them together.
+"""An error is its fields: its text is made from them, and nowhere else in the code.
 
-Of raise sites that still hide an advice in the reason there may only be fewer.
+The number of raise sites that still hide advice in the reason may only decrease.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ KINDS = [
     if isinstance(each, type) and issubclass(each, GMSError)
 ]
 PLAIN = [each for each in KINDS if not issubclass(each, ExpressionError | SimulationError)]
-HIDDEN = 0  # raise sites with "; " in the reason, by `_hiding`; this number may only shrink
+HIDDEN = 0  # raise sites with "; " in the reason, by `_hiding`; this number may only decrease
 
 
 def _failed() -> SimulationError:
@@ -48,7 +48,7 @@ def test_the_text_is_made_from_the_fields(kind: type[GMSError]) -> None:
     assert str(error.replaced(advice="")) == "k is -1.0; it must be > 0"
 
 
-def test_a_failed_run_says_when_and_where_the_run_is_kept() -> None:
+def test_a_failed_run_states_the_time_and_where_the_run_is_kept() -> None:
     error = _failed()
     assert error.t == error.trace.t[-1]
     assert str(error) == (
@@ -60,7 +60,7 @@ def test_a_failed_run_says_when_and_where_the_run_is_kept() -> None:
 
 @pytest.mark.parametrize("error", _made(), ids=lambda error: type(error).__name__)
 def test_copies_have_the_same_fields(error: GMSError) -> None:
-    """A trace is compared by its text: it is large."""
+    """A trace is compared by its text, because it is large."""
     error = error.inside("run.toml")
     for again in (copy.copy(error), pickle.loads(pickle.dumps(error))):
         assert type(again) is type(error)
@@ -82,7 +82,7 @@ def test_an_error_can_be_made_from_another() -> None:
 
 
 def _hiding(source: str) -> list[int]:
-    """Return the lines of errors made from one text that holds several fields."""
+    """Return the lines of errors made from one text that contains several fields."""
     names, found = {kind.__name__ for kind in KINDS}, []
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") in names and node.args:
@@ -95,14 +95,14 @@ def _hiding(source: str) -> list[int]:
     return found
 
 
-def test_the_check_finds_a_hidden_advice() -> None:
+def test_the_check_finds_hidden_advice() -> None:
     assert _hiding('raise ChartError("none; give one")') == [1]
     assert _hiding('raise ChartError(f"{a} is none; give {b}")') == [1]
     assert _hiding('raise ChartError("none", advice="give one; or two")') == []
 
 
 @pytest.mark.slow
-def test_hardly_any_reason_hides_an_advice() -> None:
+def test_few_reasons_hide_advice() -> None:
     found = [
         f"{path.relative_to(ROOT)}:{line}"
         for folder in ("gms_fsm", "plots")
@@ -113,8 +113,8 @@ def test_hardly_any_reason_hides_an_advice() -> None:
 
 
 @pytest.mark.slow
-def test_no_place_reads_a_message() -> None:
-    """What an error says is for people; programs have its fields."""
+def test_no_code_reads_a_message() -> None:
+    """Messages are for people; programs use the fields."""
     for folder in ("gms_fsm", "plots"):
         for path in sorted((ROOT / folder).rglob("*.py")):
             for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -122,5 +122,7 @@ def test_no_place_reads_a_message() -> None:
                     continue
                 inner = node.value
                 read = isinstance(inner, ast.Call) and ast.unparse(inner) == "str(error)"
-                if read and path.name != "_compiled.py":  # there it is numba's, in colours
+                if (
+                    read and path.name != "_compiled.py"
+                ):  # there the message is that of numba, in colours
                     raise AssertionError(f"{path}:{node.lineno}: str(error).{node.attr}")

@@ -1,6 +1,6 @@
 """Workflows, hooks, forms and policies name only what exists: targets, extras, versions, files.
 
-That GitHub accepts them is another claim: actionlint and the forms' schema were asked by hand.
+Whether GitHub accepts them is checked by hand, with actionlint and the schema of the forms.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ JOBS = {
 
 
 def commands(job: dict[str, Any]) -> list[str]:
-    """All commands of a job, once for each entry of its matrix that they name."""
+    """Return all commands of a job, once for each entry of its matrix that they use."""
     matrix = job.get("strategy", {}).get("matrix", {})
     found = [step["run"] for step in job["steps"] if "run" in step]
     for key, values in matrix.items():
@@ -48,7 +48,7 @@ def commands(job: dict[str, Any]) -> list[str]:
 
 
 def versions(job: dict[str, Any]) -> list[str]:
-    """The versions of Python that a job runs, those that may fail left out."""
+    """Return the Python versions of a job, except those that may fail."""
     given = [step["with"]["python-version"] for step in job["steps"] if "setup-python" in str(step)]
     assert len(given) == 1
     if given[0] != "${{ matrix.python }}":
@@ -103,7 +103,7 @@ def test_files_that_forms_and_policies_name_exist() -> None:
 
 
 @pytest.mark.parametrize("name", ["bug", "new_chart", "question"])
-def test_each_field_of_a_form_has_a_name_of_its_own(name: str) -> None:
+def test_each_field_of_a_form_has_a_unique_name(name: str) -> None:
     form = read(GITHUB / "ISSUE_TEMPLATE" / f"{name}.yml")
     assert form["name"]
     assert form["description"]

@@ -1,4 +1,4 @@
-"""The laws of the architecture hold: who imports whom, who knows what, and nothing is evaluated.
+"""The rules of the architecture hold: import layers, separation of knowledge, and no evaluation.
 
 Checked on the source (by tokens, not by substrings) and in fresh interpreters.
 """
@@ -40,7 +40,7 @@ def _calls(path: Path, function: str) -> list[int]:
 
 
 def _python(code: str) -> str:
-    """Run code in a fresh interpreter in the project's root and return what it prints."""
+    """Run code in a fresh interpreter in the project root and return its output."""
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
     )
@@ -48,7 +48,7 @@ def _python(code: str) -> str:
     return done.stdout
 
 
-def test_the_import_contracts_are_kept() -> None:
+def test_the_import_contracts_hold() -> None:
     pytest.importorskip("importlinter", reason="needs import-linter (extra: dev)")
     done = subprocess.run(
         [
@@ -68,10 +68,10 @@ def test_the_import_contracts_are_kept() -> None:
 
 
 @pytest.mark.parametrize("path", _sources("integrators"), ids=lambda p: p.name)
-def test_integrators_know_nothing_of_friction(path: Path) -> None:
+def test_integrators_know_nothing_about_friction(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     assert re.findall(r"(?i)\b(?:slip|stick|friction|stribeck|bristle)\w*", text) == []
-    assert "gms" not in text.lower()  # nor who calls: what a user is told is the caller's
+    assert "gms" not in text.lower()  # nor its callers: messages to users come from them
     names = {t.string for t in _tokens(path) if t.type == tokenize.NAME}
     assert "z" not in names
     imported = {
@@ -92,7 +92,7 @@ def test_nothing_is_evaluated(path: Path) -> None:
 
 
 def _bare(path: Path, function: str) -> list[int]:
-    """Calls of a builtin; re.compile and the like are methods."""
+    """Return calls of a builtin; re.compile and similar are methods."""
     tokens = _tokens(path)
     return [
         one.start[0]
@@ -106,7 +106,7 @@ def test_there_is_source_to_check(package: str) -> None:
     assert len(_sources(package)) >= 3
 
 
-def test_the_search_by_tokens_finds_what_it_looks_for(tmp_path: Path) -> None:
+def test_the_search_by_tokens_finds_calls(tmp_path: Path) -> None:
     path = tmp_path / "example.py"
     path.write_text("# eval(1)\ntext = 'eval(1)'\nevaluate(1)\nmodel.eval\neval (1)\nexec(text)\n")
     assert _calls(path, "eval") == [5]
@@ -130,7 +130,7 @@ print(json.dumps(sorted({name.partition(".")[0] for name in sys.modules})))
     assert loaded & {"matplotlib", "pygraphviz", "plots", "pandas", "IPython"} == set()
 
 
-def test_integrators_load_nothing_of_ours() -> None:
+def test_integrators_load_no_other_package_of_ours() -> None:
     code = "import json, sys, integrators\nprint(json.dumps(sorted(sys.modules)))"
     loaded = {name.partition(".")[0] for name in json.loads(_python(code))}
     assert "integrators" in loaded
@@ -142,7 +142,7 @@ CORE = [p for p in _sources("gms_fsm") if p.parent.name != "paper"]
 
 @pytest.mark.parametrize("path", CORE, ids=lambda p: p.name)
 def test_no_switching_outside_the_charts(path: Path) -> None:
-    # A state is named in a chart's page; whoever compares with such a name has a rule of its own.
+    # States are named only in charts; code that compares with such a name has its own rule.
     if path.parent.name in ("charts", "lessons"):
         return
     tokens = [t for t in _tokens(path) if t.type in (tokenize.NAME, tokenize.OP, tokenize.STRING)]

@@ -1,4 +1,4 @@
-"""What needs an extra that is not installed says so: which module, which extra, what works without.
+"""A missing extra is reported: the module, the extra, and what works without it.
 
 One function writes these texts, `gms_fsm._extras.missing`, from one table of the extras.
 """
@@ -28,7 +28,7 @@ def test_the_table_has_the_extras_that_users_can_install() -> None:
 
 
 @pytest.mark.parametrize("extra", EXTRAS)
-def test_a_message_says_what_to_type_and_what_works_without(extra: str) -> None:
+def test_a_message_names_the_command_and_what_works_without(extra: str) -> None:
     needed, without = EXTRAS[extra]
     said = str(missing("thing", extra))
     assert said.startswith(f"{needed} thing, which is not installed: ")
@@ -36,7 +36,7 @@ def test_a_message_says_what_to_type_and_what_works_without(extra: str) -> None:
     assert said.endswith(f"(without it: {without})")
 
 
-def test_the_text_has_one_home() -> None:
+def test_the_text_is_in_one_place() -> None:
     sources = [p for room in ("gms_fsm", "integrators", "plots") for p in (ROOT / room).rglob("*")]
     texts = {p: p.read_text(encoding="utf-8") for p in sources if p.suffix == ".py"}
     homes = {p.relative_to(ROOT).as_posix() for p, text in texts.items() if "gms-fsm[" in text}
@@ -79,7 +79,7 @@ def test_a_function_names_the_module_and_the_extra(
 @pytest.mark.parametrize("absent", ["matplotlib", "PIL"])
 @pytest.mark.parametrize("module", ["figures", "panels", "schematic", "animation"])
 def test_a_module_names_the_module_and_the_extra(absent: str, module: str) -> None:
-    if absent == "PIL":  # which only matplotlib asks for
+    if absent == "PIL":  # which only matplotlib needs
         pytest.importorskip("matplotlib", reason="needs the extra plots")
     code = (
         f"import sys; sys.modules[{absent!r}] = None\n"
@@ -94,7 +94,7 @@ def test_a_module_names_the_module_and_the_extra(absent: str, module: str) -> No
     assert said in done.stdout
 
 
-def test_a_module_that_is_there_but_broken_is_not_called_absent(
+def test_a_broken_module_is_not_reported_as_missing(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     (tmp_path / "halfdone.py").write_text("from math import no_such_name")
@@ -106,6 +106,6 @@ def test_a_module_that_is_there_but_broken_is_not_called_absent(
         require("needy", "plots")
 
 
-def test_what_is_there_is_returned() -> None:
+def test_an_installed_module_is_returned() -> None:
     assert require("xml.etree", "plots") is sys.modules["xml.etree"]
     assert re.__name__ == require("re", "plots").__name__

@@ -1,7 +1,7 @@
-"""A wrong kind of value at any public entry is answered by an error of ours, or taken.
+"""A wrong type of value at any public entry raises an error of ours, or is accepted.
 
-Every function, constructor and method that is public is found by looking, and called with one
-argument wrong and the others right. What Python itself says of an unknown keyword is its own.
+Every public function, constructor and method is found by introspection, and called with one wrong
+argument and the others right. Unknown keywords are left to Python.
 """
 
 from __future__ import annotations
@@ -54,13 +54,13 @@ RIG = Prescribed("0.2*sin(t)")
 STATE = State("on", {"z": "v"})
 EDGE = Transition("go", "on", "on", guard="z > 1", actions={"z": "0"})
 CHART = Chart("one", ("v",), ("z",), ("k",), (STATE,), (EDGE,), {"F": "k * z"})
-# What is made by the package alone, and given to users to read.
+# Classes that only the package creates, for users to read.
 RECORDS = {"Finding", "Report", "Sweep", "Trace", "Model", "Rig", "Signal"}
 
 
 @dataclass(frozen=True)
 class Entry:
-    """Something public with arguments that are right."""
+    """A public entry with valid arguments."""
 
     name: str
     make: Callable[[], Callable[..., Any]]
@@ -77,7 +77,7 @@ def _trace() -> Trace:
 
 
 def _entries(tmp: Path) -> Iterator[Entry]:
-    """Yield every public entry of which the right arguments are known."""
+    """Yield every public entry with known valid arguments."""
     run = {"model": MODEL, "rig": RIG, "t_end": 1.0, "t_start": 0.0, "initial": None}
     run |= {"settings": None}
     options = {each.name: each.default for each in fields(Settings)}
@@ -148,7 +148,7 @@ def _swept() -> Sweep:
 
 
 def _methods(tmp: Path) -> Iterator[Entry]:
-    """Yield every public method, by its signature; right arguments are known by name."""
+    """Yield every public method, by its signature; valid arguments are known by name."""
     objects: dict[str, Callable[[], Any]] = {
         "Trace": _trace,
         "Session": _session,
@@ -174,7 +174,7 @@ def _methods(tmp: Path) -> Iterator[Entry]:
             if name.startswith("_") or inspect.isclass(member):
                 continue
             parameters = list(inspect.signature(member).parameters.values())
-            if not inspect.ismethod(member):  # a class method has its class already
+            if not inspect.ismethod(member):  # a class method is already bound
                 parameters = parameters[1:]
             given = {
                 each.name: right.get(f"{kind}.{name}.{each.name}", right.get(each.name))
@@ -224,7 +224,7 @@ RIGHT: dict[str, Any] = {
 
 def _faults(entry: Entry) -> Iterator[str]:
     for name in entry.right:
-        for wrong in WRONG[:-1] if name == "progress" else WRONG:  # any function will do there
+        for wrong in WRONG[:-1] if name == "progress" else WRONG:  # any function is accepted there
             call = entry.make()
             given = {**entry.right, name: wrong}
             try:
@@ -241,7 +241,7 @@ NAMES = [entry.name for entry in _entries(Path())]
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.filterwarnings("ignore")
-def test_wrong_kinds_are_answered(
+def test_wrong_types_raise_our_errors(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -251,7 +251,7 @@ def test_wrong_kinds_are_answered(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in NAMES if "." not in name])
-def test_what_is_called_right_is_right(name: str, tmp_path: Path) -> None:
-    """Else the wrong ones above would be refused for another reason."""
+def test_valid_arguments_are_accepted(name: str, tmp_path: Path) -> None:
+    """Otherwise the wrong ones above would be rejected for another reason."""
     entry = next(each for each in _entries(tmp_path) if each.name == name)
     entry.make()(**entry.right)

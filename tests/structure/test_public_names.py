@@ -1,4 +1,4 @@
-"""Claim: each public name is had from `gms_fsm` in a fresh process, in any order of imports."""
+"""Claim: each public name can be imported from `gms_fsm` in a fresh process, in any order."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ assert not isinstance(first, types.ModuleType)
     assert done.returncode == 0, done.stderr
 
 
-def test_no_room_has_the_name_of_a_public_function() -> None:
+def test_no_subpackage_has_the_name_of_a_public_function() -> None:
     rooms = {path.stem for path in Path(gms_fsm.__file__).parent.iterdir()}
     assert len(rooms) >= 8
     assert rooms & set(gms_fsm.__all__) == set()
 
 
-def test_type_checkers_and_python_read_the_same_names() -> None:
+def test_type_checkers_and_python_see_the_same_names() -> None:
     tree = ast.parse(Path(gms_fsm.__file__).read_text(encoding="utf-8"))
     branch = next(node for node in tree.body if isinstance(node, ast.If))
     told = {
@@ -89,7 +89,7 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
 @pytest.mark.parametrize(
     "hiding", ["plots.py", "integrators.py", "plots/", "integrators/__init__.py"]
 )
-def test_a_file_that_hides_a_package_is_named(hiding: str, tmp_path: Path) -> None:
+def test_a_file_that_shadows_a_package_is_named(hiding: str, tmp_path: Path) -> None:
     place = tmp_path / hiding
     if hiding.endswith("/"):
         place.mkdir()

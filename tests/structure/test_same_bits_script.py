@@ -1,4 +1,4 @@
-"""The script that compares two commits says which run differs, is missing or failed, and exits 1.
+"""The script that compares two commits reports runs that differ, are missing or fail, and exits 1.
 
 The tables are invented; the runs themselves take too long for a test.
 """
@@ -40,7 +40,7 @@ def script() -> ModuleType:
          {"sine": "FAILED: ValueError: no", "pulled": "same"}),
     ],
 )  # fmt: skip
-def test_what_is_said_and_the_exit_code(
+def test_the_report_and_the_exit_code(
     script: ModuleType,
     new: dict[str, dict[str, str]],
     said: dict[str, str],
@@ -59,12 +59,12 @@ def test_what_is_said_and_the_exit_code(
     assert f"{len(said)} runs, {len(said) - others} the same" in capsys.readouterr().out
 
 
-def test_a_run_that_fails_at_both_is_not_the_same(script: ModuleType) -> None:
+def test_a_run_that_fails_at_both_commits_is_reported(script: ModuleType) -> None:
     failed = {"sine": {"failed": "ValueError: no"}}
     assert script.compared(failed, failed)[1] == 1
 
 
-def test_no_run_at_all_is_no_success(script: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_run_at_all_is_a_failure(script: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(script, "table_at", lambda *_: {})
     monkeypatch.setattr(sys, "argv", ["same_bits.py", "HEAD"])
     assert script.main() == 1

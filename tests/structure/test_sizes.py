@@ -1,7 +1,7 @@
-"""No module is over 600 lines and no function over 80 lines of code, but where a comment says why.
+"""No module has over 600 lines and no function over 80 lines of code, unless a comment says why.
 
-Lines of code are those that hold code: blank lines, comments and docstrings do not count, and a
-function inside another one counts for itself. The comment stands directly above the function (or
+Blank lines, comments and docstrings do not count as code, and a nested function counts
+separately. The comment stands directly above the function (or
 its decorators) and begins with "Long because".
 """
 
@@ -30,7 +30,7 @@ def modules() -> list[Path]:
 
 
 def code_lines(text: str) -> set[int]:
-    """Return the numbers of the lines that hold code."""
+    """Return the numbers of the lines that contain code."""
     tokens = tokenize.generate_tokens(io.StringIO(text).readline)
     blank = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT}
     found = {
@@ -91,5 +91,5 @@ def test_lines_of_code_are_counted() -> None:
     assert long_functions(f"# Too long.\n@g\n{head}" + "    x = 1\n" * 80) == {"f": 81}
     inner = "    def g():\n" + "        x = 1\n" * 40
     assert long_functions(head + inner + "    x = 1\n" * 40) == {}
-    text = "    x = '''\n\n\n'''\n"  # a text that is code counts with all its lines
+    text = "    x = '''\n\n\n'''\n"  # a string that is code counts with all its lines
     assert long_functions(head + text * 20) == {"f": 81}

@@ -1,6 +1,6 @@
 """Every file of the three packages goes into the wheel.
 
-`make wheel` builds and tries one; this says at once which file it would lack.
+`make wheel` builds and tests one; this test is faster and names the missing file.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def test_each_folder_is_a_package() -> None:
     assert [f.parent for f in FILES if not (f.parent / "__init__.py").is_file()] == []
 
 
-def test_each_file_that_is_no_module_is_package_data() -> None:
+def test_each_file_that_is_not_a_module_is_package_data() -> None:
     assert set(TOOL["package-data"]) == {"*"}
     patterns = TOOL["package-data"]["*"]
     data = [path for path in FILES if path.suffix != ".py"]

@@ -1,7 +1,7 @@
-"""An argument of the wrong kind is an error of ours that names it, says what it is, and what fits.
+"""An argument of the wrong type raises an error of ours that names it and says what is expected.
 
-These calls were made by people who had read the documentation; each of them ended in an error of
-Python's own, from deep inside.
+These calls were made by people who had read the documentation; each of them ended in an unclear
+Python exception from deep inside the package.
 """
 
 from __future__ import annotations
@@ -78,13 +78,13 @@ def test_a_state_has_no_states() -> None:
 
 @pytest.mark.parametrize("each", ["states", "transitions"])
 @pytest.mark.parametrize("wrong", [("a", "b"), ({"name": "a"},), ((1, 2),)], ids=str)
-def test_what_is_no_state_and_no_edge(each: str, wrong: Any) -> None:
+def test_invalid_states_and_edges(each: str, wrong: Any) -> None:
     kind = each.removesuffix("s").capitalize()
     _refused(ChartError, rf"{each} has .*write it as {kind}\(", lambda: _chart(**{each: wrong}))
     _refused(ChartError, f"{each} is None; give a tuple", lambda: _chart(**{each: None}))
 
 
-def test_a_dict_is_no_equation() -> None:
+def test_a_dict_is_not_an_equation() -> None:
     wrong: Any = {"z": {"v": 1}}
     said = r"state 'stick', flow of 'z'.*expected a text, got dict; allowed: a text in quotes"
     _refused(ExpressionError, said, lambda: _chart(states=(State("stick", flow=wrong),)))
@@ -103,7 +103,7 @@ def test_how_many_elements(n: Any) -> None:
     said = "n is .*; the number of elements must be an integer"
     _refused(ParameterError, said, lambda: ChartModel(_chart(), {"k": 1.0}, n=n))
     if n != 1.5:
-        _refused(ParameterError, "elements is .*a whole number", lambda: block_diagram(n))
+        _refused(ParameterError, "elements is .*an integer", lambda: block_diagram(n))
 
 
 @pytest.mark.parametrize("values", [None, [1.0], "k = 1"])
@@ -134,13 +134,13 @@ def test_arguments_of_a_sweep_in_another_order() -> None:
         _refused(ParameterError, text, lambda given=given: sweep(*given, engine="machines"))
 
 
-def test_a_variable_that_is_not_there(trace: Trace) -> None:
+def test_an_unknown_variable(trace: Trace) -> None:
     for name in ("zz", 3):
         said = f"name is {name!r}; the chart has the variables z"
         _refused(ParameterError, said, lambda name=name: trace.variable(name))
 
 
-def test_an_edge_is_no_element() -> None:
+def test_an_edge_is_not_an_element() -> None:
     session = Session(MODEL, RIG, 3.0)
     wrong: Any = "arrest"
     said = r"no element 'arrest' \(to name an edge, use edge='arrest'\); there are 0 to 3"
@@ -164,7 +164,7 @@ def test_an_edge_is_no_element() -> None:
     ],
 )
 @pytest.mark.parametrize("wrong", ["run.npz", MODEL], ids=["path", "model"])
-def test_pictures_are_drawn_of_a_trace(draw: str, wrong: Any) -> None:
+def test_figures_need_a_trace(draw: str, wrong: Any) -> None:
     pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
     import plots
     from plots import figures, panels, schematic

@@ -1,4 +1,4 @@
-"""Claim: a rig's number or signal never stands for something else, whatever it is called."""
+"""A rig's number or signal is never confused with something else, whatever its name."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ USED = ["x", "v", "t", "F", "exp", "pi"]
 
 @dataclass
 class Pushed:
-    """A rig of a user's own with one number, or one signal, of some name."""
+    """A user-defined rig with one number or one signal of a given name."""
 
     acceleration: str
     numbers: Mapping[str, float] = field(default_factory=dict)

@@ -18,11 +18,11 @@ from tests.helpers import stick_slip
 
 @pytest.mark.parametrize("number", [10**400, -(10**400)])
 def test_whole_numbers_that_no_float_holds_are_refused(number: int) -> None:
-    with pytest.raises(ParameterError, match="F_s: it is too large; it must be finite"):
+    with pytest.raises(ParameterError, match="F_s: it is too large"):
         Stribeck(1.0, number, 1.0)
-    with pytest.raises(ParameterError, match=r"k.*it is too large; it must be finite"):
+    with pytest.raises(ParameterError, match=r"k.*it is too large"):
         GMSParameters([number], [0], [1], sigma_2=0, stribeck=Stribeck(1, 1, 1), v_c=1e-6)
-    with pytest.raises(ParameterError, match="t_end: it is too large; it must be finite"):
+    with pytest.raises(ParameterError, match="t_end: it is too large"):
         simulate(stick_slip("signed"), Prescribed("0"), number)
     for given in (number, [(0, number), (1, 0)], ([0, 1], [0, number])):
         with pytest.raises(SignalError):

@@ -1,6 +1,6 @@
 """However a motion is given (expression, ramps, record, function), the run is the same.
 
-Jumps are right-continuous, a record has no value outside itself, and what is no signal is refused
+Jumps are right-continuous, a record has no value outside its range, and anything else is refused
 with its value.
 """
 
@@ -60,7 +60,7 @@ def test_the_same_motion_gives_the_same_run(given: str, reference: Trace) -> Non
     assert len(reference.transitions) > 8
     assert trace.transitions.edge.tolist() == reference.transitions.edge.tolist()
     assert trace.transitions.element.tolist() == reference.transitions.element.tolist()
-    # The corners of a function are unknown; only error control meets them.
+    # The corners of a function are unknown; only error control detects them.
     close = 1e-5 if given.startswith("function") else 1e-7
     np.testing.assert_allclose(trace.transitions.t, reference.transitions.t, atol=10 * close)
     np.testing.assert_allclose(trace.v, np.interp(GRID, TIMES, VALUES), atol=1e-15)
@@ -121,7 +121,7 @@ def test_a_jump_can_release_an_element_at_once() -> None:
     jump = [(0.0, 0.5), (1.0, 0.5), (1.0, 0.0), (3.0, 0.0), (3.0, 0.5)]
     trace = simulate(stick_slip("signed"), Prescribed(jump), 5.0)
     # z = 0.5 > 0.4 = s at t = 0.8: slip; at rest s is 1.5 and |z| < s: all arrest at the jump; and
-    # at the next jump s falls under z again: all break away there.
+    # at the next jump s falls below z again: all break away there.
     np.testing.assert_allclose(trace.transitions.t, [0.8] * 4 + [1.0] * 4 + [3.0] * 4, atol=1e-9)
     assert trace.transitions.edge.tolist() == (
         ["break_away_forward"] * 4 + ["arrest"] * 4 + ["break_away_forward"] * 4
@@ -147,7 +147,7 @@ def test_two_functions_on_one_generated_text_stay_apart() -> None:
 
 @dataclass
 class Ramp:
-    """A callable that compares by part of what it knows, and cannot be hashed."""
+    """A callable that compares by only part of its data, and cannot be hashed."""
 
     unit: str
     slope: float = field(compare=False)
@@ -156,7 +156,7 @@ class Ramp:
         return self.slope * t
 
 
-def test_a_callable_object_is_called_itself_though_another_is_equal_to_it() -> None:
+def test_a_callable_object_is_not_replaced_by_an_equal_one() -> None:
     for slope in (0.1, 0.2):
         trace = simulate(stick_slip("signed"), Prescribed(Ramp("m/s", slope)), 1.0)
         assert trace.v[-1] == slope
@@ -192,7 +192,7 @@ def test_a_pair_of_tuples_is_a_record_too() -> None:
     assert not signal.held
 
 
-def test_kinds_are_told_apart() -> None:
+def test_kinds_of_signals_are_distinguished() -> None:
     assert isinstance(as_signal("t"), Formula)
     assert isinstance(as_signal(abs), Function)
     assert as_signal(as_signal("t")) == Formula("t")
@@ -224,7 +224,7 @@ def test_kinds_are_told_apart() -> None:
         ((0, 1), ["times have shape ()", "flat list"]),
     ],
 )
-def test_what_is_no_signal_is_refused_with_its_value(given: Any, words: list[str]) -> None:
+def test_anything_but_a_signal_is_refused_with_its_value(given: Any, words: list[str]) -> None:
     for build in (as_signal, Prescribed, lambda signal: Slider(1.0, signal)):
         with pytest.raises(SignalError) as caught:
             build(given)  # type: ignore[operator]
@@ -238,7 +238,7 @@ def test_an_unreadable_expression_is_an_expression_error_of_the_signal(text: str
         Prescribed(text)
 
 
-# --------------------------------------------------------------------------- signals that give out
+# --------------------------------------------------------------------------- signals that end
 def _fails(error: type[SimulationError], signal: Any, t_end: float, **options: Any) -> Any:
     with pytest.raises(error) as caught:
         simulate(stick_slip("signed"), Prescribed(signal), t_end, **options)
@@ -247,7 +247,7 @@ def _fails(error: type[SimulationError], signal: Any, t_end: float, **options: A
 
 @pytest.mark.parametrize("method", [{}, {"method": "rk4", "step": 0.0101}], ids=["dp45", "rk4"])
 @pytest.mark.parametrize("rows", [None, [0.0, 1.5, 2.5, 3.0, 3.5, 5.0]], ids=["steps", "t_eval"])
-def test_a_record_that_ends_early_keeps_the_run_up_to_its_end(rows: Any, method: Any) -> None:
+def test_a_record_that_ends_early_keeps_the_run_so_far(rows: Any, method: Any) -> None:
     record = ([0.0, 1.0, 2.0, 3.0], [0.0, 0.2, 0.2, 0.1])
     error = _fails(SignalEndError, record, 5.0, t_eval=rows, **method)
     for word in ("a sampled signal at t = 3.0 s", "t_end = 5.0 s", "t_end <= 3.0"):
@@ -307,9 +307,7 @@ WORDS = {
     [{}, {"method": "rk4", "step": 0.01}, {"events": "step", "step": 0.01}],
     ids=["dp45", "rk4", "step"],
 )
-def test_a_function_that_breaks_keeps_the_run_up_to_there(
-    how: str, options: dict[str, Any]
-) -> None:
+def test_a_function_that_fails_keeps_the_run_so_far(how: str, options: dict[str, Any]) -> None:
     error = _fails(SimulationError, _broken_after(2.0, BREAKS[how]), 5.0, **options)
     trace = error.trace
     assert 0.0 < trace.t[-1] <= 2.0 + 1e-9
@@ -345,7 +343,7 @@ def test_a_function_that_never_works_gives_an_error_whose_trace_can_be_read(how:
     ("text", "t_break"),
     [("0.1*sqrt(2 - t)", 2.0), ("0.01/(2 - t)", 2.0), ("exp(400*t)", 1.775), ("1/0 + t", 0.0)],
 )
-def test_an_expression_that_leaves_the_numbers_keeps_the_run_up_to_there(
+def test_an_expression_that_becomes_undefined_keeps_the_run_so_far(
     text: str, t_break: float
 ) -> None:
     error = _fails(SimulationError, text, 5.0)

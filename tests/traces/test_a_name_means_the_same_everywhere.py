@@ -1,4 +1,4 @@
-"""Claim: a name has one meaning, whoever asks: guards, watches, invariants, machines and pages.
+"""Claim: a name means the same in guards, watches, invariants, machines and replay pages.
 
 `gms_fsm.traces.scope` gives the values of one row as numbers and of all rows as arrays.
 """
@@ -74,7 +74,7 @@ def trace(request: pytest.FixtureRequest) -> Trace:
     return simulate(*CASES[request.param], 8.0)
 
 
-def test_the_values_are_the_traces(trace: Trace) -> None:
+def test_the_values_are_those_of_the_trace(trace: Trace) -> None:
     watches = Scope.over(trace).watches()
     columns = {"t": trace.t, "x": trace.x, "v": trace.v, "F": trace.F}
     for i in range(trace.n):
@@ -90,7 +90,7 @@ def test_the_values_are_the_traces(trace: Trace) -> None:
         np.testing.assert_allclose(watches["s"], trace.model.stribeck(trace.v), rtol=1e-15)
 
 
-def test_one_row_is_a_row_of_all(trace: Trace) -> None:
+def test_one_row_agrees_with_all_rows(trace: Trace) -> None:
     run = Scope.over(trace)
     for row in range(0, len(trace), 5):
         here = Scope.at(trace, row)
@@ -101,7 +101,7 @@ def test_one_row_is_a_row_of_all(trace: Trace) -> None:
 
 
 def test_one_row_is_plain_numbers(trace: Trace) -> None:
-    """Numbers of numpy would not raise where Python does: 1/0 would be true or false."""
+    """NumPy numbers do not raise where Python numbers do: 1/0 would be true or false."""
     here = Scope.at(trace, -1)
     for values in (here.guards(0), here.watches()):
         assert {type(value) for value in values.values()} <= {float, str}
@@ -129,7 +129,7 @@ def test_an_invariant_sees_what_guards_see(trace: Trace) -> None:
 
 
 def test_machines_show_the_values_of_guards() -> None:
-    """At every firing, what a callback sees of its element is what `explain` tells later."""
+    """At every firing, a callback sees the values of its element that `explain` reports later."""
     model, rig = CASES["two variables"]
     machines, seen = ElementMachines(model), []
     machines.machine.on_enter_slip(
@@ -144,7 +144,7 @@ def test_machines_show_the_values_of_guards() -> None:
     ]
     assert len(entered) == len(seen) > 3
     for (row, element), values in zip(entered, seen, strict=True):
-        # The guards of a set are asked before any of them is taken.
+        # All guards of a set are evaluated before any of its edges is taken.
         before = row - int(trace.microstep[row])
         assert values == values_at(trace, before, element)
 
@@ -188,7 +188,7 @@ def test_an_invariant_and_a_watch_agree_on_a_single_element() -> None:
 
 
 def test_a_layout_needs_no_program() -> None:
-    """Names alone decide it; the program only adds how many surfaces there are."""
+    """It depends only on names; the program only adds the number of surfaces."""
     for model, rig in CASES.values():
         layout = simulate(model, rig, 0.1).program.layout
         assert layout == Layout.of(assembled(system_of(model, rig)), layout.surfaces)

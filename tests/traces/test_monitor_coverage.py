@@ -1,6 +1,6 @@
 """Coverage counts what the log and the rows show: states, edges, and clauses true and false.
 
-Clauses count only where they are asked: in the edge's source state.
+Clauses count only where they are evaluated: in the source state of the edge.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def run(*arguments: Any, **options: Any) -> Trace:
     return simulate(*arguments, monitors="coverage", **options)
 
 
-def test_a_motion_both_ways_covers_the_gms_chart() -> None:
+def test_motion_in_both_directions_covers_the_gms_chart() -> None:
     trace = run(stick_slip("signed"), Prescribed(FIG4_SINE), 50.0)
     found = coverage(trace)
     assert found.ok
@@ -57,7 +57,7 @@ def test_a_motion_both_ways_covers_the_gms_chart() -> None:
     assert found.text == ("states 2 of 2, edges 3 of 3, clauses true 6 of 6, clauses false 6 of 6")
 
 
-def test_a_motion_one_way_does_not() -> None:
+def test_motion_in_one_direction_does_not() -> None:
     found = coverage(run(stick_slip("signed"), Prescribed(0.2), 3.0))
     assert not found.ok
     assert found.never == (
@@ -73,7 +73,7 @@ def test_a_motion_one_way_does_not() -> None:
     assert "a longer run, motion in both directions" in found.text
 
 
-def test_nothing_is_asked_in_a_state_that_is_never_reached() -> None:
+def test_no_clause_counts_in_a_state_that_is_never_reached() -> None:
     found = coverage(run(stick_slip("signed"), Prescribed(0.2), 1.0))
     assert found.states == {"stick": (True,) * 4, "slip": (False,) * 4}
     arrest = [clause for clause in found.clauses if clause.edge == "arrest"]
@@ -82,7 +82,7 @@ def test_nothing_is_asked_in_a_state_that_is_never_reached() -> None:
     assert "|z| < s of arrest false" in found.never
 
 
-def test_elements_are_counted_one_by_one() -> None:
+def test_elements_are_counted_separately() -> None:
     """Four elements of a pulled mass: each breaks away forward, none backward."""
     model, rig = pulled_mass()
     found = coverage(run(model, rig, 60.0))
@@ -94,7 +94,7 @@ def test_elements_are_counted_one_by_one() -> None:
 
 @pytest.mark.parametrize("t_eval", [None, [0.0, 20.0, 50.0]])
 def test_clauses_are_those_of_the_explanations(t_eval: list[float] | None) -> None:
-    """Row by row, element by element, as `explain` tells it."""
+    """Row by row, element by element, as reported by `explain`."""
     trace = run(stick_slip("published"), Prescribed(FIG4_SINE), 50.0, t_eval=t_eval)
     found, whole = coverage(trace), trace.whole()
     seen: set[tuple[str, str, int, bool]] = set()
@@ -124,7 +124,7 @@ def test_lugre_has_one_state_and_no_edges() -> None:
 
 
 def test_a_clause_that_cannot_be_computed_is_false() -> None:
-    """As the guards themselves: 1/z at z = 0 does not hold."""
+    """As in the guards themselves: 1/z at z = 0 does not hold."""
     chart = Chart(
         "reciprocal",
         inputs=("v",),
@@ -141,7 +141,7 @@ def test_a_clause_that_cannot_be_computed_is_false() -> None:
     assert not found.edges["go"][0]
 
 
-def test_an_event_missed_by_looking_once_a_step_is_missed_here_too() -> None:
+def test_an_event_missed_between_steps_is_missed_here_too() -> None:
     model = one_element("signed", v_s=1e-3)
     rig, step = Prescribed("0.2*sin(2*pi*t/20)"), {"method": "rk4", "step": 1.0001e-2}
     looked = coverage(run(model, rig, 19.0, events="step", **step))

@@ -1,10 +1,11 @@
-"""The energy book of every element is right, and says which laws make energy out of nothing.
+"""The energy balance of every element is right, and shows which laws create energy.
 
 Heat = energy taken from the motion - rise of k z**2 / 2. In stick it grows by sigma v**2. In slip
 it grows by k z (v - dz) + sigma dz v: the signed law keeps that positive while the deflection
-follows the motion, but not while a spring winds up faster than it is moved (dz > v). Then it makes
-energy, in one phase of slip at most what the rise of the Stribeck curve from F_c to F_s stores,
-k w**2 (F_s**2 - F_c**2) / 2; with F_s = F_c none. The published law has no such bound for v < 0.
+follows the motion, but not while a spring winds up faster than it is moved (dz > v). Then it
+creates energy, in one phase of slip at most what the rise of the Stribeck curve from F_c to F_s
+stores, k w**2 (F_s**2 - F_c**2) / 2; with F_s = F_c none. The published law has no such bound for
+v < 0.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ def test_stick_at_constant_velocity(law: str, v: float) -> None:
 
 
 def slip(law: str, v: float, z0: float, t: float) -> tuple[float, float]:
-    """Return taken and stored of C = 0.1, s = 1, k = 2, sigma = 0.3 at constant v."""
+    """Return the energies taken and stored for C = 0.1, s = 1, k = 2, sigma = 0.3 at constant v."""
     C, k, sigma, sign = 0.1, 2.0, 0.3, math.copysign(1.0, v)
     rest, rate = (sign, -C) if law == "signed" else (1.0, -sign * C)
     growth = math.exp(rate * t)
@@ -85,7 +86,7 @@ def test_slip_at_constant_velocity(law: str, v: float, z0: float) -> None:
 
 @pytest.mark.slow
 def test_over_a_run_heat_and_spring_add_up_to_what_was_taken() -> None:
-    """On a fine grid of its own, by the trapezoid, from the forces of the trace."""
+    """On a separate fine grid, by the trapezoid rule, from the forces of the trace."""
     model, rig = pulled_mass()
     times = np.linspace(0.0, 20.0, 200_001)
     fine = simulate(model, rig, 20.0, t_eval=times)
@@ -110,7 +111,7 @@ MOTIONS = st.lists(
 
 
 def bank(F_s: float, v_s: float, C: float) -> GMS:
-    """Two elements with sigma C <= k w F_c: the damper never overrules the spring."""
+    """Two elements with sigma C <= k w F_c: the damper force never exceeds the spring force."""
     parameters = GMSParameters(
         [2.0, 5.0],
         [0.2, 0.4],
@@ -126,10 +127,10 @@ def bank(F_s: float, v_s: float, C: float) -> GMS:
 @pytest.mark.slow
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(parts=MOTIONS, C=st.floats(0.02, 1.0))
-def test_with_plain_coulomb_friction_no_element_ever_makes_energy(
+def test_with_plain_coulomb_friction_no_element_creates_energy(
     parts: list[tuple[float, float, float]], C: float
 ) -> None:
-    """Not only overall: not even between two times."""
+    """Not only overall, but between any two times."""
     found = passivity(simulate(bank(1.0, 0.05, C), motion(parts), 15.0, monitors="passivity"))
     assert found.ok
     for made, tolerance, taken in zip(found.made, found.tolerance, found.taken, strict=True):
@@ -140,7 +141,7 @@ def test_with_plain_coulomb_friction_no_element_ever_makes_energy(
 @pytest.mark.slow
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(parts=MOTIONS, C=st.floats(0.02, 1.0), F_s=st.floats(1.05, 2.0), v_s=st.floats(1e-3, 0.1))
-def test_a_phase_of_slip_makes_at_most_what_the_stribeck_rise_stores(
+def test_a_phase_of_slip_creates_at_most_what_the_stribeck_rise_stores(
     parts: list[tuple[float, float, float]], C: float, F_s: float, v_s: float
 ) -> None:
     model = bank(F_s, v_s, C)
@@ -163,7 +164,7 @@ def test_a_phase_of_slip_makes_at_most_what_the_stribeck_rise_stores(
 def test_strokes_longer_than_the_pre_sliding_are_passive(
     stroke: float, w: float, C: float, F_s: float, v_s: float
 ) -> None:
-    """Each half period slides so far that its heat pays for the spring's winding up."""
+    """Each half period slides so far that its heat exceeds the energy of the spring."""
     model = bank(F_s, v_s, C)
     amplitude = stroke * w * F_s * 0.3  # a stroke is 2 amplitude / w
     rig = Prescribed(f"{amplitude!r}*sin({w!r}*t)")
@@ -172,7 +173,7 @@ def test_strokes_longer_than_the_pre_sliding_are_passive(
     assert found.deficit == (0.0, 0.0)
 
 
-def test_the_signed_law_can_make_that_much() -> None:
+def test_the_signed_law_can_create_that_much() -> None:
     """Break away fast at w F_c, stop at once, creep: the spring winds itself up to w F_s."""
     model = one_element("signed", F_c=0.5, F_s=1.5, v_s=1e-3, C=1.0, sigma=0.0)
     corners = [(0.0, 0.2), (2.6, 0.2), (2.601, 1e-5), (30.0, 1e-5)]
@@ -186,7 +187,7 @@ def test_the_signed_law_can_make_that_much() -> None:
     assert "published" not in found.text
 
 
-def test_a_start_in_slip_can_make_it_too() -> None:
+def test_a_start_in_slip_can_create_energy_too() -> None:
     """From z = 0 at v < C: the closed form's lowest heat."""
     model = one_element("signed", k=2.0, sigma=0.3, F_c=1.0, F_s=1.5, v_s=1e-3, C=0.1)
     trace = simulate(
@@ -201,8 +202,8 @@ def test_a_start_in_slip_can_make_it_too() -> None:
 
 # --------------------------------------------------------------------------- the published law
 @pytest.mark.slow
-def test_the_published_law_makes_energy_in_fig_4() -> None:
-    """2.16 J by element 1; checked on a fine grid from the forces, by the trapezoid."""
+def test_the_published_law_creates_energy_in_fig_4() -> None:
+    """2.16 J by element 1; checked on a fine grid from the forces, by the trapezoid rule."""
     model, rig = stick_slip("published"), Prescribed(FIG4_SINE)
     found = passivity(simulate(model, rig, 100.0, monitors="passivity"))
     fine = simulate(model, rig, 100.0, t_eval=np.linspace(0.0, 100.0, 100_001))
@@ -222,23 +223,23 @@ def test_the_published_law_makes_energy_in_fig_4() -> None:
         assert part in found.text
 
 
-def test_the_signed_law_makes_none_in_fig_4() -> None:
+def test_the_signed_law_creates_none_in_fig_4() -> None:
     found = passivity(
         simulate(stick_slip("signed"), Prescribed(FIG4_SINE), 100.0, monitors="passivity")
     )
     assert found.ok
     assert found.deficit == (0.0,) * 4
     assert "no element gave back more energy than it had taken" in found.text
-    # Between two times it does: the springs wind up before each arrest.
+    # Between two times it does, because the springs wind up before each arrest.
     assert found.made[0] == pytest.approx(6.58e-4, rel=0.01)
 
 
 @settings(max_examples=20, deadline=None, derandomize=True)
 @given(v=st.floats(0.05, 0.5), z0=st.floats(-0.9, 0.9), t=st.floats(20.0, 40.0))
-def test_the_published_law_makes_energy_for_every_backward_slip(
+def test_the_published_law_creates_energy_in_every_backward_slip(
     v: float, z0: float, t: float
 ) -> None:
-    """z runs away from s like exp(+C t / s): far more than any rise of the Stribeck curve."""
+    """z moves away from s like exp(+C t / s): far more than any rise of the Stribeck curve."""
     model = one_element("published", k=2.0, sigma=0.3, F_c=1.0, F_s=1.5, v_s=1e-3, C=0.1)
     start = {"z": [z0], "states": ["slip"]}
     trace = simulate(model, Prescribed(-v), t, initial=start, monitors="passivity", **FINE)  # type: ignore[arg-type]
@@ -271,7 +272,7 @@ def test_lugre_is_a_spring_and_a_damper_too() -> None:
         ("k * z + c * dz + v", False),
     ],
 )
-def test_other_forces_are_not_judged(force: str, applicable: bool) -> None:
+def test_other_forces_are_not_applicable(force: str, applicable: bool) -> None:
     chart = Chart(
         "own",
         inputs=("v",),
@@ -314,7 +315,7 @@ def exactly(law: str) -> PassivityVerdict:
     ids=str,
 )
 def test_the_tolerance_covers_the_error_of_the_sums(law: str, options: dict[str, object]) -> None:
-    """The same energies from coarse steps, or few rows, as from fine ones, within what is said."""
+    """Coarse steps or few rows give the same energies as fine ones, within the stated tolerance."""
     model, rig = stick_slip(law), Prescribed(FIG4_SINE)
     fine = exactly(law)
     found = passivity(simulate(model, rig, 60.0, monitors=[Passivity(1e-3)], **options))  # type: ignore[arg-type]
@@ -325,7 +326,7 @@ def test_the_tolerance_covers_the_error_of_the_sums(law: str, options: dict[str,
             assert abs(value - right) <= tolerance, name
 
 
-def test_few_rows_are_said_to_be_few() -> None:
+def test_too_few_rows_are_reported() -> None:
     model, rig = stick_slip("published"), Prescribed(FIG4_SINE)
     few = passivity(simulate(model, rig, 100.0, t_eval=[0.0, 50.0, 100.0], monitors="passivity"))
     assert "the rows are too far apart for these sums" in few.text
@@ -343,7 +344,7 @@ def test_rest_is_passive() -> None:
     assert still.taken == still.stored == still.deficit == (0.0,) * 4
 
 
-def test_a_run_that_grows_without_bound_is_judged_while_it_is_finite() -> None:
+def test_a_run_that_grows_without_bound_is_checked_while_it_is_finite() -> None:
     model = one_element("published", C=50.0, F_c=1.0, F_s=1.5, v_s=1e-3)
     start = {"z": [0.5], "states": ["slip"]}
     try:
@@ -356,7 +357,7 @@ def test_a_run_that_grows_without_bound_is_judged_while_it_is_finite() -> None:
     assert all(math.isfinite(value) for value in (*found.taken, *found.made, *found.tolerance))
 
 
-def test_a_signal_that_a_file_cannot_hold_is_no_obstacle(tmp_path: Path) -> None:
+def test_a_signal_that_a_file_cannot_store_is_no_obstacle(tmp_path: Path) -> None:
     rig = Prescribed(lambda t: 0.15 * math.sin(2 * math.pi * t / 25))
     trace = simulate(stick_slip("published"), rig, 60.0, monitors="passivity")
     read = Trace.load(trace.save(tmp_path / "run.npz"))

@@ -1,6 +1,6 @@
-"""A run without monitors does nothing for them; one with them computes no row twice.
+"""Monitors cost nothing in a run without them; with them no row is computed twice.
 
-How long they take is measured by benchmarks/monitors.py.
+Their running time is measured by benchmarks/monitors.py.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ FUNCTIONS = (
 
 @pytest.fixture
 def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Note every call into the monitors, and every table of observed rows."""
+    """Record every call into the monitors, and every table of observed rows."""
     noted: list[str] = []
 
     def noting(name: str, function: Any) -> Any:
@@ -67,7 +67,7 @@ def test_nothing_is_called_when_off_and_the_run_fails(calls: list[str]) -> None:
 
 
 def test_the_run_itself_is_the_same(calls: list[str]) -> None:
-    """Rows, log and the program's text do not depend on being watched."""
+    """Rows, log and the text of the program do not depend on monitors."""
     model, rig = stick_slip("published"), open_loop()
     plain = simulate(model, rig, 30.0)
     assert calls == []

@@ -1,7 +1,7 @@
-"""Monitors find what happens: chattering and livelock in the log, invariants where they break.
+"""Monitors find chattering and livelock in the log, and the points where invariants break.
 
-Times are checked against closed forms, verdicts at rows against one evaluation at a time, and what
-cannot be watched is refused before the run begins.
+Times are checked against closed forms, verdicts at rows against single evaluations, and
+invalid monitors are rejected before the run begins.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ SLOWING = Prescribed("0.2*cos(2*pi*t/20)")
 
 
 def memoryless(weights: list[float]) -> ChartModel:
-    """Guards that are each other's negation: on z = s both flows push into the other's state."""
+    """Guards that negate each other: on z = s both flows push into the other state."""
     return ChartModel(
         BROKEN["memoryless"].chart,
         {"k": 1.0, "sigma": 0.1, "C": 0.1, "v_c": 1e-6},
@@ -59,7 +59,7 @@ def memoryless(weights: list[float]) -> ChartModel:
 
 
 def blinker(period: float) -> ChartModel:
-    """An element that goes on and off once a period, at known times."""
+    """An element that switches on and off once per period, at known times."""
     return ChartModel(
         Chart(
             "blinker",
@@ -94,7 +94,7 @@ def invariant(trace: Trace, text: str) -> InvariantVerdict:
 
 # --------------------------------------------------------------------------- chattering
 def test_memoryless_guards_chatter() -> None:
-    """Slow enough to go on, fast enough to be meant by nobody: a gap of a thousandth."""
+    """Slow enough to make progress, too fast to be intended: a gap of a thousandth."""
     trace = simulate(banging(1e-3), Prescribed("1"), 1.2, monitors=["chattering"])
     found = chattering(trace)
     assert not found.ok
@@ -130,7 +130,7 @@ def test_sound_guards_do_not_chatter(events: str) -> None:
 
 
 @pytest.mark.parametrize(("within", "ok"), [(0.3999, True), (0.4001, False)])
-def test_so_often_in_so_many_seconds(within: float, ok: bool) -> None:
+def test_firings_are_counted_within_the_time_window(within: float, ok: bool) -> None:
     """Five rises of a blinker of 0.1 s take 0.4 s."""
     monitor = Chattering(times=5, within=within)
     trace = simulate(blinker(0.1), Prescribed("0"), 2.02, monitors=[monitor], max_step=0.01)
@@ -142,8 +142,8 @@ def test_so_often_in_so_many_seconds(within: float, ok: bool) -> None:
         assert episode.t_last - episode.t_first == pytest.approx(0.1 * (episode.count - 1))
 
 
-def test_the_longest_stretch_counts() -> None:
-    """Fast for half a second, slow, fast for a second: the second stretch is reported."""
+def test_the_longest_episode_is_reported() -> None:
+    """Fast for half a second, slow, fast for a second: the second interval is reported."""
     times = "min(t, 0.5) + max(0, min(t - 5, 1))"
     slow = blinker(0.1).chart
     model = ChartModel(
@@ -190,7 +190,7 @@ def test_a_livelock_of_a_surface_has_no_edge() -> None:
     assert (found.ok, found.livelock, found.episodes) == (False, True, ())
 
 
-def test_a_slide_is_no_livelock() -> None:
+def test_a_slide_is_not_a_livelock() -> None:
     model = one_element("published", F_c=1.0, F_s=1.5, v_s=0.05, C=0.1, sigma=5.0, k=1.0)
     start = {"z": [-2.5], "states": ["slip"], "v": 0.05}
     trace = simulate(model, Slider(1.0, -2.4), 5.0, initial=start, monitors=["chattering"])
@@ -265,8 +265,8 @@ def test_an_invariant_of_the_whole_has_no_element() -> None:
     assert set(found.values) == {"F", "z2"}
 
 
-def test_a_break_at_an_edge_is_on_the_row_behind_it() -> None:
-    """The force steps by sigma (dz - v) at a break-away: nothing lies between the two rows."""
+def test_a_break_at_an_edge_is_on_the_row_after_it() -> None:
+    """The force steps by sigma (dz - v) at a break-away: there is nothing between the two rows."""
     model = one_element("signed", F_c=1.0, F_s=1.0, sigma=1.0, C=0.1)
     trace = simulate(model, Prescribed(0.2), 8.0, monitors=["F >= 1.1 or z < 0.95"])
     found = invariant(trace, "F >= 1.1 or z < 0.95")
@@ -274,7 +274,7 @@ def test_a_break_at_an_edge_is_on_the_row_behind_it() -> None:
     assert found.values["F"] == trace.transitions.F_after[0]
 
 
-def test_states_can_be_asked_for() -> None:
+def test_invariants_can_test_states() -> None:
     model = one_element("signed", F_c=1.0, F_s=1.0, sigma=1.0, C=0.1)
     texts = ["state == stick", "state(1) != slip", "state == slip or abs(z) <= s"]
     trace = simulate(model, Prescribed(0.2), 8.0, monitors=texts)
@@ -296,7 +296,7 @@ def test_what_cannot_be_computed_does_not_hold() -> None:
     "text",
     ["z <= q", "abs(z) <= 1.1*", "z", "state(9) == slip", "state == slide", "z == s", "w < 1"],
 )
-def test_an_invariant_that_cannot_be_read_is_refused_before_the_run(text: str) -> None:
+def test_an_invariant_that_cannot_be_parsed_is_rejected_before_the_run(text: str) -> None:
     def never(_: object) -> None:
         raise AssertionError("the run has begun")
 
@@ -328,7 +328,7 @@ CONDITIONS = (
 
 
 @pytest.mark.parametrize("text", CONDITIONS)
-def test_the_verdict_at_a_row_is_that_of_the_row_alone(text: str) -> None:
+def test_the_verdict_at_a_row_depends_only_on_that_row(text: str) -> None:
     trace = simulate(stick_slip("published"), Prescribed(FIG4_SINE), 30.0, monitors=[text])
     found = invariant(trace, text)
     model, n = trace.model, trace.n
@@ -390,7 +390,7 @@ def test_all_means_these_three() -> None:
         (["everything"], "unknown monitor 'everything'"),
     ],
 )
-def test_what_is_no_monitor_is_refused(monitors: Any, said: str) -> None:
+def test_invalid_monitors_are_rejected(monitors: Any, said: str) -> None:
     with pytest.raises(ParameterError, match=r".") as caught:
         simulate(stick_slip("signed"), Prescribed(0.2), 1.0, monitors=monitors)
     assert said in str(caught.value)
@@ -411,7 +411,7 @@ def test_numbers_of_a_monitor_have_rules(make: Any) -> None:
         make()
 
 
-def test_with_the_end_alone_only_the_log_can_be_watched() -> None:
+def test_with_only_the_end_kept_only_the_log_can_be_monitored() -> None:
     model, rig = pulled_mass()
     trace = simulate(model, rig, 20.0, output="end", monitors=[Chattering(2, 30.0)])
     assert chattering(trace).episodes
@@ -449,7 +449,7 @@ def test_all_engines_say_the_same(engine: str) -> None:
 
 
 @pytest.mark.parametrize("ending", ["npz", "csv"])
-def test_files_keep_what_they_said(ending: str, tmp_path: Path) -> None:
+def test_files_keep_the_verdicts(ending: str, tmp_path: Path) -> None:
     monitors = ["all", "abs(z) <= 1.1*s", "1 / z > 0", "F < 1", "state == stick"]
     trace = simulate(stick_slip("published"), Prescribed(FIG4_SINE), 50.0, monitors=monitors)
     read = Trace.load(trace.save(tmp_path / f"run.{ending}"))
@@ -472,7 +472,7 @@ def test_values_that_are_not_finite_survive_a_file(tmp_path: Path) -> None:
         assert read.monitors == {"z < 1": found}
 
 
-def test_a_run_that_fails_has_been_watched_too() -> None:
+def test_a_run_that_fails_is_monitored_too() -> None:
     """The velocity has no value after 0.5 s."""
     monitors = ["all", "z <= 0.1"]
     with pytest.raises(SimulationError) as caught:

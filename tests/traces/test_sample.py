@@ -29,9 +29,9 @@ def assert_close(sampled, wanted, bound):
 @pytest.mark.parametrize("dense", [False, True])
 @cases
 def test_a_sample_is_what_t_eval_gives(case, dense):
-    """From all accepted steps, and from a run that has wanted rows only (a fine grid)."""
+    """From all accepted steps, and from a run with requested rows only (a fine grid)."""
     model, rig, T = CASES[case]
-    # The nearest transition may be a clock tick away from a wanted time: all sides are asked for.
+    # The nearest transition may be a clock tick away from a requested time, so check all sides.
     run = simulate(model, rig, T, **TIGHT)
     at = np.unique(run.transitions.t)
     times = np.unique(
@@ -49,7 +49,7 @@ def test_a_sample_is_what_t_eval_gives(case, dense):
 
 @cases
 def test_a_straight_line_across_an_event_would_be_wrong(case):
-    """The naive way, numpy.interp over the rows of a t_eval run, smears every break-away's F."""
+    """Naive interpolation with numpy.interp over rows of a t_eval run smears F at break-aways."""
     model, rig, T = CASES[case]
     trace = simulate(model, rig, T, t_eval=np.linspace(0, T, 1001), **TIGHT)
     log = trace.transitions
@@ -90,7 +90,7 @@ def test_a_jump_of_the_velocity(t_eval):
 
 
 def test_a_jump_of_the_force():
-    """F_a steps: v has a kink there, and a sample on both sides keeps to a t_eval run."""
+    """F_a steps: v has a kink there, and samples on both sides agree with a t_eval run."""
     model, _ = non_drifting("signed")
     rig = Slider(1.0, [(0, 0.0), (1, 0.0), (1, 0.4), (3, 0.4)])
     times = np.linspace(0, 3, 301)
@@ -98,8 +98,8 @@ def test_a_jump_of_the_force():
     assert_close(simulate(model, rig, 3.0, **TIGHT).sample(times), wanted, 1e-7)
 
 
-def test_rows_of_a_sample_are_in_the_order_asked():
-    """Unsorted and repeated times are answered as they come."""
+def test_rows_of_a_sample_are_in_the_given_order():
+    """Unsorted and repeated times are returned in the given order."""
     model, rig, T = CASES["open loop, signed"]
     trace = simulate(model, rig, T)
     rows = trace.sample([7.0, 3.0, 7.0])
@@ -109,7 +109,7 @@ def test_rows_of_a_sample_are_in_the_order_asked():
 
 
 @pytest.mark.parametrize("t_eval", [None, np.linspace(0, 31, 62)])
-def test_outside_of_the_run_is_refused(t_eval):
+def test_times_outside_the_run_are_rejected(t_eval):
     """Nothing is extrapolated."""
     model, rig, T = CASES["open loop, signed"]
     trace = simulate(model, rig, T, t_eval=t_eval)

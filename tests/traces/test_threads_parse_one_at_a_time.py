@@ -1,7 +1,7 @@
-"""Claim: threads may read trace files and texts of formulas at the same time.
+"""Claim: threads can read trace files and parse formulas at the same time.
 
-Python 3.11 counts the depth of ``ast.parse`` for all threads together, so that one thread made
-another fail (SystemError) wherever the garbage collector gave way to it. Here it always does.
+Python 3.11 counts the depth of ``ast.parse`` for all threads together, so one thread could make
+another fail (SystemError) when the garbage collector switched threads. Here it always does.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""A saved trace reads back equal to the last bit; a damaged or hostile file is refused in words.
+"""A saved trace reads back equal to the last bit; a damaged or hostile file is rejected.
 
-Files are written whole or not at all. Reading executes nothing and raises `TraceFileError` only,
-whatever bytes the file holds.
+Files are written completely or not at all. Reading executes nothing and raises only
+`TraceFileError`, whatever bytes the file contains.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from gms_fsm import (
     Transition,
     simulate,
 )
-from gms_fsm._files import written_whole
+from gms_fsm._files import write_whole
 from gms_fsm.errors import GMSError, OutputError, SignalError, TraceFileError
 from tests.helpers import non_drifting, pulled_mass, stick_slip
 
@@ -109,7 +109,7 @@ def made(case: str) -> Trace:
 
 
 def equal(a: Trace, b: Trace) -> None:
-    """Assert equality to the last bit, the sign of zero included."""
+    """Assert equality to the last bit, including the sign of zero."""
     for name in COLUMNS:
         one, other = np.asarray(getattr(a, name)), np.asarray(getattr(b, name))
         assert one.shape == other.shape, name
@@ -126,7 +126,7 @@ def equal(a: Trace, b: Trace) -> None:
 # --------------------------------------------------------------------------- round trips
 @ENDINGS
 @pytest.mark.parametrize("case", CASES)
-def test_what_is_loaded_is_what_was_saved(case: str, ending: str, tmp_path: Path) -> None:
+def test_a_loaded_trace_equals_the_saved_one(case: str, ending: str, tmp_path: Path) -> None:
     trace = made(case)
     path = trace.save(tmp_path / f"run{ending}")
     assert path == tmp_path / f"run{ending}"
@@ -144,7 +144,7 @@ def test_what_is_loaded_is_what_was_saved(case: str, ending: str, tmp_path: Path
 
 @ENDINGS
 @pytest.mark.parametrize("case", CASES)
-def test_saving_what_was_loaded_writes_the_same(case: str, ending: str, tmp_path: Path) -> None:
+def test_saving_a_loaded_trace_writes_the_same(case: str, ending: str, tmp_path: Path) -> None:
     first = made(case).save(tmp_path / f"one{ending}")
     second = Trace.load(first).save(tmp_path / f"two{ending}")
     equal(Trace.load(second), made(case))
@@ -172,7 +172,7 @@ def test_a_loaded_trace_can_be_sampled_and_run_again(
     equal(again, trace)
 
 
-def test_with_wanted_times_the_npz_keeps_what_sampling_needs(tmp_path: Path) -> None:
+def test_with_requested_times_the_npz_keeps_what_sampling_needs(tmp_path: Path) -> None:
     trace = made("wanted times")
     loaded = Trace.load(trace.save(tmp_path / "run.npz"))
     times = np.linspace(0.0, 30.0, 77)
@@ -236,7 +236,7 @@ def test_no_variable_takes_the_column_of_another(
     equal(Trace.load(trace.save(tmp_path / f"run{ending}")), trace)
 
 
-def test_to_pandas_has_one_column_a_quantity_and_element() -> None:
+def test_to_pandas_has_one_column_per_quantity_and_element() -> None:
     pytest.importorskip("pandas", reason="needs pandas (extra: pandas)")
     trace = made("own chart")
     frame = trace.to_pandas()
@@ -279,7 +279,7 @@ def test_a_writer_that_fails_leaves_the_old_file_and_nothing_else(
         raise error
 
     with pytest.raises(OutputError if isinstance(error, OSError) else type(error)) as caught:
-        written_whole(path, fail)
+        write_whole(path, fail)
     if isinstance(error, OSError):
         assert "disk full" in str(caught.value)
         assert str(path) in str(caught.value)
@@ -303,7 +303,7 @@ def test_a_folder_that_cannot_be_written_is_an_output_error(ending: str, tmp_pat
 
 
 @pytest.mark.parametrize("name", ["run", "run.txt", "run.npz.gz", "run.NPZ.bak", ".npz"])
-def test_other_endings_are_refused(name: str, tmp_path: Path) -> None:
+def test_other_endings_are_rejected(name: str, tmp_path: Path) -> None:
     with pytest.raises(OutputError, match=r"\.npz or \.csv"):
         made("no transitions").save(tmp_path / name)
     with pytest.raises(TraceFileError, match=r"\.npz or \.csv"):
@@ -334,7 +334,7 @@ def _read_everything(path: Path) -> None:
 
 
 def _loads_or_is_refused(files: dict[str, bytes]) -> None:
-    """Load; only `TraceFileError` may escape, and what loads can be read."""
+    """Load; only `TraceFileError` may be raised, and a loaded trace must be readable."""
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("error")
         for name, content in files.items():
@@ -378,7 +378,7 @@ def _damaged(content: bytes, changes: list[tuple[str, float, int]]) -> bytes:
 @pytest.mark.slow
 @settings(max_examples=250, deadline=None)
 @given(mutations)
-def test_a_damaged_npz_loads_or_is_refused(changes: list[tuple[str, float, int]]) -> None:
+def test_a_damaged_npz_loads_or_is_rejected(changes: list[tuple[str, float, int]]) -> None:
     (content,) = _bytes_of(".npz").values()
     _loads_or_is_refused({"run.npz": _damaged(content, changes)})
 
@@ -386,7 +386,7 @@ def test_a_damaged_npz_loads_or_is_refused(changes: list[tuple[str, float, int]]
 @pytest.mark.slow
 @settings(max_examples=250, deadline=None)
 @given(mutations, st.booleans())
-def test_a_damaged_csv_loads_or_is_refused(
+def test_a_damaged_csv_loads_or_is_rejected(
     changes: list[tuple[str, float, int]], log: bool
 ) -> None:
     files = dict(_bytes_of(".csv"))
@@ -398,7 +398,7 @@ def test_a_damaged_csv_loads_or_is_refused(
 @pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(mutations, st.sampled_from(["rows_t", "rows_y", "rows_mode", "transitions", "header"]))
-def test_a_damaged_array_in_a_sound_archive_loads_or_is_refused(
+def test_a_damaged_array_in_a_valid_archive_loads_or_is_rejected(
     changes: list[tuple[str, float, int]], member: str
 ) -> None:
     (content,) = _bytes_of(".npz").values()
@@ -412,7 +412,7 @@ def test_a_damaged_array_in_a_sound_archive_loads_or_is_refused(
 
 @settings(max_examples=60, deadline=None)
 @given(st.binary(max_size=300), st.sampled_from([b"", b"PK\x03\x04", b"\x93NUMPY\x01\x00", b"# {"]))
-def test_random_bytes_are_refused(content: bytes, start: bytes) -> None:
+def test_random_bytes_are_rejected(content: bytes, start: bytes) -> None:
     for name in ("run.npz", "run.csv"):
         _loads_or_is_refused({name: start + content})
 
@@ -560,7 +560,7 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("case", HOSTILE)
-def test_a_hostile_npz_is_refused(case: str, tmp_path: Path) -> None:
+def test_a_hostile_npz_is_rejected(case: str, tmp_path: Path) -> None:
     arrays = _arrays()
     HOSTILE[case](arrays)
     path = tmp_path / "run.npz"
@@ -610,7 +610,7 @@ def test_an_array_that_claims_to_be_endless_is_refused(tmp_path: Path) -> None:
         Trace.load(path)
 
 
-def test_a_single_array_is_no_trace(tmp_path: Path) -> None:
+def test_a_single_array_is_not_a_trace(tmp_path: Path) -> None:
     with (tmp_path / "run.npz").open("wb") as file:
         np.save(file, np.zeros(3))
     with pytest.raises(TraceFileError):
@@ -663,7 +663,7 @@ HOSTILE_CSV: dict[str, Callable[[], dict[str, bytes]]] = {
 
 
 @pytest.mark.parametrize("case", HOSTILE_CSV)
-def test_a_hostile_csv_is_refused(case: str, tmp_path: Path) -> None:
+def test_a_hostile_csv_is_rejected(case: str, tmp_path: Path) -> None:
     for name, content in HOSTILE_CSV[case]().items():
         (tmp_path / name).write_bytes(content)
     with pytest.raises(TraceFileError):
@@ -677,14 +677,14 @@ def test_a_missing_file_is_named(name: str, tmp_path: Path) -> None:
 
 
 @ENDINGS
-def test_a_folder_is_no_trace(ending: str, tmp_path: Path) -> None:
+def test_a_folder_is_not_a_trace(ending: str, tmp_path: Path) -> None:
     (tmp_path / f"run{ending}").mkdir()
     with pytest.raises(TraceFileError):
         Trace.load(tmp_path / f"run{ending}")
 
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 0.99])
-def test_a_truncated_npz_is_refused(share: float, tmp_path: Path) -> None:
+def test_a_truncated_npz_is_rejected(share: float, tmp_path: Path) -> None:
     (content,) = _bytes_of(".npz").values()
     (tmp_path / "run.npz").write_bytes(content[: int(share * len(content))])
     with pytest.raises(TraceFileError, match=r"run\.npz"):

@@ -1,8 +1,8 @@
-"""The debugger: commands over a session, with a terminal as their face.
+"""The debugger: commands on a session, with a terminal interface.
 
-`_view` makes plain data of what a session shows, `_text` makes lines of 80 columns of that,
-`_commands` reads a command, does it and answers in lines; `_terminal` asks and prints. Another face
-needs `_view` and the session, or `_commands`.
+`_view` turns a session into plain data, and `_text` turns that into lines of 80 columns.
+`_commands` parses and executes a command and answers in lines; `_terminal` reads and prints.
+Another interface can use `_view` and the session, or `_commands`.
 """
 
 from gms_fsm.app.debugger._help import ALIASES, COMMANDS, help_of

@@ -1,6 +1,6 @@
-"""The debugger's commands: each reads its argument, acts on the session, and answers in lines.
+"""The commands of the debugger: each parses its argument, acts on the session and answers in lines.
 
-A command yields its lines as they come, so that what was said before an interruption stays said.
+A command yields its lines as they are produced, so an interruption does not lose earlier lines.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ __all__ = ["Commands"]
 
 
 class Commands:
-    """Commands over a session.
+    """Commands on a session.
 
     Parameters
     ----------
     session : Session
-        What is walked.
+        The session.
     marks : Marks
-        Characters to draw with.
+        Drawing characters.
 
     Examples
     --------
@@ -45,45 +45,45 @@ class Commands:
         self.session, self.marks, self.element = session, marks, 0
 
     def answer(self, name: str, arg: str) -> Iterator[str]:
-        """Do a command.
+        """Execute a command.
 
         Parameters
         ----------
         name : str
-            In full.
+            Full name of the command.
         arg : str
-            What stands behind it.
+            The rest of the line.
 
         Yields
         ------
         str
-            Lines of the answer.
+            The lines of the answer.
 
         Raises
         ------
         GMSError
-            For a mistake; the session is as it was.
+            On a mistake; the session is unchanged.
         """
         if name not in COMMANDS:
             near = difflib.get_close_matches(name, COMMANDS, 1)
             hint = f"did you mean {near[0]}? " if near else ""
-            raise SessionError(f"no command {name!r}", advice=f"{hint}help lists them")
+            raise SessionError(f"unknown command {name!r}", advice=f"{hint}help lists all commands")
         yield from getattr(self, f"do_{name}")(arg)
 
     def words(self, name: str, before: str) -> Sequence[str]:
-        """Return what can stand behind a command: edges, states, names, numbers.
+        """Return the possible arguments of a command: edges, states, names, numbers.
 
         Parameters
         ----------
         name : str
-            The command, in full.
+            Full name of the command.
         before : str
-            The line up to the word that is completed.
+            The line up to the word to complete.
 
         Returns
         -------
         sequence of str
-            Words.
+            The words.
         """
         chart, session = self.session.model.chart, self.session
         states, edges = self._states, self._edges
@@ -131,13 +131,13 @@ class Commands:
 
     # ------------------------------------------------------------------ help
     def do_help(self, arg: str) -> Iterator[str]:
-        """Show the overview, or one command."""
+        """Show the overview, or the help on one command."""
         if not arg:
             yield overview(self.session)
             return
         name = ALIASES.get(arg, arg)
         if name not in COMMANDS:
-            raise SessionError(f"no command {arg!r}", advice="help lists them")
+            raise SessionError(f"unknown command {arg!r}", advice="help lists all commands")
         each = help_of(name, self.session)
         alias = f"   (short: {each.alias})" if each.alias else ""
         yield f"{each.usage}{alias}\n{each.says}"
@@ -145,19 +145,19 @@ class Commands:
 
     # ------------------------------------------------------------------ moving
     def _ahead(self) -> None:
-        """Refuse to go forward from the end."""
+        """Raise an error at the end of the run."""
         branch = self.session.branch
         last = branch.between is None and branch.cursor + 1 == len(branch)
         if last and not branch.pull() and branch.ended:
             raise SessionError("this is the end of the run", advice="go back first")
 
     def here(self) -> Iterator[str]:
-        """Say where we are, after a move.
+        """Show the current position, after a move.
 
         Yields
         ------
         str
-            The place, the ending if it is the last row, the watches.
+            The position, the outcome if it is the last row, the watches.
         """
         yield str(self.session.here)
         yield from text_of.ending_lines(ending(self.session))
@@ -185,7 +185,7 @@ class Commands:
         yield from self.here()
 
     def do_prev(self, arg: str) -> Iterator[str]:
-        """Go to the transition before."""
+        """Go to the previous transition."""
         _nothing("prev", arg)
         self.session.prev_transition()
         yield from self.here()
@@ -195,7 +195,7 @@ class Commands:
         try:
             t = float(arg.removesuffix("s"))
         except ValueError:
-            raise SessionError(f"{arg!r} is no time", advice=f"{self._usage('goto')}") from None
+            raise SessionError(f"{arg!r} is not a time", advice=f"{self._usage('goto')}") from None
         try:
             self.session.goto(t)
         except KeyboardInterrupt:
@@ -204,7 +204,7 @@ class Commands:
         yield from self.here()
 
     def do_until(self, arg: str) -> Iterator[str]:
-        """Go to where a condition becomes true."""
+        """Go to the next point where a condition becomes true."""
         if not arg:
             raise SessionError("a condition is missing", advice=f"{self._usage('until')}")
         condition, session, branch = self._with_states(arg), self.session, self.session.branch
@@ -215,18 +215,18 @@ class Commands:
             if already:
                 branch.cursor, branch.between = start
                 yield (
-                    "it is true here already and does not become true again; until waits for "
-                    "it to become true"
+                    "it is already true here and does not become true again; until stops where "
+                    "it becomes true"
                 )
             else:
                 yield "it does not become true before the end"
         yield from self.here()
 
     def _with_states(self, condition: str) -> str:
-        """Return a condition with the states' own capitals."""
+        """Return a condition with the states spelled as in the chart."""
         return re.sub(
             r"(\bstate\b\s*(?:\(\s*\d+\s*\)\s*)?[=!]=\s*)(\w+)",
-            lambda found: found[1] + _spelt(found[2], self._states),
+            lambda found: found[1] + _spelled(found[2], self._states),
             condition,
         )
 
@@ -236,7 +236,7 @@ class Commands:
         self._ahead()
         _, point = self.session.proceed()
         if point is None:
-            yield "no breakpoint hit" if self.session.breakpoints else "no breakpoint is set"
+            yield "no breakpoint was hit" if self.session.breakpoints else "no breakpoint is set"
         else:
             number = self.session.breakpoints.index(point) + 1
             yield f"breakpoint {number}: {text_of.breakpoint_text(point)}"
@@ -263,17 +263,17 @@ class Commands:
         if words and words[0].isdigit():
             i = self._element("why", words.pop(0))
         if words:
-            edge = _spelt(words.pop(0), self._edges)
+            edge = _spelled(words.pop(0), self._edges)
             if edge not in self._edges or words:
                 raise SessionError(
-                    f"{' '.join([edge, *words])!r} is no edge",
+                    f"{' '.join([edge, *words])!r} is not an edge",
                     advice=f"there are {', '.join(self._edges) or 'none'}; {self._usage('why')}",
                 )
         found, branch = self.session.why(i, edge), self.session.branch
         yield str(found)
         if found.left and not edge and (branch.cursor + 1 < len(branch) or branch.pull()):
             which = "" if i == self.element else f" {i + 1}"
-            yield f"step, then why{which}: the edges that leave {found.state}"
+            yield f"for the edges that leave {found.state}: step, then why{which}"
 
     def do_list(self, arg: str) -> Iterator[str]:
         """Draw the chart."""
@@ -288,11 +288,11 @@ class Commands:
         count, branch = _count("log", arg, 10), self.session.branch
         rows = branch.firing_rows(self.session.here.row + 1)
         if not rows:
-            yield "no transition up to here"
+            yield "no transition so far"
         for row in rows[-count:]:
             yield f"  t = {branch.raw(row).t:<12.9g} s  row {row:<5} {branch.fired(row)}"
         if len(rows) > count:
-            yield f"  ({len(rows) - count} before these)"
+            yield f"  ({len(rows) - count} earlier ones)"
 
     def do_print(self, arg: str) -> Iterator[str]:
         """Show a value."""
@@ -313,9 +313,9 @@ class Commands:
             raise SessionError(f"{text!r} cannot be computed here: {error}") from None
 
     def do_watch(self, arg: str) -> Iterator[str]:
-        """Add a watch, show all."""
+        """Add a watch, or show all."""
         if arg:
-            self._value(arg)  # refuses what cannot be read
+            self._value(arg)  # raises if it cannot be parsed
             self.session.watches.append(arg)
         for number, text in enumerate(self.session.watches, start=1):
             try:
@@ -324,10 +324,10 @@ class Commands:
                 value = error.reason
             yield f"  watch {number}: {text} = {value}"
         if not self.session.watches:
-            yield "nothing is watched"
+            yield "no watch is set"
 
     def do_unwatch(self, arg: str) -> Iterator[str]:
-        """Take watches away."""
+        """Remove watches."""
         _remove(self.session.watches, "unwatch", arg)
         yield from self.do_watch("")
 
@@ -337,7 +337,7 @@ class Commands:
         yield f"element {self.element + 1} is in {self.session.here.states[self.element]}"
 
     def _element(self, command: str, text: str) -> int:
-        number = _whole(text, help_of(command, self.session).usage)
+        number = _integer(text, help_of(command, self.session).usage)
         if not 1 <= number <= self.session.model.n:
             raise SessionError(
                 f"no element {number}", advice=f"there are 1 to {self.session.model.n}"
@@ -356,11 +356,11 @@ class Commands:
             arg,
         )
         if form is None:
-            raise SessionError(f"{arg!r} is no breakpoint", advice=f"{self._usage('break')}")
+            raise SessionError(f"{arg!r} is not a breakpoint", advice=f"{self._usage('break')}")
         kind, name, element, condition, hits = form.groups()
         states, edges = self._states, self._edges
         asked = {None: states + edges, "enter": states, "leave": states}.get(kind, edges)
-        name = _spelt(name, asked)
+        name = _spelled(name, asked)
         if name not in states + edges:
             raise SessionError(
                 f"no edge or state {name!r}",
@@ -371,7 +371,7 @@ class Commands:
             name,
             None if element in (None, "all") else self._element("break", element),
             self._with_states(condition or ""),
-            _whole(hits, "hits K") if hits else 1,
+            _integer(hits, "hits K") if hits else 1,
         )
         yield f"breakpoint {len(self.session.breakpoints)}: {text_of.breakpoint_text(point)}"
 
@@ -379,12 +379,12 @@ class Commands:
         """Show breakpoints."""
         _nothing("breaks", arg)
         for number, point in enumerate(self.session.breakpoints, start=1):
-            yield f"  {number}  {text_of.breakpoint_text(point)}; seen {point.seen}"
+            yield f"  {number}  {text_of.breakpoint_text(point)}; hits: {point.seen}"
         if not self.session.breakpoints:
             yield "no breakpoint is set"
 
     def do_clear(self, arg: str) -> Iterator[str]:
-        """Take breakpoints away."""
+        """Remove breakpoints."""
         _remove(self.session.breakpoints, "clear", arg)
         yield from self.do_breaks("")
 
@@ -403,12 +403,12 @@ class Commands:
             if not what and name in parameter_names(self.session.model):
                 raise SessionError(
                     f"{name} is a parameter",
-                    advice="for another value start a session with another model",
+                    advice="to change it, start a session with another model",
                 )
             if not value or not what:
                 raise SessionError(f"{part!r} cannot be poked", advice=f"{self._usage('poke')}")
             if what == "state":
-                states[i] = _spelt(value, self._states)
+                states[i] = _spelled(value, self._states)
             else:
                 variables.setdefault(what, {})[i] = self.session.watch(value)
         parent = self.session.current
@@ -417,7 +417,7 @@ class Commands:
         yield from self.here()
 
     def _pokeable(self, name: str) -> tuple[str, int]:
-        """Return variable (or 'state') and element; an empty text for another name."""
+        """Return variable (or 'state') and element; an empty string for any other name."""
         known = (*self.session.model.chart.variables, "state")
         form = re.fullmatch(rf"({'|'.join(map(re.escape, known))})(\d*)", name)
         if form is None:
@@ -434,14 +434,14 @@ class Commands:
         yield from text_of.branch_lines(branches(self.session))
 
     def do_branch(self, arg: str) -> Iterator[str]:
-        """Walk another branch."""
-        self.session.switch(_whole(arg, "branch N"))
+        """Switch to another branch."""
+        self.session.switch(_integer(arg, "branch N"))
         yield f"branch {self.session.current}"
         yield from self.here()
 
     def do_compare(self, arg: str) -> Iterator[str]:
         """Compare branches."""
-        numbers = [_whole(text, "compare A B") for text in arg.split()]
+        numbers = [_integer(text, "compare A B") for text in arg.split()]
         if len(numbers) not in (0, 2):
             raise SessionError("two branches are needed", advice=f"{self._usage('compare')}")
         yield str(self.session.compare(*numbers))
@@ -451,7 +451,7 @@ class Commands:
         path = self._path("plot", arg)
         from plots import formats
 
-        formats.chosen(path, "figure")  # a mistake is said before matplotlib is asked for
+        formats.chosen(path, "figure")  # check the file name before importing matplotlib
         from plots import figures
 
         runs = {}
@@ -460,7 +460,7 @@ class Commands:
             trace = branch.trace()
             if not trace.t[-1] > trace.t[0]:
                 raise SessionError(
-                    f"branch {number} failed at once", advice="there is nothing to draw"
+                    f"branch {number} failed immediately", advice="there is nothing to draw"
                 )
             edits = f": {branch.edits}" if branch.edits else ""
             runs[text_of.short(f"branch {number}{edits}", 50)] = trace
@@ -479,40 +479,42 @@ class Commands:
         yield from self.here()
 
     def do_quit(self, arg: str) -> Iterator[str]:
-        """Leave: whoever asks for commands does."""
+        """Do nothing: the interface ends the loop."""
         _nothing("quit", arg)
         yield from ()
 
 
-def _whole(text: str, usage: str) -> int:
+def _integer(text: str, usage: str) -> int:
     if not re.fullmatch(r"\d{1,9}", text):
         raise SessionError(f"{text!r} is not an integer", advice=f"usage: {usage}")
     return int(text)
 
 
 def _count(name: str, text: str, default: int = 1) -> int:
-    count = _whole(text, COMMANDS[name].usage) if text else default
+    count = _integer(text, COMMANDS[name].usage) if text else default
     if count < 1:
-        raise SessionError(f"{name} {count} goes nowhere", advice=f"usage: {COMMANDS[name].usage}")
+        raise SessionError(
+            f"{name} {count}: the count must be at least 1", advice=f"usage: {COMMANDS[name].usage}"
+        )
     return count
 
 
 def _nothing(name: str, arg: str) -> None:
     if arg:
-        raise SessionError(f"{name} takes no argument, it got {arg!r}")
+        raise SessionError(f"{name} takes no argument, but got {arg!r}")
 
 
 def _remove(where: list[Breakpoint] | list[str], name: str, arg: str) -> None:
     if arg == "all":
         where.clear()
         return
-    number = _whole(arg, COMMANDS[name].usage)
+    number = _integer(arg, COMMANDS[name].usage)
     if not 1 <= number <= len(where):
         raise SessionError(f"there is no number {number}", advice=f"there are {len(where)}")
     del where[number - 1]
 
 
-def _spelt(name: str, known: Iterable[str]) -> str:
-    """Return the known name that is the same but for capitals; the name as it is if in doubt."""
+def _spelled(name: str, known: Iterable[str]) -> str:
+    """Return the known name that differs only in case; the name itself unless there is one."""
     same = [each for each in known if each.casefold() == name.casefold()]
     return same[0] if len(same) == 1 else name

@@ -1,4 +1,4 @@
-"""What the debugger's commands are called and what the help says of them."""
+"""Names and help texts of the commands of the debugger."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["ALIASES", "COMMANDS", "MOVES", "Command", "help_of", "names_for", "o
 
 @dataclass(frozen=True)
 class Command:
-    """What the help says of a command; `help_of` fills the braces with a chart's names."""
+    """Help on a command; `help_of` replaces the names in braces by those of a chart."""
 
     group: str
     usage: str
@@ -25,8 +25,8 @@ COMMANDS = {
     "where": Command(
         "look",
         "where",
-        "Everything on one screen: each element's state, variables, threshold s and |{z}|/s if it "
-        "has one, force, and its edges by priority with a mark a clause; below, the states over "
+        "Show everything on one screen: state, variables, threshold s and |{z}|/s (if any), force "
+        "and edges of each element, by priority, with one mark per clause; below, the states over "
         "time.",
         ("where",),
         "w",
@@ -34,56 +34,56 @@ COMMANDS = {
     "why": Command(
         "look",
         "why [ELEMENT] [EDGE]",
-        "Say why the edges of an element fire or do not, clause by clause: both sides, the margin "
-        "(negative: on the false side), and the truth. With an edge's name, that one alone.",
+        "Explain why the edges of an element fire or not, clause by clause: both sides, the margin "
+        "(negative on the false side), and the truth. With the name of an edge, only that edge.",
         ("why", "why {n}", "why {n} {leaving}"),
     ),
     "list": Command(
         "look",
         "list",
-        "Draw the current element's chart: the active state and the guards that are asked.",
+        "Draw the chart of the current element: the active state and the guards evaluated.",
         ("list",),
         "l",
     ),
-    "log": Command("look", "log [N]", "The last N transitions (10) up to here.", ("log 4",)),
+    "log": Command("look", "log [N]", "Show the last N transitions (default 10).", ("log 4",)),
     "print": Command(
         "look",
         "print EXPRESSION",
-        "The value of an expression or the truth of a condition. Names: t, x, v, F, s, and with an "
-        "element's number {numbered}, s1, F1, state(1).",
+        "Print the value of an expression or the truth of a condition. Names: t, x, v, F, s, and "
+        "with an element number {numbered}, s1, F1, state(1).",
         ("print {z}1 / {s}1", "p state({n}) == {state}"),
         "p",
     ),
     "watch": Command(
         "look",
         "watch [EXPRESSION]",
-        "Show an expression after every move; alone, show all watches.",
+        "Show an expression after every move; without an argument, show all watches.",
         ("watch F{n}", "watch abs({z}1) / {s}1"),
     ),
-    "unwatch": Command("look", "unwatch N|all", "Take a watch away.", ("unwatch 1",)),
+    "unwatch": Command("look", "unwatch N|all", "Remove a watch.", ("unwatch 1",)),
     "element": Command(
         "look",
         "element N",
-        "Choose the element that list and why show; counted from 1.",
+        "Choose the element shown by list and why; elements are numbered from 1.",
         ("element {n}",),
     ),
     "step": Command(
         "move",
         "step [N]",
-        "Go forward N rows (1). The firings of one time are rows of their own.",
+        "Go forward N rows (default 1). Each firing at one time is a separate row.",
         ("step", "s 10"),
         "s",
     ),
-    "back": Command("move", "back [N]", "Go back N rows (1).", ("back 10",)),
+    "back": Command("move", "back [N]", "Go back N rows (default 1).", ("back 10",)),
     "next": Command("move", "next", "Go forward to the next transition.", ("next",), "n"),
-    "prev": Command("move", "prev", "Go back to the transition before.", ("prev",)),
+    "prev": Command("move", "prev", "Go back to the previous transition.", ("prev",)),
     "goto": Command(
-        "move", "goto T", "Go to the last row at or before a time, in seconds.", ("goto {t}",)
+        "move", "goto T", "Go to the last row at or before a time in seconds.", ("goto {t}",)
     ),
     "until": Command(
         "move",
         "until CONDITION",
-        "Go forward to where a condition next becomes true, also between two rows.",
+        "Go forward to the next point where a condition becomes true, also between rows.",
         ("until abs({z}1) > 0.9*{s}1", "u state({n}) == {state} and v > 0"),
         "u",
     ),
@@ -98,30 +98,30 @@ COMMANDS = {
         "stop",
         "break [tested|valid|fires] EDGE [element N] [if CONDITION] [hits K], or "
         "break [enter|leave] STATE ...",
-        "Let continue stop where an edge's guard is asked (tested), becomes true (valid), or where "
-        "it is taken (fires, also if left out); where a state is entered (also if left out) or "
-        "left. The condition is looked at after the event; K: stop from the K-th hit on. Alone, "
-        "show all breakpoints.",
+        "Make continue stop where the guard of an edge is evaluated (tested) or becomes true "
+        "(valid), or where the edge is taken (fires, the default); where a state is entered (the "
+        "default) or left. The condition is evaluated after the event; with hits K, stop from the "
+        "K-th hit on. Without an argument, show all breakpoints.",
         ("break fires {edge} element {n}", "b enter {state} if v < 0 hits 3"),
         "b",
     ),
     "breaks": Command("stop", "breaks", "Show all breakpoints and their hits.", ("breaks",)),
-    "clear": Command("stop", "clear N|all", "Take a breakpoint away.", ("clear 1",)),
+    "clear": Command("stop", "clear N|all", "Remove a breakpoint.", ("clear 1",)),
     "poke": Command(
         "change",
         "poke {z}1=VALUE v=VALUE state1=STATE ...",
-        "Change values here and go on in a new branch; the present one stays as it is. What can be "
-        "changed: {numbered}, state1, likewise of the other elements, and v where the rig has a "
-        "mass. A value can be an expression without blanks.",
+        "Change values here and continue in a new branch; the present one is kept. What can be "
+        "changed: {numbered}, state1, likewise for the other elements, and v if the rig has a "
+        "mass. A value can be an expression without spaces.",
         ("poke {z}1=0", "poke {z}{n}=0.9*{s}{n} state{n}={state}"),
     ),
-    "run": Command("change", "run", "Compute this branch to its end; stay here.", ("run",)),
+    "run": Command("change", "run", "Compute this branch to its end, without moving.", ("run",)),
     "branches": Command("change", "branches", "Show all branches.", ("branches",)),
-    "branch": Command("change", "branch N", "Walk another branch.", ("branch 0",)),
+    "branch": Command("change", "branch N", "Switch to another branch.", ("branch 0",)),
     "compare": Command(
         "change",
         "compare [A B]",
-        "Compute two branches to their ends and compare them; alone, this one and its parent.",
+        "Compute two branches to their ends and compare them; by default this one and its parent.",
         ("compare 0 1",),
     ),
     "plot": Command(
@@ -131,8 +131,10 @@ COMMANDS = {
         ("plot branches.png",),
     ),
     "save": Command("file", "save FILE", "Write the session to a file.", ("save mine.json",)),
-    "load": Command("file", "load FILE", "Go on with a session from a file.", ("load mine.json",)),
-    "help": Command("file", "help [COMMAND]", "Show what there is.", ("help break",), "h"),
+    "load": Command("file", "load FILE", "Load a session from a file.", ("load mine.json",)),
+    "help": Command(
+        "file", "help [COMMAND]", "Show all commands, or the help on one.", ("help break",), "h"
+    ),
     "quit": Command("file", "quit", "Leave.", ("quit",), "q"),
 }
 ALIASES = {each.alias: name for name, each in COMMANDS.items() if each.alias} | {"?": "help"}
@@ -142,24 +144,24 @@ To find out why an element switches or does not:  goto {t}   then   why 1
 
 {groups}
 
-help COMMAND says how it is used, with an example. Elements count from 1.
+help COMMAND shows its usage and an example. Elements are numbered from 1.
 An empty line repeats the last move when you type; in a script it does nothing.
-Lines that begin with # are comments. NO_COLOR=1 gives plain text.
-Ctrl-C stops a long move where it is."""
+Lines that begin with # are comments. Set NO_COLOR=1 for plain text.
+Ctrl-C interrupts a long move."""
 
 
 def names_for(session: Session) -> dict[str, str]:
-    """Return what stands for the braces of the help, as far as the chart has it.
+    """Return the replacements for the names in braces, as far as the chart has them.
 
     Parameters
     ----------
     session : Session
-        What is walked.
+        The session.
 
     Returns
     -------
     dict
-        Name in braces to text.
+        Replacement text by name.
     """
     chart = session.model.chart
     start, n = session.branch.raw(0).t, min(2, session.model.n)
@@ -180,19 +182,19 @@ def names_for(session: Session) -> dict[str, str]:
 
 
 def help_of(name: str, session: Session) -> Command:
-    """Return what the help says of a command, with the names of a session.
+    """Return the help on a command, with the names of a session.
 
     Parameters
     ----------
     name : str
-        A command.
+        Name of the command.
     session : Session
-        What is walked.
+        The session.
 
     Returns
     -------
     Command
-        Without braces; an example that needs what the chart lacks is left out.
+        The help without braces; examples that need names the chart lacks are omitted.
     """
     each, names = COMMANDS[name], names_for(session)
     examples = [
@@ -205,17 +207,17 @@ def help_of(name: str, session: Session) -> Command:
 
 
 def overview(session: Session) -> str:
-    """Return the help's first page.
+    """Return the first page of the help.
 
     Parameters
     ----------
     session : Session
-        What is walked.
+        The session.
 
     Returns
     -------
     str
-        Lines.
+        The lines.
     """
     groups: dict[str, list[str]] = {}
     for name, each in COMMANDS.items():

@@ -1,7 +1,7 @@
-"""The terminal face of a session: one command per line, answers as plain text of 80 columns.
+"""The terminal interface of a session: one command per line, plain-text answers of 80 columns.
 
-Nothing is ever redrawn: what was said stays above, so that a transcript, a pipe and a screen reader
-all get the same words. Colour is put on last and says nothing that the words do not.
+Nothing is redrawn, so a transcript, a pipe and a screen reader all get the same text. Colour is
+added last and carries no additional information.
 """
 
 from __future__ import annotations
@@ -24,26 +24,26 @@ from gms_fsm.inspection.session import Session
 
 __all__ = ["Debugger", "run_debugger", "scenario_to_debug"]
 
-COLOURS = ("34", "33", "35", "36", "32")  # of states
+COLOURS = ("34", "33", "35", "36", "32")  # for states
 WORDS = {"true": "32", "false": "31", "fired": "1", "FIRED": "1", "error:": "1;31", "ACTIVE": "1"}
 
 
 class Debugger(cmd.Cmd):
-    r"""Reads commands and shows a session: ``Debugger(Session(model, rig, t_end)).run()``.
+    r"""Reads commands and displays a session: ``Debugger(Session(model, rig, t_end)).run()``.
 
     Parameters
     ----------
     session : Session
-        What is walked.
+        The session.
     title : str, optional
-        Said by `run` before the titles of the model and the rig.
+        Printed by `run` before the titles of the model and the rig.
     stdin, stdout : text files, optional
-        The terminal when left out. Commands that do not come from a terminal are echoed, so that a
-        transcript reads well.
+        The terminal by default. Commands that do not come from a terminal are echoed, so that a
+        transcript is readable.
 
     Examples
     --------
-    At a terminal ``Debugger(session).run()`` asks for commands. Here they come from a text:
+    In a terminal, ``Debugger(session).run()`` prompts for commands. Here they come from a string:
 
     >>> import io
     >>> from gms_fsm import GMS, GMSParameters, Prescribed
@@ -53,7 +53,7 @@ class Debugger(cmd.Cmd):
     1.5
     >>> code = Debugger(session, stdin=io.StringIO("next\nquit\n")).run()
     GMS, 4 elements, published law; prescribed velocity, to t = 100 s
-    help shows the commands, where shows everything, quit leaves.
+    help lists the commands, where shows everything, quit exits.
     (t=0.0000 s) next
     row 12, t = 4.91276067 s, micro-step 1: v = 0.141608 m/s, F = 1.34657 N
       element 1: stick -> slip by break_away_forward
@@ -84,39 +84,39 @@ class Debugger(cmd.Cmd):
 
     @property
     def session(self) -> Session:
-        """What is walked; `load` changes it."""
+        """The current session; `load` replaces it."""
         return self.commands.session
 
     # ------------------------------------------------------------------ the loop
     def run(self) -> int:
-        """Greet, then read and answer until `quit` or the end of input.
+        """Print a greeting, then read and answer commands until `quit` or the end of input.
 
         Returns
         -------
         int
-            0, the exit code.
+            The exit code, 0.
         """
         model, rig = self.session.model, self.session.rig
         if self.title:
             self.say(self.title)
         self.say(f"{model.title}; {rig.title}, to t = {self.session.t_end:g} s")
-        self.say("help shows the commands, where shows everything, quit leaves.")
+        self.say("help lists the commands, where shows everything, quit exits.")
         while True:
             try:
                 self.cmdloop()
             except KeyboardInterrupt:  # at the prompt
-                self.say("\nquit leaves")
+                self.say("\nquit exits")
             else:
                 return 0
 
     def precmd(self, line: str) -> str:
-        """Echo a command that nobody typed."""
+        """Echo a command that was not typed."""
         if not self.typed:
             self.stdout.write("\n" if line == "EOF" else f"{line}\n")
         return line
 
-    def postcmd(self, stop: bool, line: str) -> bool:  # noqa: ARG002 (the base's signature)
-        """Say in the prompt where we are."""
+    def postcmd(self, stop: bool, line: str) -> bool:  # noqa: ARG002 (signature of the base class)
+        """Show the current position in the prompt."""
         self._new_prompt()
         return stop
 
@@ -126,17 +126,17 @@ class Debugger(cmd.Cmd):
         self.prompt = f"(t={session.here.t:.4f} s{branch}) "
 
     def onecmd(self, line: str) -> bool:
-        """Do one command; a mistake is answered and never ends the session.
+        """Execute one command; an error is printed and never ends the session.
 
         Parameters
         ----------
         line : str
-            As typed.
+            The line as typed.
 
         Returns
         -------
         bool
-            Whether to leave.
+            Whether to exit.
         """
         name, rest = ([*line.split(None, 1), "", ""])[:2]
         if not name:
@@ -161,14 +161,14 @@ class Debugger(cmd.Cmd):
             self.say(f"error: {error}")
         except BrokenPipeError:
             raise
-        except Exception as error:  # losing a session would be worse than an odd message
+        except Exception as error:  # losing the session would be worse than an unclear message
             self.say(f"error: {type(error).__name__}: {error}")
         else:
             return name == "quit"
         return False
 
     def reply(self, line: str) -> str:
-        """Return what a command answers, for scripts.
+        """Return the answer to a command, for scripts.
 
         Parameters
         ----------
@@ -178,7 +178,7 @@ class Debugger(cmd.Cmd):
         Returns
         -------
         str
-            The answer without the last line break.
+            The answer without the final line break.
         """
         stdout, self.stdout = self.stdout, io.StringIO()
         try:
@@ -188,7 +188,7 @@ class Debugger(cmd.Cmd):
             self.stdout = stdout
 
     def say(self, text: str) -> None:
-        """Write lines, none wider than the screen."""
+        """Print lines, wrapped to the screen width."""
         for line in text.split("\n"):
             for part in wrapped(line):
                 part = part.encode(self.encoding, "replace").decode(self.encoding)
@@ -210,7 +210,7 @@ class Debugger(cmd.Cmd):
         return [name for name in COMMANDS if name.startswith(text)]
 
     def completedefault(self, *arguments: object) -> list[str]:
-        """Complete an argument: edges, states, names, numbers, whatever the command takes."""
+        """Complete an argument: edges, states, names or numbers, depending on the command."""
         text, line, begin = str(arguments[0]), str(arguments[1]), int(str(arguments[2]))
         name = line.split(None, 1)[0]
         words = self.commands.words(ALIASES.get(name, name), line[:begin])
@@ -220,7 +220,7 @@ class Debugger(cmd.Cmd):
 
 
 def scenario_to_debug(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
-    """Read the scenario that ``gms-fsm debug`` is given; say where another file belongs.
+    """Read the scenario for ``gms-fsm debug``; for other files, raise an error with advice.
 
     Parameters
     ----------
@@ -232,12 +232,12 @@ def scenario_to_debug(path: str | Path, overrides: Sequence[str] = ()) -> Loaded
     Returns
     -------
     Loaded
-        For `run_debugger`.
+        The scenario, for `run_debugger`.
 
     Raises
     ------
     ScenarioError
-        If it is a trace, a Python file, or no valid scenario.
+        If it is a trace, a Python file, or not a valid scenario.
 
     Examples
     --------
@@ -249,8 +249,8 @@ def scenario_to_debug(path: str | Path, overrides: Sequence[str] = ()) -> Loaded
     match Path(path).suffix.lower():
         case ".py":
             raise ScenarioError(
-                f"{path} is Python",
-                advice="debug takes a scenario (.toml); for a model of your own: "
+                f"{path} is a Python file",
+                advice="debug takes a scenario (.toml); for a custom model use "
                 "Debugger(Session(model, rig, t_end)).run(), see "
                 "docs/howto/debugging.md",
             )
@@ -268,10 +268,10 @@ def run_debugger(loaded: Loaded, stdin: TextIO | None = None, stdout: TextIO | N
     Parameters
     ----------
     loaded : Loaded
-        From `gms_fsm.app.scenario.load_scenario`. Wanted times are left out: a session stops at
-        every row.
+        From `gms_fsm.app.scenario.load_scenario`. Requested times are ignored: a session has a row
+        at every step.
     stdin, stdout : text files, optional
-        The terminal when left out.
+        The terminal by default.
 
     Returns
     -------
@@ -281,7 +281,7 @@ def run_debugger(loaded: Loaded, stdin: TextIO | None = None, stdout: TextIO | N
     Raises
     ------
     ScenarioError
-        If the scenario's run cannot be set up.
+        If the run of the scenario cannot be set up.
     """
     not_here = ("t_eval", "monitors")
     options = {name: value for name, value in loaded.arguments.items() if name not in not_here}

@@ -1,4 +1,4 @@
-"""Lines of at most 80 columns for what a debugger shows."""
+"""The display of the debugger as lines of at most 80 columns."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ __all__ = [
 
 WIDTH = 80
 RIBBON = WIDTH - 6
-BAR = 8  # characters of |z|/s = 1
+BAR = 8  # characters for |z|/s = 1
 
 
 @dataclass(frozen=True)
 class Marks:
-    """Characters to draw with: no and yes, bar, a ribbon's states, a box, the active box."""
+    """Drawing characters: no and yes, bar, states of a ribbon, a box, the active box."""
 
     truth: str
     bar: str
@@ -48,18 +48,18 @@ DRAWN = Marks("✗✓", "░█", "─▓═┼▒┄", "┌─┐│└┘", "�
 def screen_lines(
     view: View, ribbons: Ribbons, chart: Chart, chosen: int, marks: Marks
 ) -> Iterator[str]:
-    """Yield one screen: the place, each element with its numbers and edges, the states over time.
+    """Yield one screen: the position, each element with values and edges, the states over time.
 
     Parameters
     ----------
     view, ribbons : View, Ribbons
-        What is shown.
+        The data to show.
     chart : Chart
-        The session's.
+        The chart of the session.
     chosen : int
-        The marked element, counted from 0.
+        Index of the marked element, from 0.
     marks : Marks
-        Characters.
+        Drawing characters.
 
     Yields
     ------
@@ -78,7 +78,7 @@ def screen_lines(
         if each.s is not None and each.ratio is not None:
             shown = f"{each.ratio:.3f}" if each.ratio < 100 else f"{each.ratio:.1e}"
             cells += [f"{each.s:>9.4g}", f"{shown:>7}"]
-            if len(each.variables) == 1:  # further variables need the bar's place
+            if len(each.variables) == 1:  # further variables take the place of the bar
                 cells.append(_bar(each.ratio, marks))
         cells.append(f"{each.F:>10.4g}")
         line = lead + " ".join([f"{short(each.state, wide):<{wide}}", *cells])
@@ -99,7 +99,7 @@ def screen_lines(
 
 
 def _heads(chart: Chart) -> list[str]:
-    """Return the headings of an element's numbers, as wide as these."""
+    """Return the headings of the values of an element, with the same widths."""
     units = {name: chart.unit(name) for name in chart.variables}
     names = [f"{name} [{unit}]" if unit else name for name, unit in units.items()]
     heads = [f"{short(name, 10):>10}" for name in names]
@@ -117,7 +117,7 @@ def _bar(ratio: float, marks: Marks) -> str:
 
 
 def _ribbon_lines(ribbons: Ribbons, chart: Chart, n: int, marks: Marks) -> Iterator[str]:
-    """Yield every element's states over time, and where we are."""
+    """Yield the states of every element over time, and the current position."""
     drawn = marks.ribbon
     scale = f"{ribbons.start:g} s"
     yield f"      {scale}{f'{ribbons.end:g} s':>{len(ribbons.modes) - len(scale)}}"
@@ -130,12 +130,12 @@ def _ribbon_lines(ribbons: Ribbons, chart: Chart, n: int, marks: Marks) -> Itera
 
 
 def ending_lines(ending: str) -> Iterator[str]:
-    """Yield what there is to say at the last row.
+    """Yield a note at the last row.
 
     Parameters
     ----------
     ending : str
-        See `View`.
+        As in `View`.
 
     Yields
     ------
@@ -145,8 +145,8 @@ def ending_lines(ending: str) -> Iterator[str]:
     if ending == "end":
         yield "  end of the run"
     elif ending:
-        yield f"  the run cannot go on: {ending}"
-        yield "  go back, look, or poke something to go on in another branch"
+        yield f"  the run cannot continue: {ending}"
+        yield "  go back and look, or poke a value to continue in a new branch"
 
 
 def chart_lines(states: Sequence[StateView], marks: Marks) -> Iterator[str]:
@@ -155,9 +155,9 @@ def chart_lines(states: Sequence[StateView], marks: Marks) -> Iterator[str]:
     Parameters
     ----------
     states : sequence of StateView
-        The chart's.
+        The states of the chart.
     marks : Marks
-        Characters.
+        Drawing characters.
 
     Yields
     ------
@@ -192,7 +192,7 @@ def branch_lines(branches: Sequence[BranchView]) -> Iterator[str]:
     Parameters
     ----------
     branches : sequence of BranchView
-        All of them.
+        All branches.
 
     Yields
     ------
@@ -206,19 +206,19 @@ def branch_lines(branches: Sequence[BranchView]) -> Iterator[str]:
 
 
 def progress(branch: BranchView) -> str:
-    """Return how far a branch is computed.
+    """Return how far a branch has been computed.
 
     Parameters
     ----------
     branch : BranchView
-        One of a session's.
+        One of the session.
 
     Returns
     -------
     str
         Rows, transitions, time.
     """
-    how = {"": "not at its end", "end": "at its end"}.get(branch.outcome, "it cannot go on")
+    how = {"": "not at its end", "end": "at its end"}.get(branch.outcome, "it cannot continue")
     return (
         f"{branch.rows} rows, {branch.transitions} transitions, computed to "
         f"t = {branch.t_computed:.9g} s; {how}"
@@ -226,12 +226,12 @@ def progress(branch: BranchView) -> str:
 
 
 def breakpoint_text(point: Breakpoint) -> str:
-    """Return what a breakpoint waits for.
+    """Return the description of a breakpoint.
 
     Parameters
     ----------
     point : Breakpoint
-        One of a session's.
+        One of the session.
 
     Returns
     -------
@@ -245,7 +245,7 @@ def breakpoint_text(point: Breakpoint) -> str:
 
 
 def short(text: str, wide: int) -> str:
-    """Return a text that fits a column.
+    """Return a text shortened to fit a column.
 
     >>> short("break_away_forward", 8)
     'break_a~'

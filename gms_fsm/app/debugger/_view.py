@@ -1,4 +1,4 @@
-"""What a debugger shows of a session, as plain data: no text is laid out here."""
+"""The display of the debugger as plain data, without text layout."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ __all__ = [
 
 @dataclass(frozen=True)
 class EdgeView:
-    """An edge of a chart, as an element sees it.
+    """An edge of a chart, for one element.
 
     Parameters
     ----------
     name, target, guard : str
-        Its name, the state it leads to, its guard as the chart shows it.
+        Name, target state, and guard as shown in the chart.
     priority : int
-        From 1, among the edges of its state.
+        Priority among the edges of its source state, from 1.
     clauses : tuple of bool or None
-        The truth of each part of the guard; None where it cannot be computed. Empty where the guard
-        is not asked.
+        Truth of each clause of the guard; None if it cannot be computed. Empty if the guard is not
+        evaluated.
     fired : bool
-        Whether it was taken at this row.
+        Whether the edge was taken at this row.
     """
 
     name: str
@@ -54,17 +54,17 @@ class ElementView:
     Parameters
     ----------
     number : int
-        Counted from 1.
+        Element number, from 1.
     state : str
-        Its active state.
+        Active state.
     variables : tuple of float
-        In the chart's order.
+        Values in the order of the chart.
     s, ratio : float or None
-        The threshold, m, and the first variable against it; None where the chart has none.
+        Threshold, m, and ratio of the first variable to it; None if the chart has no threshold.
     F : float
-        N.
+        Force, N.
     edges : tuple of EdgeView
-        The edges that are asked, by priority.
+        The edges evaluated, by priority.
     """
 
     number: int
@@ -78,20 +78,20 @@ class ElementView:
 
 @dataclass(frozen=True)
 class View:
-    """One screen: where the session stands.
+    """One screen: the current position of the session.
 
     Parameters
     ----------
     branch, row, microstep : int
-        The place.
+        The position.
     located : bool
-        Whether it lies between this row and the next.
+        Whether the position is between this row and the next.
     t, x, v, F : float
-        s, m, m/s, N.
+        Time, s; position, m; velocity, m/s; friction force, N.
     ending : str
-        ``"end"`` at the end of the run, why it cannot go on at a failure, else empty.
+        ``"end"`` at the end of the run, the reason at a failure, else empty.
     elements : tuple of ElementView
-        All of them.
+        All elements.
     """
 
     branch: int
@@ -113,12 +113,12 @@ class Ribbons:
     Parameters
     ----------
     start, end : float
-        s.
+        Start and end time, s.
     modes : tuple of (tuple of int or None)
-        For equal parts of that time: each element's state, by its place in the chart; None where
-        the branch is not computed.
+        State index of each element, for equal parts of that time; None where the branch has not
+        been computed.
     now : int
-        The part in which the cursor stands.
+        The part that contains the cursor.
     """
 
     start: float
@@ -129,18 +129,18 @@ class Ribbons:
 
 @dataclass(frozen=True)
 class StateView:
-    """A state of the chart, as one element sees it.
+    """A state of the chart, for one element.
 
     Parameters
     ----------
     name : str
-        The state's.
+        Name of the state.
     active : bool
-        Whether the element is in it.
+        Whether the element is in this state.
     flow : tuple of (str, str)
-        Variable and the text of its rate.
+        Variables with the texts of their rates.
     edges : tuple of EdgeView
-        That leave it, by priority.
+        Edges that leave the state, by priority.
     """
 
     name: str
@@ -156,19 +156,19 @@ class BranchView:
     Parameters
     ----------
     number, rows, transitions : int
-        Its number, and how much of it is computed.
+        Branch number, and numbers of computed rows and transitions.
     current : bool
-        Whether the cursor is in it.
+        Whether this is the current branch.
     t_computed : float
-        s, the last row's.
+        Time of the last computed row, s.
     outcome : str
-        Empty while it goes on, ``"end"``, or why it cannot go on.
+        Empty if not finished, ``"end"``, or the reason why it cannot continue.
     parent : int or None
-        The branch it left.
+        Number of the parent branch.
     t_fork : float or None
-        s, where it left that.
+        Time of the poke, s.
     edits : str
-        What was poked there.
+        The changed values.
     """
 
     number: int
@@ -183,17 +183,17 @@ class BranchView:
 
 
 def view(session: Session) -> View:
-    """Return what a session shows at its cursor.
+    """Return the screen at the cursor of a session.
 
     Parameters
     ----------
     session : Session
-        What is walked.
+        The session.
 
     Returns
     -------
     View
-        Plain data.
+        The screen as plain data.
 
     Examples
     --------
@@ -219,17 +219,17 @@ def view(session: Session) -> View:
 
 
 def ending(session: Session) -> str:
-    """Return what there is to say at the last row of a branch.
+    """Return the outcome at the last row of a branch.
 
     Parameters
     ----------
     session : Session
-        What is walked.
+        The session.
 
     Returns
     -------
     str
-        ``"end"`` at the end of the run, why it cannot go on at a failure; empty before that.
+        ``"end"`` at the end of the run, the reason at a failure; empty before that.
     """
     here, branch = session.here, session.branch
     at_last = here.row + 1 == len(branch) and not here.located
@@ -269,19 +269,19 @@ def _element(session: Session, i: int) -> ElementView:
 
 
 def chart_states(session: Session, i: int) -> tuple[StateView, ...]:
-    """Return the chart as an element sees it: which state is active, which guards are asked.
+    """Return the chart for an element: the active state, and the guards evaluated.
 
     Parameters
     ----------
     session : Session
-        What is walked.
+        The session.
     i : int
-        The element, counted from 0.
+        Element index, from 0.
 
     Returns
     -------
     tuple of StateView
-        In the chart's order.
+        In the order of the chart.
     """
     chart, element = session.model.chart, _element(session, i)
     asked = {each.name: each for each in element.edges}
@@ -304,14 +304,14 @@ def chart_states(session: Session, i: int) -> tuple[StateView, ...]:
 
 
 def ribbons(session: Session, parts: int) -> Ribbons:
-    """Return the states of all elements over the whole time.
+    """Return the states of all elements over the whole time span.
 
     Parameters
     ----------
     session : Session
-        What is walked.
+        The session.
     parts : int
-        How many equal parts of the time to show.
+        Number of equal parts of the time span.
 
     Returns
     -------
@@ -323,7 +323,7 @@ def ribbons(session: Session, parts: int) -> Ribbons:
     for part in range(parts):
         t = start + (end - start) * (part + 0.5) / parts
         row = branch.row_at(t)
-        # The last row's states are known up to its time only.
+        # The states of the last row are known only up to its time.
         reached = row + 1 < len(branch) or branch.ended
         modes.append(branch.raw(row).mode if row >= 0 and reached else None)
     now = min(parts - 1, int(parts * (session.here.t - start) / (end - start)))
@@ -336,12 +336,12 @@ def branches(session: Session) -> tuple[BranchView, ...]:
     Parameters
     ----------
     session : Session
-        What is walked.
+        The session.
 
     Returns
     -------
     tuple of BranchView
-        By number.
+        All branches, in the order of their numbers.
     """
     return tuple(
         BranchView(

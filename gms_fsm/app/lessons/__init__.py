@@ -1,19 +1,19 @@
-"""Eight lessons: what the GMS model does, and what goes wrong when it is simulated carelessly.
+"""Eight lessons: the behaviour of the GMS model, and the pitfalls of simulating it.
 
-Each lesson is a plain module with one question: ``run()`` makes the runs, measures, and returns a
-result; ``figure(result)`` draws one picture of it; ``result.lines()`` says it in five lines, every
-figure in them measured by this very run.
+Each lesson is a module that answers one question: ``run()`` makes the runs, measures, and returns a
+result; ``figure(result)`` draws it; ``result.lines()`` summarizes it in five lines, in which every
+number is measured in that run.
 
 >>> for number, lesson in LESSONS.items():
 ...     print(number, lesson.QUESTION)
 1 What is pre-sliding hysteresis?
 2 Why does LuGre drift, and GMS not?
 3 What happens when a stepper misses v_c?
-4 What hangs on the sign of s(v) for v < 0?
+4 What depends on the sign of s(v) for v < 0?
 5 How many elements are enough?
 6 Why does a pulled mass stick and slip?
 7 Why does friction lag behind the speed?
-8 Does it matter whether a chart decides or an if-else text?
+8 Does it matter whether a chart or if-else code decides?
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from gms_fsm._files import output_folder, written_whole
+from gms_fsm._files import output_folder, write_whole
 from gms_fsm.app.lessons import (
     l1_hysteresis,
     l2_drift,
@@ -45,18 +45,18 @@ __all__ = ["LESSONS", "Lesson", "Result", "Taught", "lesson", "listed", "numbere
 
 
 class Result(Protocol):
-    """What a lesson's ``run()`` returns."""
+    """The result of ``run()`` of a lesson."""
 
     @property
     def replayed(self) -> dict[str, Trace]:
-        """One or two runs by their names, for the replay page."""
+        """One or two runs for the replay page, by name."""
 
     def lines(self) -> tuple[str, ...]:
-        """Question, what was run, two lines of measured figures, what follows."""
+        """Question, runs, two lines of measured values, conclusion."""
 
 
 class Lesson(Protocol):
-    """What a module must have to be a lesson."""
+    """Interface of a lesson module."""
 
     TITLE: str
     QUESTION: str
@@ -65,7 +65,7 @@ class Lesson(Protocol):
         """Make the runs and measure."""
 
     def figure(self, result: Any) -> Figure:
-        """Draw one picture of the result."""
+        """Draw the figure of the result."""
 
 
 LESSONS: Mapping[int, Lesson] = {
@@ -87,9 +87,9 @@ class Taught:
     Parameters
     ----------
     lines : tuple of str
-        Its five lines.
+        The five lines of the lesson.
     files : tuple of Path
-        What was written, the text first.
+        The files written, the text first.
     """
 
     lines: tuple[str, ...]
@@ -107,7 +107,7 @@ def lesson(number: int) -> Lesson:
     Returns
     -------
     Lesson
-        Its module.
+        The module of the lesson.
 
     Raises
     ------
@@ -123,12 +123,12 @@ def lesson(number: int) -> Lesson:
 
 
 def numbered(text: str) -> int:
-    """Return the number of a lesson that was asked for by a text.
+    """Return the number of a lesson, given as text.
 
     Parameters
     ----------
     text : str
-        For example ``"7"``.
+        Number as text, for example ``"7"``.
 
     Returns
     -------
@@ -138,18 +138,16 @@ def numbered(text: str) -> int:
     Raises
     ------
     ParameterError
-        If there is no such lesson; all are listed.
+        If there is no such lesson; the message lists all lessons.
     """
     for number in LESSONS:
         if text == str(number):
             return number
-    raise ParameterError(
-        f"there is no lesson {shown(text)}", advice=f"these are there:\n{listed()}"
-    )
+    raise ParameterError(f"there is no lesson {shown(text)}", advice=f"choose one of\n{listed()}")
 
 
 def listed() -> str:
-    """Return the lessons, a line each.
+    """Return a list of the lessons, one line each.
 
     Returns
     -------
@@ -160,15 +158,15 @@ def listed() -> str:
 
 
 def teach(number: int, folder: str | Path) -> Taught:
-    """Run a lesson and write its text, its picture and its replay page.
+    """Run a lesson and write its text, figure and replay page.
 
     Parameters
     ----------
     number : int
         1 to 8.
     folder : str or Path
-        Made where missing, before anything is run. ``lesson_N.txt``, its picture and its replay
-        page go there.
+        Output folder for ``lesson_N.txt``, the figure and the replay page; created before the run
+        if it does not exist.
 
     Returns
     -------
@@ -185,7 +183,7 @@ def teach(number: int, folder: str | Path) -> Taught:
     Warns
     -----
     UserWarning
-        If a picture or the page is left out because an extra is not installed.
+        If the figure or the page is omitted because an extra is not installed.
     """
     from plots import formats
 
@@ -195,12 +193,12 @@ def teach(number: int, folder: str | Path) -> Taught:
     folder = output_folder(folder, [f"{stem}.txt", *pictures, *pages])
     result = chosen.run()
     text = ("\n".join(result.lines()) + "\n").encode()
-    files = [written_whole(folder / f"{stem}.txt", lambda file: file.write(text))]
-    for what, write in (("picture", _draw), ("replay page", _replay)):
+    files = [write_whole(folder / f"{stem}.txt", lambda file: file.write(text))]
+    for kind, write in (("figure", _draw), ("replay page", _replay)):
         try:
             files += write(number, result, folder)
         except MissingExtraError as error:
-            warnings.warn(f"no {what} was written: {error}", stacklevel=2)
+            warnings.warn(f"no {kind} was written: {error}", stacklevel=2)
     return Taught(result.lines(), tuple(files))
 
 

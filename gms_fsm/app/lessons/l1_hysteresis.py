@@ -1,15 +1,15 @@
-"""Lesson 1: what pre-sliding hysteresis is.
+"""Lesson 1: pre-sliding hysteresis.
 
-A contact gives way before it slides. Each Maxwell element is a spring that lets go at a deflection
-s_i of its own, so on the first loading the elements let go one after another, and the force bends
-over from the sum of all springs to a plateau. After a reversal an element has to travel 2 s_i
-before it slips the other way: the branch back is the first loading curve, twice as large (Masing's
-rule). And the elements that still stick remember: when the motion comes back to an old reversal
-point, the force passes through the same point again and goes on as if the inner loop had never
-been.
+A contact gives way before it slides. Each Maxwell element is a spring that slips at its own
+deflection s_i, so on the first loading the elements slip one after another, and the stiffness falls
+from the sum of all springs to zero on a plateau. After a reversal an element must travel 2 s_i
+before it slips in the other direction: the return branch is the first loading curve, twice as large
+(Masing's rule). The elements that still stick are a memory: when the motion returns to an earlier
+reversal point, the force passes through the same point again and continues as if the inner loop
+had never happened.
 
 Here the motion is 0, A, B, C, D, E with |v| = 10 um/s, and each element has F_s = F_c, so that it
-is nothing but a spring and a slider.
+is a plain spring and slider.
 """
 
 from __future__ import annotations
@@ -34,34 +34,34 @@ TITLE = "Pre-sliding hysteresis"
 QUESTION = "What is pre-sliding hysteresis?"
 
 NAMES = "ABCDE"
-TURNS = np.array([20e-6, -12e-6, 12e-6, -6e-6, 30e-6])  # m: where the motion turns; it ends at E
-SPEED, RAMP = 10e-6, 0.02  # m/s; s in which the velocity grows from 0 to that
+TURNS = np.array([20e-6, -12e-6, 12e-6, -6e-6, 30e-6])  # m: reversal points; the motion ends at E
+SPEED, RAMP = 10e-6, 0.02  # m/s; s for the velocity to grow from 0 to that
 K = np.array([40e3, 30e3, 20e3, 10e3])  # N/m
 STRIBECK = Stribeck(F_c=1.0, F_s=1.0, v_s=1e-3)  # flat
 PARAMETERS = GMSParameters.from_shares([0.25] * 4, K, C=200.0, stribeck=STRIBECK, v_c=1e-6)
-FINE = 1e-13  # m, absolute tolerance: z are micrometres here
+FINE = 1e-13  # m, absolute tolerance: z is in micrometres here
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What was run and measured.
+    """The runs and the measured values.
 
     Parameters
     ----------
     gms, lugre : Trace
-        The bank, and a LuGre bristle of the same first stiffness, moved alike.
+        The GMS model, and a LuGre bristle of the same initial stiffness with the same motion.
     turn_times : ndarray, shape (5,), s
-        When they are at A, B, C, D, E.
+        Times at A, B, C, D, E.
     back : ndarray, shape (2,), s
-        When the last stroke comes back to C and to A.
+        Times at which the last stroke returns to C and to A.
     let_go : ndarray, shape (4,), m
-        Where the elements let go on the first loading.
+        Positions at which the elements slip on the first loading.
     misses, lugre_misses : ndarray, shape (2,), N
-        Force on coming back less the force at the reversal, at C and at A.
+        Force on return minus the force at the reversal, at C and at A.
     masing_error : float
-        Largest distance of the run from Masing's rule, N.
+        Largest deviation of the run from Masing's rule, N.
     loss : float
-        Work lost from A back to A, J.
+        Energy dissipated from A back to A, J.
     """
 
     gms: Trace
@@ -76,16 +76,16 @@ class Result:
 
     @property
     def replayed(self) -> dict[str, Trace]:
-        """The runs of the replay page, by their names."""
+        """The runs for the replay page, by name."""
         return {"GMS": self.gms}
 
     def lines(self) -> tuple[str, ...]:
-        """Return the lesson in five lines.
+        """Return the lesson as five lines.
 
         Returns
         -------
         tuple of str
-            Question, what was run, two lines of measured figures, what follows.
+            Question, runs, two lines of measured values, conclusion.
         """
         path = ", ".join(f"{1e6 * x:+.0f}" for x in TURNS)
         let_go = ", ".join(f"{1e6 * x:.2f}" for x in self.let_go)
@@ -95,27 +95,29 @@ class Result:
         return (
             f"Question: {QUESTION}",
             f"Run: {self.gms.model.title}, F_s = F_c (a spring and a slider each), moved to "
-            f"{path} um at {1e6 * SPEED:g} um/s; LuGre of the same first stiffness and F_c beside "
-            "it. Motion and parameters are chosen by us.",
-            f"Measured: along the first loading the elements let go at x = {let_go} um, so it is "
-            f"a chain of lines from {stiffness / 1e3:.1f} N/mm down to a plateau of "
-            f"{self.gms.F[-1]:.3f} N; from A back to A {1e6 * self.loss:.2f} uJ are lost.",
-            f"Measured: back at C the force is {at_C:.0e} N from what it was, back at A "
-            f"{at_A:.0e} N; every branch is the first loading curve doubled (Masing) within "
+            f"{path} um at {1e6 * SPEED:g} um/s; for comparison LuGre with the same initial "
+            "stiffness and F_c. Motion and parameters are chosen by us.",
+            f"Measured: on the first loading the elements slip at x = {let_go} um, so the curve "
+            f"is piecewise linear, from {stiffness / 1e3:.1f} N/mm to a plateau of "
+            f"{self.gms.F[-1]:.3f} N; from A back to A {1e6 * self.loss:.2f} uJ are dissipated.",
+            f"Measured: on return to C the force differs by {at_C:.0e} N, on return to A by "
+            f"{at_A:.0e} N; every branch is the doubled first loading curve (Masing) within "
             f"{self.masing_error:.0e} N. LuGre misses C by {abs(self.lugre_misses[0]):.3f} N and "
             f"A by {abs(self.lugre_misses[1]):.3f} N.",
-            "So: hysteresis before sliding is elements letting go one by one, and its memory is in "
-            "those that still stick. One LuGre bristle makes loops too, but they do not close.",
+            "So: pre-sliding hysteresis comes from elements that slip one by one, and its memory "
+            "from "
+            "those that still stick. A single LuGre bristle also makes loops, but they do not "
+            "close.",
         )
 
 
 def run() -> Result:
-    """Move the bank and the bristle through nested reversals.
+    """Move the GMS model and the bristle through nested reversals.
 
     Returns
     -------
     Result
-        Traces and measured figures.
+        Traces and measured values.
 
     Examples
     --------
@@ -128,7 +130,7 @@ def run() -> Result:
     gms_run = simulate(GMS(PARAMETERS, law="signed"), Prescribed(velocity), end, atol=FINE)
     lugre_run = simulate(lugre, Prescribed(velocity), end, atol=FINE)
 
-    # The last stroke is at C and at A again when it has gone that far from D at constant speed.
+    # Times at which the last stroke, at constant speed from D, is at C and at A again.
     back = turn_times[3] + RAMP / 2 + (TURNS[[2, 0]] - TURNS[3]) / SPEED
     misses, lugre_misses = (
         trace.sample(back).F - trace.sample(turn_times[[2, 0]]).F for trace in (gms_run, lugre_run)
@@ -152,14 +154,14 @@ def run() -> Result:
 
 
 def strokes(turns: Sequence[float] | FloatArray) -> tuple[list[tuple[float, float]], FloatArray]:
-    """Return a velocity that leads from 0 to each turning point, and when it is there.
+    """Return a velocity that leads from 0 to each reversal point, and the times of the reversals.
 
-    The velocity passes through 0 in ramps: in a jump it would skip the window |v| <= v_c.
+    The velocity passes through 0 in ramps, since a jump would skip the window |v| <= v_c.
 
     Parameters
     ----------
     turns : sequence of float, m
-        Where the motion turns.
+        Reversal points.
 
     Returns
     -------
@@ -184,7 +186,7 @@ def strokes(turns: Sequence[float] | FloatArray) -> tuple[list[tuple[float, floa
 
 
 def first_loading(x: ArrayLike) -> FloatArray:
-    """Return the force of the first loading at x: springs that let go at s_i.
+    """Return the force of the first loading at x: springs that slip at s_i.
 
     Parameters
     ----------
@@ -194,7 +196,7 @@ def first_loading(x: ArrayLike) -> FloatArray:
     Returns
     -------
     ndarray, N
-        Of the same shape.
+        Forces, of the same shape.
 
     Examples
     --------
@@ -206,14 +208,14 @@ def first_loading(x: ArrayLike) -> FloatArray:
 
 
 def masing(t: FloatArray, x: FloatArray, turn_times: FloatArray) -> FloatArray:
-    """Return the force by Masing's rule, which knows reversal points and no elements.
+    """Return the force by Masing's rule, which uses reversal points but no elements.
 
     Parameters
     ----------
     t, x : ndarray, shape (m,)
-        s and m.
+        Times, s, and positions, m.
     turn_times : ndarray, shape (5,), s
-        When it was at A, B, C, D, E.
+        Times at A, B, C, D, E.
 
     Returns
     -------
@@ -229,11 +231,11 @@ def masing(t: FloatArray, x: FloatArray, turn_times: FloatArray) -> FloatArray:
 
 
 def _branch(stroke: int, F_turn: Sequence[float], x: ArrayLike) -> FloatArray:
-    """Return the force of a stroke: the even ones rise, the odd ones fall.
+    """Return the force of a stroke; even strokes rise, odd strokes fall.
 
-    From the reversal (x_r, F_r) before it the stroke follows ``F_r +- 2 f(|x - x_r| / 2)``, f being
-    the first loading. At the reversal before that the inner loop closes, and it goes on along the
-    older branch.
+    From the last reversal (x_r, F_r) the stroke follows ``F_r +- 2 f(|x - x_r| / 2)``, where f is
+    the first loading. At the reversal before that the inner loop closes, and the stroke continues
+    along the older branch.
     """
     x, sign = np.asarray(x), 1.0 if stroke % 2 == 0 else -1.0
     F = first_loading(x)
@@ -282,19 +284,19 @@ def figure(result: Result) -> Figure:
         )
         axes["a"].set_title(f"a) {gms.model.title}: loops close")
         notes = {
-            "a": "circles: the first loading, doubled\n(Masing's rule)",
+            "a": "circles: doubled first loading\n(Masing's rule)",
             "b": "dashed: first loading\norange: last stroke, D to E\nsquares: back at C and A",
         }
         for name, note in notes.items():
             axes[name].annotate(
                 note, (0.98, 0.04), xycoords="axes fraction", ha="right", color=TEXT_GREY
             )
-        axes["b"].set_title("b) LuGre of the same first stiffness: they do not")
+        axes["b"].set_title("b) LuGre, same initial stiffness: open loops")
         axes["b"].sharey(axes["a"])
 
         motion = axes["c"]
         motion.plot(gms.t, 1e6 * gms.x, color=INK)
-        motion.set(xlim=(0, end), ylabel="x [µm]", title="c) the motion (chosen by us)")
+        motion.set(xlim=(0, end), ylabel="x [µm]", title="c) motion (chosen by us)")
         motion.tick_params(labelbottom=False)
         motion.margins(y=0.25)
         for name, time, place in zip(NAMES, result.turn_times, TURNS, strict=True):
@@ -319,7 +321,7 @@ def figure(result: Result) -> Figure:
                 va="bottom" if left else "top",
             )
         panels.ribbons(axes["d"], gms)
-        axes["d"].set_title("d) who sticks and who slips")
+        axes["d"].set_title("d) states of the elements")
         for time in result.turn_times[:-1]:
             axes["d"].axvline(time, color=LINE_GREY, linewidth=0.7, zorder=0)
         sheet.suptitle(f"Lesson 1: {QUESTION}", x=0.01, ha="left", fontsize=12)
@@ -327,7 +329,7 @@ def figure(result: Result) -> Figure:
 
 
 def _loops(ax: Axes, trace: Trace, result: Result) -> None:
-    """Draw F against x, name the reversals, and mark where the last stroke comes back to them."""
+    """Draw F over x, label the reversals, and mark where the last stroke returns to them."""
     from plots import panels
     from plots.style import BLUE, INK, VERMILION
 

@@ -1,15 +1,15 @@
 """Lesson 2: why LuGre drifts and GMS does not.
 
-Push a slider with a force below break-away, then shake it. LuGre's bristle gives way at any load:
-``dz = v - sigma_0 |v| z / s(v)``, so x - z grows at the rate sigma_0 |v| z / s(v), which has the
-sign of z whichever way it moves. Under a load every stroke, forward or back, creeps forward. A GMS
-element that sticks has ``dz = v``: it is a spring, x - z stands still, and what it gives it takes
-back.
+A slider is pushed with a force below break-away and then shaken. LuGre's bristle gives way at any
+load: ``dz = v - sigma_0 |v| z / s(v)``, so x - z grows at the rate sigma_0 |v| z / s(v), which has
+the sign of z whichever way the slider moves. Under a load every stroke, forward or backward,
+creeps forward. A GMS element in stick has ``dz = v``: it is a spring, x - z is constant, and every
+deflection is recovered.
 
-With the numbers of the paper's Table I that is all there is to see: no element can slip at 0.5 N,
-so the run would look the same with four ordinary springs. Therefore a third run, with the
-thresholds scaled by w_i = 0.25/k_i (chosen by us): an element really slips, arrests, and then
-nothing drifts.
+With the numbers of Table I of the paper there is nothing else to see: no element can slip at 0.5 N,
+so the run would look the same with four ordinary springs. A third run therefore scales the
+thresholds by w_i = 0.25/k_i (chosen by us): an element really slips and arrests, and then nothing
+drifts.
 """
 
 from __future__ import annotations
@@ -32,25 +32,25 @@ if TYPE_CHECKING:
 __all__ = ["QUESTION", "TITLE", "Result", "cycle_means", "figure", "run"]
 
 TITLE = "Drift"
-QUESTION = "Why does LuGre drift, and GMS not?"
+QUESTION = "Why does LuGre drift and GMS not?"
 
 END = 30.0  # s
-PERIOD, STEADY = 0.5, 10.0  # s: of the shaking, and from when on it is measured
+PERIOD, STEADY = 0.5, 10.0  # s: period of the shaking, and start of the measurement
 TABLE_I = GMSParameters.paper("non-drifting")
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What was run and measured.
+    """The runs and the measured values.
 
     Parameters
     ----------
     lugre, springs, slipping : Trace
         LuGre; GMS with Table I, where no element can slip; GMS with weights 0.25/k.
     drifts : ndarray, shape (3,), m/s
-        Their steady drift.
+        Steady drift of each.
     plastic : ndarray, shape (3,), m
-        x - z_1 at the end: what the first bristle does not give back.
+        x - z_1 at the end: displacement that the first bristle does not recover.
     """
 
     lugre: Trace
@@ -61,16 +61,16 @@ class Result:
 
     @property
     def replayed(self) -> dict[str, Trace]:
-        """The runs of the replay page, by their names."""
+        """The runs for the replay page, by name."""
         return {"GMS, weights 0.25/k": self.slipping, "LuGre": self.lugre}
 
     def lines(self) -> tuple[str, ...]:
-        """Return the lesson in five lines.
+        """Return the lesson as five lines.
 
         Returns
         -------
         tuple of str
-            Question, what was run, two lines of measured figures, what follows.
+            Question, runs, two lines of measured values, conclusion.
         """
         x = 1e3 * self.lugre.sample([2.0, END]).x
         low, high = 1e3 * _range(self.springs)
@@ -80,19 +80,20 @@ class Result:
         needed = float(TABLE_I.k[0]) * TABLE_I.stribeck.F_s
         return (
             f"Question: {QUESTION}",
-            "Run: 1 kg pushed by F_a up to 0.5 N, then 0.25 N and a shake of 0.1 N at 2 Hz "
+            "Run: 1 kg pushed by F_a up to 0.5 N, then 0.25 N and a vibration of 0.1 N at 2 Hz "
             f"(chosen by us); {self.lugre.model.title}; {self.springs.model.title}, Table I; "
             f"{self.slipping.model.title}, Table I with weights 0.25/k (chosen by us).",
             f"Measured: LuGre is at {x[0]:.2f} mm at 2 s and at {x[1]:.2f} mm at {END:g} s, a "
-            f"steady {1e3 * self.drifts[0]:.2f} mm/s; {1e3 * self.plastic[0]:.2f} mm of it are "
-            f"plastic (x - z). GMS with Table I stays between {low:.3f} and {high:.3f} mm, but "
-            f"with {len(self.springs.transitions)} transitions: element 1 would need "
+            f"steady {1e3 * self.drifts[0]:.2f} mm/s; {1e3 * self.plastic[0]:.2f} mm of it is "
+            f"plastic (x - z). GMS with Table I stays between {low:.3f} and {high:.3f} mm, with "
+            f"{len(self.springs.transitions)} transitions: element 1 would need "
             f"{needed:.0f} N to slip.",
-            f"Measured, where elements really slip: {story}; then x stays between "
+            f"Measured with elements that slip: {story}; then x stays between "
             f"{low_slipping:.2f} and {high_slipping:.2f} mm, drift {self.drifts[2]:.0e} m/s.",
-            "So: under a load every stroke of LuGre, forward or back, is a little plastic; a GMS "
-            "element is a pure spring below its threshold. Show that on a run with slip: with "
-            "Table I four springs do the same.",
+            "So: under a load every stroke of LuGre, forward or backward, is slightly plastic; a "
+            "GMS "
+            "element is a pure spring below its threshold. To show this, use a run with slip: with "
+            "Table I four springs behave the same.",
         )
 
 
@@ -102,7 +103,7 @@ def run() -> Result:
     Returns
     -------
     Result
-        Traces and measured figures.
+        Traces and measured values.
 
     Examples
     --------
@@ -124,7 +125,7 @@ def run() -> Result:
 
 
 def cycle_means(trace: Trace) -> tuple[FloatArray, FloatArray]:
-    """Return the middle of each cycle of the shaking, and the mean position in it.
+    """Return the middle of each cycle of the vibration, and the mean position in it.
 
     Parameters
     ----------
@@ -149,7 +150,7 @@ def _range(trace: Trace) -> FloatArray:
 
 
 def figure(result: Result) -> Figure:
-    """Draw the force, the positions, and F against x of the three runs.
+    """Draw the force, the positions, and F over x of the three runs.
 
     Parameters
     ----------
@@ -196,7 +197,7 @@ def figure(result: Result) -> Figure:
         for letter, trace, name, what, colour, ink in runs:
             x = 1e3 * trace.sample(grid).x
             place.plot(grid, x, color=colour, linewidth=0.9)
-            under = letter == "d"  # there LuGre's curve is above it
+            under = letter == "d"  # the curve of LuGre is above it there
             place.annotate(
                 f"{name}: {what}",
                 (0.995 * END, x[-200:].min() if under else x[-200:].max()),

@@ -1,13 +1,13 @@
-"""Lesson 3: what happens when a stepper misses v_c.
+"""Lesson 3: an integrator that steps over v_c.
 
 An element arrests only while |v| <= v_c = 1e-6 m/s. At a reversal of this motion that window is 32
-us wide. A program that looks at its guards once a step of 1 ms meets it at one reversal in thirty,
-by chance; else the element goes on slipping with the wrong sign of v, and from then on its
-deflection and the friction are wrong. No tolerance helps: each step is accurate, the question is
-asked too seldom.
+us wide. A program that evaluates its guards once per step of 1 ms hits it at one reversal in
+thirty, by chance. Otherwise the element continues to slip with the wrong sign of v, and from then
+on its deflection and the friction are wrong. A tighter tolerance does not help: each step is
+accurate, but the guards are evaluated too rarely.
 
-``events="step"`` is such a program. ``events="located"`` makes the same steps, but it watches the
-comparisons inside them, cuts a step where one changes, and asks there.
+``events="step"`` is such a program. ``events="located"`` takes the same steps, but monitors the
+comparisons inside them, cuts a step where one changes, and evaluates the guards there.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["QUESTION", "TITLE", "Result", "figure", "run", "samples_in_window", "window_width"]
 
 TITLE = "The missed window"
-QUESTION = "What happens when a stepper misses v_c?"
+QUESTION = "What happens when an integrator misses v_c?"
 
 A, PERIOD, END = 0.2, 20.0, 61.0  # m/s, s, s
 RIG = Prescribed(f"{A}*sin(2*pi*t/{PERIOD})")
@@ -41,22 +41,22 @@ ROWS = np.linspace(0.0, END, 6101)
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What was run and measured.
+    """The runs and the measured values.
 
     Parameters
     ----------
     located, once : Trace
-        The same fixed steps of `STEP`, with located switches and with guards looked at once a step.
+        Runs with fixed steps of `STEP`: switches located, and guards evaluated once per step.
     counts : tuple of int
-        Switches that are found once a step with each of `STEPS`.
+        Number of switches found with guards evaluated once per step, for each of `STEPS`.
     met : tuple of int
-        Reversals at which a sample of that grid lies in the window.
+        Number of reversals with a sample of that grid in the window.
     late : float
-        Largest lateness of the first break-aways, once a step, s.
+        Largest delay of the first break-aways with guards evaluated once per step, s.
     arrest_error : float
-        Largest distance of a located arrest from the instant at which |v| = v_c, s.
+        Largest deviation of a located arrest from the time at which |v| = v_c, s.
     z_error, F_error : float
-        Largest error once a step, m and N.
+        Largest errors with guards evaluated once per step, m and N.
     """
 
     located: Trace
@@ -70,53 +70,55 @@ class Result:
 
     @property
     def replayed(self) -> dict[str, Trace]:
-        """The runs of the replay page, by their names."""
-        return {"located": self.located, "once a step": self.once}
+        """The runs for the replay page, by name."""
+        return {"located": self.located, "once per step": self.once}
 
     def lines(self) -> tuple[str, ...]:
-        """Return the lesson in five lines.
+        """Return the lesson as five lines.
 
         Returns
         -------
         tuple of str
-            Question, what was run, two lines of measured figures, what follows.
+            Question, runs, two lines of measured values, conclusion.
         """
         total = len(self.located.transitions)
         luck = ", ".join(
-            f"{1e3 * h:g} ms {count} ({met} of {REVERSALS.size} reversals met)"
+            f"{count} with {1e3 * h:g} ms ({met} of {REVERSALS.size} reversals hit)"
             for h, count, met in zip(STEPS, self.counts, self.met, strict=True)
         )
         odds = window_width() / STEP
         return (
             f"Question: {QUESTION}",
             f"Run: {MODEL.title}, Table I (stick-slip), v = {A:g} sin(2 pi t/{PERIOD:g}) m/s "
-            f"(chosen by us), {END:g} s, rk4 with steps of {1e3 * STEP:g} ms; guards looked at "
-            "once a step, and located.",
-            f"Measured: once a step finds {len(self.once.transitions)} of {total} switches, the "
+            f"(chosen by us), {END:g} s, rk4 with steps of {1e3 * STEP:g} ms; guards evaluated "
+            "once per step, and located.",
+            f"Measured: once per step, {len(self.once.transitions)} of {total} switches are "
+            "found, the "
             f"first ones {1e3 * self.late:.2f} ms late; z is wrong by up to {self.z_error:.2f} m, "
-            f"F by {self.F_error:.2f} N. Located, with the same steps, it finds all {total}, and "
+            f"F by {self.F_error:.2f} N. With the same steps, locating finds all {total}, and "
             f"arrests at |v| = v_c within {self.arrest_error:.0e} s.",
-            f"Measured: |v| <= v_c lasts {1e6 * window_width():.0f} us, so a step meets it with "
-            f"odds of {100 * odds:.0f} %. Switches found with other steps: {luck}.",
-            "So: a step that hits is luck, not accuracy (1 ms divides the half period, 1.0001 ms "
+            f"Measured: |v| <= v_c lasts {1e6 * window_width():.0f} us, so a step hits it with a "
+            f"probability of {100 * odds:.0f} %. Switches found once per step: {luck}.",
+            "So: a step that hits the window is luck, not accuracy (1 ms divides the half period, "
+            "1.0001 ms "
             "nearly does). Locate the switches, or test with a step that does not divide the "
             "period.",
         )
 
 
 def run() -> Result:
-    """Run the same steps with guards looked at once a step and located, and other steps.
+    """Run the same steps with guards evaluated once per step and located, and other steps.
 
     Returns
     -------
     Result
-        Traces and measured figures.
+        Traces and measured values.
     """
     located = simulate(MODEL, RIG, END, method="rk4", step=STEP, t_eval=ROWS)
     looked = {step: once_a_step(step) for step in STEPS}
     once = looked[STEP]
     arrests = located.transitions[located.transitions.edge == "arrest"]
-    # v falls below v_c this long before it is zero: A |sin| = v_c.
+    # Times at which |v| falls to v_c, shortly before the reversal: A |sin| = v_c.
     due = REVERSALS - PERIOD / (2 * math.pi) * math.asin(V_C / A)
     nearest = np.abs(arrests.t[:, None] - due).min(axis=1)
     return Result(
@@ -132,17 +134,17 @@ def run() -> Result:
 
 
 def once_a_step(step: float) -> Trace:
-    """Run with guards looked at once a step.
+    """Run with guards evaluated once per step.
 
     Parameters
     ----------
     step : float
-        s.
+        Step size, s.
 
     Returns
     -------
     Trace
-        With `ROWS`.
+        The run, with rows at `ROWS`.
     """
     return simulate(
         MODEL, RIG, END, method="rk4", step=step, events="step", engine="ifelse", t_eval=ROWS
@@ -150,7 +152,7 @@ def once_a_step(step: float) -> Trace:
 
 
 def window_width() -> float:
-    """Return how long |v| <= v_c at a reversal, s.
+    """Return the duration of |v| <= v_c at a reversal, s.
 
     Examples
     --------
@@ -161,17 +163,17 @@ def window_width() -> float:
 
 
 def samples_in_window(step: float) -> int:
-    """Count the reversals at which a sample of the grid lies in the window; no run is needed.
+    """Count the reversals with a sample of the grid in the window, without a run.
 
     Parameters
     ----------
     step : float
-        s.
+        Step size, s.
 
     Returns
     -------
     int
-        0 to `REVERSALS.size`.
+        Count, 0 to `REVERSALS.size`.
 
     Examples
     --------
@@ -191,7 +193,7 @@ def _velocity(t: FloatArray) -> FloatArray:
 
 
 def figure(result: Result) -> Figure:
-    """Draw a reversal, the friction, the states, and how many switches each step finds.
+    """Draw a reversal, the friction, the states, and the number of switches found per step size.
 
     Parameters
     ----------
@@ -209,14 +211,14 @@ def figure(result: Result) -> Figure:
     from plots import panels
     from plots.style import BLUE, INK, RC, STATE_FILLS, TEXT_GREY, TEXT_ORANGE, VERMILION
 
-    found = {"located": result.located, "once a step": result.once}
+    found = {"located": result.located, "once per step": result.once}
     with rc_context(RC):
         sheet = Figure(figsize=(8.2, 8.2), layout="constrained")
         axes = sheet.subplot_mosaic(
             [["a", "b"], ["c", "c"], ["d", "d"], ["e", "e"]], height_ratios=(1.7, 1.5, 1, 1)
         )
         near, counts, force = axes["a"], axes["b"], axes["c"]
-        # The reversal that is missed by most.
+        # The reversal that is missed by the largest margin.
         t = max(_samples(STEP), key=lambda t: float(np.abs(_velocity(t)).min()))
         turn = round(float(t.mean()))
         t = t[np.abs(t - turn) < 2e-3]
@@ -249,8 +251,8 @@ def figure(result: Result) -> Figure:
                 fontsize=8,
             )
         counts.set_xticks(places, [f"{1e3 * h:g}" for h in STEPS], fontsize=8)
-        counts.set(xlabel="step [ms]", ylabel="switches found once a step", ylim=(0, 62))
-        counts.set_title("b) luck (above: reversals met by a sample)")
+        counts.set(xlabel="step [ms]", ylabel="switches found once per step", ylim=(0, 62))
+        counts.set_title("b) luck (above: reversals hit by a sample)")
         counts.axhline(len(result.located.transitions), color=INK, linestyle="--", linewidth=0.9)
         counts.annotate(
             f"located, {1e3 * STEP:g} ms: {len(result.located.transitions)}",

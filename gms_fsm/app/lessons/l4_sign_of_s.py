@@ -1,13 +1,13 @@
-"""Lesson 4: what hangs on the sign of s(v) for v < 0.
+"""Lesson 4: the sign of s(v) for v < 0.
 
 Eq. (1) of the paper, ``dz = sgn(v) C (1 - z/s)``, and the signed law of Al-Bender, Lampaert and
-Swevers, ``dz = C (sgn(v) - z/s)``, are one law for v > 0. For v < 0 the signed law pulls z to -s;
-the published one pushes it away from +s, at which its eigenvalue is +C/s. An element that slips
-backward then stretches its spring further than the slider moves: the spring is charged with energy
-that nobody put in.
+Swevers, ``dz = C (sgn(v) - z/s)``, are identical for v > 0. For v < 0 the signed law pulls z to -s;
+the published law pushes it away from +s, where its eigenvalue is +C/s. An element that slips
+backward then stretches its spring further than the slider moves: the spring gains energy that was
+not supplied.
 
-An energy balance shows it without any taste in laws. Of the work of the motion, a part is stored
-in the springs; the rest is heat, and heat can only grow.
+An energy balance shows this independently of the choice of law. A part of the work of the motion is
+stored in the springs; the rest is heat, and heat can only increase.
 """
 
 from __future__ import annotations
@@ -30,22 +30,22 @@ if TYPE_CHECKING:
 __all__ = ["QUESTION", "TITLE", "Energy", "Result", "energy", "figure", "run"]
 
 TITLE = "The sign of s(v)"
-QUESTION = "What hangs on the sign of s(v) for v < 0?"
+QUESTION = "What depends on the sign of s(v) for v < 0?"
 
 PARAMETERS = GMSParameters.paper("stick-slip")
-POINTS = 20_000  # of the integrals over time
+POINTS = 20_000  # for the integrals over time
 
 
 @dataclass(frozen=True, eq=False)
 class Energy:
-    """Where the work of the motion goes.
+    """The energy balance of a run.
 
     Parameters
     ----------
     t : ndarray, shape (m,), s
-        When.
+        Time.
     v : ndarray, shape (m,), m/s
-        How fast it moves then.
+        Velocity.
     work, stored : ndarray, shape (m,), J
         The integral of F v; the sum of k z**2 / 2.
     """
@@ -57,12 +57,12 @@ class Energy:
 
     @property
     def heat(self) -> FloatArray:
-        """Work less stored, shape (m,), J."""
+        """Work minus stored energy, shape (m,), J."""
         return self.work - self.stored
 
     @property
     def lost_heat(self) -> FloatArray:
-        """How much heat vanishes from each time to the next, shape (m - 1,), J, >= 0."""
+        """Decrease of heat from each time to the next, shape (m - 1,), J, >= 0."""
         return np.maximum(-np.diff(self.heat), 0.0)
 
     @property
@@ -74,18 +74,18 @@ class Energy:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What was run and measured.
+    """The runs and the measured values.
 
     Parameters
     ----------
     published, signed : Trace
         Fig. 4 under both laws.
     published_energy, signed_energy : Energy
-        Their balances.
+        Their energy balances.
     vanished : ndarray, shape (2,), J
-        All the heat that vanishes, published and signed.
+        Total decrease of heat, published and signed.
     outside_dip : ndarray, shape (2,), J
-        How much of it vanishes where s(v) is flat.
+        The part of it where s(v) is flat.
     """
 
     published: Trace
@@ -97,16 +97,16 @@ class Result:
 
     @property
     def replayed(self) -> dict[str, Trace]:
-        """The runs of the replay page, by their names."""
+        """The runs for the replay page, by name."""
         return {"published law": self.published, "signed law": self.signed}
 
     def lines(self) -> tuple[str, ...]:
-        """Return the lesson in five lines.
+        """Return the lesson as five lines.
 
         Returns
         -------
         tuple of str
-            Question, what was run, two lines of measured figures, what follows.
+            Question, runs, two lines of measured values, conclusion.
         """
         lowest = ", ".join(f"{z:.2f}" for z in self.published.z.min(axis=0))
         t, z = self.published.t, self.published.z[:, 0]
@@ -116,27 +116,28 @@ class Result:
             f"Question: {QUESTION}",
             f"Run: GMS, Table I (stick-slip), v = {VELOCITY} m/s (chosen by us), {FIG4_END:g} s, "
             "under the published law (eq. (1) as printed) and under the signed law.",
-            f"Measured: published, the z_i go down to {lowest} m (z_1 to {cycles} m in the four "
-            f"cycles); signed, |z_i| is {np.abs(self.signed.z).max():.4f} m at most, both ways "
-            f"(s is {PARAMETERS.stribeck.F_c:g} m when it slides, weights 1 m/N).",
-            f"Measured: of {published.work[-1]:.2f} J of work the published springs hold "
-            f"{published.stored[-1]:.2f} J at the end; on the way {self.vanished[0]:.1f} J of heat "
-            f"turn back into spring energy. Signed: {signed.stored[-1]:.2f} J of "
+            f"Measured: with the published law the z_i fall to {lowest} m (z_1 to {cycles} m in "
+            "the four "
+            f"cycles); signed, |z_i| is {np.abs(self.signed.z).max():.4f} m at most, in both "
+            f"directions (s is {PARAMETERS.stribeck.F_c:g} m in sliding, weights 1 m/N).",
+            f"Measured: of {published.work[-1]:.2f} J of work the springs of the published law "
+            f"store {published.stored[-1]:.2f} J at the end; meanwhile {self.vanished[0]:.1f} J "
+            f"of heat turn back into spring energy. Signed law: {signed.stored[-1]:.2f} J of "
             f"{signed.work[-1]:.2f} J, and {1e3 * self.vanished[1]:.1f} mJ of heat vanish, "
             f"{1e3 * self.outside_dip[1]:.1g} mJ of them outside the Stribeck dip.",
-            "So: with s(v) unsigned for v < 0 the model makes energy out of nothing. Use "
-            'law="signed"; it makes a little too, where s(v) rises at a reversal and z follows '
-            "while the slider hardly moves.",
+            'So: with s(v) unsigned for v < 0 the model creates energy. Use law="signed"; it also '
+            "creates a little, where s(v) rises at a reversal and z follows while the slider "
+            "hardly moves.",
         )
 
 
 def run() -> Result:
-    """Run Fig. 4 under both laws and draw up their energy balances.
+    """Run Fig. 4 under both laws and compute the energy balances.
 
     Returns
     -------
     Result
-        Traces and measured figures.
+        Traces and measured values.
 
     Examples
     --------
@@ -161,17 +162,17 @@ def run() -> Result:
 
 
 def energy(trace: Trace) -> Energy:
-    """Draw up the energy balance of a run.
+    """Compute the energy balance of a run.
 
     Parameters
     ----------
     trace : Trace
-        Of a GMS model.
+        A run of a GMS model.
 
     Returns
     -------
     Energy
-        Over the run.
+        The energy balance.
     """
     fine = trace.refined(POINTS)  # both sides of every jump of F are rows
     power = fine.F * fine.v
@@ -222,9 +223,7 @@ def figure(result: Result) -> Figure:
         axes[0, 0].set_title("a) " + columns[0][0])
         axes[0, 1].set_title("b) " + columns[1][0])
         axes[1, 0].set_title("c) energy (hatched: heat turns back)")
-        axes[1, 1].set_title(
-            f"d) energy ({1e3 * result.vanished[1]:.1f} mJ turn back: too little to see)"
-        )
+        axes[1, 1].set_title(f"d) energy ({1e3 * result.vanished[1]:.1f} mJ turn back: invisible)")
         axes[0, 1].annotate(
             "all four $z_i$ together\ngrey: ± s(v) away from reversals",
             (0.97, 0.04),
@@ -253,10 +252,10 @@ def _balance(ax: Axes, balance: Energy) -> None:
     for values, colour, dash, name in (
         (balance.work, INK, "-", "work of the motion"),
         (balance.stored, BLUE, "--", "stored in the springs"),
-        (balance.heat, VERMILION, "-", "heat: work less stored"),
+        (balance.heat, VERMILION, "-", "heat: work minus stored"),
     ):
         ax.plot(balance.t, values, color=colour, linestyle=dash, linewidth=1.5, label=name)
-    # Where more than 0.05 W turn back.
+    # Where more than 0.05 W turns back.
     falls = np.append(balance.lost_heat > 0.05 * np.diff(balance.t), False)
     ax.fill_between(
         balance.t,

@@ -1,12 +1,12 @@
-"""Lesson 5: how many elements are enough.
+"""Lesson 5: the number of elements.
 
-A measured first loading is a smooth curve; n elements make a chain of n straight pieces of it.
-Here the curve is the parabola f(x) = F_c (1 - (1 - x/X)**2) (chosen by us), because its best chain
-is known: thresholds evenly spaced, s_i = i X/n, and n equal springs of 2 F_c/(n X), the last one
-half as stiff. The chain is then off by F_c/(4 n**2) at most.
+A measured first loading is a smooth curve, which n elements approximate by n straight segments.
+Here the curve is the parabola f(x) = F_c (1 - (1 - x/X)**2) (chosen by us), because its best
+approximation is known: evenly spaced thresholds, s_i = i X/n, and n equal springs of 2 F_c/(n X),
+the last one half as stiff. The error is then at most F_c/(4 n**2).
 
-The plateau is right for any n, even n = 1. What is lost with few elements is the small loops: as
-long as no element slips, nothing is dissipated.
+The plateau is right for any n, even n = 1. Few elements lose the small loops: as long as no element
+slips, nothing is dissipated.
 """
 
 from __future__ import annotations
@@ -32,23 +32,23 @@ QUESTION = "How many elements are enough?"
 
 COUNTS = (1, 2, 4, 12)
 F_c, X = 1.0, 100e-6  # N, m: the plateau, and where it begins
-STROKE, SMALL = 1.2 * X, 0.4 * X  # m: of the first loading, and amplitude of the small loop
+STROKE, SMALL = 1.2 * X, 0.4 * X  # m: length of the first loading, and amplitude of the small loop
 SPEED, OMEGA = 10e-6, 1.0  # m/s, rad/s
-RTOL, ATOL = 1e-10, 1e-13  # 1, m: z are micrometres here
+RTOL, ATOL = 1e-10, 1e-13  # 1, m: z is in micrometres here
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What was run and measured.
+    """The runs and the measured values.
 
     Parameters
     ----------
     loadings, loops : dict of int to Trace
-        By the number of elements: the first loading, and the small loop.
+        Runs of the first loading and of the small loop, by the number of elements.
     errors : ndarray, shape (4,), N
-        Largest distance of the first loading from the parabola.
+        Largest deviation of the first loading from the parabola.
     losses : ndarray, shape (4,), J
-        Energy lost in one small loop.
+        Energy dissipated in one small loop.
     """
 
     loadings: dict[int, Trace]
@@ -58,16 +58,16 @@ class Result:
 
     @property
     def replayed(self) -> dict[str, Trace]:
-        """The runs of the replay page, by their names."""
+        """The runs for the replay page, by name."""
         return {"four elements": self.loops[4]}
 
     def lines(self) -> tuple[str, ...]:
-        """Return the lesson in five lines.
+        """Return the lesson as five lines.
 
         Returns
         -------
         tuple of str
-            Question, what was run, two lines of measured figures, what follows.
+            Question, runs, two lines of measured values, conclusion.
         """
         errors = ", ".join(
             f"{100 * e / F_c:.3g} % (n = {n})" for n, e in zip(COUNTS, self.errors, strict=True)
@@ -80,23 +80,24 @@ class Result:
             f"Question: {QUESTION}",
             f"Run: GMS, {bank(1).law} law, n = {', '.join(map(str, COUNTS))} elements fitted to a "
             f"parabola that reaches F_c = {F_c:g} N at {1e6 * X:g} um; loaded once to "
-            f"{1e6 * STROKE:g} um, and moved to and fro by {1e6 * SMALL:g} um (chosen by us).",
-            f"Measured: the first loading is off by {errors} of F_c at most: 1/(4 n^2).",
-            f"Measured: of the energy that a loop of {1e6 * SMALL:g} um costs the smooth curve, "
-            f"the banks lose {losses}; a bank whose first element lets go beyond the loop loses "
-            "none.",
-            "So: four give the curve within 2 %; for the damping of small motions it is the "
-            "smallest threshold that counts: put it well below the smallest motion you care for.",
+            f"{1e6 * STROKE:g} um, and moved back and forth by {1e6 * SMALL:g} um (chosen by us).",
+            f"Measured: the largest error of the first loading is {errors} of F_c: 1/(4 n^2).",
+            "Measured: of the energy that the smooth curve dissipates in a loop of "
+            f"{1e6 * SMALL:g} "
+            f"um, the models dissipate {losses}; a model whose first element slips beyond the loop "
+            "dissipates none.",
+            "So: four elements give the curve within 2 %; the damping of small motions depends on "
+            "the smallest threshold: put it well below the smallest motion of interest.",
         )
 
 
 def run() -> Result:
-    """Load each bank once, and move it to and fro.
+    """Load each model once, and move it back and forth.
 
     Returns
     -------
     Result
-        Traces and measured figures.
+        Traces and measured values.
 
     Examples
     --------
@@ -123,12 +124,12 @@ def bank(n: int) -> GMS:
     Parameters
     ----------
     n : int
-        How many.
+        Number of elements.
 
     Returns
     -------
     GMS
-        Plain springs and sliders, F_s = F_c.
+        A model of plain springs and sliders, F_s = F_c.
 
     Examples
     --------
@@ -155,7 +156,7 @@ def parabola(x: ArrayLike) -> FloatArray:
     Returns
     -------
     ndarray, N
-        Of the same shape.
+        Forces, of the same shape.
 
     Examples
     --------
@@ -166,15 +167,15 @@ def parabola(x: ArrayLike) -> FloatArray:
 
 
 def smooth_loss(a: float) -> float:
-    """Return what one loop of amplitude a <= X costs the smooth curve, J.
+    """Return the energy dissipated in one loop of amplitude a <= X by the smooth curve, J.
 
-    By Masing's rule both branches are f doubled; between them lie 4 F_c a**3 / (3 X**2).
+    By Masing's rule both branches are f doubled; the area between them is 4 F_c a**3 / (3 X**2).
     """
     return 4 * F_c * a**3 / (3 * X**2)
 
 
 def small_loop(trace: Trace) -> Trace:
-    """Return one period of the swing, from its first reversal on, in a fine grid with all rows."""
+    """Return one period of the loop, from its first reversal, with all rows and fine samples."""
     begin = 0.5 * math.pi / OMEGA
     grid = np.linspace(begin, begin + 2 * math.pi / OMEGA, 4001)
     inside = trace.t[(trace.t > grid[0]) & (trace.t < grid[-1])]
@@ -186,7 +187,7 @@ def _work(trace: Trace) -> float:
 
 
 def figure(result: Result) -> Figure:
-    """Draw first loadings, small loops, and how the errors fall with n.
+    """Draw first loadings, small loops, and the errors over n.
 
     Parameters
     ----------
@@ -230,7 +231,7 @@ def figure(result: Result) -> Figure:
         loading.set(xlabel="x [µm]", ylabel="F [N]", xlim=(0, None), ylim=(0, None))
         loading.set_title("a) first loading, signed law, $F_s$ = $F_c$")
         loop.set(xlabel="x [µm]", ylabel="F [N]")
-        loop.set_title(f"b) to and fro by {1e6 * SMALL:g} µm")
+        loop.set_title(f"b) back and forth by {1e6 * SMALL:g} µm")
         loop.annotate(
             "n = 1 and n = 2: no element slips,\na line and no loop",
             (0.03, 0.97),
@@ -254,7 +255,7 @@ def figure(result: Result) -> Figure:
 
 
 def _draw_losses(ax: Axes, result: Result) -> None:
-    """Draw the energy lost in the small loop over n."""
+    """Draw the energy dissipated in the small loop over n."""
     from plots.style import BLUE, INK, STATE_FILLS, TEXT_GREY
 
     share = 100 * np.abs(result.losses) / smooth_loss(SMALL)
@@ -279,5 +280,5 @@ def _draw_losses(ax: Axes, result: Result) -> None:
         color=TEXT_GREY,
     )
     ax.set_xticks(places, [str(n) for n in COUNTS])
-    ax.set(xlabel="elements n", ylabel="energy lost in a loop [%]", ylim=(0, 112))
+    ax.set(xlabel="elements n", ylabel="energy per loop [%]", ylim=(0, 112))
     ax.set_title("d) damping of the small loop")

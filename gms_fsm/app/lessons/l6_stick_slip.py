@@ -1,12 +1,13 @@
-"""Lesson 6: why a pulled mass sticks and slips.
+"""Lesson 6: stick-slip of a pulled mass.
 
 A mass is pulled through a soft spring whose end moves at V. It waits until the spring pulls with
-F_s; as it begins to slide, friction falls along the Stribeck curve, from F_s to F_c, and the
-surplus throws it forward until the spring is slack enough for it to stop. Then it waits again.
+F_s. When it begins to slide, friction falls along the Stribeck curve from F_s to F_c, and the
+surplus force throws it forward until the spring is slack enough for it to stop. Then it waits
+again.
 
-So a cycle has two parts of different kinds. The wait is the time in which the spring is stretched
-once more by the same amount: a length divided by V. The slip is the swing of a mass on a spring
-and hardly asks for V. At a high speed the mass no longer comes to rest, and slides.
+A cycle thus has two different parts. The wait is the time needed to stretch the spring again by
+the same amount: a length divided by V. The slip is half an oscillation of a mass on a spring and
+hardly depends on V. At a high speed the mass no longer comes to rest and slides.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ TITLE = "Stick-slip"
 QUESTION = "Why does a pulled mass stick and slip?"
 
 MASS, STIFFNESS = 1.0, 2.0  # kg, N/m
-SPEED, END = 0.1, 60.0  # m/s, s: of the portrait
+SPEED, END = 0.1, 60.0  # m/s, s: for the phase portrait
 SPEEDS = (0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2)  # m/s
 TOO_FAST = 0.25  # m/s
 F_c, F_s, V_S = 1.0, 1.5, 0.05  # N, N, m/s
@@ -38,12 +39,12 @@ K = np.array([40.0, 30.0, 20.0, 10.0])  # N/m
 
 @dataclass(frozen=True)
 class Cycle:
-    """The last whole cycle of a run.
+    """The last complete cycle of a run.
 
     Parameters
     ----------
     slip, wait : float
-        From the moment all elements slip to the first arrest, and from there to the next slip, s.
+        Times from gross slip to the first arrest, and from there to the next gross slip, s.
     pull_at_slip, pull_at_stop : float
         Force of the spring at both ends of the wait, N.
     """
@@ -56,7 +57,7 @@ class Cycle:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What was run and measured.
+    """The runs and the measured values.
 
     Parameters
     ----------
@@ -65,7 +66,7 @@ class Result:
     cycles : tuple of Cycle
         At each of `SPEEDS`.
     rests : dict of str to int
-        How often an element arrests in runs in which the mass does not stick and slip.
+        Number of arrests in runs without stick-slip.
     """
 
     portrait: Trace
@@ -74,32 +75,32 @@ class Result:
 
     @property
     def replayed(self) -> dict[str, Trace]:
-        """The runs of the replay page, by their names."""
+        """The runs for the replay page, by name."""
         return {f"pulled at {SPEED:g} m/s": self.portrait}
 
     @property
     def waits(self) -> FloatArray:
-        """Waits at each of `SPEEDS`, s."""
+        """Waiting times at each of `SPEEDS`, s."""
         return np.array([cycle.wait for cycle in self.cycles])
 
     @property
     def slips(self) -> FloatArray:
-        """Slips at each of `SPEEDS`, s."""
+        """Slip times at each of `SPEEDS`, s."""
         return np.array([cycle.slip for cycle in self.cycles])
 
     def lines(self) -> tuple[str, ...]:
-        """Return the lesson in five lines.
+        """Return the lesson as five lines.
 
         Returns
         -------
         tuple of str
-            Question, what was run, two lines of measured figures, what follows.
+            Question, runs, two lines of measured values, conclusion.
         """
         log, v = self.portrait.transitions, self.portrait.v
         here = self.cycles[SPEEDS.index(SPEED)]
         slow, fast = self.waits[0] + self.slips[0], self.waits[-1] + self.slips[-1]
         lengths = 1e3 * self.waits * np.array(SPEEDS)
-        never = ", ".join(f"{name} {count}" for name, count in self.rests.items())
+        never = ", ".join(f"{count} {name}" for name, count in self.rests.items())
         return (
             f"Question: {QUESTION}",
             f"Run: {self.portrait.model.title}, {MASS:g} kg pulled from rest through {STIFFNESS:g} "
@@ -107,16 +108,17 @@ class Result:
             f"{F_c:g} N, v_s = {V_S:g} m/s, all chosen by us).",
             f"Measured at {SPEED:g} m/s: {len(log)} transitions in {END:g} s, "
             f"{int((log.edge == 'arrest').sum())} of them arrests, v from {v.min():.3f} to "
-            f"{v.max():.2f} m/s; the spring pulls with {here.pull_at_slip:.2f} N when all slip and "
-            f"with {here.pull_at_stop:.2f} N when the first one stops; period "
+            f"{v.max():.2f} m/s; the spring pulls with {here.pull_at_slip:.2f} N at gross slip and "
+            f"with {here.pull_at_stop:.2f} N at the first arrest; period "
             f"{here.wait + here.slip:.2f} s.",
             f"Measured: the period falls from {slow:.1f} s at {SPEEDS[0]:g} m/s to {fast:.1f} s at "
             f"{SPEEDS[-1]:g} m/s: a wait of {lengths.min():.0f} to {lengths.max():.0f} mm / V and "
-            f"a slip of {self.slips.min():.1f} to {self.slips.max():.1f} s. Arrests elsewhere: "
+            f"a slip of {self.slips.min():.1f} to {self.slips.max():.1f} s. Arrests in other runs: "
             f"{never}.",
-            "So: it takes a friction that falls with speed and a slow pull; the wait is a length "
-            f"divided by V. At {SPEEDS[-1]:g} m/s both are possible: from rest it sticks and "
-            "slips, set going it slides on.",
+            "So: stick-slip needs friction that falls with speed, and a slow pull; the wait is a "
+            "length "
+            f"divided by V. At {SPEEDS[-1]:g} m/s both are possible: started from rest the mass "
+            "sticks and slips, started in motion it keeps sliding.",
         )
 
 
@@ -126,7 +128,7 @@ def run() -> Result:
     Returns
     -------
     Result
-        Traces and measured figures.
+        Traces and measured values.
     """
     portrait = simulate(bank(), PulledSlider(MASS, STIFFNESS, SPEED), END)
     cycles = tuple(
@@ -147,7 +149,7 @@ def run() -> Result:
         f"at {SPEED:g} m/s with F_s = F_c": simulate(
             bank(F_s=F_c), PulledSlider(MASS, STIFFNESS, SPEED), END
         ),
-        f"at {fastest:g} m/s, set going": simulate(
+        f"at {fastest:g} m/s, started in motion": simulate(
             bank(), PulledSlider(MASS, STIFFNESS, fastest), END, initial=sliding
         ),
     }
@@ -158,7 +160,7 @@ def run() -> Result:
 
 
 def bank(F_s: float = F_s) -> GMS:
-    """Return the friction: four elements, each with a quarter of it.
+    """Return the friction model: four elements, each with a quarter of the friction.
 
     Parameters
     ----------
@@ -168,7 +170,7 @@ def bank(F_s: float = F_s) -> GMS:
     Returns
     -------
     GMS
-        Under the signed law.
+        The model, with the signed law.
 
     Examples
     --------
@@ -188,17 +190,17 @@ def bank(F_s: float = F_s) -> GMS:
 
 
 def last_cycle(trace: Trace) -> Cycle:
-    """Measure the last whole cycle of a run that sticks and slips.
+    """Measure the last complete cycle of a run with stick-slip.
 
     Parameters
     ----------
     trace : Trace
-        With at least two gross slips.
+        A run with at least two gross slips.
 
     Returns
     -------
     Cycle
-        Its parts.
+        The parts of the cycle.
     """
     log = trace.transitions
     slipping = np.cumsum(np.where(log.target == "slip", 1, -1))
@@ -217,7 +219,7 @@ def last_cycle(trace: Trace) -> Cycle:
 
 
 def figure(result: Result) -> Figure:
-    """Draw v and states over time, the portrait, and the parts of the period against speed.
+    """Draw v and states over time, the phase portrait, and the parts of the period over speed.
 
     Parameters
     ----------
@@ -250,15 +252,15 @@ def figure(result: Result) -> Figure:
         panels.portrait(loop, trace, window=window)
         v = np.linspace(0.0, 0.38, 400)
         curve = trace.model.stribeck
-        assert curve is not None  # of a GMS bank
+        assert curve is not None  # a GMS model has one
         steady = curve(v) + SIGMA_2 * v
         loop.plot(v, steady, color=LINE_GREY, linestyle="--", linewidth=1.2, zorder=1)
-        loop.set_title("c) friction against velocity")
+        loop.set_title("c) friction over velocity")
         loop.set_ylim(0.6, 1.55)
         for text, place in (
             ("thrown forward →", (0.13, 1.31)),
             ("← slows down", (0.2, 1.03)),
-            ("waits, swinging\non its bristles", (0.045, 0.77)),
+            ("waits, oscillating\non its bristles", (0.045, 0.77)),
             (r"dashed: steady, s(v) + $\sigma_2$ v", (0.12, 0.63)),
         ):
             loop.annotate(text, place, color=TEXT_GREY, fontsize=8)

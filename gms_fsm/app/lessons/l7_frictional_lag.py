@@ -1,12 +1,12 @@
-"""Lesson 7: why friction lags behind the speed.
+"""Lesson 7: frictional lag.
 
 In steady sliding the friction is s(v) + sigma_2 v. When the speed changes, the deflections follow
-with a delay: ``dz = C (1 - z/s)`` goes to s within the time s/C. While the slider accelerates the
-friction is therefore still that of the slower speed, which is higher, and while it slows down it
-is lower: a loop around the steady curve.
+with a delay: by ``dz = C (1 - z/s)`` z approaches s with the time constant s/C. While the slider
+accelerates, the friction is therefore still that of the lower speed, which is higher, and while it
+decelerates the friction is lower: a loop around the steady curve.
 
-The usual rule says that the loop grows with the frequency. It does as long as the deflections can
-follow. Beyond w = C/s they follow less and less, and the loop closes again.
+The usual rule says that the loop grows with the frequency. It does, as long as the deflections can
+follow. Above w = C/s they follow less and less, and the loop closes again.
 """
 
 from __future__ import annotations
@@ -31,29 +31,29 @@ QUESTION = "Why does friction lag behind the speed?"
 MEAN, SWING = 1.5e-3, 1e-3  # m/s: v = MEAN + SWING cos(w t), never zero
 SHOWN = (1.0, 10.0, 25.0)  # rad/s
 OMEGAS = (1.0, 3.0, 10.0, 25.0, 35.0, 45.0, 60.0, 100.0, 250.0, 600.0)  # rad/s
-C = 50.0  # N/s, of the whole bank
+C = 50.0  # N/s, of the whole model
 STRIBECK = Stribeck(F_c=1.0, F_s=1.5, v_s=1e-3)
 SIGMA_2 = 0.4  # Ns/m
 PARAMETERS = GMSParameters.from_shares(
     [0.25] * 4, [40e3, 30e3, 20e3, 10e3], C=C, stribeck=STRIBECK, v_c=1e-6, sigma_2=SIGMA_2
 )
 MODEL = GMS(PARAMETERS, law="signed")
-RTOL, ATOL = 1e-9, 1e-12  # 1, m: z are micrometres here
-SETTLED = 1.0  # s: then all elements slip, and the start is forgotten
+RTOL, ATOL = 1e-9, 1e-12  # 1, m: z is in micrometres here
+SETTLED = 1.0  # s: by then all elements slip and the initial transient has decayed
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What was run and measured.
+    """The runs and the measured values.
 
     Parameters
     ----------
     runs : dict of float to Trace
-        By the frequency w, rad/s; whole runs.
+        Complete runs, by the frequency w, rad/s.
     loops : dict of float to Trace
-        Their last periods.
+        Last period of each run.
     widths : ndarray, shape (10,), N
-        Friction while accelerating less friction while slowing down, at the mean speed.
+        Friction during acceleration minus friction during deceleration, at the mean speed.
     """
 
     runs: dict[float, Trace]
@@ -62,16 +62,16 @@ class Result:
 
     @property
     def replayed(self) -> dict[str, Trace]:
-        """The runs of the replay page, by their names."""
+        """The runs for the replay page, by name."""
         return {"10 rad/s": self.runs[10.0]}
 
     def lines(self) -> tuple[str, ...]:
-        """Return the lesson in five lines.
+        """Return the lesson as five lines.
 
         Returns
         -------
         tuple of str
-            Question, what was run, two lines of measured figures, what follows.
+            Question, runs, two lines of measured values, conclusion.
         """
         width = dict(zip(OMEGAS, 1e3 * self.widths, strict=True))
         shown = ", ".join(f"{width[w]:.1f} mN at {w:g} rad/s" for w in SHOWN)
@@ -81,23 +81,23 @@ class Result:
             f"Run: {MODEL.title}, all in slip, v = {1e3 * MEAN:g} + {1e3 * SWING:g} cos(w t) mm/s, "
             f"F_s = {STRIBECK.F_s:g}, F_c = {STRIBECK.F_c:g} N, v_s = {1e3 * STRIBECK.v_s:g} mm/s, "
             f"C = {C:g} N/s (chosen by us), w = {OMEGAS[0]:g} to {OMEGAS[-1]:g} rad/s.",
-            f"Measured: at {1e3 * MEAN:g} mm/s there is more friction on the way up than on the "
-            f"way down: by {shown}.",
+            f"Measured: at {1e3 * MEAN:g} mm/s friction is higher during acceleration than "
+            f"during deceleration, by {shown}.",
             f"Measured: of {len(OMEGAS)} loops the widest is at {widest:g} rad/s "
             f"({width[widest]:.0f} mN; C/F_c = {C / STRIBECK.F_c:g}/s) and they close again "
-            f"beyond: {width[100.0]:.0f} mN at 100, {width[600.0]:.0f} mN at 600 rad/s.",
-            'So: friction remembers the speed of s/C ago. "Wider with the frequency" holds up to '
-            "about w = C/s; the frequency of the widest loop tells you C.",
+            f"above that: {width[100.0]:.0f} mN at 100, {width[600.0]:.0f} mN at 600 rad/s.",
+            'So: friction depends on the speed a time s/C ago. "Wider with frequency" holds up to '
+            "about w = C/s; the frequency of the widest loop reveals C.",
         )
 
 
 def run() -> Result:
-    """Move the bank at ten frequencies.
+    """Move the model at ten frequencies.
 
     Returns
     -------
     Result
-        Traces and measured figures.
+        Traces and measured values.
 
     Examples
     --------
@@ -109,7 +109,7 @@ def run() -> Result:
     loops = {w: last_period(trace, w) for w, trace in runs.items()}
     widths = []
     for w, trace in runs.items():
-        # The mean speed is passed downward a quarter of a period after the top, upward at three.
+        # From the top speed, the mean speed comes after a quarter and three quarters of a period.
         top = _end(w) - 2 * math.pi / w
         down, up = trace.sample(top + np.array([0.25, 0.75]) * 2 * math.pi / w).F
         widths.append(up - down)
@@ -121,7 +121,7 @@ def _rig(w: float) -> Prescribed:
 
 
 def _end(w: float) -> float:
-    """Return the end of the first whole period that begins after `SETTLED`, s."""
+    """Return the end of the first complete period that begins after `SETTLED`, s."""
     period = 2 * math.pi / w
     return period * (math.ceil(SETTLED / period) + 1)
 
@@ -134,19 +134,19 @@ def last_period(trace: Trace, w: float) -> Trace:
     trace : Trace
         The run.
     w : float
-        rad/s.
+        Frequency, rad/s.
 
     Returns
     -------
     Trace
-        1001 even samples, from top speed to top speed.
+        1001 evenly spaced samples, from top speed to top speed.
     """
     end = _end(w)
     return trace.sample(np.linspace(end - 2 * math.pi / w, end, 1001).clip(max=trace.t[-1]))
 
 
 def figure(result: Result) -> Figure:
-    """Draw three loops around the steady curve, and their width against frequency.
+    """Draw three loops around the steady curve, and the loop width over frequency.
 
     Parameters
     ----------
@@ -195,15 +195,15 @@ def figure(result: Result) -> Figure:
                 linewidth=1.6,
                 label=f"{w:g} rad/s",
             )
-            for row in (250, 750):  # a head on either branch, where it passes the mean speed
+            for row in (250, 750):  # an arrowhead on each branch, at the mean speed
                 loops.annotate(
                     "",
                     (1e3 * loop.v[row + 4], loop.F[row + 4]),
                     (1e3 * loop.v[row - 4], loop.F[row - 4]),
                     arrowprops={"arrowstyle": "-|>", "color": colour, "mutation_scale": 13},
                 )
-        loops.annotate("speeding up", (1.55, 1.235), color=TEXT_GREY)
-        loops.annotate("slowing down", (0.75, 0.99), color=TEXT_GREY)
+        loops.annotate("accelerating", (1.55, 1.235), color=TEXT_GREY)
+        loops.annotate("decelerating", (0.75, 0.99), color=TEXT_GREY)
         loops.set(xlabel="v [mm/s]", ylabel="F [N]", ylim=(0.96, None))
         loops.set_title(f"a) loops, {MODEL.title}")
         loops.legend(loc="upper right", handlelength=3.2)

@@ -1,15 +1,14 @@
-"""Lesson 8: chart against if-else.
+"""Lesson 8: state chart and if-else code.
 
-The paper runs the model twice, as a state chart and as if-else code, and finds the two about 1e-3
-N apart, with spikes at the transitions. It takes that for the difference between two
-implementations.
+The paper runs the model twice, as a state chart and as if-else code, and finds a difference of
+about 1e-3 N, with spikes at the transitions. It attributes this to the two implementations.
 
-Here both are made from one chart. Driven alike they agree to the last bit, whether the switches
-are located or looked for once a step. What differs is the driving: a guard that is looked at once
-a step answers late. For as long as it is late the force is that of the old state, a spike; and
-after it the element has been stretched too far, by the way the slider made in the meantime, and
-forgets that only slowly. That is a residual of the paper's kind. Its size is a matter of how late
-the switch comes.
+Here both are made from one chart. With the same driver they agree to the last bit, whether the
+switches are located or searched for once per step. The difference comes from the driver: a guard
+that is evaluated once per step responds late. During the delay the force is that of the old state,
+which is a spike. After it the element is stretched too far, by the distance the slider moved in the
+meantime, and this excess decays only slowly. That is a residual like the one in the paper. Its size
+depends on the delay of the switch.
 """
 
 from __future__ import annotations
@@ -31,32 +30,32 @@ if TYPE_CHECKING:
 __all__ = ["QUESTION", "TITLE", "Result", "figure", "predicted", "run"]
 
 TITLE = "Chart or if-else"
-QUESTION = "Does it matter whether a chart decides or an if-else text?"
+QUESTION = "Does it matter whether a chart or if-else code decides?"
 
 MODEL = GMS(GMSParameters.paper("stick-slip"), law="published")
 RIG = Prescribed(VELOCITY)
 END = 30.0  # s
 STEPS = (0.3e-3, 0.9e-3, 2.1e-3, 3.3e-3, 5e-3, 10e-3, 23e-3, 50e-3)  # s
-LOOK = 5.0  # s: when the residual is read, after the first break-away
-PAPERS = 1e-3  # N: the residual the paper prints
+LOOK = 5.0  # s: time at which the residual is read, after the first break-away
+PAPERS = 1e-3  # N: the residual in the paper
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What was run and measured.
+    """The runs and the measured values.
 
     Parameters
     ----------
     chart, ifelse : Trace
-        Switches located; the machines and the if-else text decide.
+        Runs with located switches, decided by the machines and by the if-else code.
     chart_once, ifelse_once : Trace
-        Guards looked at once a step, with the paper's settings.
+        Runs with guards evaluated once per step, with the settings of the paper.
     differ, differ_once : (int, int)
-        Numbers that differ between the two, of how many.
+        How many numbers differ between the two, and how many there are.
     t, residual : ndarray, shape (m,), s and N
-        If-else once a step less chart located.
+        Difference between if-else code once per step and the chart with located switches.
     late, left : ndarray, shape (8,), s and N
-        How late the first break-away comes with each of `STEPS`, and the residual left at `LOOK`.
+        Delay of the first break-away for each of `STEPS`, and the residual at `LOOK`.
     """
 
     chart: Trace
@@ -72,25 +71,25 @@ class Result:
 
     @property
     def replayed(self) -> dict[str, Trace]:
-        """The runs of the replay page, by their names."""
-        return {"chart, located": self.chart, "if-else, once a step": self.ifelse_once}
+        """The runs for the replay page, by name."""
+        return {"chart, located": self.chart, "if-else, once per step": self.ifelse_once}
 
     @property
     def late_for_the_papers(self) -> float:
-        """How late a switch must come to leave the paper's residual, s."""
-        return float(PAPERS * np.median(self.late / self.left))  # it is in proportion
+        """Delay of a switch that leaves the residual of the paper, s."""
+        return float(PAPERS * np.median(self.late / self.left))  # they are proportional
 
     def between(self, begin: float, end: float) -> FloatArray:
-        """Return the size of the residual from begin to end [s], N."""
+        """Return the magnitude of the residual from begin to end [s], N."""
         return np.abs(self.residual[(self.t > begin) & (self.t < end)])
 
     def lines(self) -> tuple[str, ...]:
-        """Return the lesson in five lines.
+        """Return the lesson as five lines.
 
         Returns
         -------
         tuple of str
-            Question, what was run, two lines of measured figures, what follows.
+            Question, runs, two lines of measured values, conclusion.
         """
         log = self.chart.transitions
         first, arrest = float(log.t[0]), float(log.t[log.edge == "arrest"][0])
@@ -99,29 +98,31 @@ class Result:
         return (
             f"Question: {QUESTION}",
             f"Run: {MODEL.title}, Table I (stick-slip), v = {VELOCITY} m/s (chosen by us), "
-            f"{END:g} s; transitions machines and generated if-else, with located switches and "
-            f"looked at once a step (max step {1e3 * PAPER_STEP:g} ms, rtol {PAPER_RTOL:.0e}).",
-            f"Measured, driven alike: {self.differ[0]} of {self.differ[1]} numbers differ with "
-            f"located switches, {self.differ_once[0]} of {self.differ_once[1]} once a step.",
-            f"Measured, once a step against located: {np.median(self.between(0.0, 4.9)):.0e} N "
+            f"{END:g} s; transitions machines and generated if-else code, with located switches, "
+            f"and with guards evaluated once per step (max step {1e3 * PAPER_STEP:g} ms, rtol "
+            f"{PAPER_RTOL:.0e}).",
+            f"Measured with the same driver: {self.differ[0]} of {self.differ[1]} numbers differ "
+            f"with located switches, {self.differ_once[0]} of {self.differ_once[1]} once per step.",
+            f"Measured, once per step minus located: {np.median(self.between(0.0, 4.9)):.0e} N "
             f"before the first break-away, a spike of {spike:.2f} N at it, then "
             f"{after:.0e} N; the arrests at {arrest:.1f} s "
-            f"are missed, and the runs part by up to {self.between(arrest, END).max():.1f} N. The "
-            f"paper's {PAPERS:.0e} N takes a switch that comes "
+            f"are missed, and the runs diverge by up to {self.between(arrest, END).max():.1f} N. "
+            f"The paper's {PAPERS:.0e} N needs a switch that is "
             f"{1e3 * self.late_for_the_papers:.1f} ms late.",
-            "So: chart and if-else are one program; what differs is when the guards are asked. "
-            f"Steps of {1e3 * PAPER_STEP:g} ms explain the paper's residual in kind, spikes and "
-            f"all, but here they leave it {PAPERS / after:.0f} times smaller.",
+            "So: chart and if-else code are one program; what differs is when guards are "
+            "evaluated. "
+            f"Steps of {1e3 * PAPER_STEP:g} ms explain the shape of the paper's residual, "
+            f"including the spikes, but here it is {PAPERS / after:.0f} times smaller.",
         )
 
 
 def run() -> Result:
-    """Run the chart and the if-else text under both drivers, and make switches later and later.
+    """Run the chart and the if-else code with both drivers, and with increasing delays.
 
     Returns
     -------
     Result
-        Traces and measured figures.
+        Traces and measured values.
     """
     chart, ifelse = (simulate(MODEL, RIG, END, engine=e) for e in ("machines", "ifelse"))
     chart_once, ifelse_once = (
@@ -147,29 +148,29 @@ def run() -> Result:
 
 
 def _late(step: float, chart: Trace) -> tuple[float, float]:
-    """Return how late the first break-away comes [s] and what residual is left at `LOOK` [N]."""
+    """Return the delay of the first break-away [s] and the residual at `LOOK` [N]."""
     looked = simulate(MODEL, RIG, LOOK, method="rk4", step=step, events="step", engine="ifelse")
     left = looked.sample([LOOK]).F - chart.sample([LOOK]).F
     return float(looked.transitions.t[0] - chart.transitions.t[0]), float(np.abs(left)[0])
 
 
 def predicted(late: FloatArray, chart: Trace) -> FloatArray:
-    """Return the residual that a late first break-away must leave at `LOOK`.
+    """Return the residual at `LOOK` expected from a late first break-away.
 
-    While the switch is late the slider moves by v late, and so do the deflections; after it each
-    excess dies as exp(-C t / s).
+    During the delay the slider moves by v late, and so do the deflections; afterwards each excess
+    decays as exp(-C t / s).
 
     Parameters
     ----------
     late : ndarray, shape (m,), s
-        How late.
+        Delays.
     chart : Trace
         The run with located switches.
 
     Returns
     -------
     ndarray, shape (m,), N
-        The residual.
+        The residuals.
     """
     p, first = MODEL.parameters, chart.transitions[0]
     rate = p.C / first.s  # 1/s
@@ -178,7 +179,7 @@ def predicted(late: FloatArray, chart: Trace) -> FloatArray:
 
 
 def figure(result: Result) -> Figure:
-    """Draw the friction, the residual over time, the spike, and the residual against lateness.
+    """Draw the friction, the residual over time, the spike, and the residual over the delay.
 
     Parameters
     ----------
@@ -206,7 +207,7 @@ def figure(result: Result) -> Figure:
         force, residual, zoom, lateness = (axes[letter] for letter in "abcd")
         looks = (
             (result.chart, "chart, located", INK, "-"),
-            (result.ifelse_once, "if-else, once a step", VERMILION, "--"),
+            (result.ifelse_once, "if-else, once per step", VERMILION, "--"),
         )
         for trace, name, colour, dash in looks:
             (line,) = panels.force(force, trace)
@@ -225,8 +226,8 @@ def figure(result: Result) -> Figure:
             ("spike at the\nbreak-away", (first + 0.25, 0.06), "left"),
             ("missed arrests →", (arrest - 0.2, 2.0), "right"),
             (
-                f"driven alike: {result.differ[0]} of {result.differ[1]} numbers differ (located), "
-                f"{result.differ_once[0]} of {result.differ_once[1]} (once a step)",
+                f"same driver: {result.differ[0]} of {result.differ[1]} numbers differ (located), "
+                f"{result.differ_once[0]} of {result.differ_once[1]} (once per step)",
                 (END - 0.3, 3e-7),
                 "right",
             ),
@@ -243,7 +244,7 @@ def figure(result: Result) -> Figure:
         near = (rows.t > window[0]) & (rows.t < window[1]) & (rows.microstep == 0)
         zoom.plot(1e3 * (rows.t[near] - first), rows.F[near], "o", color=VERMILION, markersize=5)
         zoom.set(xlabel=f"t − {first:.4f} s [ms]", ylabel="F [N]", xlim=(-0.8, 1.2))
-        zoom.set_title("c) the break-away: once a step it comes late")
+        zoom.set_title("c) the break-away: late if once per step")
         zoom.annotate(
             "dots: ends of steps",
             (0.97, 0.94),
@@ -260,7 +261,7 @@ def figure(result: Result) -> Figure:
 
 
 def _draw_lateness(ax: Axes, result: Result) -> None:
-    """Draw what a switch leaves over how late it is."""
+    """Draw the residual of a switch over its delay."""
     from plots.style import BLUE, LINE_GREY, TEXT_GREY, VERMILION
 
     times = np.geomspace(0.5 * result.late.min(), 2 * result.late.max(), 20)
@@ -276,12 +277,12 @@ def _draw_lateness(ax: Axes, result: Result) -> None:
         fontsize=8,
     )
     ax.annotate(
-        "line: v late Σ k, dying\nas exp(−C t/s)",
+        "line: v late Σ k, decaying\nas exp(−C t/s)",
         (0.97, 0.05),
         xycoords="axes fraction",
         ha="right",
         color=TEXT_GREY,
         fontsize=8,
     )
-    ax.set(xlabel="lateness of the switch [ms]", ylabel=f"difference at {LOOK:g} s [N]")
-    ax.set_title("d) what a late switch leaves")
+    ax.set(xlabel="delay of the switch [ms]", ylabel=f"difference at {LOOK:g} s [N]")
+    ax.set_title("d) residual of a late switch")

@@ -1,10 +1,10 @@
-"""The paper's two experiments, run, drawn, and judged claim by claim.
+"""Reproduction of the paper's two experiments: runs, figures and an assessment of each claim.
 
-Here are the numbers and signals of the experiments, which the help of the command line shows;
-`gms_fsm.app.paper.experiments` runs them, `gms_fsm.app.paper.claims` judges them,
-`gms_fsm.app.paper.writing` writes what came out. The paper prints neither the applied force of
-Fig. 3 nor the velocity of Fig. 4 nor its guards; what is used here is chosen by us, said in the
-output, and can be changed.
+This module has the numbers and signals of the experiments, which the help of the command line
+shows. `gms_fsm.app.paper.experiments` runs them, `gms_fsm.app.paper.claims` assesses the claims,
+and `gms_fsm.app.paper.writing` writes the results. The paper prints neither the applied force of
+Fig. 3 nor the velocity of Fig. 4 nor the guards. Those used here were chosen by us; the output
+says so, and they can be changed.
 
 References
 ----------

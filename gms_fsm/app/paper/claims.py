@@ -1,4 +1,4 @@
-"""The paper's claims, each held against the runs."""
+"""The paper's claims, each compared with the runs."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from gms_fsm.traces.trace import Trace
 
 __all__ = ["Claim", "differing_numbers", "force_difference", "judge"]
 
-SAMPLES_PER_SECOND = 200  # of the common grid on which forces are subtracted
+SAMPLES_PER_SECOND = 200  # of the common time grid for force differences
 
 
 @dataclass(frozen=True)
 class Claim:
-    """One claim of the paper with what was measured and what follows.
+    """One claim of the paper, with the measurements and the verdict.
 
     Parameters
     ----------
     figure : str
-        Where the paper makes it.
+        Figure or section in which the paper makes the claim.
     text : str
         The claim.
     measured : str
-        Figures with units.
+        Measured values with units.
     verdict : str
         ``holds``, ``holds only with ...`` or ``differs``, with a reason.
     """
@@ -39,17 +39,17 @@ class Claim:
 
 
 def judge(traces: Mapping[str, Trace]) -> list[Claim]:
-    """Hold every claim of the paper against the runs.
+    """Compare every claim of the paper with the runs.
 
     Parameters
     ----------
     traces : mapping of str to Trace
-        From `run`, with the default signals (the claims are about those).
+        From `run`, with the default signals, to which the claims refer.
 
     Returns
     -------
     list of Claim
-        In the paper's order.
+        In the order of the paper.
     """
     return [*_judge_figure_3(traces), *_judge_figure_4(traces), *_judge_implementations(traces)]
 
@@ -77,14 +77,14 @@ def _judge_figure_3(traces: Mapping[str, Trace]) -> list[Claim]:
         Claim(
             "Fig. 3b",
             "GMS is linearly elastic while the force rises",
-            f"0.2–2 s: F against x is a line of {slope:.1f} N/m (sum of k: {K:.1f} N/m), largest "
-            f"deviation {100 * bend:.2f} % of F",
+            f"0.2–2 s: F over x is a line of {slope:.1f} N/m (sum of k: {K:.1f} N/m), "
+            f"largest deviation {100 * bend:.2f} % of F",
             _verdict(abs(slope / K - 1) < 0.05 and bend < 0.02),
         ),
         Claim(
             "Fig. 3b",
             "hysteresis when the force falls",
-            f"at equal x the rising branch lies {1e3 * gap.min():.1f} to {1e3 * gap.max():.1f} mN "
+            f"at equal x the rising branch is {1e3 * gap.min():.1f} to {1e3 * gap.max():.1f} mN "
             "above the falling one; all of it is viscous (every element sticks)",
             f"holds only {spring_only.replace('as that of', 'as the damping of')}"
             if gap.min() > 0
@@ -210,21 +210,22 @@ def _judge_implementations(traces: Mapping[str, Trace]) -> list[Claim]:
         Claim(
             "Fig. 4d–e",
             "… with spikes at the transitions",
-            "if-else looked at once a step (max step 1e-3 s, rtol 1e-4) against located switches: "
-            f"|dF| {np.median(quiet):.1e} N before the first break-away (median), a spike of "
-            f"{between.max():.2f} N at it, then {np.median(between):.1e} N (median) to the "
-            "reversal at 12.5 s. There the sampled guards miss the arrest, and the runs part: "
+            "if-else evaluated once per step (max step 1e-3 s, rtol 1e-4), compared with located "
+            f"switches: |dF| {np.median(quiet):.1e} N before the first break-away (median), a "
+            "spike "
+            f"of {between.max():.2f} N at it, then {np.median(between):.1e} N (median) to the "
+            "reversal at 12.5 s. There the sampled guards miss the arrest, and the runs diverge: "
             f"up to {after.max():.1f} N, {lost} of {total} transitions lost",
-            "holds only with guards looked at once a step: the residual is the switching rule's "
-            "sampling, not the implementation",
+            "holds only with guards evaluated once per step: the residual comes from sampling the "
+            "switching rule, not from the implementation",
         ),
         Claim(
             "Fig. 3b–c",
             "a residual of about 1e-4 N and 1e-6 m in the non-drifting run",
             f"the same comparison in Fig. 3: largest |dF| {np.abs(d3).max():.1e} N, |dx| "
             f"{np.abs(x3).max():.1e} m; it comes from the tolerance 1e-4 alone (no transition)",
-            "differs: identical under one driver, and looking once a step at the paper's tolerance "
-            "explains less than the paper prints",
+            "differs: identical under one driver, and guards evaluated once per step at the "
+            "paper's tolerance explain less than the paper reports",
         ),
     ]
 
@@ -261,7 +262,7 @@ def _break_aways(trace: Trace, half_period: float = 12.5) -> list[list[float]]:
 def _asymmetry(trace: Trace, half_period: float) -> float:
     """Return the largest |F(t) + F(t + half period)| [N] in the second half of the run."""
     end = trace.t[-1]
-    # A millisecond beside the break-aways: there two equal jumps need not fall on the same sample.
+    # Omit 1 ms around break-aways, where equal jumps need not fall on the same sample.
     grid = np.arange(end / 2, end - half_period, 1 / SAMPLES_PER_SECOND)
     jumps = np.concatenate([trace.transitions.t, trace.transitions.t - half_period])
     if jumps.size:
@@ -283,12 +284,12 @@ def differing_numbers(a: Trace, b: Trace) -> tuple[int, int]:
     Parameters
     ----------
     a, b : Trace
-        Of the same model and rig.
+        Runs of the same model and rig.
 
     Returns
     -------
     (int, int)
-        How many differ, of how many; all differ if the traces have other lengths.
+        How many numbers differ, and how many there are; all differ if the lengths differ.
     """
     total = sum(getattr(a, name).size for name in ("t", "x", "v", "z", "F", "F_elements"))
     if len(a) != len(b):
@@ -301,14 +302,14 @@ def differing_numbers(a: Trace, b: Trace) -> tuple[int, int]:
 
 
 def force_difference(a: Trace, b: Trace) -> tuple[FloatArray, FloatArray]:
-    """Return common times [s] and the difference of the friction forces there [N].
+    """Return common times [s] and the differences of the friction forces there [N].
 
     The times are an even grid and the transitions of `b`, where the residual has its spikes.
 
     Parameters
     ----------
     a, b : Trace
-        Of the same length in time.
+        Runs of equal duration.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The runs of the paper's two experiments: what runs, and how."""
+"""The runs of the paper's two experiments: systems and settings."""
 
 from __future__ import annotations
 
@@ -21,20 +21,21 @@ Progress = Callable[[str, float], object]
 
 @dataclass(frozen=True)
 class Experiment:
-    """One run of the reproduction: its name, what runs, and how.
+    """One run of the reproduction: name, system and settings.
 
     Parameters
     ----------
     name : str
         File name of its trace.
     model, rig
-        What runs.
+        The simulated system.
     t_end : float
-        s.
+        End time, s.
     engine : str
-        Who decides.
+        The engine.
     paper_settings : bool
-        Guards looked at once a step, step at most 1e-3 s, rtol 1e-4, instead of located switches.
+        Guards evaluated once per step, steps of at most 1e-3 s and rtol 1e-4, instead of located
+        switches.
     """
 
     name: str
@@ -58,7 +59,7 @@ def experiments(force: str = FORCE, velocity: str = VELOCITY) -> tuple[Experimen
     Returns
     -------
     tuple of Experiment
-        Fig. 3 first.
+        The runs, those of Fig. 3 first.
 
     Examples
     --------
@@ -87,7 +88,7 @@ def experiments(force: str = FORCE, velocity: str = VELOCITY) -> tuple[Experimen
 
 
 def lugre_like(parameters: GMSParameters) -> LuGre:
-    """Return the LuGre model a column is compared with."""
+    """Return the LuGre model with which a column is compared."""
     own: Any = BENCHMARK.values
     return LuGre(**own, sigma_2=parameters.sigma_2, stribeck=parameters.stribeck)
 
@@ -100,19 +101,19 @@ def run(
     Parameters
     ----------
     force, velocity : str
-        The signals the paper does not print.
+        The signals that the paper does not print.
     progress : callable, optional
         ``progress(name, done)`` with done from 0 to 1.
 
     Returns
     -------
     dict of str to Trace
-        By the experiments' names.
+        Traces by the names of the experiments.
 
     Raises
     ------
     SimulationError
-        If a run cannot go on (a signal that is not finite, say).
+        If a run cannot continue, for example because a signal is not finite.
     """
     return {e.name: run_one(e, progress) for e in experiments(force, velocity)}
 
@@ -123,7 +124,7 @@ def run_one(experiment: Experiment, progress: Progress | None = None) -> Trace:
     Parameters
     ----------
     experiment : Experiment
-        What to run.
+        The experiment.
     progress : callable, optional
         ``progress(name, done)`` with done from 0 to 1.
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm._files import output_folder, written_whole
+from gms_fsm._files import output_folder, write_whole
 from gms_fsm.app.paper import FORCE, VELOCITY
 from gms_fsm.app.paper.claims import Claim, differing_numbers, force_difference, judge
 from gms_fsm.app.paper.experiments import Progress, experiments, run_one
@@ -33,14 +33,14 @@ def write(
     velocity: str = VELOCITY,
     progress: Progress | None = None,
 ) -> list[Path]:
-    """Run everything and write figures, charts, traces, logs and the table of claims.
+    """Run all experiments and write figures, charts, traces, logs and the table of claims.
 
     Parameters
     ----------
     folder : str or Path
-        Made where missing.
+        Output folder; created if it does not exist.
     force, velocity : str
-        The signals the paper does not print, in the expression language.
+        The signals that the paper does not print, in the expression language.
     progress : callable, optional
         ``progress(name, done)``.
 
@@ -52,9 +52,9 @@ def write(
     Raises
     ------
     OutputError
-        If the folder cannot be written (said before anything is run).
+        If the folder is not writable (checked before the runs).
     SimulationError
-        If a run cannot go on; its part so far is written to ``partial.npz``.
+        If a run cannot continue; the run so far is written to ``partial.npz``.
     """
     from plots import formats
 
@@ -75,7 +75,7 @@ def write(
             raise error.replaced(kept=kept).inside(name) from error.__cause__
         files += _keep(folder, name, traces[name])
     text = claims_text(traces, force, velocity)
-    claims = written_whole(folder / "claims.md", lambda file: file.write(text.encode()))
+    claims = write_whole(folder / "claims.md", lambda file: file.write(text.encode()))
     files += _draw_charts(folder)
     try:
         files += _draw_figures(folder, traces, force)
@@ -85,12 +85,12 @@ def write(
 
 
 def _keep(folder: Path, name: str, trace: Trace) -> list[Path]:
-    """Write a run as soon as it is done: a later failure must not lose it."""
+    """Write a run as soon as it is complete, so that a later failure cannot lose it."""
     log = trace.transitions_csv().encode()
     path = folder / "transitions" / f"{name}.csv"
     return [
         trace.save(folder / "traces" / f"{name}.npz"),
-        written_whole(path, lambda file: file.write(log)),
+        write_whole(path, lambda file: file.write(log)),
     ]
 
 
@@ -109,7 +109,7 @@ def _draw_charts(folder: Path) -> list[Path]:
         for name, graph in pictures.items()
         for ending in formats.endings("graph", usual=True)
     ]
-    return list(dict.fromkeys(files))  # without Graphviz both endings give one DOT text
+    return list(dict.fromkeys(files))  # without Graphviz both endings give one DOT file
 
 
 def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list[Path]:
@@ -154,7 +154,7 @@ def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list
                     traces["fig3_step"], traces["fig3_chart"]
                 ),
             },
-            "Guards looked at once a step (max step 1e-3 s, rtol 1e-4) against located switches",
+            "Guards evaluated once per step (max step 1e-3 s, rtol 1e-4) and located switches",
         ),
     }
     return [
@@ -172,7 +172,7 @@ def claims_text(traces: Mapping[str, Trace], force: str = FORCE, velocity: str =
     traces : mapping of str to Trace
         From `run`.
     force, velocity : str
-        The signals they were run with; with other than our own the claims are not judged.
+        The signals of the runs; the claims are assessed only for the default signals.
 
     Returns
     -------
@@ -193,7 +193,7 @@ def claims_text(traces: Mapping[str, Trace], force: str = FORCE, velocity: str =
         table = _table(judge(traces))
     else:
         table = [
-            "Not judged: the claims are about the signals chosen for the reproduction, and these "
+            "Not assessed: the claims refer to the signals chosen for the reproduction, and these "
             "were changed. Run without --force and --velocity for the table."
         ]
     lugre = ", ".join(
@@ -218,10 +218,10 @@ def claims_text(traces: Mapping[str, Trace], force: str = FORCE, velocity: str =
             "Eq. (1) of the paper, `dz = sgn(v) C (1 - z/s(v))`, and the signed law of Al-Bender, "
             "Lampaert and Swevers (2005), `dz = C (sgn(v) - z/s(v))`, agree for v > 0. For v < 0 "
             "the printed law is unstable about z = +s (eigenvalue +C/s): once an element slips "
-            "backward its |z| grows until v turns. The elements then arrest late or not at all "
+            "backward, its |z| grows until v reverses. The elements then arrest late or not at all "
             "(|z| < s fails), and the later forward break-aways split. Fig. 4's several peaks and "
-            "its asymmetry rest on this sign; under the signed law, same signal, both are gone "
-            "(`fig4_laws.png`).",
+            "its asymmetry rest on this sign; under the signed law, with the same signal, both are "
+            "gone (`fig4_laws.png`).",
             "",
             "## Machines and if-else",
             "",
@@ -235,7 +235,7 @@ def claims_text(traces: Mapping[str, Trace], force: str = FORCE, velocity: str =
             "- the text of the guards: our reading of Section II-D (`gms-fsm code` prints them)",
             f"- LuGre: {lugre}, and the column's F_s, F_c, v_s, sigma_2",
             "- the absolute tolerances, from the models' own scales (`gms_fsm.lowering.scales`); "
-            "where not said otherwise rtol is 1e-6 and switches are located",
+            "unless stated otherwise, rtol is 1e-6 and switches are located",
             "- the run with weights w_i = 0.25/k_i, in which an element slips (`fig3_slipping`)",
             "",
             "## Runs",

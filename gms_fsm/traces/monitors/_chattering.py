@@ -28,13 +28,13 @@ def chattering(monitor: Chattering, trace: Trace, error: Exception | None) -> Ch
         parts.append(
             f"{elements_text([first.element])}{others} took {first.edge}"
             f"{f', and back {back},' if back else ''} {first.count} times in {span:.3g} s, from "
-            f"t = {first.t_first:.9g} s ({values_text(first.values)}): {_way_out(trace, first)}"
+            f"t = {first.t_first:.9g} s ({values_text(first.values)}): {_advice(trace, first)}"
         )
     quiet = f"no element took an edge {monitor.times} times within {monitor.within:g} s"
     return ChatteringVerdict(not parts, "; ".join(parts) or quiet, episodes, livelock)
 
 
-def _way_out(trace: Trace, episode: Episode) -> str:
+def _advice(trace: Trace, episode: Episode) -> str:
     texts = [
         f"{edge} [{trace.model.chart.guard_text(edge)}]" for edge in (episode.edge, *episode.back)
     ]

@@ -68,7 +68,7 @@ def passivity(monitor: Passivity, trace: Trace) -> PassivityVerdict:
         made_until=tuple(times[until].tolist()),
         tolerance=tuple(tolerance.tolist()),
     )
-    parts = _told(verdict, trace, lost)
+    parts = _sentences(verdict, trace, lost)
     if endless.size:
         parts.append(f"values are not finite after t = {t[end]:.6g} s")
     if (doubt.sum(axis=0) > 0.01 * turnover).any():
@@ -177,7 +177,7 @@ def _rates(trace: Trace, row: int) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def _told(verdict: PassivityVerdict, trace: Trace, lost: FloatArray) -> list[str]:
+def _sentences(verdict: PassivityVerdict, trace: Trace, lost: FloatArray) -> list[str]:
     """Describe the energies in words."""
     chart, tolerance = trace.model.chart, verdict.tolerance
     over = [i for i in range(trace.n) if verdict.deficit[i] > tolerance[i]]
