@@ -258,7 +258,7 @@ def test_a_user_defined_rig_is_refused_with_an_explanation(kind: str, tmp_path: 
     assert told == [], "before the run"
     trace = simulate(stick_slip("signed"), rig, 1.0)
     for name in ("run.npz", "run.csv"):
-        with pytest.raises(OutputError, match="it can hold Prescribed, Slider, PulledSlider"):
+        with pytest.raises(OutputError, match="a file can store Prescribed, Slider, PulledSlider"):
             trace.save(tmp_path / name)
     with pytest.raises(OutputError, match="a custom class"):
         Session(stick_slip("signed"), rig, 1.0).save(tmp_path / "session.json")

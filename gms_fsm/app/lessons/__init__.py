@@ -7,8 +7,8 @@ number is measured in that run.
 >>> for number, lesson in LESSONS.items():
 ...     print(number, lesson.QUESTION)
 1 What is pre-sliding hysteresis?
-2 Why does LuGre drift, and GMS not?
-3 What happens when a stepper misses v_c?
+2 Why does LuGre drift and GMS not?
+3 What happens when an integrator misses v_c?
 4 What depends on the sign of s(v) for v < 0?
 5 How many elements are enough?
 6 Why does a pulled mass stick and slip?
