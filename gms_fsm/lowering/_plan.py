@@ -230,7 +230,7 @@ def plan_of(read: Assembly) -> Plan:
             for block in held.blocks
         ),
     )
-    landmarks = [r for bank in read.banks if bank.threshold for r in _landmarks(bank)]
+    landmarks = [r for bank in read.banks if _reads_curve(bank) for r in _landmarks(bank)]
     always = [relation for u in outer for relation in both_sides(u)] + landmarks
     smoothing = _Smoothing(held, names)
     charts = " and ".join(dict.fromkeys(bank.chart.name for bank in read.banks))
@@ -403,6 +403,10 @@ def both_sides(u: Value) -> tuple[Comparison, Comparison]:
     """Return the comparisons of a value with zero: u > 0 and u >= 0."""
     zero = Number(0.0)
     return Comparison(u, zero, strict=True), Comparison(u, zero, strict=False)
+
+
+def _reads_curve(bank: Bank) -> bool:
+    return bool(bank.threshold) and "s" in bank.chart.inputs
 
 
 def _landmarks(bank: Bank) -> list[Comparison]:

@@ -584,12 +584,11 @@ def system_of(model: Model, rig: Rig) -> System:
 
 def _balance(acceleration: Value, rig: Rig) -> tuple[Value, Value]:
     """Split an acceleration into (force - F) / inertia."""
-    F = Name("F")
     match acceleration:
-        case Binary("/", Binary("-", force, right), inertia) if right == F and not (
-            {"F"} & (names_in(force) | names_in(inertia))
-        ):
-            return force, inertia
+        case Binary("/", numerator, inertia) if "F" not in names_in(inertia):
+            force, sign = _without_force(numerator)
+            if sign == -1:
+                return force, inertia
     slope = derivative(acceleration, "F")
     if slope is None or "F" in names_in(slope) or slope == Number(0.0):
         raise ParameterError(
@@ -597,8 +596,35 @@ def _balance(acceleration: Value, rig: Rig) -> tuple[Value, Value]:
             place=f"rig {rig.title!r}",
             advice="it must be linear in F, for example '(F_a - F) / mass'",
         )
-    inertia = Negative(Binary("/", Number(1.0), slope))
+    if slope == Number(-1.0):
+        force, sign = _without_force(acceleration)
+        if sign == -1:
+            return force, Number(1.0)
+    inertia = Binary("/", Number(-1.0), slope)
     return Binary("*", renamed(acceleration, {"F": Number(0.0)}), inertia), inertia
+
+
+def _without_force(tree: Value) -> tuple[Value, int]:
+    """Return a sum without its term F, and the sign of that term; 0 if there is no such term."""
+    match tree:
+        case Name("F"):
+            return Number(0.0), 1
+        case Negative(operand):
+            rest, sign = _without_force(operand)
+            return rest if rest == Number(0.0) else Negative(rest), -sign
+        case Binary("+" | "-" as op, left, right):
+            inside, other = names_in(left), names_in(right)
+            if "F" in inside and "F" not in other:
+                rest, sign = _without_force(left)
+                if rest == Number(0.0):
+                    return right if op == "+" else Negative(right), sign
+                return Binary(op, rest, right), sign
+            if "F" in other and "F" not in inside:
+                rest, sign = _without_force(right)
+                if rest == Number(0.0):
+                    return left, sign if op == "+" else -sign
+                return Binary(op, left, rest), sign if op == "+" else -sign
+    return tree, 0
 
 
 def is_zero(tree: Value, numbers: Mapping[str, float]) -> bool:

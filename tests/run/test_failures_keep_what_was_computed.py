@@ -82,7 +82,7 @@ ARGUMENTS = [
     _wrong("t_eval", [[0.1, 0.2]], "t_eval", "flat list"),
     _wrong("t_eval", ["a"], "t_eval", "a"),
     _wrong("t_eval", "often", "t_eval", "often"),
-    _wrong("initial", {"q": [1]}, "'q'", "'x', 'v', 'z', 'states'"),
+    _wrong("initial", {"q": [1]}, "'q'", "'x', 'z', 'states'"),
     _wrong("initial", {"z": [1.0]}, "initial['z'] has 1 entries", "4 elements"),
     _wrong("initial", {"z": [1.0] * 5}, "initial['z'] has 5 entries", "4 elements"),
     _wrong("initial", {"z": 1.0}, "initial['z'] has shape ()"),
