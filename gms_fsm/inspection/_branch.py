@@ -195,7 +195,7 @@ class Branch:
                 len(raw), start.program.layout.modes
             ),
         )
-        return Trace(rows, rows, log_of(self.log()), start.model, start.rig, start.settings)
+        return start.trace(rows, rows, log_of(self.log()))
 
 
 @contextmanager

@@ -24,7 +24,16 @@ from gms_fsm.errors import ParameterError, shown
 from gms_fsm.language import names_in
 from gms_fsm.lowering._assembly import Assembly, Bank, of
 
-__all__ = ["LOG_NUMBERS", "LOG_TEXTS", "BankPlaces", "Block", "Layout", "LogRecord", "Places"]
+__all__ = [
+    "CONTACT",
+    "LOG_NUMBERS",
+    "LOG_TEXTS",
+    "BankPlaces",
+    "Block",
+    "Layout",
+    "LogRecord",
+    "Places",
+]
 
 Name = TypeVar("Name", bound=Hashable)
 
@@ -571,8 +580,10 @@ class LogRecord(NamedTuple):
     s: float
     F_before: float
     F_after: float
+    contact: str = ""  # in a run of a system; of one model there is one contact only
 
 
 LOG_TEXTS = ("edge", "source", "target")
+CONTACT = "contact"  # a column of the logs of systems only
 # In the order in which machine code stores them for a firing.
 LOG_NUMBERS = ("z", "v", "s", "F_before", "F_after")

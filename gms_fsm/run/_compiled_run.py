@@ -59,7 +59,7 @@ class CompiledRun:
         self.recorder: Recording = self.columns
         self.engine: MachineEngine | None = None
         if machines is not None:
-            self.engine = MachineEngine(machines, program, start.mode)
+            self.engine = MachineEngine([machines], program, start.mode)
 
     @property
     def buffers(self) -> hybrid.Buffers:
@@ -78,8 +78,9 @@ class CompiledRun:
         if self.engine is not None:
             self.engine.restore(t, y, mode[self.start.program.layout.elements])
             if counts[loop.PHASE] == loop.FIRE:  # its callbacks have run, the loop has yet to fire
-                edge = self.start.model.chart.transitions[counts[loop.EDGE]]
-                self.engine.set_state(int(counts[loop.MACHINE]), edge.target)
+                machine = int(counts[loop.MACHINE])
+                _, edge = self.start.edge(machine, int(counts[loop.EDGE]))
+                self.engine.set_state(machine, edge.target)
 
     def reset(self, model: Model, rig: Rig) -> None:
         """Start over with different numbers; signals and initial values stay.
@@ -294,17 +295,23 @@ class Columns:
 
     def transitions(self) -> Any:
         """Return the transition log."""
-        chart, log, count = self.start.model.chart, self.log, int(self.log.counts[FIRINGS])
-        edges = log.edge[:count]
+        start, log, count = self.start, self.log, int(self.log.counts[FIRINGS])
+        every = [edge for each in start.system.contacts for edge in each.chart.transitions]
+        edges, machines = log.edge[:count], np.asarray(log.machine[:count])
         texts = [
-            np.array([getattr(edge, name) for edge in chart.transitions], dtype=np.str_)[edges]
+            np.array([getattr(edge, name) for edge in every], dtype=np.str_)[edges]
             for name in ("name", "source", "target")
-            if chart.transitions
+            if every
         ] or [np.empty(0, dtype=np.str_) for _ in LOG_TEXTS]
         numbers: Any = log.numbers
-        columns = {"t": log.t[:count], "element": log.machine[:count]}
+        banks = start.program.layout.banks
+        whose = np.searchsorted([bank.first for bank in banks], machines, "right") - 1
+        firsts = np.array([bank.first for bank in banks])
+        columns: dict[str, Any] = {"t": log.t[:count], "element": machines - firsts[whose]}
         columns |= zip(LOG_TEXTS, texts, strict=True)
         columns |= zip(LOG_NUMBERS, numbers[:count].T, strict=True)
+        if start.given is not None and count:
+            columns["contact"] = np.array([bank.name for bank in banks])[whose]
         return log_from(columns)
 
     def trace(self) -> Trace:
@@ -325,7 +332,7 @@ class Columns:
                 log.stops_y,
                 log.stops_mode,
             )
-        return Trace(rows, stops, self.transitions(), start.model, start.rig, start.settings)
+        return start.trace(rows, stops, self.transitions())
 
 
 def _doubled(column: Any) -> Any:

@@ -166,10 +166,11 @@ class Recorder:
         self.latest = latest
 
     def _record(self, firing: Firing) -> LogRecord:
-        start, i = self.start, firing.machine
-        edge = start.model.chart.transitions[firing.edge]
+        start = self.start
+        bank, edge = start.edge(firing.machine, firing.edge)
+        i, contact = firing.machine - bank.first, start.system.contact(bank.name)
         before, after = (
-            Scope.of(start.model, start.program, firing.t, y, mode)
+            Scope.of(contact, start.program, firing.t, y, mode, bank.name)
             for y, mode in ((firing.y_before, firing.mode_before), (firing.y, firing.mode))
         )
         return LogRecord(
@@ -178,11 +179,12 @@ class Recorder:
             edge=edge.name,
             source=edge.source,
             target=edge.target,
-            z=before.z[i],
+            z=before.z[i] if bank.variables else math.nan,
             v=before.v,
             s=before.s[i],
             F_before=before.F,
             F_after=after.F,
+            contact="" if start.given is None else bank.name,
         )
 
     def trace(self) -> Trace:
@@ -195,7 +197,7 @@ class Recorder:
             self.rows.add(t, 0, y, mode)
         rows = self.rows.rows(layout)
         stops = self.stops.rows(layout) if start.output == "t_eval" else rows
-        return Trace(rows, stops, log_of(self.log), start.model, start.rig, start.settings)
+        return start.trace(rows, stops, log_of(self.log))
 
 
 @dataclass(frozen=True, eq=False)

@@ -155,6 +155,8 @@ class ElementMachines:
         for state in chart.states:
             rows = []
             for index, edge in enumerate(chart.transitions):
+                if edge.source != state.name:  # an edge may leave several states
+                    continue
                 for transition in self.machine.get_transitions(edge.name, source=state.name):
                     conditions = [c.func for c in transition.conditions]
                     if conditions != [self.guards[edge.name]] or transition.dest != edge.target:
@@ -226,17 +228,33 @@ class Interference(Exception):
 
 
 class MachineEngine:
-    """Evaluates and fires the `transitions` machines."""
+    """Evaluates and fires the `transitions` machines of all contacts.
 
-    def __init__(self, machines: ElementMachines, program: Program, mode: list[int]) -> None:
-        self.machines, self.program = machines, program
-        self.chart = machines.model.chart
-        self.table = machines.table(self.chart)
+    Parameters
+    ----------
+    parts : sequence of ElementMachines
+        One for each contact.
+    program : Program
+        Of the run.
+    mode : list of int
+        Active state of each element.
+    """
+
+    def __init__(self, parts: Sequence[ElementMachines], program: Program, mode: list[int]) -> None:
+        self.program, self.banks = program, program.layout.banks
+        self.parts = [part for part in parts for _ in part.elements]  # by machine
+        self.elements = [element for part in parts for element in part.elements]
+        tables = [
+            _numbered(each, bank.first_edge) for each, bank in zip(parts, self.banks, strict=True)
+        ]
+        self.tables = [
+            table for table, part in zip(tables, parts, strict=True) for _ in part.elements
+        ]
         self.shown = [0.0] * program.layout.shown.size
         self.values = GuardValues(program.layout)
         # Bypasses __setattr__ of the elements, which would cost time.
-        self.seen_by = [vars(element) for element in machines.elements]
-        self.states = [""] * len(mode)
+        self.seen_by = [vars(element) for element in self.elements]
+        self.states = [""] * len(self.elements)
         self.set_states(mode)
 
     def restore(self, t: float, y: list[float], mode: Sequence[int]) -> None:
@@ -247,11 +265,11 @@ class MachineEngine:
     def set_states(self, mode: Sequence[int]) -> None:
         """Put every element into a state, without callbacks."""
         for i, state in enumerate(mode):
-            self.set_state(i, self.chart.states[state].name)
+            self.set_state(i, self.parts[i].model.chart.states[state].name)
 
     def set_state(self, machine: int, state: str) -> None:
         """Put one element into a state, without callbacks."""
-        self.machines.machine.set_state(state, self.machines.elements[machine])
+        self.parts[machine].machine.set_state(state, self.elements[machine])
         self.states[machine] = state
 
     def show(self, t: float, y: list[float], mode: list[int]) -> None:
@@ -266,9 +284,9 @@ class MachineEngine:
         """Fill the first enabled edge of each element, or -1."""
         del p  # the program has the same values
         self.show(t, y, mode)
-        for i, element in enumerate(self.machines.elements):
+        for i, element in enumerate(self.elements):
             edges[i] = -1
-            for edge, guard in self.table[mode[i]]:
+            for edge, guard in self.tables[i][mode[i]]:
                 if guard.holds(element):
                     edges[i] = edge
                     break
@@ -288,12 +306,14 @@ class MachineEngine:
         Interference
             If a callback changed these values, or a state.
         """
-        row, elements = self.chart.transitions[edge], self.machines.elements
-        place = f"element {machine + 1}, edge {row.name!r}"
+        bank = self.program.layout.bank(machine)
+        row = self.parts[machine].model.chart.transitions[edge - bank.first_edge]
+        whose = "" if len(self.banks) == 1 else f"contact {bank.name!r}, "
+        place = f"{whose}element {machine - bank.first + 1}, edge {row.name!r}"
         # The trigger evaluates the guard once more; assignments follow, as in Stateflow, where the
         # whole set is selected before any of them.
         try:
-            fired = getattr(elements[machine], row.name)()
+            fired = getattr(self.elements[machine], row.name)()
         except MachineError as error:
             raise Interference(
                 f"a callback changed a state ({error.value}); {ONLY_LOOK}", place, t
@@ -306,7 +326,7 @@ class MachineEngine:
                 t,
             )
         self.states[machine] = row.target
-        for i, (element, state) in enumerate(zip(elements, self.states, strict=True)):
+        for i, (element, state) in enumerate(zip(self.elements, self.states, strict=True)):
             if element.state != state:
                 raise Interference(
                     f"a callback put element {i + 1} into state {shown(element.state)}, "
@@ -314,6 +334,12 @@ class MachineEngine:
                     place,
                     t,
                 )
+
+
+def _numbered(machines: ElementMachines, first: int) -> list[list[tuple[int, Guard]]]:
+    """Return the table of a contact with its edges numbered over all contacts."""
+    table = machines.table(machines.model.chart)
+    return [[(first + edge, guard) for edge, guard in row] for row in table]
 
 
 ONLY_LOOK = "callbacks may only read"

@@ -26,6 +26,7 @@ from gms_fsm.run.settings import RunOptions, SettingOptions, Settings
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
+from gms_fsm.systems.system import System
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.monitors import Monitor, checked, watched
 from gms_fsm.traces.trace import Trace
@@ -37,9 +38,9 @@ __all__ = ["Moment", "Run", "simulate"]
 
 
 def simulate(
-    model: Model,
-    rig: Rig,
-    t_end: float,
+    model: Model | System,
+    rig: Rig | float,
+    t_end: float | None = None,
     *,
     t_start: float = 0.0,
     initial: Mapping[str, Any] | None = None,
@@ -52,22 +53,24 @@ def simulate(
     monitors: str | Iterable[str | Monitor] = (),
     **options: Unpack[RunOptions],
 ) -> Trace:
-    """Run a friction model on a rig.
+    """Run a friction model on a rig, or a system: ``simulate(system, t_end)``.
 
     The driver evaluates the guards, freezes the states, integrates until a watched comparison
     changes its truth value, and evaluates the guards again.
 
     Parameters
     ----------
-    model : GMS, LuGre or ChartModel
-        Friction model to simulate.
+    model : GMS, LuGre, ChartModel or System
+        Friction model to simulate; or a system of bodies and contacts.
     rig : Prescribed, Slider or PulledSlider
-        The rig it is mounted on.
+        The rig it is mounted on; a system has none.
     t_end, t_start : float
         s.
     initial : mapping, optional
         Any of the chart's variables by name, for example ``z`` (n,) [m], ``states`` (n,) names,
-        ``v`` [m/s] (not with a prescribed velocity) and ``x`` [m].
+        ``v`` [m/s] (not with a prescribed velocity) and ``x`` [m]. In a system ``"load.x"`` is the
+        position of the body load, ``"gear.z"`` and ``"gear.states"`` belong to the contact gear,
+        and further states have their names. All else starts at 0.
     settings : Settings, optional
         How to integrate and what to record; the defaults if omitted.
     engine : {"machines", "ifelse", "compiled"} or ElementMachines, optional
@@ -121,6 +124,7 @@ def simulate(
     >>> len(trace.transitions)
     48
     """
+    on, end = _mounted(model, rig, t_end)
     if isinstance(engine, ElementMachines):
         if machines is not None:
             raise ParameterError(
@@ -142,8 +146,8 @@ def simulate(
             raise ParameterError(
                 "engine 'ifelse' uses no machines", advice="leave machines=... out"
             )
-    start = Start.of(model, rig, t_end, chosen, t_start=t_start, initial=initial)
-    watching = checked(monitors, model, start.output).values() if monitors else ()
+    start = Start.of(model, on, end, chosen, t_start=t_start, initial=initial)
+    watching = checked(monitors, start.model, start.output).values() if monitors else ()
     run = CompiledRun(start, machines) if chosen.engine == "compiled" else Run(start, machines)
     keeper = None if path is None else Checkpointer(run, path, checkpoint_every)
     try:
@@ -163,6 +167,24 @@ def simulate(
         keeper.finish()
     trace = run.recorder.trace()
     return watched(trace, watching) if watching else trace
+
+
+def _mounted(model: object, rig: Rig | float, t_end: float | None) -> tuple[Rig | None, float]:
+    """Return the rig, if there is one, and the end of the run."""
+    if isinstance(model, System):
+        if t_end is not None and not isinstance(rig, float | int):
+            raise ParameterError(
+                "a system has no rig",
+                place="rig",
+                value=rig,
+                advice="write simulate(system, t_end)",
+            )
+        return None, rig if t_end is None else t_end  # type: ignore[return-value]
+    if t_end is None:
+        raise ParameterError(
+            "it is missing", place="t_end", advice="write simulate(model, rig, t_end)"
+        )
+    return rig, t_end  # type: ignore[return-value]
 
 
 class Run:
@@ -189,8 +211,9 @@ class Run:
         switch: MachineEngine | IfElse = IfElse(start.program)
         self.engine: MachineEngine | None = None
         if start.chosen.engine != "ifelse":
-            machines = ElementMachines(start.model) if machines is None else machines
-            switch = self.engine = MachineEngine(machines, start.program, start.mode)
+            whose = [start.model] if start.given is None else start.system.contacts
+            parts = [ElementMachines(each) for each in whose] if machines is None else [machines]
+            switch = self.engine = MachineEngine(parts, start.program, start.mode)
         self.recorder, self.next_look = Recorder(start), PATIENCE
         self.event: integrators.Event | None = None  # the latest
         made, options = equations(start.program), start.options

@@ -10,17 +10,20 @@ from typing import Any
 import numpy as np
 
 import integrators
+from gms_fsm.charts.chart import Transition
 from gms_fsm.charts.parameters import as_floats, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError, SignalError, shown
 from gms_fsm.lowering._pulses import waking_times
-from gms_fsm.lowering.layout import Layout
+from gms_fsm.lowering.layout import BankPlaces, Layout
 from gms_fsm.lowering.program import Program, arguments, lower
 from gms_fsm.lowering.scales import Setting, Tolerance, scales_of_system
 from gms_fsm.run.settings import Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Corners, Formula
-from gms_fsm.systems.system import System, system_of
+from gms_fsm.systems.system import Mounting, Several, System, system_of
+from gms_fsm.traces.rows import Rows
+from gms_fsm.traces.trace import Trace
 from integrators import Options
 
 __all__ = ["Start"]
@@ -37,7 +40,7 @@ class Start:
     system : System
         What runs.
     model, rig
-        What it was made from; None for a system of the user's.
+        What it was made from; of a system of the user's its only contact, and the rest.
     program : Program
         Its generated program.
     t_start, t_end, last : float
@@ -66,6 +69,34 @@ class Start:
     options: Options
     settings: Mapping[str, Setting]
     chosen: Settings
+
+    @property
+    def given(self) -> System | None:
+        """The system, if it is the user's and not a model on a rig."""
+        return self.system if isinstance(self.rig, Mounting) else None
+
+    def trace(self, rows: Rows, stops: Rows, log: Any) -> Trace:
+        """Return the trace of a run.
+
+        Parameters
+        ----------
+        rows, stops : Rows
+            What was kept.
+        log : recarray
+            The transitions.
+
+        Returns
+        -------
+        Trace
+            With what it was made from.
+        """
+        return Trace(rows, stops, log, self.model, self.rig, self.settings, system=self.given)
+
+    def edge(self, machine: int, edge: int) -> tuple[BankPlaces, Transition]:
+        """Return the contact of a machine and one of its edges, by their numbers in the run."""
+        bank = self.program.layout.bank(machine)
+        chart = self.system.contact(bank.name).chart
+        return bank, chart.transitions[edge - bank.first_edge]
 
     @property
     def output(self) -> str:
@@ -160,7 +191,10 @@ class Start:
             "t_start": t_start,
             "t_end": t_end,
         }
-        origin: tuple[Any, Any] = (None, None) if isinstance(model, System) else (model, rig)
+        single = system.contacts[0] if len(system.contacts) == 1 else Several(system)
+        origin: tuple[Any, Any] = (single, Mounting(system))
+        if not isinstance(model, System):
+            origin = model, rig
         return cls(
             system=system,
             model=origin[0],

@@ -37,7 +37,7 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Signal, as_signal
 
-__all__ = ["Body", "Contact", "Mounting", "Sampled", "System", "system_of"]
+__all__ = ["Body", "Contact", "Mounting", "Sampled", "Several", "System", "system_of"]
 
 Text: TypeAlias = str | float  # an expression, or just a number
 
@@ -534,6 +534,28 @@ class Mounting:
             if not body.driven:
                 return f"({body.force} - F) / ({body.inertia})"
         return None
+
+
+class Several:
+    """Stands where a run has one model, in a system with several contacts.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    """
+
+    def __init__(self, system: System) -> None:
+        self._system = system
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        known = ", ".join(repr(each.name) for each in self._system.contacts)
+        raise ParameterError(
+            f"system {self._system.name!r} has the contacts {known}",
+            advice=f"say which one: trace.contact({self._system.contacts[0].name!r})",
+        )
 
 
 # --------------------------------------------------------------------------- from a model on a rig

@@ -123,10 +123,13 @@ class Trace:
     which: str = field(default="", repr=False)  # the contact, of a system with several
 
     def __repr__(self) -> str:
-        return (
-            f"<Trace: {self.model.title}; {self.rig.title}; {len(self.rows)} rows, "
-            f"{len(self.transitions)} transitions>"
-        )
+        return f"<Trace: {self._title}; {len(self.rows)} rows, {len(self.transitions)} transitions>"
+
+    @property
+    def _title(self) -> str:
+        if self.system is None or self.which:
+            return f"{self.model.title}; {self.rig.title}"
+        return f"{self.system.name}; contacts {', '.join(self.contacts)}"
 
     def __len__(self) -> int:
         return len(self.rows)
