@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from gms_fsm.app._findings import explained
+from gms_fsm._records import explained
+from gms_fsm._toml import override, parsed
 from gms_fsm.app._tables import (
     PrescribedTable,
     PulledTable,
@@ -24,7 +25,6 @@ from gms_fsm.app._tables import (
     SignalRecordTable,
     SliderTable,
 )
-from gms_fsm.app._toml import override, parsed
 from gms_fsm.app.records import Motion, Record, motion_of, read_record
 from gms_fsm.errors import GMSError, RecordError, ScenarioError, UnitError, cut, shown
 from gms_fsm.systems.models import Model
@@ -106,7 +106,8 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
     try:
         scenario = Scenario.model_validate(data)
     except ValidationError as error:
-        raise ScenarioError(explained(error, data), place=str(path)) from None
+        _, sentence = explained(error, data, Scenario)
+        raise ScenarioError(sentence, place=str(path)) from None
     try:
         return _loaded(path, scenario)
     except (RecordError, ScenarioError):

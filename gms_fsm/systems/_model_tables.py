@@ -1,4 +1,4 @@
-"""Tables of a scenario file that define the friction model.
+"""Tables of a scenario or system file that define the friction model.
 
 Their keys, units and rules are those of the parameters of the charts. ``kind`` names a model of
 `gms_fsm.systems.models`, which has additional keys (columns of Table I, shares); ``chart`` names
@@ -14,8 +14,6 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from pydantic import (
-    BaseModel,
-    ConfigDict,
     Discriminator,
     Field,
     Tag,
@@ -23,6 +21,7 @@ from pydantic import (
     model_validator,
 )
 
+from gms_fsm._records import Table
 from gms_fsm.charts.gms import PARAMETERS, Law
 from gms_fsm.charts.lugre import LUGRE
 from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, Parameter
@@ -41,17 +40,10 @@ __all__ = [
     "GMSTable",
     "LuGreTable",
     "ModelTable",
-    "Table",
 ]
 
 # Tags of union members in pydantic's errors; no key of a file looks like these.
 BY_KIND, BY_CHART, ONE, LIST = "<kind>", "<chart>", "<number>", "<list>"
-
-
-class Table(BaseModel):
-    """A table of a scenario file, without unknown keys or type conversions."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
 _DESCRIBED: Mapping[str, str] = {

@@ -1,0 +1,320 @@
+"""Defensive reading of TOML with the lines of its keys, changes to single keys, and writing."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from gms_fsm.errors import GMSError, ScenarioError, cut, shown
+
+__all__ = ["LARGEST_FILE", "Key", "data_of", "line_of", "override", "parsed", "text_of", "written"]
+
+Key = tuple[str | int, ...]  # names of keys, and places in arrays from 0
+
+LARGEST_FILE = 1_000_000  # bytes
+MOST_PREFIXES = 300  # that are read to find a line
+DEEPEST_KEY = 6  # parts
+# tomllib takes quadratic time in the number of parts of a key, which can be hours.
+_ENDLESS_KEY = re.compile(
+    r"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){20}"""
+)
+_TEXT_OR_COMMENT = re.compile(r""""[^"]*"?|'[^']*'?|#.*""")
+_HALF_A_NUMBER = re.compile(  # a digit on only one side of the point
+    r"(?<![\w.+-])([+-]?)(?:(\d+)\.|\.(\d+))((?:[eE][+-]?\d+)?)(?![\w.])"
+)
+
+
+def parsed(path: Path) -> dict[str, Any]:
+    """Return the contents of a scenario file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    dict
+        Tables and values as written.
+
+    Raises
+    ------
+    ScenarioError
+        If the file cannot be read, is too large, or is not TOML.
+    """
+    return data_of(text_of(path), path)
+
+
+def text_of(path: Path, kind: type[GMSError] = ScenarioError) -> str:
+    """Return the text of a file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    kind : type of GMSError
+        The class of error to raise.
+
+    Returns
+    -------
+    str
+        Its text.
+
+    Raises
+    ------
+    GMSError
+        If the file cannot be read, is too large, or is not text.
+    """
+    try:
+        with path.open("rb") as file:
+            raw = file.read(LARGEST_FILE + 1)
+    except FileNotFoundError:
+        raise kind(
+            "no such file", place=str(path), advice="check the name and the folder"
+        ) from None
+    except (OSError, ValueError) as error:  # a ValueError if the name contains a null byte
+        reason = getattr(error, "strerror", None) or str(error)
+        raise kind(
+            f"cannot be read ({reason})", place=str(path), advice="give a readable file"
+        ) from None
+    if len(raw) > LARGEST_FILE:
+        raise kind(
+            f"larger than {LARGEST_FILE} bytes",
+            place=str(path),
+            advice="keep records in separate files",
+        )
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise kind("not UTF-8 text", place=str(path), advice="give a TOML file") from None
+
+
+def data_of(text: str, path: Path, kind: type[GMSError] = ScenarioError) -> dict[str, Any]:
+    """Return the contents of a TOML text.
+
+    Parameters
+    ----------
+    text : str
+        From `text_of`.
+    path : Path
+        Its file, for messages.
+    kind : type of GMSError
+        The class of error to raise.
+
+    Returns
+    -------
+    dict
+        Tables and values as written.
+
+    Raises
+    ------
+    GMSError
+        If the text is not TOML.
+    """
+    if endless := _ENDLESS_KEY.search(text):
+        line = text.count("\n", 0, endless.start()) + 1
+        raise kind(
+            f"line {line}: a key of more than 20 parts",
+            place=str(path),
+            advice="no key is nested this deeply",
+        )
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # a number with 5,000 digits raises ValueError
+        hint = _with_digits(text)
+        raise kind(f"not valid TOML: {cut(str(error))}{hint}", place=str(path)) from None
+
+
+def _with_digits(text: str) -> str:
+    """Return advice on the first number of a text that is invalid in TOML, such as .25."""
+    for number, line in enumerate(text.splitlines(), start=1):
+        found = _HALF_A_NUMBER.search(_TEXT_OR_COMMENT.sub("", line))
+        if found:
+            sign, whole, part, exponent = found.groups()
+            better = f"{sign}{whole or 0}.{part or 0}{exponent}"
+            return f"; line {number}: write {better}, not {found[0]}"
+    return ""
+
+
+def override(data: dict[str, Any], setting: str) -> None:
+    """Change one key.
+
+    Parameters
+    ----------
+    data : dict
+        Contents of a file; modified in place.
+    setting : str
+        ``"model.law=published"``: a key path and a TOML value; a bare word is a string.
+
+    Raises
+    ------
+    ScenarioError
+        If the text does not have this form.
+    """
+    key, equals, text = setting.partition("=")
+    parts = [part.strip() for part in key.split(".")]
+    if not equals or not all(parts):
+        raise ScenarioError(
+            "give it as key=value, for example run.t_end=10", place=f"--set {cut(setting)}"
+        )
+    if "\n" in setting:
+        line = setting.partition("\n")[0]
+        raise ScenarioError("give one key and one value, on one line", place=f"--set {cut(line)}")
+    if len(parts) > DEEPEST_KEY:
+        raise ScenarioError("no key is nested this deeply", place=f"--set {cut(setting)}")
+    if _ENDLESS_KEY.search(text):
+        raise ScenarioError("no key is nested this deeply", place=f"--set {cut(setting)}")
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = text.strip()
+        hint = _with_digits(text)
+        if hint and (value[0] in "[{" or _HALF_A_NUMBER.fullmatch(value)):
+            raise ScenarioError(f"not valid TOML{hint}", place=f"--set {cut(setting)}") from None
+    except (ValueError, RecursionError) as error:
+        raise ScenarioError(f"{cut(str(error))}", place=f"--set {cut(setting)}") from None
+    table = data
+    for part in parts[:-1]:
+        table = table.setdefault(part, {})
+        if not isinstance(table, dict):
+            raise ScenarioError(
+                f"{shown(part)} is a value, not a table", place=f"--set {cut(setting)}"
+            )
+    table[parts[-1]] = value
+
+
+# --------------------------------------------------------------------------- lines
+def line_of(text: str, key: Key) -> int:
+    """Return the line on which a key is written.
+
+    The line is found by reading prefixes of the text: the first one that has the key ends there.
+
+    Parameters
+    ----------
+    text : str
+        Valid TOML.
+    key : tuple of str or int
+        Such as ``("edge", 2, "guard")``.
+
+    Returns
+    -------
+    int
+        Counted from 1; if the key is not written, the line of the innermost table around it that
+        is; 0 if the line cannot be found at reasonable cost.
+
+    Examples
+    --------
+    >>> line_of('[[edge]]\\nname = "b"\\n[[edge]]\\nguard = "z > s"', ("edge", 1, "guard"))
+    4
+    """
+    whole = tomllib.loads(text)
+    while key and not _has(whole, key):
+        key = key[:-1]
+    lines, left = text.split("\n"), MOST_PREFIXES
+    if not key:
+        return 1
+
+    def valid_end(last: int) -> tuple[int, bool]:
+        """Return the end of the longest valid prefix up to a line, and whether it has the key."""
+        nonlocal left
+        for end in range(last, 0, -1):  # a prefix may end inside an array or a long text
+            left -= 1
+            if left < 0:
+                break
+            try:
+                return end, _has(tomllib.loads("\n".join(lines[:end])), key)
+            except tomllib.TOMLDecodeError:
+                continue
+        return 0, False
+
+    low, high = 0, len(lines)
+    while low + 1 < high and left >= 0:
+        middle = (low + high) // 2
+        end, found = valid_end(middle)
+        low, high = (low, end) if found else (middle, high)
+    before, _ = valid_end(high - 1)
+    return before + 1 if left >= 0 else 0
+
+
+def _has(data: Any, key: Key) -> bool:
+    for part in key:
+        inside = range(len(data)) if isinstance(data, list) else data
+        if not isinstance(data, list | dict) or part not in inside:
+            return False
+        data = data[part]
+    return True
+
+
+# --------------------------------------------------------------------------- writing
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def written(data: Mapping[str, Any]) -> str:
+    """Return tables as TOML text that reads back equal.
+
+    Parameters
+    ----------
+    data : mapping
+        Texts, numbers, truth values, lists of these, tables, and lists of tables.
+
+    Returns
+    -------
+    str
+        Small tables inside others are written as dotted keys.
+
+    Examples
+    --------
+    >>> print(written({"name": "a", "state": [{"name": "b", "flow": {"z": "v"}}]}), end="")
+    name = "a"
+    <BLANKLINE>
+    [[state]]
+    name = "b"
+    flow.z = "v"
+    """
+    return "\n".join(_lines(data, ())).removeprefix("\n") + "\n"
+
+
+def _lines(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str]:
+    tables = {}
+    for name, value in table.items():
+        if path and value and _is_table(value) and not any(map(_nested, value.values())):
+            yield from (f"{_dotted((name, key))} = {_value(u)}" for key, u in value.items())
+        elif _nested(value):
+            tables[name] = value
+        else:
+            yield f"{_dotted((name,))} = {_value(value)}"
+    for name, value in tables.items():
+        here = (*path, name)
+        head = f"[[{_dotted(here)}]]" if _is_tables(value) else f"[{_dotted(here)}]"
+        for each in value if _is_tables(value) else [value]:
+            yield from ("", head, *_lines(each, here))
+
+
+def _is_table(value: object) -> bool:
+    return isinstance(value, Mapping)
+
+
+def _nested(value: object) -> bool:
+    return _is_table(value) or _is_tables(value)
+
+
+def _is_tables(value: object) -> bool:
+    return isinstance(value, list) and bool(value) and all(map(_is_table, value))
+
+
+def _dotted(names: Sequence[str]) -> str:
+    return ".".join(name if _BARE.fullmatch(name) else _value(name) for name in names)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(map(_value, value))}]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):  # the escapes of JSON are those of TOML, which needs one more
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(value)
