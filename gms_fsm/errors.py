@@ -9,7 +9,7 @@ from __future__ import annotations
 import copy
 import copyreg
 import enum
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 LONGEST_SHOWN = 120  # characters of a value in a message
 
@@ -82,6 +82,9 @@ class GMSError(Exception):
         The value found there.
     advice : str, optional
         What to do about it.
+    key : tuple of str or int, optional
+        The part of a chart or a system that is at fault, as the names of attributes and places in
+        sequences that lead to it: ``("transitions", 2, "guard")``. Not shown.
 
     Examples
     --------
@@ -94,9 +97,16 @@ class GMSError(Exception):
     """
 
     def __init__(
-        self, reason: str, *, place: str = "", value: object = NOTHING, advice: str = ""
+        self,
+        reason: str,
+        *,
+        place: str = "",
+        value: object = NOTHING,
+        advice: str = "",
+        key: tuple[str | int, ...] = (),
     ) -> None:
         self.reason, self.place, self.value, self.advice = reason, place, value, advice
+        self.key = key
         self.outer = ""  # what contains the place: files, keys
         super().__init__(reason)
 
@@ -173,7 +183,31 @@ class GMSError(Exception):
         ScenarioError("column 't' is 'mN'; unknown unit")
         """
         made = cls(error.reason, place=error.place, value=error.value, advice=error.advice)
-        return made.replaced(outer=error.outer)
+        return made.replaced(outer=error.outer, key=error.key)
+
+
+class Part(NamedTuple):
+    """A part of a chart or of a system, to be named in errors.
+
+    Parameters
+    ----------
+    words : str
+        For messages: ``"chart 'a', edge 'slips', guard"``.
+    key : tuple of str or int
+        As in `GMSError`.
+
+    Examples
+    --------
+    >>> Part("chart 'a'").of("edge 'slips'", "transitions", 2)
+    Part(words="chart 'a', edge 'slips'", key=('transitions', 2))
+    """
+
+    words: str
+    key: tuple[str | int, ...] = ()
+
+    def of(self, words: str, *key: str | int) -> Part:
+        """Return a part of this part."""
+        return Part(f"{self.words}, {words}", (*self.key, *key))
 
 
 class ExpressionError(GMSError, ValueError):
@@ -211,9 +245,11 @@ class ExpressionError(GMSError, ValueError):
         )
         self.text, self.column, self.allowed, self.where = text, column, allowed, where
 
-    def at(self, where: str) -> ExpressionError:
+    def at(self, where: str | Part) -> ExpressionError:
         """Return the same error with its owner named."""
-        return ExpressionError(self.reason, self.text, self.column, self.allowed, where)
+        part = Part(where) if isinstance(where, str) else where
+        made = ExpressionError(self.reason, self.text, self.column, self.allowed, part.words)
+        return made.replaced(key=part.key)
 
 
 class ChartError(GMSError, ValueError):

@@ -160,39 +160,45 @@ class Chart:
             raise ChartError("it has no states", place=here, advice="give at least one")
         if not self.velocities:
             raise ChartError(
-                "it has no velocity", place=here, advice="give at least one, for example ('v',)"
+                "it has no velocity",
+                place=here,
+                advice="give at least one, for example ('v',)",
+                key=("velocities",),
             )
         derivatives = ["d" + variable for variable in self.variables]
         groups = (
-            ("input", dict.fromkeys([*self.inputs, *self.velocities])),
-            ("variable", self.variables),
-            ("derivative", derivatives),
-            ("parameter", self.parameter_names),
-            ("let", self.let),
-            ("state", [s.name for s in self.states]),
-            ("edge", [t.name for t in self.transitions]),
+            ("input", "inputs", dict.fromkeys([*self.inputs, *self.velocities])),
+            ("variable", "variables", self.variables),
+            ("derivative", "variables", derivatives),
+            ("parameter", "parameters", self.parameter_names),
+            ("let", "let", self.let),
+            ("state", "states", [s.name for s in self.states]),
+            ("edge", "transitions", [t.name for t in self.transitions]),
         )
         owner: dict[str, str] = {}
-        for kind, names in groups:
-            for name in names:
-                _check_name(name, kind, here)
+        for kind, attribute, names in groups:
+            for i, name in enumerate(names):
+                key = (attribute, name) if kind == "let" else (attribute, i)
+                _check_name(name, kind, here, key)
                 if name in SUPPLIED and kind != "input" and (name, kind) != ("s", "let"):
                     raise ChartError(
                         f"{kind} name {name!r} is taken",
                         place=here,
                         advice="t, x, v and s can only be inputs",
+                        key=key,
                     )
                 if name in owner:
                     raise ChartError(
                         f"the name {name!r} is used twice ({owner[name]} and {kind})",
                         place=here,
                         advice="every name must be unique",
+                        key=key,
                     )
                 owner[name] = kind
         for name in sorted({*self.force_names} & owner.keys()):
             raise ChartError(f"{owner[name]} name {name!r} is taken by a force", place=here)
         known = [s.name for s in self.states]
-        for edge in self.transitions:
+        for i, edge in enumerate(self.transitions):
             for end, state in (
                 *(("source", each) for each in edge.sources),
                 ("target", edge.target),
@@ -202,16 +208,18 @@ class Chart:
                         f"{end} {state!r} is not a state",
                         place=f"{here}, edge {edge.name!r}",
                         advice=f"states: {_listed(known)}",
+                        key=("transitions", i, end),
                     )
 
     def _check_rules(self) -> None:
-        for each in self.parameters:
+        for i, each in enumerate(self.parameters):
             known = {*self.parameter_names} - {each.name}
             for name in sorted(each.others - known):
                 raise ChartError(
                     f"chart {self.name!r}, parameter {each.name!r}: its rule names {name!r}, "
                     "which is not another parameter",
                     advice=f"there are {_listed(sorted(known))}",
+                    key=("parameters", i, "rule"),
                 )
 
     # ------------------------------------------------------------------ forces
@@ -357,21 +365,25 @@ def _parameter(given: object, here: str) -> Parameter:
     )
 
 
-def _check_name(name: str, kind: str, here: str) -> None:
+def _check_name(name: str, kind: str, here: str, key: tuple[str | int, ...]) -> None:
     if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
         raise ChartError(
             f"{kind} name {name!r} is not a name",
             place=here,
             advice="use letters, digits and _, not starting with a digit, and no Python keyword",
+            key=key,
         )
     if unicodedata.normalize("NFKC", name) != name:
-        raise ChartError(f"{kind} name {name!r} is not in Unicode normal form NFKC", place=here)
+        raise ChartError(
+            f"{kind} name {name!r} is not in Unicode normal form NFKC", place=here, key=key
+        )
     if name in RESERVED or name.startswith(("_", "on_", "is_", "may_", "to_")):
         raise ChartError(
             f"{kind} name {name!r} is reserved",
             place=here,
             advice=f"not available are {_listed(sorted(RESERVED))}, and names that start "
             "with _, on_, is_, may_ or to_",
+            key=key,
         )
 
 
