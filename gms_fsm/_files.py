@@ -28,6 +28,7 @@ if sys.platform != "win32":  # on Windows nothing is locked, and no leftovers ar
 
 __all__ = [
     "folder_lock",
+    "inside",
     "leftovers",
     "output_folder",
     "refuse_input",
@@ -134,6 +135,38 @@ def refuse_input(path: str | Path, *inputs: Path) -> None:
                 place=str(path),
                 advice="choose another output",
             )
+
+
+def inside(folder: Path, name: str) -> Path | None:
+    """Return the path of a file named in another file, if it is inside a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    name : str
+        A relative path.
+
+    Returns
+    -------
+    Path or None
+        None if it leads outside.
+
+    Raises
+    ------
+    OSError, ValueError
+        If it is not a file name: too long, or with a null byte.
+
+    Examples
+    --------
+    >>> inside(Path("runs"), "../secret.toml") is None
+    True
+    """
+    place = (folder / name).resolve()
+    place.is_file()  # raises for what is not a name
+    if Path(name).is_absolute() or not place.is_relative_to(folder.resolve()):
+        return None
+    return folder / name
 
 
 # --------------------------------------------------------------------------- files

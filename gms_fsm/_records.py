@@ -6,15 +6,33 @@ The sentence gives key, value, rule, and the nearest key; it names no file.
 from __future__ import annotations
 
 import difflib
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Annotated, Any, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Discriminator, Tag, ValidationError
 
-from gms_fsm._toml import Key, line_of
-from gms_fsm.errors import LONGEST_SHOWN, GMSError, cut, shown
+from gms_fsm._files import output_folder, write_whole
+from gms_fsm._toml import LARGEST_FILE, Key, data_of, line_of, text_of, written
+from gms_fsm.errors import LONGEST_SHOWN, GMSError, OutputError, cut, shown
 
-__all__ = ["Kind", "Table", "checked_table", "explained", "placed"]
+__all__ = [
+    "LIST",
+    "ONE",
+    "TABLE",
+    "TEXT",
+    "Numbers",
+    "Table",
+    "Texts",
+    "Value",
+    "built",
+    "explained",
+    "read_file",
+    "write_file",
+]
+
+# Tags of union members in pydantic's errors; no key of a file looks like these.
+ONE, LIST, TEXT, TABLE = "<one>", "<list>", "<text>", "<table>"
 
 
 class Table(BaseModel):
@@ -23,68 +41,159 @@ class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
+def _form(given: Any) -> str:
+    return LIST if isinstance(given, list) else ONE
+
+
+def _kind(given: Any) -> str:
+    return TEXT if isinstance(given, str) else ONE
+
+
+# A number, or one per element; one text or several; an expression or a number.
+Numbers = Annotated[
+    Annotated[float, Tag(ONE)] | Annotated[list[float], Tag(LIST)], Discriminator(_form)
+]
+Texts = Annotated[Annotated[str, Tag(ONE)] | Annotated[list[str], Tag(LIST)], Discriminator(_form)]
+Value = Annotated[Annotated[str, Tag(TEXT)] | Annotated[float, Tag(ONE)], Discriminator(_kind)]
+
 Kind = TypeVar("Kind", bound=BaseModel)
+Made = TypeVar("Made")
 
 
-def checked_table(
-    kind: type[Kind], data: dict[str, Any], text: str, path: Path, error: type[GMSError]
-) -> Kind:
-    """Return the contents of a file as a table.
+# --------------------------------------------------------------------------- files
+def read_file(
+    path: Path, kind: type[Kind], error: type[GMSError], build: Callable[[Kind], Made]
+) -> Made:
+    """Read what a TOML file describes.
 
     Parameters
     ----------
-    kind : type of Table
-        What the file must be.
-    data, text : dict and str
-        Its contents.
     path : Path
         The file.
+    kind : type of Table
+        What it must contain.
     error : type of GMSError
-        The class of error to raise.
+        The class of error to raise for a file that is not such a table.
+    build : callable
+        ``build(table)`` returns the object; the part at fault is the `GMSError.key` of its errors.
 
     Returns
     -------
-    Table
-        Checked.
+    object
+        From `build`.
 
     Raises
     ------
     GMSError
-        Naming file, line, key, value and rule.
+        Naming file, line, key, and what is wrong.
     """
+    text = text_of(path, error)
+    data = data_of(text, path, error)
     try:
-        return kind.model_validate(data)
+        table = kind.model_validate(data)
     except ValidationError as found:
         key, sentence = explained(found, data, kind)
         line = line_of(text, key)
         raise error(f"line {line}: {sentence}" if line else sentence, place=str(path)) from None
+    try:
+        return build(table)
+    except GMSError as found:
+        key = _key_in_file(found.key, data, kind)
+        line = line_of(text, key)
+        place = [f"line {line}"] if line else []
+        place += [".".join(map(str, key))] if key else []
+        raise (found.inside(", ".join(place)) if place else found).inside(path) from None
 
 
-def placed(error: GMSError, key: Key, text: str, path: Path) -> GMSError:
-    """Return an error with the file, the line and the key it comes from.
+def write_file(path: Path, table: Table) -> Path:
+    """Write a table to a TOML file, whole.
 
     Parameters
     ----------
-    error : GMSError
-        From the object that a file describes.
-    key : tuple of str or int
-        The key at fault.
-    text : str
-        Contents of the file.
     path : Path
-        The file.
+        File name ending in ``.toml``.
+    table : Table
+        Keys with their default values are left out.
 
     Returns
     -------
-    GMSError
-        An error of the same class.
+    Path
+        The file.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written, has another ending, or exists and is not as gms-fsm wrote it.
     """
-    line = line_of(text, key)
-    place = ".".join(map(str, key))
-    both = ", ".join(filter(None, (f"line {line}" if line else "", place)))
-    return (error.inside(both) if both else error).inside(path)
+    if path.suffix != ".toml":
+        raise OutputError(f"its name must end in .toml, not {path.suffix!r}", place=str(path))
+    text = written(table.model_dump(by_alias=True, exclude_defaults=True))
+    try:
+        raw = text.encode()
+    except UnicodeEncodeError as error:
+        found = shown(error.object[error.start : error.end])
+        raise OutputError(
+            f"a text has the character {found}, which no file can store", place=str(path)
+        ) from None
+    if len(raw) > LARGEST_FILE:
+        raise OutputError(
+            f"it would have {len(raw)} bytes, and at most {LARGEST_FILE} can be read",
+            place=str(path),
+            advice="give long signals as expressions",
+        )
+    output_folder(path.parent, [path.name])
+    return write_whole(path, lambda file: file.write(raw))
 
 
+def built(make: Callable[..., Made], *key: str | int, **given: Any) -> Made:
+    """Return what a function makes; its errors name a part of something larger.
+
+    Parameters
+    ----------
+    make : callable
+        Such as a class.
+    *key : str or int
+        The part: ``"states", 2``.
+    **given : object
+        Arguments of `make`.
+
+    Returns
+    -------
+    object
+        From `make`.
+
+    Raises
+    ------
+    GMSError
+        As `make` does, with `key` before its own key.
+    """
+    try:
+        return make(**given)
+    except GMSError as error:
+        raise error.replaced(key=(*key, *error.key)) from None
+
+
+def _key_in_file(key: Key, data: Any, root: type[BaseModel]) -> Key:
+    """Return the key of a part as the file has it: with aliases, and no deeper than its tables."""
+    options, found = [root], list[str | int]()
+    for part in key:
+        if not isinstance(data, dict | list):
+            break
+        name = part
+        if isinstance(part, str) and options:
+            field = _fitting(options, data).model_fields.get(part)
+            options = [] if field is None else _tables_in(field.annotation)
+            if field is not None and field.alias in data:
+                name = field.alias or part
+        found.append(name)
+        try:
+            data = data[name]  # type: ignore[call-overload]
+        except (LookupError, TypeError):
+            break
+    return tuple(found)
+
+
+# --------------------------------------------------------------------------- errors
 def explained(
     error: ValidationError, data: dict[str, Any], root: type[BaseModel]
 ) -> tuple[Key, str]:

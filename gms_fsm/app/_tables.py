@@ -19,10 +19,10 @@ from pydantic import (
 from pydantic_core import CoreSchema, PydanticKnownError
 from pydantic_core.core_schema import literal_schema
 
-from gms_fsm._records import Table
+from gms_fsm._records import ONE, TABLE, TEXT, Table
 from gms_fsm.app.records import Column
 from gms_fsm.run.settings import ENGINES, EVENTS, Settings
-from gms_fsm.systems._model_tables import ONE, ModelTable
+from gms_fsm.systems._model_tables import ModelTable
 from gms_fsm.systems.rigs import PulledSlider
 from integrators import METHODS
 
@@ -38,7 +38,7 @@ __all__ = [
 ]
 
 # Tags of union members in pydantic's errors; no key of a file looks like these.
-TEXT, RAMPS, TABLE = "<text>", "<ramps>", "<table>"
+RAMPS = "<ramps>"
 SCIPY_METHODS = ("RK45", "DOP853", "Radau", "BDF", "LSODA")
 
 

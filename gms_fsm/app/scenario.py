@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from gms_fsm._files import inside
 from gms_fsm._records import explained
 from gms_fsm._toml import override, parsed
 from gms_fsm.app._tables import (
@@ -208,27 +209,25 @@ def find_file(scenario: Path, name: str) -> Path:
     ScenarioError
         If the path leads outside the folder, or there is no such file.
     """
-    wanted = Path(name)
     folders = [scenario.parent]
     if os.environ.get(DATA_VARIABLE):
         folders.append(Path(os.environ[DATA_VARIABLE]))
     for folder in folders:
         try:
-            place = (folder / wanted).resolve()
-            there = place.is_file()
+            found = inside(folder, name)
         except (OSError, ValueError) as error:  # too long, or contains a null byte
             raise ScenarioError(
                 f"file = {shown(name)} is not a file name ({cut(str(error))})", place=str(scenario)
             ) from None
-        if wanted.is_absolute() or not place.is_relative_to(folder.resolve()):
+        if found is None:
             raise ScenarioError(
                 f"file = {shown(name)} is outside the folder of the scenario",
                 place=str(scenario),
                 advice="put the file next to the scenario, or in the folder named by "
                 f"{DATA_VARIABLE}",
             )
-        if there:
-            return folder / wanted
+        if found.is_file():
+            return found
     looked = " and ".join(str(folder) for folder in folders)
     hint = "" if len(folders) > 1 else f" (set {DATA_VARIABLE} to name a data folder)"
     raise ScenarioError(

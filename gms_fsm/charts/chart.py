@@ -10,9 +10,10 @@ import keyword
 import unicodedata
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
-from gms_fsm._arguments import checked_kind
+from gms_fsm._arguments import checked_kind, checked_path
 from gms_fsm.charts._parts import State, Transition, texts_of
 from gms_fsm.charts._reader import Reader
 from gms_fsm.charts.parameters import QUANTITIES, Parameter
@@ -147,6 +148,11 @@ class Chart:
     # ------------------------------------------------------------------ checks
     def _check_names(self) -> None:
         here = f"chart {self.name!r}"
+        for text in ("name", "reference"):
+            if not isinstance(getattr(self, text), str):
+                raise ChartError(
+                    "it must be a text", place=f"{here}: {text}", value=getattr(self, text)
+                )
         for each, wanted, example in (
             ("states", State, "State('stick', flow={'z': 'v'})"),
             ("transitions", Transition, "Transition('slips', 'stick', 'slip', guard='z > s')"),
@@ -178,7 +184,8 @@ class Chart:
         owner: dict[str, str] = {}
         for kind, attribute, names in groups:
             for i, name in enumerate(names):
-                key = (attribute, name) if kind == "let" else (attribute, i)
+                key: tuple[str | int, ...] = (attribute, name) if kind == "let" else (attribute, i)
+                key = (*key, "name") if kind in ("state", "edge", "parameter") else key
                 _check_name(name, kind, here, key)
                 if name in SUPPLIED and kind != "input" and (name, kind) != ("s", "let"):
                     raise ChartError(
@@ -237,6 +244,63 @@ class Chart:
     def locks(self) -> bool:
         """Whether there is a state that locks the contact."""
         return any(state.locked for state in self.states)
+
+    # ------------------------------------------------------------------ files
+    @classmethod
+    def load(cls, path: str | Path) -> Chart:
+        """Read a chart from a TOML file.
+
+        Parameters
+        ----------
+        path : str or Path
+            With the keys ``name``, ``inputs``, ``velocities``, ``variables``, ``parameters`` (names)
+            or ``[[parameter]]`` (name, unit, rule, per_element, meaning, assumed), ``[let]``,
+            ``[outputs]``, ``[contact_outputs]``, ``reference``, ``[[state]]`` (name, flow, entry,
+            exit, outputs, locked) and ``[[edge]]`` (name, from, to, guard, do).
+
+        Returns
+        -------
+        Chart
+            Checked, as any chart.
+
+        Raises
+        ------
+        ChartError, ExpressionError
+            If the file is no chart; the message names file, line, key and text.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from gms_fsm.charts import LUGRE
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     Chart.load(LUGRE.save(f"{folder}/lugre.toml")) == LUGRE
+        True
+        """
+        from gms_fsm.charts._file import load
+
+        return load(checked_path("path", path))
+
+    def save(self, path: str | Path) -> Path:
+        """Write the chart to a TOML file, from which `load` returns an equal one.
+
+        Parameters
+        ----------
+        path : str or Path
+            File name ending in ``.toml``.
+
+        Returns
+        -------
+        Path
+            The file written.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written, has another ending, or exists and is not as gms-fsm wrote it.
+        """
+        from gms_fsm.charts._file import save
+
+        return save(self, checked_path("path", path))
 
     # ------------------------------------------------------------------ queries
     @property

@@ -21,7 +21,7 @@ from pydantic import (
     model_validator,
 )
 
-from gms_fsm._records import Table
+from gms_fsm._records import Numbers, Table
 from gms_fsm.charts.gms import PARAMETERS, Law
 from gms_fsm.charts.lugre import LUGRE
 from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, Parameter
@@ -34,8 +34,6 @@ from gms_fsm.systems.models import GMS, ChartModel, LuGre
 __all__ = [
     "BY_CHART",
     "BY_KIND",
-    "LIST",
-    "ONE",
     "ChartTable",
     "GMSTable",
     "LuGreTable",
@@ -43,22 +41,13 @@ __all__ = [
 ]
 
 # Tags of union members in pydantic's errors; no key of a file looks like these.
-BY_KIND, BY_CHART, ONE, LIST = "<kind>", "<chart>", "<number>", "<list>"
+BY_KIND, BY_CHART = "<kind>", "<chart>"
 
 
 _DESCRIBED: Mapping[str, str] = {
     each.name: each.described
     for each in (*PARAMETERS, *LUGRE.parameters, SIGMA_2, WEIGHTS, *STRIBECK)
 }
-
-
-def _form(given: Any) -> str:
-    return LIST if isinstance(given, list) else ONE
-
-
-Numbers = Annotated[
-    Annotated[float, Tag(ONE)] | Annotated[list[float], Tag(LIST)], Discriminator(_form)
-]
 
 
 class StribeckTable(Table):
