@@ -19,7 +19,7 @@ from gms_fsm.charts.parameters import Parameter, checked_values
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ChartError, GMSError, ParameterError, shown, why
 
-__all__ = ["Demonstration", "Entry", "entry", "registered"]
+__all__ = ["Demonstration", "Entry", "chart_named", "entry", "named_charts", "registered"]
 
 # Keys of a scenario's table [model] that are not parameters.
 KEYS = ("chart", "law", "n", "stribeck")
@@ -273,3 +273,57 @@ def entry(name: str) -> Entry:
         said = f"name is {shown(name)}; it" if name else "a name is missing; it"
         raise ParameterError(f"{said} must be one of {', '.join(registered())}")
     return registered()[name]
+
+
+@functools.cache
+def named_charts() -> Mapping[str, Chart]:
+    """Return the built-in charts by name: ``"lugre"``; with a law, ``"gms-signed"``.
+
+    Returns
+    -------
+    mapping of str to Chart
+        One for each law of each entry.
+
+    Examples
+    --------
+    >>> named_charts()["gms-signed"].default_state.name
+    'stick'
+    """
+    return {
+        f"{each.name}-{law}" if law else each.name: each.chart(law)
+        for each in registered().values()
+        for law in each.laws or ("",)
+    }
+
+
+def chart_named(name: str) -> Chart:
+    """Return a built-in chart by name.
+
+    Parameters
+    ----------
+    name : str
+        As in `named_charts`.
+
+    Returns
+    -------
+    Chart
+        That one.
+
+    Raises
+    ------
+    ParameterError
+        If there is none.
+
+    Examples
+    --------
+    >>> chart_named("lugre").default_state.name
+    'bristle'
+    """
+    if name not in named_charts():
+        raise ParameterError(
+            "no chart has this name",
+            place="chart",
+            value=name,
+            advice=f"there are {', '.join(named_charts())}; the name of a file ends in .toml",
+        )
+    return named_charts()[name]

@@ -24,10 +24,10 @@ from pydantic import (
 from gms_fsm._records import Numbers, Table
 from gms_fsm.charts.gms import PARAMETERS, Law
 from gms_fsm.charts.lugre import LUGRE
-from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, Parameter
+from gms_fsm.charts.parameters import SIGMA_2, WEIGHTS, Parameter
 from gms_fsm.charts.registry import Entry, registered
-from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError
+from gms_fsm.systems._record import StribeckTable
 from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.models import GMS, ChartModel, LuGre
 
@@ -46,20 +46,8 @@ BY_KIND, BY_CHART = "<kind>", "<chart>"
 
 _DESCRIBED: Mapping[str, str] = {
     each.name: each.described
-    for each in (*PARAMETERS, *LUGRE.parameters, SIGMA_2, WEIGHTS, *STRIBECK)
+    for each in (*PARAMETERS, *LUGRE.parameters, SIGMA_2, WEIGHTS)
 }
-
-
-class StribeckTable(Table):
-    """The Stribeck curve, eq. (2)."""
-
-    F_c: float = Field(description=_DESCRIBED["F_c"])
-    F_s: float = Field(description=_DESCRIBED["F_s"])
-    v_s: float = Field(description=_DESCRIBED["v_s"])
-
-    def build(self) -> Stribeck:
-        """Return the curve."""
-        return Stribeck(self.F_c, self.F_s, self.v_s)
 
 
 class GMSTable(Table):

@@ -10,10 +10,12 @@ import keyword
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
+from gms_fsm._arguments import checked_path
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import FloatArray, checked_scalar, checked_values
 from gms_fsm.charts.stribeck import Stribeck
@@ -379,6 +381,59 @@ class System:
             if part.name in seen:
                 raise ParameterError(f"the name {part.name!r} is used twice", place=here)
             seen.add(part.name)
+
+    # ------------------------------------------------------------------ files
+    @classmethod
+    def load(cls, path: str | Path) -> System:
+        """Read a system from a TOML file.
+
+        Parameters
+        ----------
+        path : str or Path
+            With the keys ``name``, ``[[body]]`` (name, inertia, force, velocity, x, v),
+            ``[[contact]]`` (name, v, n, inputs, period; ``chart``, a chart file next to this file,
+            the name of an included chart, or a table as in a chart file, with ``values``; or
+            ``model``, as in scenario files), ``[signals]``, ``[numbers]``, ``[flow]`` and
+            ``[[sampled]]`` (name, period, updates, initial, offset).
+
+        Returns
+        -------
+        System
+            Checked, as any system.
+
+        Raises
+        ------
+        ScenarioError, ParameterError, SignalError, ChartError, ExpressionError
+            If the file is no system; the message names file, line, key and text.
+        """
+        from gms_fsm.systems._file import load
+
+        return load(checked_path("path", path))
+
+    def save(self, path: str | Path) -> Path:
+        """Write the system to a TOML file, from which `load` returns an equivalent one.
+
+        Charts that are included are written by name, others in full.
+
+        Parameters
+        ----------
+        path : str or Path
+            File name ending in ``.toml``.
+
+        Returns
+        -------
+        Path
+            The file written.
+
+        Raises
+        ------
+        OutputError
+            If a signal is a Python function, or the file cannot be written, has another ending, or
+            exists and is not as gms-fsm wrote it.
+        """
+        from gms_fsm.systems._file import save
+
+        return save(self, checked_path("path", path))
 
     # ------------------------------------------------------------------ queries
     @property
