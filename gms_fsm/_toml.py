@@ -189,7 +189,7 @@ def override(data: dict[str, Any], setting: str) -> None:
 
 # --------------------------------------------------------------------------- lines
 def line_of(text: str, key: Key) -> int:
-    """Return the line on which a key is written.
+    r"""Return the line on which a key is written.
 
     The line is found by reading prefixes of the text: the first one that has the key ends there.
 
@@ -208,7 +208,7 @@ def line_of(text: str, key: Key) -> int:
 
     Examples
     --------
-    >>> line_of('[[edge]]\\nname = "b"\\n[[edge]]\\nguard = "z > s"', ("edge", 1, "guard"))
+    >>> line_of('[[edge]]\nname = "b"\n[[edge]]\nguard = "z > s"', ("edge", 1, "guard"))
     4
     """
     whole = tomllib.loads(text)

@@ -5,7 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import (
+    ConfigDict,
+    Discriminator,
+    Field,
+    SerializerFunctionWrapHandler,
+    Tag,
+    model_serializer,
+    model_validator,
+)
 
 from gms_fsm._records import ONE, TABLE, Table, Texts, built, read_file, write_file
 from gms_fsm.charts._parts import State, Transition
@@ -32,10 +40,10 @@ class StateTable(Table):
     """A state."""
 
     name: str
-    flow: dict[str, str] = {}
-    entry: dict[str, str] = {}
-    exit: dict[str, str] = {}
-    outputs: dict[str, str] = {}
+    flow: dict[str, str] = Field({})
+    entry: dict[str, str] = Field({})
+    exit: dict[str, str] = Field({})
+    outputs: dict[str, str] = Field({})
     locked: bool = False
 
 
@@ -67,13 +75,13 @@ class ChartTable(Table):
 
     name: str
     reference: str = ""
-    inputs: list[str] = ["v"]
-    velocities: list[str] = ["v"]
-    variables: list[str] = []
+    inputs: list[str] = Field(["v"])
+    velocities: list[str] = Field(["v"])
+    variables: list[str] = Field([])
     parameters: list[ParameterField] = Field([], alias="parameter")
-    let: dict[str, str] = {}
-    outputs: dict[str, str] = {}
-    contact_outputs: dict[str, str] = {}
+    let: dict[str, str] = Field({})
+    outputs: dict[str, str] = Field({})
+    contact_outputs: dict[str, str] = Field({})
     states: list[StateTable] = Field(alias="state")
     transitions: list[EdgeTable] = Field([], alias="edge")
 
@@ -83,6 +91,18 @@ class ChartTable(Table):
         if isinstance(given, dict) and {"parameters", "parameter"} <= given.keys():
             raise ValueError("it has parameters = [...] and [[parameter]]; give only one of them")
         return given
+
+    @model_serializer(mode="wrap")
+    def _plain_names(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Write plain names of parameters as one list; else each as a table."""
+        data: dict[str, Any] = write(self)
+        given = data.get("parameter", [])
+        if not all(isinstance(each, str) for each in given):
+            data["parameter"] = [
+                {"name": each} if isinstance(each, str) else each for each in given
+            ]
+            return data
+        return {"parameters" if key == "parameter" else key: each for key, each in data.items()}
 
     @classmethod
     def of(cls, chart: Chart) -> ChartTable:

@@ -45,7 +45,9 @@ class Reader:
         self.only_forces(chart.outputs, here.of("outputs", "outputs"))
         self.only_forces(chart.contact_outputs, here.of("contact_outputs", "contact_outputs"))
         for name, text in chart.let.items():
-            self.lets[name] = self.value(text, self.known_now, here.of(f"let {name!r}", "let", name))
+            self.lets[name] = self.value(
+                text, self.known_now, here.of(f"let {name!r}", "let", name)
+            )
         flows: dict[tuple[str, str], Value] = {}
         forces: dict[tuple[str, str], Value | None] = {}
         assignments: dict[tuple[str, str], dict[str, Value]] = {}

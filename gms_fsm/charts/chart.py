@@ -253,10 +253,10 @@ class Chart:
         Parameters
         ----------
         path : str or Path
-            With the keys ``name``, ``inputs``, ``velocities``, ``variables``, ``parameters`` (names)
-            or ``[[parameter]]`` (name, unit, rule, per_element, meaning, assumed), ``[let]``,
-            ``[outputs]``, ``[contact_outputs]``, ``reference``, ``[[state]]`` (name, flow, entry,
-            exit, outputs, locked) and ``[[edge]]`` (name, from, to, guard, do).
+            With the keys ``name``, ``reference``, ``inputs``, ``velocities``, ``variables``,
+            ``parameters`` (a list of names) or ``[[parameter]]`` (name, unit, rule, per_element,
+            meaning, assumed), ``[let]``, ``[outputs]``, ``[contact_outputs]``, ``[[state]]`` (name,
+            flow, entry, exit, outputs, locked) and ``[[edge]]`` (name, from, to, guard, do).
 
         Returns
         -------

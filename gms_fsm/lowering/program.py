@@ -36,7 +36,6 @@ import integrators
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.errors import SignalError
 from gms_fsm.language import Binary, Requirement, Value, spell
-from gms_fsm.lowering._assembly import assembled
 from gms_fsm.lowering._generated import ieee, load, load_careful
 from gms_fsm.lowering._plan import Plan, both_sides, plan_of
 from gms_fsm.lowering._python import FUNCTIONS, python
@@ -200,7 +199,7 @@ class _Shape:
 def _lowered(shape: _Shape) -> Program:
     """Generate the text for all systems of one shape, without their numbers."""
     system = shape.system
-    plan = plan_of(assembled(system))
+    plan = plan_of(system.assembly)
     source = python(plan)
     callables = {
         name: signal.call for name, signal in system.signals.items() if isinstance(signal, Function)
@@ -242,7 +241,7 @@ def arguments(system: System) -> Arguments:
     tuple of lists
         See `Program`.
     """
-    read = assembled(system)
+    read = system.assembly
     tables = [
         as_floats(column)
         for s in system.signals.values()

@@ -31,8 +31,8 @@ from gms_fsm.language import (
     spell,
     split,
 )
-from gms_fsm.lowering._assembly import assembled, of
 from gms_fsm.lowering._generated import load
+from gms_fsm.systems._assembly import of
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact, System
 
@@ -184,7 +184,7 @@ def scales_of_system(system: System) -> SystemScales:
     SystemScales
         Those of its contacts; a body's are the smallest of the contacts it takes part in.
     """
-    read = assembled(system)
+    read = system.assembly
     sizes: dict[str, list[float]] = {}
     times: list[float] = []
     moved: dict[str, tuple[list[float], list[float]]] = {b.name: ([], []) for b in system.bodies}

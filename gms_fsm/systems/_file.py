@@ -58,7 +58,8 @@ class ContactInFile(ContactTable):
     """A contact of a system file."""
 
     chart: ChartField | None = Field(  # type: ignore[assignment]
-        None, description="a chart file next to this file, the name of an included chart, or a table"
+        None,
+        description="a chart file next to this one, the name of an included chart, or a table",
     )
     model: ModelField | None = Field(  # type: ignore[assignment]
         None, description="a model, as in scenario files, instead of a chart and values"

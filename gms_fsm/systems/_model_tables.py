@@ -45,8 +45,7 @@ BY_KIND, BY_CHART = "<kind>", "<chart>"
 
 
 _DESCRIBED: Mapping[str, str] = {
-    each.name: each.described
-    for each in (*PARAMETERS, *LUGRE.parameters, SIGMA_2, WEIGHTS)
+    each.name: each.described for each in (*PARAMETERS, *LUGRE.parameters, SIGMA_2, WEIGHTS)
 }
 
 

@@ -229,13 +229,13 @@ class ContactTable(Table):
     """A contact: a chart with values, or a model."""
 
     name: str
+    v: Texts = "v"
+    n: int = 1
+    inputs: dict[str, Value] = Field({})
+    period: float | None = None
     chart: ChartTable | None = None
     values: dict[str, Numbers] | None = None
     model: ModelTable | None = None
-    v: Texts = "v"
-    n: int = 1
-    inputs: dict[str, Value] = {}
-    period: float | None = None
 
     @classmethod
     def of(cls, contact: Contact) -> ContactTable:
@@ -278,7 +278,7 @@ class SampledTable(Table):
     name: str
     period: float
     updates: dict[str, str]
-    initial: dict[str, float] = {}
+    initial: dict[str, float] = Field({})
     offset: float = 0.0
 
 
@@ -288,12 +288,12 @@ class SystemTable(Table):
     model_config = ConfigDict(populate_by_name=True)
 
     name: str
-    numbers: dict[str, float] = {}
-    signals: dict[str, SignalField] = {}
-    flow: dict[str, str] = {}
+    numbers: dict[str, float] = Field({})
+    signals: dict[str, SignalField] = Field({})
+    flow: dict[str, str] = Field({})
     bodies: list[BodyTable] = Field(alias="body")
     contacts: list[ContactTable] = Field(alias="contact")
-    sampled: list[SampledTable] = []
+    sampled: list[SampledTable] = Field([])
 
     @classmethod
     def of(cls, system: System) -> SystemTable:
@@ -343,9 +343,7 @@ def system_from(table: SystemTable, contacts: list[Contact]) -> System:
     """Return the system that a table describes, with its contacts."""
     return System(
         table.name,
-        bodies=tuple(
-            built(Body, "bodies", i, **vars(each)) for i, each in enumerate(table.bodies)
-        ),
+        bodies=tuple(built(Body, "bodies", i, **vars(each)) for i, each in enumerate(table.bodies)),
         contacts=tuple(contacts),
         signals={
             name: built(signal_of, "signals", name, name=name, table=each)

@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from gms_fsm._arguments import checked_path
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import FloatArray, checked_scalar, checked_values
 from gms_fsm.charts.stribeck import Stribeck
-from gms_fsm.errors import ExpressionError, ParameterError, shown
+from gms_fsm.errors import ExpressionError, ParameterError, Part, shown
 from gms_fsm.language import (
     CONSTANTS,
     FUNCTIONS,
@@ -38,6 +38,9 @@ from gms_fsm.language import (
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Signal, as_signal
+
+if TYPE_CHECKING:
+    from gms_fsm.systems._assembly import Assembly
 
 __all__ = ["Body", "Contact", "Mounting", "Sampled", "Several", "System", "system_of"]
 
@@ -314,8 +317,11 @@ class System:
     numbers: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     flow: Mapping[str, str] = field(default_factory=dict, kw_only=True)
     sampled: tuple[Sampled, ...] = field(default=(), kw_only=True)
+    assembly: Assembly = field(init=False, repr=False)  # its texts, read
 
     def __post_init__(self) -> None:
+        from gms_fsm.systems._assembly import assembled
+
         put, here = object.__setattr__, f"system {shown(self.name)}"
         for each, kind in (("bodies", Body), ("contacts", Contact), ("sampled", Sampled)):
             given = getattr(self, each)
@@ -339,48 +345,54 @@ class System:
         self._check_names(here)
         signals = {name: self._signal(name, given, here) for name, given in self.signals.items()}
         put(self, "signals", signals)
+        put(self, "assembly", assembled(self))
 
     def _signal(self, name: str, given: Any, here: str) -> Signal | str:
         """Return a signal; one whose text names numbers stays a text."""
         if isinstance(given, str):
-            owner = f"{here}, signal {name!r}"
-            tree = self._read(given, ["t", *self.numbers], owner)
+            try:
+                tree = parse_value(given, ["t", *self.numbers])
+            except ExpressionError as error:
+                part = Part(f"{here}, signal {name!r}", ("signals", name))
+                raise error.at(part) from None
             if names_in(tree) - {"t"}:
                 return given
         return as_signal(given)
 
-    @staticmethod
-    def _read(text: Text, names: Iterable[str], owner: str) -> Value:
-        try:
-            return parse_value(text if isinstance(text, str) else repr(float(text)), names)
-        except ExpressionError as error:
-            raise error.at(owner) from None
-
     def _check_names(self, here: str) -> None:
-        groups: list[tuple[str, Iterable[str]]] = [("time", ["t"])]
-        for body in self.bodies:
+        # What has names, with their keys, and the names.
+        groups: list[tuple[str, Mapping[str, tuple[str | int, ...]]]] = [("time", {"t": ()})]
+        for i, body in enumerate(self.bodies):
             alias = body.velocity == body.v and body.v in self.signals
-            groups.append((f"body {body.name!r}", [body.x] if alias else [body.x, body.v]))
-        groups += [("signal", self.signals), ("number", self.numbers), ("flow", self.flow)]
-        groups += [(f"sampled {each.name!r}", each.updates) for each in self.sampled]
+            own = {body.x: ("bodies", i, "x")} | ({} if alias else {body.v: ("bodies", i, "v")})
+            groups.append((f"body {body.name!r}", own))
+        for kind, attribute in (("signal", "signals"), ("number", "numbers"), ("flow", "flow")):
+            groups.append((kind, {name: (attribute, name) for name in getattr(self, attribute)}))
+        for i, each in enumerate(self.sampled):
+            values = {name: ("sampled", i, "updates", name) for name in each.updates}
+            groups.append((f"sampled {each.name!r}", values))
         owner: dict[str, str] = {}
         for kind, names in groups:
-            for name in names:
-                _check_name(name, f"{here}, {kind}")
+            for name, key in names.items():
+                _check_name(name, f"{here}, {kind}", key)
                 if name in owner:
                     raise ParameterError(
                         f"the name {name!r} is used twice ({owner[name]} and {kind})",
                         place=here,
                         advice="every name must be unique; a body's names are x=... and v=...",
+                        key=key,
                     )
                 owner[name] = kind
-        parts: list[Body | Contact | Sampled] = [*self.bodies, *self.contacts, *self.sampled]
         seen: set[str] = set()
-        for part in parts:
-            _check_name(part.name, f"{here}, {type(part).__name__.lower()}")
-            if part.name in seen:
-                raise ParameterError(f"the name {part.name!r} is used twice", place=here)
-            seen.add(part.name)
+        for attribute in ("bodies", "contacts", "sampled"):
+            for i, part in enumerate(getattr(self, attribute)):
+                key = (attribute, i, "name")
+                _check_name(part.name, f"{here}, {type(part).__name__.lower()}", key)
+                if part.name in seen:
+                    raise ParameterError(
+                        f"the name {part.name!r} is used twice", place=here, key=key
+                    )
+                seen.add(part.name)
 
     # ------------------------------------------------------------------ files
     @classmethod
@@ -485,10 +497,10 @@ class System:
         return _found(self.contacts, name, f"system {self.name!r} has no contact")
 
 
-Part = TypeVar("Part", "Body", "Contact")
+Named = TypeVar("Named", "Body", "Contact")
 
 
-def _found(parts: tuple[Part, ...], name: str, reason: str) -> Part:
+def _found(parts: tuple[Named, ...], name: str, reason: str) -> Named:
     for each in parts:
         if each.name == name:
             return each
@@ -496,15 +508,16 @@ def _found(parts: tuple[Part, ...], name: str, reason: str) -> Part:
     raise ParameterError(f"{reason} {shown(name)}", advice=f"there are {known}")
 
 
-def _check_name(name: object, place: str) -> None:
+def _check_name(name: object, place: str, key: tuple[str | int, ...]) -> None:
     if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
         raise ParameterError(
             f"{shown(name)} is not a name",
             place=place,
             advice="use letters, digits and _, not starting with a digit, and no Python keyword",
+            key=key,
         )
     if name in FUNCTIONS or name in CONSTANTS or name == "pow":
-        raise ParameterError(f"the name {name!r} is a word of the language", place=place)
+        raise ParameterError(f"the name {name!r} is a word of the language", place=place, key=key)
 
 
 def checked_numbers(

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from gms_fsm.charts.chart import Chart
-from gms_fsm.errors import ExpressionError, ParameterError, shown
+from gms_fsm.errors import ExpressionError, ParameterError, Part, shown
 from gms_fsm.language import (
     Binary,
     Condition,
@@ -266,51 +266,59 @@ def assembled(system: System) -> Assembly:
 
 class _Reader:
     def __init__(self, system: System) -> None:
-        self.system, self.here = system, f"system {system.name!r}"
+        self.system, self.here = system, Part(f"system {system.name!r}")
         self.definitions: list[Definition] = []
         self.shared: dict[str, float] = {}
         self.own: dict[str, tuple[int, np.ndarray]] = {}
 
-    def value(self, text: str | float, names: Iterable[str], owner: str) -> Value:
+    def value(self, text: str | float, names: Iterable[str], owner: Part) -> Value:
         try:
             return parse_value(text if isinstance(text, str) else repr(float(text)), names)
         except ExpressionError as error:
-            raise error.at(f"{self.here}, {owner}") from None
+            raise error.at(owner) from None
 
     def read(self) -> Assembly:
         system, numbers = self.system, self.system.numbers
+        here = self.here
         for contact in system.contacts:
             self.model_numbers(contact)
         self.shared |= numbers
         for name, signal in system.signals.items():
             if isinstance(signal, str):
-                tree = self.value(signal, ["t", *numbers], f"signal {name!r}")
+                owner = here.of(f"signal {name!r}", "signals", name)
+                tree = self.value(signal, ["t", *numbers], owner)
                 self.definitions.append(Definition(name, tree))
             else:
                 formula = signal.tree if isinstance(signal, Formula) else None
                 self.definitions.append(Definition(name, formula, signal=signal))
         given = ["t", *system.signals, *numbers]
         forces, inertias = {}, {}
-        for body in system.bodies:
-            owner = f"body {body.name!r}"
+        for i, body in enumerate(system.bodies):
+            owner = here.of(f"body {body.name!r}", "bodies", i)
             if body.velocity is None:
                 assert body.inertia is not None
-                forces[body.name] = self.value(body.force, system.names, f"{owner}, force")
-                tree = self.value(body.inertia, system.names, f"{owner}, inertia")
+                forces[body.name] = self.value(body.force, system.names, owner.of("force", "force"))
+                tree = self.value(body.inertia, system.names, owner.of("inertia", "inertia"))
                 if is_zero(tree, numbers):
                     raise ParameterError(
                         f"the inertia {body.inertia!r} is zero, or not finite",
-                        place=f"{self.here}, {owner}",
+                        place=owner.words,
                         advice="every free body needs one",
+                        key=(*owner.key, "inertia"),
                     )
                 inertias[body.name] = tree
             elif not (body.velocity == body.v and body.v in system.signals):
-                tree = self.value(body.velocity, given, f"{owner}, velocity")
+                tree = self.value(body.velocity, given, owner.of("velocity", "velocity"))
                 self.definitions.append(Definition(body.v, tree))
         flow = {
-            name: self.value(text, system.names, f"flow of {name!r}")
+            name: self.value(text, system.names, here.of(f"flow of {name!r}", "flow", name))
             for name, text in system.flow.items()
         }
+        for i, each in enumerate(system.sampled):
+            owner = here.of(f"sampled {each.name!r}", "sampled", i)
+            for name, text in each.updates.items():
+                part = owner.of(f"update of {name!r}", "updates", name)
+                self.value(text, [*system.names, "period"], part)
         banks = tuple(self.bank(i, contact) for i, contact in enumerate(system.contacts))
         return Assembly(
             system,
@@ -340,7 +348,7 @@ class _Reader:
 
     def bank(self, index: int, contact: Contact) -> Bank:
         chart, model, c = contact.chart, contact.model, contact.name
-        owner = f"contact {c!r}"
+        owner = self.here.of(f"contact {c!r}", "contacts", index)
         weights = np.ones(contact.n) if model is None else model.weights
         self.own[of(c, "threshold weight")] = (index, np.asarray(weights, dtype=np.float64))
         names: dict[str, Value] = {"t": Name("t")}
@@ -355,7 +363,7 @@ class _Reader:
         jacobian, moved = [], {body.v: body for body in self.system.bodies}
         velocities = []
         for text, name in zip(contact.v, chart.velocities, strict=True):
-            tree = self.value(text, [*moved, *self.system.numbers], f"{owner}, v")
+            tree = self.value(text, [*moved, *self.system.numbers], owner.of("v", "v"))
             row = self.coefficients(tree, moved, text, owner)
             jacobian.append(row)
             known = self.defined(of(c, name), tree)
@@ -372,8 +380,9 @@ class _Reader:
             if name not in chart.inputs:
                 raise ParameterError(
                     f"inputs has {shown(name)}, which its chart does not read",
-                    place=f"{self.here}, {owner}",
+                    place=owner.words,
                     advice=f"the chart's inputs are {', '.join(chart.inputs) or 'none'}",
+                    key=(*owner.key, "inputs", name),
                 )
         threshold = ""
         if model is not None and model.stribeck is not None:
@@ -435,7 +444,7 @@ class _Reader:
         )
 
     def coefficients(
-        self, tree: Value, moved: Mapping[str, Body], text: str, owner: str
+        self, tree: Value, moved: Mapping[str, Body], text: str, owner: Part
     ) -> Mapping[str, Value]:
         """Return the coefficients of a velocity that is linear in the bodies' velocities."""
         row: dict[str, Value] = {}
@@ -450,8 +459,9 @@ class _Reader:
         if not constant or not row:
             raise ParameterError(
                 f"v = {text!r} is not linear in the velocities {', '.join(moved)}",
-                place=f"{self.here}, {owner}",
+                place=owner.words,
                 advice="write it for example as 'v_1 - ratio * v_2'",
+                key=(*owner.key, "v"),
             )
         return row
 
@@ -462,16 +472,17 @@ class _Reader:
         self.definitions.append(Definition(name, tree))
         return Name(name)
 
-    def input(self, contact: Contact, name: str, owner: str) -> Value:
+    def input(self, contact: Contact, name: str, owner: Part) -> Value:
         """Bind an input of a chart."""
         if name not in contact.inputs and name not in self.system.names:
             raise ParameterError(
                 f"its chart reads the input {name!r}, which is not bound",
-                place=f"{self.here}, {owner}",
+                place=owner.words,
                 advice=f"give inputs={{{name!r}: ...}} over {', '.join(self.system.names)}",
+                key=owner.key,
             )
         text = contact.inputs.get(name, name)
-        tree = self.value(text, self.system.names, f"{owner}, input {name!r}")
+        tree = self.value(text, self.system.names, owner.of(f"input {name!r}", "inputs", name))
         return tree if isinstance(tree, Number) else self.defined(of(contact.name, name), tree)
 
     def curve(self, contact: Contact, index: int, names: dict[str, Value]) -> str:
