@@ -173,9 +173,9 @@ def built(make: Callable[..., Made], *key: str | int, **given: Any) -> Made:
         raise error.replaced(key=(*key, *error.key)) from None
 
 
-def _key_in_file(key: Key, data: Any, root: type[BaseModel]) -> Key:
+def _key_in_file(key: Key, given: Any, root: type[BaseModel]) -> Key:
     """Return the key of a part as the file has it: with aliases, and no deeper than its tables."""
-    options, found = [root], list[str | int]()
+    options, found, data = [root], list[str | int](), given
     for part in key:
         if not isinstance(data, dict | list):
             break
@@ -187,7 +187,7 @@ def _key_in_file(key: Key, data: Any, root: type[BaseModel]) -> Key:
                 name = field.alias or part
         found.append(name)
         try:
-            data = data[name]  # type: ignore[call-overload]
+            data = _inside(data, name)
         except (LookupError, TypeError):
             break
     return tuple(found)
@@ -276,6 +276,10 @@ def _written_key(loc: tuple[int | str, ...], data: Any) -> Key:
     return tuple(places)
 
 
+def _inside(data: Any, part: str | int) -> Any:
+    return data[part]
+
+
 def _valid_keys(places: Key, data: dict[str, Any], root: type[BaseModel]) -> list[str]:
     """Return the keys that are valid in a table of the file."""
     options, table = [root], data
@@ -289,7 +293,7 @@ def _valid_keys(places: Key, data: dict[str, Any], root: type[BaseModel]) -> lis
             if not options:
                 return []
         try:
-            table = table[place]
+            table = _inside(table, place)
         except (LookupError, TypeError):
             table = {}
     fields = _fitting(options, table).model_fields

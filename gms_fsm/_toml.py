@@ -242,10 +242,10 @@ def line_of(text: str, key: Key) -> int:
 
 def _has(data: Any, key: Key) -> bool:
     for part in key:
-        inside = range(len(data)) if isinstance(data, list) else data
-        if not isinstance(data, list | dict) or part not in inside:
+        try:
+            data = data[part]
+        except (LookupError, TypeError):
             return False
-        data = data[part]
     return True
 
 

@@ -67,7 +67,8 @@ class ContactInFile(ContactTable):
 
     def chosen(self, folder: Path) -> Contact:
         """Return the contact; its chart may be a file in a folder."""
-        chart = model = None
+        chart: Chart | None = None
+        model: Model | None = None
         if (self.chart is None) == (self.model is None):
             raise ParameterError(
                 "it needs a chart or a model, not both"

@@ -151,9 +151,9 @@ class StribeckTable(Table):
     v_s: float = Field(description=_DESCRIBED["v_s"])
 
     @classmethod
-    def of(cls, curve: Stribeck | None) -> StribeckTable | None:
-        """Describe a curve, if there is one."""
-        return None if curve is None else cls(**asdict(curve))
+    def of(cls, curve: Stribeck) -> StribeckTable:
+        """Describe a curve."""
+        return cls(**asdict(curve))
 
     def build(self) -> Stribeck:
         """Return the curve."""
@@ -180,7 +180,7 @@ class ModelTable(Table):
             chart=ChartTable.of(model.chart),
             values=values_table(model.values),
             weights=model.weights.tolist(),
-            stribeck=StribeckTable.of(model.stribeck),
+            stribeck=None if model.stribeck is None else StribeckTable.of(model.stribeck),
             sigma_2=model.sigma_2,
         )
 
@@ -267,9 +267,9 @@ def numbers_table(contact: Contact) -> dict[str, Any]:
     return {"chart": ChartTable.of(contact.chart), "values": values_table(contact.values)}
 
 
-def value_table(value: str | float | None) -> str | float | None:
+def value_table(value: str | float) -> str | float:
     """Return an expression or a number of plain types."""
-    return value if value is None or isinstance(value, str) else float(value)
+    return value if isinstance(value, str) else float(value)
 
 
 class SampledTable(Table):
@@ -327,9 +327,9 @@ def plain(system: System) -> dict[str, Any]:
         "bodies": [
             BodyTable(
                 name=each.name,
-                inertia=value_table(each.inertia),
+                inertia=None if each.inertia is None else value_table(each.inertia),
                 force=value_table(each.force),
-                velocity=value_table(each.velocity),
+                velocity=None if each.velocity is None else value_table(each.velocity),
                 x=each.x,
                 v=each.v,
             )
