@@ -111,7 +111,7 @@ def write(path: Path, record: SessionRecord) -> Path:
             raise SessionError(f"the option {name} = {value!r} cannot be written to a file")
     data = {
         "format": FORMAT,
-        "header": json.loads(Header.of(record.model, record.rig, {}).model_dump_json()),
+        "header": json.loads(Header.of(record.model, record.rig, None, {}).model_dump_json()),
         "t_end": record.t_end,
         "options": {name: _plain(value) for name, value in record.options.items()},
         "branches": [

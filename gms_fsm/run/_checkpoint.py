@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 
 from gms_fsm._files import write_whole
 from gms_fsm.errors import CheckpointError, ParameterError, SignalError, cut, shown, why
-from gms_fsm.lowering.layout import LOG_TEXTS
+from gms_fsm.lowering.layout import CONTACT, LOG_TEXTS
 from gms_fsm.run._identity import identity
 from gms_fsm.run.start import Start
 from gms_fsm.systems.signals import Function
+from gms_fsm.systems.system import Contact
 from gms_fsm.traces._archives import member
 from gms_fsm.traces._header import Header
 from integrators import hybrid, loop
@@ -69,7 +70,7 @@ class Checkpointer:
         If the integrator is a SciPy solver, whose history cannot be saved, or if a signal is a
         function that cannot be identified.
     OutputError
-        If the file cannot be written, or the rig is of a user-defined class.
+        If the file cannot be written.
     """
 
     def __init__(self, run: Resumable, path: Path, every: float) -> None:
@@ -135,7 +136,7 @@ class Checkpointer:
             )
         if head != ours:
             raise CheckpointError(
-                "belongs to a run with another model, rig, signal or setting",
+                "belongs to a run with another model, rig, system, signal or setting",
                 place=str(self.path),
                 advice="remove it, or use a separate file for this run",
             )
@@ -154,9 +155,10 @@ def _program() -> str:
 
 def _identity(start: Start) -> str:
     """Return a hash of everything that determines a run."""
-    head = Header.of(start.model, start.rig, start.settings).model_dump_json()
+    header = Header.of(start.model, start.rig, start.given, start.settings)
+    head = header.model_dump_json()
     functions = {}
-    for name, signal in start.rig.signals.items():
+    for name, signal in start.system.signals.items():
         if isinstance(signal, Function):
             try:
                 functions[name] = identity(signal.call)
@@ -174,26 +176,36 @@ def _identity(start: Start) -> str:
 # --------------------------------------------------------------------------- plausibility
 def _check(run: Resumable, state: Mapping[str, Any], kept: Mapping[str, Any]) -> None:
     """Raise a ValueError unless a run like this one can have reached such values."""
-    start, b, chart = run.start, run.buffers, run.start.model.chart
+    start, b, layout = run.start, run.buffers, run.start.program.layout
+    contacts = {each.name: each for each in start.system.contacts}
+    charts = [contacts[bank.name].chart for bank in layout.banks for _ in range(bank.n)]
+    # Of each machine: its last state, and its first and last edge, which are counted over all.
+    last = np.array([len(chart.states) - 1 for chart in charts])
+    first_edge = np.array([bank.first_edge for bank in layout.banks for _ in range(bank.n)])
+    last_edge = first_edge + [len(chart.transitions) - 1 for chart in charts]
     for name, place in hybrid.state_of(b).items():
         _expect(name, state[name], np.asarray(place), rows=False)
     for name, column in run.kept().items():
         _expect(name, kept[name], np.asarray(column), rows=name not in ("counts", "seen"))
-    states, edges, n = len(chart.states), len(chart.transitions), len(b.now.mode)
-    layout = start.program.layout
+    n = len(b.now.mode)
     counts, cursor = state["counts"], state["cursor"]
     # Compiled rows are in the saved columns, others in the buffer.
     capacity = max(len(kept["rows_t"]), len(b.out.rows_t))
     machine = 0 if counts[loop.PHASE] == loop.FIRE else -1
+    enabled = np.asarray(state["edges"]) >= 0
+    fired = 0, max(0, last_edge.max())
+    if machine == 0 and 0 <= counts[loop.MACHINE] < n:
+        fired = first_edge[counts[loop.MACHINE]], last_edge[counts[loop.MACHINE]]
     within = {
         "time": (state["clock"][T], start.t_start, start.t_end),
-        "mode": (state["mode"], 0, states - 1),
-        "edges": (state["edges"], -1, edges - 1),
+        "mode": (state["mode"], 0, last),
+        "edges": (state["edges"], -1, last_edge),
+        "enabled edges": (state["edges"][enabled], first_edge[enabled], last_edge[enabled]),
         "room": (state["room"], 0, len(b.relations.watch) - 1),
         "watch": (state["watch"], 0, 1),
         "phase": (counts[loop.PHASE], loop.START, loop.END),
         "machine": (counts[loop.MACHINE], machine, n - 1),
-        "edge": (counts[loop.EDGE], 0, max(0, edges - 1)),
+        "edge": (counts[loop.EDGE], *fired),
         "jump": (counts[loop.JUMP], 0, len(b.plan.jumps)),
         "active relations": (counts[loop.ACTIVE], 0, len(b.relations.watch)),
         "row": (cursor[ROW], 0, capacity),
@@ -204,31 +216,44 @@ def _check(run: Resumable, state: Mapping[str, Any], kept: Mapping[str, Any]) ->
         "surfaces slid on": (state["which"][-1], 0, len(b.sliding.sigma)),
         "slid": (state["slid"], 0, 1),
         "arrived": (state["arrived"], 0, 1),
-        "rows' mode": (kept["rows_mode"][:, layout.elements], 0, states - 1),
-        "stops' mode": (kept["stops_mode"][:, layout.elements], 0, states - 1),
+        "rows' mode": (kept["rows_mode"][:, layout.elements], 0, last),
+        "stops' mode": (kept["stops_mode"][:, layout.elements], 0, last),
         "rows slid": (kept["rows_mode"][:, layout.slides], 0, 1),
         "stops slid": (kept["stops_mode"][:, layout.slides], 0, 1),
     }
     groups = [[name for name in kept if name.startswith(kind)] for kind in ("rows_", "stops_")]
     if "log" in kept:  # from a run in Python
         log = kept["log"]
-        within["log"] = log["element"], 0, n - 1
-        known = {(edge.name, edge.source, edge.target) for edge in chart.transitions}
-        if not known >= {tuple(row) for row in log[[*LOG_TEXTS]].tolist()}:
-            raise ValueError("log: an edge that the chart does not have")
+        _check_log(log, contacts, named=start.given is not None)
     else:  # from a compiled run
         groups.append(["t", "machine", "edge", "numbers"])
         firings, stops = kept["counts"]
         within["firings"] = firings, 0, len(kept["t"])
         within["stops"] = stops, 0, len(kept["stops_t"])
         within["firing machines"] = kept["machine"], 0, n - 1
-        within["fired edges"] = kept["edge"], 0, max(0, edges - 1)
+        within["fired edges"] = kept["edge"], 0, max(0, last_edge.max())
     for group in groups:
         if len({len(kept[name]) for name in group}) != 1:
             raise ValueError(f"{', '.join(group)}: lengths differ")
     for name, (found, least, most) in within.items():
         if not np.all((np.asarray(found) >= least) & (np.asarray(found) <= most)):
             raise ValueError(f"{name}: not within {least} to {most}")
+
+
+def _check_log(log: Any, contacts: Mapping[str, Contact], *, named: bool) -> None:
+    """Raise a ValueError unless a run of these contacts can have written a log."""
+    if (CONTACT in log.dtype.names) != (named and log.size > 0):
+        raise ValueError("log: only those of systems name contacts")
+    names = log[CONTACT] if CONTACT in log.dtype.names else np.full(log.size, next(iter(contacts)))
+    for name in np.unique(names).tolist():
+        if name not in contacts:
+            raise ValueError(f"log: no contact {shown(name)}")
+        mine, contact = log[names == name], contacts[name]
+        if not ((mine["element"] >= 0) & (mine["element"] < contact.n)).all():
+            raise ValueError(f"log: not within 0 to {contact.n - 1}")
+        known = {(edge.name, edge.source, edge.target) for edge in contact.chart.transitions}
+        if not known >= {tuple(row) for row in mine[[*LOG_TEXTS]].tolist()}:
+            raise ValueError("log: an edge that the chart does not have")
 
 
 def _expect(name: str, found: NDArray[Any], like: NDArray[Any], *, rows: bool) -> None:
@@ -242,4 +267,5 @@ def _expect(name: str, found: NDArray[Any], like: NDArray[Any], *, rows: bool) -
 
 
 def _kinds(record: np.dtype[Any]) -> list[tuple[str, str]]:
-    return [(name, field[0].kind) for name, field in (record.fields or {}).items()]
+    fields = (record.fields or {}).items()  # the contact is only in logs that are not empty
+    return [(name, field[0].kind) for name, field in fields if name != CONTACT]

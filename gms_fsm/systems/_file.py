@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -80,7 +81,8 @@ class ContactInFile(ContactTable):
         if self.chart is not None:
             chart = built(_chart, "chart", given=self.chart, folder=folder)
         if self.model is not None:
-            model = built(self.model.build, "model")
+            build: Callable[[], Model] = self.model.build
+            model = built(build, "model")
         return contact_from(self, chart, model)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from gms_fsm.charts.parameters import Parameter, checked_scalar
 from gms_fsm.systems.signals import Signal, SignalLike, as_signal
 
-__all__ = ["Prescribed", "PulledSlider", "Rig", "Slider", "numbers_of", "with_numbers"]
+__all__ = ["Prescribed", "PulledSlider", "Rig", "Slider", "TextRig", "numbers_of", "with_numbers"]
 
 MASS = Parameter("mass", "kg", "> 0", per_element=False, meaning="mass")
 
@@ -151,6 +151,37 @@ class PulledSlider:
     def numbers(self) -> Mapping[str, float]:
         """The mass, stiffness and speed."""
         return {each.name: getattr(self, each.name) for each in self.parameters}
+
+
+@dataclass(frozen=True, eq=False)
+class TextRig:
+    """Any rig as its texts, numbers and signals: what a file keeps of a rig of your own.
+
+    Parameters
+    ----------
+    title : str
+        For figures and summaries.
+    acceleration : str or None
+        dv/dt over t, x, v, F, the signals and the numbers; None if v is prescribed.
+    signals : mapping of str to signal
+        As those of any rig.
+    numbers : mapping of str to float
+        Constants.
+
+    Examples
+    --------
+    >>> TextRig("pushed", "(P - F) / m", {"P": "sin(t)"}, {"m": 1.0}).numbers["m"]
+    1.0
+    """
+
+    title: str
+    acceleration: str | None
+    signals: Mapping[str, Any]
+    numbers: Mapping[str, float]
+
+    def __post_init__(self) -> None:
+        signals = {name: as_signal(given) for name, given in self.signals.items()}
+        object.__setattr__(self, "signals", signals)
 
 
 def _check(rig: Slider | PulledSlider) -> None:

@@ -626,6 +626,23 @@ class Several:
         )
 
 
+def origin_of(system: System) -> tuple[Any, Mounting]:
+    """Return what stands for model and rig of a system, for everything that reads these.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+
+    Returns
+    -------
+    Contact or Several, Mounting
+        Its only contact, if it has one only; and the rest.
+    """
+    single = system.contacts[0] if len(system.contacts) == 1 else Several(system)
+    return single, Mounting(system)
+
+
 # --------------------------------------------------------------------------- from a model on a rig
 def system_of(model: Model, rig: Rig) -> System:
     """Return a model on a rig as a system: one body, called body, and one contact, called friction.

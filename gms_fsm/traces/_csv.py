@@ -20,12 +20,11 @@ from numpy.typing import NDArray
 from gms_fsm._files import folder_lock, leftovers, write_together
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import TraceFileError
-from gms_fsm.lowering.layout import LOG_NUMBERS, LOG_TEXTS, Layout
-from gms_fsm.lowering.program import lower
-from gms_fsm.systems.models import Model
+from gms_fsm.lowering.layout import CONTACT, LOG_NUMBERS, LOG_TEXTS
+from gms_fsm.traces._columns import column_title
 from gms_fsm.traces._header import Header
 from gms_fsm.traces._log import log_from
-from gms_fsm.traces._parts import Parts
+from gms_fsm.traces._parts import Parts, Ran
 from gms_fsm.traces.rows import Rows, column_name
 
 __all__ = ["log_path", "log_text", "read", "write"]
@@ -69,16 +68,18 @@ def read(path: Path) -> Parts:
             header = _header(path, file.readline())
             table = _read_columns(file, path, 2)
         log = _read_columns(io.StringIO(_log_of(path, header.log)), log_path(path), 1)
-    model, rig = header.to_model(), header.to_rig()
-    rows = _rows(table, model, lower(model, rig).layout)
-    observed = {
-        "v": _numbers(table, "v"),
-        "F": _numbers(table, "F"),
-        "s": _block(table, "s", model.n),
-        "F_elements": _block(table, "F", model.n),
-        "dz": _block(table, f"d{model.chart.variables[0]}", model.n),
-    }
-    return Parts(header, model, rig, rows, rows, _log(log), observed)
+    ran = Ran.of(header)
+    layout, short = ran.layout, ran.system is None
+    rows = _rows(table, ran)
+    observed = {}
+    for name in ran.names.values():
+        title = column_title(layout, name, short=short)
+        observed[name] = (
+            _block(table, title, len(layout.observed.all_of(name)))
+            if name in layout.observed.own
+            else _numbers(table, title)
+        )
+    return Parts(header, ran, rows, rows, _log(log), observed)
 
 
 def _header(path: Path, line: str) -> Header:
@@ -90,14 +91,18 @@ def _header(path: Path, line: str) -> Header:
     return Header.model_validate_json(line[2:])
 
 
-def _rows(table: Mapping[str, list[str]], model: Model, layout: Layout) -> Rows:
-    start = layout.contact().of("")
+def _rows(table: Mapping[str, list[str]], ran: Ran) -> Rows:
+    layout, short = ran.layout, ran.system is None
+    titles = {name: column_title(layout, name, short=short) for name, _ in layout.y}
     y = [
-        _numbers(table, name if i is None else column_name(name.removeprefix(start), i))
+        _numbers(table, titles[name] if i is None else column_name(titles[name], i))
         for name, i in layout.y
     ]
-    states = [state.name for state in model.chart.states]
-    mode = [[states.index(c) for c in table[column_name("state", i)]] for i in range(model.n)]
+    mode = []
+    for bank, contact in zip(layout.banks, ran.whole.contacts, strict=True):
+        states = {state.name: k for k, state in enumerate(contact.chart.states)}
+        title = column_title(layout, bank.of("state"), short=short)
+        mode += [[states[cell] for cell in table[column_name(title, i)]] for i in range(bank.n)]
     slid = sum(name.startswith("slides") and name[6:].isdigit() for name in table)
     mode += [[int(c) for c in table[column_name("slides", k)]] for k in range(slid)]
     return Rows(
@@ -119,7 +124,8 @@ def _block(table: Mapping[str, list[str]], name: str, n: int) -> FloatArray:
 def _log(table: Mapping[str, list[str]]) -> Any:
     columns: dict[str, NDArray[Any]] = {name: _numbers(table, name) for name in ("t", *LOG_NUMBERS)}
     columns["element"] = np.array([int(cell) - 1 for cell in table["element"]])
-    columns |= {name: np.array(table[name], dtype=np.str_) for name in LOG_TEXTS}
+    texts = [name for name in (*LOG_TEXTS, CONTACT) if name in table]
+    columns |= {name: np.array(table[name], dtype=np.str_) for name in texts}
     return log_from(columns)
 
 

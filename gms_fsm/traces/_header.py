@@ -2,126 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
-import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from gms_fsm.charts._reader import AGE
-from gms_fsm.charts.chart import Chart, State, Transition
-from gms_fsm.charts.parameters import Parameter
-from gms_fsm.charts.stribeck import Stribeck
-from gms_fsm.errors import OutputError, SignalError
+from gms_fsm._records import Table
 from gms_fsm.lowering.scales import Setting
+from gms_fsm.systems._record import (
+    ModelTable,
+    SignalField,
+    SystemTable,
+    signal_of,
+    signal_table,
+)
 from gms_fsm.systems.models import ChartModel, Model
-from gms_fsm.systems.rigs import Prescribed, PulledSlider, Rig, Slider
-from gms_fsm.systems.signals import Corners, Formula, Function, Signal
+from gms_fsm.systems.rigs import Prescribed, PulledSlider, Rig, Slider, TextRig
+from gms_fsm.systems.system import System
 from gms_fsm.traces.verdicts import Verdict
 
 __all__ = ["Header"]
 
-
-class _Record(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, ser_json_inf_nan="constants")
-
-
-class TransitionRecord(_Record):
-    """One edge of a chart."""
-
-    name: str
-    source: str
-    target: str
-    guard: str
-    actions: dict[str, str] = {}
-
-
-class ChartRecord(_Record):
-    """The texts of a chart."""
-
-    name: str
-    inputs: tuple[str, ...]
-    variables: tuple[str, ...]
-    parameters: tuple[Parameter | str, ...]
-    states: tuple[State, ...]
-    transitions: tuple[TransitionRecord, ...]
-    outputs: dict[str, str]
-    reference: str
-    let: dict[str, str] = {}
-    velocities: tuple[str, ...] = ("v",)
-    contact_outputs: dict[str, str] = {}
-
-    @classmethod
-    def of(cls, chart: Chart) -> ChartRecord:
-        """Describe a chart; a parameter without unit and rule is stored as its name only."""
-        fields = {name: getattr(chart, name) for name in cls.model_fields}
-        plain = [each.name if each == Parameter(each.name) else each for each in chart.parameters]
-        edges = [
-            {name: getattr(edge, name) for name in TransitionRecord.model_fields}
-            for edge in chart.transitions
-        ]
-        # The age is there because a text reads it.
-        variables = [name for name in chart.variables if name != AGE]
-        return cls(**{**fields, "variables": variables, "parameters": plain, "transitions": edges})
-
-    def to_chart(self) -> Chart:
-        """Return an equal chart; an edge with several sources has become several edges."""
-        edges: dict[str, list[TransitionRecord]] = {}
-        for edge in self.transitions:
-            edges.setdefault(edge.name, []).append(edge)
-        given = [
-            Transition(
-                same[0].name,
-                [each.source for each in same],
-                same[0].target,
-                same[0].guard,
-                same[0].actions,
-            )
-            for same in edges.values()
-        ]
-        return Chart(**{**vars(self), "transitions": given})
-
-
-class ModelRecord(_Record):
-    """The numbers of a model."""
-
-    title: str
-    n: int
-    chart: ChartRecord
-    values: dict[str, float | list[float]]
-    weights: list[float]
-    stribeck: Stribeck | None
-    sigma_2: float
-
-
-class FormulaRecord(_Record):
-    """A signal given by an expression."""
-
-    kind: Literal["formula"] = "formula"
-    text: str
-
-
-class CornersRecord(_Record):
-    """A signal given by corner points: ramps or a measured record."""
-
-    kind: Literal["corners"] = "corners"
-    times: list[float]
-    values: list[float]
-    held: bool
-
-
-class FunctionRecord(_Record):
-    """A Python function, which cannot be stored in a file."""
-
-    kind: Literal["function"] = "function"
-
-
-SignalRecord = Annotated[
-    FormulaRecord | CornersRecord | FunctionRecord, Field(discriminator="kind")
-]
-
-
-RigKind = Literal["Prescribed", "Slider", "PulledSlider"]
+RigKind = Literal["Prescribed", "Slider", "PulledSlider", "custom"]
 RIGS: Mapping[type, RigKind] = {
     Prescribed: "Prescribed",
     Slider: "Slider",
@@ -129,125 +31,89 @@ RIGS: Mapping[type, RigKind] = {
 }
 
 
-class RigRecord(_Record):
-    """The numbers and signals of a rig."""
+class RigTable(Table):
+    """The numbers and signals of a rig; of one of a custom class also its texts."""
 
     kind: RigKind
     numbers: dict[str, float]
-    signals: dict[str, SignalRecord]
+    signals: dict[str, SignalField]
+    title: str = ""
+    acceleration: str | None = None
 
-    @property
-    def prescribed(self) -> bool:
-        """Whether the velocity is prescribed."""
-        return self.kind == "Prescribed"
+    @classmethod
+    def of(cls, rig: Rig) -> RigTable:
+        """Describe a rig."""
+        # Look up the class, not its name: a user's class may have the same name as ours.
+        kind = RIGS.get(type(rig), "custom")
+        own: Any = (
+            {"title": rig.title, "acceleration": rig.acceleration} if kind == "custom" else {}
+        )
+        return cls(
+            kind=kind,
+            numbers={name: float(value) for name, value in rig.numbers.items()},
+            signals={name: signal_table(signal) for name, signal in rig.signals.items()},
+            **own,
+        )
+
+    def build(self) -> Rig:
+        """Return an equivalent rig, in which a Python function becomes one that raises."""
+        signals: Any = {name: signal_of(name, each) for name, each in self.signals.items()}
+        match self.kind:
+            case "Prescribed":
+                return Prescribed(signals["v"])
+            case "Slider":
+                return Slider(self.numbers["mass"], signals["F_a"])
+            case "PulledSlider":
+                return PulledSlider(**self.numbers)
+            case _:
+                return TextRig(self.title, self.acceleration, signals, self.numbers)
 
 
-class Header(_Record):
-    """The complete header of a trace file."""
+class Header(BaseModel):
+    """The complete header of a trace file: a model on a rig, or a system."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, ser_json_inf_nan="constants")
 
     format: Literal["gms-fsm trace 1"] = "gms-fsm trace 1"
-    model: ModelRecord
-    rig: RigRecord
+    model: ModelTable | None = None
+    rig: RigTable | None = None
+    system: SystemTable | None = None
     settings: dict[str, str | float | dict[str, float | list[float]] | None]
     log: str = ""  # in a CSV file: the hash of its transition log
     monitors: dict[str, Annotated[Verdict, Field(discriminator="kind")]] = {}
+
+    @model_validator(mode="after")
+    def _one_run(self) -> Header:
+        given = [each is not None for each in (self.model, self.rig, self.system)]
+        if given not in ([True, True, False], [False, False, True]):
+            raise ValueError("it must have a model and a rig, or a system")
+        return self
 
     @classmethod
     def of(
         cls,
         model: Model,
         rig: Rig,
+        system: System | None,
         settings: Mapping[str, Setting],
         monitors: Mapping[str, Verdict] | None = None,
     ) -> Header:
-        """Describe a run; a rig of a user-defined class raises `OutputError`."""
-        chart = model.chart
-        return cls(
-            model=ModelRecord(
-                title=model.title,
-                n=model.n,
-                chart=ChartRecord.of(chart),
-                values={
-                    name: float(value) if np.ndim(value) == 0 else np.asarray(value).tolist()
-                    for name, value in model.values.items()
-                },
-                weights=model.weights.tolist(),
-                stribeck=model.stribeck,
-                sigma_2=model.sigma_2,
-            ),
-            rig=RigRecord(
-                kind=_kind(rig),
-                numbers=dict(rig.numbers),
-                signals={name: _signal_record(signal) for name, signal in rig.signals.items()},
-            ),
-            settings=dict(settings),
-            monitors=dict(monitors or {}),
-        )
+        """Describe a run of a system, if there is one, else of a model on a rig."""
+        rest: Any = {"settings": dict(settings), "monitors": dict(monitors or {})}
+        if system is not None:
+            return cls(system=SystemTable.of(system), **rest)
+        return cls(model=ModelTable.of(model), rig=RigTable.of(rig), **rest)
 
     def to_model(self) -> ChartModel:
         """Return an equivalent model."""
-        record = self.model
-        return ChartModel(
-            record.chart.to_chart(),
-            {
-                name: np.array(value) if isinstance(value, list) else value
-                for name, value in record.values.items()
-            },
-            n=record.n,
-            stribeck=record.stribeck,
-            sigma_2=record.sigma_2,
-            weights=np.array(record.weights),
-            title=record.title,
-        )
+        assert self.model is not None
+        return self.model.build()
 
     def to_rig(self) -> Rig:
         """Return an equivalent rig, in which a Python function becomes one that raises."""
-        signals = {name: _signal(name, record) for name, record in self.rig.signals.items()}
-        numbers = self.rig.numbers
-        match self.rig.kind:
-            case "Prescribed":
-                return Prescribed(signals["v"])
-            case "Slider":
-                return Slider(numbers["mass"], signals["F_a"])
-            case "PulledSlider":
-                return PulledSlider(**numbers)
+        assert self.rig is not None
+        return self.rig.build()
 
-
-def _kind(rig: Rig) -> RigKind:
-    # Look up the class, not its name: a user's class may have the same name as ours.
-    if type(rig) not in RIGS:
-        raise OutputError(
-            f"the rig is a {type(rig).__qualname__}, a custom class, which cannot be saved",
-            advice=f"a file can store {', '.join(RIGS.values())} of gms_fsm",
-        )
-    return RIGS[type(rig)]
-
-
-def _signal_record(signal: Signal) -> FormulaRecord | CornersRecord | FunctionRecord:
-    match signal:
-        case Formula(text=text):
-            return FormulaRecord(text=text)
-        case Corners(times=times, values=values, held=held):
-            return CornersRecord(times=times.tolist(), values=values.tolist(), held=held)
-        case _:
-            return FunctionRecord()
-
-
-def _signal(name: str, record: FormulaRecord | CornersRecord | FunctionRecord) -> Signal:
-    match record:
-        case FormulaRecord(text=text):
-            return Formula(text)
-        case CornersRecord(times=times, values=values, held=held):
-            return Corners(np.array(times), np.array(values), held)
-        case _:
-            return Function(_lost(name))
-
-
-def _lost(name: str) -> Callable[[float], float]:
-    def missing(_: float) -> float:
-        raise SignalError(
-            f"{name!r} was a Python function, which a trace file cannot store",
-            advice="sample the trace before saving it, or run with t_eval",
-        )
-
-    return missing
+    def to_system(self) -> System | None:
+        """Return an equivalent system, if it is one and not a model on a rig."""
+        return None if self.system is None else self.system.build()

@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from gms_fsm._files import write_whole
-from gms_fsm.lowering.program import lower
 from gms_fsm.traces._archives import member
 from gms_fsm.traces._header import Header
-from gms_fsm.traces._parts import OBSERVED, Parts
+from gms_fsm.traces._parts import Parts, Ran
 from gms_fsm.traces.rows import Rows
 
 __all__ = ["read", "write"]
@@ -21,7 +20,7 @@ def write(path: Path, parts: Parts) -> Path:
     arrays = {
         **{f"rows_{name}": value for name, value in vars(parts.rows).items()},
         **{f"stops_{name}": value for name, value in vars(parts.stops).items()},
-        **{f"observed_{name}": value for name, value in parts.stored.items()},
+        **{f"observed_{name}": parts.stored[place] for name, place in parts.ran.names.items()},
         "transitions": np.asarray(parts.log),
         "header": np.array(parts.header.model_dump_json()),
     }
@@ -32,8 +31,8 @@ def read(path: Path) -> Parts:
     """Read a trace; an array larger than the number of rows allows is rejected."""
     with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
         header = Header.model_validate_json(str(member(file, "header")))
-        model, rig = header.to_model(), header.to_rig()
-        layout = lower(model, rig).layout
+        ran = Ran.of(header)
+        layout = ran.layout
         width = 8 * max(layout.y.size, layout.observed.size, layout.modes)  # bytes per row
         tables = {}
         for kind in ("rows", "stops"):
@@ -41,6 +40,8 @@ def read(path: Path) -> Parts:
             names = [f"{kind}_{name}" for name in ("microstep", "y", "mode")]
             tables[kind] = Rows(t, *(member(file, name, width * t.size) for name in names))
         most = width * len(tables["rows"])
-        stored = {name: member(file, f"observed_{name}", most) for name in OBSERVED}
+        stored = {
+            place: member(file, f"observed_{name}", most) for name, place in ran.names.items()
+        }
         log = member(file, "transitions").view(np.recarray)
-    return Parts(header, model, rig, tables["rows"], tables["stops"], log, stored)
+    return Parts(header, ran, tables["rows"], tables["stops"], log, stored)

@@ -4,24 +4,89 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import TraceFileError
-from gms_fsm.lowering.layout import LOG_TEXTS, Layout
+from gms_fsm.lowering.layout import CONTACT, LOG_TEXTS, Layout
 from gms_fsm.lowering.program import lower
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
+from gms_fsm.systems.system import System, origin_of, system_of
 from gms_fsm.traces._header import Header
 from gms_fsm.traces._log import is_log
 from gms_fsm.traces.rows import Rows
 
-__all__ = ["BY_ELEMENT", "OBSERVED", "Parts", "checked"]
+__all__ = ["Parts", "Ran", "checked", "stored_names"]
 
-BY_ELEMENT = ("s", "F_elements", "dz")  # dz is the rate of the chart's first variable
-OBSERVED = ("v", "F", *BY_ELEMENT)  # the observed quantities stored in files
+
+@dataclass(frozen=True, eq=False)
+class Ran:
+    """What ran, as a file describes it.
+
+    Parameters
+    ----------
+    model, rig
+        A model on a rig; of a system what stands for them.
+    system : System or None
+        The system, if it is one.
+    """
+
+    model: Model
+    rig: Rig
+    system: System | None
+
+    @classmethod
+    def of(cls, header: Header) -> Ran:
+        """Return what a header describes."""
+        system = header.to_system()
+        if system is None:
+            return cls(header.to_model(), header.to_rig(), None)
+        return cls(*origin_of(system), system)
+
+    @cached_property
+    def whole(self) -> System:
+        """The system, also where it is a model on a rig."""
+        return system_of(self.model, self.rig) if self.system is None else self.system
+
+    @cached_property
+    def layout(self) -> Layout:
+        """Where everything is."""
+        return lower(self.whole).layout
+
+    @cached_property
+    def names(self) -> Mapping[str, str]:
+        """For each observed quantity in the file its name in the layout."""
+        return stored_names(self.system, self.layout)
+
+
+def stored_names(system: System | None, layout: Layout) -> dict[str, str]:
+    """Return for each observed quantity in a file its name in the layout.
+
+    Parameters
+    ----------
+    system : System or None
+        None for a model on a rig, whose files have short names.
+    layout : Layout
+        Of the run.
+
+    Returns
+    -------
+    dict of str to str
+        With the velocities of driven bodies, which are in no layout, under their own names.
+    """
+    if system is not None:
+        driven = [body.v for body in system.bodies if body.driven]
+        return {name: name for name in (*layout.observed.shared, *layout.observed.own, *driven)}
+    bank = layout.contact()
+    names = {name: bank.of(name) for name in ("F", "s", "F_elements")}
+    names["v"] = bank.of(bank.velocity)
+    if bank.variables:
+        names["dz"] = bank.of(f"d{bank.variables[0]}")
+    return names
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,20 +96,19 @@ class Parts:
     Parameters
     ----------
     header : Header
-        Description of the model, the rig and the settings.
-    model, rig
-        The simulated system.
+        Description of what ran, and the settings.
+    ran : Ran
+        What ran.
     rows, stops : Rows
         The rows, and both sides of every stop.
     log : recarray
         The log, as in ``Trace.transitions``.
     stored : mapping of str to ndarray
-        Observed quantities, by the names in `OBSERVED`.
+        Observed quantities, by their names in the layout.
     """
 
     header: Header
-    model: Model
-    rig: Rig
+    ran: Ran
     rows: Rows
     stops: Rows
     log: Any
@@ -69,15 +133,18 @@ def checked(parts: Parts) -> Parts:
     TraceFileError
         If they are inconsistent.
     """
-    layout, states = lower(parts.model, parts.rig).layout, len(parts.model.chart.states)
+    layout, system = parts.ran.layout, parts.ran.whole
+    states = [len(each.chart.states) for each in system.contacts for _ in range(each.n)]
     rows, stops = (_with_slides(table, layout) for table in (parts.rows, parts.stops))
     for kind, table in (("rows", rows), ("stops", stops)):
-        _check_table(kind, table, layout, states)
+        _check_table(kind, table, layout, np.array(states))
     if not len(rows):
         raise TraceFileError("the file has no rows")
     for name, value in parts.stored.items():
-        _expect(name, value, (len(rows), layout.n)[: 1 + (name in BY_ELEMENT)], "f")
-    _check_log(parts.log, parts.model)
+        own = name in layout.observed.own
+        shape = (len(rows), len(layout.observed.all_of(name))) if own else (len(rows),)
+        _expect(name, value, shape, "f")
+    _check_log(parts.log, parts.ran)
     for kind, table in (("rows", rows), ("stops", stops)):
         times = parts.log.t
         fired = np.searchsorted(times, table.t, "right") - np.searchsorted(times, table.t)
@@ -88,7 +155,7 @@ def checked(parts: Parts) -> Parts:
     return replace(parts, rows=rows, stops=stops)
 
 
-def _check_table(kind: str, table: Rows, layout: Layout, states: int) -> None:
+def _check_table(kind: str, table: Rows, layout: Layout, states: Any) -> None:
     count = table.t.size
     _expect(f"{kind} t", table.t, (count,), "f")
     _expect(f"{kind} microstep", table.microstep, (count,), "i")
@@ -97,22 +164,29 @@ def _check_table(kind: str, table: Rows, layout: Layout, states: int) -> None:
     if not (np.diff(table.t) >= 0).all() or not np.isfinite(table.t).all():
         raise TraceFileError(f"{kind} t: times must be finite and must not decrease")
     active, slid = table.mode[:, layout.elements], table.mode[:, layout.slides]
-    if count and not 0 <= active.min() <= active.max() < states:
+    if not ((active >= 0) & (active < states)).all():
         raise TraceFileError(f"{kind} mode: it contains a number that is not a state of the chart")
     if slid.size and not 0 <= slid.min() <= slid.max() <= 1:
         raise TraceFileError(f"{kind} mode: a slide flag must be 0 or 1")
 
 
-def _check_log(log: Any, model: Model) -> None:
-    if not is_log(log):
+def _check_log(log: Any, ran: Ran) -> None:
+    if not is_log(log) or (CONTACT in log.dtype.names) != (ran.system is not None and log.size > 0):
         raise TraceFileError("the transition log does not have the columns of a trace")
-    if log.size and not 0 <= log.element.min() <= log.element.max() < model.n:
-        raise TraceFileError("the transition log names an element that the model does not have")
     if not (np.diff(log.t) >= 0).all() or not np.isfinite(log.t).all():
         raise TraceFileError("the transition log: times must be finite and must not decrease")
-    edges = {(edge.name, edge.source, edge.target) for edge in model.chart.transitions}
-    if not edges >= set(zip(*(log[name].tolist() for name in LOG_TEXTS), strict=True)):
-        raise TraceFileError("the transition log names an edge that the chart does not have")
+    known = {each.name: each for each in ran.whole.contacts}
+    named = CONTACT in log.dtype.names
+    of_contact = log.contact if named else np.full(log.size, next(iter(known)))
+    for name in np.unique(of_contact).tolist():
+        if name not in known:
+            raise TraceFileError("the transition log names a contact that the system does not have")
+        mine, contact = log[of_contact == name], known[name]
+        if not 0 <= mine.element.min() <= mine.element.max() < contact.n:
+            raise TraceFileError("the transition log names an element that the model does not have")
+        edges = {(edge.name, edge.source, edge.target) for edge in contact.chart.transitions}
+        if not edges >= set(zip(*(mine[name].tolist() for name in LOG_TEXTS), strict=True)):
+            raise TraceFileError("the transition log names an edge that the chart does not have")
 
 
 def _with_slides(rows: Rows, layout: Layout) -> Rows:

@@ -36,10 +36,11 @@ from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System, system_of
 from gms_fsm.traces import _csv, _npz
 from gms_fsm.traces._between import interpolated
+from gms_fsm.traces._columns import columns_of
 from gms_fsm.traces._header import Header
 from gms_fsm.traces._observed import observed_rows
-from gms_fsm.traces._parts import OBSERVED, Parts, checked
-from gms_fsm.traces.rows import Rows, column_name, merged
+from gms_fsm.traces._parts import Parts, Ran, checked
+from gms_fsm.traces.rows import Rows, merged
 from gms_fsm.traces.verdicts import Verdict
 
 if TYPE_CHECKING:
@@ -183,7 +184,7 @@ class Trace:
         chosen = replace(self, model=model, transitions=mine, which=bank.name)
         # What the rows were computed to stays.
         kept: dict[str, Any] = {
-            key: vars(self)[key] for key in ("program", "_seen") if key in vars(self)
+            key: vars(self)[key] for key in ("program", "seen") if key in vars(self)
         }
         vars(chosen).update(kept)
         return chosen
@@ -208,11 +209,13 @@ class Trace:
         """
         system = system_of(self.model, self.rig) if self.system is None else self.system
         body = system.body(name)
-        velocity = self._named(body.v) if not body.driven else self._velocity(body.v)
+        velocity = self._velocity(body.v) if body.driven else self._named(body.v)
         return BodyTrace(name, self._named(body.x), velocity)
 
     def _velocity(self, name: str) -> FloatArray:
         """Return the velocity of a driven body: that of its rows' dy/dt."""
+        if name in self.stored:
+            return self.stored[name]
         place = self.program.layout.y.shared.index(
             next(b.x for b in self._system.bodies if b.v == name)
         )
@@ -256,7 +259,7 @@ class Trace:
         position = self.places.position
         if position in self.program.layout.y.shared:
             return self._named(position)
-        return self._seen[position]
+        return self.seen[position]
 
     @property
     def n(self) -> int:
@@ -314,29 +317,29 @@ class Trace:
     @property
     def v(self) -> FloatArray:
         """Velocity, shape (rows,), m/s."""
-        return self._seen[self.places.of(self.places.velocity)]
+        return self.seen[self.places.of(self.places.velocity)]
 
     @property
     def s(self) -> FloatArray:
         """Thresholds, shape (rows, n), m; NaN where the model has no Stribeck curve."""
-        return self._seen[self.places.of("s")]
+        return self.seen[self.places.of("s")]
 
     @property
     def F(self) -> FloatArray:
         """Friction force, shape (rows,), N."""
-        return self._seen[self.places.of("F")]
+        return self.seen[self.places.of("F")]
 
     @property
     def F_elements(self) -> FloatArray:
         """Force of each element, shape (rows, n), N."""
-        return self._seen[self.places.of("F_elements")]
+        return self.seen[self.places.of("F_elements")]
 
     @property
     def dz(self) -> FloatArray:
         """Rate of the first variable in the states of the row, shape (rows, n), m/s."""
         if not self.places.variables:
             return np.empty((len(self.rows), self.places.n)) * np.nan
-        return self._seen[self.places.of(f"d{self.places.variables[0]}")]
+        return self.seen[self.places.of(f"d{self.places.variables[0]}")]
 
     @property
     def sliding(self) -> Any:
@@ -389,19 +392,12 @@ class Trace:
         """The generated program of the run."""
         return lower(self.model, self.rig) if self.system is None else lower(self.system)
 
-    @property
-    def _observed(self) -> Mapping[str, FloatArray]:
-        """What files of one model on a rig store."""
-        return {name: getattr(self, name) for name in OBSERVED}
-
     @cached_property
-    def _seen(self) -> Mapping[str, FloatArray]:
-        """What was observed, by its name in the layout."""
-        compiled, layout = self.settings.get("engine") == "compiled", self.program.layout
+    def seen(self) -> Mapping[str, FloatArray]:
+        """What was observed, by its name in the layout; elements on the second axis."""
         if self.stored:
-            bank = layout.contact()
-            names = {"v": bank.velocity, "dz": f"d{(*bank.variables, '')[0]}"}
-            return {bank.of(names.get(name, name)): u for name, u in self.stored.items()}
+            return self.stored
+        compiled, layout = self.settings.get("engine") == "compiled", self.program.layout
         table = observed_rows(self.program, self.rows, compiled=compiled)
         return {name: column.T for name, column in layout.observed.named(table.T).items()}
 
@@ -530,8 +526,8 @@ class Trace:
         Raises
         ------
         OutputError
-            If the folder is not writable, the file name has another ending, or the rig is of a
-            custom class.
+            If the folder is not writable, the file name has another ending, or the trace is what
+            one contact sees of a run.
         """
         path = checked_path("path", path)
         if path.suffix not in (".npz", ".csv"):
@@ -539,12 +535,20 @@ class Trace:
                 f"the name of a trace file must end in .npz or .csv, not {path.suffix!r}",
                 place=str(path),
             )
-        header = Header.of(self.model, self.rig, self.settings, self.monitors)
+        if self.which:
+            raise OutputError(
+                f"this is what the contact {self.which!r} sees of a run",
+                place=str(path),
+                advice="save the trace of the whole run",
+            )
+        header = Header.of(self.model, self.rig, self.system, self.settings, self.monitors)
         if path.suffix == ".csv":
             return _csv.write(path, header, self.columns(), self.transitions)
         stops = merged(self.rows, self.stops)
-        log, stored = self.transitions, self._observed
-        return _npz.write(path, Parts(header, self.model, self.rig, self.rows, stops, log, stored))
+        ran = Ran(self.model, self.rig, self.system)
+        driven = [body for body in self._system.bodies if body.driven and self.system is not None]
+        stored = {**self.seen, **{body.v: self.body(body.name).v for body in driven}}
+        return _npz.write(path, Parts(header, ran, self.rows, stops, self.transitions, stored))
 
     @classmethod
     def load(cls, path: str | Path) -> Trace:
@@ -592,11 +596,12 @@ class Trace:
             parts.rows,
             parts.stops,
             parts.log,
-            parts.model,
-            parts.rig,
+            parts.ran.model,
+            parts.ran.rig,
             parts.header.settings,
             parts.stored,
             parts.header.monitors,
+            parts.ran.system,
         )
 
     # ------------------------------------------------------------------ tables
@@ -607,24 +612,11 @@ class Trace:
         -------
         dict of str to ndarray, shape (rows,)
             ``t, microstep, x, v, F, z1.., state1.., s1.., F1..``, and ``slides1..``: 1 where the
-            motion slides along a surface.
+            motion slides along a surface. Of a system the positions and velocities of bodies and
+            the further states by their names, and for each contact such columns with its name:
+            ``pad.v, pad.F, pad.z1..``.
         """
-        table: dict[str, NDArray[Any]] = {
-            "t": self.t,
-            "microstep": self.microstep,
-            "x": self.x,
-            "v": self.v,
-            "F": self.F,
-        }
-        variables = self.model.chart.variables
-        blocks = [(name, self.variable(name)) for name in variables]
-        blocks += [("state", self.states), ("s", self.s), ("F", self.F_elements)]  # type: ignore[list-item]
-        blocks.append((f"d{variables[0]}", self.dz))
-        slid = self.rows.mode[:, self.program.layout.slides]
-        table |= {column_name("slides", k): flags for k, flags in enumerate(slid.T)}
-        for name, values in blocks:
-            table |= {column_name(name, i): values[:, i] for i in range(self.n)}
-        return table
+        return columns_of(self)
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return the rows as a pandas DataFrame, one column per quantity and element.

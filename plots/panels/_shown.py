@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.errors import shown as written
-from gms_fsm.traces._parts import OBSERVED
 from gms_fsm.traces.trace import Trace, check_trace
 
 __all__ = ["has_threshold", "shown"]
@@ -100,8 +99,7 @@ def shown(trace: Trace, window: Window | None = None) -> Trace:
 def _picked(trace: Trace, keep: NDArray[np.intp], *, known: bool) -> Trace:
     """Return the trace with some of its rows; known forces are passed on."""
     rows = trace.rows.at(keep)
-    names = OBSERVED if known else ()
-    stored = {name: getattr(trace, name)[keep] for name in names}
+    stored = {name: values[keep] for name, values in trace.seen.items()} if known else {}
     return replace(trace, rows=rows, stops=rows, stored=stored)
 
 

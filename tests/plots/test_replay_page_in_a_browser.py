@@ -611,9 +611,9 @@ def test_a_hostile_name_is_shown_and_not_run(open_page: Open, tmp_path: Path) ->
 
 def test_values_that_are_not_numbers_are_shown_as_words(open_page: Open, tmp_path: Path) -> None:
     trace = fig4("signed")
-    stored = {name: np.array(values) for name, values in trace._observed.items()}
-    stored["F"][:3] = math.nan, math.inf, -math.inf
-    stored["v"][0] = math.nan
+    stored = {name: np.array(values) for name, values in trace.seen.items()}
+    stored["friction.F"][:3] = math.nan, math.inf, -math.inf
+    stored["friction.v"][0] = math.nan
     page = open_page(write_replay(tmp_path / "nan.html", replace(trace, stored=stored)))
     texts = []
     for _ in range(3):

@@ -202,9 +202,9 @@ def test_a_hostile_name_stays_a_text() -> None:
 @uplot
 def test_nan_and_infinities_are_distinguished() -> None:
     trace = fig4("signed")
-    stored = {name: np.array(values) for name, values in trace._observed.items()}
-    stored["F"][:3] = np.nan, np.inf, -np.inf
-    stored["v"][5] = np.nan
+    stored = {name: np.array(values) for name, values in trace.seen.items()}
+    stored["friction.F"][:3] = np.nan, np.inf, -np.inf
+    stored["friction.v"][5] = np.nan
     (run,) = data_of(replay_html(replace(trace, stored=stored)))["runs"]
     assert run["pool"][run["names"]["F"]][:3] == ["NaN", "Infinity", "-Infinity"]
     assert [run["pool"][side][5] for side in run["sides"][0][0][1][::2]] == ["NaN", "NaN"]

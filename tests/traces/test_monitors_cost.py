@@ -56,7 +56,7 @@ def test_nothing_is_called_when_off(calls: list[str], engine: str, output: str) 
     run = simulate(model, rig, 20.0, engine=engine, output=output)
     assert calls == []
     assert run.monitors == {}
-    assert "_observed" not in vars(run)
+    assert "seen" not in vars(run)
 
 
 def test_nothing_is_called_when_off_and_the_run_fails(calls: list[str]) -> None:

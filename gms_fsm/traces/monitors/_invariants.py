@@ -16,7 +16,6 @@ from gms_fsm.language import Condition, names_in, parse_condition, states_in
 from gms_fsm.language._vectors import truths
 from gms_fsm.systems.models import Model
 from gms_fsm.traces._between import first_true, interpolated
-from gms_fsm.traces._parts import OBSERVED
 from gms_fsm.traces.monitors._kinds import Invariant
 from gms_fsm.traces.monitors._words import elements_text, values_text
 from gms_fsm.traces.rows import Rows
@@ -102,7 +101,7 @@ def invariant_verdict(monitor: Invariant, trace: Trace) -> InvariantVerdict:
 def _located(invariant: _Held, trace: Trace, row: int) -> Trace:
     """Return a one-row trace where an invariant first fails, between the previous row and this."""
     rows = trace.rows
-    seen = {name: getattr(trace, name)[row : row + 1] for name in OBSERVED}
+    seen = {name: values[row : row + 1] for name, values in trace.seen.items()}
 
     def at(t: float, y: FloatArray, stored: Mapping[str, FloatArray]) -> Trace:
         one = Rows(np.array([t]), np.zeros(1, np.int64), y[np.newaxis], rows.mode[row : row + 1])
