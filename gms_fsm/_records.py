@@ -218,7 +218,9 @@ def explained(
     first = min(findings, key=lambda f: f["type"] != "extra_forbidden")
     places = _written_key(first["loc"], data)
     rest = len(findings) - 1
-    return places, _sentence(first, places, data, root) + (f" (and {rest} more)" if rest else "")
+    sentence = _sentence(first, places, data, root) + (f" (and {rest} more)" if rest else "")
+    tag = first.get("ctx", {}).get("discriminator", "").strip("'")
+    return (*places, tag) if tag else places, sentence
 
 
 def _sentence(first: Any, places: Key, data: dict[str, Any], root: type[BaseModel]) -> str:

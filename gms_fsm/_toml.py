@@ -16,7 +16,7 @@ __all__ = ["LARGEST_FILE", "Key", "data_of", "line_of", "override", "parsed", "t
 Key = tuple[str | int, ...]  # names of keys, and places in arrays from 0
 
 LARGEST_FILE = 1_000_000  # bytes
-MOST_PREFIXES = 300  # that are read to find a line
+MOST_PREFIXES = 60  # that are read to find a line
 DEEPEST_KEY = 6  # parts
 # tomllib takes quadratic time in the number of parts of a key, which can be hours.
 _ENDLESS_KEY = re.compile(

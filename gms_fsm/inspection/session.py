@@ -539,7 +539,7 @@ class Session:
         SessionError
             If a signal is a Python function, the method a class, or the engine custom machines.
         OutputError
-            If the rig is of a custom class, or the file cannot be written.
+            If the file cannot be written.
         """
         record = SessionRecord(
             self.model,

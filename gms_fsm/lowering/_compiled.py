@@ -56,7 +56,8 @@ def packed(p: Arguments) -> Packed:
     -------
     tuple of ndarray
         Shared numbers (m,), own parameters (rows, n), corner tables (2 tables, corners). Shorter
-        tables are padded by repeating their last corner, which changes no value.
+        rows are padded by repeating their last entry: elements that no contact has, corners that
+        change no value.
 
     Examples
     --------
@@ -64,13 +65,13 @@ def packed(p: Arguments) -> Packed:
     (1, 2)
     """
     shared, own, tables = p
-    length = max(map(len, tables), default=0)
-    padded = [row + row[-1:] * (length - len(row)) for row in tables]
-    return (
-        np.array(shared, dtype=np.float64),
-        np.array(own, dtype=np.float64),
-        np.array(padded, dtype=np.float64).reshape(len(tables), length),
-    )
+    return np.array(shared, dtype=np.float64), _table(own), _table(tables)
+
+
+def _table(rows: list[list[float]]) -> FloatArray:
+    length = max(map(len, rows), default=0)
+    padded = [row + row[-1:] * (length - len(row)) for row in rows]
+    return np.array(padded, dtype=np.float64).reshape(len(rows), length)
 
 
 def machine_code(program: Program, name: str) -> Any:

@@ -136,7 +136,7 @@ class Checkpointer:
             )
         if head != ours:
             raise CheckpointError(
-                "belongs to a run with another model, rig, system, signal or setting",
+                "belongs to a run with another model, rig, signal or setting",
                 place=str(self.path),
                 advice="remove it, or use a separate file for this run",
             )

@@ -109,7 +109,7 @@ def simulate(
     CheckpointError
         If the checkpoint belongs to another run or another program, or is damaged.
     OutputError
-        If a checkpoint is requested and the rig is of a user-defined class.
+        If a checkpoint is requested and cannot be written.
     SimulationError
         If the run cannot continue (`LivelockError`, `StepSizeError`, `StepLimitError`,
         `NotFiniteError`, `SignalEndError`, `CallbackError`); its ``trace`` has the part before.

@@ -8,17 +8,15 @@ from __future__ import annotations
 
 import keyword
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from gms_fsm._arguments import checked_path
-from gms_fsm.charts.chart import Chart
-from gms_fsm.charts.parameters import FloatArray, checked_scalar, checked_values
-from gms_fsm.charts.stribeck import Stribeck
+from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import ExpressionError, ParameterError, Part, shown
 from gms_fsm.language import (
     CONSTANTS,
@@ -35,6 +33,7 @@ from gms_fsm.language import (
     renamed,
     spell,
 )
+from gms_fsm.systems._parts import Body, Contact, Sampled
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Signal, as_signal
@@ -43,234 +42,6 @@ if TYPE_CHECKING:
     from gms_fsm.systems._assembly import Assembly
 
 __all__ = ["Body", "Contact", "Mounting", "Sampled", "Several", "System", "system_of"]
-
-Text: TypeAlias = str | float  # an expression, or just a number
-
-
-@dataclass(frozen=True)
-class Body:
-    """A body with one degree of freedom: free, or moved with a given velocity.
-
-    ``inertia * dv/dt = force`` minus what its contacts take from it.
-
-    Parameters
-    ----------
-    name : str
-        Unique in its system.
-    inertia : str or float
-        kg (or kg m^2, with angles); None for a body whose velocity is given.
-    force : str or float
-        N, over ``t``, the names of bodies, further states, signals and numbers.
-    velocity : str or float, optional
-        m/s, over ``t``, signals and numbers: the body moves like this whatever acts on it.
-    x, v : str
-        What its position and its velocity are called in texts.
-
-    Examples
-    --------
-    >>> Body("load", inertia=1.0, force="K * (x_m - x_l)", x="x_l", v="v_l").v
-    'v_l'
-    """
-
-    name: str
-    inertia: Text | None = field(default=None, kw_only=True)
-    force: Text = field(default="0", kw_only=True)
-    velocity: Text | None = field(default=None, kw_only=True)
-    x: str = field(default="x", kw_only=True)
-    v: str = field(default="v", kw_only=True)
-
-    def __post_init__(self) -> None:
-        here = f"body {shown(self.name)}"
-        if (self.inertia is None) == (self.velocity is None):
-            raise ParameterError(
-                "it has neither an inertia nor a velocity"
-                if self.inertia is None
-                else "it has an inertia and a velocity",
-                place=here,
-                advice="give inertia=... to a free body, velocity=... to a driven one",
-            )
-
-    @property
-    def driven(self) -> bool:
-        """Whether its velocity is given."""
-        return self.velocity is not None
-
-
-@dataclass(frozen=True, init=False, eq=False)
-class Contact:
-    """Machines of one chart on one relative velocity.
-
-    The contact takes its force F from each body, times that body's coefficient in `v`: its power is
-    F v, whatever the gearing.
-
-    Parameters
-    ----------
-    name : str
-        Unique in its system.
-    chart : Chart or Model
-        A chart; or a friction model (`GMS`, `LuGre`, `ChartModel`), which brings its numbers.
-    values : mapping, optional
-        For each parameter of the chart a number, or one per element.
-    v : str or sequence of str
-        The relative velocity, linear in the bodies' velocities, such as ``"w_m - 3 * w_l"``; one
-        for each velocity of the chart.
-    n : int
-        Number of elements.
-    inputs : mapping of str to str or float
-        For an input of the chart what it is, over the names of the system; those of the same name
-        need not be given.
-    period : float, optional
-        s: the machines are asked at these ticks only, and what the chart gives out is held between
-        them. Without a period the contact is continuous.
-
-    Examples
-    --------
-    >>> from gms_fsm import GMS, GMSParameters
-    >>> Contact("bearing", GMS(GMSParameters.paper("stick-slip"), law="signed"), v="v_l").n
-    4
-    """
-
-    name: str
-    chart: Chart
-    values: Mapping[str, float | FloatArray]
-    v: tuple[str, ...]
-    n: int
-    inputs: Mapping[str, Text]
-    period: float | None
-    model: Model | None
-
-    def __init__(
-        self,
-        name: str,
-        chart: Chart | Model,
-        values: Mapping[str, Any] | None = None,
-        *,
-        v: str | Iterable[str] = "v",
-        n: int = 1,
-        inputs: Mapping[str, Text] | None = None,
-        period: float | None = None,
-    ) -> None:
-        here = f"contact {shown(name)}"
-        model = None
-        if isinstance(chart, Chart):
-            values = checked_numbers(chart, {} if values is None else values, n, here)
-        elif hasattr(chart, "chart") and hasattr(chart, "weights"):
-            model = chart
-            if values is not None or n != 1:
-                raise ParameterError(
-                    "a model brings its values and its number of elements", place=here
-                )
-            chart, values, n = model.chart, model.values, model.n
-        else:
-            raise ParameterError(
-                "it must be a Chart, or a model such as GMS(parameters, law='signed')",
-                place=f"{here}: chart",
-                value=chart,
-            )
-        if chart.locks and n != 1:
-            raise ParameterError(
-                f"n is {n}, and the chart has a locked state",
-                place=here,
-                advice="elements that lock the same motion cannot share the force; use n = 1",
-            )
-        velocities = (v,) if isinstance(v, str) else tuple(v)
-        if len(velocities) != len(chart.velocities):
-            raise ParameterError(
-                f"v gives {len(velocities)} velocities, chart {chart.name!r} has "
-                f"{', '.join(chart.velocities)}",
-                place=here,
-            )
-        if period is not None:
-            period = checked_scalar(f"{here}: period", period, "> 0")
-        for each, value in {
-            "name": name,
-            "chart": chart,
-            "values": values,
-            "v": velocities,
-            "n": n,
-            "inputs": dict(inputs or {}),
-            "period": period,
-            "model": model,
-        }.items():
-            object.__setattr__(self, each, value)
-
-    # What a `Model` has, so that everything that reads models reads contacts too.
-    @property
-    def title(self) -> str:
-        """Name and chart."""
-        return f"{self.name}: {self.chart.name if self.model is None else self.model.title}"
-
-    @property
-    def weights(self) -> FloatArray:
-        """Threshold weights, shape (n,), m/N."""
-        return np.ones(self.n) if self.model is None else self.model.weights
-
-    @property
-    def stribeck(self) -> Stribeck | None:
-        """The Stribeck curve of its model, if it has one."""
-        return None if self.model is None else self.model.stribeck
-
-    @property
-    def sigma_2(self) -> float:
-        """Viscous friction of its model, Ns/m."""
-        return 0.0 if self.model is None else self.model.sigma_2
-
-
-@dataclass(frozen=True)
-class Sampled:
-    """A sampled controller: values that change at exact ticks only.
-
-    Parameters
-    ----------
-    name : str
-        Unique in its system.
-    period : float
-        s.
-    updates : mapping of str to str
-        For each value its text over the names of the system and ``period``; they run in this order
-        and see the results before them.
-    initial : mapping of str to float, optional
-        Values before the first tick; 0 where not given.
-    offset : float
-        s: the first tick is at t_start + offset.
-
-    Examples
-    --------
-    >>> Sampled("pid", period=1e-3, updates={"u": "k_p * (r - x)"}).period
-    0.001
-    """
-
-    name: str
-    period: float = field(kw_only=True)
-    updates: Mapping[str, str] = field(kw_only=True)
-    initial: Mapping[str, float] = field(default_factory=dict, kw_only=True)
-    offset: float = field(default=0.0, kw_only=True)
-
-    def __post_init__(self) -> None:
-        here = f"sampled {shown(self.name)}"
-        put = object.__setattr__
-        put(self, "period", checked_scalar(f"{here}: period", self.period, "> 0"))
-        put(self, "offset", checked_scalar(f"{here}: offset", self.offset, ">= 0"))
-        put(self, "updates", dict(self.updates))
-        if not self.updates:
-            raise ParameterError("it updates nothing", place=here)
-        for name in self.initial:
-            if name not in self.updates:
-                raise ParameterError(
-                    f"initial has {shown(name)}, which is not updated",
-                    place=here,
-                    advice=f"its values are {', '.join(self.updates)}",
-                )
-        put(
-            self,
-            "initial",
-            {
-                name: checked_scalar(
-                    f"{here}: initial[{name!r}]", self.initial.get(name, 0.0), "finite"
-                )
-                for name in self.updates
-            },
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -518,53 +289,6 @@ def _check_name(name: object, place: str, key: tuple[str | int, ...]) -> None:
         )
     if name in FUNCTIONS or name in CONSTANTS or name == "pow":
         raise ParameterError(f"the name {name!r} is a word of the language", place=place, key=key)
-
-
-def checked_numbers(
-    chart: Chart, values: Mapping[str, Any], n: int, here: str
-) -> Mapping[str, float | FloatArray]:
-    """Return the numbers of a chart, checked against its parameters.
-
-    Parameters
-    ----------
-    chart : Chart
-        Whose parameters.
-    values : mapping
-        A number, or one per element, for each.
-    n : int
-        Number of elements.
-    here : str
-        For messages.
-
-    Returns
-    -------
-    mapping
-        Complete.
-
-    Raises
-    ------
-    ParameterError
-        If one is missing, unknown, or breaks its rule.
-    """
-    if isinstance(n, bool) or not isinstance(n, int) or n < 1:
-        raise ParameterError(
-            "a bank has an integer number of elements, at least one", place=f"{here}: n", value=n
-        )
-    if not isinstance(values, Mapping):
-        raise ParameterError(
-            "it must give a number for each parameter of the chart, for example {'k': 1.0}",
-            place=f"{here}: values",
-            value=values,
-        )
-    wanted, given = set(chart.parameter_names), set(values)
-    if wanted != given:
-        raise ParameterError(
-            f"chart {chart.name!r} has the parameters {sorted(wanted)}",
-            place=here,
-            advice=f"missing values: {sorted(wanted - given) or 'none'}, unknown: "
-            f"{sorted(given - wanted) or 'none'}",
-        )
-    return checked_values(chart.parameters, values, n)
 
 
 @dataclass(frozen=True)

@@ -40,19 +40,23 @@ class RigTable(Table):
     title: str = ""
     acceleration: str | None = None
 
+    @model_validator(mode="after")
+    def _has_texts(self) -> RigTable:
+        if self.kind != "custom" and (self.title or self.acceleration):
+            raise ValueError(f"the texts of a {self.kind} are not in a file")
+        return self
+
     @classmethod
     def of(cls, rig: Rig) -> RigTable:
         """Describe a rig."""
         # Look up the class, not its name: a user's class may have the same name as ours.
         kind = RIGS.get(type(rig), "custom")
-        own: Any = (
-            {"title": rig.title, "acceleration": rig.acceleration} if kind == "custom" else {}
-        )
+        texts: Any = {"title": rig.title, "acceleration": rig.acceleration}
         return cls(
             kind=kind,
             numbers={name: float(value) for name, value in rig.numbers.items()},
             signals={name: signal_table(signal) for name, signal in rig.signals.items()},
-            **own,
+            **(texts if kind == "custom" else {}),
         )
 
     def build(self) -> Rig:

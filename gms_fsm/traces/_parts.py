@@ -82,8 +82,8 @@ def stored_names(system: System | None, layout: Layout) -> dict[str, str]:
         driven = [body.v for body in system.bodies if body.driven]
         return {name: name for name in (*layout.observed.shared, *layout.observed.own, *driven)}
     bank = layout.contact()
-    names = {name: bank.of(name) for name in ("F", "s", "F_elements")}
-    names["v"] = bank.of(bank.velocity)
+    names = {"v": bank.of(bank.velocity)}
+    names |= {name: bank.of(name) for name in ("F", "s", "F_elements")}
     if bank.variables:
         names["dz"] = bank.of(f"d{bank.variables[0]}")
     return names

@@ -1,0 +1,128 @@
+"""A chart read from the file it was saved to is equal to it, and its file is written whole."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gms_fsm import Chart, Parameter, State, Transition
+from gms_fsm.charts.registry import named_charts
+from gms_fsm.errors import OutputError
+
+TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=12)
+VALUES = st.sampled_from(["0", "k * z", "-k", "exp(-v**2) + σ_0", "F_c * sgn(v)", "1e-300 * w"])
+GUARDS = st.sampled_from(["True", "v > 0", "F < -k and z >= σ_0", "after(0.1)", "not w < 1"])
+NAMES = ("stuck", "slip", "Schlupf", "αβ", "x1_")
+
+
+@st.composite
+def charts(draw: st.DrawFn) -> Chart:
+    """Return a chart with any of the parts that a chart can have."""
+
+    def some(keys: tuple[str, ...]) -> dict[str, str]:
+        return draw(st.dictionaries(st.sampled_from(keys), VALUES, max_size=len(keys)))
+
+    names = draw(st.lists(st.sampled_from(NAMES), min_size=1, unique=True))
+    states = []
+    for name in names:
+        locked = draw(st.booleans())
+        texts = [some(("z", "w")) for _ in range(3)]
+        states.append(State(name, *texts, {} if locked else some(("F",)), locked))
+    edges = [
+        Transition(
+            f"edge_{k}",
+            draw(st.lists(st.sampled_from(names), min_size=1, unique=True)),
+            draw(st.sampled_from(names)),
+            draw(GUARDS),
+            some(("z", "v")),
+        )
+        for k in range(draw(st.integers(0, 3)))
+    ]
+    parameters = [
+        "k",
+        Parameter(
+            "F_c", "N", draw(st.sampled_from(["finite", "> 0", ">= k"])), meaning=draw(TEXTS)
+        ),
+        Parameter(
+            "σ_0", per_element=draw(st.booleans()), assumed=draw(st.sampled_from(["", "> 0"]))
+        ),
+    ]
+    return Chart(
+        draw(TEXTS),
+        inputs=draw(st.sampled_from([("v",), ("t", "v", "x"), ()])),
+        variables=("z", "w"),
+        parameters=draw(st.permutations(parameters)),
+        states=states,
+        transitions=edges,
+        outputs={"F": draw(VALUES)},
+        reference=draw(TEXTS),
+        let=draw(st.sampled_from([{}, {"S": "k * v", "T": "S + 1"}])),
+        contact_outputs=draw(st.sampled_from([{}, {"F": "F + v"}])),
+    )
+
+
+@given(chart=charts())
+@settings(max_examples=60, deadline=None)
+def test_any_chart_is_read_back_equal(
+    chart: Chart, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    path = tmp_path_factory.mktemp("chart") / "own.toml"
+    again = Chart.load(chart.save(path))
+    assert again == chart
+    assert repr(again) == repr(chart)
+    assert again.forces == chart.forces
+    assert again.guards == chart.guards
+
+
+@pytest.mark.parametrize("name", named_charts())
+def test_every_included_chart_is_read_back_equal(name: str, tmp_path: Path) -> None:
+    chart = named_charts()[name]
+    assert Chart.load(chart.save(tmp_path / "chart.toml")) == chart
+
+
+def test_a_planar_chart_and_plain_names_are_written_as_one_would(tmp_path: Path) -> None:
+    chart = Chart(
+        "puck",
+        inputs=(),
+        velocities=("v", "w"),
+        parameters=("F_c", "m"),
+        states=(
+            State("free", outputs={"F": "F_c * v", "F_w": "F_c * w"}),
+            State("held", locked=True),
+        ),
+        transitions=(Transition("stops", ("free", "held"), "held", guard="v < 0"),),
+    )
+    path = chart.save(tmp_path / "puck.toml")
+    data = tomllib.loads(path.read_text(encoding="utf-8"))
+    assert data["velocities"] == ["v", "w"]
+    assert data["parameters"] == ["F_c", "m"]
+    assert data["edge"] == [
+        {"name": "stops", "from": ["free", "held"], "to": "held", "guard": "v < 0"}
+    ]
+    assert data["state"][1] == {"name": "held", "locked": True}
+    assert Chart.load(path) == chart
+
+
+CHART = Chart("one", states=(State("a"),), outputs={"F": "v"})
+
+
+def test_its_own_file_is_replaced_and_any_other_is_kept(tmp_path: Path) -> None:
+    path = CHART.save(tmp_path / "one.toml")
+    CHART.save(path)
+    path.write_text("# my notes\n" + path.read_text(encoding="utf-8"), encoding="utf-8")
+    with pytest.raises(OutputError, match="was not written by gms-fsm"):
+        CHART.save(path)
+    assert path.read_text(encoding="utf-8").startswith("# my notes\n")
+    assert Chart.load(path) == CHART
+
+
+def test_what_no_file_can_store_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match=r"must end in \.toml"):
+        CHART.save(tmp_path / "one.json")
+    with pytest.raises(OutputError, match="which no file can store"):
+        Chart("\ud800", states=(State("a"),), outputs={"F": "v"}).save(tmp_path / "one.toml")
+    assert not (tmp_path / "one.toml").exists()

@@ -1,0 +1,177 @@
+"""A system read from the file it was saved to runs as it did, to the last bit."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gms_fsm import (
+    GMS,
+    Chart,
+    ChartModel,
+    GMSParameters,
+    LuGre,
+    State,
+    Stribeck,
+    Transition,
+    simulate,
+)
+from gms_fsm.charts import LUGRE
+from gms_fsm.errors import OutputError
+from gms_fsm.lowering.program import lower
+from gms_fsm.systems.system import Body, Contact, Sampled, System
+from tests.helpers import same_bits
+
+STICTION = Chart(
+    "stiction",
+    parameters=("F_c", "F_s"),
+    states=(
+        State("stuck", locked=True),
+        State("forward", outputs={"F": "F_c"}),
+        State("backward", outputs={"F": "-F_c"}),
+    ),
+    transitions=(
+        Transition("release_forward", "stuck", "forward", guard="F > F_s"),
+        Transition("release_backward", "stuck", "backward", guard="F < -F_s"),
+        Transition("arrest_forward", "forward", "stuck", guard="v < 0"),
+        Transition("arrest_backward", "backward", "stuck", guard="v > 0"),
+    ),
+)
+CURVE = Stribeck(1.0, 1.5, 1e-3)
+CONTACTS: dict[str, dict[str, Any]] = {
+    "own chart": {"chart": STICTION, "values": {"F_c": 1.0, "F_s": 1.5}},
+    "included chart": {
+        "chart": LUGRE,
+        "values": {"sigma_0": [1e3, 2e3], "sigma_1": 31.6},
+        "n": 2,
+        "inputs": {"s": "1 + 0.1 * r"},
+    },
+    "GMS": {"chart": GMS(GMSParameters.paper("stick-slip"), law="published")},
+    "LuGre": {"chart": LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4, stribeck=CURVE)},
+    "chart model": {
+        "chart": ChartModel(LUGRE, {"sigma_0": 1e3, "sigma_1": [1.0, 2.0]}, n=2, stribeck=CURVE)
+    },
+}
+SIGNALS = st.sampled_from(
+    [
+        "0.5 * sin(t)",
+        "A * t",
+        0.25,
+        [(0, 0), (1, 0.1 + 0.2)],
+        (np.array([-1.0, 99.0]), np.array([0.0, 1e-7])),
+    ]
+)
+
+
+def system_with(contacts: list[str], signal: Any = "0.5 * sin(t)", m: float = 1.5) -> System:
+    return System(
+        "two masses on a belt",
+        bodies=(
+            Body("one", inertia=m, force="k * (q2 - q1) + 4 * r + i", x="q1", v="w1"),
+            Body("two", inertia="2 * k / k", force="k * (q1 - q2)", x="q2", v="w2"),
+            Body("belt", velocity="A * r", x="q_b", v="w_b"),
+        ),
+        contacts=[
+            Contact(f"contact_{i}", **CONTACTS[name], v=["w1 - w_b", "w2", "w1 - 2 * w2"][i])
+            for i, name in enumerate(contacts)
+        ],
+        signals={"r": signal},
+        numbers={"k": 40.0, "A": 0.1},
+        flow={"i": "(r - i) / 0.3"},
+    )
+
+
+@given(
+    contacts=st.lists(st.sampled_from([*CONTACTS]), min_size=1, max_size=3),
+    signal=SIGNALS,
+    m=st.floats(1e-3, 1e3),
+)
+@settings(max_examples=25, deadline=None)
+def test_any_system_has_the_same_program_and_numbers(
+    contacts: list[str], signal: Any, m: float, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    system = system_with(contacts, signal, m)
+    again = System.load(system.save(tmp_path_factory.mktemp("system") / "own.toml"))
+    one, other = lower(system), lower(again)
+    assert other.source == one.source
+    assert other.p == one.p
+    assert other.knots == one.knots
+    assert [each.title for each in again.contacts] == [each.title for each in system.contacts]
+    assert (again.bodies, again.sampled, again.flow) == (system.bodies, system.sampled, system.flow)
+
+
+@pytest.mark.parametrize("contact", CONTACTS)
+def test_it_runs_as_before(contact: str, tmp_path: Path) -> None:
+    system = system_with([contact])
+    again = System.load(system.save(tmp_path / "own.toml"))
+    one, other = (simulate(each, 3.0) for each in (system, again))
+    same_bits(one, other)
+
+
+def test_samplers_and_periods_are_kept(tmp_path: Path) -> None:
+    sampled = Sampled(
+        "pid", period=1e-3, updates={"u": "k * x", "w": "u"}, initial={"w": -0.0}, offset=0.5
+    )
+    system = System(
+        "servo",
+        bodies=(Body("load", inertia="m", force="-u"),),
+        contacts=(Contact("pad", STICTION, {"F_c": 1.0, "F_s": 1.5}, period=2e-3),),
+        numbers={"m": 1.0, "k": 2.0},
+        sampled=(sampled,),
+    )
+    again = System.load(system.save(tmp_path / "own.toml"))
+    assert repr(again.sampled) == repr(system.sampled)
+    assert again.contact("pad").period == 2e-3
+
+
+def test_a_chart_may_be_a_file_next_to_it_or_a_name(tmp_path: Path) -> None:
+    STICTION.save(tmp_path / "stiction.toml")
+    (tmp_path / "own.toml").write_text(
+        """
+        name = "two pads"
+        numbers = { K = 2.0 }
+        body = { name = "mass", inertia = 1, force = "K * (t - x)" }
+        [[contact]]
+        name = "pad"
+        chart = "stiction.toml"
+        values = { F_c = 1, F_s = 1.5 }
+        [[contact]]
+        name = "brush"
+        chart = "lugre"
+        inputs.s = 1
+        values = { sigma_0 = 1e3, sigma_1 = 31.6 }
+        [[contact]]
+        name = "gms"
+        model = { kind = "GMS", law = "signed", preset = "stick-slip" }
+        """.replace("body = {", "body = [{").replace('- x)" }', '- x)" }]'),
+        encoding="utf-8",
+    )
+    system = System.load(tmp_path / "own.toml")
+    assert system.contact("pad").chart == STICTION
+    assert system.contact("brush").chart == LUGRE
+    assert system.contact("gms").n == 4
+    data = tomllib.loads(system.save(tmp_path / "again.toml").read_text(encoding="utf-8"))
+    assert data["contact"][1]["chart"] == "lugre"
+    assert data["contact"][0]["chart"]["name"] == "stiction"
+    assert data["contact"][2]["model"]["kind"] == "GMS"
+
+
+def test_a_python_function_is_named_and_refused(tmp_path: Path) -> None:
+    system = system_with(["GMS"], lambda t: 0.5 * t)
+    with pytest.raises(OutputError, match="signal 'r' is a Python function"):
+        system.save(tmp_path / "own.toml")
+    assert not (tmp_path / "own.toml").exists()
+
+
+def test_a_file_of_somebody_else_is_kept(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text("name = 'my own'", encoding="utf-8")
+    with pytest.raises(OutputError, match="was not written by gms-fsm"):
+        system_with(["GMS"]).save(path)
+    assert path.read_text(encoding="utf-8") == "name = 'my own'"
