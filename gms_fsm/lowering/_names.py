@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from gms_fsm.language import Binary, Name, Node, product_power
-from gms_fsm.lowering._assembly import Assembly, Bank
+from gms_fsm.systems._assembly import Assembly, Bank
 from gms_fsm.lowering.layout import sizes_of
 
 __all__ = ["Names", "computed_names", "names_of"]
@@ -99,7 +99,7 @@ def names_of(read: Assembly) -> Names:
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters, Slider
-    >>> from gms_fsm.lowering._assembly import assembled
+    >>> from gms_fsm.systems._assembly import assembled
     >>> from gms_fsm.systems.system import system_of
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
     >>> names = names_of(assembled(system_of(model, Slider(1.0, "t"))))

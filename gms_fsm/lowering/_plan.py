@@ -26,7 +26,7 @@ from gms_fsm.language import (
     turning_inside,
 )
 from gms_fsm.language._functions import ROUGH
-from gms_fsm.lowering._assembly import ONE, Assembly, Bank, of
+from gms_fsm.systems._assembly import ONE, Assembly, Bank, of
 from gms_fsm.lowering._names import Names, names_of
 from gms_fsm.lowering.layout import Block, Layout, Places, sizes_of
 from gms_fsm.systems.signals import Corners, Function
@@ -210,7 +210,7 @@ def plan_of(read: Assembly) -> Plan:
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters, Prescribed
-    >>> from gms_fsm.lowering._assembly import assembled
+    >>> from gms_fsm.systems._assembly import assembled
     >>> from gms_fsm.systems.system import system_of
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
     >>> plan = plan_of(assembled(system_of(model, Prescribed("0.1*t"))))

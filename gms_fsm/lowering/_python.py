@@ -15,7 +15,7 @@ from gms_fsm.language import (
     names_in,
     split,
 )
-from gms_fsm.lowering._assembly import Bank, Edge, of
+from gms_fsm.systems._assembly import Bank, Edge, of
 from gms_fsm.lowering._lines import TABLES, Line, Signs, Writer, indented, reads_of
 from gms_fsm.lowering._locks import Locks
 from gms_fsm.lowering._names import computed_names
@@ -43,7 +43,7 @@ def python(plan: Plan) -> str:
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters, Prescribed
-    >>> from gms_fsm.lowering._assembly import assembled
+    >>> from gms_fsm.systems._assembly import assembled
     >>> from gms_fsm.lowering._plan import plan_of
     >>> from gms_fsm.systems.system import system_of
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")

@@ -1,7 +1,7 @@
 """The layout of the state vector y, of a run's observed quantities, of the modes and of the log.
 
 No other module computes such a position, neither as a number nor as text: it looks it up by name.
-Names are those of the trees (`gms_fsm.lowering._assembly`): what belongs to a contact is called
+Names are those of the trees (`gms_fsm.systems._assembly`): what belongs to a contact is called
 ``contact.name``.
 
 y            position and, unless it is driven, velocity of each body; further states; sampled
@@ -22,7 +22,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.language import names_in
-from gms_fsm.lowering._assembly import Assembly, Bank, of
+from gms_fsm.systems._assembly import Assembly, Bank, of
 
 __all__ = [
     "CONTACT",
@@ -358,7 +358,7 @@ class Layout:
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters, Prescribed
-    >>> from gms_fsm.lowering._assembly import assembled
+    >>> from gms_fsm.systems._assembly import assembled
     >>> from gms_fsm.systems.system import system_of
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
     >>> layout = Layout.of(assembled(system_of(model, Prescribed("0.1*t"))), surfaces=0)

@@ -33,7 +33,7 @@ from gms_fsm.language import (
     renamed,
     spell,
 )
-from gms_fsm.systems.models import Model
+from gms_fsm.systems.models import Model, check_bank
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Signal, as_signal
 
@@ -162,12 +162,7 @@ class Contact:
                 place=f"{here}: chart",
                 value=chart,
             )
-        if chart.locks and n != 1:
-            raise ParameterError(
-                f"n is {n}, and the chart has a locked state",
-                place=here,
-                advice="elements that lock the same motion cannot share the force; use n = 1",
-            )
+        check_bank(chart, n, here)
         velocities = (v,) if isinstance(v, str) else tuple(v)
         if len(velocities) != len(chart.velocities):
             raise ParameterError(
@@ -292,7 +287,8 @@ class System:
     Raises
     ------
     ParameterError, ExpressionError
-        If names clash, a text cannot be read, a velocity is not linear, or an inertia is zero.
+        If names clash, a text cannot be read, a velocity is not linear, an inertia is zero, or a
+        lock cannot hold.
 
     Examples
     --------
@@ -337,6 +333,10 @@ class System:
         self._check_names(here)
         signals = {name: self._signal(name, given, here) for name, given in self.signals.items()}
         put(self, "signals", signals)
+        # Imported here: the reader itself needs the classes of this module.
+        from gms_fsm.systems._assembly import assembled
+
+        assembled(self)  # refuses what cannot be read, while the user's line is at fault
 
     def _signal(self, name: str, given: Any, here: str) -> Signal | str:
         """Return a signal; one whose text names numbers stays a text."""

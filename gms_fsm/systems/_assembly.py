@@ -8,6 +8,7 @@ the velocity of a driven body, a relative velocity, an input, a named expression
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,6 +25,7 @@ from gms_fsm.language import (
     Number,
     Value,
     derivative,
+    evaluate,
     names_in,
     parse_value,
     renamed,
@@ -242,8 +244,9 @@ class Assembly:
         return renamed(tree, inside) if inside else tree
 
 
+@functools.lru_cache(maxsize=64)
 def assembled(system: System) -> Assembly:
-    """Read all texts of a system.
+    """Read all texts of a system; a system is read once, when it is constructed.
 
     Parameters
     ----------
@@ -312,6 +315,7 @@ class _Reader:
             for name, text in system.flow.items()
         }
         banks = tuple(self.bank(i, contact) for i, contact in enumerate(system.contacts))
+        self.check_locks(banks)
         return Assembly(
             system,
             tuple(self.definitions),
@@ -434,6 +438,34 @@ class _Reader:
             means=names,
         )
 
+    def check_locks(self, banks: Iterable[Bank]) -> None:
+        """Refuse locks that nothing can keep, and those that always hold and repeat each other."""
+        free = [body.name for body in self.system.bodies if not body.driven]
+        always: list[Bank] = []
+        for bank in banks:
+            owner, chart = f"{self.here}, contact {bank.name!r}", bank.chart
+            if chart.locks or chart.sets_velocity:
+                for row, text in zip(bank.jacobian, bank.contact.v, strict=True):
+                    if not row.keys() & {*free}:
+                        raise ParameterError(
+                            f"chart {chart.name!r} locks the contact or sets its velocity, but "
+                            f"only driven bodies move it (v = {text!r})",
+                            place=owner,
+                            advice="mount it where a free body can follow, for example on a "
+                            "Slider or a PulledSlider",
+                        )
+            if all(state.locked for state in chart.states):
+                always.append(bank)
+                if _rank(always, free, self.system.numbers) < sum(len(b.jacobian) for b in always):
+                    names = ", ".join(repr(each.name) for each in always)
+                    raise ParameterError(
+                        f"the contacts {names} are always locked, and the lock of "
+                        f"{bank.name!r} follows from the others or from driven bodies",
+                        place=self.here,
+                        advice="leave one of them out, or give its chart a state that is not "
+                        "locked",
+                    )
+
     def coefficients(
         self, tree: Value, moved: Mapping[str, Body], text: str, owner: str
     ) -> Mapping[str, Value]:
@@ -504,6 +536,16 @@ class _Reader:
                 Definition(of(c, name), renamed(tree, names), index if per_element else None)
             )
             names[name] = Name(of(c, name))
+
+
+def _rank(banks: Iterable[Bank], free: list[str], numbers: Mapping[str, float]) -> int:
+    """Return how many velocities of contacts are independent of each other."""
+    rows = [
+        [float(evaluate(row.get(body, ZERO), numbers)) for body in free]
+        for bank in banks
+        for row in bank.jacobian
+    ]
+    return int(np.linalg.matrix_rank(np.array(rows)))
 
 
 def derivative_free(rest: Value) -> bool:
