@@ -31,9 +31,7 @@ END_STOP = Chart(
         State("rest", locked=True),
     ),
     transitions=(
-        Transition(
-            "bounce", "free", "free", guard="x >= x_s and v > v_r", actions={"v": "-e * v"}
-        ),
+        Transition("bounce", "free", "free", guard="x >= x_s and v > v_r", actions={"v": "-e * v"}),
         Transition("settle", "free", "rest", guard="x >= x_s and 0 < v <= v_r"),
         Transition("lift", "rest", "free", guard="F < 0"),
     ),

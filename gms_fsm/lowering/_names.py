@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from gms_fsm.language import Binary, Name, Node, product_power
-from gms_fsm.systems._assembly import Assembly, Bank
 from gms_fsm.lowering.layout import sizes_of
+from gms_fsm.systems._assembly import Assembly, Bank
 
 __all__ = ["Names", "computed_names", "names_of"]
 

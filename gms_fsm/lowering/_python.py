@@ -15,11 +15,11 @@ from gms_fsm.language import (
     names_in,
     split,
 )
-from gms_fsm.systems._assembly import Bank, Edge, of
 from gms_fsm.lowering._lines import TABLES, Line, Signs, Writer, indented, reads_of
 from gms_fsm.lowering._locks import Locks
 from gms_fsm.lowering._names import computed_names
 from gms_fsm.lowering._plan import BankPlan, Computed, Gradient, Plan, both_sides, gradient_of
+from gms_fsm.systems._assembly import Bank, Edge, of
 from integrators import LIVE
 
 __all__ = ["FUNCTIONS", "python"]

@@ -31,8 +31,8 @@ from gms_fsm.language import (
     spell,
     split,
 )
-from gms_fsm.systems._assembly import assembled, of
 from gms_fsm.lowering._generated import load
+from gms_fsm.systems._assembly import assembled, of
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact, System
 

@@ -31,8 +31,9 @@ from gms_fsm.language import (
     renamed,
 )
 from gms_fsm.language._normal import renamed_in
+from gms_fsm.systems._given import is_zero
 from gms_fsm.systems.signals import Formula, Signal
-from gms_fsm.systems.system import Body, Contact, System, is_zero
+from gms_fsm.systems.system import Body, Contact, System
 
 __all__ = ["Assembly", "Bank", "Definition", "Edge", "assembled", "of"]
 
