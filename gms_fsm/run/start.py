@@ -178,6 +178,7 @@ class Start:
         )
         last = _covered(system, t_start, t_end)
         program = _with_waking_times(program, system, t_start, last)
+        program = replace(program, ticks=_ticks(system, t_start, last))
         y, mode = _initial(system, program, {} if initial is None else initial)
         kept: dict[str, Setting] = {
             "method": chosen.method_name,
@@ -320,6 +321,29 @@ def _with_waking_times(program: Program, system: System, t_start: float, t_end: 
     return replace(program, knots=sorted({*program.knots, *times})) if times else program
 
 
+MOST_TICKS = 10_000_000  # of a run: their times are kept
+
+
+def _ticks(system: System, t_start: float, t_end: float) -> dict[float, int]:
+    """Return what ticks when: the samplers, then the contacts with a period, each as a bit."""
+    clocks = [(each.name, each.period, each.offset) for each in system.sampled]
+    clocks += [(each.name, each.period, 0.0) for each in system.contacts if each.period is not None]
+    found: dict[float, int] = {}
+    for bit, (name, period, offset) in enumerate(clocks):
+        count = math.ceil((t_end - t_start - offset) / period)
+        if count > MOST_TICKS:
+            raise ParameterError(
+                f"its period of {period!r} s makes {count:.4g} ticks",
+                place=name,
+                advice=f"at most {MOST_TICKS:,} fit into a run",
+            )
+        for k in range(count):
+            time = t_start + offset + k * period
+            if time < t_end:
+                found[time] = found.get(time, 0) | 1 << bit
+    return dict(sorted(found.items()))
+
+
 def _covered(system: System, t_start: float, t_end: float) -> float:
     """Return the last time covered by all sampled signals."""
     last = t_end
@@ -375,6 +399,11 @@ def _initial(
                     advice=f"the model has {bank.n} elements",
                 )
             y[name] = as_floats(values)
+        y |= {
+            name: [0.0] * bank.n
+            for name in layout.y.own
+            if name not in y and name.startswith(bank.of(""))
+        }
     state, mode = layout.y.joined(y), list[int]()
     for bank, part in zip(layout.banks, system.contacts, strict=True):
         chart = part.chart
