@@ -154,6 +154,7 @@ def lower(system: System | Model, rig: Rig | None = None) -> Program:
             tuple(contact.inputs.items()),
             tuple(np.ndim(contact.values[name]) for name in contact.chart.parameter_names),
             contact.model is None,
+            contact.period is None,
             contact.model is None or contact.model.stribeck is None,
         )
         for contact in system.contacts

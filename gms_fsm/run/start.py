@@ -149,7 +149,8 @@ class Start:
                         f"it must be a {what}, for example {example}", place=what, value=given
                     )
             assert rig is not None
-            system = system_of(model, rig)
+            held = settings is not None and settings.events == "held"
+            system = system_of(model, rig, settings.step if settings and held else None)
         chosen = Settings() if settings is None else settings
         t_start, t_end = _times(t_start, t_end)
         _check_resolution(chosen, t_start, t_end)
@@ -166,13 +167,13 @@ class Start:
             )
         options = Options(
             integrators.METHODS[method] if isinstance(method, str) else method,
-            chosen.step,
+            None if chosen.events == "held" else chosen.step,
             chosen.rtol,
             tolerances,
             chosen.max_step,
             scales.time,
             chosen.max_steps,
-            chosen.events == "located",
+            chosen.events != "step",
             [] if chosen.output == "end" else _wanted(chosen, t_start, t_end),
             rows_at_once,
         )
@@ -224,7 +225,8 @@ class Start:
         Start
             With the tolerances of the new model.
         """
-        system = system_of(model, rig)
+        period = self.system.contacts[0].period if self.given is None else None
+        system = system_of(model, rig, period)
         scales = scales_of_system(system)
         default = scales.tolerances(self.options.rtol)
         tolerances, used = _tolerances(self.program.layout, self.chosen.atol, default)
