@@ -13,6 +13,7 @@ import integrators
 from gms_fsm.charts.chart import Transition
 from gms_fsm.charts.parameters import as_floats, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError, SignalError, shown
+from gms_fsm.language import evaluate
 from gms_fsm.lowering._pulses import waking_times
 from gms_fsm.lowering.layout import BankPlaces, Layout
 from gms_fsm.lowering.program import Program, arguments, lower
@@ -23,6 +24,7 @@ from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Corners, Formula
 from gms_fsm.systems.system import Mounting, Several, System, system_of
 from gms_fsm.traces.rows import Rows
+from gms_fsm.traces.scope import GuardValues, parameter_values
 from gms_fsm.traces.trace import Trace
 from integrators import Options
 
@@ -180,7 +182,7 @@ class Start:
         last = _covered(system, t_start, t_end)
         program = _with_waking_times(program, system, t_start, last)
         program = replace(program, ticks=_ticks(system, t_start, last))
-        y, mode = _initial(system, program, {} if initial is None else initial)
+        y, mode = _initial(system, program, t_start, {} if initial is None else initial)
         kept: dict[str, Setting] = {
             "method": chosen.method_name,
             "step": chosen.step,
@@ -362,7 +364,7 @@ def _covered(system: System, t_start: float, t_end: float) -> float:
 
 
 def _initial(
-    system: System, program: Program, initial: Mapping[str, Any]
+    system: System, program: Program, t_start: float, initial: Mapping[str, Any]
 ) -> tuple[list[float], list[int]]:
     """Build the state vector and the modes."""
     layout = program.layout
@@ -417,7 +419,50 @@ def _initial(
                 f"it must list {bank.n} state names", place=f"initial[{label!r}]", value=wanted
             )
         mode += [chart.state_index(str(name)) for name in wanted]
-    return state, mode
+    return _entered(system, program, t_start, state, mode, {*given}), mode
+
+
+def _entered(
+    system: System,
+    program: Program,
+    t_start: float,
+    y: list[float],
+    mode: list[int],
+    given: set[str],
+) -> list[float]:
+    """Perform the entry of each element's default state, as when a chart is first entered.
+
+    What the initial values give stays.
+    """
+    layout, out = program.layout, [0.0] * program.layout.shown.size
+    if not any(
+        contact.chart.assignments["entry", contact.chart.default_state.name]
+        for contact in system.contacts
+    ):
+        return y
+    program.ieee["values"](t_start, y, mode, program.p, out)
+    found: list[dict[str, Any]] = [{} for _ in mode]
+    GuardValues(layout).put(t_start, y, out, found)
+    new = list(y)
+    for bank, contact in zip(layout.banks, system.contacts, strict=True):
+        chart = contact.chart
+        steps = chart.assignments["entry", chart.default_state.name]
+        for i in range(bank.n):
+            values = found[bank.first + i] | parameter_values(contact, i)
+            if mode[bank.first + i] != 0:
+                continue
+            for name, tree in steps.items():
+                if name in chart.velocities:
+                    raise ParameterError(
+                        f"the entry of the default state {chart.states[0].name!r} sets {name!r}",
+                        place=f"chart {chart.name!r}",
+                        advice="give the initial velocity instead",
+                    )
+                if bank.of(name) not in given:
+                    values[name] = new[layout.y.index(bank.of(name), i)] = float(
+                        evaluate(tree, values)
+                    )
+    return new
 
 
 def _unknown_initial(system: System, layout: Layout, key: object, value: object) -> tuple[str, str]:
