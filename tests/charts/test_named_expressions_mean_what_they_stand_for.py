@@ -80,7 +80,7 @@ def test_a_chart_may_use_the_names_of_the_generated_text() -> None:
             State("held", flow={"y": "-S * y"}),
         ),
         transitions=(
-            Transition("out", "mode", "held", guard="n > own"),
+            Transition("out", "mode", "held", guard="n > own and y > 0.5"),
             Transition("edge", "held", "mode", guard="y < tables"),
         ),
         outputs={"F": "y + n"},
@@ -94,7 +94,7 @@ def test_a_chart_may_use_the_names_of_the_generated_text() -> None:
             State("s2", flow={"a1": "-b3 * a1"}),
         ),
         transitions=(
-            Transition("e1", "s1", "s2", guard="a2 > b4"),
+            Transition("e1", "s1", "s2", guard="a2 > b4 and a1 > 0.5"),
             Transition("e2", "s2", "s1", guard="a1 < b5"),
         ),
         outputs={"F": "a1 + a2"},
