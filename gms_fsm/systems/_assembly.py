@@ -163,6 +163,15 @@ class Bank:
         """Name of the weights, of which every bank has one per element."""
         return of(self.name, "threshold weight")
 
+    @property
+    def periodic(self) -> bool:
+        """Whether its machines are asked at ticks only, and what they give out is held."""
+        return self.contact.period is not None
+
+    def held(self, name: str) -> str:
+        """Return what the held value of a rate or of a force is called."""
+        return f"{name} held"
+
     def rate(self, variable: str) -> str:
         """Return what the rate of a variable is called."""
         contact, name = variable.rsplit(".", 1)
@@ -185,6 +194,8 @@ class Assembly:
         By free body.
     flow : mapping of str to Value
         Rates of the further states.
+    updates : mapping of str to mapping of str to Value
+        By sampler, those of its values.
     shared : mapping of str to float
         Numbers with one value, by name.
     own : mapping of str to (int, ndarray)
@@ -197,6 +208,7 @@ class Assembly:
     forces: Mapping[str, Value]
     inertias: Mapping[str, Value]
     flow: Mapping[str, Value]
+    updates: Mapping[str, Mapping[str, Value]]
     shared: Mapping[str, float]
     own: Mapping[str, tuple[int, np.ndarray]]
 
@@ -218,6 +230,13 @@ class Assembly:
             found |= dict.fromkeys(bank.variables, bank.index)
             found |= {bank.rate(name): bank.index for name in bank.variables}
         return found | {each.name: each.bank for each in self.definitions if each.bank is not None}
+
+    def bit(self, bank: Bank) -> int:
+        """Return the bit of a contact with a period among all that ticks; 0 for any other."""
+        if bank.contact.period is None:
+            return 0
+        periodic = [each.index for each in self.banks if each.contact.period is not None]
+        return 1 << (len(self.system.sampled) + periodic.index(bank.index))
 
     def bank_of(self, tree: Value | Condition) -> int | None:
         """Return the bank whose elements have one value of a tree each; None if there is one."""
@@ -315,6 +334,16 @@ class _Reader:
             name: self.value(text, system.names, f"flow of {name!r}")
             for name, text in system.flow.items()
         }
+        updates = {}
+        for each in system.sampled:
+            own = {"period": Number(each.period)}
+            updates[each.name] = {
+                name: renamed(
+                    self.value(text, [*system.names, "period"], f"sampled {each.name!r}, {name!r}"),
+                    own if "period" not in system.names else {},
+                )
+                for name, text in each.updates.items()
+            }
         banks = tuple(self.bank(i, contact) for i, contact in enumerate(system.contacts))
         self.check_locks(banks)
         return Assembly(
@@ -324,6 +353,7 @@ class _Reader:
             forces,
             inertias,
             flow,
+            updates,
             self.shared,
             self.own,
         )

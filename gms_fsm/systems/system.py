@@ -503,13 +503,15 @@ class Several:
 
 
 # --------------------------------------------------------------------------- from a model on a rig
-def system_of(model: Model, rig: Rig) -> System:
+def system_of(model: Model, rig: Rig, period: float | None = None) -> System:
     """Return a model on a rig as a system: one body, called body, and one contact, called friction.
 
     Parameters
     ----------
     model, rig
         What runs.
+    period : float, optional
+        s: of a discrete contact.
 
     Returns
     -------
@@ -542,7 +544,7 @@ def system_of(model: Model, rig: Rig) -> System:
     return System(
         rig.title,
         bodies=(body,),
-        contacts=(Contact("friction", model),),
+        contacts=(Contact("friction", model, period=period),),
         signals=dict(rig.signals),
         numbers=rig.numbers,
     )
