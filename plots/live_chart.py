@@ -136,7 +136,9 @@ class LiveChart:
         self.root.set("style", f"background:{self._sheet.colours.paper}")
         groups = {group.get("id", ""): group for group in self.root.iter("g")}
         self._parts = {i: _ElementParts(self._sheet, i, groups) for i in self.elements}
-        texts = groups["graph0"].findall("text")  # below the picture: the values, and last the time
+        # Below the picture: definitions, then the values, and last the time.
+        defined = sum(map(len, self._sheet.definitions()))
+        texts = groups["graph0"].findall("text")[defined:]
         self._value_texts = {
             i: texts[:-1] if bare else groups[element_id(i)].findall("text")[TITLE:]
             for i in self.elements
