@@ -11,7 +11,17 @@ from dataclasses import dataclass
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.traces.trace import Trace, dwell_times
 
-__all__ = ["Piece", "Row", "Tally", "edge_id", "element_id", "escape", "part_id", "printable", "wrapped"]
+__all__ = [
+    "Piece",
+    "Row",
+    "Tally",
+    "edge_id",
+    "element_id",
+    "escape",
+    "part_id",
+    "printable",
+    "wrapped",
+]
 
 LONGEST_LINE = 52  # characters; longer texts are wrapped
 DOT, TRUE, FALSE, UNKNOWN = "●", "✓", "✗", "?"

@@ -205,7 +205,7 @@ class Scope:
             With numbers as values, identical to those seen by the run.
         """
         seen = {
-            "v": float(trace.v[row]),
+            trace.places.velocity: float(trace.v[row]),
             "F": float(trace.F[row]),
             "x": float(trace.x[row]),
             "s": trace.s[row].tolist(),
@@ -230,7 +230,8 @@ class Scope:
         Scope
             With arrays as values, whose last axis is the row.
         """
-        seen = {"v": trace.v, "F": trace.F, "x": trace.x, "s": trace.s.T, FORCE: trace.F_elements.T}
+        seen = {"F": trace.F, "x": trace.x, "s": trace.s.T, FORCE: trace.F_elements.T}
+        seen[trace.places.velocity] = trace.v
         rows, layout = trace.rows, trace.program.layout
         return cls(trace.model, layout, rows.t, rows.y.T, seen, rows.mode.T, trace.places)
 
