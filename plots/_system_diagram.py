@@ -158,11 +158,10 @@ def _body(system: System, body: Body) -> Block:
         return Block("body", body.name, "driven body", texts, _read(system, [tree]))
     inertia, force = (_tree(each, system.names) for each in (body.inertia or 0.0, body.force))
     total = force
-    for contact, v, name in _forces(system):
-        total = _less(total, _share(system, contact, v, body), name)
-    left = Binary("*", inertia, Name(f"d{body.v}/dt"))
-    if inertia == Number(1.0):
-        left = Name(f"d{body.v}/dt")
+    for v, name in _forces(system):
+        total = _less(total, _share(system, v, body), name)
+    rate = Name(f"d{body.v}/dt")
+    left = rate if inertia == Number(1.0) else Binary("*", inertia, rate)
     texts = (_equation(spell(left, MATLAB_LIKE), total),)
     return Block("body", body.name, "body", texts, _read(system, [inertia, force]))
 
@@ -186,14 +185,14 @@ def _contact(system: System, contact: Contact) -> Block:
     return Block("contact", contact.name, note, (title, *texts), _read(system, bound.values()))
 
 
-def _forces(system: System) -> Iterator[tuple[Contact, str, str]]:
-    """Yield each force: its contact, the text of its velocity, what it is called."""
+def _forces(system: System) -> Iterator[tuple[str, str]]:
+    """Yield each force: the text of its velocity, and what it is called."""
     for contact in system.contacts:
         for force, v in zip(contact.chart.force_names, contact.v, strict=True):
-            yield contact, v, f"{contact.name}.{force}"
+            yield v, f"{contact.name}.{force}"
 
 
-def _share(system: System, contact: Contact, v: str, body: Body) -> Value:
+def _share(system: System, v: str, body: Body) -> Value:
     """Return the coefficient of a body's velocity in that of a contact."""
     share = derivative(_tree(v, system.names), body.v)
     return Number(0.0) if share is None else share
@@ -249,7 +248,7 @@ def _draw_contacts(graph: graphviz.Digraph, system: System) -> None:
         touched = [
             body
             for body in system.bodies
-            if any(_share(system, contact, v, body) != Number(0.0) for v in contact.v)
+            if any(_share(system, v, body) != Number(0.0) for v in contact.v)
         ]
         place = f"contact-{contact.name}"
         for k, body in enumerate(touched):

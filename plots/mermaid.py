@@ -1,8 +1,8 @@
 """Write a chart as Mermaid text, which many sites and editors can draw.
 
 The result is a ``stateDiagram-v2``: the actions and forces of a state are its description; an edge
-carries its priority, guard and action; named expressions are a note. Every character that Mermaid could read as syntax is written as
-``#code;``, which Mermaid displays as the character.
+carries its priority, guard and action; named expressions are a note. Every character that Mermaid
+could read as syntax is written as ``#code;``, which Mermaid displays as the character.
 """
 
 from __future__ import annotations

@@ -375,8 +375,9 @@ def _read(
 ) -> dict[str, Any]:
     """Return what guards of a contact can read besides ``t, x, v, s``, variables, parameters."""
     shown, start = program.layout.shown, places.of("")
-    names = {name for name in (*shown.shared, *shown.own) if name.startswith(start)}
-    if names <= {places.of(name) for name in ("x", "v", "s")}:
+    known = {places.of(name) for name in ("x", places.velocity)}
+    names = {name for name in (*shown.shared, *shown.own) if name.startswith(start)} - known
+    if names <= {places.of("s")}:
         return {}
     out = [0.0] * shown.size
     program.ieee["values"](t, y, mode, program.p, out)

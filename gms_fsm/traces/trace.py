@@ -200,11 +200,10 @@ class Trace:
         Micro-steps count the firings of all contacts at one time.
         """
         log = self.transitions if self.every is None else self.every
-        counted = np.arange(log.size) - np.searchsorted(log.t, log.t) + 1
+        counted: NDArray[np.int64] = np.arange(log.size) - np.searchsorted(log.t, log.t) + 1
         if self.every is None or not log.size:
             return counted
-        mine: NDArray[np.int64] = counted[log.contact == self.which]
-        return mine
+        return np.asarray(counted[log.contact == self.which])
 
     def picked(self, keep: NDArray[Any]) -> Trace:
         """Return some of the rows, with what was observed there, and the whole log.
