@@ -74,7 +74,10 @@ _OF_AN_EVENT: tuple[Callable[..., Any], ...] = (
     loop._fired,
     loop._flowed,
     loop._is_full,
+    loop._held,
     loop._jump,
+    loop._make_due,
+    loop._only_due,
     loop._pick,
     loop._put_firing,
     loop._put_stop,
@@ -119,6 +122,7 @@ SIGNATURES: Mapping[str, str] = {
     "normal": "ifVIPV",
     "switch": "fVIPI",
     "act": "iifVIP",
+    "tick": "ifVIP",
     "observe": "fVIVPV",
 }
 # IEEE arithmetic: x / 0 is inf or NaN, as in our Python (together with the caller's numbers that do
@@ -437,8 +441,8 @@ def _compile_record(
 
     for helper in (*_INLINED, *_OF_AN_ARC):
         usable_inside(helper, inlined=helper in _INLINED)
-    names = ("flow", "arm", "margins", "normal", "switch", "act", "observe")
-    at_flow, at_arm, at_margins, at_normal, at_switch, at_act, at_observe = (
+    names = ("flow", "arm", "margins", "normal", "switch", "act", "tick", "observe")
+    at_flow, at_arm, at_margins, at_normal, at_switch, at_act, at_tick, at_observe = (
         _function_at(_signature(SIGNATURES[name])) for name in names
     )
     run = numba.njit(inline="always", **_OPTIONS)(loop.record)  # otherwise it is compiled twice
@@ -450,7 +454,10 @@ def _compile_record(
             at_flow(at.flow), at_arm(at.arm), at_margins(at.margins), at_normal(at.normal), at.p
         )
         switch = Machines(
-            at_switch(machines.ask), at_act(machines.act), at_observe(machines.observe)
+            at_switch(machines.ask),
+            at_act(machines.act),
+            at_tick(machines.tick),
+            at_observe(machines.observe),
         )
         return run(functions, switch, b, log, recorded, most_steps, pause)
 

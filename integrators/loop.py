@@ -74,9 +74,9 @@ ROWS, FIRING, FIRED, STOPPED, DONE, SLID = 10, 11, 12, 13, 14, 15
 MACHINE_LIVELOCK, RELATION_LIVELOCK, ADVANCE, TOO_MANY_STEPS = 16, 17, 18, 19
 NOTHING = -1  # no event yet
 # Indices into Memory.counts.
-PLACES = 11
-PHASE, MICROSTEP, MACHINE, EDGE, FIRED_ONE, FRESH, STATUS, JUMP, ACTIVE, TAKEN, NEW_ARC = range(
-    PLACES
+PLACES = 12
+PHASE, MICROSTEP, MACHINE, EDGE, FIRED_ONE, FRESH, STATUS, JUMP, ACTIVE, TAKEN, NEW_ARC, HOLD = (
+    range(PLACES)
 )
 # Phases.
 START, ASK, PICK, FIRE, SETTLED, BEGIN, ARC, AFTER, JUMPING, FINISH, END = range(11)
@@ -93,12 +93,16 @@ class Switch(Protocol):
     def act(self, edge: int, machine: int, t: float, y: Vector, mode: list[int], p: Any) -> None:
         """Take an edge: update mode, and y if the edge assigns something."""
 
+    def tick(self, bits: int, t: float, y: Vector, mode: list[int], p: Any) -> None:
+        """Update what ticks: samplers, and what discrete machines give out."""
+
 
 class Machines(NamedTuple):
     """A `Switch` made of two functions, and a function that observes firings."""
 
     ask: Callable[..., Any]
     act: Callable[..., Any]
+    tick: Callable[..., Any]
     observe: Callable[..., Any]  # observe(t, y, mode, signs, p, seen)
 
 
@@ -110,6 +114,7 @@ class Memory(NamedTuple):
     switches: list[int]  # firings of each machine since the time Now.clock[ANCHOR]
     changes: list[int]  # changes of each relation since that time
     anchor: Vector  # the state at that time
+    due: list[int]  # whether each discrete machine is to be asked
 
 
 class Buffers(NamedTuple):
@@ -185,6 +190,7 @@ def run_to_event(
         phase, event = counts[PHASE], NOTHING
         if phase == ASK:
             switch.ask(clock[T], now.y, now.mode, p, memory.edges)
+            _only_due(plan, memory)
             counts[MACHINE] = -1
             counts[FIRED_ONE] = 0
             counts[PHASE] = PICK
@@ -194,8 +200,12 @@ def run_to_event(
             switch.act(counts[EDGE], counts[MACHINE], clock[T], now.y, now.mode, p)
             event = _fired(plan, now, memory, scratch)
         elif phase == SETTLED:
-            _choose_stop(plan, clock, counts)
-            if plan.located and counts[PHASE] == BEGIN:
+            if counts[HOLD] > 0:  # discrete machines have fired: what they give out is held now
+                switch.tick(counts[HOLD], clock[T], now.y, now.mode, p)
+                event = _held(now, counts, out)
+            else:
+                _choose_stop(plan, clock, counts)
+            if event == NOTHING and plan.located and counts[PHASE] == BEGIN:
                 event = _rearm(functions, now, relations, sliding, counts)
         elif phase == BEGIN:
             event = _begin_arc(motion, plan, now, scratch, counts)
@@ -212,8 +222,15 @@ def run_to_event(
                 often = _often_changed(motion, plan, now, w, sliding, memory, scratch)
             event = _end_arc(plan, clock, counts, often)
         elif phase == JUMPING:
-            event = _jump(plan, now, counts, out)
+            now.clock[T] = plan.jumps[counts[JUMP]]
+            if plan.ticks[counts[JUMP]] > 0:
+                switch.tick(plan.ticks[counts[JUMP]], clock[T], now.y, now.mode, p)
+                _make_due(plan, memory)
+            event = _jump(now, counts, out)
         elif phase == START:
+            if len(plan.jumps) > 0 and plan.jumps[0] <= clock[T]:
+                switch.tick(plan.ticks[0], clock[T], now.y, now.mode, p)
+                _make_due(plan, memory)
             _start(plan, now, counts, out)
         elif phase == FINISH:
             _finish(now, counts, out)
@@ -387,9 +404,37 @@ def _end_arc(plan: Plan, clock: Vector, counts: list[int], often: bool) -> int:
     return NOTHING
 
 
-def _jump(plan: Plan, now: Now, counts: list[int], out: Output) -> int:
+def _only_due(plan: Plan, memory: Memory) -> None:
+    """Forget the edges of discrete machines between their ticks; each is asked once at a tick."""
+    edges, due = memory.edges, memory.due
+    for i in range(len(edges)):
+        if plan.discrete[i] > 0:
+            if due[i] == 0:
+                edges[i] = -1
+            due[i] = 0
+
+
+def _make_due(plan: Plan, memory: Memory) -> None:
+    """Let discrete machines be asked at the tick that has just come."""
+    bits = plan.ticks[memory.counts[JUMP]]
+    for i in range(len(memory.due)):
+        if plan.discrete[i] & bits > 0:
+            memory.due[i] = 1
+            memory.counts[HOLD] |= plan.discrete[i]
+
+
+def _held(now: Now, counts: list[int], out: Output) -> int:
+    """Go on with what discrete machines give out from now on."""
+    counts[HOLD] = 0
+    counts[FRESH] = 1
+    counts[PHASE] = ASK
+    if out.every_step:
+        put_row(out, now.clock[T], now.y)
+    return STOPPED
+
+
+def _jump(now: Now, counts: list[int], out: Output) -> int:
     """Pass a jump of the flow."""
-    now.clock[T] = plan.jumps[counts[JUMP]]
     counts[PHASE] = ASK
     if out.every_step:
         put_row(out, now.clock[T], now.y)

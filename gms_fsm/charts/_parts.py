@@ -120,8 +120,11 @@ class Transition:
             object.__setattr__(self, each, value)
 
     def each(self) -> tuple[Transition, ...]:
-        """Return one transition per source."""
-        return tuple(replace(self, source=source) for source in self.sources)
+        """Return one transition per source; each knows all of them."""
+        parts = tuple(replace(self, source=source) for source in self.sources)
+        for part in parts:
+            object.__setattr__(part, "sources", self.sources)
+        return parts
 
 
 def texts_of(given: object, owner: str) -> dict[str, str]:

@@ -19,7 +19,7 @@ from gms_fsm.charts.parameters import Parameter, checked_values
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ChartError, GMSError, ParameterError, shown, why
 
-__all__ = ["Demonstration", "Entry", "entry", "registered"]
+__all__ = ["Demonstration", "Entry", "charts", "entry", "registered"]
 
 # Keys of a scenario's table [model] that are not parameters.
 KEYS = ("chart", "law", "n", "stribeck")
@@ -227,6 +227,27 @@ def registered() -> Mapping[str, Entry]:
             found[each.name] = each, place
     entries = sorted((each for each, _ in found.values()), key=lambda each: bool(each.wrong))
     return {each.name: each for each in entries}
+
+
+def charts() -> Mapping[str, Chart]:
+    """Return the charts that are models, without those that demonstrate a fault.
+
+    Returns
+    -------
+    mapping of str to Chart
+        By the name of the entry; with several laws, one per law: ``"gms-signed"``.
+
+    Examples
+    --------
+    >>> charts()["gms-signed"].name
+    'GMS element, signed law'
+    """
+    return {
+        "-".join(filter(None, (each.name, law))): each.chart(law)
+        for each in registered().values()
+        if not each.wrong
+        for law in each.laws or ("",)
+    }
 
 
 def _entries(module: str, place: str) -> tuple[Entry, ...]:

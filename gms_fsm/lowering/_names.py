@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from gms_fsm.language import Binary, Name, Node, product_power
-from gms_fsm.lowering._assembly import Assembly, Bank
 from gms_fsm.lowering.layout import sizes_of
+from gms_fsm.systems._assembly import Assembly, Bank
 
 __all__ = ["Names", "computed_names", "names_of"]
 
@@ -99,7 +99,7 @@ def names_of(read: Assembly) -> Names:
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters, Slider
-    >>> from gms_fsm.lowering._assembly import assembled
+    >>> from gms_fsm.systems._assembly import assembled
     >>> from gms_fsm.systems.system import system_of
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
     >>> names = names_of(assembled(system_of(model, Slider(1.0, "t"))))
@@ -123,6 +123,8 @@ def names_of(read: Assembly) -> Names:
         for name in every_name(bank, read):
             if name not in local:
                 local[name] = choice.of(bank, name.split(".", 1)[1])
+        for force in bank.forces if bank.periodic else ():
+            local[bank.held(force)] = choice.of(bank, f"held_{force.split('.', 1)[1]}")
         for name in (*bank.variables, *bank.velocities):
             plain[name] = name.split(".", 1)[-1] if choice.alone else name
     plain |= {name: name.split(".", 1)[1] for name in local if choice.alone and "." in name}

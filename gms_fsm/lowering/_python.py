@@ -15,16 +15,27 @@ from gms_fsm.language import (
     names_in,
     split,
 )
-from gms_fsm.lowering._assembly import Bank, Edge, of
 from gms_fsm.lowering._lines import TABLES, Line, Signs, Writer, indented, reads_of
 from gms_fsm.lowering._locks import Locks
 from gms_fsm.lowering._names import computed_names
 from gms_fsm.lowering._plan import BankPlan, Computed, Gradient, Plan, both_sides, gradient_of
+from gms_fsm.systems._assembly import Bank, Edge, of
 from integrators import LIVE
 
 __all__ = ["FUNCTIONS", "python"]
 
-FUNCTIONS = ("flow", "flow_live", "switch", "act", "observe", "normal", "arm", "margins", "values")
+FUNCTIONS = (
+    "flow",
+    "flow_live",
+    "switch",
+    "act",
+    "observe",
+    "normal",
+    "arm",
+    "margins",
+    "values",
+    "tick",
+)
 
 
 def python(plan: Plan) -> str:
@@ -43,7 +54,7 @@ def python(plan: Plan) -> str:
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters, Prescribed
-    >>> from gms_fsm.lowering._assembly import assembled
+    >>> from gms_fsm.systems._assembly import assembled
     >>> from gms_fsm.lowering._plan import plan_of
     >>> from gms_fsm.systems.system import system_of
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
@@ -72,6 +83,7 @@ def python(plan: Plan) -> str:
         printer.arm(),
         printer.margins(),
         printer.values(),
+        printer.tick(),
     ):
         lines += ["", "", *function]
     return "\n".join(lines) + "\n"
@@ -116,10 +128,19 @@ class _Printer(Writer):
         return lines
 
     def bank_forces(
-        self, plan: BankPlan, signs: Signs, wanted: bool, *, rates: bool, observed: bool
+        self,
+        plan: BankPlan,
+        signs: Signs,
+        wanted: bool,
+        *,
+        rates: bool = False,
+        observed: bool = False,
+        held: bool = False,
     ) -> list[Line]:
-        """Write the loop over the elements of a contact, and its force."""
-        bank, y, seen = plan.bank, self.layout.y, self.layout.observed
+        """Write the loop over the elements of a contact, and its force; `held` stores both."""
+        bank, y = plan.bank, self.layout.y
+        if bank.periodic and not held:
+            return self.held_forces(bank, wanted, rates=rates, observed=observed)
         forces = wanted and (plan.moves or observed or not rates or self.locking)
         used = {name for tree in plan.common.values() for name in names_in(tree)} | {
             name
@@ -130,7 +151,7 @@ class _Printer(Writer):
         needed = {
             name
             for name in bank.variables
-            if rates or observed or (forces and bank.rate(name) in used)
+            if rates or observed or held or (forces and bank.rate(name) in used)
         }
         # Only a contact with several velocities has several forces.
         several = {force: f"F_i{'' if q == 0 else f'_{q}'}" for q, force in enumerate(bank.forces)}
@@ -153,7 +174,7 @@ class _Printer(Writer):
             total = self.local(force)
             if force not in plan.common:
                 after.append(Line(f"{total} += {several[force]}"))
-            elif observed:
+            elif observed or held:
                 after.append(self.put(several[force], plan.common[force], "  # (3)"))
                 after.append(Line(f"{total} += {several[force]}"))
             else:
@@ -163,12 +184,55 @@ class _Printer(Writer):
             after += self.elements_seen(plan, several)
         if rates:
             after += [self.store("dy", y, v, self.local(bank.rate(v))) for v in bank.variables]
+        if held:
+            after += [
+                self.store("y", y, bank.held(bank.rate(v)), self.local(bank.rate(v)))
+                for v in bank.variables
+            ]
+            after += [
+                self.store("y", y, bank.held(f"{force}_elements"), several[force])
+                for force in bank.forces
+            ]
         lines = [Line(f"{self.local(force)} = 0.0") for force in bank.forces if forces]
         lines += self.loop(bank.index, signs, (), branches, after)
-        del seen
         for force, value in plan.totals.items() if forces else ():
             lines += self.computed(self.local(force), value, signs, "  # (4)")
+        if held:
+            lines += [
+                Line(f"y[{y.text(bank.held(force))}] = {self.local(force)}")
+                for force in bank.forces
+            ]
         return lines
+
+    def held_forces(self, bank: Bank, wanted: bool, *, rates: bool, observed: bool) -> list[Line]:
+        """Write the force of a contact with a period, and its rates: what is held of them."""
+        y, seen, lines = self.layout.y, self.layout.observed, list[Line]()
+        for force in bank.forces if wanted else ():
+            held = bank.held(force)
+            lines.append(Line(f"{self.local(force)} = {self.local(held)}", frozenset({held})))
+            if rates:
+                lines.append(Line(f"dy[{y.text(held)}] = 0.0"))
+        after: list[Line] = []
+        pairs = [(bank.rate(v), bank.held(bank.rate(v))) for v in bank.variables]
+        for v, (rate, held) in zip(bank.variables, pairs, strict=True):
+            place, sizes = self.at("y", y, held)
+            if rates:
+                line = self.store("dy", y, v, place)
+                after += [Line(line.text, line.reads | sizes), self.store("dy", y, held, "0.0")]
+            if observed:
+                line = self.store("out", seen, rate, place)
+                after.append(Line(line.text, line.reads | sizes))
+        for force in bank.forces:
+            held = bank.held(f"{force}_elements")
+            place, sizes = self.at("y", y, held)
+            if rates:
+                after.append(self.store("dy", y, held, "0.0"))
+            if observed:
+                line = self.store("out", seen, f"{force}_elements", place)
+                after.append(Line(line.text, line.reads | sizes))
+        if observed:
+            after.append(self.threshold_seen(bank))
+        return [*lines, *self.loop(bank.index, "live", (), None, after)]
 
     @staticmethod
     def names_of(value: Computed) -> frozenset[str]:
@@ -179,21 +243,22 @@ class _Printer(Writer):
     def elements_seen(self, plan: BankPlan, several: Mapping[str, str]) -> list[Line]:
         """Store what is observed of an element."""
         bank, seen = plan.bank, self.layout.observed
-        s = of(bank.name, "s")
-        if bank.threshold:
-            place, sizes = self.at("out", seen, s)
-            lines = [Line(f"{place} = {self.local(bank.threshold)}", sizes | {bank.threshold})]
-        elif s in self.read.owner:  # a chart's own
-            place, sizes = self.at("out", seen, s)
-            lines = [Line(f"{place} = {self.local(s)}", sizes | {s})]
-        else:
-            lines = [self.store("out", seen, s, "nan")]
+        lines = [self.threshold_seen(bank)]
         lines += [
             self.store("out", seen, f"{force}_elements", several[force]) for force in bank.forces
         ]
         return lines + [
             self.store("out", seen, bank.rate(v), self.local(bank.rate(v))) for v in bank.variables
         ]
+
+    def threshold_seen(self, bank: Bank) -> Line:
+        """Store the threshold of an element: that of its model, or the chart's own."""
+        seen, s = self.layout.observed, of(bank.name, "s")
+        if not bank.threshold and s not in self.read.owner:
+            return self.store("out", seen, s, "nan")
+        threshold = bank.threshold or s
+        place, sizes = self.at("out", seen, s)
+        return Line(f"{place} = {self.local(threshold)}", sizes | {threshold})
 
     def driven_accelerations(self) -> list[Line]:
         """Write the accelerations of driven bodies that locks refer to."""
@@ -494,7 +559,7 @@ class _Printer(Writer):
         held = self.plan.held
         watched = [*self.plan.always]
         for bank in self.read.banks:
-            for edge in bank.edges:
+            for edge in bank.edges if not bank.periodic else ():
                 watched += _comparisons(split(edge.guard))
         lines = self.before_guards(
             computed_names(side) for each in watched for side in (each.left, each.right)
@@ -509,7 +574,7 @@ class _Printer(Writer):
                     if u in held.own:
                         rows.append(self.hold(u))
                     rows += [self.watch(relation) for relation in both_sides(u)]
-                for edge, _ in self.leaving(bank, state):
+                for edge, _ in self.leaving(bank, state) if not bank.periodic else ():
                     rows.append(Line(f"# {edge.name}: {self.spell(edge.guard)}"))
                     rows += self.witness(split(edge.guard))
                 branches[state] = rows
@@ -633,6 +698,25 @@ class _Printer(Writer):
         return self.function(
             "values(t, y, mode, p, out)",
             "out = what guards can read besides variables and parameters.",
+            lines,
+            "live",
+        )
+
+    def tick(self) -> list[str]:
+        y, lines = self.layout.y, list[Line]()
+        for k, each in enumerate(self.read.system.sampled):
+            inside: list[Line] = []
+            for name, tree in self.read.updates[each.name].items():
+                inside.append(self.put(self.local(name), tree))
+                inside.append(Line(f"y[{y.text(name)}] = {self.local(name)}"))
+            lines += [Line(f"if bits & {1 << k}:  # {each.name}"), *indented(inside)]
+        for plan in self.plan.banks:
+            if bit := self.read.bit(plan.bank):
+                lines += [Line(f"if bits & {bit}:  # {plan.bank.name}")]
+                lines += indented(self.bank_forces(plan, "live", True, held=True))
+        return self.function(
+            "tick(bits, t, y, mode, p)",
+            "Update what ticks: samplers, and what discrete machines give out.",
             lines,
             "live",
         )

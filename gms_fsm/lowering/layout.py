@@ -1,7 +1,7 @@
 """The layout of the state vector y, of a run's observed quantities, of the modes and of the log.
 
 No other module computes such a position, neither as a number nor as text: it looks it up by name.
-Names are those of the trees (`gms_fsm.lowering._assembly`): what belongs to a contact is called
+Names are those of the trees (`gms_fsm.systems._assembly`): what belongs to a contact is called
 ``contact.name``.
 
 y            position and, unless it is driven, velocity of each body; further states; sampled
@@ -22,7 +22,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.language import names_in
-from gms_fsm.lowering._assembly import Assembly, Bank, of
+from gms_fsm.systems._assembly import Assembly, Bank, of
 
 __all__ = [
     "CONTACT",
@@ -358,7 +358,7 @@ class Layout:
     Examples
     --------
     >>> from gms_fsm import GMS, GMSParameters, Prescribed
-    >>> from gms_fsm.lowering._assembly import assembled
+    >>> from gms_fsm.systems._assembly import assembled
     >>> from gms_fsm.systems.system import system_of
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
     >>> layout = Layout.of(assembled(system_of(model, Prescribed("0.1*t"))), surfaces=0)
@@ -405,7 +405,7 @@ class Layout:
         updated = (name for each in system.sampled for name in each.updates)
         sizes = sizes_of(read.banks)
         blocks = tuple(
-            Block(bank.variables, bank.n, size)
+            Block((*bank.variables, *held_of(bank)), bank.n, size)
             for bank, size in zip(read.banks, sizes, strict=True)
         )
         seen = tuple(
@@ -420,7 +420,8 @@ class Layout:
             )
             for bank, size in zip(read.banks, sizes, strict=True)
         )
-        y = Places((*moved, *system.flow, *updated), blocks)
+        held = [bank.held(force) for bank in read.banks if bank.periodic for force in bank.forces]
+        y = Places((*moved, *system.flow, *updated, *held), blocks)
         keys = {name: name for name, _ in y}
         for body in system.bodies:
             keys |= {f"{body.name}.x": body.x, f"{body.name}.v": body.v}
@@ -529,6 +530,14 @@ class Layout:
             The modes of a row.
         """
         return (*states, *[0] * self.surfaces)
+
+
+def held_of(bank: Bank) -> tuple[str, ...]:
+    """Return what is held of each element of a contact with a period: rates, then forces."""
+    if not bank.periodic:
+        return ()
+    rates = [bank.held(bank.rate(name)) for name in bank.variables]
+    return (*rates, *(bank.held(f"{force}_elements") for force in bank.forces))
 
 
 def sizes_of(banks: Sequence[Bank]) -> tuple[str, ...]:

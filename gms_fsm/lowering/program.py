@@ -36,11 +36,11 @@ import integrators
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.errors import SignalError
 from gms_fsm.language import Binary, Requirement, Value, spell
-from gms_fsm.lowering._assembly import assembled
 from gms_fsm.lowering._generated import ieee, load, load_careful
 from gms_fsm.lowering._plan import Plan, both_sides, plan_of
 from gms_fsm.lowering._python import FUNCTIONS, python
 from gms_fsm.lowering.layout import Layout
+from gms_fsm.systems._assembly import assembled
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import (
@@ -90,6 +90,11 @@ class Program:
         The value that is zero on each.
     knots, jumps : list of float
         Times [s] where a signal has a corner, and where it jumps.
+    ticks : mapping of float to int
+        For each time [s] at which something ticks what does, as bits: the samplers, then the
+        contacts with a period.
+    discrete : list of int
+        For each machine the bit of its contact if this has a period, else 0.
     """
 
     source: str
@@ -105,6 +110,8 @@ class Program:
     surface_names: list[str]
     knots: list[float]
     jumps: list[float]
+    discrete: list[int]
+    ticks: Mapping[float, int] = field(default_factory=dict)
 
     @property
     def live(self) -> list[float]:
@@ -147,6 +154,7 @@ def lower(system: System | Model, rig: Rig | None = None) -> Program:
             tuple(contact.inputs.items()),
             tuple(np.ndim(contact.values[name]) for name in contact.chart.parameter_names),
             contact.model is None,
+            contact.period is None,
             contact.model is None or contact.model.stribeck is None,
         )
         for contact in system.contacts
@@ -226,6 +234,7 @@ def _lowered(shape: _Shape) -> Program:
         surface_names=_surface_names(plan),
         knots=[],
         jumps=[],
+        discrete=[bit for bank in plan.read.banks for bit in [plan.read.bit(bank)] * bank.n],
     )
 
 
@@ -280,6 +289,8 @@ def equations(program: Program) -> integrators.Equations:
         surfaces=program.surfaces,
         knots=program.knots,
         jumps=program.jumps,
+        ticks=program.ticks,
+        discrete=program.discrete,
         seen=program.layout.observed.size,
     )
 

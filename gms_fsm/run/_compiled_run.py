@@ -53,7 +53,7 @@ class CompiledRun:
         self.start = start
         program = start.program
         flow = "flow" if start.options.located else "flow_live"
-        names = (flow, "arm", "margins", "normal", "switch", "act", "observe")
+        names = (flow, "arm", "margins", "normal", "switch", "act", "tick", "observe")
         self.code = [compiled.machine_code(program, name) for name in names]
         self.columns = Columns(start)
         self.recorder: Recording = self.columns

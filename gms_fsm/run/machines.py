@@ -255,6 +255,7 @@ class MachineEngine:
         # Bypasses __setattr__ of the elements, which would cost time.
         self.seen_by = [vars(element) for element in self.elements]
         self.states = [""] * len(self.elements)
+        self.tick = program.ieee["tick"]
         self.set_states(mode)
 
     def restore(self, t: float, y: list[float], mode: Sequence[int]) -> None:
@@ -351,3 +352,4 @@ class IfElse:
     def __init__(self, program: Program) -> None:
         self.ask = program.ieee["switch"]
         self.act = program.ieee["act"]
+        self.tick = program.ieee["tick"]

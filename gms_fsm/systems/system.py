@@ -6,40 +6,42 @@ relative velocity, which is linear in the bodies' velocities.
 
 from __future__ import annotations
 
-import keyword
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from gms_fsm.charts.chart import Chart
-from gms_fsm.charts.parameters import FloatArray, checked_scalar, checked_values
+from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ExpressionError, ParameterError, shown
 from gms_fsm.language import (
-    CONSTANTS,
-    FUNCTIONS,
     Binary,
     Name,
     Negative,
     Number,
     Value,
     derivative,
-    evaluate,
     names_in,
     parse_value,
     renamed,
     spell,
 )
-from gms_fsm.systems.models import Model
+from gms_fsm.systems._given import (
+    Text,
+    check_name,
+    check_text,
+    checked_numbers,
+    mapping_of,
+    several,
+    texts_of,
+)
+from gms_fsm.systems.models import Model, check_bank
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Signal, as_signal
 
 __all__ = ["Body", "Contact", "Mounting", "Sampled", "Several", "System", "system_of"]
-
-Text: TypeAlias = str | float  # an expression, or just a number
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,11 @@ class Body:
                 place=here,
                 advice="give inertia=... to a free body, velocity=... to a driven one",
             )
+        for each in ("inertia", "force", "velocity"):
+            if (text := getattr(self, each)) is not None:
+                check_text(text, f"{here}: {each}")
+        for name in (self.name, self.x, self.v):
+            check_name(name, here)
 
     @property
     def driven(self) -> bool:
@@ -162,13 +169,8 @@ class Contact:
                 place=f"{here}: chart",
                 value=chart,
             )
-        if chart.locks and n != 1:
-            raise ParameterError(
-                f"n is {n}, and the chart has a locked state",
-                place=here,
-                advice="elements that lock the same motion cannot share the force; use n = 1",
-            )
-        velocities = (v,) if isinstance(v, str) else tuple(v)
+        check_bank(chart, n, here)
+        velocities = several(v, str, f"{here}: v")
         if len(velocities) != len(chart.velocities):
             raise ParameterError(
                 f"v gives {len(velocities)} velocities, chart {chart.name!r} has "
@@ -183,7 +185,7 @@ class Contact:
             "values": values,
             "v": velocities,
             "n": n,
-            "inputs": dict(inputs or {}),
+            "inputs": texts_of({} if inputs is None else inputs, f"{here}: inputs"),
             "period": period,
             "model": model,
         }.items():
@@ -246,7 +248,8 @@ class Sampled:
         put = object.__setattr__
         put(self, "period", checked_scalar(f"{here}: period", self.period, "> 0"))
         put(self, "offset", checked_scalar(f"{here}: offset", self.offset, ">= 0"))
-        put(self, "updates", dict(self.updates))
+        put(self, "updates", texts_of(self.updates, f"{here}: updates"))
+        put(self, "initial", mapping_of(self.initial, f"{here}: initial"))
         if not self.updates:
             raise ParameterError("it updates nothing", place=here)
         for name in self.initial:
@@ -292,7 +295,8 @@ class System:
     Raises
     ------
     ParameterError, ExpressionError
-        If names clash, a text cannot be read, a velocity is not linear, or an inertia is zero.
+        If names clash, a text cannot be read, a velocity is not linear, an inertia is zero, or a
+        lock cannot hold.
 
     Examples
     --------
@@ -316,27 +320,25 @@ class System:
     def __post_init__(self) -> None:
         put, here = object.__setattr__, f"system {shown(self.name)}"
         for each, kind in (("bodies", Body), ("contacts", Contact), ("sampled", Sampled)):
-            given = getattr(self, each)
-            parts = (given,) if isinstance(given, kind) else tuple(given)
-            for part in parts:
-                if not isinstance(part, kind):
-                    raise ParameterError(
-                        f"it must be a {kind.__name__}", place=f"{here}: {each}", value=part
-                    )
-            put(self, each, parts)
+            put(self, each, several(getattr(self, each), kind, f"{here}: {each}"))
         if not self.bodies:
             raise ParameterError("it has no bodies", place=here, advice="give at least one")
         if not self.contacts:
             raise ParameterError("it has no contacts", place=here, advice="give at least one")
         numbers = {
             name: checked_scalar(f"{here}: {name}", value, "finite")
-            for name, value in self.numbers.items()
+            for name, value in mapping_of(self.numbers, f"{here}: numbers").items()
         }
         put(self, "numbers", numbers)
-        put(self, "flow", dict(self.flow))
+        put(self, "flow", texts_of(self.flow, f"{here}: flow"))
+        put(self, "signals", mapping_of(self.signals, f"{here}: signals"))
         self._check_names(here)
         signals = {name: self._signal(name, given, here) for name, given in self.signals.items()}
         put(self, "signals", signals)
+        # Imported here: the reader itself needs the classes of this module.
+        from gms_fsm.systems._assembly import assembled
+
+        assembled(self)  # refuses what cannot be read, while the user's line is at fault
 
     def _signal(self, name: str, given: Any, here: str) -> Signal | str:
         """Return a signal; one whose text names numbers stays a text."""
@@ -364,7 +366,7 @@ class System:
         owner: dict[str, str] = {}
         for kind, names in groups:
             for name in names:
-                _check_name(name, f"{here}, {kind}")
+                check_name(name, f"{here}, {kind}")
                 if name in owner:
                     raise ParameterError(
                         f"the name {name!r} is used twice ({owner[name]} and {kind})",
@@ -375,7 +377,7 @@ class System:
         parts: list[Body | Contact | Sampled] = [*self.bodies, *self.contacts, *self.sampled]
         seen: set[str] = set()
         for part in parts:
-            _check_name(part.name, f"{here}, {type(part).__name__.lower()}")
+            check_name(part.name, f"{here}, {type(part).__name__.lower()}")
             if part.name in seen:
                 raise ParameterError(f"the name {part.name!r} is used twice", place=here)
             seen.add(part.name)
@@ -439,64 +441,6 @@ def _found(parts: tuple[Part, ...], name: str, reason: str) -> Part:
             return each
     known = ", ".join(repr(each.name) for each in parts)
     raise ParameterError(f"{reason} {shown(name)}", advice=f"there are {known}")
-
-
-def _check_name(name: object, place: str) -> None:
-    if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
-        raise ParameterError(
-            f"{shown(name)} is not a name",
-            place=place,
-            advice="use letters, digits and _, not starting with a digit, and no Python keyword",
-        )
-    if name in FUNCTIONS or name in CONSTANTS or name == "pow":
-        raise ParameterError(f"the name {name!r} is a word of the language", place=place)
-
-
-def checked_numbers(
-    chart: Chart, values: Mapping[str, Any], n: int, here: str
-) -> Mapping[str, float | FloatArray]:
-    """Return the numbers of a chart, checked against its parameters.
-
-    Parameters
-    ----------
-    chart : Chart
-        Whose parameters.
-    values : mapping
-        A number, or one per element, for each.
-    n : int
-        Number of elements.
-    here : str
-        For messages.
-
-    Returns
-    -------
-    mapping
-        Complete.
-
-    Raises
-    ------
-    ParameterError
-        If one is missing, unknown, or breaks its rule.
-    """
-    if isinstance(n, bool) or not isinstance(n, int) or n < 1:
-        raise ParameterError(
-            "a bank has an integer number of elements, at least one", place=f"{here}: n", value=n
-        )
-    if not isinstance(values, Mapping):
-        raise ParameterError(
-            "it must give a number for each parameter of the chart, for example {'k': 1.0}",
-            place=f"{here}: values",
-            value=values,
-        )
-    wanted, given = set(chart.parameter_names), set(values)
-    if wanted != given:
-        raise ParameterError(
-            f"chart {chart.name!r} has the parameters {sorted(wanted)}",
-            place=here,
-            advice=f"missing values: {sorted(wanted - given) or 'none'}, unknown: "
-            f"{sorted(given - wanted) or 'none'}",
-        )
-    return checked_values(chart.parameters, values, n)
 
 
 @dataclass(frozen=True)
@@ -563,13 +507,15 @@ class Several:
 
 
 # --------------------------------------------------------------------------- from a model on a rig
-def system_of(model: Model, rig: Rig) -> System:
+def system_of(model: Model, rig: Rig, period: float | None = None) -> System:
     """Return a model on a rig as a system: one body, called body, and one contact, called friction.
 
     Parameters
     ----------
     model, rig
         What runs.
+    period : float, optional
+        s: of a discrete contact.
 
     Returns
     -------
@@ -602,7 +548,7 @@ def system_of(model: Model, rig: Rig) -> System:
     return System(
         rig.title,
         bodies=(body,),
-        contacts=(Contact("friction", model),),
+        contacts=(Contact("friction", model, period=period),),
         signals=dict(rig.signals),
         numbers=rig.numbers,
     )
@@ -651,17 +597,6 @@ def _without_force(tree: Value) -> tuple[Value, int]:
                     return left, sign if op == "+" else -sign
                 return Binary(op, left, rest), sign if op == "+" else -sign
     return tree, 0
-
-
-def is_zero(tree: Value, numbers: Mapping[str, float]) -> bool:
-    """Tell whether a value is zero, or not finite, whatever the state is."""
-    if names_in(tree) - {*numbers}:
-        return False
-    try:
-        value = float(evaluate(tree, numbers))
-    except (ArithmeticError, ValueError):
-        return True
-    return value == 0.0 or not math.isfinite(value)
 
 
 def broadcast(value: float | FloatArray, n: int) -> list[float]:

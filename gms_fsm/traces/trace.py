@@ -58,6 +58,12 @@ _SLIDING = np.dtype(
 )
 
 
+def held_period(settings: Mapping[str, Setting]) -> float | None:
+    """Return the period of a run with ``events="held"``; None of any other."""
+    step = settings.get("step")
+    return step if settings.get("events") == "held" and isinstance(step, float) else None
+
+
 def check_trace(trace: object) -> None:
     """Raise unless an object to be drawn is a trace of one contact.
 
@@ -423,7 +429,9 @@ class Trace:
     @cached_property
     def program(self) -> Program:
         """The generated program of the run."""
-        return lower(self.model, self.rig) if self.system is None else lower(self.system)
+        if self.system is not None:
+            return lower(self.system)
+        return lower(system_of(self.model, self.rig, held_period(self.settings)))
 
     @property
     def _observed(self) -> Mapping[str, FloatArray]:

@@ -15,9 +15,9 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import ChartModel, Prescribed, Slider
-from gms_fsm.lowering._assembly import assembled
 from gms_fsm.lowering.layout import LOG_NUMBERS, LOG_TEXTS, Block, Layout, LogRecord, Places
 from gms_fsm.lowering.program import lower
+from gms_fsm.systems._assembly import assembled
 from gms_fsm.systems.system import system_of
 from tests.helpers import ROOT, pulled_mass, stick_slip
 

@@ -28,8 +28,8 @@ from gms_fsm import (
 )
 from gms_fsm.inspection.explain import values_at
 from gms_fsm.language import names_in, parse_value
-from gms_fsm.lowering._assembly import assembled
 from gms_fsm.lowering.layout import Layout
+from gms_fsm.systems._assembly import assembled
 from gms_fsm.systems.system import system_of
 from gms_fsm.traces.monitors import examine
 from gms_fsm.traces.scope import Scope, invariant_names, watch_names

@@ -8,6 +8,7 @@ the velocity of a driven body, a relative velocity, an input, a named expression
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,13 +25,15 @@ from gms_fsm.language import (
     Number,
     Value,
     derivative,
+    evaluate,
     names_in,
     parse_value,
     renamed,
 )
 from gms_fsm.language._normal import renamed_in
+from gms_fsm.systems._given import is_zero
 from gms_fsm.systems.signals import Formula, Signal
-from gms_fsm.systems.system import Body, Contact, System, is_zero
+from gms_fsm.systems.system import Body, Contact, System
 
 __all__ = ["Assembly", "Bank", "Definition", "Edge", "assembled", "of"]
 
@@ -160,6 +163,15 @@ class Bank:
         """Name of the weights, of which every bank has one per element."""
         return of(self.name, "threshold weight")
 
+    @property
+    def periodic(self) -> bool:
+        """Whether its machines are asked at ticks only, and what they give out is held."""
+        return self.contact.period is not None
+
+    def held(self, name: str) -> str:
+        """Return what the held value of a rate or of a force is called."""
+        return f"{name} held"
+
     def rate(self, variable: str) -> str:
         """Return what the rate of a variable is called."""
         contact, name = variable.rsplit(".", 1)
@@ -182,6 +194,8 @@ class Assembly:
         By free body.
     flow : mapping of str to Value
         Rates of the further states.
+    updates : mapping of str to mapping of str to Value
+        By sampler, those of its values.
     shared : mapping of str to float
         Numbers with one value, by name.
     own : mapping of str to (int, ndarray)
@@ -194,6 +208,7 @@ class Assembly:
     forces: Mapping[str, Value]
     inertias: Mapping[str, Value]
     flow: Mapping[str, Value]
+    updates: Mapping[str, Mapping[str, Value]]
     shared: Mapping[str, float]
     own: Mapping[str, tuple[int, np.ndarray]]
 
@@ -215,6 +230,13 @@ class Assembly:
             found |= dict.fromkeys(bank.variables, bank.index)
             found |= {bank.rate(name): bank.index for name in bank.variables}
         return found | {each.name: each.bank for each in self.definitions if each.bank is not None}
+
+    def bit(self, bank: Bank) -> int:
+        """Return the bit of a contact with a period among all that ticks; 0 for any other."""
+        if bank.contact.period is None:
+            return 0
+        periodic = [each.index for each in self.banks if each.contact.period is not None]
+        return 1 << (len(self.system.sampled) + periodic.index(bank.index))
 
     def bank_of(self, tree: Value | Condition) -> int | None:
         """Return the bank whose elements have one value of a tree each; None if there is one."""
@@ -242,8 +264,9 @@ class Assembly:
         return renamed(tree, inside) if inside else tree
 
 
+@functools.lru_cache(maxsize=64)
 def assembled(system: System) -> Assembly:
-    """Read all texts of a system.
+    """Read all texts of a system; a system is read once, when it is constructed.
 
     Parameters
     ----------
@@ -311,7 +334,18 @@ class _Reader:
             name: self.value(text, system.names, f"flow of {name!r}")
             for name, text in system.flow.items()
         }
+        updates = {}
+        for each in system.sampled:
+            own = {"period": Number(each.period)}
+            updates[each.name] = {
+                name: renamed(
+                    self.value(text, [*system.names, "period"], f"sampled {each.name!r}, {name!r}"),
+                    own if "period" not in system.names else {},
+                )
+                for name, text in each.updates.items()
+            }
         banks = tuple(self.bank(i, contact) for i, contact in enumerate(system.contacts))
+        self.check_locks(banks)
         return Assembly(
             system,
             tuple(self.definitions),
@@ -319,6 +353,7 @@ class _Reader:
             forces,
             inertias,
             flow,
+            updates,
             self.shared,
             self.own,
         )
@@ -434,6 +469,34 @@ class _Reader:
             means=names,
         )
 
+    def check_locks(self, banks: Iterable[Bank]) -> None:
+        """Refuse locks that nothing can keep, and those that always hold and repeat each other."""
+        free = [body.name for body in self.system.bodies if not body.driven]
+        always: list[Bank] = []
+        for bank in banks:
+            owner, chart = f"{self.here}, contact {bank.name!r}", bank.chart
+            if chart.locks or chart.sets_velocity:
+                for row, text in zip(bank.jacobian, bank.contact.v, strict=True):
+                    if not row.keys() & {*free}:
+                        raise ParameterError(
+                            f"chart {chart.name!r} locks the contact or sets its velocity, but "
+                            f"only driven bodies move it (v = {text!r})",
+                            place=owner,
+                            advice="mount it where a free body can follow, for example on a "
+                            "Slider or a PulledSlider",
+                        )
+            if all(state.locked for state in chart.states):
+                always.append(bank)
+                if _rank(always, free, self.system.numbers) < sum(len(b.jacobian) for b in always):
+                    names = ", ".join(repr(each.name) for each in always)
+                    raise ParameterError(
+                        f"the contacts {names} are always locked, and the lock of "
+                        f"{bank.name!r} follows from the others or from driven bodies",
+                        place=self.here,
+                        advice="leave one of them out, or give its chart a state that is not "
+                        "locked",
+                    )
+
     def coefficients(
         self, tree: Value, moved: Mapping[str, Body], text: str, owner: str
     ) -> Mapping[str, Value]:
@@ -504,6 +567,16 @@ class _Reader:
                 Definition(of(c, name), renamed(tree, names), index if per_element else None)
             )
             names[name] = Name(of(c, name))
+
+
+def _rank(banks: Iterable[Bank], free: list[str], numbers: Mapping[str, float]) -> int:
+    """Return how many velocities of contacts are independent of each other."""
+    rows = [
+        [float(evaluate(row.get(body, ZERO), numbers)) for body in free]
+        for bank in banks
+        for row in bank.jacobian
+    ]
+    return int(np.linalg.matrix_rank(np.array(rows)))
 
 
 def derivative_free(rest: Value) -> bool:
