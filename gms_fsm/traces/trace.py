@@ -30,7 +30,7 @@ from gms_fsm.lowering.program import Program, lower
 from gms_fsm.lowering.scales import Setting
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
-from gms_fsm.systems.system import System, system_of
+from gms_fsm.systems.system import Several, System, system_of
 from gms_fsm.traces import _csv, _npz
 from gms_fsm.traces._between import interpolated
 from gms_fsm.traces._header import Header
@@ -55,7 +55,7 @@ __all__ = ["BodyTrace", "Trace", "check_trace", "dwell_times", "files_of"]
 
 
 def check_trace(trace: object) -> None:
-    """Raise unless an object to be drawn is a trace.
+    """Raise unless an object to be drawn is a trace of one contact.
 
     Parameters
     ----------
@@ -65,12 +65,15 @@ def check_trace(trace: object) -> None:
     Raises
     ------
     ParameterError
-        If it is not a trace; the message says how to make one.
+        If it is not a trace, or that of a system with several contacts; the message says how to
+        make one, or to choose a contact.
     """
     if not isinstance(trace, Trace):
         raise ParameterError(
             "it must be a Trace, from simulate(...) or Trace.load(path)", place="trace", value=trace
         )
+    if isinstance(trace.model, Several):
+        raise trace.model.refused()
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +120,7 @@ class Trace:
     monitors: Mapping[str, Verdict] = field(default_factory=dict, repr=False)
     system: System | None = field(default=None, repr=False)  # where it is not a model on a rig
     which: str = field(default="", repr=False)  # the contact, of a system with several
+    every: Any = field(default=None, repr=False)  # the log of all contacts, where one is chosen
 
     def __repr__(self) -> str:
         return f"<Trace: {self._title}; {len(self.rows)} rows, {len(self.transitions)} transitions>"
@@ -176,12 +180,44 @@ class Trace:
         log = self.transitions
         mine = log[log.contact == bank.name] if "contact" in log.dtype.names else log
         model: Any = self.system.contact(bank.name)
-        chosen = replace(self, model=model, transitions=mine, which=bank.name)
+        every = log if self.every is None else self.every
+        chosen = replace(self, model=model, transitions=mine, which=bank.name, every=every)
         kept: dict[str, Any] = {
             key: vars(self)[key] for key in ("program", "_seen") if key in vars(self)
         }
         vars(chosen).update(kept)
         return chosen
+
+    @cached_property
+    def steps(self) -> NDArray[np.int64]:
+        """Micro-step of the row that each entry of the log made, shape (transitions,).
+
+        Micro-steps count the firings of all contacts at one time.
+        """
+        log = self.transitions if self.every is None else self.every
+        counted: NDArray[np.int64] = np.arange(log.size) - np.searchsorted(log.t, log.t) + 1
+        if self.every is None or not log.size:
+            return counted
+        return np.asarray(counted[log.contact == self.which])
+
+    def picked(self, keep: NDArray[Any]) -> Trace:
+        """Return some of the rows, with what was observed there, and the whole log.
+
+        Parameters
+        ----------
+        keep : ndarray of int or bool
+            Which rows.
+
+        Returns
+        -------
+        Trace
+            Nothing is computed again.
+        """
+        rows = self.rows.at(keep)
+        part = replace(self, rows=rows, stops=rows, stored={})
+        seen = {name: column[keep] for name, column in self._seen.items()}
+        vars(part).update({"program": self.program, "_seen": seen})
+        return part
 
     def body(self, name: str) -> BodyTrace:
         """Return the motion of a body.
