@@ -57,6 +57,10 @@ if TYPE_CHECKING:
     from gms_fsm.systems.rigs import Rig as Rig
     from gms_fsm.systems.rigs import Slider as Slider
     from gms_fsm.systems.signals import Signal as Signal
+    from gms_fsm.systems.system import Body as Body
+    from gms_fsm.systems.system import Contact as Contact
+    from gms_fsm.systems.system import Sampled as Sampled
+    from gms_fsm.systems.system import System as System
     from gms_fsm.traces.failures import CallbackError as CallbackError
     from gms_fsm.traces.failures import LivelockError as LivelockError
     from gms_fsm.traces.failures import NotFiniteError as NotFiniteError
@@ -83,6 +87,7 @@ _HOMES = {
     "systems.models": "ChartModel GMS LuGre Model",
     "systems.rigs": "Prescribed PulledSlider Rig Slider",
     "systems.signals": "Signal",
+    "systems.system": "Body Contact Sampled System",
     "traces.failures": "CallbackError LivelockError NotFiniteError SignalEndError SimulationError "
     "StepLimitError StepSizeError",
     "traces.trace": "Trace",

@@ -59,6 +59,8 @@ class Plan(NamedTuple):
     foreign: bool  # the caller takes the steps (the loop requests them)
     jumps: Vector  # times at which the flow jumps, increasing
     before_jumps: Vector  # one clock tick before each
+    ticks: list[int]  # what ticks at each jump, as bits
+    discrete: list[int]  # for each machine the bit with which it is asked; 0: whenever it may fire
     knots: Vector  # times that steps may not jump over
     max_steps: int  # attempted steps in the whole run
 

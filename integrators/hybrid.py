@@ -7,7 +7,7 @@ that the caller keeps everything up to that point.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -88,8 +88,12 @@ class Equations:
         Times that steps may not jump over.
     jumps : list of float
         Times at which the flow jumps; the step size is chosen afresh there.
+    ticks : mapping of float to int
+        For each time at which something ticks what does, as bits: samplers, or discrete machines.
+    discrete : list of int
+        For each machine the bit at whose ticks alone it is asked; 0 for one that may fire any time.
     seen : int
-        Number of values that `integrators.loop.record` observes.
+        Number of values that `integrators.columns.record` observes.
     """
 
     flow: Flow
@@ -104,6 +108,8 @@ class Equations:
     surfaces: Surfaces
     knots: list[float] = field(default_factory=list)
     jumps: list[float] = field(default_factory=list)
+    ticks: Mapping[float, int] = field(default_factory=dict)
+    discrete: list[int] = field(default_factory=list)
     seen: int = 0
 
     def functions(self, located: bool) -> Functions:
@@ -361,7 +367,7 @@ def buffers(
     size, n, surfaces = len(y), len(mode), equations.surfaces
     # After the relations of the equations, those that end a slide: sigma <= 1 and sigma >= -1.
     strict = equations.strict + [False] * (2 * min(len(surfaces.sign), MOST_SLIDING))
-    plan = _plan(equations, t, t_end, options)
+    plan = _plan(equations, t, t_end, options, n)
     times = options.times
     if capacity is None:
         capacity = ROWS_AT_ONCE if times is None else len(times)
@@ -385,6 +391,7 @@ def buffers(
             switches=[0] * n,
             changes=[0] * len(strict),
             anchor=list(y),
+            due=[0] * n,
         ),
         relations=watched(strict, size),
         sliding=sliding_scratch(surfaces, size, equations.held, len(strict), equations.seen),
@@ -405,10 +412,11 @@ def buffers(
     )
 
 
-def _plan(equations: Equations, t: float, t_end: float, options: Options) -> Plan:
+def _plan(equations: Equations, t: float, t_end: float, options: Options, machines: int) -> Plan:
     # A SciPy solver needs no coefficients, but the loop's signature requires them.
     tableau = options.method if isinstance(options.method, Tableau) else EULER
-    jumps = [s for s in equations.jumps if options.located and t < s <= t_end]
+    ticks = {s: bits for s, bits in equations.ticks.items() if t <= s < t_end}
+    jumps = sorted({*(s for s in equations.jumps if options.located and t < s <= t_end), *ticks})
     control = Control(
         step=options.step or 0.0,
         origin=t,
@@ -425,6 +433,8 @@ def _plan(equations: Equations, t: float, t_end: float, options: Options) -> Pla
         foreign=tableau is not options.method,
         jumps=jumps,
         before_jumps=[math.nextafter(s, -math.inf) for s in jumps],
+        ticks=[ticks.get(s, 0) for s in jumps],
+        discrete=equations.discrete or [0] * machines,
         knots=equations.knots if options.located else [],
         max_steps=options.max_steps,
     )

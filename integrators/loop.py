@@ -31,8 +31,6 @@ from integrators.sliding import (
     Functions,
     Held,
     Sliding,
-    flow_on,
-    look,
     margins_on,
     seize,
 )
@@ -53,12 +51,9 @@ from integrators.steps import (
 __all__ = [
     "MOST_SWITCHES",
     "Buffers",
-    "Log",
     "Machines",
     "Memory",
-    "Recorded",
     "Switch",
-    "record",
     "run_to_event",
 ]
 
@@ -74,14 +69,12 @@ ROWS, FIRING, FIRED, STOPPED, DONE, SLID = 10, 11, 12, 13, 14, 15
 MACHINE_LIVELOCK, RELATION_LIVELOCK, ADVANCE, TOO_MANY_STEPS = 16, 17, 18, 19
 NOTHING = -1  # no event yet
 # Indices into Memory.counts.
-PLACES = 11
-PHASE, MICROSTEP, MACHINE, EDGE, FIRED_ONE, FRESH, STATUS, JUMP, ACTIVE, TAKEN, NEW_ARC = range(
-    PLACES
+PLACES = 12
+PHASE, MICROSTEP, MACHINE, EDGE, FIRED_ONE, FRESH, STATUS, JUMP, ACTIVE, TAKEN, NEW_ARC, HOLD = (
+    range(PLACES)
 )
 # Phases.
 START, ASK, PICK, FIRE, SETTLED, BEGIN, ARC, AFTER, JUMPING, FINISH, END = range(11)
-# Indices into Log.counts.
-FIRINGS, STOPS = 0, 1
 
 
 class Switch(Protocol):
@@ -93,12 +86,16 @@ class Switch(Protocol):
     def act(self, edge: int, machine: int, t: float, y: Vector, mode: list[int], p: Any) -> None:
         """Take an edge: update mode, and y if the edge assigns something."""
 
+    def tick(self, bits: int, t: float, y: Vector, mode: list[int], p: Any) -> None:
+        """Update what ticks: samplers, and what discrete machines give out."""
+
 
 class Machines(NamedTuple):
     """A `Switch` made of two functions, and a function that observes firings."""
 
     ask: Callable[..., Any]
     act: Callable[..., Any]
+    tick: Callable[..., Any]
     observe: Callable[..., Any]  # observe(t, y, mode, signs, p, seen)
 
 
@@ -110,6 +107,7 @@ class Memory(NamedTuple):
     switches: list[int]  # firings of each machine since the time Now.clock[ANCHOR]
     changes: list[int]  # changes of each relation since that time
     anchor: Vector  # the state at that time
+    due: list[int]  # whether each discrete machine is to be asked
 
 
 class Buffers(NamedTuple):
@@ -122,30 +120,6 @@ class Buffers(NamedTuple):
     sliding: Sliding
     out: Output
     scratch: Scratch
-
-
-class Recorded(NamedTuple):
-    """Where the numbers are that a log stores for each machine."""
-
-    own: list[int]  # place in y of its own variable, -1 if it has none
-    seen: list[list[int]]  # three places among what is observed; the third is read after, too
-
-
-class Log(NamedTuple):
-    """Columns that `record` fills: one entry per firing, and both sides of every stop."""
-
-    counts: list[int]  # [firings, stops]
-    t: Vector
-    machine: list[int]
-    edge: list[int]
-    numbers: list[Vector]  # [own variable, the three of `Recorded.seen`, the third after]
-    seen: Vector  # scratch space for `observe`
-    rows_microstep: list[int]  # alongside the rows of Output
-    rows_mode: list[list[int]]  # of each machine, then for each surface whether it slides
-    stops_t: Vector
-    stops_microstep: list[int]
-    stops_y: list[Vector]
-    stops_mode: list[list[int]]
 
 
 def run_to_event(
@@ -185,6 +159,7 @@ def run_to_event(
         phase, event = counts[PHASE], NOTHING
         if phase == ASK:
             switch.ask(clock[T], now.y, now.mode, p, memory.edges)
+            _only_due(plan, memory)
             counts[MACHINE] = -1
             counts[FIRED_ONE] = 0
             counts[PHASE] = PICK
@@ -194,8 +169,12 @@ def run_to_event(
             switch.act(counts[EDGE], counts[MACHINE], clock[T], now.y, now.mode, p)
             event = _fired(plan, now, memory, scratch)
         elif phase == SETTLED:
-            _choose_stop(plan, clock, counts)
-            if plan.located and counts[PHASE] == BEGIN:
+            if counts[HOLD] > 0:  # discrete machines have fired: what they give out is held now
+                switch.tick(counts[HOLD], clock[T], now.y, now.mode, p)
+                event = _held(now, counts, out)
+            else:
+                _choose_stop(plan, clock, counts)
+            if event == NOTHING and plan.located and counts[PHASE] == BEGIN:
                 event = _rearm(functions, now, relations, sliding, counts)
         elif phase == BEGIN:
             event = _begin_arc(motion, plan, now, scratch, counts)
@@ -212,8 +191,15 @@ def run_to_event(
                 often = _often_changed(motion, plan, now, w, sliding, memory, scratch)
             event = _end_arc(plan, clock, counts, often)
         elif phase == JUMPING:
-            event = _jump(plan, now, counts, out)
+            now.clock[T] = plan.jumps[counts[JUMP]]
+            if plan.ticks[counts[JUMP]] > 0:
+                switch.tick(plan.ticks[counts[JUMP]], clock[T], now.y, now.mode, p)
+                _make_due(plan, memory)
+            event = _jump(now, counts, out)
         elif phase == START:
+            if len(plan.jumps) > 0 and plan.jumps[0] <= clock[T]:
+                switch.tick(plan.ticks[0], clock[T], now.y, now.mode, p)
+                _make_due(plan, memory)
             _start(plan, now, counts, out)
         elif phase == FINISH:
             _finish(now, counts, out)
@@ -387,9 +373,37 @@ def _end_arc(plan: Plan, clock: Vector, counts: list[int], often: bool) -> int:
     return NOTHING
 
 
-def _jump(plan: Plan, now: Now, counts: list[int], out: Output) -> int:
+def _only_due(plan: Plan, memory: Memory) -> None:
+    """Forget the edges of discrete machines between their ticks; each is asked once at a tick."""
+    edges, due = memory.edges, memory.due
+    for i in range(len(edges)):
+        if plan.discrete[i] > 0:
+            if due[i] == 0:
+                edges[i] = -1
+            due[i] = 0
+
+
+def _make_due(plan: Plan, memory: Memory) -> None:
+    """Let discrete machines be asked at the tick that has just come."""
+    bits = plan.ticks[memory.counts[JUMP]]
+    for i in range(len(memory.due)):
+        if plan.discrete[i] & bits > 0:
+            memory.due[i] = 1
+            memory.counts[HOLD] |= plan.discrete[i]
+
+
+def _held(now: Now, counts: list[int], out: Output) -> int:
+    """Go on with what discrete machines give out from now on."""
+    counts[HOLD] = 0
+    counts[FRESH] = 1
+    counts[PHASE] = ASK
+    if out.every_step:
+        put_row(out, now.clock[T], now.y)
+    return STOPPED
+
+
+def _jump(now: Now, counts: list[int], out: Output) -> int:
     """Pass a jump of the flow."""
-    now.clock[T] = plan.jumps[counts[JUMP]]
     counts[PHASE] = ASK
     if out.every_step:
         put_row(out, now.clock[T], now.y)
@@ -466,129 +480,3 @@ def _often_changed(
         if w.watch[above] and (w.changed[above] or w.changed[at_least]):
             sliding.arrived[k] = 1
     return often and _no_progress(plan, now, memory, scratch)
-
-
-# --------------------------------------------------------------------------- into columns
-def record(
-    functions: Functions,
-    machines: Machines,
-    b: Buffers,
-    log: Log,
-    recorded: Recorded,
-    most_steps: int,
-    pause: bool,
-) -> int:
-    """Run and write all events into columns, until they are full or the run has ended.
-
-    Parameters
-    ----------
-    functions, machines
-        The system. ``observe(t, y, mode, signs, p, seen)`` fills the observed values of a state.
-    b : Buffers
-        The state of the run, changed in place.
-    log : Log
-        Filled; if it has room in ``stops_t``, stops are stored too.
-    recorded : Recorded
-        Where the numbers are that the log stores.
-    most_steps : int
-        Return after about this many steps or events.
-    pause : bool
-        Return before each firing as well.
-
-    Returns
-    -------
-    int
-        ROWS if a column is full or the steps are used up, FIRING, DONE or an error as in
-        `run_to_event`.
-    """
-    observe, now = machines.observe, b.now
-    counts, cursor = b.memory.counts, b.out.cursor
-    seen_at = float("nan")  # the time at which log.seen was computed
-    on = Held(functions, now.held, b.sliding)
-    motion = Motion(flow_on, margins_on, on)
-    left = most_steps
-    while True:
-        left -= 1
-        if left < 0 or _is_full(b.out, log):
-            return ROWS
-        event = run_to_event(functions, machines, motion, b, most_steps)
-        t = now.clock[T]
-        if event == ROWS:
-            for row in range(counts[TAKEN], cursor[ROW]):
-                log.rows_microstep[row] = 0
-                _put_modes(now.mode, b.sliding.flags, log.rows_mode[row])
-            counts[TAKEN] = cursor[ROW]
-            if counts[PHASE] == ARC:
-                return ROWS
-        elif event == FIRING:
-            if seen_at != t:
-                look(observe, on, t, now.y, now.mode, log.seen)
-            _put_firing(now, counts, log, recorded)
-            if pause:
-                return FIRING
-        elif event == FIRED:
-            look(observe, on, t, now.y, now.mode, log.seen)
-            seen_at = t
-            log.numbers[log.counts[FIRINGS]][4] = log.seen[recorded.seen[counts[MACHINE]][2]]
-            log.counts[FIRINGS] += 1
-        elif event == SLID:
-            seen_at = float("nan")
-        elif event not in (STOPPED, DONE):
-            return event
-        if event not in (ROWS, FIRING):
-            switched = event in (FIRED, SLID)
-            _put_stop(now, counts, b.out, b.sliding.flags, log, switched)
-        if event == DONE:
-            return DONE
-
-
-def _is_full(out: Output, log: Log) -> bool:
-    """Return whether a column has no room for the next event."""
-    if out.every_step and out.cursor[ROW] + 1 >= len(out.rows_t):
-        return True
-    if log.counts[FIRINGS] >= len(log.t):
-        return True
-    return 0 < len(log.stops_t) <= log.counts[STOPS]
-
-
-def _put_firing(now: Now, counts: list[int], log: Log, recorded: Recorded) -> None:
-    """Write the values known before a firing."""
-    i, row = counts[MACHINE], log.counts[FIRINGS]
-    numbers = log.numbers[row]
-    log.t[row] = now.clock[T]
-    log.machine[row] = i
-    log.edge[row] = counts[EDGE]
-    own, seen = recorded.own[i], recorded.seen[i]
-    numbers[0] = now.y[own] if own >= 0 else float("nan")
-    numbers[1] = log.seen[seen[0]]
-    numbers[2] = log.seen[seen[1]]
-    numbers[3] = log.seen[seen[2]]
-
-
-def _put_stop(
-    now: Now, counts: list[int], out: Output, flags: list[int], log: Log, switched: bool
-) -> None:
-    """Write the state and the modes from here on."""
-    t = now.clock[T]
-    if out.every_step and switched:
-        row = out.cursor[ROW]
-        put_row(out, t, now.y)
-        log.rows_microstep[row] = counts[MICROSTEP]
-        _put_modes(now.mode, flags, log.rows_mode[row])
-        counts[TAKEN] = out.cursor[ROW]
-    if len(log.stops_t) > 0:
-        row = log.counts[STOPS]
-        log.stops_t[row] = t
-        log.stops_microstep[row] = counts[MICROSTEP] if switched else 0
-        for j in range(len(now.y)):
-            log.stops_y[row][j] = now.y[j]
-        _put_modes(now.mode, flags, log.stops_mode[row])
-        log.counts[STOPS] += 1
-
-
-def _put_modes(mode: list[int], flags: list[int], place: list[int]) -> None:
-    n = len(mode)
-    for i in range(n):
-        place[i] = mode[i]
-    for k in range(len(flags)):
-        place[n + k] = flags[k]

@@ -53,6 +53,7 @@ NEAR = {  # module: its tests, those that detect most first
         "integrators/test_steps_and_stops",
         "integrators/test_the_first_change_is_found",
         *PHYSICS,
+        "lowering/test_tolerances_come_from_the_model",
         "integrators/test_convergence_orders",
     ],
     "integrators/crossings.py": [

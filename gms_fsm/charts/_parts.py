@@ -105,6 +105,12 @@ class Transition:
         guard: str,
         actions: Mapping[str, str] | None = None,
     ) -> None:
+        if not isinstance(source, str) and not isinstance(source, Sequence):
+            raise ChartError(
+                "it must be the name of a state, or several",
+                place=f"edge {shown(name)}: source",
+                value=source,
+            )
         sources = (source,) if isinstance(source, str) else tuple(source)
         if not sources:
             raise ChartError("it leaves no state", place=f"edge {shown(name)}")
@@ -120,8 +126,11 @@ class Transition:
             object.__setattr__(self, each, value)
 
     def each(self) -> tuple[Transition, ...]:
-        """Return one transition per source."""
-        return tuple(replace(self, source=source) for source in self.sources)
+        """Return one transition per source; each knows all of them."""
+        parts = tuple(replace(self, source=source) for source in self.sources)
+        for part in parts:
+            object.__setattr__(part, "sources", self.sources)
+        return parts
 
 
 def texts_of(given: object, owner: str) -> dict[str, str]:

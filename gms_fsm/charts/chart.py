@@ -245,6 +245,11 @@ class Chart:
         """Whether there is a state that locks the contact."""
         return any(state.locked for state in self.states)
 
+    @property
+    def sets_velocity(self) -> bool:
+        """Whether an assignment sets a velocity of the contact."""
+        return any({*self.velocities} & {*steps} for steps in self.assignments.values())
+
     # ------------------------------------------------------------------ files
     @classmethod
     def load(cls, path: str | Path) -> Chart:

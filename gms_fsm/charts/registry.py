@@ -19,7 +19,7 @@ from gms_fsm.charts.parameters import Parameter, checked_values
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ChartError, GMSError, ParameterError, shown, why
 
-__all__ = ["Demonstration", "Entry", "chart_named", "entry", "named_charts", "registered"]
+__all__ = ["Demonstration", "Entry", "chart_named", "charts", "entry", "registered"]
 
 # Keys of a scenario's table [model] that are not parameters.
 KEYS = ("chart", "law", "n", "stribeck")
@@ -229,6 +229,27 @@ def registered() -> Mapping[str, Entry]:
     return {each.name: each for each in entries}
 
 
+def charts() -> Mapping[str, Chart]:
+    """Return the charts that are models, without those that demonstrate a fault.
+
+    Returns
+    -------
+    mapping of str to Chart
+        By the name of the entry; with several laws, one per law: ``"gms-signed"``.
+
+    Examples
+    --------
+    >>> charts()["gms-signed"].name
+    'GMS element, signed law'
+    """
+    return {
+        "-".join(filter(None, (each.name, law))): each.chart(law)
+        for each in registered().values()
+        if not each.wrong
+        for law in each.laws or ("",)
+    }
+
+
 def _entries(module: str, place: str) -> tuple[Entry, ...]:
     try:
         page: Any = importlib.import_module(module)
@@ -275,34 +296,13 @@ def entry(name: str) -> Entry:
     return registered()[name]
 
 
-@functools.cache
-def named_charts() -> Mapping[str, Chart]:
-    """Return the built-in charts by name: ``"lugre"``; with a law, ``"gms-signed"``.
-
-    Returns
-    -------
-    mapping of str to Chart
-        One for each law of each entry.
-
-    Examples
-    --------
-    >>> named_charts()["gms-signed"].default_state.name
-    'stick'
-    """
-    return {
-        f"{each.name}-{law}" if law else each.name: each.chart(law)
-        for each in registered().values()
-        for law in each.laws or ("",)
-    }
-
-
 def chart_named(name: str) -> Chart:
-    """Return a built-in chart by name.
+    """Return an included chart by name.
 
     Parameters
     ----------
     name : str
-        As in `named_charts`.
+        As in `charts`.
 
     Returns
     -------
@@ -319,11 +319,12 @@ def chart_named(name: str) -> Chart:
     >>> chart_named("lugre").default_state.name
     'bristle'
     """
-    if name not in named_charts():
+    known = charts()
+    if name not in known:
         raise ParameterError(
             "no chart has this name",
             place="chart",
             value=name,
-            advice=f"there are {', '.join(named_charts())}; the name of a file ends in .toml",
+            advice=f"there are {', '.join(known)}; the name of a chart file ends in .toml",
         )
-    return named_charts()[name]
+    return known[name]

@@ -1,4 +1,4 @@
-"""The five checks of a chart, described in `gms_fsm.inspection.prove`."""
+"""The checks of a chart that need no locked state, described in `gms_fsm.inspection.prove`."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from gms_fsm.inspection._prover import (
     refuted,
     shown,
 )
+from gms_fsm.inspection._subject import Subject
 from gms_fsm.language import (
     Condition,
     Not,
@@ -35,7 +36,8 @@ from gms_fsm.language import (
     split,
 )
 
-__all__ = ["chattering", "determinism", "livelock", "reachability", "stability"]
+__all__ = ["after", "chattering", "determinism", "livelock", "moving", "moving_names"]
+__all__ += ["reachability", "stability", "ways"]
 
 MOST_CYCLES = 200  # cycles; a friction chart has a handful
 MOST_WAYS = 64  # alternatives per guard
@@ -46,19 +48,20 @@ def determinism(prover: Prover) -> Iterator[Finding]:
     """Check that edges of one state exclude each other, or that their order decides."""
     chart = prover.chart
     for state in chart.states:
-        edges = [edge.name for _, edge in chart.leaving(state.name)]
+        edges = [edge for _, edge in chart.leaving(state.name)]
         if len(edges) < 2:
             yield Finding("determinism", "proved", (state.name,), "fewer than two edges leave it")
         for pair in combinations(edges, 2):
-            guards = [chart.guards[edge] for edge in pair]
-            yield prover.settle("determinism", (state.name, *pair), _at_once, guards, pair[0])
+            where = (state.name, *(edge.name for edge in pair))
+            yield prover.settle("determinism", where, _at_once, pair)
 
 
-def _at_once(prover: Prover, guards: Sequence[Condition], first: str) -> Answer:
-    reading = Reading()
+def _at_once(prover: Prover, pair: Sequence[Transition]) -> Answer:
+    reading, first = Reading(), pair[0].name
+    guards = [prover.subject.guard(edge) for edge in pair]
     formulas = [reading.truth(guard, prover.still) for guard in guards]
     prover.defined(reading)
-    point = prover.example(names_of(*guards), *formulas)
+    point = prover.example(names_of(*guards), *formulas, *prover.at_rest(pair[0].source))
     if point is None:
         return Answer("proved", "never enabled at the same time")
     text = f"both are enabled at the same time; the machine takes the earlier, {first}"
@@ -95,24 +98,20 @@ def _cycles(chart: Chart) -> Iterator[tuple[Transition, ...]]:
         yield from extend((), first)
 
 
-def _assigned(chart: Chart, edge: Transition) -> list[tuple[str, Value]]:
-    """Return the assignments of an edge in the order of execution."""
-    places = (("exit", edge.source), ("action", edge.name), ("entry", edge.target))
-    return [item for place in places for item in chart.assignments[place].items()]
-
-
 def _all_around(prover: Prover, cycle: tuple[Transition, ...]) -> Answer:
-    chart = prover.chart
-    steps = [step for edge in cycle for step in _assigned(chart, edge)]
-    assigned = frozenset(name for name, _ in steps)
-    guards = [chart.guards[edge.name] for edge in cycle]
+    subject = prover.subject
+    assigned = frozenset(
+        name
+        for edge in cycle
+        for name in (*(name for name, _ in subject.assigned(edge)), *subject.landed(edge))
+    )
 
     def around(passes: int) -> tuple[list[Any], Duals]:
-        reading, formulas, here = Reading(), [], dict(prover.still)
+        reading, here = Reading(), dict(prover.still)
+        formulas = prover.at_rest(cycle[0].source)
         for edge in cycle * passes:
-            formulas.append(reading.truth(chart.guards[edge.name], here))
-            for name, tree in _assigned(chart, edge):
-                here[name] = reading.value(tree, here)
+            formulas.append(reading.truth(subject.guard(edge), here))
+            here = after(prover, reading, edge, here)
         prover.defined(reading)
         return formulas, here
 
@@ -120,24 +119,39 @@ def _all_around(prover: Prover, cycle: tuple[Transition, ...]) -> Answer:
     if prover.find(*once) is None:
         return Answer("proved", "never all enabled at one point")
     closed = [end[name].value == prover.symbols[name] for name in sorted(assigned)]
-    names = names_of(*guards, *(tree for _, tree in steps)) | assigned
+    names = names_of(*(tree for edge in cycle for tree in subject.trees(edge))) | assigned
     point = prover.example(names, *once, *closed)
     if point is not None:
         text = "all are enabled at one point: endless switching"
-        return refuted(text, point, _comes_back(chart, cycle, point))
+        return refuted(text, point, _comes_back(subject, cycle, point))
     if prover.find(*around(2)[0]) is None:
         return Answer("proved", "the assignments end it before a second pass")
     return Answer("undecided", "each pass assigns different values; only two passes were followed")
 
 
-def _comes_back(chart: Chart, cycle: Sequence[Transition], point: Mapping[str, float]) -> bool:
+def after(prover: Prover, reading: Reading, edge: Transition, here: Duals) -> dict[str, Dual]:
+    """Return the values after an edge; F and a are those before it."""
+    subject = prover.subject
+    before = subject.before[edge.source, edge.name].items()
+    held = {name: reading.value(tree, here) for name, tree in before}
+    there = dict(here)
+    for name, tree in subject.assigned(edge):
+        there[name] = reading.value(tree, {**there, **held})
+    zero = prover.z3.RealVal(0)
+    return there | dict.fromkeys(subject.landed(edge), Dual(zero, zero))
+
+
+def _comes_back(subject: Subject, cycle: Sequence[Transition], point: Mapping[str, float]) -> bool:
     """Return whether the cycle also returns to the same point in floats."""
     here = dict(point)
     for edge in cycle:
-        if not enabled([chart.guards[edge.name]], here):
+        if not enabled([subject.guard(edge)], here):
             return False
-        for name, tree in _assigned(chart, edge):
-            here[name] = evaluate(tree, here)
+        before = subject.before[edge.source, edge.name].items()
+        held = {name: evaluate(tree, here) for name, tree in before}
+        for name, tree in subject.assigned(edge):
+            here[name] = evaluate(tree, {**here, **held})
+        here |= dict.fromkeys(subject.landed(edge), 0.0)
     return here == point
 
 
@@ -146,11 +160,17 @@ def reachability(prover: Prover) -> Iterator[Finding]:
     """Check that every state can be entered and left, and every guard can hold."""
     chart = prover.chart
     guards = {
-        edge.name: prover.settle("reachability", (edge.name,), _can_hold, edge)
+        (edge.source, edge.name): prover.settle(
+            "reachability",
+            (edge.name,) if len(edge.sources) == 1 else (edge.source, edge.name),
+            _can_hold,
+            edge,
+        )
         for edge in chart.transitions
     }
-    possible = [e for e in chart.transitions if guards[e.name].status != "refuted"]
-    certain = [e for e in possible if guards[e.name].status == "proved"]
+    found = [(edge, guards[edge.source, edge.name].status) for edge in chart.transitions]
+    possible = [edge for edge, status in found if status != "refuted"]
+    certain = [edge for edge, status in found if status == "proved"]
     entered = _entered(chart, certain), _entered(chart, possible)
     left = {edge.source for edge in certain}, {edge.source for edge in possible}
     for state in chart.states:
@@ -161,20 +181,20 @@ def reachability(prover: Prover) -> Iterator[Finding]:
 
 
 def _can_hold(prover: Prover, edge: Transition) -> Answer:
-    chart, reading = prover.chart, Reading()
-    formula = reading.truth(chart.guards[edge.name], prover.still)
+    subject, reading = prover.subject, Reading()
+    formulas = [reading.truth(subject.guard(edge), prover.still), *prover.at_rest(edge.source)]
     prover.defined(reading)
-    if prover.find(formula) is None:
-        return Answer("refuted", f"its guard can never hold: {shown(chart.guards[edge.name])}")
+    if prover.find(*formulas) is None:
+        return Answer("refuted", f"its guard can never hold: {shown(subject.guard(edge))}")
     earlier = []
-    for _, other in chart.leaving(edge.source):
+    for _, other in prover.chart.leaving(edge.source):
         if other.name == edge.name:
             break
-        earlier.append(other.name)
-    hidden = [reading.truth(Not(chart.guards[name]), prover.still) for name in earlier]
+        earlier.append(other)
+    hidden = [reading.truth(Not(subject.guard(each)), prover.still) for each in earlier]
     prover.defined(reading)
-    if prover.find(formula, *hidden) is None:
-        names = ", ".join(earlier)
+    if prover.find(*formulas, *hidden) is None:
+        names = ", ".join(each.name for each in earlier)
         text = f"never taken: wherever its guard holds, an earlier edge takes precedence ({names})"
         return Answer("refuted", text)
     return Answer("proved", "its guard can hold")
@@ -219,15 +239,16 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
     positive, or zero and growing. A margin at rest at zero, or a point where a flow jumps, is not
     decided to first order.
     """
-    chart, z3 = prover.chart, prover.z3
-    if _assigned(chart, there) or _assigned(chart, back):
+    subject, z3 = prover.subject, prover.z3
+    if subject.assigned(there) or subject.assigned(back):
         raise Undecided("an edge assigns variables; the flow after a jump is not followed")
-    guards = [chart.guards[edge.name] for edge in (there, back)]
+    guards = [subject.guard(edge) for edge in (there, back)]
+    resting = prover.at_rest(there.source, back.source)
     of_flows, of_guards = Reading(), Reading()
-    moved = [_moved(prover, of_flows, edge.source) for edge in (there, back)]
+    moved = [moving(prover, of_flows, edge.source, prover.still) for edge in (there, back)]
     at_break = z3.Or([u == 0 for u in of_flows.breaks])
     strict, loose = [], []
-    for pair in product(*(_ways(split(guard)) for guard in guards)):
+    for pair in product(*(ways(split(guard)) for guard in guards)):
         if not _at_one_time(prover, [*pair[0], *pair[1]]):
             continue
         crossed, touched, growing, not_falling, reached = [], [], [], [], []
@@ -247,18 +268,15 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
     breaks = [*of_flows.breaks, *of_guards.breaks]
     prover.defined(of_flows)
     prover.defined(of_guards)
-    flows = [chart.flows[edge.source, x] for edge in (there, back) for x in chart.variables]
-    names = names_of(*guards, *flows)
-    names |= {f"d{name}/dt" for name in names_of(*guards) & {*chart.inputs} - {"t", "x"}}
-    names |= names & {"x"} and {"v"} & {*chart.inputs}
-    point = prover.example(names, z3.Or(strict), *(u != 0 for u in breaks))
+    names = moving_names(prover, guards, (there.source, back.source))
+    point = prover.example(names, z3.Or(strict), *resting, *(u != 0 for u in breaks))
     if point is not None:
         place = _surface(guards[0], point)
         text = f"on {place} each flow pushes into the other's guard: endless switching"
         return refuted(text, point)
     if of_guards.breaks:
         raise Undecided("sgn jumps in a guard")
-    if prover.find(z3.Or(loose)) is not None:
+    if prover.find(z3.Or(loose), *resting) is not None:
         raise Undecided("not decided to first order: a flow jumps, or a margin stays at zero")
     return Answer("proved", "there is no surface on which both flows push into the other's guard")
 
@@ -266,17 +284,17 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
 Ways: TypeAlias = list[tuple[Requirement, ...]]
 
 
-def _ways(parts: Split) -> Ways:
+def ways(parts: Split) -> Ways:
     """Return the alternatives under which a split condition holds."""
     if isinstance(parts, Requirement):
         return [(parts,)]
     word, inner = parts
-    ways = [_ways(part) for part in inner]
+    found = [ways(part) for part in inner]
     if word == "either":
-        return [way for some in ways for way in some]
-    if math.prod(map(len, ways)) > MOST_WAYS:
+        return [way for some in found for way in some]
+    if math.prod(map(len, found)) > MOST_WAYS:
         raise Undecided(f"a guard has more than {MOST_WAYS} alternatives")
-    return [tuple(part for way in some for part in way) for some in product(*ways)]
+    return [tuple(part for way in some for part in way) for some in product(*found)]
 
 
 def _at_one_time(prover: Prover, parts: Sequence[Requirement]) -> bool:
@@ -286,7 +304,7 @@ def _at_one_time(prover: Prover, parts: Sequence[Requirement]) -> bool:
     one and ``abs(v) <= v_c`` in the other is not chattering, though both are about to change at
     v_c.
     """
-    variables = {*prover.chart.variables}
+    variables = {*prover.subject.variables}
     alike = [part.relation for part in parts if not names_in(part.relation) & variables]
     reading = Reading()
     formulas = [reading.truth(relation, prover.still) for relation in alike]
@@ -294,22 +312,42 @@ def _at_one_time(prover: Prover, parts: Sequence[Requirement]) -> bool:
     return prover.find(*formulas) is not None
 
 
-def _moved(prover: Prover, reading: Reading, state: str) -> Duals:
-    """Return every name with its rate of change in a state."""
-    chart, symbols = prover.chart, prover.symbols
-    rates = {name: prover.rates[f"d{name}/dt"] for name in chart.inputs}
+def moving(prover: Prover, reading: Reading, state: str, here: Duals) -> Duals:
+    """Return every name with its rate of change in a state, at some values of the names."""
+    subject = prover.subject
+    rates = {name: prover.rates[f"d{name}/dt"] for name in subject.inputs}
     if "t" in rates:
         rates["t"] = prover.z3.RealVal(1)
-    if {"x", "v"} <= {*rates}:
-        rates["x"] = symbols["v"]
-    for name in chart.variables:
-        rates[name] = reading.value(chart.flows[state, name], prover.still).value
-    return {**prover.still, **{name: Dual(symbols[name], rate) for name, rate in rates.items()}}
+    if subject.mobility:
+        rates[subject.mobility] = prover.z3.RealVal(0)
+    if "x" in rates and (velocity := _velocity(subject)):
+        rates["x"] = here[velocity].value
+    for name in subject.variables:
+        rates[name] = reading.value(subject.flows[state, name], here).value
+    return {**here, **{name: Dual(here[name].value, rate) for name, rate in rates.items()}}
+
+
+def _velocity(subject: Subject) -> str:
+    """Return the name of the rate of x; empty if the chart has none."""
+    v = subject.chart.velocities[0]
+    return v if v in (*subject.inputs, *subject.variables) else ""
+
+
+def moving_names(
+    prover: Prover, guards: Sequence[Condition], states: Sequence[str]
+) -> frozenset[str]:
+    """Return what decides how guards change in states: their names, rates, and the flows."""
+    subject = prover.subject
+    flows = [subject.flows[state, name] for state in states for name in subject.variables]
+    names = names_of(*guards, *flows)
+    steady = {"t", "x", subject.mobility}
+    names |= {f"d{name}/dt" for name in names_of(*guards) & {*subject.inputs} - steady}
+    return names | (names & {"x"} and frozenset({_velocity(subject)}))
 
 
 def _surface(guard: Condition, point: Mapping[str, float]) -> str:
     """Describe the surface of a guard on which a point lies."""
-    for part in (part.comparison for way in _ways(split(guard)) for part in way):
+    for part in (part.comparison for way in ways(split(guard)) for part in way):
         if evaluate(part.left, point) == evaluate(part.right, point):
             return f"{shown(part.left)} = {shown(part.right)}"
     return f"the surface of {shown(guard)}"
@@ -319,11 +357,13 @@ def _surface(guard: Condition, point: Mapping[str, float]) -> str:
 def stability(prover: Prover) -> Iterator[Finding]:
     """Check that no state has an unstable equilibrium."""
     chart = prover.chart
+    if not chart.variables:
+        yield Finding("stability", "proved", (), "it has no variables")
     for state in chart.states:
         for variable in chart.variables:
-            flow = chart.flows[state.name, variable]
-            by_sign = "v" in names_in(flow) & {*chart.inputs}
-            for sign in ("v > 0", "v < 0", "v = 0") if by_sign else ("",):
+            flow = prover.subject.flows[state.name, variable]
+            signs = ("v = 0",) if state.locked else ("v > 0", "v < 0", "v = 0")
+            for sign in signs if "v" in names_in(flow) else ("",):
                 yield prover.settle(
                     "stability",
                     (state.name,),
@@ -369,7 +409,7 @@ def _equilibrium(prover: Prover, flow: Value, variable: str, sign: str) -> Answe
 def _place(prover: Prover, flow: Value, variable: str, case: Sequence[Any]) -> str:
     """Describe the equilibrium of a flow, if a short text can."""
     chart = prover.chart
-    names = sorted(names_in(flow) & {*chart.inputs, *chart.parameter_names} - {"v"})
+    names = sorted(names_in(flow) & {*prover.subject.inputs, *chart.parameter_names} - {"v"})
     simple = ["0", *names, *(f"{a} / {b}" for a in names for b in names if a != b)]
     for text in (sign + text for text in simple for sign in ("", "-")):
         reading = Reading()

@@ -7,10 +7,13 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias, get_args
 
 from gms_fsm.charts.chart import Chart
+from gms_fsm.inspection._subject import subject_of
 
 __all__ = ["CHECKS", "Check", "Finding", "Report", "Status", "listed"]
 
-Check: TypeAlias = Literal["determinism", "livelock", "reachability", "chattering", "stability"]
+Check: TypeAlias = Literal[
+    "determinism", "livelock", "reachability", "chattering", "stability", "release"
+]
 Status: TypeAlias = Literal["proved", "settled by order", "refuted", "undecided"]
 CHECKS: tuple[Check, ...] = get_args(Check)
 
@@ -21,7 +24,7 @@ class Finding:
 
     Parameters
     ----------
-    check : {"determinism", "livelock", "reachability", "chattering", "stability"}
+    check : {"determinism", "livelock", "reachability", "chattering", "stability", "release"}
         The check.
     status : {"proved", "settled by order", "refuted", "undecided"}
         The result.
@@ -68,7 +71,7 @@ class Report:
     domain : tuple of str
         The conditions assumed.
     findings : tuple of Finding
-        All findings, check by check; at least one per check.
+        All findings, check by check.
     """
 
     chart: Chart
@@ -90,13 +93,13 @@ class Report:
 
         Parameters
         ----------
-        check : {"determinism", "livelock", "reachability", "chattering", "stability"}
+        check : {"determinism", "livelock", "reachability", "chattering", "stability", "release"}
             The check.
 
         Returns
         -------
         tuple of Finding
-            At least one finding.
+            At least one finding; of release none, if the chart neither locks, nor reads F or a.
         """
         return tuple(f for f in self.findings if f.check == check)
 
@@ -108,7 +111,13 @@ class Report:
             "over the reals, not floats; over points, not trajectories",
             "inputs and their rates (ds/dt, dv/dt) are free, but equal in both states of a switch",
         ]
-        for check in CHECKS:
+        subject = subject_of(self.chart)
+        if subject.moves:
+            v, H, W = self.chart.velocities[0], subject.load, subject.mobility
+            held = f", F = {H} and a = {v} = 0 while it is locked" * self.chart.locks
+            lines.append(f"{H}, the force that would hold {v}, is free")
+            lines.append(f"a = ({H} - F) {W} while the contact moves{held}")
+        for check in (check for check in CHECKS if self.of(check)):
             lines += ["", check]
             lines += [f"  {line}" for f in self.of(check) for line in str(f).splitlines()]
         lines += ["", ", ".join(f"{n} {status}" for status, n in count.items())]

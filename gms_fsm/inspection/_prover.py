@@ -13,6 +13,7 @@ from gms_fsm._extras import require
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ExpressionError, ParameterError
 from gms_fsm.inspection._findings import Check, Finding, Status, listed
+from gms_fsm.inspection._subject import subject_of
 from gms_fsm.language import (
     COMPARISONS,
     LARGEST_PRODUCT_POWER,
@@ -123,6 +124,8 @@ class _Formulas:
         return Dual(self.z3.RealVal(str(Fraction(value))), self.zero)
 
     def name(self, name: str) -> Dual:
+        if name not in self.names:
+            raise Undecided(f"{name} is not encoded for a contact with several velocities")
         return self.names[name]
 
     def negative(self, _: Negative, parts: Iterator[Dual]) -> Dual:
@@ -243,15 +246,15 @@ class Answer:
 
 
 class Prover:
-    """The names of a chart as real symbols, within the domain."""
+    """The names of a chart, as its subject has them, as real symbols within the domain."""
 
     def __init__(self, chart: Chart, domain: Sequence[str]) -> None:
-        self.chart, self.z3 = chart, solver()
+        self.chart, self.subject, self.z3 = chart, subject_of(chart), solver()
         real, zero = self.z3.Real, self.z3.RealVal(0)
         # In the order in which an example fixes them: constants, inputs, variables.
-        names = (*chart.parameter_names, *chart.inputs, *chart.variables)
+        names = (*chart.parameter_names, *self.subject.inputs, *self.subject.variables)
         self.symbols = {name: real(name) for name in names}
-        self.rates = {f"d{name}/dt": real(f"d{name}/dt") for name in chart.inputs}
+        self.rates = {f"d{name}/dt": real(f"d{name}/dt") for name in self.subject.inputs}
         self.still = {name: Dual(symbol, zero) for name, symbol in self.symbols.items()}
         self.domain = [self._assumed(text) for text in domain]
         try:
@@ -279,6 +282,12 @@ class Prover:
                 advice="write it without one, for example 'z > s' for 'z / s > 1'",
             )
         return formula
+
+    def at_rest(self, *states: str) -> list[Any]:
+        """Return the formulas that hold in locked states: the velocities are 0."""
+        if not any(map(self.subject.locked, states)):
+            return []
+        return [self.symbols[name] == 0 for name in self.chart.velocities]
 
     def find(self, *formulas: Any) -> Any:
         """Return a model of the formulas within the domain, or None."""

@@ -16,6 +16,11 @@ order would be a different model.
 - ``sgn``, ``abs``, ``min`` and ``max`` are split by case, integer powers are products. ``exp``,
   ``sqrt``, ``sin``, ``cos``, ``tanh`` and other powers are not encoded: undecided. A quotient
   is accepted only if the domain proves its denominator nonzero.
+- A chart that reads F or a, locks the contact, or sets its velocity is read for a contact of one
+  element on any system: H, the force that would hold v where it is, and its rate are free, and so
+  is W > 0, the inverse of the inertia that the contact feels. While the contact moves,
+  ``a = (H - F) W`` is the rate of v; while it is locked, ``F = H`` and ``a = v = 0``. H and its
+  rate are the same on both sides of a switch, of an impulse too.
 - Only determinism and reachability use the priorities of edges; the other checks do not.
 
 The checks. *determinism*: no two edges of one state are enabled at the same time, or their
@@ -24,7 +29,9 @@ from the graph and the guards alone: every state can be entered and left, and ev
 where no earlier edge takes precedence. *chattering*: no two states have flows that cross the
 surfaces of the guards between them in opposite directions, each into the other's guard (to first
 order in time; edges that assign variables are undecided). *stability*: no state has an unstable
-equilibrium, for flows linear in the variable.
+equilibrium, for flows linear in the variable. *release*, for charts with locked states: whoever
+lets go is not pushed back at once, into the guard of an edge that locks it again (to first order
+in time). If it could be, the contact would chatter between stuck and moving.
 """
 
 from __future__ import annotations
@@ -37,7 +44,8 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.inspection._checks import chattering, determinism, livelock, reachability, stability
 from gms_fsm.inspection._findings import CHECKS, Check, Finding, Report, Status
 from gms_fsm.inspection._prover import Prover
-from gms_fsm.language import Condition, Value, names_in
+from gms_fsm.inspection._release import release
+from gms_fsm.inspection._subject import subject_of
 
 __all__ = ["CHECKS", "Check", "Finding", "Report", "Status", "default_domain", "prove"]
 
@@ -62,10 +70,7 @@ def default_domain(chart: Chart) -> tuple[str, ...]:
     >>> default_domain(gms_element("signed")), default_domain(LUGRE)
     (('s > 0', 'C > 0', 'v_c > 0'), ('s > 0', 'sigma_0 > 0'))
     """
-    trees: list[Value | Condition] = [*chart.guards.values(), *chart.flows.values()]
-    trees += [tree for texts in chart.assignments.values() for tree in texts.values()]
-    used = frozenset[str]().union(*map(names_in, trees))
-    declared = chart.declared
+    used, declared = subject_of(chart).used, chart.declared
     return tuple(
         condition
         for name in chart.inputs + chart.parameter_names
@@ -118,6 +123,7 @@ def prove(chart: Chart, domain: Sequence[str] | None = None) -> Report:
         if isinstance(domain, str)
         else tuple(listed("domain", domain, "a list of conditions"))
     )
+    domain = (*domain, *subject_of(chart).assumed)
     prover = Prover(chart, domain)
-    checks = (determinism, livelock, reachability, chattering, stability)
+    checks = (determinism, livelock, reachability, chattering, stability, release)
     return Report(chart, domain, tuple(found for check in checks for found in check(prover)))

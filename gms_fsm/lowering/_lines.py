@@ -35,6 +35,11 @@ def reads_of(lines: Iterable[Line]) -> frozenset[str]:
     return frozenset[str]().union(*(line.reads for line in lines))
 
 
+def _does_something(lines: Iterable[Line]) -> bool:
+    """Return whether lines are more than comments."""
+    return any(not line.text.lstrip().startswith("#") for line in lines)
+
+
 def indented(lines: Iterable[Line]) -> list[Line]:
     """Return lines one level deeper."""
     return [Line("    " + line.text, line.reads) for line in lines]
@@ -203,8 +208,11 @@ class Writer:
     def by_state(self, bank: int, branches: Mapping[str, list[Line]]) -> list[Line]:
         """Write an if-else over the element's state."""
         states = self.names.states[bank]
-        filled = [(states[state], body or [Line("pass")]) for state, body in branches.items()]
-        if not any(branches.values()):
+        filled = [
+            (states[state], body if _does_something(body) else [*body, Line("pass")])
+            for state, body in branches.items()
+        ]
+        if not any(_does_something(body) for body in branches.values()):
             return []
         if len(filled) == 1:
             return next(iter(branches.values()))

@@ -16,7 +16,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from gms_fsm.charts.chart import Chart
 from gms_fsm.language import Binary, Name, Negative, Number, Value
 from gms_fsm.lowering._lines import Line, Writer, indented
 from gms_fsm.lowering._names import computed_names
@@ -61,7 +60,7 @@ class Locks:
         self.rows = [
             Lock(bank.index, q, row)
             for bank in self.read.banks
-            if bank.chart.locks or _sets_velocity(bank.chart)
+            if bank.chart.locks or bank.chart.sets_velocity
             for q, row in enumerate(bank.jacobian)
         ]
 
@@ -263,9 +262,3 @@ class Locks:
     def velocity(body: Body) -> str:
         """Return the name of a body's velocity."""
         return body.v
-
-
-def _sets_velocity(chart: Chart) -> bool:
-    """Tell whether an action of a chart sets a velocity."""
-    velocities = {*chart.velocities}
-    return any(velocities & {*steps} for steps in chart.assignments.values())

@@ -123,6 +123,8 @@ def names_of(read: Assembly) -> Names:
         for name in every_name(bank, read):
             if name not in local:
                 local[name] = choice.of(bank, name.split(".", 1)[1])
+        for force in bank.forces if bank.periodic else ():
+            local[bank.held(force)] = choice.of(bank, f"held_{force.split('.', 1)[1]}")
         for name in (*bank.variables, *bank.velocities):
             plain[name] = name.split(".", 1)[-1] if choice.alone else name
     plain |= {name: name.split(".", 1)[1] for name in local if choice.alone and "." in name}

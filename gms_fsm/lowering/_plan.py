@@ -331,15 +331,18 @@ def _outer_rough(read: Assembly, accelerations: Mapping[str, Value]) -> tuple[Va
     late = {name for bank in read.banks for name in bank.forces}
     trees = [each.tree for each in read.definitions if each.bank is None and each.tree is not None]
     trees += [*accelerations.values(), *read.flow.values()]
-    trees += [tree for bank in read.banks for tree in bank.totals.values()]
+    trees += [tree for bank in read.banks for tree in bank.totals.values() if not bank.periodic]
     # A sign of a force itself stays live: it is known only with the flow.
     return tuple(u for tree in trees for u in rough_points(tree) if not names_in(u) & late)
 
 
 def _rough(read: Assembly, bank: Bank) -> Mapping[str, tuple[Value, ...]]:
     """Return by state where a flow or a force has a corner or a jump: the driver stops there."""
-    found = {}
+    found: dict[str, tuple[Value, ...]] = {}
     for state in bank.states:
+        if bank.periodic:  # what it gives out is held, whatever the signs are meanwhile
+            found[state] = ()
+            continue
         trees = [bank.flows[state, name] for name in bank.variables]
         trees += [tree for name in bank.forces if (tree := _force(bank, state, name)) is not None]
         needed = read.closure(name for tree in trees for name in names_in(tree))
@@ -406,7 +409,7 @@ def both_sides(u: Value) -> tuple[Comparison, Comparison]:
 
 
 def _reads_curve(bank: Bank) -> bool:
-    return bool(bank.threshold) and "s" in bank.chart.inputs
+    return bool(bank.threshold) and "s" in bank.chart.inputs and not bank.periodic
 
 
 def _landmarks(bank: Bank) -> list[Comparison]:
@@ -422,7 +425,7 @@ def _relations(
     """Lay out all comparisons that may be watched."""
     wanted: list[Comparison] = []
     for bank in read.banks:
-        for edge in bank.edges:
+        for edge in bank.edges if not bank.periodic else ():
             wanted += comparisons(split(edge.guard))
     for u in (*held.shared, *held.own):
         wanted += both_sides(u)

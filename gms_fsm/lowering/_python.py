@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 from gms_fsm.language import (
     Comparison,
@@ -15,16 +15,27 @@ from gms_fsm.language import (
     names_in,
     split,
 )
-from gms_fsm.lowering._lines import TABLES, Line, Signs, Writer, indented, reads_of
-from gms_fsm.lowering._locks import Locks
+from gms_fsm.lowering._forces import Forces
+from gms_fsm.lowering._lines import Line, Signs, indented, reads_of
 from gms_fsm.lowering._names import computed_names
-from gms_fsm.lowering._plan import BankPlan, Computed, Gradient, Plan, both_sides, gradient_of
+from gms_fsm.lowering._plan import Gradient, Plan, both_sides
 from gms_fsm.systems._assembly import Bank, Edge, of
 from integrators import LIVE
 
 __all__ = ["FUNCTIONS", "python"]
 
-FUNCTIONS = ("flow", "flow_live", "switch", "act", "observe", "normal", "arm", "margins", "values")
+FUNCTIONS = (
+    "flow",
+    "flow_live",
+    "switch",
+    "act",
+    "observe",
+    "normal",
+    "arm",
+    "margins",
+    "values",
+    "tick",
+)
 
 
 def python(plan: Plan) -> str:
@@ -72,171 +83,16 @@ def python(plan: Plan) -> str:
         printer.arm(),
         printer.margins(),
         printer.values(),
+        printer.tick(),
     ):
         lines += ["", "", *function]
     return "\n".join(lines) + "\n"
 
 
-class _Printer(Writer):
+class _Printer(Forces):
     """Prints the functions of a plan."""
 
-    def __init__(self, plan: Plan) -> None:
-        super().__init__(plan)
-        self.locks = Locks(self)
-        self.locking = any(bank.chart.locks for bank in self.read.banks)
-
-    # ------------------------------------------------------------------ forces
-    def forces(
-        self, signs: Signs, *, wanted: bool, rates: bool = False, observed: bool = False
-    ) -> list[Line]:
-        """Write the rates and the forces of all contacts, and the accelerations.
-
-        Parameters
-        ----------
-        signs : {"held", "live", "given"}
-            Where signs come from.
-        wanted : bool
-            Whether forces are wanted at all.
-        rates : bool
-            Store the rates into dy.
-        observed : bool
-            Store what is observed of the elements into out.
-        """
-        lines: list[Line] = []
-        for bank in self.plan.banks:
-            lines += self.bank_forces(bank, signs, wanted, rates=rates, observed=observed)
-        if wanted and (rates or self.locking):
-            for body in self.read.free:
-                value = self.plan.accelerations[body.name]
-                if self.locking:
-                    lines += self.computed(self.local(f"{body.name} a"), value, signs)
-        if wanted and self.locking:
-            lines += self.driven_accelerations()
-            lines += self.locks.forces()
-        return lines
-
-    def bank_forces(
-        self, plan: BankPlan, signs: Signs, wanted: bool, *, rates: bool, observed: bool
-    ) -> list[Line]:
-        """Write the loop over the elements of a contact, and its force."""
-        bank, y, seen = plan.bank, self.layout.y, self.layout.observed
-        forces = wanted and (plan.moves or observed or not rates or self.locking)
-        used = {name for tree in plan.common.values() for name in names_in(tree)} | {
-            name
-            for each in plan.states
-            for value in each.forces.values()
-            for name in self.names_of(value)
-        }
-        needed = {
-            name
-            for name in bank.variables
-            if rates or observed or (forces and bank.rate(name) in used)
-        }
-        # Only a contact with several velocities has several forces.
-        several = {force: f"F_i{'' if q == 0 else f'_{q}'}" for q, force in enumerate(bank.forces)}
-        branches: dict[str, list[Line]] = {}
-        for each in plan.states:
-            branch: list[Line] = []
-            for name in bank.variables:
-                if name in needed:
-                    branch += self.computed(self.local(bank.rate(name)), each.rates[name], signs)
-            for force in bank.forces if forces else ():
-                if force in plan.common:
-                    continue
-                if each.locked:
-                    branch.append(Line(f"{several[force]} = 0.0"))
-                else:
-                    branch += self.computed(several[force], each.forces[force], signs, "  # (3)")
-            branches[each.state] = branch
-        after: list[Line] = []
-        for force in bank.forces if forces else ():
-            total = self.local(force)
-            if force not in plan.common:
-                after.append(Line(f"{total} += {several[force]}"))
-            elif observed:
-                after.append(self.put(several[force], plan.common[force], "  # (3)"))
-                after.append(Line(f"{total} += {several[force]}"))
-            else:
-                tree = plan.common[force]
-                after.append(Line(f"{total} += {self.spell(tree)}  # (3)", computed_names(tree)))
-        if observed:
-            after += self.elements_seen(plan, several)
-        if rates:
-            after += [self.store("dy", y, v, self.local(bank.rate(v))) for v in bank.variables]
-        lines = [Line(f"{self.local(force)} = 0.0") for force in bank.forces if forces]
-        lines += self.loop(bank.index, signs, (), branches, after)
-        del seen
-        for force, value in plan.totals.items() if forces else ():
-            lines += self.computed(self.local(force), value, signs, "  # (4)")
-        return lines
-
-    @staticmethod
-    def names_of(value: Computed) -> frozenset[str]:
-        """Return what a computed value reads, in its rough calls too."""
-        found = computed_names(value.tree)
-        return found.union(*(computed_names(call.call) for call in value.calls))
-
-    def elements_seen(self, plan: BankPlan, several: Mapping[str, str]) -> list[Line]:
-        """Store what is observed of an element."""
-        bank, seen = plan.bank, self.layout.observed
-        s = of(bank.name, "s")
-        if bank.threshold:
-            place, sizes = self.at("out", seen, s)
-            lines = [Line(f"{place} = {self.local(bank.threshold)}", sizes | {bank.threshold})]
-        elif s in self.read.owner:  # a chart's own
-            place, sizes = self.at("out", seen, s)
-            lines = [Line(f"{place} = {self.local(s)}", sizes | {s})]
-        else:
-            lines = [self.store("out", seen, s, "nan")]
-        lines += [
-            self.store("out", seen, f"{force}_elements", several[force]) for force in bank.forces
-        ]
-        return lines + [
-            self.store("out", seen, bank.rate(v), self.local(bank.rate(v))) for v in bank.variables
-        ]
-
-    def driven_accelerations(self) -> list[Line]:
-        """Write the accelerations of driven bodies that locks refer to."""
-        wanted = {name for row in self.locks.rows for name in row.row}
-        lines = []
-        for body in self.read.system.bodies:
-            if body.driven and body.name in wanted:
-                lines.append(self.rate_in_time(self.local(f"{body.name} a"), body.v))
-        return lines
-
-    def rate_in_time(self, target: str, name: str) -> Line:
-        """Write the rate of a quantity that depends on time only."""
-        gradient = gradient_of(Name(name), self.read)
-        terms, reads = self.time_terms(gradient)
-        return Line(f"{target} = {' + '.join(terms) or '0.0'}", reads)
-
     # ------------------------------------------------------------------ the functions
-    def before_guards(self, names: Iterable[frozenset[str]]) -> list[Line]:
-        """Write the forces, and the accelerations, where guards or actions read them."""
-        read = frozenset[str]().union(*names)
-        if not read & self.late:
-            return []
-        lines = self.forces("live", wanted=True)
-        rates = {name for bank in self.read.banks for name in bank.rates}
-        if read & rates:
-            if not self.locking:
-                for body in self.read.free:
-                    value = self.plan.accelerations[body.name]
-                    lines += self.computed(self.local(f"{body.name} a"), value, "live")
-                for body in self.read.system.bodies:
-                    if body.driven:
-                        lines.append(self.rate_in_time(self.local(f"{body.name} a"), body.v))
-            wanted = [
-                (name, row)
-                for bank in self.read.banks
-                for name, row in zip(bank.rates, bank.jacobian, strict=True)
-                if name in read
-            ]
-            for name, row in wanted:
-                tree = self.locks.relative(row, {each: f"{each} a" for each in row})
-                lines.append(self.put(self.local(name), tree))
-        return lines
-
     def switch(self) -> list[str]:
         lines = self.before_guards(
             computed_names(edge.guard) for bank in self.read.banks for edge in bank.edges
@@ -478,23 +334,12 @@ class _Printer(Writer):
             lines.append(Line(f"out[{self.size_text()}] = {' + '.join(terms)}", reads | every))
         return lines
 
-    def time_terms(self, gradient: Gradient) -> tuple[list[str], frozenset[str]]:
-        """Spell the terms of a rate in time, and say what they read."""
-        terms, reads = [], frozenset[str]()
-        if gradient.by_t is not None:
-            terms.append(self.spell(gradient.by_t))
-            reads |= computed_names(gradient.by_t)
-        for name, value in gradient.by_signal.items():
-            terms.append(f"({self.spell(value)}) * piecewise_slope(t, {self.table(name)})")
-            reads |= computed_names(value) | {TABLES}
-        return terms, reads
-
     # ------------------------------------------------------------------ comparisons
     def arm(self) -> list[str]:
         held = self.plan.held
         watched = [*self.plan.always]
         for bank in self.read.banks:
-            for edge in bank.edges:
+            for edge in bank.edges if not bank.periodic else ():
                 watched += _comparisons(split(edge.guard))
         lines = self.before_guards(
             computed_names(side) for each in watched for side in (each.left, each.right)
@@ -509,7 +354,7 @@ class _Printer(Writer):
                     if u in held.own:
                         rows.append(self.hold(u))
                     rows += [self.watch(relation) for relation in both_sides(u)]
-                for edge, _ in self.leaving(bank, state):
+                for edge, _ in self.leaving(bank, state) if not bank.periodic else ():
                     rows.append(Line(f"# {edge.name}: {self.spell(edge.guard)}"))
                     rows += self.witness(split(edge.guard))
                 branches[state] = rows
@@ -633,6 +478,25 @@ class _Printer(Writer):
         return self.function(
             "values(t, y, mode, p, out)",
             "out = what guards can read besides variables and parameters.",
+            lines,
+            "live",
+        )
+
+    def tick(self) -> list[str]:
+        y, lines = self.layout.y, list[Line]()
+        for k, each in enumerate(self.read.system.sampled):
+            inside: list[Line] = []
+            for name, tree in self.read.updates[each.name].items():
+                inside.append(self.put(self.local(name), tree))
+                inside.append(Line(f"y[{y.text(name)}] = {self.local(name)}"))
+            lines += [Line(f"if bits & {1 << k}:  # {each.name}"), *indented(inside)]
+        for plan in self.plan.banks:
+            if bit := self.read.bit(plan.bank):
+                lines += [Line(f"if bits & {bit}:  # {plan.bank.name}")]
+                lines += indented(self.bank_forces(plan, "live", True, held=True))
+        return self.function(
+            "tick(bits, t, y, mode, p)",
+            "Update what ticks: samplers, and what discrete machines give out.",
             lines,
             "live",
         )

@@ -405,7 +405,7 @@ class Layout:
         updated = (name for each in system.sampled for name in each.updates)
         sizes = sizes_of(read.banks)
         blocks = tuple(
-            Block(bank.variables, bank.n, size)
+            Block((*bank.variables, *held_of(bank)), bank.n, size)
             for bank, size in zip(read.banks, sizes, strict=True)
         )
         seen = tuple(
@@ -420,7 +420,8 @@ class Layout:
             )
             for bank, size in zip(read.banks, sizes, strict=True)
         )
-        y = Places((*moved, *system.flow, *updated), blocks)
+        held = [bank.held(force) for bank in read.banks if bank.periodic for force in bank.forces]
+        y = Places((*moved, *system.flow, *updated, *held), blocks)
         keys = {name: name for name, _ in y}
         for body in system.bodies:
             keys |= {f"{body.name}.x": body.x, f"{body.name}.v": body.v}
@@ -529,6 +530,14 @@ class Layout:
             The modes of a row.
         """
         return (*states, *[0] * self.surfaces)
+
+
+def held_of(bank: Bank) -> tuple[str, ...]:
+    """Return what is held of each element of a contact with a period: rates, then forces."""
+    if not bank.periodic:
+        return ()
+    rates = [bank.held(bank.rate(name)) for name in bank.variables]
+    return (*rates, *(bank.held(f"{force}_elements") for force in bank.forces))
 
 
 def sizes_of(banks: Sequence[Bank]) -> tuple[str, ...]:

@@ -89,6 +89,11 @@ class Program:
         The value that is zero on each.
     knots, jumps : list of float
         Times [s] where a signal has a corner, and where it jumps.
+    ticks : mapping of float to int
+        For each time [s] at which something ticks what does, as bits: the samplers, then the
+        contacts with a period.
+    discrete : list of int
+        For each machine the bit of its contact if this has a period, else 0.
     """
 
     source: str
@@ -104,6 +109,8 @@ class Program:
     surface_names: list[str]
     knots: list[float]
     jumps: list[float]
+    discrete: list[int]
+    ticks: Mapping[float, int] = field(default_factory=dict)
 
     @property
     def live(self) -> list[float]:
@@ -146,6 +153,7 @@ def lower(system: System | Model, rig: Rig | None = None) -> Program:
             tuple(contact.inputs.items()),
             tuple(np.ndim(contact.values[name]) for name in contact.chart.parameter_names),
             contact.model is None,
+            contact.period is None,
             contact.model is None or contact.model.stribeck is None,
         )
         for contact in system.contacts
@@ -225,6 +233,7 @@ def _lowered(shape: _Shape) -> Program:
         surface_names=_surface_names(plan),
         knots=[],
         jumps=[],
+        discrete=[bit for bank in plan.read.banks for bit in [plan.read.bit(bank)] * bank.n],
     )
 
 
@@ -279,6 +288,8 @@ def equations(program: Program) -> integrators.Equations:
         surfaces=program.surfaces,
         knots=program.knots,
         jumps=program.jumps,
+        ticks=program.ticks,
+        discrete=program.discrete,
         seen=program.layout.observed.size,
     )
 

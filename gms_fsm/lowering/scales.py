@@ -32,6 +32,7 @@ from gms_fsm.language import (
     split,
 )
 from gms_fsm.lowering._generated import load
+from gms_fsm.lowering.layout import held_of
 from gms_fsm.systems._assembly import of
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact, System
@@ -200,6 +201,9 @@ def scales_of_system(system: System) -> SystemScales:
     for each in system.bodies:
         for name, found in zip((each.x, each.v), moved[each.name], strict=True):
             sizes[name] = [min((u for u in found if u > 0.0), default=0.0)]
+    for bank in read.banks:
+        sizes |= {name: [0.0] * bank.n for name in held_of(bank)}
+        sizes |= {bank.held(force): [0.0] for force in bank.forces if bank.periodic}
     for name in (*system.flow, *(u for sampler in system.sampled for u in sampler.updates)):
         sizes[name] = [0.0]
     return SystemScales(sizes, min((u for u in times if u > 0.0), default=0.0))

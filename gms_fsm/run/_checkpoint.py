@@ -203,6 +203,8 @@ def _check(run: Resumable, state: Mapping[str, Any], kept: Mapping[str, Any]) ->
         "enabled edges": (state["edges"][enabled], first_edge[enabled], last_edge[enabled]),
         "room": (state["room"], 0, len(b.relations.watch) - 1),
         "watch": (state["watch"], 0, 1),
+        "due": (state["due"], 0, 1),
+        "held": (counts[loop.HOLD], 0, sum({*start.program.discrete})),
         "phase": (counts[loop.PHASE], loop.START, loop.END),
         "machine": (counts[loop.MACHINE], machine, n - 1),
         "edge": (counts[loop.EDGE], *fired),

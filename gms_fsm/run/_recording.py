@@ -280,8 +280,9 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
     scope = Scope.of(start.model, start.program, error.t, error.y, error.mode)
 
     def described(i: int) -> str:
-        s = f", s = {scope.s[i]:.6g}" if "s" in chart.inputs else ""
-        return f"{chart.variables[0]} = {scope.z[i]:.6g}{s}, v = {scope.v:.6g}"
+        z = f"{chart.variables[0]} = {scope.z[i]:.6g}, " if chart.variables else ""
+        s = f"s = {scope.s[i]:.6g}, " if "s" in chart.inputs else ""
+        return f"{z}{s}v = {scope.v:.6g}"
 
     if error.machine is not None:
         log = trace.transitions

@@ -21,7 +21,7 @@ __all__ = ["ENGINES", "EVENTS", "MOST_STEPS", "OUTPUTS", "RunOptions", "SettingO
 
 MOST_STEPS = 1_000_000  # default limit for a run
 ENGINES = ("machines", "ifelse", "compiled")
-EVENTS = ("located", "step")
+EVENTS = ("located", "step", "held")
 OUTPUTS = ("all", "t_eval", "end")
 
 
@@ -69,10 +69,13 @@ class Settings:
         Longest adaptive step, s. Not needed for accuracy.
     max_steps : int
         Maximum number of attempted steps; a run that needs more ends in a `StepLimitError`.
-    events : {"located", "step"}
+    events : {"located", "step", "held"}
         ``"located"`` finds the exact point of each switch. ``"step"`` evaluates the guards once at
         the end of a step, at most one edge per element, like an if-else in a block diagram: it
         misses switches and is here to demonstrate that. It needs `step` or a finite `max_step`.
+        ``"held"`` evaluates the guards at ticks `step` apart and holds what the chart gives out
+        (rates and force) between them, as a chart with a sample time does in a block diagram; the
+        motion between two ticks is integrated with steps of its own.
     engine : {"machines", "ifelse", "compiled"}
         What evaluates the guards: the `transitions` machines, the generated if-else text, or that
         text as machine code (extra ``fast``). The results are the same to the last bit.
@@ -129,6 +132,10 @@ class Settings:
             raise ParameterError(
                 "events='step' checks the guards once per step: give step=... or a finite max_step"
             )
+        if self.events == "held" and self.step is None:
+            raise ParameterError(
+                "events='held' evaluates the chart at ticks", advice="give their distance, step=..."
+            )
         if self.t_eval is not None:
             put(self, "t_eval", _increasing(self.t_eval))
         put(self, "output", self._output())
@@ -149,7 +156,8 @@ class Settings:
                     place="method",
                     value=method,
                 )
-            if self.step is None and not integrators.METHODS[method].adaptive:
+            steps = None if self.events == "held" else self.step
+            if steps is None and not integrators.METHODS[method].adaptive:
                 raise ParameterError(
                     f"method {method!r} has no error estimate",
                     advice="give step=..., or use 'dp45' or 'bs23'",

@@ -13,6 +13,7 @@ import integrators
 from gms_fsm.charts.chart import Transition
 from gms_fsm.charts.parameters import as_floats, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError, SignalError, shown
+from gms_fsm.language import evaluate
 from gms_fsm.lowering._pulses import waking_times
 from gms_fsm.lowering.layout import BankPlaces, Layout
 from gms_fsm.lowering.program import Program, arguments, lower
@@ -23,6 +24,7 @@ from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Corners, Formula
 from gms_fsm.systems.system import Mounting, Several, System, system_of
 from gms_fsm.traces.rows import Rows
+from gms_fsm.traces.scope import GuardValues, parameter_values
 from gms_fsm.traces.trace import Trace
 from integrators import Options
 
@@ -137,20 +139,8 @@ class Start:
         ParameterError, SignalError
             If an argument breaks its rule.
         """
-        if isinstance(model, System):
-            system = model
-        else:
-            for what, given, mark, example in (
-                ("model", model, "chart", "GMS(parameters, law='signed')"),
-                ("rig", rig, "signals", "Prescribed('0.1*sin(t)')"),
-            ):
-                if not hasattr(given, mark):
-                    raise ParameterError(
-                        f"it must be a {what}, for example {example}", place=what, value=given
-                    )
-            assert rig is not None
-            system = system_of(model, rig)
         chosen = Settings() if settings is None else settings
+        system = _system(model, rig, chosen)
         t_start, t_end = _times(t_start, t_end)
         _check_resolution(chosen, t_start, t_end)
         program = lower(system)
@@ -166,31 +156,20 @@ class Start:
             )
         options = Options(
             integrators.METHODS[method] if isinstance(method, str) else method,
-            chosen.step,
+            None if chosen.events == "held" else chosen.step,
             chosen.rtol,
             tolerances,
             chosen.max_step,
             scales.time,
             chosen.max_steps,
-            chosen.events == "located",
+            chosen.events != "step",
             [] if chosen.output == "end" else _wanted(chosen, t_start, t_end),
             rows_at_once,
         )
         last = _covered(system, t_start, t_end)
         program = _with_waking_times(program, system, t_start, last)
-        y, mode = _initial(system, program, {} if initial is None else initial)
-        kept: dict[str, Setting] = {
-            "method": chosen.method_name,
-            "step": chosen.step,
-            "rtol": chosen.rtol,
-            "atol": used,
-            "max_step": chosen.max_step if math.isfinite(chosen.max_step) else None,
-            "max_steps": chosen.max_steps,
-            "events": chosen.events,
-            "engine": chosen.engine,
-            "t_start": t_start,
-            "t_end": t_end,
-        }
+        program = replace(program, ticks=_ticks(system, t_start, last))
+        y, mode = _initial(system, program, t_start, {} if initial is None else initial)
         single = system.contacts[0] if len(system.contacts) == 1 else Several(system)
         origin: tuple[Any, Any] = (single, Mounting(system))
         if not isinstance(model, System):
@@ -206,7 +185,7 @@ class Start:
             y=y,
             mode=mode,
             options=options,
-            settings=kept,
+            settings=_recorded(chosen, used, t_start, t_end),
             chosen=chosen,
         )
 
@@ -223,7 +202,8 @@ class Start:
         Start
             With the tolerances of the new model.
         """
-        system = system_of(model, rig)
+        period = self.system.contacts[0].period if self.given is None else None
+        system = system_of(model, rig, period)
         scales = scales_of_system(system)
         default = scales.tolerances(self.options.rtol)
         tolerances, used = _tolerances(self.program.layout, self.chosen.atol, default)
@@ -236,6 +216,38 @@ class Start:
             options=replace(self.options, atol=tolerances, time_scale=scales.time),
             settings={**self.settings, "atol": used},
         )
+
+
+def _system(model: Model | System, rig: Rig | None, chosen: Settings) -> System:
+    """Return what runs as a system."""
+    if isinstance(model, System):
+        return model
+    for what, given, mark, example in (
+        ("model", model, "chart", "GMS(parameters, law='signed')"),
+        ("rig", rig, "signals", "Prescribed('0.1*sin(t)')"),
+    ):
+        if not hasattr(given, mark):
+            raise ParameterError(
+                f"it must be a {what}, for example {example}", place=what, value=given
+            )
+    assert rig is not None
+    return system_of(model, rig, chosen.step if chosen.events == "held" else None)
+
+
+def _recorded(chosen: Settings, atol: Setting, t_start: float, t_end: float) -> dict[str, Setting]:
+    """Return the settings as a trace records them."""
+    return {
+        "method": chosen.method_name,
+        "step": chosen.step,
+        "rtol": chosen.rtol,
+        "atol": atol,
+        "max_step": chosen.max_step if math.isfinite(chosen.max_step) else None,
+        "max_steps": chosen.max_steps,
+        "events": chosen.events,
+        "engine": chosen.engine,
+        "t_start": t_start,
+        "t_end": t_end,
+    }
 
 
 def _times(t_start: float, t_end: float) -> tuple[float, float]:
@@ -320,6 +332,29 @@ def _with_waking_times(program: Program, system: System, t_start: float, t_end: 
     return replace(program, knots=sorted({*program.knots, *times})) if times else program
 
 
+MOST_TICKS = 10_000_000  # of a run: their times are kept
+
+
+def _ticks(system: System, t_start: float, t_end: float) -> dict[float, int]:
+    """Return what ticks when: the samplers, then the contacts with a period, each as a bit."""
+    clocks = [(each.name, each.period, each.offset) for each in system.sampled]
+    clocks += [(each.name, each.period, 0.0) for each in system.contacts if each.period is not None]
+    found: dict[float, int] = {}
+    for bit, (name, period, offset) in enumerate(clocks):
+        count = math.ceil((t_end - t_start - offset) / period)
+        if count > MOST_TICKS:
+            raise ParameterError(
+                f"its period of {period!r} s makes {count:.4g} ticks",
+                place=name,
+                advice=f"at most {MOST_TICKS:,} fit into a run",
+            )
+        for k in range(count):
+            time = t_start + offset + k * period
+            if time < t_end:
+                found[time] = found.get(time, 0) | 1 << bit
+    return dict(sorted(found.items()))
+
+
 def _covered(system: System, t_start: float, t_end: float) -> float:
     """Return the last time covered by all sampled signals."""
     last = t_end
@@ -336,7 +371,7 @@ def _covered(system: System, t_start: float, t_end: float) -> float:
 
 
 def _initial(
-    system: System, program: Program, initial: Mapping[str, Any]
+    system: System, program: Program, t_start: float, initial: Mapping[str, Any]
 ) -> tuple[list[float], list[int]]:
     """Build the state vector and the modes."""
     layout = program.layout
@@ -375,6 +410,11 @@ def _initial(
                     advice=f"the model has {bank.n} elements",
                 )
             y[name] = as_floats(values)
+        y |= {
+            name: [0.0] * bank.n
+            for name in layout.y.own
+            if name not in y and name.startswith(bank.of(""))
+        }
     state, mode = layout.y.joined(y), list[int]()
     for bank, part in zip(layout.banks, system.contacts, strict=True):
         chart = part.chart
@@ -386,7 +426,51 @@ def _initial(
                 f"it must list {bank.n} state names", place=f"initial[{label!r}]", value=wanted
             )
         mode += [chart.state_index(str(name)) for name in wanted]
-    return state, mode
+    return _entered(system, program, t_start, state, mode, {*given}), mode
+
+
+def _entered(
+    system: System,
+    program: Program,
+    t_start: float,
+    y: list[float],
+    mode: list[int],
+    given: set[str],
+) -> list[float]:
+    """Perform the entry of each element's default state, as when a chart is first entered.
+
+    What the initial values give stays.
+    """
+    layout, out = program.layout, [0.0] * program.layout.shown.size
+    if not any(
+        contact.chart.assignments["entry", contact.chart.default_state.name]
+        for contact in system.contacts
+    ):
+        return y
+    program.ieee["values"](t_start, y, mode, program.p, out)
+    found: list[dict[str, Any]] = [{} for _ in mode]
+    GuardValues(layout).put(t_start, y, out, found)
+    new = list(y)
+    for bank, contact in zip(layout.banks, system.contacts, strict=True):
+        chart = contact.chart
+        steps = chart.assignments["entry", chart.default_state.name]
+        elements = zip(found[bank.elements], mode[bank.elements], strict=True)
+        for i, (seen, state) in enumerate(elements):
+            if state != 0:
+                continue
+            values = seen | parameter_values(contact, i)
+            for name, tree in steps.items():
+                if name in chart.velocities:
+                    raise ParameterError(
+                        f"the entry of the default state {chart.states[0].name!r} sets {name!r}",
+                        place=f"chart {chart.name!r}",
+                        advice="give the initial velocity instead",
+                    )
+                if bank.of(name) not in given:
+                    values[name] = new[layout.y.index(bank.of(name), i)] = float(
+                        evaluate(tree, values)
+                    )
+    return new
 
 
 def _unknown_initial(system: System, layout: Layout, key: object, value: object) -> tuple[str, str]:

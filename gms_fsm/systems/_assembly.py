@@ -8,6 +8,7 @@ the velocity of a driven body, a relative velocity, an input, a named expression
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,17 +21,18 @@ from gms_fsm.language import (
     Binary,
     Condition,
     Name,
-    Negative,
     Number,
     Value,
     derivative,
+    evaluate,
     names_in,
     parse_value,
     renamed,
 )
 from gms_fsm.language._normal import renamed_in
+from gms_fsm.systems._given import derivative_free, is_zero
 from gms_fsm.systems.signals import Formula, Signal
-from gms_fsm.systems.system import Body, Contact, System, is_zero
+from gms_fsm.systems.system import Body, Contact, System
 
 __all__ = ["Assembly", "Bank", "Definition", "Edge", "assembled", "of"]
 
@@ -160,6 +162,15 @@ class Bank:
         """Name of the weights, of which every bank has one per element."""
         return of(self.name, "threshold weight")
 
+    @property
+    def periodic(self) -> bool:
+        """Whether its machines are asked at ticks only, and what they give out is held."""
+        return self.contact.period is not None
+
+    def held(self, name: str) -> str:
+        """Return what the held value of a rate or of a force is called."""
+        return f"{name} held"
+
     def rate(self, variable: str) -> str:
         """Return what the rate of a variable is called."""
         contact, name = variable.rsplit(".", 1)
@@ -182,6 +193,8 @@ class Assembly:
         By free body.
     flow : mapping of str to Value
         Rates of the further states.
+    updates : mapping of str to mapping of str to Value
+        By sampler, those of its values.
     shared : mapping of str to float
         Numbers with one value, by name.
     own : mapping of str to (int, ndarray)
@@ -194,6 +207,7 @@ class Assembly:
     forces: Mapping[str, Value]
     inertias: Mapping[str, Value]
     flow: Mapping[str, Value]
+    updates: Mapping[str, Mapping[str, Value]]
     shared: Mapping[str, float]
     own: Mapping[str, tuple[int, np.ndarray]]
 
@@ -215,6 +229,13 @@ class Assembly:
             found |= dict.fromkeys(bank.variables, bank.index)
             found |= {bank.rate(name): bank.index for name in bank.variables}
         return found | {each.name: each.bank for each in self.definitions if each.bank is not None}
+
+    def bit(self, bank: Bank) -> int:
+        """Return the bit of a contact with a period among all that ticks; 0 for any other."""
+        if bank.contact.period is None:
+            return 0
+        periodic = [each.index for each in self.banks if each.contact.period is not None]
+        return 1 << (len(self.system.sampled) + periodic.index(bank.index))
 
     def bank_of(self, tree: Value | Condition) -> int | None:
         """Return the bank whose elements have one value of a tree each; None if there is one."""
@@ -242,8 +263,9 @@ class Assembly:
         return renamed(tree, inside) if inside else tree
 
 
+@functools.lru_cache(maxsize=64)
 def assembled(system: System) -> Assembly:
-    """Read all texts of a system.
+    """Read all texts of a system; a system is read once, when it is constructed.
 
     Parameters
     ----------
@@ -279,13 +301,12 @@ class _Reader:
 
     def read(self) -> Assembly:
         system, numbers = self.system, self.system.numbers
-        here = self.here
         for contact in system.contacts:
             self.model_numbers(contact)
         self.shared |= numbers
         for name, signal in system.signals.items():
             if isinstance(signal, str):
-                owner = here.of(f"signal {name!r}", "signals", name)
+                owner = self.here.of(f"signal {name!r}", "signals", name)
                 tree = self.value(signal, ["t", *numbers], owner)
                 self.definitions.append(Definition(name, tree))
             else:
@@ -294,7 +315,7 @@ class _Reader:
         given = ["t", *system.signals, *numbers]
         forces, inertias = {}, {}
         for i, body in enumerate(system.bodies):
-            owner = here.of(f"body {body.name!r}", "bodies", i)
+            owner = self.here.of(f"body {body.name!r}", "bodies", i)
             if body.velocity is None:
                 assert body.inertia is not None
                 forces[body.name] = self.value(body.force, system.names, owner.of("force", "force"))
@@ -311,15 +332,24 @@ class _Reader:
                 tree = self.value(body.velocity, given, owner.of("velocity", "velocity"))
                 self.definitions.append(Definition(body.v, tree))
         flow = {
-            name: self.value(text, system.names, here.of(f"flow of {name!r}", "flow", name))
+            name: self.value(text, system.names, self.here.of(f"flow of {name!r}", "flow", name))
             for name, text in system.flow.items()
         }
+        updates = {}
         for i, each in enumerate(system.sampled):
-            owner = here.of(f"sampled {each.name!r}", "sampled", i)
-            for name, text in each.updates.items():
-                part = owner.of(f"update of {name!r}", "updates", name)
-                self.value(text, [*system.names, "period"], part)
+            own = {"period": Number(each.period)}
+            owner = self.here.of(f"sampled {each.name!r}", "sampled", i)
+            updates[each.name] = {
+                name: renamed(
+                    self.value(
+                        text, [*system.names, "period"], owner.of(repr(name), "updates", name)
+                    ),
+                    own if "period" not in system.names else {},
+                )
+                for name, text in each.updates.items()
+            }
         banks = tuple(self.bank(i, contact) for i, contact in enumerate(system.contacts))
+        self.check_locks(banks)
         return Assembly(
             system,
             tuple(self.definitions),
@@ -327,6 +357,7 @@ class _Reader:
             forces,
             inertias,
             flow,
+            updates,
             self.shared,
             self.own,
         )
@@ -349,16 +380,8 @@ class _Reader:
     def bank(self, index: int, contact: Contact) -> Bank:
         chart, model, c = contact.chart, contact.model, contact.name
         owner = self.here.of(f"contact {c!r}", "contacts", index)
-        weights = np.ones(contact.n) if model is None else model.weights
-        self.own[of(c, "threshold weight")] = (index, np.asarray(weights, dtype=np.float64))
-        names: dict[str, Value] = {"t": Name("t")}
+        names: dict[str, Value] = {"t": Name("t"), **self.numbers(index, contact)}
         own_names: dict[str, str] = {}  # of what an action can set
-        for name, value in contact.values.items():
-            if np.ndim(value) == 0:
-                self.shared[of(c, name)] = float(value)
-            else:
-                self.own[of(c, name)] = (index, np.asarray(value, dtype=np.float64))
-            names[name] = Name(of(c, name))
         # Velocities and the position, those of a body where they are just that.
         jacobian, moved = [], {body.v: body for body in self.system.bodies}
         velocities = []
@@ -376,17 +399,8 @@ class _Reader:
         for name in chart.inputs:
             if name not in names and not (name == "s" and model is not None):
                 names[name] = self.input(contact, name, owner)
-        for name in contact.inputs:
-            if name not in chart.inputs:
-                raise ParameterError(
-                    f"inputs has {shown(name)}, which its chart does not read",
-                    place=owner.words,
-                    advice=f"the chart's inputs are {', '.join(chart.inputs) or 'none'}",
-                    key=(*owner.key, "inputs", name),
-                )
-        threshold = ""
-        if model is not None and model.stribeck is not None:
-            threshold = self.curve(contact, index, names)
+        curved = model is not None and model.stribeck is not None
+        threshold = self.curve(contact, index, names) if curved else ""
         for name in chart.variables:
             names[name], names[f"d{name}"] = Name(of(c, name)), Name(of(c, f"d{name}"))
             own_names[name] = of(c, name)
@@ -442,6 +456,56 @@ class _Reader:
             start=steps(("entry", chart.default_state.name)),
             means=names,
         )
+
+    def numbers(self, index: int, contact: Contact) -> dict[str, Value]:
+        """Note the numbers of a contact; return what its chart's parameters are called."""
+        c, model = contact.name, contact.model
+        weights = np.ones(contact.n) if model is None else model.weights
+        self.own[of(c, "threshold weight")] = (index, np.asarray(weights, dtype=np.float64))
+        for name, value in contact.values.items():
+            if np.ndim(value) == 0:
+                self.shared[of(c, name)] = float(value)
+            else:
+                self.own[of(c, name)] = (index, np.asarray(value, dtype=np.float64))
+        for name in contact.inputs:
+            if name not in contact.chart.inputs:
+                raise ParameterError(
+                    f"inputs has {shown(name)}, which its chart does not read",
+                    place=f"{self.here.words}, contact {c!r}",
+                    advice=f"the chart's inputs are {', '.join(contact.chart.inputs) or 'none'}",
+                    key=("contacts", index, "inputs", name),
+                )
+        return {name: Name(of(c, name)) for name in contact.values}
+
+    def check_locks(self, banks: Iterable[Bank]) -> None:
+        """Refuse locks that nothing can keep, and those that always hold and repeat each other."""
+        free = [body.name for body in self.system.bodies if not body.driven]
+        always: list[Bank] = []
+        for bank in banks:
+            chart = bank.chart
+            if chart.locks or chart.sets_velocity:
+                for row, text in zip(bank.jacobian, bank.contact.v, strict=True):
+                    if not row.keys() & {*free}:
+                        raise ParameterError(
+                            f"chart {chart.name!r} locks the contact or sets its velocity, but "
+                            f"only driven bodies move it (v = {text!r})",
+                            place=f"{self.here.words}, contact {bank.name!r}",
+                            key=("contacts", bank.index, "v"),
+                            advice="mount it where a free body can follow, for example on a "
+                            "Slider or a PulledSlider",
+                        )
+            if all(state.locked for state in chart.states):
+                always.append(bank)
+                if _rank(always, free, self.system.numbers) < sum(len(b.jacobian) for b in always):
+                    names = ", ".join(repr(each.name) for each in always)
+                    raise ParameterError(
+                        f"the contacts {names} are always locked, and the lock of "
+                        f"{bank.name!r} follows from the others or from driven bodies",
+                        place=self.here.words,
+                        key=("contacts", bank.index),
+                        advice="leave one of them out, or give its chart a state that is not "
+                        "locked",
+                    )
 
     def coefficients(
         self, tree: Value, moved: Mapping[str, Body], text: str, owner: Part
@@ -517,19 +581,11 @@ class _Reader:
             names[name] = Name(of(c, name))
 
 
-def derivative_free(rest: Value) -> bool:
-    """Tell whether a linear form without its velocities is zero."""
-    match rest:
-        case Number(value):
-            return value == 0.0
-        case Name():
-            return False
-        case Negative(operand):
-            return derivative_free(operand)
-        case Binary("+" | "-", a, b):
-            return derivative_free(a) and derivative_free(b)
-        case Binary("*", a, b):
-            return derivative_free(a) or derivative_free(b)
-        case Binary("/", a, _):
-            return derivative_free(a)
-    return False
+def _rank(banks: Iterable[Bank], free: list[str], numbers: Mapping[str, float]) -> int:
+    """Return how many velocities of contacts are independent of each other."""
+    rows = [
+        [float(evaluate(row.get(body, ZERO), numbers)) for body in free]
+        for bank in banks
+        for row in bank.jacobian
+    ]
+    return int(np.linalg.matrix_rank(np.array(rows)))

@@ -14,7 +14,7 @@ from gms_fsm._files import inside
 from gms_fsm._records import ONE, TABLE, built, read_file, write_file
 from gms_fsm.charts._file import ChartTable
 from gms_fsm.charts.chart import Chart
-from gms_fsm.charts.registry import chart_named, named_charts
+from gms_fsm.charts.registry import chart_named, charts
 from gms_fsm.errors import OutputError, ParameterError, ScenarioError
 from gms_fsm.systems._record import (
     ContactTable,
@@ -200,7 +200,7 @@ def _numbers(contact: Contact) -> dict[str, Any]:
     if contact.model is not None:
         return {"model": _model(contact.model) or ModelTable.of(contact.model)}
     found = numbers_table(contact)
-    for name, chart in named_charts().items():
+    for name, chart in charts().items():
         if chart == contact.chart:
             found["chart"] = name
     return found

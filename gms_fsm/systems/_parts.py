@@ -4,19 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from gms_fsm.charts.chart import Chart
-from gms_fsm.charts.parameters import FloatArray, checked_scalar, checked_values
+from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError, shown
-from gms_fsm.systems.models import Model
+from gms_fsm.systems._given import (
+    Text,
+    check_name,
+    check_text,
+    checked_numbers,
+    mapping_of,
+    several,
+    texts_of,
+)
+from gms_fsm.systems.models import Model, check_bank
 
 __all__ = ["Body", "Contact", "Sampled"]
-
-Text: TypeAlias = str | float  # an expression, or just a number
 
 
 @dataclass(frozen=True)
@@ -61,6 +68,11 @@ class Body:
                 place=here,
                 advice="give inertia=... to a free body, velocity=... to a driven one",
             )
+        for each in ("inertia", "force", "velocity"):
+            if (text := getattr(self, each)) is not None:
+                check_text(text, f"{here}: {each}")
+        for name in (self.name, self.x, self.v):
+            check_name(name, here)
 
     @property
     def driven(self) -> bool:
@@ -139,13 +151,8 @@ class Contact:
                 place=f"{here}: chart",
                 value=chart,
             )
-        if chart.locks and n != 1:
-            raise ParameterError(
-                f"n is {n}, and the chart has a locked state",
-                place=here,
-                advice="elements that lock the same motion cannot share the force; use n = 1",
-            )
-        velocities = (v,) if isinstance(v, str) else tuple(v)
+        check_bank(chart, n, here)
+        velocities = several(v, str, f"{here}: v")
         if len(velocities) != len(chart.velocities):
             raise ParameterError(
                 f"v gives {len(velocities)} velocities, chart {chart.name!r} has "
@@ -160,7 +167,7 @@ class Contact:
             "values": values,
             "v": velocities,
             "n": n,
-            "inputs": dict(inputs or {}),
+            "inputs": texts_of({} if inputs is None else inputs, f"{here}: inputs"),
             "period": period,
             "model": model,
         }.items():
@@ -223,7 +230,8 @@ class Sampled:
         put = object.__setattr__
         put(self, "period", checked_scalar(f"{here}: period", self.period, "> 0"))
         put(self, "offset", checked_scalar(f"{here}: offset", self.offset, ">= 0"))
-        put(self, "updates", dict(self.updates))
+        put(self, "updates", texts_of(self.updates, f"{here}: updates"))
+        put(self, "initial", mapping_of(self.initial, f"{here}: initial"))
         if not self.updates:
             raise ParameterError("it updates nothing", place=here)
         for name in self.initial:
@@ -243,50 +251,3 @@ class Sampled:
                 for name in self.updates
             },
         )
-
-
-def checked_numbers(
-    chart: Chart, values: Mapping[str, Any], n: int, here: str
-) -> Mapping[str, float | FloatArray]:
-    """Return the numbers of a chart, checked against its parameters.
-
-    Parameters
-    ----------
-    chart : Chart
-        Whose parameters.
-    values : mapping
-        A number, or one per element, for each.
-    n : int
-        Number of elements.
-    here : str
-        For messages.
-
-    Returns
-    -------
-    mapping
-        Complete.
-
-    Raises
-    ------
-    ParameterError
-        If one is missing, unknown, or breaks its rule.
-    """
-    if isinstance(n, bool) or not isinstance(n, int) or n < 1:
-        raise ParameterError(
-            "a bank has an integer number of elements, at least one", place=f"{here}: n", value=n
-        )
-    if not isinstance(values, Mapping):
-        raise ParameterError(
-            "it must give a number for each parameter of the chart, for example {'k': 1.0}",
-            place=f"{here}: values",
-            value=values,
-        )
-    wanted, given = set(chart.parameter_names), set(values)
-    if wanted != given:
-        raise ParameterError(
-            f"chart {chart.name!r} has the parameters {sorted(wanted)}",
-            place=here,
-            advice=f"missing values: {sorted(wanted - given) or 'none'}, unknown: "
-            f"{sorted(given - wanted) or 'none'}",
-        )
-    return checked_values(chart.parameters, values, n)

@@ -36,6 +36,7 @@ __all__ = [
     "ChartModel",
     "LuGre",
     "Model",
+    "check_bank",
     "demonstration",
     "parameter_names",
     "parameters_of",
@@ -293,6 +294,13 @@ class ChartModel:
                 advice=f"missing values: {sorted(wanted - given) or 'none'}, unknown: "
                 f"{sorted(given - wanted) or 'none'}",
             )
+        check_bank(self.chart, self.n, f"chart {self.chart.name!r}")
+        if len(self.chart.velocities) > 1:
+            raise ParameterError(
+                f"its velocities are {', '.join(self.chart.velocities)}, and a rig has only one",
+                place=f"chart {self.chart.name!r}",
+                advice="use it in a System, Contact(name, chart, values, v=(...))",
+            )
         values = checked_values(self.chart.parameters, self.values, self.n)
         object.__setattr__(self, "values", values)
         sigma_2 = checked_scalar(SIGMA_2.name, self.sigma_2, SIGMA_2.rule)
@@ -301,6 +309,31 @@ class ChartModel:
         weights = checked_array(WEIGHTS.name, weights, self.n, WEIGHTS.rule)
         object.__setattr__(self, "weights", weights)
         object.__setattr__(self, "title", self.title or self.chart.name)
+
+
+def check_bank(chart: Chart, n: int, here: str) -> None:
+    """Refuse banks whose elements would lock the same motion.
+
+    Parameters
+    ----------
+    chart : Chart
+        The element's chart.
+    n : int
+        Number of elements.
+    here : str
+        The place, for the message.
+
+    Raises
+    ------
+    ParameterError
+        If there are several elements and a locked state.
+    """
+    if chart.locks and n != 1:
+        raise ParameterError(
+            f"n is {n}, and the chart has a locked state",
+            place=here,
+            advice="elements that lock the same motion cannot share the force; use n = 1",
+        )
 
 
 def demonstration(entry: Entry, law: str = "") -> ChartModel:

@@ -6,8 +6,6 @@ relative velocity, which is linear in the bodies' velocities.
 
 from __future__ import annotations
 
-import keyword
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,19 +17,22 @@ from gms_fsm._arguments import checked_path
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import ExpressionError, ParameterError, Part, shown
 from gms_fsm.language import (
-    CONSTANTS,
-    FUNCTIONS,
     Binary,
     Name,
     Negative,
     Number,
     Value,
     derivative,
-    evaluate,
     names_in,
     parse_value,
     renamed,
     spell,
+)
+from gms_fsm.systems._given import (
+    check_name,
+    mapping_of,
+    several,
+    texts_of,
 )
 from gms_fsm.systems._parts import Body, Contact, Sampled
 from gms_fsm.systems.models import Model
@@ -42,6 +43,9 @@ if TYPE_CHECKING:
     from gms_fsm.systems._assembly import Assembly
 
 __all__ = ["Body", "Contact", "Mounting", "Sampled", "Several", "System", "system_of"]
+
+
+Key = tuple[str | int, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +72,8 @@ class System:
     Raises
     ------
     ParameterError, ExpressionError
-        If names clash, a text cannot be read, a velocity is not linear, or an inertia is zero.
+        If names clash, a text cannot be read, a velocity is not linear, an inertia is zero, or a
+        lock cannot hold.
 
     Examples
     --------
@@ -91,31 +96,26 @@ class System:
     assembly: Assembly = field(init=False, repr=False)  # its texts, read
 
     def __post_init__(self) -> None:
-        from gms_fsm.systems._assembly import assembled
-
         put, here = object.__setattr__, f"system {shown(self.name)}"
         for each, kind in (("bodies", Body), ("contacts", Contact), ("sampled", Sampled)):
-            given = getattr(self, each)
-            parts = (given,) if isinstance(given, kind) else tuple(given)
-            for part in parts:
-                if not isinstance(part, kind):
-                    raise ParameterError(
-                        f"it must be a {kind.__name__}", place=f"{here}: {each}", value=part
-                    )
-            put(self, each, parts)
+            put(self, each, several(getattr(self, each), kind, f"{here}: {each}"))
         if not self.bodies:
             raise ParameterError("it has no bodies", place=here, advice="give at least one")
         if not self.contacts:
             raise ParameterError("it has no contacts", place=here, advice="give at least one")
         numbers = {
             name: checked_scalar(f"{here}: {name}", value, "finite")
-            for name, value in self.numbers.items()
+            for name, value in mapping_of(self.numbers, f"{here}: numbers").items()
         }
         put(self, "numbers", numbers)
-        put(self, "flow", dict(self.flow))
+        put(self, "flow", texts_of(self.flow, f"{here}: flow"))
+        put(self, "signals", mapping_of(self.signals, f"{here}: signals"))
         self._check_names(here)
         signals = {name: self._signal(name, given, here) for name, given in self.signals.items()}
         put(self, "signals", signals)
+        # Imported here: the reader itself needs the classes of this module.
+        from gms_fsm.systems._assembly import assembled
+
         put(self, "assembly", assembled(self))
 
     def _signal(self, name: str, given: Any, here: str) -> Signal | str:
@@ -131,21 +131,24 @@ class System:
         return as_signal(given)
 
     def _check_names(self, here: str) -> None:
-        # What has names, with their keys, and the names.
-        groups: list[tuple[str, Mapping[str, tuple[str | int, ...]]]] = [("time", {"t": ()})]
+        # What has names, and the names, each with its key.
+        groups: list[tuple[str, list[tuple[str, Key]]]] = [("time", [("t", ())])]
         for i, body in enumerate(self.bodies):
-            alias = body.velocity == body.v and body.v in self.signals
-            own = {body.x: ("bodies", i, "x")} | ({} if alias else {body.v: ("bodies", i, "v")})
+            own: list[tuple[str, Key]] = [(body.x, ("bodies", i, "x"))]
+            if not (body.velocity == body.v and body.v in self.signals):
+                own.append((body.v, ("bodies", i, "v")))
             groups.append((f"body {body.name!r}", own))
         for kind, attribute in (("signal", "signals"), ("number", "numbers"), ("flow", "flow")):
-            groups.append((kind, {name: (attribute, name) for name in getattr(self, attribute)}))
+            groups.append((kind, [(name, (attribute, name)) for name in getattr(self, attribute)]))
         for i, each in enumerate(self.sampled):
-            values = {name: ("sampled", i, "updates", name) for name in each.updates}
+            values: list[tuple[str, Key]] = [
+                (name, ("sampled", i, "updates", name)) for name in each.updates
+            ]
             groups.append((f"sampled {each.name!r}", values))
         owner: dict[str, str] = {}
         for kind, names in groups:
-            for name, key in names.items():
-                _check_name(name, f"{here}, {kind}", key)
+            for name, key in names:
+                check_name(name, f"{here}, {kind}", key)
                 if name in owner:
                     raise ParameterError(
                         f"the name {name!r} is used twice ({owner[name]} and {kind})",
@@ -158,7 +161,7 @@ class System:
         for attribute in ("bodies", "contacts", "sampled"):
             for i, part in enumerate(getattr(self, attribute)):
                 key = (attribute, i, "name")
-                _check_name(part.name, f"{here}, {type(part).__name__.lower()}", key)
+                check_name(part.name, f"{here}, {type(part).__name__.lower()}", key)
                 if part.name in seen:
                     raise ParameterError(
                         f"the name {part.name!r} is used twice", place=here, key=key
@@ -279,18 +282,6 @@ def _found(parts: tuple[Named, ...], name: str, reason: str) -> Named:
     raise ParameterError(f"{reason} {shown(name)}", advice=f"there are {known}")
 
 
-def _check_name(name: object, place: str, key: tuple[str | int, ...]) -> None:
-    if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
-        raise ParameterError(
-            f"{shown(name)} is not a name",
-            place=place,
-            advice="use letters, digits and _, not starting with a digit, and no Python keyword",
-            key=key,
-        )
-    if name in FUNCTIONS or name in CONSTANTS or name == "pow":
-        raise ParameterError(f"the name {name!r} is a word of the language", place=place, key=key)
-
-
 @dataclass(frozen=True)
 class Mounting:
     """What moves the contacts of a system, as a `Rig` for everything that reads rigs.
@@ -343,8 +334,12 @@ class Several:
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)
+        raise self.refused()
+
+    def refused(self) -> ParameterError:
+        """Return the error that says to choose a contact."""
         known = ", ".join(repr(each.name) for each in self._system.contacts)
-        raise ParameterError(
+        return ParameterError(
             f"system {self._system.name!r} has the contacts {known}",
             advice=f"say which one: trace.contact({self._system.contacts[0].name!r})",
         )
@@ -368,13 +363,15 @@ def origin_of(system: System) -> tuple[Any, Mounting]:
 
 
 # --------------------------------------------------------------------------- from a model on a rig
-def system_of(model: Model, rig: Rig) -> System:
+def system_of(model: Model, rig: Rig, period: float | None = None) -> System:
     """Return a model on a rig as a system: one body, called body, and one contact, called friction.
 
     Parameters
     ----------
     model, rig
         What runs.
+    period : float, optional
+        s: of a discrete contact.
 
     Returns
     -------
@@ -407,7 +404,7 @@ def system_of(model: Model, rig: Rig) -> System:
     return System(
         rig.title,
         bodies=(body,),
-        contacts=(Contact("friction", model),),
+        contacts=(Contact("friction", model, period=period),),
         signals=dict(rig.signals),
         numbers=rig.numbers,
     )
@@ -456,17 +453,6 @@ def _without_force(tree: Value) -> tuple[Value, int]:
                     return left, sign if op == "+" else -sign
                 return Binary(op, left, rest), sign if op == "+" else -sign
     return tree, 0
-
-
-def is_zero(tree: Value, numbers: Mapping[str, float]) -> bool:
-    """Tell whether a value is zero, or not finite, whatever the state is."""
-    if names_in(tree) - {*numbers}:
-        return False
-    try:
-        value = float(evaluate(tree, numbers))
-    except (ArithmeticError, ValueError):
-        return True
-    return value == 0.0 or not math.isfinite(value)
 
 
 def broadcast(value: float | FloatArray, n: int) -> list[float]:

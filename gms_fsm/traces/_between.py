@@ -9,8 +9,9 @@ import numpy as np
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.lowering._observing import armed, rate
 from gms_fsm.lowering.program import Program
+from gms_fsm.traces.rows import Rows
 
-__all__ = ["first_true", "interpolated", "slopes"]
+__all__ = ["between", "first_true", "interpolated", "slopes"]
 
 HALVINGS = 60  # bisections between two rows
 
@@ -104,3 +105,29 @@ def slopes(
     held = armed(program, 0.5 * (t0 + t1), (0.5 * (y0 + y1)).tolist(), mode)
     at_start, at_end = (rate(program, t, y.tolist(), mode, held) for t, y in ((t0, y0), (t1, y1)))
     return at_start, at_end
+
+
+def between(program: Program, table: Rows, i: int, t: float) -> FloatArray:
+    """Return the state at a time in a run.
+
+    Parameters
+    ----------
+    program : Program
+        Of the run.
+    table : Rows
+        Its rows, with both sides of every stop.
+    i : int
+        The last row not after t.
+    t : float
+        s.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        The row itself at its time.
+    """
+    t0 = table.t[i]
+    if t == t0 or i + 1 == len(table):
+        return np.asarray(table.y[i])
+    mode, ends = table.mode[i].tolist(), (float(t0), table.y[i], float(table.t[i + 1]))
+    return interpolated(program, mode, *ends, table.y[i + 1], t)

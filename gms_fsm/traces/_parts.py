@@ -13,6 +13,7 @@ from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import TraceFileError
 from gms_fsm.lowering.layout import CONTACT, LOG_TEXTS, Layout
 from gms_fsm.lowering.program import lower
+from gms_fsm.lowering.scales import Setting
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System, origin_of, system_of
@@ -20,7 +21,13 @@ from gms_fsm.traces._header import Header
 from gms_fsm.traces._log import is_log
 from gms_fsm.traces.rows import Rows
 
-__all__ = ["Parts", "Ran", "checked", "stored_names"]
+__all__ = ["Parts", "Ran", "checked", "held_period", "stored_names"]
+
+
+def held_period(settings: Mapping[str, Setting]) -> float | None:
+    """Return the period of a run with ``events="held"``; None of any other."""
+    step = settings.get("step")
+    return step if settings.get("events") == "held" and isinstance(step, float) else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,24 +40,30 @@ class Ran:
         A model on a rig; of a system what stands for them.
     system : System or None
         The system, if it is one.
+    period : float or None
+        s: of the contact, in a run of a model on a rig with ``events="held"``.
     """
 
     model: Model
     rig: Rig
     system: System | None
+    period: float | None
 
     @classmethod
     def of(cls, header: Header) -> Ran:
         """Return what a header describes."""
         system = header.to_system()
         if system is None:
-            return cls(header.to_model(), header.to_rig(), None)
-        return cls(*origin_of(system), system)
+            period = held_period(header.settings)
+            return cls(header.to_model(), header.to_rig(), None, period)
+        return cls(*origin_of(system), system, None)
 
     @cached_property
     def whole(self) -> System:
         """The system, also where it is a model on a rig."""
-        return system_of(self.model, self.rig) if self.system is None else self.system
+        if self.system is not None:
+            return self.system
+        return system_of(self.model, self.rig, self.period)
 
     @cached_property
     def layout(self) -> Layout:

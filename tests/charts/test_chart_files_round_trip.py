@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gms_fsm import Chart, Parameter, State, Transition
-from gms_fsm.charts.registry import named_charts
+from gms_fsm.charts import CHARTS
 from gms_fsm.errors import OutputError
 
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=12)
@@ -78,9 +78,9 @@ def test_any_chart_is_read_back_equal(
     assert again.guards == chart.guards
 
 
-@pytest.mark.parametrize("name", named_charts())
+@pytest.mark.parametrize("name", CHARTS)
 def test_every_included_chart_is_read_back_equal(name: str, tmp_path: Path) -> None:
-    chart = named_charts()[name]
+    chart = CHARTS[name]
     assert Chart.load(chart.save(tmp_path / "chart.toml")) == chart
 
 

@@ -227,3 +227,37 @@ def test_an_infinite_slope_and_a_zero_step_are_distinguished() -> None:
     assert _Run(t=1.0).to(2.0, h=1e-30)[:2] == (kernel.TOO_SMALL, 1.0)
     blind = _Run(lambda t, y: 1e200 * math.sin(1e30 * t), tolerance=1e-12, t=0.5)
     assert blind.to(1.0)[0] == kernel.TOO_SMALL
+
+
+def _without_a_scale(slope: Callable[[float, float], float], rtol: float) -> _Run:
+    run = _Run(slope, tolerance=0.0)
+    control = run.b.plan.control._replace(rtol=rtol)
+    run.b = run.b._replace(plan=run.b.plan._replace(control=control))
+    return run
+
+
+def test_the_tolerance_of_a_component_without_a_scale_follows_its_largest_value() -> None:
+    run = _without_a_scale(lambda t, y: 3.0 * math.cos(t), 1e-6)
+    kernel.raise_floor(run.b.plan.control, run.b.now)
+    assert run.b.now.floor == [1e-6]
+    assert run.to(2.0, h=0.01)[0] == kernel.REACHED
+    largest = max(abs(y[0]) for y in run.b.out.rows_y[: len(run.rows)])
+    assert largest > 3.9
+    assert run.b.now.floor == [1e-6 * largest]
+    run.y[0] = 0.0
+    kernel.raise_floor(run.b.plan.control, run.b.now)
+    assert run.b.now.floor == [1e-6 * largest], "it never falls again"
+
+
+def test_a_component_that_is_zero_still_has_a_tolerance() -> None:
+    run = _without_a_scale(lambda t, y: 0.0, 1e-6)
+    run.y[0] = 0.0
+    kernel.raise_floor(run.b.plan.control, run.b.now)
+    assert run.b.now.floor == [1e-280]
+
+
+def test_a_tolerance_that_is_given_stays() -> None:
+    run = _Run(lambda t, y: 1.0, tolerance=1e-3)
+    kernel.raise_floor(run.b.plan.control, run.b.now)
+    run.to(3.0)
+    assert run.b.now.floor == [1e-3]

@@ -325,7 +325,7 @@ def test_a_log_of_another_run_is_refused(tmp_path: Path) -> None:
     first.save(tmp_path / "run.csv")
     second.save(tmp_path / "other.csv")
     (tmp_path / "other.transitions.csv").rename(tmp_path / "run.transitions.csv")
-    with pytest.raises(Exception, match=r"run\.transitions\.csv: belongs to another run"):
+    with pytest.raises(Exception, match=r"run\.transitions\.csv: it belongs to a different run"):
         Trace.load(tmp_path / "run.csv")
 
 

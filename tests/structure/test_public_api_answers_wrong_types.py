@@ -21,8 +21,10 @@ import gms_fsm
 import plots
 from gms_fsm import (
     GMS,
+    Body,
     Chart,
     ChartModel,
+    Contact,
     Element,
     ElementMachines,
     GMSError,
@@ -37,6 +39,7 @@ from gms_fsm import (
     State,
     Stribeck,
     Sweep,
+    System,
     Trace,
     Transition,
     prove,
@@ -54,6 +57,8 @@ RIG = Prescribed("0.2*sin(t)")
 STATE = State("on", {"z": "v"})
 EDGE = Transition("go", "on", "on", guard="z > 1", actions={"z": "0"})
 CHART = Chart("one", ("v",), ("z",), ("k",), (STATE,), (EDGE,), {"F": "k * z"})
+BODY, CONTACT = Body("mass", inertia=1.0), Contact("pad", CHART, {"k": 1.0})
+SYSTEM = System("one mass", bodies=(BODY,), contacts=(CONTACT,))
 # Classes that only the package creates, for users to read.
 RECORDS = {"Finding", "Report", "Sweep", "Trace", "Model", "Rig", "Signal"}
 
@@ -87,10 +92,14 @@ def _entries(tmp: Path) -> Iterator[Entry]:
     view |= {"direction": "TB"}
     edge = {"name": "go", "source": "on", "target": "on", "guard": "z > 1", "actions": {}}
     right: dict[str, dict[str, Any]] = {
+        "Body": {"name": "mass", "inertia": 1.0, "force": "0", "velocity": None}
+        | {"x": "x", "v": "v"},
         "Chart": _chart_parts(),
         "ChartModel": {"chart": MODEL.chart, "values": dict(MODEL.values), "n": 1, "title": ""}
         | bank
         | {"weights": PARAMETERS.weights},
+        "Contact": {"name": "pad", "chart": CHART, "values": {"k": 1.0}, "v": "v", "n": 1}
+        | {"inputs": {}, "period": None},
         "Element": {},
         "ElementMachines": {"model": MODEL, "element": Element},
         "GMS": {"parameters": PARAMETERS, "law": "signed"},
@@ -101,11 +110,15 @@ def _entries(tmp: Path) -> Iterator[Entry]:
         | {"per_element": True},
         "Prescribed": {"velocity": "t"},
         "PulledSlider": {"mass": 1.0, "stiffness": 1.0, "speed": 1.0},
+        "Sampled": {"name": "pid", "period": 1e-3, "updates": {"u": "t"}, "initial": {"u": 1.0}}
+        | {"offset": 0.0},
         "Session": run | options,
         "Settings": options,
         "Slider": {"mass": 1.0, "force": "t"},
         "State": {"name": "on", "flow": {"z": "v"}},
         "Stribeck": {"F_c": 1.0, "F_s": 1.5, "v_s": 0.1},
+        "System": {"name": "one mass", "bodies": (BODY,), "contacts": (CONTACT,), "signals": {}}
+        | {"numbers": {}, "flow": {}, "sampled": ()},
         "Transition": edge,
         "prove": {"chart": CHART, "domain": None},
         "simulate": run
@@ -164,6 +177,7 @@ def _methods(tmp: Path) -> Iterator[Entry]:
         "PulledSlider": lambda: PulledSlider(1.0, 1.0, 1.0),
         "Prescribed": lambda: RIG,
         "Settings": Settings,
+        "System": lambda: SYSTEM,
         "ElementMachines": lambda: ElementMachines(MODEL),
         "Report": lambda: prove(CHART),
         "LiveChart": lambda: plots.LiveChart(_trace()),
@@ -217,6 +231,8 @@ RIGHT: dict[str, Any] = {
     "Session.break_on.kind": "tested",
     "Session.watch.expression": "z1",
     "Session.watch.text": "z1",
+    "System.body.name": "mass",
+    "System.contact.name": "pad",
     "Chart.guard_text.edge": "go",
     "Chart.state_index.name": "on",
 }

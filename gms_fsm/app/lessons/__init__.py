@@ -18,6 +18,9 @@ number is measured in that run.
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
+import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,16 +28,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from gms_fsm._files import output_folder, write_whole
-from gms_fsm.app.lessons import (
-    l1_hysteresis,
-    l2_drift,
-    l3_missed_window,
-    l4_sign_of_s,
-    l5_how_many,
-    l6_stick_slip,
-    l7_frictional_lag,
-    l8_chart_or_ifelse,
-)
 from gms_fsm.errors import MissingExtraError, ParameterError, shown
 from gms_fsm.traces.trace import Trace
 
@@ -68,16 +61,18 @@ class Lesson(Protocol):
         """Draw the figure of the result."""
 
 
-LESSONS: Mapping[int, Lesson] = {
-    1: l1_hysteresis,
-    2: l2_drift,
-    3: l3_missed_window,
-    4: l4_sign_of_s,
-    5: l5_how_many,
-    6: l6_stick_slip,
-    7: l7_frictional_lag,
-    8: l8_chart_or_ifelse,
-}
+def _found() -> Mapping[int, Lesson]:
+    """Return the lessons in this folder: a module ``l3_name`` is lesson 3."""
+    names = (each.name for each in pkgutil.iter_modules(__path__))
+    numbers = {int(match[1]): name for name in names if (match := re.match(r"l(\d+)_", name))}
+    modules: dict[int, Any] = {
+        number: importlib.import_module(f"{__name__}.{numbers[number]}")
+        for number in sorted(numbers)
+    }
+    return modules
+
+
+LESSONS: Mapping[int, Lesson] = _found()
 
 
 @dataclass(frozen=True, eq=False)

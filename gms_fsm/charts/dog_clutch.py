@@ -1,0 +1,43 @@
+"""A dog clutch: from t_on to t_off the contact is locked, else it transmits nothing.
+
+Engagement is an impact that keeps the momentum of the bodies. With a ratio in the velocity of the
+contact, such as ``v="w_a - 3 * w_b"``, the clutch engages a gear.
+
+References
+----------
+C. Glocker, "Set-Valued Force Laws: Dynamics of Non-Smooth Systems", Springer (2001), for
+constraints that are imposed suddenly. That the claws mesh at any speed is a simplification.
+"""
+
+from __future__ import annotations
+
+from gms_fsm.charts.chart import Chart, State, Transition
+from gms_fsm.charts.parameters import Parameter
+from gms_fsm.charts.registry import Demonstration, Entry
+
+__all__ = ["CHARTS", "DOG_CLUTCH"]
+
+DOG_CLUTCH = Chart(
+    name="Dog clutch",
+    inputs=("t",),
+    parameters=(
+        Parameter("t_on", "s", per_element=False, meaning="time of engagement"),
+        Parameter("t_off", "s", "> t_on", per_element=False, meaning="time of disengagement"),
+    ),
+    states=(
+        State("open", outputs={"F": "0"}),
+        State("engaged", locked=True),
+    ),
+    transitions=(
+        Transition("engage", "open", "engaged", guard="t_on <= t < t_off"),
+        Transition("disengage", "engaged", "open", guard="t >= t_off"),
+    ),
+    reference="Glocker (2001)",
+)
+CHARTS = (
+    Entry(
+        "dog-clutch",
+        DOG_CLUTCH,
+        Demonstration({"t_on": 2.0, "t_off": 5.0}, "chosen by us"),
+    ),
+)

@@ -1,0 +1,47 @@
+"""Coulomb and viscous friction with stiction: the contact is locked while it sticks.
+
+At rest the friction force is whatever holds the contact, up to the stiction F_s; in motion it is
+the Coulomb friction F_c against the motion, plus viscous friction. There is no regularization: a
+stuck contact is at rest exactly.
+
+References
+----------
+H. Olsson, K. J. Astrom, C. Canudas de Wit, M. Gafvert, P. Lischinsky, "Friction Models and Friction
+Compensation", European Journal of Control 4 (1998), Section 2.
+"""
+
+from __future__ import annotations
+
+from gms_fsm.charts.chart import Chart, State, Transition
+from gms_fsm.charts.parameters import Parameter
+from gms_fsm.charts.registry import Demonstration, Entry
+
+__all__ = ["CHARTS", "STICTION"]
+
+STICTION = Chart(
+    name="Coulomb friction with stiction",
+    parameters=(
+        Parameter("F_c", "N", "> 0", per_element=False, meaning="Coulomb friction"),
+        Parameter("F_s", "N", ">= F_c", per_element=False, meaning="stiction"),
+        Parameter("b", "Ns/m", ">= 0", per_element=False, meaning="viscous friction"),
+    ),
+    states=(
+        State("stuck", locked=True),
+        State("forward", outputs={"F": "F_c + b * v"}),
+        State("backward", outputs={"F": "-F_c + b * v"}),
+    ),
+    transitions=(
+        Transition("release_forward", "stuck", "forward", guard="F > F_s"),
+        Transition("release_backward", "stuck", "backward", guard="F < -F_s"),
+        Transition("arrest_forward", "forward", "stuck", guard="v < 0"),
+        Transition("arrest_backward", "backward", "stuck", guard="v > 0"),
+    ),
+    reference="Olsson et al. (1998)",
+)
+CHARTS = (
+    Entry(
+        "stiction",
+        STICTION,
+        Demonstration({"F_c": 1.0, "F_s": 1.5, "b": 0.1}, "chosen by us"),
+    ),
+)

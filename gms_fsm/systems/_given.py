@@ -1,0 +1,265 @@
+"""Checks of what a system is given."""
+
+from __future__ import annotations
+
+import keyword
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeAlias
+
+from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.parameters import FloatArray, checked_values
+from gms_fsm.errors import ParameterError, shown
+from gms_fsm.language import (
+    CONSTANTS,
+    FUNCTIONS,
+    Binary,
+    Name,
+    Negative,
+    Number,
+    Value,
+    evaluate,
+    names_in,
+)
+
+__all__ = ["Text", "check_name", "check_text", "checked_numbers"]
+__all__ += ["derivative_free", "is_zero", "mapping_of", "several", "texts_of"]
+
+Text: TypeAlias = str | float  # an expression, or just a number
+
+
+def check_text(text: object, place: str) -> None:
+    """Refuse what is neither an expression nor a number.
+
+    Parameters
+    ----------
+    text : str or float
+        What was given.
+    place : str
+        For the message.
+
+    Raises
+    ------
+    ParameterError
+        If it is something else.
+    """
+    if not isinstance(text, str | int | float) or isinstance(text, bool):
+        raise ParameterError(
+            "it must be an expression or a number", place=place, value=text, advice="such as '2*t'"
+        )
+
+
+def mapping_of(given: object, place: str) -> dict[str, Any]:
+    """Return a copy of a mapping with texts as keys.
+
+    Parameters
+    ----------
+    given : mapping
+        What was given.
+    place : str
+        For the message.
+
+    Returns
+    -------
+    dict
+        A copy.
+
+    Raises
+    ------
+    ParameterError
+        If it is no mapping.
+    """
+    if not isinstance(given, Mapping):
+        raise ParameterError(
+            "it must be a mapping, such as {'name': ...}", place=place, value=given
+        )
+    return dict(given)
+
+
+def texts_of(given: object, place: str) -> dict[str, str]:
+    """Return a copy of a mapping of names to texts, with numbers as texts.
+
+    Parameters
+    ----------
+    given : mapping of str to str or float
+        What was given.
+    place : str
+        For the message.
+
+    Returns
+    -------
+    dict of str to str
+        A copy.
+
+    Raises
+    ------
+    ParameterError
+        If it is no mapping, or has something else for a name.
+    """
+    texts = mapping_of(given, place)
+    for name, text in texts.items():
+        check_text(text, f"{place}[{name!r}]")
+    return {
+        name: text if isinstance(text, str) else repr(float(text)) for name, text in texts.items()
+    }
+
+
+def several(given: object, kind: type, place: str) -> tuple[Any, ...]:
+    """Return parts of a kind as a tuple; a single one may stand alone.
+
+    Parameters
+    ----------
+    given : part or sequence of parts
+        What was given.
+    kind : type
+        Their class.
+    place : str
+        For the message.
+
+    Returns
+    -------
+    tuple
+        The parts.
+
+    Raises
+    ------
+    ParameterError
+        If there is something else.
+    """
+    if isinstance(given, kind):
+        return (given,)
+    if not isinstance(given, Iterable) or isinstance(given, str):
+        raise ParameterError(f"it must be a {kind.__name__}, or several", place=place, value=given)
+    parts = tuple(given)
+    for part in parts:
+        if not isinstance(part, kind):
+            raise ParameterError(f"it must be a {kind.__name__}", place=place, value=part)
+    return parts
+
+
+def check_name(name: object, place: str, key: tuple[str | int, ...] = ()) -> None:
+    """Refuse what cannot be the name of a part or a quantity of a system.
+
+    Parameters
+    ----------
+    name : str
+        The name.
+    place : str
+        For the message.
+    key : tuple of str or int
+        The part of the system, as in `GMSError`.
+
+    Raises
+    ------
+    ParameterError
+        If it is not an identifier, or a word of the language.
+    """
+    if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
+        raise ParameterError(
+            f"{shown(name)} is not a name",
+            place=place,
+            advice="use letters, digits and _, not starting with a digit, and no Python keyword",
+            key=key,
+        )
+    if name in FUNCTIONS or name in CONSTANTS or name == "pow":
+        raise ParameterError(f"the name {name!r} is a word of the language", place=place, key=key)
+
+
+def checked_numbers(
+    chart: Chart, values: Mapping[str, Any], n: int, here: str
+) -> Mapping[str, float | FloatArray]:
+    """Return the numbers of a chart, checked against its parameters.
+
+    Parameters
+    ----------
+    chart : Chart
+        Whose parameters.
+    values : mapping
+        A number, or one per element, for each.
+    n : int
+        Number of elements.
+    here : str
+        For messages.
+
+    Returns
+    -------
+    mapping
+        Complete.
+
+    Raises
+    ------
+    ParameterError
+        If one is missing, unknown, or breaks its rule.
+    """
+    if isinstance(n, bool) or not isinstance(n, int) or n < 1:
+        raise ParameterError(
+            "a bank has an integer number of elements, at least one", place=f"{here}: n", value=n
+        )
+    if not isinstance(values, Mapping):
+        raise ParameterError(
+            "it must give a number for each parameter of the chart, for example {'k': 1.0}",
+            place=f"{here}: values",
+            value=values,
+        )
+    wanted, given = set(chart.parameter_names), set(values)
+    if wanted != given:
+        raise ParameterError(
+            f"chart {chart.name!r} has the parameters {sorted(wanted)}",
+            place=here,
+            advice=f"missing values: {sorted(wanted - given) or 'none'}, unknown: "
+            f"{sorted(given - wanted) or 'none'}",
+        )
+    return checked_values(chart.parameters, values, n)
+
+
+def is_zero(tree: Value, numbers: Mapping[str, float]) -> bool:
+    """Tell whether a value is zero, or not finite, whatever the state is.
+
+    Parameters
+    ----------
+    tree : Value
+        Over the names of a system.
+    numbers : mapping of str to float
+        The system's numbers.
+
+    Returns
+    -------
+    bool
+        False if it depends on the state.
+    """
+    if names_in(tree) - {*numbers}:
+        return False
+    try:
+        value = float(evaluate(tree, numbers))
+    except (ArithmeticError, ValueError):
+        return True
+    return value == 0.0 or not math.isfinite(value)
+
+
+def derivative_free(rest: Value) -> bool:
+    """Tell whether a linear form without its velocities is zero.
+
+    Parameters
+    ----------
+    rest : Value
+        The form, with 0 for each velocity.
+
+    Returns
+    -------
+    bool
+        False also if that cannot be seen.
+    """
+    match rest:
+        case Number(value):
+            return value == 0.0
+        case Name():
+            return False
+        case Negative(operand):
+            return derivative_free(operand)
+        case Binary("+" | "-", a, b):
+            return derivative_free(a) and derivative_free(b)
+        case Binary("*", a, b):
+            return derivative_free(a) or derivative_free(b)
+        case Binary("/", a, _):
+            return derivative_free(a)
+    return False
