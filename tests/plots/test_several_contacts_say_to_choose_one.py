@@ -53,4 +53,4 @@ def test_a_notebook_shows_text() -> None:
 
 def test_another_contact_can_be_chosen() -> None:
     first, second = (run(BLOCKS).contact(name) for name in ("pad1", "pad2"))
-    assert first.contact("pad2").transitions.tolist() == second.transitions.tolist()
+    assert first.contact("pad2").transitions.t.tolist() == second.transitions.t.tolist()
