@@ -1,4 +1,4 @@
-"""`gms_fsm.charts.CHARTS` has every chart that is a model, by name, and is read from the registry."""
+"""`gms_fsm.charts.CHARTS` is read from the registry: every chart that is a model, by name."""
 
 from __future__ import annotations
 

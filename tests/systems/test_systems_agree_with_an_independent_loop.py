@@ -76,7 +76,7 @@ def blocks() -> list[Switch]:
                     Way(
                         i,
                         "stuck",
-                        lambda _, y, i=i, s=sign(mode): -s * (y[2 * i + 1] - p["V"]),
+                        lambda _, y, i=i, mode=mode: -sign(mode) * (y[2 * i + 1] - p["V"]),
                         with_the_belt,
                     )
                 )
@@ -191,7 +191,7 @@ def servo_on_paper(t_end: float) -> list[Switch]:
                     Way(
                         contact,
                         "stuck",
-                        lambda _, y, place=place, s=sign(mode): -s * y[place],
+                        lambda _, y, place=place, mode=mode: -sign(mode) * y[place],
                         stopped,
                     )
                 )
