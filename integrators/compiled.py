@@ -1,4 +1,4 @@
-"""`integrators.loop.record` as machine code: the very same functions, compiled by numba.
+"""`integrators.columns.record` as machine code: the very same functions, compiled by numba.
 
 The system's functions are passed as addresses of functions with fixed signatures, so that the loop
 is compiled once per machine and cached, whatever it integrates.
@@ -20,7 +20,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from integrators import advance, crossings, loop, sliding, step_size, steps
+from integrators import advance, columns, crossings, loop, sliding, step_size, steps
 from integrators.loop import Machines
 from integrators.sliding import Functions
 
@@ -73,14 +73,14 @@ _OF_AN_EVENT: tuple[Callable[..., Any], ...] = (
     loop._finish,
     loop._fired,
     loop._flowed,
-    loop._is_full,
+    columns._is_full,
     loop._held,
     loop._jump,
     loop._make_due,
     loop._only_due,
     loop._pick,
-    loop._put_firing,
-    loop._put_stop,
+    columns._put_firing,
+    columns._put_stop,
     loop._start,
     loop._steps_ahead,
 )
@@ -92,7 +92,7 @@ _OF_AN_ARC: tuple[Callable[..., Any], ...] = (
     loop._reset_if_advanced,
     loop._no_progress,
     loop._often_changed,
-    loop._put_modes,
+    columns._put_modes,
     loop._rearm,
     loop._undefined,
     loop.run_to_event,
@@ -222,8 +222,8 @@ def edition() -> str:
     >>> len(edition())
     16
     """
-    functions: list[Callable[..., Any]] = [loop.record, *_INLINED, *_OF_AN_ARC]
-    modules = (steps, step_size, crossings, advance, sliding, loop)
+    functions: list[Callable[..., Any]] = [columns.record, *_INLINED, *_OF_AN_ARC]
+    modules = (steps, step_size, crossings, advance, sliding, loop, columns)
     constants = [
         (name, value if isinstance(value, int | float) else getattr(value, "_fields", None))
         for module in modules
@@ -368,7 +368,7 @@ def compiled(name: str, function: Callable[..., None], store: Store | None) -> A
 
 
 def record(arguments: tuple[Any, ...], store: Store | None, notify: Callable[[str], None]) -> int:
-    """Call `integrators.loop.record` as machine code; this releases the GIL.
+    """Call `integrators.columns.record` as machine code; this releases the GIL.
 
     Parameters
     ----------
@@ -382,7 +382,7 @@ def record(arguments: tuple[Any, ...], store: Store | None, notify: Callable[[st
     Returns
     -------
     int
-        The result of `integrators.loop.record`.
+        The result of `integrators.columns.record`.
     """
     functions, machines, *others = arguments
     addresses: list[Any] = [_address(function) for function in (*functions[:4], *machines)]
@@ -445,7 +445,7 @@ def _compile_record(
     at_flow, at_arm, at_margins, at_normal, at_switch, at_act, at_tick, at_observe = (
         _function_at(_signature(SIGNATURES[name])) for name in names
     )
-    run = numba.njit(inline="always", **_OPTIONS)(loop.record)  # otherwise it is compiled twice
+    run = numba.njit(inline="always", **_OPTIONS)(columns.record)  # otherwise it is compiled twice
 
     def record(
         at: Any, machines: Any, b: Any, log: Any, recorded: Any, most_steps: Any, pause: Any

@@ -93,7 +93,7 @@ class Equations:
     discrete : list of int
         For each machine the bit at whose ticks alone it is asked; 0 for one that may fire any time.
     seen : int
-        Number of values that `integrators.loop.record` observes.
+        Number of values that `integrators.columns.record` observes.
     """
 
     flow: Flow

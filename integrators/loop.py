@@ -31,8 +31,6 @@ from integrators.sliding import (
     Functions,
     Held,
     Sliding,
-    flow_on,
-    look,
     margins_on,
     seize,
 )
@@ -53,12 +51,9 @@ from integrators.steps import (
 __all__ = [
     "MOST_SWITCHES",
     "Buffers",
-    "Log",
     "Machines",
     "Memory",
-    "Recorded",
     "Switch",
-    "record",
     "run_to_event",
 ]
 
@@ -80,8 +75,6 @@ PHASE, MICROSTEP, MACHINE, EDGE, FIRED_ONE, FRESH, STATUS, JUMP, ACTIVE, TAKEN, 
 )
 # Phases.
 START, ASK, PICK, FIRE, SETTLED, BEGIN, ARC, AFTER, JUMPING, FINISH, END = range(11)
-# Indices into Log.counts.
-FIRINGS, STOPS = 0, 1
 
 
 class Switch(Protocol):
@@ -127,30 +120,6 @@ class Buffers(NamedTuple):
     sliding: Sliding
     out: Output
     scratch: Scratch
-
-
-class Recorded(NamedTuple):
-    """Where the numbers are that a log stores for each machine."""
-
-    own: list[int]  # place in y of its own variable, -1 if it has none
-    seen: list[list[int]]  # three places among what is observed; the third is read after, too
-
-
-class Log(NamedTuple):
-    """Columns that `record` fills: one entry per firing, and both sides of every stop."""
-
-    counts: list[int]  # [firings, stops]
-    t: Vector
-    machine: list[int]
-    edge: list[int]
-    numbers: list[Vector]  # [own variable, the three of `Recorded.seen`, the third after]
-    seen: Vector  # scratch space for `observe`
-    rows_microstep: list[int]  # alongside the rows of Output
-    rows_mode: list[list[int]]  # of each machine, then for each surface whether it slides
-    stops_t: Vector
-    stops_microstep: list[int]
-    stops_y: list[Vector]
-    stops_mode: list[list[int]]
 
 
 def run_to_event(
@@ -511,129 +480,3 @@ def _often_changed(
         if w.watch[above] and (w.changed[above] or w.changed[at_least]):
             sliding.arrived[k] = 1
     return often and _no_progress(plan, now, memory, scratch)
-
-
-# --------------------------------------------------------------------------- into columns
-def record(
-    functions: Functions,
-    machines: Machines,
-    b: Buffers,
-    log: Log,
-    recorded: Recorded,
-    most_steps: int,
-    pause: bool,
-) -> int:
-    """Run and write all events into columns, until they are full or the run has ended.
-
-    Parameters
-    ----------
-    functions, machines
-        The system. ``observe(t, y, mode, signs, p, seen)`` fills the observed values of a state.
-    b : Buffers
-        The state of the run, changed in place.
-    log : Log
-        Filled; if it has room in ``stops_t``, stops are stored too.
-    recorded : Recorded
-        Where the numbers are that the log stores.
-    most_steps : int
-        Return after about this many steps or events.
-    pause : bool
-        Return before each firing as well.
-
-    Returns
-    -------
-    int
-        ROWS if a column is full or the steps are used up, FIRING, DONE or an error as in
-        `run_to_event`.
-    """
-    observe, now = machines.observe, b.now
-    counts, cursor = b.memory.counts, b.out.cursor
-    seen_at = float("nan")  # the time at which log.seen was computed
-    on = Held(functions, now.held, b.sliding)
-    motion = Motion(flow_on, margins_on, on)
-    left = most_steps
-    while True:
-        left -= 1
-        if left < 0 or _is_full(b.out, log):
-            return ROWS
-        event = run_to_event(functions, machines, motion, b, most_steps)
-        t = now.clock[T]
-        if event == ROWS:
-            for row in range(counts[TAKEN], cursor[ROW]):
-                log.rows_microstep[row] = 0
-                _put_modes(now.mode, b.sliding.flags, log.rows_mode[row])
-            counts[TAKEN] = cursor[ROW]
-            if counts[PHASE] == ARC:
-                return ROWS
-        elif event == FIRING:
-            if seen_at != t:
-                look(observe, on, t, now.y, now.mode, log.seen)
-            _put_firing(now, counts, log, recorded)
-            if pause:
-                return FIRING
-        elif event == FIRED:
-            look(observe, on, t, now.y, now.mode, log.seen)
-            seen_at = t
-            log.numbers[log.counts[FIRINGS]][4] = log.seen[recorded.seen[counts[MACHINE]][2]]
-            log.counts[FIRINGS] += 1
-        elif event == SLID:
-            seen_at = float("nan")
-        elif event not in (STOPPED, DONE):
-            return event
-        if event not in (ROWS, FIRING):
-            switched = event in (FIRED, SLID)
-            _put_stop(now, counts, b.out, b.sliding.flags, log, switched)
-        if event == DONE:
-            return DONE
-
-
-def _is_full(out: Output, log: Log) -> bool:
-    """Return whether a column has no room for the next event."""
-    if out.every_step and out.cursor[ROW] + 1 >= len(out.rows_t):
-        return True
-    if log.counts[FIRINGS] >= len(log.t):
-        return True
-    return 0 < len(log.stops_t) <= log.counts[STOPS]
-
-
-def _put_firing(now: Now, counts: list[int], log: Log, recorded: Recorded) -> None:
-    """Write the values known before a firing."""
-    i, row = counts[MACHINE], log.counts[FIRINGS]
-    numbers = log.numbers[row]
-    log.t[row] = now.clock[T]
-    log.machine[row] = i
-    log.edge[row] = counts[EDGE]
-    own, seen = recorded.own[i], recorded.seen[i]
-    numbers[0] = now.y[own] if own >= 0 else float("nan")
-    numbers[1] = log.seen[seen[0]]
-    numbers[2] = log.seen[seen[1]]
-    numbers[3] = log.seen[seen[2]]
-
-
-def _put_stop(
-    now: Now, counts: list[int], out: Output, flags: list[int], log: Log, switched: bool
-) -> None:
-    """Write the state and the modes from here on."""
-    t = now.clock[T]
-    if out.every_step and switched:
-        row = out.cursor[ROW]
-        put_row(out, t, now.y)
-        log.rows_microstep[row] = counts[MICROSTEP]
-        _put_modes(now.mode, flags, log.rows_mode[row])
-        counts[TAKEN] = out.cursor[ROW]
-    if len(log.stops_t) > 0:
-        row = log.counts[STOPS]
-        log.stops_t[row] = t
-        log.stops_microstep[row] = counts[MICROSTEP] if switched else 0
-        for j in range(len(now.y)):
-            log.stops_y[row][j] = now.y[j]
-        _put_modes(now.mode, flags, log.stops_mode[row])
-        log.counts[STOPS] += 1
-
-
-def _put_modes(mode: list[int], flags: list[int], place: list[int]) -> None:
-    n = len(mode)
-    for i in range(n):
-        place[i] = mode[i]
-    for k in range(len(flags)):
-        place[n + k] = flags[k]

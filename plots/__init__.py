@@ -2,7 +2,7 @@
 
 Importing this package needs neither a Graphviz program nor matplotlib; drawing does. Figures are in
 `plots.figures`, single panels in `plots.panels` (extra ``plots``). Once it is imported, charts,
-models and traces display themselves in a notebook.
+models, systems and traces display themselves in a notebook.
 """
 
 from __future__ import annotations

@@ -8,9 +8,20 @@ import textwrap
 from collections import Counter
 from dataclasses import dataclass
 
+from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.traces.trace import Trace, dwell_times
 
-__all__ = ["Piece", "Row", "Tally", "element_id", "escape", "part_id", "printable", "wrapped"]
+__all__ = [
+    "Piece",
+    "Row",
+    "Tally",
+    "edge_id",
+    "element_id",
+    "escape",
+    "part_id",
+    "printable",
+    "wrapped",
+]
 
 LONGEST_LINE = 52  # characters; longer texts are wrapped
 DOT, TRUE, FALSE, UNKNOWN = "●", "✓", "✗", "?"
@@ -50,8 +61,8 @@ class Tally:
     def __init__(self, trace: Trace) -> None:
         log = trace.transitions
         self.states = [state.name for state in trace.model.chart.states]
-        self.firings: Counter[tuple[int, str]] = Counter(
-            zip(log.element.tolist(), log.edge.tolist(), strict=True)
+        self.firings: Counter[tuple[int, str, str]] = Counter(
+            zip(log.element.tolist(), log.edge.tolist(), log.source.tolist(), strict=True)
         )
         self.dwell = dwell_times(trace)
 
@@ -61,9 +72,13 @@ class Tally:
         share = f" ({100 * seconds / whole:.0f} %)" if whole > 0 else ""
         return f"active {seconds:.4g} s{share}"
 
-    def of_edge(self, element: int, edge: str) -> str:
+    def times(self, element: int, edge: Transition) -> int:
+        """Return how often an edge was taken from its source."""
+        return self.firings[element, edge.name, edge.source]
+
+    def of_edge(self, element: int, edge: Transition) -> str:
         """Write how often an edge was taken."""
-        times = self.firings[element, edge]
+        times = self.times(element, edge)
         if not times:
             return "never taken"
         return "taken once" if times == 1 else f"taken {times} times"
@@ -115,3 +130,27 @@ def part_id(element: str, kind: str, name: str) -> str:
     """
     # Names in a chart are identifiers; other characters could be read as a port or as DOT syntax.
     return f"{element}-{kind}-" + re.sub(r"\W", "_", name)
+
+
+def edge_id(chart: Chart, element: str, kind: str, edge: Transition) -> str:
+    """Return the id of an edge or its guard; one that leaves several states has one per source.
+
+    Parameters
+    ----------
+    chart : Chart
+        The edge's chart.
+    element : str
+        Id of the element.
+    kind : {"edge", "guard"}
+        Which part.
+    edge : Transition
+        The edge, from one source.
+
+    Returns
+    -------
+    str
+        Such as ``element1-edge-arrest``, or ``element1-edge-arrest-from-slip``.
+    """
+    alone = sum(each.name == edge.name for each in chart.transitions) == 1
+    name = part_id(element, kind, edge.name)
+    return name if alone else part_id(name, "from", edge.source)

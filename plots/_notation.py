@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 import unicodedata
 from collections.abc import Mapping
@@ -14,8 +13,10 @@ from gms_fsm.language import (
     Both,
     Condition,
     Either,
+    Name,
     Spelling,
     Value,
+    renamed,
     spell,
 )
 
@@ -23,13 +24,14 @@ __all__ = ["NOTATIONS", "Writer"]
 
 NOTATIONS = ("stateflow", "math")
 
-MATH = Spelling(" ∧ ", " ∨ ", "!", "⊤", bars=True, products=False)  # ! puts its operand in brackets
+# ! puts its operand in brackets
+MATH = Spelling(" ∧ ", " ∨ ", "!", "⊤", bars=True, products=False, timers=True)
 # Tokens that differ between the two notations; numbers are separate tokens, so that the minus of
 # 1e-06 is not mistaken for an operator.
 _TOKEN = re.compile(
     r"(?P<power>\^\d+(?![\w.]))|(?P<number>\d[\d.]*(?:e[+-]?\d+)?)|(?P<name>\w+)|>=|<=|[*!-]"
 )
-_SIGNS = {">=": "≥", "<=": "≤", "*": "·", "-": "−", "!": "¬", "sqrt": "√"}
+_SIGNS = {">=": "≥", "<=": "≤", "*": "·", "-": "−", "!": "¬", "sqrt": "√", "pi": "π"}
 _RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 _GREEK = {
@@ -70,8 +72,10 @@ class Writer:
         if not self.math:
             return spell(tree, MATLAB_LIKE)
         chart = self.chart
-        known = chart.inputs + chart.variables + chart.parameter_names
-        names = {name: _symbol(name) for name in known}
+        known = (*chart.inputs, *chart.velocities, *chart.variables, *chart.parameter_names)
+        own = (*chart.let, *chart.force_names, *chart.rate_names)
+        names = {name: _symbol(name) for name in (*known, *own)}
+        names |= {f"d{name}": self.rate(name) for name in chart.variables}
         if "s" in chart.inputs:
             names["s"] = "s(v)"  # the threshold that the model supplies depends on the velocity
         return _TOKEN.sub(_formula_token, spell(tree, MATH, names))
@@ -86,6 +90,23 @@ class Writer:
     def flow(self, variable: str, tree: Value) -> str:
         """Write a flow."""
         return f"{self.rate(variable)} = {self.text(tree)}{'' if self.math else ';'}"
+
+    def equation(self, name: str, tree: Value) -> str:
+        """Write what a force or a named expression is."""
+        left = _symbol(name) if self.math else name
+        return f"{left} = {self.text(tree)}{'' if self.math else ';'}"
+
+    def total(self, force: str, tree: Value) -> str:
+        """Write the force of a contact over the sum of its elements' forces."""
+        elements = Name(f"Σ{force}" if self.math else f"sum({force})")
+        return self.equation(force, renamed(tree, {force: elements}))
+
+    def held(self) -> str:
+        """Write what a locked state does."""
+        write = _symbol if self.math else str
+        zeros = ", ".join(f"{write(each)} = 0" for each in self.chart.velocities)
+        forces = [write(each) for each in self.chart.force_names]
+        return f"{zeros}, {' and '.join(forces)} {'hold them' if forces[1:] else 'holds it'}"
 
     def assignment(self, variable: str, tree: Value) -> str:
         """Write an assignment."""
@@ -121,8 +142,6 @@ def _formula_token(match: re.Match[str]) -> str:
     if match["power"]:
         return token[1:].translate(_RAISED)
     if match["number"]:
-        if float(token) == math.pi:
-            return "π"
         digits, _, exponent = token.partition("e")
         power = f"10{str(int(exponent)).translate(_RAISED)}" if exponent else ""
         return (power if digits == "1" else f"{digits}·{power}") if power else digits

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from xml.etree import ElementTree
 
 from gms_fsm.charts.chart import Chart
-from plots._labels import Row, element_id, part_id
+from plots._labels import Row, edge_id, element_id, part_id
 from plots.render import drawn
 from plots.statechart import Sheet
 
@@ -33,6 +33,7 @@ def chart_svg(chart: Chart, n: int) -> str:
     root.attrib = {"viewBox": root.attrib["viewBox"]}
     groups = {group.get("id", ""): group for group in root.iter("g")}
     groups["graph0"].remove(groups["graph0"][0])  # the background; the page has its own
+    _name_texts(groups["graph0"], sheet.definitions())
     for number in numbers:
         element, edges = element_id(number), 0
         groups.get(element, root).attrib |= {"data-slot": str(number)}
@@ -41,8 +42,8 @@ def chart_svg(chart: Chart, n: int) -> str:
             group.attrib |= {"data-slot": str(number), "data-state": str(k)}
             _name_texts(group, sheet.state_rows(state, number))
             for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
-                guard = groups[part_id(element, "guard", edge.name)]
-                path = part_id(element, "edge", edge.name)
+                guard = groups[edge_id(chart, element, "guard", edge)]
+                path = edge_id(chart, element, "edge", edge)
                 for part in (guard, groups[f"{path}-1"], groups[f"{path}-2"]):
                     part.attrib |= {"data-slot": str(number), "data-edge": str(edges)}
                 _name_texts(guard, sheet.guard_rows(edge, priority, number))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -29,12 +28,7 @@ def stored_run(trace: Trace, between: NDArray[np.bool_], frame_of: Sequence[int]
     chart, n, pool = trace.model.chart, trace.n, _Pool()
     values = Scope.over(trace).watches()
     edges = _edges(chart)
-    first = chart.variables[0]
-    inner, inner_title = trace.z, "z [m]" if first == "z" else first
-    threshold = bool(edges) and "s" in chart.inputs  # without edges (LuGre) s is no threshold
-    if threshold:
-        with np.errstate(all="ignore"):
-            inner, inner_title = trace.z / trace.s, f"{first} / s(v), lines at ±1"
+    inner, inner_title, threshold = _inner(trace)
     sides, truth, holds = _explained(trace, edges, pool)
     log = _log(trace, edges)
     for entry in log:
@@ -51,7 +45,7 @@ def stored_run(trace: Trace, between: NDArray[np.bool_], frame_of: Sequence[int]
         "inner": {
             "title": inner_title,
             "bounds": [1, -1] if threshold else [],
-            "columns": [pool.add(inner[:, i]) for i in range(n)],
+            "columns": [] if inner is None else [pool.add(inner[:, i]) for i in range(n)],
         },
         "mode": mode,
         "pieces": [_pieces(trace.t.tolist(), mode[i]) for i in range(n)],
@@ -82,6 +76,18 @@ def stored_run(trace: Trace, between: NDArray[np.bool_], frame_of: Sequence[int]
         "fired": {e["row"]: [e["element"], e["edge"]] for e in log if e["made"]},
         "pool": pool.columns,
     }
+
+
+def _inner(trace: Trace) -> tuple[NDArray[np.float64] | None, str, bool]:
+    """Return what is drawn of each element, its title, and whether there are thresholds at ±1."""
+    chart = trace.model.chart
+    if not trace.places.variables:
+        return None, "", False
+    first = trace.places.variables[0]
+    if chart.transitions and "s" in chart.inputs:  # without edges (LuGre) s is no threshold
+        with np.errstate(all="ignore"):
+            return trace.z / trace.s, f"{first} / s(v), lines at ±1", True
+    return trace.z, "z [m]" if first == "z" else first, False
 
 
 def _edges(chart: Chart) -> list[dict[str, Any]]:
@@ -125,17 +131,17 @@ def _log(trace: Trace, edges: Sequence[Mapping[str, Any]]) -> list[dict[str, Any
     """Return each firing, the row that shows it, and whether the firing made that row."""
     times, steps = trace.t.tolist(), trace.microstep.tolist()
     made = {(t, step): row for row, (t, step) in enumerate(zip(times, steps, strict=True)) if step}
-    names = [edge["name"] for edge in edges]
-    firings: Counter[float] = Counter()  # of one instant
+    states = [state.name for state in trace.model.chart.states]
+    names = [(edge["name"], states[edge["source"]]) for edge in edges]
     found: list[dict[str, Any]] = []
-    for record in trace.transitions:
-        t, name = float(record.t), str(record.edge)
-        if name not in names:
+    for record, step in zip(trace.transitions, trace.steps.tolist(), strict=True):
+        t, name, source = float(record.t), str(record.edge), str(record.source)
+        if (name, source) not in names:
             raise TraceFileError(
-                f"the transition log names an edge {name!r} that is not in the chart"
+                f"the transition log names an edge {name!r} from {source!r} that is not in the "
+                "chart"
             )
-        firings[t] += 1
-        row = made.get((t, firings[t]))
+        row = made.get((t, step))
         after = min(int(np.searchsorted(trace.t, t, side="left")), len(times) - 1)
         text = f"element {int(record.element) + 1} {record.source} → {record.target} ({name})"
         found.append(
@@ -144,7 +150,7 @@ def _log(trace: Trace, edges: Sequence[Mapping[str, Any]]) -> list[dict[str, Any
                 "row": after if row is None else row,
                 "made": row is not None,
                 "element": int(record.element),
-                "edge": names.index(name),
+                "edge": names.index((name, source)),
                 "text": text,
             }
         )
@@ -231,9 +237,7 @@ def page_rows(trace: Trace) -> tuple[Trace, NDArray[np.bool_]]:
     if others.size > wanted:
         others = others[np.linspace(0, others.size - 1, wanted).astype(int)]
     kept[others] = True
-    rows = trace.rows.at(kept)
-    stored = {name: column[kept] for name, column in trace.stored.items()}
-    return replace(trace, rows=rows, stops=rows, stored=stored), between[kept]
+    return trace.picked(kept), between[kept]
 
 
 def _with_microsteps(trace: Trace) -> Trace:
@@ -246,7 +250,7 @@ def _with_microsteps(trace: Trace) -> Trace:
     pairs = zip(vars(stops).values(), vars(rows.at(new)).values(), strict=True)
     table = Rows(*(np.concatenate(pair) for pair in pairs))
     table = table.at(np.argsort(table.t, kind="stable"))
-    return Trace(table, table, trace.transitions, trace.model, trace.rig, trace.settings)
+    return replace(trace, rows=table, stops=table, stored={})
 
 
 def _explained(

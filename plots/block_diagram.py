@@ -1,6 +1,7 @@
-"""Draw the block diagram of the whole friction model, Fig. 2a of the paper, for any n.
+"""Draw block diagrams: of a system, or of the whole friction model (Fig. 2a of the paper).
 
-The velocity enters the chart of the elements directly and through the Stribeck curve; the chart
+A system is drawn by `plots._system_diagram`. In the friction model, for any number n of elements,
+the velocity enters the chart of the elements directly and through the Stribeck curve; the chart
 gives each element's force F_i and deflection rate dz_i; integrators turn the rates into deflections
 and feed them back; the forces and the viscous part add up to F. All positions are fixed here, in
 points, so Graphviz only draws: an automatic layout does not keep ports and wires in order.
@@ -21,6 +22,8 @@ from itertools import pairwise
 import graphviz
 
 from gms_fsm.errors import ParameterError
+from gms_fsm.systems.system import System
+from plots._system_diagram import system_diagram
 from plots.style import (
     BLUE,
     BLUE_TINT,
@@ -52,13 +55,14 @@ INTEGRATOR = (
 )
 
 
-def block_diagram(elements: int = 4) -> graphviz.Digraph:
-    """Draw the block diagram of a GMS model.
+def block_diagram(elements: int | System = 4) -> graphviz.Digraph:
+    """Draw the block diagram of a system, or of a GMS model.
 
     Parameters
     ----------
-    elements : int, optional
-        Number of elements; the picture counts them from 1.
+    elements : int or System, optional
+        A system: its bodies, contacts, signals, controllers and further states, and who acts on
+        whom. Or the number of elements of a GMS model; the picture counts them from 1.
 
     Returns
     -------
@@ -68,20 +72,32 @@ def block_diagram(elements: int = 4) -> graphviz.Digraph:
     Raises
     ------
     ParameterError
-        If `elements` is not an integer of at least 1.
+        If it is neither a system nor an integer of at least 1.
 
     Examples
     --------
     >>> graph = block_diagram(2)
     >>> graph.engine, sum("class=integrator" in line for line in graph.body)
     ('neato', 2)
+    >>> from gms_fsm import GMS, GMSParameters, PulledSlider
+    >>> from gms_fsm.systems.system import system_of
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> graph = block_diagram(system_of(model, PulledSlider(1.0, 2.0, 0.1)))
+    >>> sum("class=body" in line for line in graph.body)
+    1
     """
+    if isinstance(elements, System):
+        return system_diagram(elements)
     if isinstance(elements, bool) or not isinstance(elements, int) or elements < 1:
         raise ParameterError(
-            "the number of elements must be an integer of at least 1",
+            "it must be a System, or the number of elements, an integer of at least 1",
             place="elements",
             value=elements,
         )
+    return _model_diagram(int(elements))
+
+
+def _model_diagram(elements: int) -> graphviz.Digraph:
     graph = graphviz.Digraph(
         name="block diagram",
         engine="neato",
@@ -103,10 +119,10 @@ def block_diagram(elements: int = 4) -> graphviz.Digraph:
         },
         edge_attr={"color": INK, "arrowsize": "0.7", "penwidth": "1.1"},
     )
-    last = int(elements) - 1
+    last = elements - 1
     x_sum = X_RIGHT_LANE + last * LANE + 100
     y_bottom = min(Y_RATE - last * ELEMENT, Y_DEFLECTION - last * PORT) - 32
-    _chart(graph, int(elements), y_bottom)
+    _chart(graph, elements, y_bottom)
     _velocity(graph)
     _sum(graph, x_sum, top=Y_VISCOUS + MARGIN, bottom=Y_FORCE - last * ELEMENT - MARGIN)
     _viscous_path(graph, x_sum)

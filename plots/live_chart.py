@@ -11,6 +11,7 @@ carries the marks with which it was taken. Everything else is pale.
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from xml.etree import ElementTree
@@ -20,9 +21,9 @@ import numpy as np
 from gms_fsm._arguments import checked_integer
 from gms_fsm.errors import OutputError, ParameterError, shown
 from gms_fsm.inspection.explain import values_at
-from gms_fsm.language import Condition, clauses, evaluate
+from gms_fsm.language import Condition, clauses, evaluate, names_in
 from gms_fsm.traces.trace import Trace, check_trace
-from plots._labels import FALSE, TRUE, UNKNOWN, Piece, Row, element_id, part_id
+from plots._labels import FALSE, TRUE, UNKNOWN, Piece, Row, edge_id, element_id, part_id
 from plots.render import picture
 from plots.statechart import Sheet, chosen
 
@@ -54,6 +55,8 @@ class ElementLook:
         The edges that leave the active state, highest priority first.
     fired : str
         The last edge taken up to this row; empty if there was none.
+    source : str
+        The state that this edge left; empty if there was none.
     """
 
     element: int
@@ -61,6 +64,7 @@ class ElementLook:
     marks: Mapping[str, Marks]
     leaving: tuple[str, ...]
     fired: str
+    source: str
 
 
 class LiveChart:
@@ -77,7 +81,7 @@ class LiveChart:
     theme : {"light", "dark"}
         Colours.
     values : bool
-        Also write time, variables and inputs.
+        Also write time, variables, inputs, and the forces and accelerations that guards read.
     direction : {"TB", "LR"}
         States from top to bottom, or from left to right.
 
@@ -121,7 +125,10 @@ class LiveChart:
         self.values = values
         chart = trace.model.chart
         self._sheet = Sheet(chart, notation, direction, theme, live=True)
-        self._names = [*chart.variables, *(name for name in chart.inputs if name != "t")]
+        read = frozenset[str]().union(*map(names_in, chart.guards.values()))
+        late = [name for name in (*chart.force_names, *chart.rate_names) if name in read]
+        names = dict.fromkeys([*chart.variables, *chart.inputs, *chart.velocities, *late])
+        self._names = [name for name in names if name != "t"]
         self._log_count = _log_counts(trace)
         log = trace.transitions
         self._own = {i: np.flatnonzero(log.element == i) for i in self.elements}
@@ -136,7 +143,9 @@ class LiveChart:
         self.root.set("style", f"background:{self._sheet.colours.paper}")
         groups = {group.get("id", ""): group for group in self.root.iter("g")}
         self._parts = {i: _ElementParts(self._sheet, i, groups) for i in self.elements}
-        texts = groups["graph0"].findall("text")  # below the picture: the values, and last the time
+        # Below the picture: definitions, then the values, and last the time.
+        defined = sum(map(len, self._sheet.definitions()))
+        texts = groups["graph0"].findall("text")[defined:]
         self._value_texts = {
             i: texts[:-1] if bare else groups[element_id(i)].findall("text")[TITLE:]
             for i in self.elements
@@ -208,11 +217,15 @@ class LiveChart:
         marks = {edge: _marks(chart.guards[edge], values) for edge in leaving}
         own, count = self._own[element], int(self._log_count[row])
         past = int(np.searchsorted(own, count))  # firings of this element up to here
-        fired = str(trace.transitions.edge[own[past - 1]]) if past else ""
-        if past and trace.microstep[row] and own[past - 1] == count - 1:
+        if not past:
+            return ElementLook(element, state, marks, leaving, "", "")
+        last = int(own[past - 1])
+        record = trace.transitions[last]
+        fired, source = str(record.edge), str(record.source)
+        if (record.t, trace.steps[last]) == (trace.t[row], trace.microstep[row]):
             # This row is that firing; its marks are those of the row before.
             marks[fired] = _marks(chart.guards[fired], values_at(trace, row - 1, element))
-        return ElementLook(element, state, marks, leaving, fired)
+        return ElementLook(element, state, marks, leaving, fired, source)
 
     # ------------------------------------------------------------------ drawing
     def frame(self, row: int) -> str:
@@ -329,10 +342,11 @@ def _log_counts(trace: Trace) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
     m firings at one time give m + 1 rows, the first one before them; a row of a requested time is
     a single row after all of them.
     """
-    log = trace.transitions.t
+    entries = list(zip(trace.transitions.t.tolist(), trace.steps.tolist(), strict=True))
     in_steps = np.isin(trace.t, trace.t[trace.microstep > 0])
-    before = np.searchsorted(log, trace.t, side="left") + trace.microstep
-    return np.where(in_steps, before, np.searchsorted(log, trace.t, side="right"))
+    steps = np.where(in_steps, trace.microstep, np.iinfo(np.int64).max)
+    rows = zip(trace.t.tolist(), steps.tolist(), strict=True)
+    return np.array([bisect_right(entries, row) for row in rows], dtype=np.int64)
 
 
 def _marks(guard: Condition, values: Mapping[str, float]) -> Marks:
@@ -391,30 +405,34 @@ class _ElementParts:
             texts = _paired(sheet.state_rows(state, number), group.findall("text"))
             self.states[state.name] = (group, texts)
             for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
-                name = part_id(element, "edge", edge.name)
-                guard = groups[part_id(element, "guard", edge.name)]
+                name = edge_id(chart, element, "edge", edge)
+                guard = groups[edge_id(chart, element, "guard", edge)]
                 texts = _paired(sheet.guard_rows(edge, priority, number), guard.findall("text"))
-                self.edges[edge.name] = (guard, texts, [groups[f"{name}-1"], groups[f"{name}-2"]])
+                self.edges[edge.name, edge.source] = (
+                    guard,
+                    texts,
+                    [groups[f"{name}-1"], groups[f"{name}-2"]],
+                )
 
     def paint(self, look: ElementLook) -> None:
         for state, (group, texts) in self.states.items():
             self._paint_state(group, texts, state == look.active)
-        for edge, (guard, texts, halves) in self.edges.items():
-            kind = "leaving" if edge in look.leaving else "pale"
-            colour = self.colours.ink if edge in look.leaving else self.colours.pale
-            classes = [kind]
-            if edge == look.fired:
+        for (edge, source), (guard, texts, halves) in self.edges.items():
+            leaving, fired = source == look.active, (edge, source) == (look.fired, look.source)
+            colour = self.colours.ink if leaving else self.colours.pale
+            classes = ["leaving" if leaving else "pale"]
+            if fired:
                 colour = self.colours.fired
                 classes.append("fired")
             for half in halves:
                 _classify(half, "edge", classes)
                 for shape in _shapes(half):
                     shape.set("stroke", colour)
-                    shape.set("stroke-width", THICK if edge == look.fired else THIN)
+                    shape.set("stroke-width", THICK if fired else THIN)
                     if shape.get("fill") != "none":
                         shape.set("fill", colour)
             _classify(guard, "node guard", classes)
-            marks = look.marks.get(edge)
+            marks = look.marks.get(edge) if leaving or fired else None
             plain = self.colours.pale if classes == ["pale"] else self.colours.ink
             for piece, node in texts:
                 self._paint_text(piece, node, marks, plain, colour)

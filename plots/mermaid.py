@@ -1,8 +1,8 @@
 """Write a chart as Mermaid text, which many sites and editors can draw.
 
-The result is a ``stateDiagram-v2``: the actions of a state are its description; an edge carries its
-priority, guard and action. Every character that Mermaid could read as syntax is written as
-``#code;``, which Mermaid displays as the character.
+The result is a ``stateDiagram-v2``: the actions and forces of a state are its description; an edge
+carries its priority, guard and action; named expressions are a note. Every character that Mermaid
+could read as syntax is written as ``#code;``, which Mermaid displays as the character.
 """
 
 from __future__ import annotations
@@ -12,8 +12,9 @@ import re
 from collections.abc import Iterator
 
 from gms_fsm._arguments import checked_kind
-from gms_fsm.charts.chart import Chart, State
-from gms_fsm.language import MATLAB_LIKE, spell
+from gms_fsm.charts.chart import Chart
+from plots._contents import Texts, chart_texts, state_texts
+from plots._notation import Writer
 
 __all__ = ["mermaid"]
 
@@ -51,33 +52,28 @@ def mermaid(chart: Chart) -> str:
     checked_kind("chart", chart, Chart, "a Chart, of a model its .chart")
     ids = {state.name: _id(i, state.name) for i, state in enumerate(chart.states, start=1)}
     title = json.dumps(_printable(chart.name), ensure_ascii=False)
-    lines = [f"[*] --> {ids[chart.default_state.name]}"]
+    write, lines = Writer(chart, "stateflow"), [f"[*] --> {ids[chart.default_state.name]}"]
     for state in chart.states:
         name, own = state.name[:1].upper() + state.name[1:], ids[state.name]
         lines.append(f'state "{_escape(name)}" as {own}')
         # The space after the colon is needed: Mermaid would read ":#58;" as a style.
-        lines += [f"{own} : {_escape(line)}" for line in _doings(chart, state)]
+        lines += [f"{own} : {_escape(line)}" for line in _lines(state_texts(write, state))]
     for state in chart.states:
         for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
             label = f"{priority} [{chart.guard_text(edge.name)}]"
-            actions = chart.assignments["action", edge.name]
-            if actions:
-                texts = (f"{name} = {spell(tree, MATLAB_LIKE)};" for name, tree in actions.items())
-                label += " {" + " ".join(texts) + "}"
+            actions = write.actions(chart.assignments["action", edge.name])
+            label += f" {actions}" if actions else ""
             lines.append(f"{ids[edge.source]} --> {ids[edge.target]} : {_escape(label)}")
+    shared = list(_lines(chart_texts(write)))
+    if shared:
+        first = ids[chart.default_state.name]
+        lines += [f"note right of {first}", *map(_escape, shared), "end note"]
     head = f"---\ntitle: {title}\n---\nstateDiagram-v2\n"
     return head + "".join(f"    {line}\n" for line in lines)
 
 
-def _doings(chart: Chart, state: State) -> Iterator[str]:
-    flow = {f"d{variable}": chart.flows[state.name, variable] for variable in chart.variables}
-    for kind, trees in (
-        ("entry", chart.assignments["entry", state.name]),
-        ("during", flow),
-        ("exit", chart.assignments["exit", state.name]),
-    ):
-        for name, tree in trees.items():
-            yield f"{kind}: {name} = {spell(tree, MATLAB_LIKE)};"
+def _lines(texts: Texts) -> Iterator[str]:
+    return (f"{kind}: {text}" for kind, own in texts for text in own)
 
 
 def _id(place: int, name: str) -> str:

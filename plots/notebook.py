@@ -1,4 +1,4 @@
-"""Charts, models and traces display themselves in a notebook once `plots` is imported.
+"""Charts, models, systems and traces display themselves in a notebook once `plots` is imported.
 
 The core knows nothing about pictures, so this module adds the display methods to its classes.
 """
@@ -11,7 +11,9 @@ from typing import Any
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import MissingExtraError
 from gms_fsm.systems.models import GMS, ChartModel, LuGre, Model
+from gms_fsm.systems.system import Contact, Several, System
 from gms_fsm.traces.trace import Trace
+from plots.block_diagram import block_diagram
 from plots.render import drawn
 from plots.statechart import statechart
 
@@ -26,14 +28,22 @@ def chart_svg(chart: Chart) -> str | None:
     return None if picture is None else picture.decode()
 
 
-def model_svg(model: Model) -> str | None:
-    """Return a model's bank of elements as SVG, or None without Graphviz."""
+def model_svg(model: Model | Contact) -> str | None:
+    """Return a model's or a contact's bank of elements as SVG, or None without Graphviz."""
     picture = drawn(statechart(model.chart, model.n if model.n <= MOST_ELEMENTS else 1), "svg")
     return None if picture is None else picture.decode()
 
 
+def system_svg(system: System) -> str | None:
+    """Return a system's block diagram as SVG, or None without Graphviz."""
+    picture = drawn(block_diagram(system), "svg")
+    return None if picture is None else picture.decode()
+
+
 def trace_png(trace: Trace) -> bytes | None:
-    """Return a run's overview as PNG, or None without matplotlib."""
+    """Return a run's overview as PNG, or None without matplotlib or with several contacts."""
+    if isinstance(trace.model, Several):
+        return None
     try:
         from plots.figures import overview
     except MissingExtraError:
@@ -47,7 +57,8 @@ def register() -> None:
     """Add the display methods to the classes."""
     methods: tuple[tuple[type[Any], str, Any], ...] = (
         (Chart, "_repr_svg_", chart_svg),
-        *((model, "_repr_svg_", model_svg) for model in (GMS, LuGre, ChartModel)),
+        *((model, "_repr_svg_", model_svg) for model in (GMS, LuGre, ChartModel, Contact)),
+        (System, "_repr_svg_", system_svg),
         (Trace, "_repr_png_", trace_png),
     )
     for kind, name, method in methods:

@@ -165,7 +165,8 @@ class Run {
     });
     const beside = runs.filter((run) => run !== this);
     const note = beside.length ? "; dotted: the other run" : "";
-    for (const [name, title] of [["F", "F [N]"], ["inner", this.inner.title], ["v", "v [m/s]"], ["x", "x [m]"]]) {
+    const inner = this.inner.columns.length ? [["inner", this.inner.title]] : []; // none without variables
+    for (const [name, title] of [["F", "F [N]"], ...inner, ["v", "v [m/s]"], ["x", "x [m]"]]) {
       const lines = name === "inner"
         ? [...this.inner.bounds.map((u) => [t.map(() => u), "--line", []]),
           ...this.inner.columns.map((column, i) => [along(this, column), data.colours[i % data.colours.length], DASHES[i % DASHES.length]])]
@@ -230,8 +231,10 @@ class Run {
 
   highlight() {
     const first = 1 + this.inner.bounds.length;
-    this.plots[1].series.forEach((line, k) => { line.width = k === first + this.chosen ? 2.4 : 1.2; });
-    this.plots[1].redraw();
+    if (this.inner.columns.length) {
+      this.plots[1].series.forEach((line, k) => { line.width = k === first + this.chosen ? 2.4 : 1.2; });
+      this.plots[1].redraw();
+    }
     this.tracks.forEach((track, i) => track.parentNode.classList.toggle("chosen", i === this.chosen));
     this.fit();
   }

@@ -70,10 +70,18 @@ def schematic(
     Raises
     ------
     ParameterError
-        If the row does not exist, or there are too many elements to draw.
+        If the row does not exist, there are too many elements to draw, or the chart has no
+        variables.
     """
     if trace is not None:
         check_trace(trace)
+        if not trace.model.chart.variables:
+            raise ParameterError(
+                "a schematic shows deflections, and this chart has no variables",
+                place=trace.model.title,
+                advice="draw the chart with plots.statechart, or the system with "
+                "plots.block_diagram",
+            )
     n = elements if trace is None else trace.n
     if not isinstance(n, (int, np.integer)) or isinstance(n, bool) or not 1 <= n <= MOST:
         raise ParameterError(f"a schematic shows 1 to {MOST} elements", place="elements", value=n)

@@ -21,6 +21,7 @@ from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ParameterError
 from gms_fsm.language import Both, Condition, Either, clauses
 from gms_fsm.traces.trace import Trace
+from plots._contents import Texts, chart_texts, state_texts
 from plots._labels import (
     DOT,
     LONGEST_LINE,
@@ -28,6 +29,7 @@ from plots._labels import (
     Piece,
     Row,
     Tally,
+    edge_id,
     element_id,
     escape,
     part_id,
@@ -299,9 +301,9 @@ class Sheet:
             edge_attr={"color": ink, "arrowsize": "0.7", "penwidth": "1.1"},
         )
         graph.chart = self.chart
-        if foot:
-            last = [[Piece(line, "value")] for line in foot.splitlines()]
-            below = [*values, *last] if bare else last
+        below = self.definitions() + (list(values) if bare else [])
+        below += [[Piece(line, "value")] for line in foot.splitlines()]
+        if below:
             graph.attr(label=f"<{self._lines(below)}>", labeljust="l", labelloc="b")
         if bare:
             self._draw_element(graph, numbers[0])
@@ -376,14 +378,14 @@ class Sheet:
         element = element_id(number)
         source = part_id(element, "state", edge.source)
         target = part_id(element, "state", edge.target)
-        guard = part_id(element, "guard", edge.name)
-        name = part_id(element, "edge", edge.name)
+        guard = edge_id(self.chart, element, "guard", edge)
+        name = edge_id(self.chart, element, "edge", edge)
         box = self._guard_box(edge, priority, number)
         kind = "guard marked" if edge.name in self.marked else "guard"
         graph.node(guard, f"<{box}>", id=guard, **{"class": kind})
         before, after, left, right = "nswe" if self.direction == "TB" else "wens"
         look = {}
-        if self.tally is not None and not self.tally.firings[number, edge.name]:
+        if self.tally is not None and not self.tally.times(number, edge):
             look = {"style": "dashed"}
         if edge.name in self.marked:
             look |= {"class": "marked", "color": self.colours.fired, "penwidth": MARKED}
@@ -400,6 +402,16 @@ class Sheet:
             graph.edge(f"{guard}:{after}", source, **into)
 
     # ----------------------------------------------------------------- labels
+    def definitions(self) -> list[Row]:
+        """Return what is written below the picture: what all states share.
+
+        Returns
+        -------
+        list of Row
+            Named expressions and the force of the contact (see `plots._contents.chart_texts`).
+        """
+        return _rows(chart_texts(self.write))
+
     def state_rows(self, state: State, number: int) -> list[Row]:
         """Return the text in a state's box.
 
@@ -418,19 +430,7 @@ class Sheet:
         title = [Piece(state.name[:1].upper() + state.name[1:], "title")]
         if self.live:
             title.append(Piece(f" {DOT}", "dot"))
-        write, trees = self.write, self.chart.assignments
-        flows = [write.flow(v, self.chart.flows[state.name, v]) for v in self.chart.variables]
-        rows = [title]
-        for kind, texts in (
-            ("entry", [write.assignment(*item) for item in trees["entry", state.name].items()]),
-            ("during", flows),
-            ("exit", [write.assignment(*item) for item in trees["exit", state.name].items()]),
-        ):
-            head = f"{kind}: "
-            for text in texts:
-                for line in wrapped(text):
-                    rows.append([Piece(head, "word"), Piece(line)])
-                    head = " " * len(head)
+        rows = [title, *_rows(state_texts(self.write, state))]
         if self.tally is not None:
             rows.append([Piece(self.tally.of_state(number, state.name), "count")])
         return rows
@@ -457,12 +457,12 @@ class Sheet:
             (line, clause)
             for clause, part in enumerate(clauses(guard))
             for line in self._clause_lines(part, inside=isinstance(guard, Both))
-        ]
+        ] or [(self.write.text(guard), -1)]  # always true
         rows: list[Row] = [[Piece(edge.name, "word")]] if self.names else []
         for i, (line, clause) in enumerate(lines):
             last = i + 1 == len(lines) or lines[i + 1][1] != clause
             row = [Piece("[" if i == 0 else " ", "bracket"), Piece(line, "clause", clause)]
-            if last and self.live:
+            if last and self.live and clause >= 0:
                 row.append(Piece(TRUE, "mark", clause))
             if last and i + 1 < len(lines):
                 # The space is a separate text: some SVG readers drop leading spaces.
@@ -473,9 +473,8 @@ class Sheet:
         action = self.write.actions(self.chart.assignments["action", edge.name])
         rows += [[Piece(line, "action")] for line in wrapped(action)]
         if self.tally is not None:
-            taken = bool(self.tally.firings[number, edge.name])
-            text = self.tally.of_edge(number, edge.name)
-            rows.append([Piece(text, "count" if taken else "never")])
+            taken = bool(self.tally.times(number, edge))
+            rows.append([Piece(self.tally.of_edge(number, edge), "count" if taken else "never")])
         return [
             [Piece(str(priority) if i == 0 else " ", "priority"), *row]
             for i, row in enumerate(rows)
@@ -557,3 +556,14 @@ class Sheet:
         words = escape(piece.text)
         words = f"<B>{words}</B>" if bold else words
         return f'<FONT FACE="{face}" POINT-SIZE="{size}" COLOR="{colour}">{words}</FONT>'
+
+
+def _rows(texts: Texts) -> list[Row]:
+    """Return texts as lines below one another, each kind before the first of its own."""
+    rows: list[Row] = []
+    for kind, own in texts:
+        head = f"{kind}: "
+        for line in (line for text in own for line in wrapped(text)):
+            rows.append([Piece(head, "word"), Piece(line)])
+            head = " " * len(head)
+    return rows

@@ -105,6 +105,12 @@ class Transition:
         guard: str,
         actions: Mapping[str, str] | None = None,
     ) -> None:
+        if not isinstance(source, str) and not isinstance(source, Sequence):
+            raise ChartError(
+                "it must be the name of a state, or several",
+                place=f"edge {shown(name)}: source",
+                value=source,
+            )
         sources = (source,) if isinstance(source, str) else tuple(source)
         if not sources:
             raise ChartError("it leaves no state", place=f"edge {shown(name)}")

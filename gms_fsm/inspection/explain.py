@@ -262,9 +262,9 @@ def _edge_taken(trace: Trace, row: int, element: int) -> str:
     microstep = int(trace.microstep[row])
     if microstep == 0 or _only_slides(trace, row):
         return ""
-    log = trace.transitions[trace.transitions.t == trace.t[row]]
-    taken = log[microstep - 1]
-    return str(taken.edge) if taken.element == element else ""
+    log = trace.transitions
+    made = log[(log.t == trace.t[row]) & (trace.steps == microstep) & (log.element == element)]
+    return str(made.edge[0]) if made.size else ""
 
 
 def _only_slides(trace: Trace, row: int) -> bool:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from gms_fsm.language._fold import fold
 from gms_fsm.language._powers import product_power
-from gms_fsm.language._tree import Binary, Both, Call, Either, Negative, Node, Not, Relation
+from gms_fsm.language._tree import Binary, Both, Call, Either, Name, Negative, Node, Not, Relation
 
 __all__ = ["LEVELS", "MATLAB_LIKE", "PYTHON", "Spelling", "spell"]
 
@@ -27,6 +28,8 @@ class Spelling:
         Write ``abs(u)`` as ``|u|``.
     products : bool
         Write small integer powers as products, and other powers as ``pow(a, b)``.
+    timers : bool
+        Write ``age >= T`` as ``after(T)``.
     """
 
     both: str
@@ -35,10 +38,11 @@ class Spelling:
     true: str
     bars: bool
     products: bool
+    timers: bool = False
 
 
 PYTHON = Spelling(" and ", " or ", "not ", "True", bars=False, products=True)
-MATLAB_LIKE = Spelling(" && ", " || ", "!", "true", bars=True, products=False)
+MATLAB_LIKE = Spelling(" && ", " || ", "!", "true", bars=True, products=False, timers=True)
 
 # How tightly each operator binds (its precedence).
 LEVELS = {"or": 1, "and": 2, "not": 3, "<": 4, "+": 5, "-": 5, "*": 6, "/": 6, "neg": 7, "**": 8}
@@ -96,6 +100,8 @@ class _Printer:
         text = repr(value)  # always with a point or an exponent: 1/2 stays one half everywhere
         if not self.spelling.products and float(f"{value:g}") == value:
             text = f"{value:g}"
+        if not self.spelling.products and value == math.pi:
+            text = "pi"
         return _Printed(text, _ATOM if value >= 0 else LEVELS["neg"])
 
     def name(self, name: str) -> _Printed:
@@ -135,6 +141,8 @@ class _Printer:
 
     def relation(self, node: Relation, parts: Iterator[_Printed]) -> _Printed:
         left, right = (part.at(LEVELS["+"]) for part in parts)
+        if node.left == Name("age") and node.op == ">=" and self.spelling.timers:
+            return _Printed(f"after({right})", _ATOM)
         return _Printed(f"{left} {node.op} {right}", LEVELS["<"])
 
     def in_state(self, element: int, state: str) -> _Printed:

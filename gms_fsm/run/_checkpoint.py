@@ -191,6 +191,8 @@ def _check(run: Resumable, state: Mapping[str, Any], kept: Mapping[str, Any]) ->
         "edges": (state["edges"], -1, edges - 1),
         "room": (state["room"], 0, len(b.relations.watch) - 1),
         "watch": (state["watch"], 0, 1),
+        "due": (state["due"], 0, 1),
+        "held": (counts[loop.HOLD], 0, sum({*start.program.discrete})),
         "phase": (counts[loop.PHASE], loop.START, loop.END),
         "machine": (counts[loop.MACHINE], machine, n - 1),
         "edge": (counts[loop.EDGE], 0, max(0, edges - 1)),

@@ -29,7 +29,7 @@ from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
 from integrators import hybrid, loop
 from integrators.advance import ROW, STEPS
-from integrators.loop import FIRINGS, STOPS
+from integrators.columns import FIRINGS, STOPS, Log, Recorded
 from integrators.sliding import Functions
 from integrators.steps import T
 
@@ -183,7 +183,7 @@ class Columns:
         out = b.out._replace(rows_t=floats(rows), rows_y=floats((rows, size)))
         self.buffers: hybrid.Buffers = b._replace(out=out)
         ints_of: Any = functools.partial(np.array, dtype=np.int64)
-        self.log = loop.Log(
+        self.log = Log(
             counts=ints(2),
             t=floats(256),
             machine=ints(256),
@@ -197,7 +197,7 @@ class Columns:
             stops_y=floats((stops, size)),
             stops_mode=ints((stops, modes)),
         )
-        self.recorded = loop.Recorded(*(ints_of(each) for each in layout.recorded()))
+        self.recorded = Recorded(*(ints_of(each) for each in layout.recorded()))
         if stops:
             self.log.stops_t[0], self.log.stops_y[0] = start.t_start, self.buffers.now.y
             self.log.stops_mode[0] = list(layout.not_sliding(start.mode))
@@ -240,7 +240,7 @@ class Columns:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Restore what `state` returned."""
-        self.log = loop.Log(**{name: state[name] for name in self.log._fields})
+        self.log = Log(**{name: state[name] for name in self.log._fields})
         out = self.buffers.out._replace(rows_t=state["rows_t"], rows_y=state["rows_y"])
         self.buffers = self.buffers._replace(out=out)
 

@@ -154,9 +154,8 @@ class ElementMachines:
         table: list[list[tuple[int, Guard]]] = []
         for state in chart.states:
             rows = []
-            for index, edge in enumerate(chart.transitions):
-                if edge.source != state.name:  # an edge may leave several states
-                    continue
+            own = {edge.name: index for index, edge in chart.leaving(state.name)}
+            for edge in {edge.name: edge for edge in chart.transitions}.values():
                 for transition in self.machine.get_transitions(edge.name, source=state.name):
                     conditions = [c.func for c in transition.conditions]
                     if conditions != [self.guards[edge.name]] or transition.dest != edge.target:
@@ -166,8 +165,14 @@ class ElementMachines:
                             place=f"edge {edge.name!r}",
                             advice="write them in the chart's guard, the only source of switching",
                         )
-                    rows.append((index, self.guards[edge.name]))
+                    rows.append((own.get(edge.name, -1), self.guards[edge.name]))
             found = [index for index, _ in rows]
+            if -1 in found:
+                raise ChartError(
+                    f"the machine has an edge from {state.name!r} that is not in chart "
+                    f"{chart.name!r}",
+                    advice="change the chart, the only source of switching",
+                )
             for index, edge in chart.leaving(state.name):
                 if found.count(index) != 1:
                     raise ChartError(

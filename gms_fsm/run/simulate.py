@@ -182,7 +182,10 @@ def _mounted(model: object, rig: Rig | float, t_end: float | None) -> tuple[Rig 
         return None, rig if t_end is None else t_end  # type: ignore[return-value]
     if t_end is None:
         raise ParameterError(
-            "it is missing", place="t_end", advice="write simulate(model, rig, t_end)"
+            "it must be a number",
+            place="t_end",
+            value=None,
+            advice="write simulate(model, rig, t_end), or simulate(system, t_end)",
         )
     return rig, t_end  # type: ignore[return-value]
 

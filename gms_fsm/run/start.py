@@ -139,21 +139,8 @@ class Start:
         ParameterError, SignalError
             If an argument breaks its rule.
         """
-        if isinstance(model, System):
-            system = model
-        else:
-            for what, given, mark, example in (
-                ("model", model, "chart", "GMS(parameters, law='signed')"),
-                ("rig", rig, "signals", "Prescribed('0.1*sin(t)')"),
-            ):
-                if not hasattr(given, mark):
-                    raise ParameterError(
-                        f"it must be a {what}, for example {example}", place=what, value=given
-                    )
-            assert rig is not None
-            held = settings is not None and settings.events == "held"
-            system = system_of(model, rig, settings.step if settings and held else None)
         chosen = Settings() if settings is None else settings
+        system = _system(model, rig, chosen)
         t_start, t_end = _times(t_start, t_end)
         _check_resolution(chosen, t_start, t_end)
         program = lower(system)
@@ -183,18 +170,6 @@ class Start:
         program = _with_waking_times(program, system, t_start, last)
         program = replace(program, ticks=_ticks(system, t_start, last))
         y, mode = _initial(system, program, t_start, {} if initial is None else initial)
-        kept: dict[str, Setting] = {
-            "method": chosen.method_name,
-            "step": chosen.step,
-            "rtol": chosen.rtol,
-            "atol": used,
-            "max_step": chosen.max_step if math.isfinite(chosen.max_step) else None,
-            "max_steps": chosen.max_steps,
-            "events": chosen.events,
-            "engine": chosen.engine,
-            "t_start": t_start,
-            "t_end": t_end,
-        }
         single = system.contacts[0] if len(system.contacts) == 1 else Several(system)
         origin: tuple[Any, Any] = (single, Mounting(system))
         if not isinstance(model, System):
@@ -210,7 +185,7 @@ class Start:
             y=y,
             mode=mode,
             options=options,
-            settings=kept,
+            settings=_recorded(chosen, used, t_start, t_end),
             chosen=chosen,
         )
 
@@ -241,6 +216,38 @@ class Start:
             options=replace(self.options, atol=tolerances, time_scale=scales.time),
             settings={**self.settings, "atol": used},
         )
+
+
+def _system(model: Model | System, rig: Rig | None, chosen: Settings) -> System:
+    """Return what runs as a system."""
+    if isinstance(model, System):
+        return model
+    for what, given, mark, example in (
+        ("model", model, "chart", "GMS(parameters, law='signed')"),
+        ("rig", rig, "signals", "Prescribed('0.1*sin(t)')"),
+    ):
+        if not hasattr(given, mark):
+            raise ParameterError(
+                f"it must be a {what}, for example {example}", place=what, value=given
+            )
+    assert rig is not None
+    return system_of(model, rig, chosen.step if chosen.events == "held" else None)
+
+
+def _recorded(chosen: Settings, atol: Setting, t_start: float, t_end: float) -> dict[str, Setting]:
+    """Return the settings as a trace records them."""
+    return {
+        "method": chosen.method_name,
+        "step": chosen.step,
+        "rtol": chosen.rtol,
+        "atol": atol,
+        "max_step": chosen.max_step if math.isfinite(chosen.max_step) else None,
+        "max_steps": chosen.max_steps,
+        "events": chosen.events,
+        "engine": chosen.engine,
+        "t_start": t_start,
+        "t_end": t_end,
+    }
 
 
 def _times(t_start: float, t_end: float) -> tuple[float, float]:
@@ -447,10 +454,11 @@ def _entered(
     for bank, contact in zip(layout.banks, system.contacts, strict=True):
         chart = contact.chart
         steps = chart.assignments["entry", chart.default_state.name]
-        for i in range(bank.n):
-            values = found[bank.first + i] | parameter_values(contact, i)
-            if mode[bank.first + i] != 0:
+        elements = zip(found[bank.elements], mode[bank.elements], strict=True)
+        for i, (seen, state) in enumerate(elements):
+            if state != 0:
                 continue
+            values = seen | parameter_values(contact, i)
             for name, tree in steps.items():
                 if name in chart.velocities:
                     raise ParameterError(

@@ -376,16 +376,8 @@ class _Reader:
     def bank(self, index: int, contact: Contact) -> Bank:
         chart, model, c = contact.chart, contact.model, contact.name
         owner = f"contact {c!r}"
-        weights = np.ones(contact.n) if model is None else model.weights
-        self.own[of(c, "threshold weight")] = (index, np.asarray(weights, dtype=np.float64))
-        names: dict[str, Value] = {"t": Name("t")}
+        names: dict[str, Value] = {"t": Name("t"), **self.numbers(index, contact)}
         own_names: dict[str, str] = {}  # of what an action can set
-        for name, value in contact.values.items():
-            if np.ndim(value) == 0:
-                self.shared[of(c, name)] = float(value)
-            else:
-                self.own[of(c, name)] = (index, np.asarray(value, dtype=np.float64))
-            names[name] = Name(of(c, name))
         # Velocities and the position, those of a body where they are just that.
         jacobian, moved = [], {body.v: body for body in self.system.bodies}
         velocities = []
@@ -403,16 +395,8 @@ class _Reader:
         for name in chart.inputs:
             if name not in names and not (name == "s" and model is not None):
                 names[name] = self.input(contact, name, owner)
-        for name in contact.inputs:
-            if name not in chart.inputs:
-                raise ParameterError(
-                    f"inputs has {shown(name)}, which its chart does not read",
-                    place=f"{self.here}, {owner}",
-                    advice=f"the chart's inputs are {', '.join(chart.inputs) or 'none'}",
-                )
-        threshold = ""
-        if model is not None and model.stribeck is not None:
-            threshold = self.curve(contact, index, names)
+        curved = model is not None and model.stribeck is not None
+        threshold = self.curve(contact, index, names) if curved else ""
         for name in chart.variables:
             names[name], names[f"d{name}"] = Name(of(c, name)), Name(of(c, f"d{name}"))
             own_names[name] = of(c, name)
@@ -468,6 +452,25 @@ class _Reader:
             start=steps(("entry", chart.default_state.name)),
             means=names,
         )
+
+    def numbers(self, index: int, contact: Contact) -> dict[str, Value]:
+        """Note the numbers of a contact; return what its chart's parameters are called."""
+        c, model = contact.name, contact.model
+        weights = np.ones(contact.n) if model is None else model.weights
+        self.own[of(c, "threshold weight")] = (index, np.asarray(weights, dtype=np.float64))
+        for name, value in contact.values.items():
+            if np.ndim(value) == 0:
+                self.shared[of(c, name)] = float(value)
+            else:
+                self.own[of(c, name)] = (index, np.asarray(value, dtype=np.float64))
+        for name in contact.inputs:
+            if name not in contact.chart.inputs:
+                raise ParameterError(
+                    f"inputs has {shown(name)}, which its chart does not read",
+                    place=f"{self.here}, contact {c!r}",
+                    advice=f"the chart's inputs are {', '.join(contact.chart.inputs) or 'none'}",
+                )
+        return {name: Name(of(c, name)) for name in contact.values}
 
     def check_locks(self, banks: Iterable[Bank]) -> None:
         """Refuse locks that nothing can keep, and those that always hold and repeat each other."""

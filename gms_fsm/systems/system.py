@@ -495,8 +495,12 @@ class Several:
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)
+        raise self.refused()
+
+    def refused(self) -> ParameterError:
+        """Return the error that says to choose a contact."""
         known = ", ".join(repr(each.name) for each in self._system.contacts)
-        raise ParameterError(
+        return ParameterError(
             f"system {self._system.name!r} has the contacts {known}",
             advice=f"say which one: trace.contact({self._system.contacts[0].name!r})",
         )

@@ -2,7 +2,8 @@
 
 A scope has one row of a run as numbers, or all rows as arrays. Names number elements from 1.
 
-guards       of one element: ``t, x, v, s``, its variables and parameters
+guards       of one element: ``t, x, v, s``, its variables and parameters; at one row also the
+             other inputs, named expressions, forces and accelerations that its chart reads
 watches      ``t, x, v, F``; ``s``, the Stribeck curve at v; ``z1``, ``s1``, ``F1`` ... of one
              element; ``state(1)``; for a model of one element its variables also without a number
 invariants   as watches, but ``s``, variables and parameters without a number are those of each
@@ -13,7 +14,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -128,6 +129,8 @@ class Scope:
         Where the quantities of the contact are.
     mode : sequence of int, or ndarray, shape (modes, rows)
         Modes of the elements and the surfaces.
+    read : mapping of str to float or list of float, optional
+        At one row, what else guards can read; a list has one value per element.
 
     Examples
     --------
@@ -148,6 +151,7 @@ class Scope:
     seen: Mapping[str, Any]
     mode: Any
     places: BankPlaces
+    read: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -182,7 +186,7 @@ class Scope:
         layout = program.layout
         places = layout.contact(contact)
         seen = places.plain(layout.observed.named(observe(program, t, y, mode)))
-        return cls(model, layout, t, y, seen, mode, places)
+        return cls(model, layout, t, y, seen, mode, places, _read(program, places, t, y, mode))
 
     @classmethod
     def at(cls, trace: Trace, row: int) -> Scope:
@@ -201,15 +205,16 @@ class Scope:
             With numbers as values, identical to those seen by the run.
         """
         seen = {
-            "v": float(trace.v[row]),
+            trace.places.velocity: float(trace.v[row]),
             "F": float(trace.F[row]),
             "x": float(trace.x[row]),
             "s": trace.s[row].tolist(),
             FORCE: trace.F_elements[row].tolist(),
         }
-        rows, layout = trace.rows, trace.program.layout
-        y, mode = rows.y[row].tolist(), rows.mode[row].tolist()
-        return cls(trace.model, layout, float(rows.t[row]), y, seen, mode, trace.places)
+        rows, program, places = trace.rows, trace.program, trace.places
+        t, y, mode = float(rows.t[row]), rows.y[row].tolist(), rows.mode[row].tolist()
+        read = _read(program, places, t, y, mode)
+        return cls(trace.model, program.layout, t, y, seen, mode, places, read)
 
     @classmethod
     def over(cls, trace: Trace) -> Scope:
@@ -225,7 +230,8 @@ class Scope:
         Scope
             With arrays as values, whose last axis is the row.
         """
-        seen = {"v": trace.v, "F": trace.F, "x": trace.x, "s": trace.s.T, FORCE: trace.F_elements.T}
+        seen = {"F": trace.F, "x": trace.x, "s": trace.s.T, FORCE: trace.F_elements.T}
+        seen[trace.places.velocity] = trace.v
         rows, layout = trace.rows, trace.program.layout
         return cls(trace.model, layout, rows.t, rows.y.T, seen, rows.mode.T, trace.places)
 
@@ -305,6 +311,8 @@ class Scope:
             Values by name.
         """
         values = {"t": self.t, "x": self.x, "v": self.v, "s": self.s[element]}
+        for name, value in self.read.items():
+            values[name] = value[element] if isinstance(value, list) else value
         for name in self.places.variables:
             values[name] = self.each(name)[element]
         return values | parameter_values(self.model, element)
@@ -360,6 +368,21 @@ class Scope:
 
     def _numbered_states(self) -> dict[str, Any]:
         return {f"state({i + 1})": state for i, state in enumerate(self.states)}
+
+
+def _read(
+    program: Program, places: BankPlaces, t: float, y: list[float], mode: Sequence[int]
+) -> dict[str, Any]:
+    """Return what guards of a contact can read besides ``t, x, v, s``, variables, parameters."""
+    shown, start = program.layout.shown, places.of("")
+    known = {places.of(name) for name in ("x", places.velocity)}
+    names = {name for name in (*shown.shared, *shown.own) if name.startswith(start)} - known
+    if names <= {places.of("s")}:
+        return {}
+    out = [0.0] * shown.size
+    program.ieee["values"](t, y, mode, program.p, out)
+    every = shown.named(out)
+    return {name.removeprefix(start): every[name] for name in names}
 
 
 class GuardValues:

@@ -23,22 +23,28 @@ from gms_fsm.charts.parameters import FloatArray, as_numbers
 from gms_fsm.errors import (
     OutputError,
     ParameterError,
-    TraceFileError,
     shown,
-    why,
 )
-from gms_fsm.lowering._observing import armed, rate, sigmas
 from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.lowering.program import Program, lower
 from gms_fsm.lowering.scales import Setting
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
-from gms_fsm.systems.system import System, system_of
+from gms_fsm.systems.system import Several, System, system_of
 from gms_fsm.traces import _csv, _npz
 from gms_fsm.traces._between import interpolated
 from gms_fsm.traces._header import Header
 from gms_fsm.traces._observed import observed_rows
-from gms_fsm.traces._parts import OBSERVED, Parts, checked
+from gms_fsm.traces._parts import OBSERVED, Parts
+from gms_fsm.traces._views import (
+    BodyTrace,
+    driven_velocity,
+    dwell_times,
+    held_period,
+    read_parts,
+    sigma_at,
+    sliding_of,
+)
 from gms_fsm.traces.rows import Rows, column_name, merged
 from gms_fsm.traces.verdicts import Verdict
 
@@ -47,25 +53,9 @@ if TYPE_CHECKING:
 
 __all__ = ["BodyTrace", "Trace", "check_trace", "dwell_times", "files_of"]
 
-_SLIDING = np.dtype(
-    [
-        ("t_start", "f8"),
-        ("t_end", "f8"),
-        ("surface", "U64"),
-        ("sigma_start", "f8"),
-        ("sigma_end", "f8"),
-    ]
-)
-
-
-def held_period(settings: Mapping[str, Setting]) -> float | None:
-    """Return the period of a run with ``events="held"``; None of any other."""
-    step = settings.get("step")
-    return step if settings.get("events") == "held" and isinstance(step, float) else None
-
 
 def check_trace(trace: object) -> None:
-    """Raise unless an object to be drawn is a trace.
+    """Raise unless an object to be drawn is a trace of one contact.
 
     Parameters
     ----------
@@ -75,12 +65,15 @@ def check_trace(trace: object) -> None:
     Raises
     ------
     ParameterError
-        If it is not a trace; the message says how to make one.
+        If it is not a trace, or that of a system with several contacts; the message says how to
+        make one, or to choose a contact.
     """
     if not isinstance(trace, Trace):
         raise ParameterError(
             "it must be a Trace, from simulate(...) or Trace.load(path)", place="trace", value=trace
         )
+    if isinstance(trace.model, Several):
+        raise trace.model.refused()
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +120,7 @@ class Trace:
     monitors: Mapping[str, Verdict] = field(default_factory=dict, repr=False)
     system: System | None = field(default=None, repr=False)  # where it is not a model on a rig
     which: str = field(default="", repr=False)  # the contact, of a system with several
+    every: Any = field(default=None, repr=False)  # the log of all contacts, where one is chosen
 
     def __repr__(self) -> str:
         return f"<Trace: {self._title}; {len(self.rows)} rows, {len(self.transitions)} transitions>"
@@ -186,13 +180,44 @@ class Trace:
         log = self.transitions
         mine = log[log.contact == bank.name] if "contact" in log.dtype.names else log
         model: Any = self.system.contact(bank.name)
-        chosen = replace(self, model=model, transitions=mine, which=bank.name)
-        # What the rows were computed to stays.
+        every = log if self.every is None else self.every
+        chosen = replace(self, model=model, transitions=mine, which=bank.name, every=every)
         kept: dict[str, Any] = {
             key: vars(self)[key] for key in ("program", "_seen") if key in vars(self)
         }
         vars(chosen).update(kept)
         return chosen
+
+    @cached_property
+    def steps(self) -> NDArray[np.int64]:
+        """Micro-step of the row that each entry of the log made, shape (transitions,).
+
+        Micro-steps count the firings of all contacts at one time.
+        """
+        log = self.transitions if self.every is None else self.every
+        counted: NDArray[np.int64] = np.arange(log.size) - np.searchsorted(log.t, log.t) + 1
+        if self.every is None or not log.size:
+            return counted
+        return np.asarray(counted[log.contact == self.which])
+
+    def picked(self, keep: NDArray[Any]) -> Trace:
+        """Return some of the rows, with what was observed there, and the whole log.
+
+        Parameters
+        ----------
+        keep : ndarray of int or bool
+            Which rows.
+
+        Returns
+        -------
+        Trace
+            Nothing is computed again.
+        """
+        rows = self.rows.at(keep)
+        part = replace(self, rows=rows, stops=rows, stored={})
+        seen = {name: column[keep] for name, column in self._seen.items()}
+        vars(part).update({"program": self.program, "_seen": seen})
+        return part
 
     def body(self, name: str) -> BodyTrace:
         """Return the motion of a body.
@@ -212,25 +237,9 @@ class Trace:
         ParameterError
             If there is no such body.
         """
-        system = system_of(self.model, self.rig) if self.system is None else self.system
-        body = system.body(name)
-        velocity = self._named(body.v) if not body.driven else self._velocity(body.v)
+        body = (self.system or system_of(self.model, self.rig)).body(name)
+        velocity = driven_velocity(self, body) if body.driven else self._named(body.v)
         return BodyTrace(name, self._named(body.x), velocity)
-
-    def _velocity(self, name: str) -> FloatArray:
-        """Return the velocity of a driven body: that of its rows' dy/dt."""
-        place = self.program.layout.y.shared.index(
-            next(b.x for b in self._system.bodies if b.v == name)
-        )
-        modes = self.rows.mode.tolist()
-        program, found = self.program, []
-        for t, y, mode in zip(self.t.tolist(), self.rows.y.tolist(), modes, strict=True):
-            found.append(rate(program, t, y, mode, armed(program, t, y, mode))[place])
-        return np.array(found)
-
-    @property
-    def _system(self) -> System:
-        return system_of(self.model, self.rig) if self.system is None else self.system
 
     def value(self, name: str) -> FloatArray:
         """Return a further state or a sampled value of the system, shape (rows,).
@@ -255,7 +264,6 @@ class Trace:
             raise ParameterError(f"there is no state {shown(name)}", advice=f"there are {known}")
         return self._named(name)
 
-    # ------------------------------------------------------------------ of one contact
     @property
     def x(self) -> FloatArray:
         """Position, shape (rows,), m."""
@@ -352,22 +360,7 @@ class Trace:
         ``v``) and ``sigma_start, sigma_end``, the sign held at both ends. They are found from the
         rows and the stops; a run of which only the end was kept has none.
         """
-        table = merged(self.rows, self.stops)
-        found: list[tuple[Any, ...]] = []
-        if len(table) < 2:
-            return np.array(found, dtype=_SLIDING).view(np.recarray)
-        for k, flags in enumerate(table.mode[:, self.program.layout.slides].T):
-            edges = np.flatnonzero(np.diff(np.concatenate([[0], flags, [0]])))
-            for first, behind in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-                # The last row of the interval itself, before any firing or jump of a signal.
-                last = int(np.searchsorted(table.t, table.t[behind - 1]))
-                if last > first and table.t[last] in self.program.jumps:
-                    last -= 1
-                begun, ended = (self._sigma(table, row, k) for row in (first, max(first, last)))
-                name = self.program.surface_names[k]
-                end = float(table.t[min(behind, len(table) - 1)])
-                found.append((float(table.t[first]), end, name, begun, ended))
-        return np.array(found, dtype=_SLIDING).view(np.recarray)
+        return sliding_of(self)
 
     def sigma(self, row: int) -> dict[str, float]:
         """Return the signs held between -1 and 1 at a row.
@@ -384,11 +377,10 @@ class Trace:
         """
         row = checked_integer("row", row)
         on = np.flatnonzero(self.rows.mode[row, self.program.layout.slides])
-        return {self.program.surface_names[k]: self._sigma(self.rows, row, int(k)) for k in on}
-
-    def _sigma(self, table: Rows, row: int, surface: int) -> float:
-        t, y, mode = float(table.t[row]), table.y[row].tolist(), table.mode[row].tolist()
-        return sigmas(self.program, t, y, mode)[surface]
+        return {
+            self.program.surface_names[k]: sigma_at(self.program, self.rows, row, int(k))
+            for k in on
+        }
 
     @cached_property
     def program(self) -> Program:
@@ -574,28 +566,7 @@ class Trace:
             If the file is missing, damaged or not a trace; nothing in it is executed.
         """
         path = checked_path("path", path)
-        reader = {".npz": _npz.read, ".csv": _csv.read}.get(path.suffix)
-        if reader is None:
-            raise TraceFileError(
-                f"the name of a trace file must end in .npz or .csv, not {path.suffix!r}",
-                place=str(path),
-            )
-        try:
-            parts = checked(reader(path))
-        except TraceFileError as error:
-            raise (error if error.outer else error.inside(path)) from None
-        except FileNotFoundError as error:
-            raise TraceFileError(
-                "no such file", place=error.filename, advice="check the name and the folder"
-            ) from None
-        except Exception as error:
-            # A damaged file can fail anywhere inside zipfile, zlib, numpy, csv or pydantic, each
-            # with its own errors; in every case the file is at fault.
-            raise TraceFileError(
-                f"damaged or incomplete trace file ({why(error)})",
-                place=str(path),
-                advice="write it again",
-            ) from None
+        parts = read_parts(path)
         return cls(
             parts.rows,
             parts.stops,
@@ -658,59 +629,6 @@ class Trace:
             With a header line.
         """
         return _csv.log_text(self.transitions)
-
-
-@dataclass(frozen=True, eq=False)
-class BodyTrace:
-    """The motion of a body.
-
-    Parameters
-    ----------
-    name : str
-        The body's.
-    x, v : ndarray, shape (rows,)
-        Position [m] and velocity [m/s].
-    """
-
-    name: str
-    x: FloatArray
-    v: FloatArray
-
-
-def dwell_times(trace: Trace) -> FloatArray:
-    """Return the time each element spent in each state.
-
-    Parameters
-    ----------
-    trace : Trace
-        A run; its transition log is complete, whatever its rows are.
-
-    Returns
-    -------
-    ndarray, shape (n, states), s
-        Each row adds up to the duration of the run.
-
-    Examples
-    --------
-    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
-    >>> trace = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"),
-    ...                  Prescribed("0.2"), 3.0)
-    >>> dwell_times(trace)[0].round(9).tolist()
-    [2.0, 1.0]
-    """
-    states = [state.name for state in trace.model.chart.states]
-    total = np.zeros((trace.n, len(states)))
-    begin, end = trace.stops.t[0], trace.stops.t[-1]
-    begin, end = min(begin, trace.t[0]), max(end, trace.t[-1])
-    first = trace.stops if trace.stops.t[0] <= trace.t[0] else trace.rows
-    elements = trace.places.elements
-    for i in range(trace.n):
-        since, state = begin, int(first.mode[0, elements][i])
-        for record in trace.transitions[trace.transitions.element == i]:
-            total[i, states.index(record.source)] += record.t - since
-            since, state = record.t, states.index(record.target)
-        total[i, state] += end - since
-    return total
 
 
 def files_of(path: Path) -> list[Path]:

@@ -205,7 +205,7 @@ def ribbons_figure(
         panels.ribbons(left[3], part, window=limits, elements=elements)
         one_time_axis(left)
         axes = left + right
-        second = "first variable"
+        second = "first variable" if trace.model.chart.variables else "deflection"
         if "s" in trace.model.chart.inputs:
             second = (
                 "deflection / threshold" if panels.has_threshold(trace) else "deflection / s(v)"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Artist, Axes, MaxNLocator
 from plots.panels._shown import scaled
-from plots.style import ELEMENT_COLOURS, ELEMENT_DASHES
+from plots.style import ELEMENT_COLOURS, ELEMENT_DASHES, TEXT_GREY
 
 Artists = list[Artist]
 
@@ -66,3 +66,11 @@ def log_axis(ax: Axes, values: NDArray[np.float64], axis: str) -> None:
     low = max(float(positive.min()) if positive.size else 0.1, 1e-6 * top)
     limits = (0.8 * low, 1.25 * top)
     ax.set(**{f"{axis}scale": "log", f"{axis}lim": limits})
+
+
+def note(ax: Axes, text: str) -> Artist:
+    """Write in the middle of an empty panel why it is empty."""
+    ax.set_yticks([])
+    return ax.text(
+        0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes, color=TEXT_GREY
+    )

@@ -11,7 +11,7 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.errors import shown as written
 from gms_fsm.traces.trace import Trace, check_trace
 from plots._matplotlib import Axes
-from plots.panels._axes import Artists, draw_curve, element_look, time_axis
+from plots.panels._axes import Artists, draw_curve, element_look, note, time_axis
 from plots.panels._shown import (
     Window,
     checked_elements,
@@ -20,7 +20,7 @@ from plots.panels._shown import (
     is_number,
     shown,
 )
-from plots.style import INK, LINE_GREY, TEXT_GREY
+from plots.style import INK, LINE_GREY
 
 __all__ = ["cascade", "cascade_window", "margins", "marks"]
 
@@ -191,19 +191,8 @@ def margins(
     """
     chosen = checked_elements(trace, elements)
     if not has_threshold(trace):
-        ax.set_yticks([])
         missing = "input s" if trace.model.chart.transitions else "edges"
-        return [
-            ax.text(
-                0.5,
-                0.5,
-                f"no threshold:\nthis chart has no {missing}",
-                ha="center",
-                va="center",
-                transform=ax.transAxes,
-                color=TEXT_GREY,
-            )
-        ]
+        return [note(ax, f"no threshold:\nthis chart has no {missing}")]
     limits = checked_window(trace, cascade_window(trace) if window is None else window)
     part = shown(trace, limits)
     values = 1 - np.abs(part.z / part.s)

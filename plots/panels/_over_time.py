@@ -14,6 +14,7 @@ from plots.panels._axes import (
     element_look,
     first_variable,
     log_axis,
+    note,
     time_axis,
 )
 from plots.panels._shown import (
@@ -25,6 +26,8 @@ from plots.panels._shown import (
     shown,
 )
 from plots.style import INK, LINE_GREY
+
+NO_VARIABLE = "no deflection:\nthis chart has no variables"
 
 __all__ = ["deflections", "force", "ratio", "velocity"]
 
@@ -119,9 +122,12 @@ def deflections(
     Returns
     -------
     list of Artist
-        One line per element.
+        One line per element; for a chart without variables only a note.
     """
     chosen = checked_elements(trace, elements)
+    if not trace.model.chart.variables:
+        time_axis(ax, *checked_window(trace, window))
+        return [note(ax, NO_VARIABLE)]
     part = shown(trace, window)
     factor, title = first_variable(trace, part.z[:, chosen])
     name = trace.model.chart.variables[0]
@@ -159,9 +165,13 @@ def ratio(
     Returns
     -------
     list of Artist
-        One line per element, then the lines at +1 and -1.
+        One line per element, then the lines at +1 and -1; for a chart without variables only a
+        note.
     """
     chosen = checked_elements(trace, elements)
+    if not trace.model.chart.variables:
+        time_axis(ax, *checked_window(trace, window))
+        return [note(ax, NO_VARIABLE)]
     part = shown(trace, window)
     values, threshold = part.z, has_threshold(trace)
     if "s" in trace.model.chart.inputs:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.errors import shown as written
-from gms_fsm.traces._parts import OBSERVED
 from gms_fsm.traces.trace import Trace, check_trace
 
 __all__ = ["has_threshold", "shown"]
@@ -93,16 +92,12 @@ def shown(trace: Trace, window: Window | None = None) -> Trace:
         low, high = max(low - 1, 0), high + 1
     keep = np.arange(len(trace))[low:high]
     if keep.size < len(trace):
-        trace = _picked(trace, keep, known=not sampled)
-    return trace if len(trace) <= MOST_ROWS else _picked(trace, _telling_rows(trace), known=True)
-
-
-def _picked(trace: Trace, keep: NDArray[np.intp], *, known: bool) -> Trace:
-    """Return the trace with some of its rows; known forces are passed on."""
-    rows = trace.rows.at(keep)
-    names = OBSERVED if known else ()
-    stored = {name: getattr(trace, name)[keep] for name in names}
-    return replace(trace, rows=rows, stops=rows, stored=stored)
+        if sampled:  # nothing is known yet, so observe the rows in the window only
+            rows = trace.rows.at(keep)
+            trace = replace(trace, rows=rows, stops=rows)
+        else:
+            trace = trace.picked(keep)
+    return trace if len(trace) <= MOST_ROWS else trace.picked(_telling_rows(trace))
 
 
 def _telling_rows(trace: Trace) -> NDArray[np.intp]:

@@ -1,4 +1,4 @@
-"""`gms_fsm.charts.CHARTS` is read from the registry: every chart that is a model, by name."""
+"""`gms_fsm.charts.CHARTS` has every chart that is a model, by name, from the registry."""
 
 from __future__ import annotations
 

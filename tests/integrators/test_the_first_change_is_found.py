@@ -140,3 +140,29 @@ def test_the_cubic_between_two_ends_is_that_of_both_slopes() -> None:
     scratch = Scratch([], y_new=[27.0], f_new=[27.0], error=[], dense=Dense([], [], [], [], []))
     assert is_quiet_step(Motion(fill, fill, None), now, 3.0, scratch, w)
     assert seen == [(3.0, 27.0), (2.0, 8.0)]
+
+
+def test_a_margin_far_from_zero_is_evaluated_at_the_end_and_in_the_middle_only() -> None:
+    """Its slopes differ by 0.08, which is too little to reach zero from -0.46."""
+    assert _first(lambda t: -0.5 + 0.16 * t * (1.0 - t)) == (NO_CHANGE, 2)
+
+
+@pytest.mark.parametrize("height", [-1.0, -1e-300, 1e-300, 1.0])
+def test_a_constant_margin_is_evaluated_at_the_end_and_in_the_middle_only(height: float) -> None:
+    assert _first(lambda t: height) == (NO_CHANGE, 2)
+
+
+@pytest.mark.parametrize("strict", [True, False])
+def test_a_margin_that_rests_at_zero_is_not_searched(strict: bool) -> None:
+    """As that of v > 0 while v = 0: it does not bend, and so has no window."""
+    assert _first(lambda t: 0.0, strict=strict) == (NO_CHANGE, 2)
+
+
+def test_the_search_is_wary_of_a_bend_four_times_as_high() -> None:
+    """The two halves differ by 0.04 in their rise; a margin within 0.16 of zero is searched."""
+
+    def dip(depth: float) -> Margin:
+        return lambda t: -depth - 0.08 * t * (1.0 - t)
+
+    assert _first(dip(0.1601))[1] == 2
+    assert _first(dip(0.1599))[1] > 2

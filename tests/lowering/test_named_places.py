@@ -15,7 +15,15 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import ChartModel, Prescribed, Slider
-from gms_fsm.lowering.layout import LOG_NUMBERS, LOG_TEXTS, Block, Layout, LogRecord, Places
+from gms_fsm.lowering.layout import (
+    CONTACT,
+    LOG_NUMBERS,
+    LOG_TEXTS,
+    Block,
+    Layout,
+    LogRecord,
+    Places,
+)
 from gms_fsm.lowering.program import lower
 from gms_fsm.systems._assembly import assembled
 from gms_fsm.systems.system import system_of
@@ -236,7 +244,7 @@ def test_texts_name_the_same_places(shared: tuple[str, ...], n: int, others: int
 
 
 def test_machine_code_finds_what_it_writes_into_the_log() -> None:
-    """`integrators.loop.record` is told where the numbers of a firing are."""
+    """`integrators.columns.record` is told where the numbers of a firing are."""
     layout = lower(stick_slip("signed"), pulled_mass()[1]).layout
     own, seen = layout.recorded()
     names = list(layout.y)
@@ -245,4 +253,4 @@ def test_machine_code_finds_what_it_writes_into_the_log() -> None:
     assert [observed[place] for place in seen[3]] == ["friction.v", "friction.s", "friction.F"]
     assert seen[3][1] == layout.observed.index("friction.s", 3)
     assert LOG_NUMBERS == ("z", "v", "s", "F_before", "F_after")
-    assert LogRecord._fields == ("t", "element", *LOG_TEXTS, *LOG_NUMBERS)
+    assert LogRecord._fields == ("t", "element", *LOG_TEXTS, *LOG_NUMBERS, CONTACT)

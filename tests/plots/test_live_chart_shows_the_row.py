@@ -317,6 +317,7 @@ def test_a_guard_that_cannot_be_computed_is_marked() -> None:
     trace = simulate(ChartModel(chart, {}, n=1, stribeck=CURVE), Prescribed("1"), 1.0)
     shown = LiveChart(trace)
     assert shown.look(0)[0].marks == {"ab": (False, False)}
-    trace.__dict__["_observed"] = {**trace._observed, "v": 0.0 * trace.v}  # a cached property
+    still = {trace.places.of("v"): 0.0 * trace.v}
+    trace.__dict__["_seen"] = {**trace._seen, **still}  # a cached property
     assert shown.look(0)[0].marks == {"ab": (False, None)}
     assert marks(groups(shown.frame(0))["element1-guard-ab"]) == ["✗", "?"]

@@ -13,6 +13,7 @@ from gms_fsm import ChartModel, LuGre, Prescribed, Stribeck, simulate
 from gms_fsm.charts import GMS_ELEMENT
 from plots import notebook
 from tests.helpers import ROOT, one_element, stick_slip
+from tests.plots.systems_to_draw import SERVO
 
 CURVE = Stribeck(1.0, 1.5, 1e-3)
 
@@ -37,6 +38,13 @@ def test_charts_and_models_are_svg() -> None:
         root = ElementTree.fromstring(shown._repr_svg_())  # type: ignore[attr-defined]
         found = [g for g in root.iter() if "region" in g.get("class", "").split()]
         assert len(found) == count, shown
+
+
+@pytest.mark.usefixtures("_graphviz")
+def test_systems_and_contacts_are_svg() -> None:
+    for shown, kind in ((SERVO, "body"), (SERVO.contact("gear"), "state")):
+        root = ElementTree.fromstring(shown._repr_svg_())  # type: ignore[attr-defined]
+        assert [g for g in root.iter() if kind in g.get("class", "").split()]
 
 
 def test_a_trace_is_a_png() -> None:

@@ -1,4 +1,4 @@
-"""`integrators.loop.record`, run by Python over the compiled engine's arrays, gives the same rows.
+"""`integrators.columns.record`, run by Python over the compiled engine's arrays: the same rows.
 
 So the loop that fills the columns is correct as source, whatever a compiler makes of it; that the
 compiled code does the same is the claim of test_compiled_is_bit_identical.py.
@@ -11,7 +11,7 @@ import gms_fsm.lowering._compiled
 import integrators.compiled
 from gms_fsm import Slider, simulate
 from gms_fsm.traces.failures import LivelockError
-from integrators import loop
+from integrators import columns
 from tests.helpers import one_element, open_loop, pulled_mass, stick_slip
 from tests.traces.test_monitors_see_what_happens import SLOWING, memoryless
 
@@ -25,7 +25,7 @@ def read(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "machine_code", lambda program, name: program.ieee[name])
     monkeypatch.setattr(module, "store", lambda: None)
     kernel = integrators.compiled
-    monkeypatch.setattr(kernel, "record", lambda arguments, store, tell: loop.record(*arguments))
+    monkeypatch.setattr(kernel, "record", lambda arguments, store, tell: columns.record(*arguments))
     monkeypatch.setattr(kernel, "_compiled_each_row", lambda store: kernel._each_row)
 
 

@@ -70,9 +70,8 @@ def test_texts_by_name() -> None:
 
 def test_a_state_has_no_states() -> None:
     inner: Any = {"states": (STICK,)}
-    said = (
-        "state 'outer': a State takes name, flow, entry and exit, not 'states'; states do not nest"
-    )
+    parts = "name, flow, entry, exit, outputs and locked"
+    said = f"state 'outer': a State takes {parts}, not 'states'; states do not nest"
     _refused(ChartError, said, lambda: State(name="outer", flow={}, **inner))
 
 

@@ -1,0 +1,98 @@
+"""What a picture of a chart shows of each state, and of the chart as a whole, in every format."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from gms_fsm.charts.chart import Chart, State
+from gms_fsm.language import Value
+from plots._notation import Writer
+
+__all__ = ["Texts", "chart_texts", "state_texts"]
+
+Texts = list[tuple[str, list[str]]]  # kinds, such as during, each with its texts
+
+
+def state_texts(write: Writer, state: State) -> Texts:
+    """Return what a picture shows in a state.
+
+    Not shown are a variable that flows in no state, the timer behind ``after(T)``, and a force that
+    is the same in all states.
+
+    Parameters
+    ----------
+    write : Writer
+        Its chart and notation.
+    state : State
+        A state of the chart.
+
+    Returns
+    -------
+    list of (str, list of str)
+        ``entry``, ``during``, ``force``, ``locked`` and ``exit``, each with its texts.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts import GMS_ELEMENT
+    >>> write = Writer(GMS_ELEMENT["signed"], "stateflow")
+    >>> [(kind, texts) for kind, texts in state_texts(write, write.chart.states[0]) if texts]
+    [('during', ['dz = v;'])]
+    """
+    chart = write.chart
+    actions = {
+        kind: [write.assignment(name, tree) for name, tree in trees.items() if name in given]
+        for kind, given in (("entry", state.entry), ("exit", state.exit))
+        for trees in (chart.assignments[kind, state.name],)
+    }
+    flowing = {name for each in chart.states for name in each.flow}
+    flows = [name for name in chart.variables if name in flowing]
+    forces = _forces(chart, state) if _forces_differ(chart) else {}
+    return [
+        ("entry", actions["entry"]),
+        ("during", [write.flow(name, chart.flows[state.name, name]) for name in flows]),
+        ("force", _equations(write, forces)),
+        ("locked", [write.held()] if state.locked else []),
+        ("exit", actions["exit"]),
+    ]
+
+
+def chart_texts(write: Writer) -> Texts:
+    """Return what a picture shows of the whole chart.
+
+    Parameters
+    ----------
+    write : Writer
+        Its chart and notation.
+
+    Returns
+    -------
+    list of (str, list of str)
+        Named expressions, the force of an element if it is the same in all states, and the force of
+        the contact. No texts for a chart that only has a force which is the same in all states.
+    """
+    chart = write.chart
+    totals = [write.total(name, tree) for name, tree in chart.totals.items()]
+    if not chart.lets and not totals:
+        return []
+    shared = {} if _forces_differ(chart) else _forces(chart, chart.default_state)
+    return [
+        ("let", _equations(write, chart.lets)),
+        ("force", _equations(write, shared)),
+        ("force of the contact", totals),
+    ]
+
+
+def _equations(write: Writer, trees: Mapping[str, Value]) -> list[str]:
+    return [write.equation(name, tree) for name, tree in trees.items()]
+
+
+def _forces_differ(chart: Chart) -> bool:
+    """Return whether forces are shown state by state: where they differ, or are all there is."""
+    own = any(state.outputs or state.locked for state in chart.states)
+    return own or not any(state.flow for state in chart.states)
+
+
+def _forces(chart: Chart, state: State) -> dict[str, Value]:
+    """Return the forces that a state gives, by name; none if it is locked."""
+    forces = {name: chart.forces[state.name, name] for name in chart.force_names}
+    return {name: tree for name, tree in forces.items() if tree is not None}

@@ -1,0 +1,162 @@
+"""Charts and systems that the tests of pictures draw."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from gms_fsm import simulate
+from gms_fsm.charts.chart import Chart, State, Transition
+from gms_fsm.charts.parameters import Parameter
+from gms_fsm.systems.system import Body, Contact, Sampled, System
+from gms_fsm.traces.trace import Trace
+
+STICTION = Chart(
+    "Coulomb friction with stiction",
+    parameters=("F_c", "F_s", "b"),
+    states=(
+        State("stuck", locked=True),
+        State("forward", outputs={"F": "F_c + b * v"}),
+        State("backward", outputs={"F": "-F_c + b * v"}),
+    ),
+    transitions=(
+        Transition("release_f", "stuck", "forward", guard="F > F_s"),
+        Transition("release_b", "stuck", "backward", guard="F < -F_s"),
+        Transition("arrest_f", "forward", "stuck", guard="v < 0"),
+        Transition("arrest_b", "backward", "stuck", guard="v > 0"),
+    ),
+)
+END_STOP = Chart(
+    "End stop",
+    inputs=("x", "v"),
+    parameters=("x_s", "e", "v_r"),
+    states=(State("free", outputs={"F": "0"}), State("rest", locked=True)),
+    transitions=(
+        Transition("bounce", "free", "free", guard="x >= x_s and v > v_r", actions={"v": "-e * v"}),
+        Transition("settle", "free", "rest", guard="x >= x_s and 0 < v <= v_r"),
+        Transition("lift", "rest", "free", guard="F < 0"),
+    ),
+)
+BACKLASH = Chart(
+    "Backlash",
+    inputs=("x", "v"),
+    parameters=("k", "d", "gap"),
+    states=(
+        State("between", outputs={"F": "0"}),
+        State("right", outputs={"F": "k * (x - gap) + d * v"}),
+        State("left", outputs={"F": "k * (x + gap) + d * v"}),
+    ),
+    transitions=(
+        Transition("touch_r", "between", "right", guard="x >= gap and v > 0"),
+        Transition("touch_l", "between", "left", guard="x <= -gap and v < 0"),
+        Transition("leave_r", "right", "between", guard="F < 0"),
+        Transition("leave_l", "left", "between", guard="F > 0"),
+    ),
+)
+PLANAR = Chart(
+    "Coulomb in the plane",
+    inputs=(),
+    velocities=("v", "w"),
+    variables=("h", "g"),
+    parameters=("F_c", "F_s", "e"),
+    states=(
+        State(
+            "stuck",
+            locked=True,
+            exit={"h": "F / sqrt(F**2 + F_w**2)", "g": "F_w / sqrt(F**2 + F_w**2)"},
+        ),
+        State("start", outputs={"F": "F_c * h", "F_w": "F_c * g"}),
+        State(
+            "slip",
+            outputs={"F": "F_c * v / sqrt(v**2 + w**2)", "F_w": "F_c * w / sqrt(v**2 + w**2)"},
+        ),
+    ),
+    transitions=(
+        Transition("release", "stuck", "start", guard="F**2 + F_w**2 > F_s**2"),
+        Transition("moves", "start", "slip", guard="v**2 + w**2 > e**2"),
+        Transition("arrest", "slip", "stuck", guard="v**2 + w**2 < 0.25 * e**2"),
+    ),
+)
+TIMED = Chart(
+    "Timed rest",
+    parameters=("T_d", "F_c", "F_s"),
+    states=(
+        State("stuck", locked=True),
+        State("slip", outputs={"F": "F_c * sgn(v)"}),
+        State("rest", outputs={"F": "0"}),
+    ),
+    transitions=(
+        Transition("fail", ("stuck", "slip"), "rest", guard="F > 2 * F_s"),
+        Transition("release", "stuck", "slip", guard="F > F_s and after(T_d)"),
+        Transition("arrest", "slip", "stuck", guard="v < 0"),
+        Transition("on", "rest", "slip", guard="True"),
+    ),
+)
+SHARED = Chart(
+    "Spring with a limit",
+    inputs=("v",),
+    variables=("z",),
+    parameters=("k", "F_c", Parameter("b", "Ns/m", ">= 0", per_element=False)),
+    let={"limit": "F_c / k", "far": "abs(z) / limit"},
+    states=(State("stick", flow={"z": "v"}), State("slip")),
+    transitions=(
+        Transition("go", "stick", "slip", guard="far > 1 and v * z > 0"),
+        Transition("stop", "slip", "stick", guard="v * z <= 0"),
+    ),
+    outputs={"F": "k * z"},
+    contact_outputs={"F": "F + b * v"},
+)
+DRY = {"F_c": 1.0, "F_s": 1.5, "b": 0.0}
+
+PULLED = System(
+    "pulled mass",
+    bodies=(Body("mass", inertia="m", force="K * (V * t - x)"),),
+    contacts=(Contact("pad", STICTION, DRY),),
+    numbers={"m": 1.0, "K": 2.0, "V": 0.1},
+)
+BALL = System(
+    "ball",
+    bodies=(Body("ball", inertia="m", force="m * g"),),
+    contacts=(Contact("floor", END_STOP, {"x_s": 1.0, "e": 0.5, "v_r": 1e-2}),),
+    numbers={"m": 2.0, "g": 9.81},
+)
+BLOCKS = System(
+    "two blocks on a belt",
+    bodies=(
+        Body("one", inertia="m", force="-k * q1 + k_c * (q2 - q1)", x="q1", v="w1"),
+        Body("two", inertia="m", force="-k * q2 + k_c * (q1 - q2)", x="q2", v="w2"),
+        Body("belt", velocity="V", x="x_b", v="w_b"),
+    ),
+    contacts=(
+        Contact("pad1", STICTION, DRY, v="w1 - w_b"),
+        Contact("pad2", STICTION, DRY, v="w2 - w_b"),
+    ),
+    numbers={"m": 1.0, "k": 2.0, "k_c": 1.3, "V": 0.1},
+)
+SERVO = System(
+    "two-mass servo",
+    bodies=(
+        Body("motor", inertia="J_m", force="k_t * i", x="q_m", v="w_m"),
+        Body("load", inertia="J_l", x="q_l", v="w_l"),
+    ),
+    contacts=(
+        Contact("bearing", STICTION, DRY, v="w_m"),
+        Contact("gear", BACKLASH, {"k": 200.0, "d": 0.05, "gap": 0.02}, v="w_m - 3 * w_l"),
+    ),
+    signals={"r": "0.5 * sin(2 * t)"},
+    flow={"i": "(u - i) / tau"},
+    sampled=(
+        Sampled(
+            "pid",
+            period=1e-3,
+            updates={"u": "k_p * (r - q_m) + I", "I": "I + k_i * period * (r - q_m)"},
+        ),
+    ),
+    numbers={"J_m": 1e-3, "J_l": 5e-3, "k_t": 1.0, "k_p": 2.0, "k_i": 1.0, "tau": 2e-3},
+)
+
+
+@cache
+def run(system: System) -> Trace:
+    """Return a run of PULLED, BALL or BLOCKS that has switches."""
+    initial = {"one.v": 0.1, "w2": 0.1, "q2": 0.2} if system is BLOCKS else {}
+    return simulate(system, 3.0 if system is BALL else 10.0, initial=initial)

@@ -1,0 +1,118 @@
+"""Figures, panels, live charts and replay pages draw the run of one contact of a system."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gms_fsm.errors import ParameterError
+from gms_fsm.inspection.explain import explain
+from gms_fsm.systems.system import System
+from gms_fsm.traces.trace import Trace
+from plots import LiveChart, replay, statechart
+from tests.plots.systems_to_draw import BALL, BLOCKS, END_STOP, PULLED, STICTION, run
+
+pytest.importorskip("matplotlib", reason="figures need the extra 'plots'")
+
+from plots import figures, panels, schematic  # after the skip
+from plots._matplotlib import Axes, Figure
+
+FIGURES = ("overview", "ribbons_figure", "cascade_figure")
+OTHERS = {"cascade_window", "difference", "has_threshold", "residual", "shown", "slip_bar"}
+PANELS = tuple(sorted({*panels.__all__} - OTHERS - {"stribeck"}))
+
+
+@pytest.fixture
+def ax() -> Axes:
+    """Return empty axes."""
+    return Figure().subplots()
+
+
+def stored(trace: Trace) -> dict[str, Any]:
+    """Return the data of the only run of a replay page."""
+    pytest.importorskip("uplot", reason="a page needs the extra 'replay'")
+    found = re.search(
+        r'<script[^>]*type="application/json"[^>]*>(.*?)</script>', replay(trace).html, re.DOTALL
+    )
+    assert found is not None
+    (only,) = json.loads(found[1])["runs"]
+    return only  # type: ignore[no-any-return]
+
+
+@pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.parametrize(
+    ("system", "contact"), [(PULLED, "pad"), (BALL, "floor"), (BLOCKS, "pad2")]
+)
+def test_every_figure_takes_a_contact(name: str, system: System, contact: str) -> None:
+    figure = getattr(figures, name)(run(system).contact(contact))
+    assert figure.get_suptitle().startswith(f"{contact}: ")
+
+
+@pytest.mark.parametrize("name", PANELS)
+def test_every_panel_takes_a_contact(name: str, ax: Axes) -> None:
+    assert getattr(panels, name)(ax, run(BLOCKS).contact("pad2"))
+
+
+@pytest.mark.parametrize("name", ["deflections", "ratio"])
+def test_a_chart_without_variables_has_no_deflection(name: str, ax: Axes) -> None:
+    (note,) = getattr(panels, name)(ax, run(PULLED))
+    assert note.get_text() == "no deflection:\nthis chart has no variables"
+
+
+def test_a_chart_without_variables_has_no_schematic(ax: Axes) -> None:
+    with pytest.raises(ParameterError, match=r"this chart has no variables; draw the chart with"):
+        schematic.schematic(ax, run(PULLED))
+
+
+def test_the_picture_of_a_run_counts_bounces() -> None:
+    trace = run(BALL)
+    bounces = int((trace.transitions.edge == "bounce").sum())
+    assert bounces > 3
+    assert f"taken {bounces} times" in statechart(END_STOP, counts=trace).source
+
+
+def test_a_live_chart_marks_guards_that_read_the_force() -> None:
+    """At the release F is above F_s; just before it, and while the mass moves, it is not."""
+    trace = run(PULLED)
+    shown, (first, *_) = LiveChart(trace), np.flatnonzero(trace.microstep > 0)
+    (look,) = shown.look(int(first))
+    assert (look.fired, look.source, look.marks["release_f"]) == ("release_f", "stuck", (True,))
+    (before,) = shown.look(int(first) - 2)
+    assert before.marks == {"release_f": (False,), "release_b": (False,)}
+
+
+@pytest.mark.parametrize("contact", ["pad1", "pad2"])
+def test_a_firing_belongs_to_its_own_contact(contact: str) -> None:
+    """A row made by another contact's firing is not taken for one of this contact."""
+    trace = run(BLOCKS).contact(contact)
+    made = [
+        row
+        for row in np.flatnonzero(trace.microstep > 0).tolist()
+        if any(edge.past for edge in explain(trace, row, 0))
+    ]
+    assert len(made) == len(trace.transitions) < (trace.microstep > 0).sum()
+    assert [LiveChart(trace).look(row)[0].fired for row in made] == trace.transitions.edge.tolist()
+    logged = stored(trace)["log"]
+    assert all(entry["made"] for entry in logged)
+    assert [entry["t"] for entry in logged] == trace.transitions.t.tolist()
+
+
+def test_a_page_of_a_chart_without_variables_has_no_plot_of_elements() -> None:
+    page = stored(run(PULLED))
+    assert page["inner"] == {"title": "", "bounds": [], "columns": []}
+    assert {edge["name"] for edge in page["edges"]} == {e.name for e in STICTION.transitions}
+
+
+def test_a_page_shows_the_force_that_guards_read() -> None:
+    """The left side of F > F_s is the force of the row, at every row."""
+    trace = run(PULLED)
+    page = stored(trace)
+    ((left, right, margin),) = page["sides"][0][0]
+    pool = page["pool"]
+    assert pool[left] == pool[page["names"]["F"]]
+    assert pool[right] == [1.5]
+    assert len(pool[margin]) > 1
