@@ -593,8 +593,3 @@ def _without_force(tree: Value) -> tuple[Value, int]:
                     return left, sign if op == "+" else -sign
                 return Binary(op, left, rest), sign if op == "+" else -sign
     return tree, 0
-
-
-def broadcast(value: float | FloatArray, n: int) -> list[float]:
-    """Return a number for each element."""
-    return [float(each) for each in np.broadcast_to(value, n)]
