@@ -14,6 +14,7 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import SignalError, TraceFileError
 from gms_fsm.inspection.explain import explain_state
 from gms_fsm.language import MATLAB_LIKE, Relation, clauses, spell
+from gms_fsm.traces._views import picked, steps_of
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.scope import Scope, watch_names
 from gms_fsm.traces.trace import Trace
@@ -134,7 +135,7 @@ def _log(trace: Trace, edges: Sequence[Mapping[str, Any]]) -> list[dict[str, Any
     states = [state.name for state in trace.model.chart.states]
     names = [(edge["name"], states[edge["source"]]) for edge in edges]
     found: list[dict[str, Any]] = []
-    for record, step in zip(trace.transitions, trace.steps.tolist(), strict=True):
+    for record, step in zip(trace.transitions, steps_of(trace).tolist(), strict=True):
         t, name, source = float(record.t), str(record.edge), str(record.source)
         if (name, source) not in names:
             raise TraceFileError(
@@ -237,7 +238,7 @@ def page_rows(trace: Trace) -> tuple[Trace, NDArray[np.bool_]]:
     if others.size > wanted:
         others = others[np.linspace(0, others.size - 1, wanted).astype(int)]
     kept[others] = True
-    return trace.picked(kept), between[kept]
+    return picked(trace, kept), between[kept]
 
 
 def _with_microsteps(trace: Trace) -> Trace:

@@ -313,9 +313,9 @@ def _title(system: System) -> str:
 def _box(block: Block) -> str:
     colour, fill, border = LOOKS[block.kind]
     title = f"{_text(block.name, bold=True)}&#160; {_text(block.note, colour=TEXT_GREY, size=10)}"
-    first = 1 if block.kind == "contact" else 0  # the name of its chart
-    rows = [title, *(_text(text, size=10) for text in block.texts[:first])]
-    for text in block.texts[first:]:
+    boundary = 1 if block.kind == "contact" else 0  # the name of its chart
+    rows = [title, *(_text(text, size=10) for text in block.texts[:boundary])]
+    for text in block.texts[boundary:]:
         rows += [_text(line, face=MONO, size=10) for line in wrapped(text)]
     style = "" if block.kind in ("sampled", "flow") else 'STYLE="ROUNDED"'
     return _rows(rows, f'BORDER="{border}" COLOR="{colour}" BGCOLOR="{fill}" {style}')

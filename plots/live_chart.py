@@ -22,6 +22,7 @@ from gms_fsm._arguments import checked_integer
 from gms_fsm.errors import OutputError, ParameterError, shown
 from gms_fsm.inspection.explain import values_at
 from gms_fsm.language import Condition, clauses, evaluate, names_in
+from gms_fsm.traces._views import steps_of
 from gms_fsm.traces.trace import Trace, check_trace
 from plots._labels import FALSE, TRUE, UNKNOWN, Piece, Row, edge_id, element_id, part_id
 from plots.render import picture
@@ -129,6 +130,7 @@ class LiveChart:
         late = [name for name in (*chart.force_names, *chart.rate_names) if name in read]
         names = dict.fromkeys([*chart.variables, *chart.inputs, *chart.velocities, *late])
         self._names = [name for name in names if name != "t"]
+        self._steps = steps_of(trace)
         self._log_count = _log_counts(trace)
         log = trace.transitions
         self._own = {i: np.flatnonzero(log.element == i) for i in self.elements}
@@ -222,7 +224,7 @@ class LiveChart:
         last = int(own[past - 1])
         record = trace.transitions[last]
         fired, source = str(record.edge), str(record.source)
-        if (record.t, trace.steps[last]) == (trace.t[row], trace.microstep[row]):
+        if (record.t, self._steps[last]) == (trace.t[row], trace.microstep[row]):
             # This row is that firing; its marks are those of the row before.
             marks[fired] = _marks(chart.guards[fired], values_at(trace, row - 1, element))
         return ElementLook(element, state, marks, leaving, fired, source)
@@ -342,7 +344,7 @@ def _log_counts(trace: Trace) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
     m firings at one time give m + 1 rows, the first one before them; a row of a requested time is
     a single row after all of them.
     """
-    entries = list(zip(trace.transitions.t.tolist(), trace.steps.tolist(), strict=True))
+    entries = list(zip(trace.transitions.t.tolist(), steps_of(trace).tolist(), strict=True))
     in_steps = np.isin(trace.t, trace.t[trace.microstep > 0])
     steps = np.where(in_steps, trace.microstep, np.iinfo(np.int64).max)
     rows = zip(trace.t.tolist(), steps.tolist(), strict=True)

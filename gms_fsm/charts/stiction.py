@@ -4,6 +4,10 @@ At rest the friction force is whatever holds the contact, up to the stiction F_s
 the Coulomb friction F_c against the motion, plus viscous friction. There is no regularization: a
 stuck contact is at rest exactly.
 
+Limitation: where an impact at another contact reverses the velocity, this contact is arrested, and
+its lock takes the remaining velocity as an impulse; the chart cannot distinguish a reversal from
+a crossing of v = 0.
+
 References
 ----------
 H. Olsson, K. J. Astrom, C. Canudas de Wit, M. Gafvert, P. Lischinsky, "Friction Models and Friction

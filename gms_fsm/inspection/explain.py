@@ -20,6 +20,7 @@ from gms_fsm.language import (
     names_in,
     spell,
 )
+from gms_fsm.traces._views import steps_of
 from gms_fsm.traces.scope import Scope
 from gms_fsm.traces.trace import Trace
 
@@ -263,7 +264,7 @@ def _edge_taken(trace: Trace, row: int, element: int) -> str:
     if microstep == 0 or _only_slides(trace, row):
         return ""
     log = trace.transitions
-    made = log[(log.t == trace.t[row]) & (trace.steps == microstep) & (log.element == element)]
+    made = log[(log.t == trace.t[row]) & (steps_of(trace) == microstep) & (log.element == element)]
     return str(made.edge[0]) if made.size else ""
 
 

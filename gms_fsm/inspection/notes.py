@@ -51,6 +51,8 @@ def notes_on(trace: Trace) -> tuple[str, ...]:
 def _sizes(trace: Trace) -> Iterator[str]:
     """Compare stroke, speed and deflections with the scales of the model."""
     model, scales = trace.model, scales_of(trace.model)
+    if not model.chart.variables:
+        return
     name = model.chart.variables[0]
     least = np.array(scales.variables[name])
     thresholds = trace.s.min(axis=0) if "s" in model.chart.inputs else least

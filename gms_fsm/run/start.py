@@ -22,7 +22,7 @@ from gms_fsm.run.settings import Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Corners, Formula
-from gms_fsm.systems.system import Mounting, Several, System, system_of
+from gms_fsm.systems.system import Mounting, System, origin_of, system_of
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.scope import GuardValues, parameter_values
 from gms_fsm.traces.trace import Trace
@@ -170,10 +170,7 @@ class Start:
         program = _with_waking_times(program, system, t_start, last)
         program = replace(program, ticks=_ticks(system, t_start, last))
         y, mode = _initial(system, program, t_start, {} if initial is None else initial)
-        single = system.contacts[0] if len(system.contacts) == 1 else Several(system)
-        origin: tuple[Any, Any] = (single, Mounting(system))
-        if not isinstance(model, System):
-            origin = model, rig
+        origin: tuple[Any, Any] = origin_of(system) if isinstance(model, System) else (model, rig)
         return cls(
             system=system,
             model=origin[0],

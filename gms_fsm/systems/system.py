@@ -11,10 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-import numpy as np
-
 from gms_fsm._arguments import checked_path
-from gms_fsm.charts.parameters import FloatArray, checked_scalar
+from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import ExpressionError, ParameterError, Part, shown
 from gms_fsm.language import (
     Binary,
@@ -334,12 +332,8 @@ class Several:
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)
-        raise self.refused()
-
-    def refused(self) -> ParameterError:
-        """Return the error that says to choose a contact."""
         known = ", ".join(repr(each.name) for each in self._system.contacts)
-        return ParameterError(
+        raise ParameterError(
             f"system {self._system.name!r} has the contacts {known}",
             advice=f"say which one: trace.contact({self._system.contacts[0].name!r})",
         )
@@ -453,8 +447,3 @@ def _without_force(tree: Value) -> tuple[Value, int]:
                     return left, sign if op == "+" else -sign
                 return Binary(op, left, rest), sign if op == "+" else -sign
     return tree, 0
-
-
-def broadcast(value: float | FloatArray, n: int) -> list[float]:
-    """Return a number for each element."""
-    return [float(each) for each in np.broadcast_to(value, n)]

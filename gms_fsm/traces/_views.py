@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import OutputError, TraceFileError, why
@@ -25,9 +26,11 @@ __all__ = [
     "BodyTrace",
     "driven_velocity",
     "dwell_times",
+    "picked",
     "read_parts",
     "sigma_at",
     "sliding_of",
+    "steps_of",
     "write_trace",
 ]
 
@@ -57,6 +60,48 @@ def driven_velocity(trace: Trace, body: Body) -> FloatArray:
     for t, y, mode in rows:
         found.append(rate(program, t, y, mode, armed(program, t, y, mode))[place])
     return np.array(found)
+
+
+def steps_of(trace: Trace) -> NDArray[np.int64]:
+    """Return the micro-step of the row that each entry of the log made.
+
+    Parameters
+    ----------
+    trace : Trace
+        A run, or the run of one contact.
+
+    Returns
+    -------
+    ndarray of int, shape (transitions,)
+        Micro-steps count the firings of all contacts at one time.
+    """
+    log = trace.transitions if trace.every is None else trace.every
+    counted: NDArray[np.int64] = np.arange(log.size) - np.searchsorted(log.t, log.t) + 1
+    if trace.every is None or not log.size:
+        return counted
+    return np.asarray(counted[log.contact == trace.places.name])
+
+
+def picked(trace: Trace, keep: NDArray[Any]) -> Trace:
+    """Return some of the rows, with what was observed there, and the whole log.
+
+    Parameters
+    ----------
+    trace : Trace
+        A run.
+    keep : ndarray of int or bool
+        Which rows.
+
+    Returns
+    -------
+    Trace
+        Nothing is computed again.
+    """
+    rows = trace.rows.at(keep)
+    part = replace(trace, rows=rows, stops=rows, stored={})
+    seen = {name: column[keep] for name, column in trace.seen.items()}
+    vars(part).update({"program": trace.program, "seen": seen})
+    return part
 
 
 def dwell_times(trace: Trace) -> FloatArray:

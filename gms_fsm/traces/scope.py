@@ -13,6 +13,7 @@ invariants   as watches, but ``s``, variables and parameters without a number ar
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -257,7 +258,8 @@ class Scope:
     @property
     def z(self) -> Any:
         """The chart's first variable, one per element."""
-        return self.each(self.places.variables[0])
+        variables = self.places.variables
+        return self.each(variables[0]) if variables else [math.nan] * self.places.n
 
     @property
     def s(self) -> Any:

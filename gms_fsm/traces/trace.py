@@ -29,7 +29,7 @@ from gms_fsm.lowering.program import Program, lower
 from gms_fsm.lowering.scales import Setting
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
-from gms_fsm.systems.system import Several, System, system_of
+from gms_fsm.systems.system import System, system_of
 from gms_fsm.traces import _csv
 from gms_fsm.traces._between import between
 from gms_fsm.traces._columns import columns_of
@@ -64,15 +64,13 @@ def check_trace(trace: object) -> None:
     Raises
     ------
     ParameterError
-        If it is not a trace, or that of a system with several contacts; the message says how to
-        make one, or to choose a contact.
+        If it is not; the message says how to make one, or to choose a contact.
     """
     if not isinstance(trace, Trace):
         raise ParameterError(
             "it must be a Trace, from simulate(...) or Trace.load(path)", place="trace", value=trace
         )
-    if isinstance(trace.model, Several):
-        raise trace.model.refused()
+    _ = trace.model.chart  # a system with several contacts refuses, and says to choose one
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,47 +174,12 @@ class Trace:
         bank = self.program.layout.contact(name)
         if self.system is None:
             return self
-        log = self.transitions
+        log = self.transitions if self.every is None else self.every
         mine = log[log.contact == bank.name] if "contact" in log.dtype.names else log
         model: Any = self.system.contact(bank.name)
-        every = log if self.every is None else self.every
-        chosen = replace(self, model=model, transitions=mine, which=bank.name, every=every)
-        kept: dict[str, Any] = {
-            key: vars(self)[key] for key in ("program", "seen") if key in vars(self)
-        }
-        vars(chosen).update(kept)
+        chosen = replace(self, model=model, transitions=mine, which=bank.name, every=log)
+        vars(chosen).update({k: u for k, u in vars(self).items() if k in ("program", "seen")})
         return chosen
-
-    @cached_property
-    def steps(self) -> NDArray[np.int64]:
-        """Micro-step of the row that each entry of the log made, shape (transitions,).
-
-        Micro-steps count the firings of all contacts at one time.
-        """
-        log = self.transitions if self.every is None else self.every
-        counted: NDArray[np.int64] = np.arange(log.size) - np.searchsorted(log.t, log.t) + 1
-        if self.every is None or not log.size:
-            return counted
-        return np.asarray(counted[log.contact == self.which])
-
-    def picked(self, keep: NDArray[Any]) -> Trace:
-        """Return some of the rows, with what was observed there, and the whole log.
-
-        Parameters
-        ----------
-        keep : ndarray of int or bool
-            Which rows.
-
-        Returns
-        -------
-        Trace
-            Nothing is computed again.
-        """
-        rows = self.rows.at(keep)
-        part = replace(self, rows=rows, stops=rows, stored={})
-        seen = {name: column[keep] for name, column in self.seen.items()}
-        vars(part).update({"program": self.program, "seen": seen})
-        return part
 
     def body(self, name: str) -> BodyTrace:
         """Return the motion of a body.

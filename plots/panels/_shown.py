@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.errors import shown as written
+from gms_fsm.traces._views import picked
 from gms_fsm.traces.trace import Trace, check_trace
 
 __all__ = ["has_threshold", "shown"]
@@ -96,8 +97,8 @@ def shown(trace: Trace, window: Window | None = None) -> Trace:
             rows = trace.rows.at(keep)
             trace = replace(trace, rows=rows, stops=rows)
         else:
-            trace = trace.picked(keep)
-    return trace if len(trace) <= MOST_ROWS else trace.picked(_telling_rows(trace))
+            trace = picked(trace, keep)
+    return trace if len(trace) <= MOST_ROWS else picked(trace, _telling_rows(trace))
 
 
 def _telling_rows(trace: Trace) -> NDArray[np.intp]:

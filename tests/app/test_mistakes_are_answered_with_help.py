@@ -164,7 +164,10 @@ def test_an_unknown_lesson_lists_the_lessons(gms_fsm: CommandLine, asked: str) -
     ("arguments", "said"),
     [
         (("code", "--law", "foo"), "error: code gms has no law 'foo'; give --law signed"),
-        (("chart", "foo"), "error: name is 'foo'; it must be one of gms, lugre"),
+        (
+            ("chart", "foo"),
+            "error: name is 'foo'; it must be one of backlash, dog-clutch, end-stop, gms, lugre",
+        ),
         (("blocks", "--elements", "x"), "Invalid value"),
     ],
 )

@@ -317,7 +317,6 @@ def test_a_guard_that_cannot_be_computed_is_marked() -> None:
     trace = simulate(ChartModel(chart, {}, n=1, stribeck=CURVE), Prescribed("1"), 1.0)
     shown = LiveChart(trace)
     assert shown.look(0)[0].marks == {"ab": (False, False)}
-    still = {trace.places.of("v"): 0.0 * trace.v}
-    trace.__dict__["seen"] = {**trace.seen, **still}  # a cached property
+    trace.__dict__["seen"] = {**trace.seen, "friction.v": 0.0 * trace.v}  # a cached property
     assert shown.look(0)[0].marks == {"ab": (False, None)}
     assert marks(groups(shown.frame(0))["element1-guard-ab"]) == ["✗", "?"]

@@ -49,3 +49,8 @@ def test_it_says_to_choose_a_contact(name: str) -> None:
 def test_a_notebook_shows_text() -> None:
     assert run(BLOCKS)._repr_png_() is None  # type: ignore[attr-defined]
     assert run(BLOCKS).contact("pad1")._repr_png_() is not None  # type: ignore[attr-defined]
+
+
+def test_another_contact_can_be_chosen() -> None:
+    first, second = (run(BLOCKS).contact(name) for name in ("pad1", "pad2"))
+    assert first.contact("pad2").transitions.t.tolist() == second.transitions.t.tolist()

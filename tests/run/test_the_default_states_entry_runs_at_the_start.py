@@ -7,7 +7,16 @@ from __future__ import annotations
 
 import pytest
 
-from gms_fsm import Chart, ChartModel, ParameterError, Prescribed, State, Transition, simulate
+from gms_fsm import (
+    Chart,
+    ChartModel,
+    ParameterError,
+    Prescribed,
+    Slider,
+    State,
+    Transition,
+    simulate,
+)
 
 MODEL = ChartModel(
     Chart(
@@ -51,4 +60,4 @@ def test_another_state_is_not_entered() -> None:
 def test_an_entry_that_sets_the_velocity_is_refused() -> None:
     chart = Chart("kick", states=(State("on", entry={"v": "1"}, outputs={"F": "0"}),))
     with pytest.raises(ParameterError, match="the entry of the default state 'on' sets 'v'"):
-        simulate(ChartModel(chart, {}), RIG, 1.0)
+        simulate(ChartModel(chart, {}), Slider(1.0, "1"), 1.0)

@@ -1,0 +1,118 @@
+"""A system or chart that cannot run is refused when it is constructed, with one clear error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from gms_fsm import (
+    Body,
+    Chart,
+    ChartError,
+    ChartModel,
+    Contact,
+    ExpressionError,
+    GMSError,
+    ParameterError,
+    Prescribed,
+    State,
+    System,
+    Transition,
+    simulate,
+)
+from tests.systems_cases import DRY, STICTION
+
+WELD = Chart("weld", states=(State("held", locked=True),))
+MASS = Body("mass", inertia=1.0)
+
+
+def system(*, body: Body = MASS, v: str = "v", **more: Any) -> System:
+    contact = Contact("pad", STICTION, DRY, v=v)
+    return System("one", **{"bodies": (body,), "contacts": (contact,), **more})
+
+
+def one_state(**parts: Any) -> Chart:
+    return Chart("c", variables=("z",), states=(State("on", **parts),))
+
+
+WELDS = (Contact("a", WELD), Contact("b", WELD))
+REFUSED: dict[str, tuple[Callable[[], object], type[GMSError], str]] = {
+    "v squared": (lambda: system(v="v * v"), ParameterError, r"'v \* v' is not linear"),
+    "v with an offset": (lambda: system(v="v + 1"), ParameterError, "is not linear"),
+    "name in v": (lambda: system(v="w"), ExpressionError, "contact 'pad', v, .*unknown name 'w'"),
+    "name in a force": (
+        lambda: system(body=Body("mass", inertia=1.0, force="K * x")),
+        ExpressionError,
+        "body 'mass', force, .*unknown name 'K'",
+    ),
+    "name in a flow": (lambda: system(flow={"i": "u"}), ExpressionError, "unknown name 'u'"),
+    "force of a contact": (
+        lambda: system(body=Body("mass", inertia=1.0, force="F")),
+        ExpressionError,
+        "unknown name 'F'",
+    ),
+    "zero inertia": (
+        lambda: system(body=Body("mass", inertia="J"), numbers={"J": 0.0}),
+        ParameterError,
+        "body 'mass': the inertia 'J' is zero",
+    ),
+    "F in a flow": (
+        lambda: one_state(flow={"z": "F"}, outputs={"F": "z"}),
+        ChartError,
+        "flow of 'z': it reads 'F', .*algebraic loop",
+    ),
+    "a in a force": (lambda: one_state(outputs={"F": "2 * a"}), ChartError, "algebraic loop"),
+    "a missing force": (
+        lambda: Chart("c", states=(State("on", outputs={"F": "1"}), State("off"))),
+        ChartError,
+        "state 'off': no output 'F'",
+    ),
+    "a bank of locks": (
+        lambda: ChartModel(STICTION, DRY, n=2),
+        ParameterError,
+        "n is 2, and the chart has a locked state",
+    ),
+    "locks that repeat": (
+        lambda: system(contacts=WELDS),
+        ParameterError,
+        "'a', 'b' are always locked",
+    ),
+    "a driven body alone": (
+        lambda: system(body=Body("mass", velocity="1")),
+        ParameterError,
+        "only driven bodies move it",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_it_is_refused(name: str) -> None:
+    make, kind, words = REFUSED[name]
+    with pytest.raises(GMSError, match=words) as caught:
+        make()
+    assert type(caught.value) is kind
+
+
+def test_one_lock_that_always_holds_is_fine_and_so_are_two_that_may() -> None:
+    system(contacts=WELDS[:1])
+    system(contacts=(*WELDS[:1], Contact("pad", STICTION, DRY)))
+
+
+def test_a_chart_that_locks_needs_a_rig_that_gives_way() -> None:
+    with pytest.raises(ParameterError, match="a Slider or a PulledSlider"):
+        simulate(ChartModel(STICTION, DRY), Prescribed("0.1"), 1.0)
+
+
+def test_several_sources_may_lead_to_a_lock() -> None:
+    """The same chart, right."""
+    Chart(
+        "c",
+        states=(
+            State("on", outputs={"F": "1"}),
+            State("off", outputs={"F": "0"}),
+            State("held", locked=True),
+        ),
+        transitions=(Transition("hold", ("on", "off"), "held", guard="v < 0"),),
+    )
