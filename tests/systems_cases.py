@@ -20,6 +20,7 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.charts import CHARTS
+from tests.helpers import FASTEST
 
 STICTION, BACKLASH = CHARTS["stiction"], CHARTS["backlash"]
 END_STOP, DOG_CLUTCH = CHARTS["end-stop"], CHARTS["dog-clutch"]
@@ -35,7 +36,7 @@ class Case:
     initial: Mapping[str, Any] = field(default_factory=dict)
     atol: float | None = None
 
-    def run(self, engine: str = "compiled") -> Trace:
+    def run(self, engine: str = FASTEST) -> Trace:
         """Run it at rtol 1e-10."""
         return simulate(
             self.system,
