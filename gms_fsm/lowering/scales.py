@@ -109,14 +109,14 @@ def scales_of(model: Model | Contact) -> Scales:
     Scales
         Derived from its guards, its force and its curve.
     """
+    if isinstance(model, Contact) and model.model is not None:
+        model = model.model
     return _scales_of(_ByIdentity(model))
 
 
 @functools.lru_cache(maxsize=64)
 def _scales_of(key: _ByIdentity[Model | Contact]) -> Scales:
     model = key.it
-    if isinstance(model, Contact) and model.model is not None:
-        return scales_of(model.model)
     chart = model.chart
     sizes = _sizes(_ByIdentity(chart))
     curve, weights = None, np.ones(1)

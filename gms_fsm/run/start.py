@@ -22,7 +22,7 @@ from gms_fsm.run.settings import Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Corners, Formula
-from gms_fsm.systems.system import Mounting, System, origin_of, system_of
+from gms_fsm.systems.system import Mounting, System, origin_of, system_of, with_model
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.scope import GuardValues, parameter_values
 from gms_fsm.traces.trace import Trace
@@ -199,8 +199,7 @@ class Start:
         Start
             With the tolerances of the new model.
         """
-        period = self.system.contacts[0].period if self.given is None else None
-        system = system_of(model, rig, period)
+        system = with_model(self.system, model, rig)
         scales = scales_of_system(system)
         default = scales.tolerances(self.options.rtol)
         tolerances, used = _tolerances(self.program.layout, self.chosen.atol, default)

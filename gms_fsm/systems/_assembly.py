@@ -283,10 +283,10 @@ def assembled(system: System) -> Assembly:
         If a text cannot be read, a velocity is not linear, an inertia is zero, or locks that
         always hold depend on each other.
     """
-    return _Reader(system).read()
+    return Reader(system).read()
 
 
-class _Reader:
+class Reader:
     def __init__(self, system: System) -> None:
         self.system, self.here = system, Part(f"system {system.name!r}")
         self.definitions: list[Definition] = []

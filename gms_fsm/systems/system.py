@@ -6,6 +6,7 @@ relative velocity, which is linear in the bodies' velocities.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -337,6 +338,34 @@ class Several:
             f"system {self._system.name!r} has the contacts {known}",
             advice=f"say which one: trace.contact({self._system.contacts[0].name!r})",
         )
+
+
+def with_model(system: System, model: Model, rig: Rig) -> System:
+    """Return a model on a rig as a system, given that of others of the same kind.
+
+    Nothing is read again, for sweeps.
+
+    Parameters
+    ----------
+    system : System
+        From `system_of`.
+    model, rig
+        With other numbers.
+
+    Returns
+    -------
+    System
+        With these.
+    """
+    from gms_fsm.systems._renumbered import renumbered
+
+    old, new = system.contacts[0], copy.copy(system)
+    contact = Contact(old.name, model, v=old.v, period=old.period)
+    numbers = {name: float(rig.numbers[name]) for name in system.numbers}
+    for name, value in (("contacts", (contact,)), ("numbers", numbers)):
+        object.__setattr__(new, name, value)
+    object.__setattr__(new, "assembly", renumbered(system.assembly, new))
+    return new
 
 
 def origin_of(system: System) -> tuple[Any, Mounting]:

@@ -24,8 +24,8 @@ from gms_fsm import Prescribed, simulate
 from gms_fsm.lowering import _compiled as compiled
 from gms_fsm.lowering._store import Store
 from gms_fsm.lowering.program import lower
+from integrators import columns, loop, step_size
 from integrators import compiled as machine
-from integrators import loop, step_size
 from tests.helpers import ROOT, open_loop, stick_slip
 
 pytestmark = pytest.mark.slow
@@ -286,7 +286,7 @@ def _changes(patch: pytest.MonkeyPatch) -> dict[str, Callable[[], None]]:
         "a function of an arc": lambda: patch.setattr(
             machine, "_OF_AN_ARC", (*machine._OF_AN_ARC[1:], _other)
         ),
-        "the loop": lambda: patch.setattr(loop, "record", _other),
+        "the loop": lambda: patch.setattr(columns, "record", _other),
         "a number": lambda: patch.setattr(step_size, "SAFETY", 0.8),
         "a limit": lambda: patch.setattr(loop, "MOST_SWITCHES", 99),
         "Python": lambda: patch.setattr(sys, "version", "4.0"),
