@@ -155,8 +155,6 @@ class _Printer(Forces):
                 body = [Line(f"i = machine{shift}", sizes), *body]
                 body = indented(body)
             lines += body
-        if not any(bank.edges for bank in self.read.banks):
-            lines = [Line("pass  # the chart has no edges")]
         machine = "machine" if several else "i"
         return self.function(
             f"act(edge, {machine}, t, y, mode, p)",

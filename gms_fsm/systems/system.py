@@ -7,12 +7,16 @@ relative velocity, which is linear in the bodies' velocities.
 from __future__ import annotations
 
 import copy
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import numpy as np
+
 from gms_fsm._arguments import checked_path
+from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import ExpressionError, ParameterError, Part, shown
 from gms_fsm.language import (
@@ -341,9 +345,9 @@ class Several:
 
 
 def with_model(system: System, model: Model, rig: Rig) -> System:
-    """Return a model on a rig as a system, given that of others of the same kind.
+    """Return a model on a rig as a system, given that of others of the same shape.
 
-    Nothing is read again, for sweeps.
+    No text is read again.
 
     Parameters
     ----------
@@ -361,8 +365,12 @@ def with_model(system: System, model: Model, rig: Rig) -> System:
 
     old, new = system.contacts[0], copy.copy(system)
     contact = Contact(old.name, model, v=old.v, period=old.period)
-    numbers = {name: float(rig.numbers[name]) for name in system.numbers}
-    for name, value in (("contacts", (contact,)), ("numbers", numbers)):
+    numbers = {
+        name: checked_scalar(f"system {shown(system.name)}: {name}", rig.numbers[name], "finite")
+        for name in system.numbers
+    }
+    changed = {"contacts": (contact,), "numbers": numbers, "signals": dict(rig.signals)}
+    for name, value in changed.items():
         object.__setattr__(new, name, value)
     object.__setattr__(new, "assembly", renumbered(system.assembly, new))
     return new
@@ -413,6 +421,36 @@ def system_of(model: Model, rig: Rig, period: float | None = None) -> System:
     >>> system_of(model, PulledSlider(1.0, 2.0, 0.1)).bodies[0].force
     'stiffness * (speed * t - x)'
     """
+    signals = tuple(rig.signals.items())
+    chart, values = model.chart, model.values
+    key = (
+        id(chart),  # the cache keeps this chart, so that no other one gets its id
+        tuple(np.ndim(values[name]) for name in chart.parameter_names),
+        model.stribeck is None,
+        rig.title,
+        rig.acceleration,
+        tuple(rig.numbers),
+        tuple((name, type(each), getattr(each, "text", None)) for name, each in signals),
+        period,
+    )
+    return with_model(_of_shape(_Shape(key, model, rig, period, chart)), model, rig)
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """What the texts of a model on a rig depend on, with a model and a rig of that shape."""
+
+    key: tuple[Any, ...]
+    model: Model = field(compare=False)
+    rig: Rig = field(compare=False)
+    period: float | None = field(compare=False)
+    chart: Chart = field(compare=False)
+
+
+@functools.lru_cache(maxsize=64)
+def _of_shape(shape: _Shape) -> System:
+    """Read the texts of a model on a rig."""
+    model, rig, period = shape.model, shape.rig, shape.period
     if rig.acceleration is None:
         body = Body("body", velocity="v")
     else:
