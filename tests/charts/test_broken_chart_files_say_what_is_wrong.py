@@ -111,7 +111,7 @@ HOSTILE = {
     "no TOML": b"name = ",
     "no text": b"\xff\xfe",
     "endless key": b".".join([b"a"] * 500) + b" = 1",
-    "a long array": b'name = "a"\nstate = [\n' + b"{},\n" * 20_000 + b"]\nq = 1\n",
+    "a long array": b'name = "a"\nstate = [\n' + b"{},\n" * 4_000 + b"]\nq = 1\n",
     "too large": b"#" * 1_100_000,
     "deep": b"name = " + b"[" * 5000,
 }
@@ -124,7 +124,7 @@ def test_hostile_files_are_refused_at_once(case: str, tmp_path: Path) -> None:
     begin = time.process_time()
     with pytest.raises(ChartError, match=r"own\.toml"):
         Chart.load(path)
-    assert time.process_time() - begin < 20.0
+    assert time.process_time() - begin < 10.0
 
 
 def test_what_is_no_file_is_named(tmp_path: Path) -> None:

@@ -65,6 +65,7 @@ def charts(draw: st.DrawFn) -> Chart:
     )
 
 
+@pytest.mark.slow
 @given(chart=charts())
 @settings(max_examples=60, deadline=None)
 def test_any_chart_is_read_back_equal(

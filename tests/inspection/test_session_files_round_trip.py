@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 import scipy.integrate
 
-from gms_fsm import Prescribed
+from gms_fsm import Prescribed, Slider
 from gms_fsm.errors import OutputError, SessionError, TraceFileError
 from gms_fsm.inspection.session import Session
 from tests.helpers import FIG4_SINE, pulled_mass, stick_slip
@@ -46,6 +46,21 @@ def test_everything_is_restored(tmp_path: Path) -> None:
         assert len(a) == len(b)
         assert [a.raw(row) for row in range(len(a))] == [b.raw(row) for row in range(len(b))]
         assert a.log() == b.log()
+
+
+class Cart:
+    title, acceleration = "cart", "(2 * F_a - F) / mass"
+    numbers = {"mass": 1.0}  # noqa: RUF012
+    signals = Slider(1.0, "0.2 * t").signals
+
+
+def test_a_rig_of_a_custom_class_is_restored(tmp_path: Path) -> None:
+    session = Session(stick_slip("signed"), Cart(), 6.0)
+    session.goto(5.0)
+    loaded = Session.load(session.save(tmp_path / "walk.json"))
+    loaded.goto(5.0)
+    assert session.here == loaded.here
+    assert loaded.rig.title == "cart"
 
 
 def test_saved_twice_is_the_same_file(tmp_path: Path) -> None:

@@ -87,6 +87,7 @@ def system_with(contacts: list[str], signal: Any = "0.5 * sin(t)", m: float = 1.
     )
 
 
+@pytest.mark.slow
 @given(
     contacts=st.lists(st.sampled_from([*CONTACTS]), min_size=1, max_size=3),
     signal=SIGNALS,
