@@ -6,14 +6,14 @@ The sentence gives key, value, rule, and the nearest key; it names no file.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Tag, ValidationError
 
 from gms_fsm._files import output_folder, write_whole
-from gms_fsm._toml import LARGEST_FILE, Key, data_of, line_of, text_of, written
+from gms_fsm._toml import LARGEST_FILE, Key, data_of, line_of, override, text_of, written
 from gms_fsm.errors import LONGEST_SHOWN, GMSError, OutputError, cut, shown
 
 __all__ = [
@@ -62,7 +62,11 @@ Made = TypeVar("Made")
 
 # --------------------------------------------------------------------------- files
 def read_file(
-    path: Path, kind: type[Kind], error: type[GMSError], build: Callable[[Kind], Made]
+    path: Path,
+    kind: type[Kind],
+    error: type[GMSError],
+    build: Callable[[Kind], Made],
+    overrides: Sequence[str] = (),
 ) -> Made:
     """Read what a TOML file describes.
 
@@ -76,6 +80,8 @@ def read_file(
         The class of error to raise for a file that is not such a table.
     build : callable
         ``build(table)`` returns the object; the part at fault is the `GMSError.key` of its errors.
+    overrides : sequence of str
+        Keys to change, as in `gms_fsm._toml.override`.
 
     Returns
     -------
@@ -89,18 +95,25 @@ def read_file(
     """
     text = text_of(path, error)
     data = data_of(text, path, error)
+    replaced = [override(data, each) for each in overrides]
+
+    def place_of(key: Key) -> list[str]:
+        """Return where a key is given: on a line, or by an override."""
+        if any(key[: len(each)] == each for each in replaced):
+            return ["--set"]
+        line = line_of(text, key)
+        return [f"line {line}"] if line else []
+
     try:
         table = kind.model_validate(data)
     except ValidationError as found:
         key, sentence = explained(found, data, kind)
-        line = line_of(text, key)
-        raise error(f"line {line}: {sentence}" if line else sentence, place=str(path)) from None
+        raise error(": ".join([*place_of(key), sentence]), place=str(path)) from None
     try:
         return build(table)
     except GMSError as found:
         key = _key_in_file(found.key, data, kind)
-        line = line_of(text, key)
-        place = [f"line {line}"] if line else []
+        place = place_of(key)
         place += [".".join(map(str, key))] if key else []
         raise (found.inside(", ".join(place)) if place else found).inside(path) from None
 

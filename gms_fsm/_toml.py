@@ -140,7 +140,7 @@ def _with_digits(text: str) -> str:
     return ""
 
 
-def override(data: dict[str, Any], setting: str) -> None:
+def override(data: dict[str, Any], setting: str) -> Key:
     """Change one key.
 
     Parameters
@@ -148,7 +148,14 @@ def override(data: dict[str, Any], setting: str) -> None:
     data : dict
         Contents of a file; modified in place.
     setting : str
-        ``"model.law=published"``: a key path and a TOML value; a bare word is a string.
+        ``"model.law=published"``: a key path and a TOML value; a bare word is a string. In an
+        array of tables, the next part of the path is the name of one, or its index from 0:
+        ``"body.load.inertia=2"``.
+
+    Returns
+    -------
+    tuple of str or int
+        The key.
 
     Raises
     ------
@@ -177,14 +184,35 @@ def override(data: dict[str, Any], setting: str) -> None:
             raise ScenarioError(f"not valid TOML{hint}", place=f"--set {cut(setting)}") from None
     except (ValueError, RecursionError) as error:
         raise ScenarioError(f"{cut(str(error))}", place=f"--set {cut(setting)}") from None
-    table = data
-    for part in parts[:-1]:
-        table = table.setdefault(part, {})
-        if not isinstance(table, dict):
-            raise ScenarioError(
-                f"{shown(part)} is a value, not a table", place=f"--set {cut(setting)}"
-            )
-    table[parts[-1]] = value
+    return _set(data, parts, value, f"--set {cut(setting)}")
+
+
+def _set(data: dict[str, Any], parts: Sequence[str], value: Any, here: str) -> Key:
+    """Set a key, and return it."""
+    table: Any = data
+    key: Key = ()
+    for depth, part in enumerate(parts):
+        step: str | int = _index(table, part, here) if isinstance(table, list) else part
+        key, last = (*key, step), depth + 1 == len(parts)
+        if last:
+            table[step] = value
+            break
+        table = table[step] if isinstance(step, int) else table.setdefault(step, {})
+        if not isinstance(table, dict) and not _is_tables(table):
+            raise ScenarioError(f"{shown(part)} is a value, not a table", place=here)
+    return key
+
+
+def _index(tables: Sequence[Mapping[str, Any]], part: str, here: str) -> int:
+    """Return the index of a table of an array, given its name or its index."""
+    names = [str(each.get("name", i)) for i, each in enumerate(tables)]
+    if part in names:
+        return names.index(part)
+    if part.isdecimal() and int(part) < len(tables):
+        return int(part)
+    raise ScenarioError(
+        f"there is no {shown(part)}", place=here, advice=f"there are {', '.join(names)}"
+    )
 
 
 # --------------------------------------------------------------------------- lines

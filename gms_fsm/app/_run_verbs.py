@@ -150,9 +150,9 @@ def sweep_command(
 
 def schema_command() -> None:
     """Print the JSON schema of scenario files, for editors."""
-    from gms_fsm.app.scenario import Scenario
+    from gms_fsm.app.scenario import schema
 
-    typer.echo(json.dumps(Scenario.model_json_schema(), indent=2))
+    typer.echo(json.dumps(schema(), indent=2))
 
 
 def debug_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:

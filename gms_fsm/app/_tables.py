@@ -19,9 +19,10 @@ from pydantic import (
 from pydantic_core import CoreSchema, PydanticKnownError
 from pydantic_core.core_schema import literal_schema
 
-from gms_fsm._records import ONE, TABLE, TEXT, Table
+from gms_fsm._records import LIST, ONE, TABLE, TEXT, Table
 from gms_fsm.app.records import Column
 from gms_fsm.run.settings import ENGINES, EVENTS, Settings
+from gms_fsm.systems._file import SystemFile
 from gms_fsm.systems._model_tables import ModelTable
 from gms_fsm.systems.rigs import PulledSlider
 from integrators import METHODS
@@ -35,6 +36,7 @@ __all__ = [
     "SignalField",
     "SignalRecordTable",
     "SliderTable",
+    "SystemScenario",
 ]
 
 # Tags of union members in pydantic's errors; no key of a file looks like these.
@@ -261,3 +263,62 @@ class Scenario(Table):
             if self.run.t_end is None:
                 raise ValueError("run.t_end is missing; it can be omitted only with a record")
         return self
+
+
+# --------------------------------------------------------------------------- systems
+STATES = "<states>"
+
+
+def _initial_form(given: Any) -> str:
+    if isinstance(given, dict):
+        return TABLE
+    if isinstance(given, list):
+        return STATES if given and isinstance(given[0], str) else LIST
+    return ONE
+
+
+_OneInitial = (
+    Annotated[float, Tag(ONE)]
+    | Annotated[list[float], Tag(LIST)]
+    | Annotated[list[str], Tag(STATES)]
+)
+InitialValue = Annotated[
+    _OneInitial
+    | Annotated[
+        dict[str, Annotated[_OneInitial, Discriminator(_initial_form)]],
+        Tag(TABLE),
+    ],
+    Discriminator(_initial_form),
+]
+
+
+class SystemScenario(SystemFile):
+    """A scenario file of a system: a system file with the tables of a run."""
+
+    title: str = Field("", description="by default the name of the system")
+    notes: str = Field("", description="text for the summary")
+    run: RunTable = RunTable()
+    initial: dict[str, InitialValue] = Field(
+        {},
+        description="by name: load.x and load.v of a body, gear.z and gear.states of a contact, "
+        "and further states; all else starts at 0",
+    )
+    output: OutputTable = OutputTable()
+
+    @model_validator(mode="after")
+    def _fits(self) -> SystemScenario:
+        if self.run.events == "held":
+            raise ValueError("run.events = 'held' is for a model on a rig; give a contact a period")
+        return self
+
+    def initial_values(self) -> dict[str, Any]:
+        """Return the initial values by name, such as ``"load.x"``."""
+        return _flat(self.initial)
+
+
+def _flat(table: Mapping[str, Any]) -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for name, value in table.items():
+        inner = _flat(value) if isinstance(value, dict) else {"": value}
+        flat |= {f"{name}.{key}".removesuffix("."): each for key, each in inner.items()}
+    return flat

@@ -19,7 +19,7 @@ from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, FloatArray
 from gms_fsm.errors import GMSError, MissingExtraError, ScenarioError
 from gms_fsm.inspection.notes import notes_on
 from gms_fsm.lowering.scales import Setting
-from gms_fsm.run.simulate import Moment, simulate
+from gms_fsm.run.simulate import Moment
 from gms_fsm.systems.models import GMS
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.trace import Trace, dwell_times
@@ -138,12 +138,8 @@ def run_scenario(
     for name in names:
         refuse_input(folder / name, loaded.path, *([loaded.record.path] if loaded.record else []))
     try:
-        trace = simulate(
-            loaded.model,
-            loaded.rig,
-            progress=progress,
-            checkpoint=folder / "run.checkpoint" if checkpoint else None,
-            **loaded.arguments,
+        trace = loaded.simulate(
+            progress=progress, checkpoint=folder / "run.checkpoint" if checkpoint else None
         )
     except SimulationError as error:
         kept = error.trace.save(folder / "partial.npz")

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from gms_fsm._files import inside
-from gms_fsm._records import explained
+from gms_fsm._records import explained, read_file
 from gms_fsm._toml import override, parsed
 from gms_fsm.app._tables import (
     PrescribedTable,
@@ -25,15 +25,20 @@ from gms_fsm.app._tables import (
     SignalField,
     SignalRecordTable,
     SliderTable,
+    SystemScenario,
 )
 from gms_fsm.app.records import Motion, Record, motion_of, read_record
+from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError, RecordError, ScenarioError, UnitError, cut, shown
+from gms_fsm.run.simulate import simulate
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Prescribed, PulledSlider, Rig, Slider
 from gms_fsm.systems.signals import Corners, SignalLike, as_signal
-from gms_fsm.traces.monitors import checked
+from gms_fsm.systems.system import System, origin_of
+from gms_fsm.traces.monitors import Monitor, checked
+from gms_fsm.traces.trace import Trace
 
-__all__ = ["DATA_VARIABLE", "Loaded", "Scenario", "load_scenario"]
+__all__ = ["DATA_VARIABLE", "Loaded", "Scenario", "load_scenario", "load_system", "schema"]
 
 DATA_VARIABLE = "GMS_FSM_DATA"
 
@@ -46,28 +51,59 @@ class Loaded:
     ----------
     path : Path
         The scenario file.
-    scenario : Scenario
+    scenario : Scenario or SystemScenario
         The contents of the file.
     model, rig
-        The system to simulate.
+        What to simulate; of a system its only contact, and the rest.
     arguments : mapping
         Further arguments of `gms_fsm.simulate`, including ``t_end``.
     record, motion : Record and Motion, or None
         The measurement used by the rig, if any.
+    system : System, optional
+        The system, if the file describes one.
     """
 
     path: Path
-    scenario: Scenario
+    scenario: Scenario | SystemScenario
     model: Model
     rig: Rig
     arguments: Mapping[str, Any]
     record: Record | None
     motion: Motion | None
+    system: System | None = None
 
     @property
     def title(self) -> str:
-        """The title of the scenario, or its file name."""
-        return self.scenario.title or self.path.stem
+        """The title of the scenario; if it has none, the system's name or the file name."""
+        name = self.path.stem if self.system is None else self.system.name
+        return self.scenario.title or name
+
+    @property
+    def subject(self) -> tuple[Any, ...]:
+        """The first arguments of `gms_fsm.simulate`: model and rig, or the system."""
+        return (self.model, self.rig) if self.system is None else (self.system,)
+
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """The names of the contacts, if there are several."""
+        several = self.system is not None and len(self.system.contacts) > 1
+        return tuple(each.name for each in self.system.contacts) if self.system and several else ()
+
+    def simulate(self, **options: Any) -> Trace:
+        """Run it.
+
+        Parameters
+        ----------
+        **options
+            Further arguments of `gms_fsm.simulate`.
+
+        Returns
+        -------
+        Trace
+            The run.
+        """
+        options = {**self.arguments, **options}
+        return simulate(*self.subject, options.pop("t_end"), **options)
 
 
 def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
@@ -83,7 +119,7 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
     Returns
     -------
     Loaded
-        Model, rig and arguments.
+        Model and rig, or system, and arguments.
 
     Raises
     ------
@@ -99,9 +135,19 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
         raise ScenarioError(
             "the file is empty",
             place=str(path),
-            advice="a scenario needs at least the tables [model], [rig] and [run] (see the "
-            "examples in scenarios/; gms-fsm schema prints all keys)",
+            advice="a scenario needs at least the tables [model], [rig] and [run], or [[body]], "
+            "[[contact]] and [run] (see the examples in scenarios/; gms-fsm schema prints all "
+            "keys)",
         )
+    if kind_of(data) == "chart":
+        raise ScenarioError(
+            "this is a chart file, which says nothing about bodies",
+            place=str(path),
+            advice="name it in a [[contact]] of a system file; "
+            f"`gms-fsm chart {path}` and `gms-fsm check {path}` take the chart itself",
+        )
+    if kind_of(data) == "system":
+        return _loaded_system(path, overrides)
     for setting in overrides:
         override(data, setting)
     try:
@@ -121,6 +167,97 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
         raise ScenarioError.of(error).replaced(place=place).inside(path) from None
 
 
+def kind_of(data: Mapping[str, Any]) -> str:
+    """Return what a file describes, by its tables: ``"system"``, ``"chart"`` or ``"rig"``."""
+    if data.keys() & {"body", "bodies", "contact", "contacts"}:
+        return "system"
+    return "chart" if data.keys() & {"state", "states"} else "rig"
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON schema of scenario files.
+
+    Returns
+    -------
+    dict
+        A model on a rig, or a system.
+    """
+    both: TypeAdapter[Any] = TypeAdapter(Scenario | SystemScenario)
+    return both.json_schema()
+
+
+# --------------------------------------------------------------------------- systems
+def load_system(path: str | Path, overrides: Sequence[str] = ()) -> System:
+    """Read the system of a system file or a scenario file.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file.
+    overrides : sequence of str
+        As in `load_scenario`.
+
+    Returns
+    -------
+    System
+        Checked.
+
+    Raises
+    ------
+    GMSError
+        Naming file, line, key and text.
+    """
+    return _system_of(Path(path), overrides)[1]
+
+
+def _system_of(path: Path, overrides: Sequence[str]) -> tuple[SystemScenario, System]:
+    def build(table: SystemScenario) -> tuple[SystemScenario, System]:
+        return table, table.chosen(path.parent)
+
+    return read_file(path, SystemScenario, ScenarioError, build, overrides)
+
+
+def _loaded_system(path: Path, overrides: Sequence[str]) -> Loaded:
+    scenario, system = _system_of(path, overrides)
+    run = scenario.run
+    start, end = run.t_start or 0.0, run.t_end
+    if end is None:
+        raise ScenarioError(
+            "run.t_end is missing",
+            place=str(path),
+            advice="add a table [run] with t_end in s, or give --set run.t_end=10.0",
+        )
+    arguments = run.options() | {"t_start": start, "t_end": end}
+    if initial := scenario.initial_values():
+        arguments["initial"] = initial
+    if scenario.output.every is not None:
+        arguments["t_eval"] = _rows(path, scenario.output.every, start, end)
+    model, rig = origin_of(system)
+    if run.monitors:
+        arguments["monitors"] = _monitors(path, run.monitors, model)
+    return Loaded(path, scenario, model, rig, arguments, None, None, system)
+
+
+def _rows(path: Path, every: float, start: float, end: float) -> FloatArray:
+    """Return the times of the rows."""
+    wanted = max(0.0, (end - start) / every)  # t_end is checked later
+    if wanted > 10_000_000:
+        raise ScenarioError(
+            f"output.every = {every} s gives {wanted:.4g} rows",
+            place=str(path),
+            advice="use a larger value",
+        )
+    return np.minimum(start + every * np.arange(int(wanted) + 1), end)
+
+
+def _monitors(path: Path, given: Sequence[str], model: Model) -> tuple[Monitor, ...]:
+    try:
+        return tuple(checked(given, model).values())
+    except GMSError as error:
+        raise ScenarioError.of(error).inside("run.monitors").inside(path) from None
+
+
+# --------------------------------------------------------------------------- a model on a rig
 def _loaded(path: Path, scenario: Scenario) -> Loaded:
     run, record, motion = scenario.run, None, None
     start, end = run.t_start, run.t_end
@@ -151,22 +288,11 @@ def _loaded(path: Path, scenario: Scenario) -> Loaded:
     assert end is not None
     start = 0.0 if start is None else start
     if scenario.output.every is not None:
-        wanted = max(0.0, (end - start) / scenario.output.every)  # t_end is checked later
-        if wanted > 10_000_000:
-            raise ScenarioError(
-                f"output.every = {scenario.output.every} s gives {wanted:.4g} rows",
-                place=str(path),
-                advice="use a larger value",
-            )
-        count = int(wanted)
-        arguments["t_eval"] = np.minimum(start + scenario.output.every * np.arange(count + 1), end)
+        arguments["t_eval"] = _rows(path, scenario.output.every, start, end)
     arguments |= {"t_start": start, "t_end": end, "initial": initial}
     model = scenario.model.build()
     if run.monitors:
-        try:
-            arguments["monitors"] = tuple(checked(run.monitors, model).values())
-        except GMSError as error:
-            raise ScenarioError.of(error).inside("run.monitors").inside(path) from None
+        arguments["monitors"] = _monitors(path, run.monitors, model)
     return Loaded(path, scenario, model, rig, arguments, record, motion)
 
 
