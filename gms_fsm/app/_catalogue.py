@@ -12,7 +12,7 @@ from gms_fsm.errors import ParameterError
 __all__ = ["catalogue", "checkable", "chosen"]
 
 WIDTH = 78
-OWN = "in Python, use plots.statechart(chart) or prove(chart), or add a file to gms_fsm/charts"
+OWN = "give a chart file, such as own.toml"
 
 
 def chosen(verb: str, name: str, law: str) -> tuple[Entry, Chart]:

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gms_fsm._files import output_folder, write_whole
-from gms_fsm.app._options import ChartName, Law
+from gms_fsm.app._options import ChartName, ContactName, Law
 from gms_fsm.app.paper import FORCE, VELOCITY
+from gms_fsm.errors import ParameterError
 
 if TYPE_CHECKING:
     from gms_fsm import Report, Rig
@@ -63,19 +64,23 @@ def chart_command(
     names: Annotated[
         bool, typer.Option("--names", help="Show the names of the edges too.")
     ] = False,
+    contact: ContactName = "",
     listed: Annotated[
         bool, typer.Option("--list", help="List the charts and their parameters.")
     ] = False,
 ) -> None:
     """Draw a state chart, or list the charts that are included."""
     from gms_fsm.app._catalogue import catalogue, chosen
+    from gms_fsm.app._own_files import own_file
 
     if listed:
         typer.echo(catalogue())
         return
     import plots
 
-    _, chart = chosen("chart", name, law)
+    own = own_file(name, law)
+    _no_contact(contact, own)
+    chart = chosen("chart", name, law)[1] if own is None else own.only_chart(contact)
     graph = plots.statechart(
         chart,
         elements,
@@ -104,41 +109,60 @@ def check_command(
     names: Annotated[
         bool, typer.Option("--list", help="List the charts that can be checked.")
     ] = False,
+    contact: ContactName = "",
 ) -> None:
     """Prove that a chart is free of contradictions, or refute it by a counterexample.
 
     The exit code is 1 if a statement is refuted. What the order of the edges
-    settles is reported, but does not count as refuted.
+    settles is reported, but does not count as refuted. Of a system, the
+    charts of all contacts are checked.
     """
     from gms_fsm import prove
     from gms_fsm.app._catalogue import checkable, chosen
+    from gms_fsm.app._own_files import domain_of, own_file
 
     if names:
         typer.echo(checkable())
         return
-    found, chart = chosen("check", name, law)
+    own = own_file(name, law)
+    _no_contact(contact, own)
+    charts = {"": chosen("check", name, law)[1]} if own is None else own.charts(contact)
     folder = None if output is None else output_folder(output)
-    report = prove(chart, domain or found.domain)
-    typer.echo(str(report))
-    for path in [] if folder is None else _write_report(report, folder):
+    reports = {each: prove(chart, domain or domain_of(chart)) for each, chart in charts.items()}
+    texts = [str(report) for report in reports.values()]
+    if own is not None and own.system is not None:
+        texts = [f"contact {each}:\n{text}" for each, text in zip(reports, texts, strict=True)]
+    text = "\n\n".join(texts)
+    typer.echo(text)
+    for path in [] if folder is None else _write_reports(text, [*reports.values()], folder):
         typer.echo(str(path))
-    if report.refuted:
+    if any(report.refuted for report in reports.values()):
         raise typer.Exit(1)
 
 
-def _write_report(report: Report, folder: Path) -> list[Path]:
-    """Write a report, and a marked chart for each finding refuted or settled by order."""
+def _no_contact(contact: str, own: object) -> None:
+    """Refuse a contact of an included chart."""
+    if contact and own is None:
+        raise ParameterError(
+            "an included chart has no contacts",
+            place=f"--contact {contact}",
+            advice="it is for a system file",
+        )
+
+
+def _write_reports(text: str, reports: list[Report], folder: Path) -> list[Path]:
+    """Write reports, and a marked chart for each finding refuted or settled by order."""
     import plots
     from plots import formats
 
-    text = f"{report}\n".encode()
-    found = [*report.refuted, *report.settled]
-    stems = [f"{number}-{finding.check}" for number, finding in enumerate(found, start=1)]
+    found = [(each, finding) for each in reports for finding in (*each.refuted, *each.settled)]
+    stems = [f"{number}-{finding.check}" for number, (_, finding) in enumerate(found, start=1)]
     pictures = [name for stem in stems for name in formats.files(stem, "graph")]
     output_folder(folder, ["report.txt", *pictures])
-    written = [write_whole(folder / "report.txt", lambda file: file.write(text))]
-    edges = report.chart.guards
-    for stem, finding in zip(stems, found, strict=True):
+    whole = f"{text}\n".encode()
+    written = [write_whole(folder / "report.txt", lambda file: file.write(whole))]
+    for stem, (report, finding) in zip(stems, found, strict=True):
+        edges = report.chart.guards
         marked = [part for part in finding.where if part in edges] or finding.where
         settled = finding.status if finding in report.settled else ""
         heading = ", ".join(part for part in (finding.check, finding.case, settled) if part)
@@ -151,36 +175,90 @@ def _write_report(report: Report, folder: Path) -> list[Path]:
 
 
 def blocks_command(
+    file: Annotated[
+        str,
+        typer.Argument(
+            help="System file or scenario file (.toml); without it, the paper's model.",
+            show_default=False,
+        ),
+    ] = "",
     output: Annotated[
         Path, typer.Option("--output", "-o", help="Output file, ending in {graph}.")
     ] = Path("blocks.svg"),
-    elements: Annotated[int, typer.Option(help="Number of elements.")] = 4,
+    elements: Annotated[
+        int | None,
+        typer.Option(help="Number of elements of the paper's model; 4 by default."),
+    ] = None,
 ) -> None:
-    """Draw the block diagram of the whole model (the paper's Fig. 2a)."""
+    """Draw the block diagram of a system, or of the paper's model (its Fig. 2a)."""
     import plots
 
-    typer.echo(str(plots.render(plots.block_diagram(elements), output)))
+    if not file:
+        picture = plots.block_diagram(4 if elements is None else elements)
+        typer.echo(str(plots.render(picture, output)))
+        return
+    from gms_fsm.app._own_files import own_file
+
+    own = own_file(file)
+    if own is None or own.system is None:
+        raise ParameterError(
+            "it is a chart file" if own is not None else "it is not a file",
+            place=file,
+            advice="give a system file or a scenario file (.toml)",
+        )
+    if elements is not None:
+        raise ParameterError(
+            f"the number of elements is in {file}", place="--elements", advice="leave it out"
+        )
+    typer.echo(str(plots.render(plots.block_diagram(own.system), output)))
 
 
 def code_command(
-    name: Annotated[str, typer.Argument(help="Name of the chart.")] = "gms",
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="Name of an included chart, or a chart file, a system file or a scenario file "
+            "(.toml)."
+        ),
+    ] = "gms",
     law: Law = "",
-    rig: Annotated[RigName, typer.Option(help="Rig that the friction acts on.")] = (
-        RigName.prescribed
-    ),
+    rig: Annotated[
+        RigName | None,
+        typer.Option(
+            help="Rig that the friction of a chart acts on; prescribed by default.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
-    """Print the stand-alone if-else program of a chart (the paper's Fig. 2c)."""
+    """Print the stand-alone if-else program of a chart (the paper's Fig. 2c) or a system."""
     from gms_fsm import Prescribed, PulledSlider, Slider
     from gms_fsm.app._catalogue import chosen
+    from gms_fsm.app._own_files import any_model, own_file
     from gms_fsm.lowering._generated import standalone
     from gms_fsm.lowering.program import lower
     from gms_fsm.systems.models import demonstration
 
-    found, _ = chosen("code", name, law)
+    own = own_file(name, law)
+    if own is not None and own.system is not None:
+        if rig is not None:
+            raise ParameterError(
+                f"{name} says what the friction acts on", place="--rig", advice="leave it out"
+            )
+        typer.echo(standalone(lower(own.system).source), nl=False)
+        return
     rigs: dict[RigName, Rig] = {
         RigName.prescribed: Prescribed(VELOCITY),
         RigName.slider: Slider(1.0, FORCE),
         RigName.pulled: PulledSlider(1.0, 2.0, 0.1),
     }
-    model = demonstration(found, law)
-    typer.echo(standalone(lower(model, rigs[rig]).source), nl=False)
+    if own is None:
+        found, _ = chosen("code", name, law)
+    try:
+        model = demonstration(found, law) if own is None else any_model(own.only_chart())
+        program = lower(model, rigs[rig or RigName.prescribed])
+    except ParameterError as error:
+        if rig is not None:
+            raise
+        advice = f"{error.advice}; here, give --rig slider, or a system file instead of a chart"
+        raise error.replaced(advice=advice).inside(name) from None
+    typer.echo(standalone(program.source), nl=False)

@@ -10,6 +10,7 @@ import typer
 __all__ = [
     "INTERRUPTED",
     "ChartName",
+    "ContactName",
     "End",
     "Law",
     "Overrides",
@@ -23,7 +24,8 @@ INTERRUPTED = 130  # the conventional exit code after Ctrl-C
 ScenarioFile = Annotated[
     Path,
     typer.Argument(
-        help="Scenario file, for example scenarios/pulled_mass.toml.", show_default=False
+        help="Scenario file, for example scenarios/pulled_mass.toml or scenarios/servo.toml.",
+        show_default=False,
     ),
 ]
 Overrides = Annotated[
@@ -34,7 +36,15 @@ TraceFile = Annotated[Path, typer.Argument(help="Trace file, .npz or .csv.", sho
 Start = Annotated[float | None, typer.Option(help="Start time in s.")]
 End = Annotated[float | None, typer.Option(help="End time in s.")]
 ChartName = Annotated[
-    str, typer.Argument(help="Name of the chart; --list shows all.", show_default=False)
+    str,
+    typer.Argument(
+        help="Name of an included chart (--list shows all), or a chart file, a system file or a "
+        "scenario file (.toml).",
+        show_default=False,
+    ),
+]
+ContactName = Annotated[
+    str, typer.Option("--contact", help="Contact, of a system with several.", show_default=False)
 ]
 Law = Annotated[
     str,

@@ -82,9 +82,8 @@ def run_command(
 ) -> None:
     """Run a scenario; write the trace, transition log, overview figure and summary."""
     from gms_fsm.app.live import LiveView
-    from gms_fsm.app.report import monitor_lines, run_scenario, velocity_note
+    from gms_fsm.app.report import monitor_lines, note_lines, run_scenario, velocity_note
     from gms_fsm.app.scenario import load_scenario
-    from gms_fsm.inspection.notes import notes_on
 
     loaded = load_scenario(scenario, overrides or [])
     folder = Path("out") / scenario.stem if output is None else output
@@ -100,7 +99,7 @@ def run_command(
     typer.echo(f"{len(trace.transitions)} transitions; {len(files)} files in {folder}")
     for line in monitor_lines(trace):
         typer.echo(line)
-    for each in notes_on(trace):
+    for each in note_lines(trace):
         typer.echo(f"note: {each}")
     typer.echo(f"start with {files[0]}")
 

@@ -4,15 +4,40 @@ from __future__ import annotations
 
 from itertools import chain
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gms_fsm._files import output_folder, refuse_input
 from gms_fsm.app._console import progress_bars
-from gms_fsm.app._options import End, Start, TraceFile
+from gms_fsm.app._options import ContactName, End, Start, TraceFile
+from gms_fsm.errors import ParameterError, shown
+
+if TYPE_CHECKING:
+    from gms_fsm import Trace
 
 __all__ = ["animate_command", "plot_command", "replay_command"]
+
+
+def _of_contact(path: Path, contact: str) -> Trace:
+    """Return a saved run as one contact sees it: the one chosen, or the only one."""
+    from gms_fsm import Trace
+
+    run = Trace.load(path)
+    known = ", ".join(map(repr, run.contacts))
+    if contact and contact not in run.contacts:
+        raise ParameterError(
+            f"{path} has no contact {shown(contact)}",
+            place="--contact",
+            advice=f"there are {known}",
+        )
+    if not contact and len(run.contacts) > 1:
+        raise ParameterError(
+            f"it has the contacts {known}",
+            place=str(path),
+            advice=f"say which one to show: --contact {run.contacts[0]}",
+        )
+    return run.contact(contact or run.contacts[0])
 
 
 def plot_command(
@@ -22,12 +47,12 @@ def plot_command(
     ),
     start: Start = None,
     end: End = None,
+    contact: ContactName = "",
 ) -> None:
     """Draw a run: an overview, and its break-aways in detail."""
-    from gms_fsm import Trace
     from plots import figures, formats
 
-    run = Trace.load(trace)
+    run = _of_contact(trace, contact)
     files = [formats.files(name, "figure") for name in ("overview", "ribbons")]
     folder = output_folder(output, chain(*files))
     window = None
@@ -50,13 +75,14 @@ def animate_command(
     frames: Annotated[int, typer.Option(help="Number of frames.")] = 200,
     start: Start = None,
     end: End = None,
+    contact: ContactName = "",
 ) -> None:
     """Make an animation of the chart next to the force."""
-    from gms_fsm.traces.trace import Trace, files_of
+    from gms_fsm.traces.trace import files_of
     from plots.animation import animate
 
     refuse_input(output, *files_of(trace))
-    run = Trace.load(trace)
+    run = _of_contact(trace, contact)
     with progress_bars() as bar:
         task = bar.add_task("frames", total=frames)
 
@@ -77,13 +103,15 @@ def replay_command(
         Path, typer.Option("--output", "-o", help="Output file, ending in {page}.")
     ] = Path("replay.html"),
     title: Annotated[str, typer.Option(help="Title of the page.")] = "",
+    contact: ContactName = "",
 ) -> None:
     """Write a run as a web page in which it can be stepped through and explained."""
-    from gms_fsm.traces.trace import Trace, files_of
+    from gms_fsm.traces.trace import files_of
     from plots import write_replay
 
     refuse_input(output, *files_of(trace), *([] if other is None else files_of(other)))
-    second = None if other is None else Trace.load(other)
+    first = _of_contact(trace, contact)
+    second = None if other is None else _of_contact(other, contact)
     names = [] if other is None else [trace.stem, other.stem]
-    page = write_replay(output, Trace.load(trace), second, title=title, names=names)
+    page = write_replay(output, first, second, title=title, names=names)
     typer.echo(str(page))

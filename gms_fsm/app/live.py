@@ -66,7 +66,7 @@ class LiveView:
                 self.show(self.latest)  # the last state is always drawn
             self.live.stop()
         elif self.detail and self.latest is not None:
-            self.console.print(self.table(self.latest))  # a log gets only the last state
+            self.console.print(*self.tables(self.latest))  # a log gets only the last state
 
     def __call__(self, moment: Moment) -> None:
         """Draw, if enough time has passed since the last frame."""
@@ -82,12 +82,12 @@ class LiveView:
     def show(self, moment: Moment) -> None:
         """Draw now."""
         self.bar.update(self.task, completed=moment.t - self.t_start, t=moment.t)
-        shown = Group(self.table(moment), self.bar) if self.detail else self.bar
+        shown = Group(*self.tables(moment), self.bar) if self.detail else self.bar
         self.live.start()
         self.live.update(shown, refresh=True)
 
-    def table(self, moment: Moment) -> Table:
-        """Return a table with one line per element.
+    def tables(self, moment: Moment) -> list[Table]:
+        """Return the table of each contact.
 
         Parameters
         ----------
@@ -96,25 +96,50 @@ class LiveView:
 
         Returns
         -------
+        list of rich.table.Table
+            One, if there are not several contacts.
+        """
+        if len(moment.contacts) == 1:
+            return [self.table(moment)]
+        return [self.table(moment.contact(name), f"{name}   ") for name in moment.contacts]
+
+    def table(self, moment: Moment, lead: str = "") -> Table:
+        """Return a table with one line per element.
+
+        Parameters
+        ----------
+        moment : Moment
+            The latest row.
+        lead : str
+            Put in front of the title.
+
+        Returns
+        -------
         rich.table.Table
             State, |z|/s and z of each element; v and F in the title.
         """
         values, states = moment.values, moment.states
-        title = f"t = {moment.t:10.4f} s   v = {values['v']:+.6f} m/s   F = {values['F']:+.5f} N"
-        table = Table("element", "state", "|z|/s", "", "z [m]", title=title, title_justify="left")
+        title = (
+            f"{lead}t = {moment.t:10.4f} s   v = {values['v']:+.6f} m/s   F = {values['F']:+.5f} N"
+        )
+        bare = all(map(math.isnan, values["s"]))  # no threshold without a Stribeck curve
+        still = all(map(math.isnan, values["z"]))  # a chart without variables
+        table = Table("element", "state", title=title, title_justify="left", min_width=len(title))
+        for head in (*(() if bare else ("|z|/s", "")), *(() if still else ("z [m]",))):
+            table.add_column(Text(head))  # [m] would be markup
         for i, (state, z, s) in enumerate(zip(states, values["z"], values["s"], strict=True)):
             if state not in self.names:
                 self.names.append(state)
             colour = COLOURS[self.names.index(state) % len(COLOURS)]
-            ratio = abs(z) / s
-            bare = math.isnan(ratio)  # no threshold without a Stribeck curve
-            filled = 0 if bare else min(BAR, round(BAR * ratio))
             # Colours and bars are repeated as words and numbers.
-            table.add_row(
-                f"E{i + 1}",
+            row = [
+                Text(f"E{i + 1}"),
                 Text(state.upper() if self.names.index(state) else state, style=colour),
-                "" if bare else f"{ratio:.3f}",
-                Text("█" * filled + "░" * (BAR - filled), style=colour),
-                f"{z:+.4e}",
-            )
+            ]
+            if not bare:
+                ratio = abs(z) / s
+                filled = min(BAR, round(BAR * ratio))
+                bar = Text("█" * filled + "░" * (BAR - filled), style=colour)
+                row += [Text(f"{ratio:.3f}"), bar]
+            table.add_row(*row, *([] if still else [f"{z:+.4e}"]))
         return table

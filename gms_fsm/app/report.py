@@ -21,6 +21,7 @@ from gms_fsm.inspection.notes import notes_on
 from gms_fsm.lowering.scales import Setting
 from gms_fsm.run.simulate import Moment
 from gms_fsm.systems.models import GMS
+from gms_fsm.systems.system import Contact, System
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.trace import Trace, dwell_times
 
@@ -29,6 +30,7 @@ __all__ = [
     "compare",
     "dwell_times",
     "monitor_lines",
+    "note_lines",
     "plain",
     "run_scenario",
     "summary_text",
@@ -184,21 +186,31 @@ def _reported(loaded: Loaded, trace: Trace, folder: Path, saved: Path) -> list[P
     return files
 
 
-def _figure_files(loaded: Loaded) -> list[str]:
-    """Return the file names of the overview figure."""
+def _figure_files(loaded: Loaded, contact: str = "") -> list[str]:
+    """Return the file names of the overview figures, of all contacts or of one of several."""
+    if loaded.contacts and not contact:
+        return [name for each in loaded.contacts for name in _figure_files(loaded, each)]
+    stem = f"overview-{contact}".removesuffix("-")
     wanted = loaded.scenario.output.figures
     if wanted is not None:
-        return [f"overview.{ending}" for ending in wanted]
+        return [f"{stem}.{ending}" for ending in wanted]
     from plots import formats
 
-    return formats.files("overview", "figure")
+    return formats.files(stem, "figure")
 
 
 def _draw(loaded: Loaded, trace: Trace, folder: Path) -> list[Path]:
-    names = _figure_files(loaded)
-    if not names:
+    if not _figure_files(loaded):
         return []
     from plots import figures
+
+    if loaded.contacts:
+        written = []
+        for name in loaded.contacts:
+            figure = figures.overview(trace.contact(name), title=loaded.title)
+            files = _figure_files(loaded, name)
+            written += [figures.save(figure, folder / file) for file in files]
+        return written
 
     measured = None
     if loaded.record is not None and loaded.motion is not None and "force" in loaded.record.columns:
@@ -206,7 +218,7 @@ def _draw(loaded: Loaded, trace: Trace, folder: Path) -> list[Path]:
         position = loaded.motion.position[loaded.record.chosen]
         measured = figures.Measured(times, position, force)
     figure = figures.overview(trace, measured, title=loaded.title)
-    return [figures.save(figure, folder / name) for name in names]
+    return [figures.save(figure, folder / name) for name in _figure_files(loaded)]
 
 
 # --------------------------------------------------------------------------- the summary
@@ -229,26 +241,77 @@ def summary_text(loaded: Loaded, trace: Trace) -> str:
     settings = ", ".join(
         f"{name} = {_setting(value)}" for name, value in trace.settings.items() if value is not None
     )
+    result = f"- result: {len(trace)} rows, {len(trace.transitions)} transitions"
     lines = [
         f"# {plain(' '.join(loaded.title.split()))}",
         "",
         *([plain(loaded.scenario.notes.strip()), ""] if loaded.scenario.notes.strip() else []),
-        f"- model: {plain(trace.model.title)}",
-        f"- rig: {plain(trace.rig.title)}",
-        f"- parameters: {_parameters(trace)}",
-        f"- run: {settings}",
-        f"- result: {len(trace)} rows, {len(trace.transitions)} transitions, F from "
-        f"{trace.F.min():.4g} to {trace.F.max():.4g} N",
-        *_held(trace),
-        *(f"- note: {note}" for note in notes_on(trace)),
-        "",
-        *_element_table(trace),
     ]
+    if trace.system is None:
+        lines += [
+            f"- model: {plain(trace.model.title)}",
+            f"- rig: {plain(trace.rig.title)}",
+            f"- parameters: {_parameters(trace)}",
+            f"- run: {settings}",
+            f"{result}, F from {trace.F.min():.4g} to {trace.F.max():.4g} N",
+            *_held(trace),
+            *(f"- note: {note}" for note in notes_on(trace)),
+            "",
+            *_element_table(trace),
+        ]
+    else:
+        lines += [
+            f"- system: {plain(trace.system.name)}",
+            *([f"- numbers: {_values(trace.system.numbers)}"] if trace.system.numbers else []),
+            f"- run: {settings}",
+            result,
+            *_held(trace),
+            "",
+            *_end_tables(trace, trace.system),
+            *(line for name in trace.contacts for line in _contact_lines(trace.contact(name))),
+        ]
     if trace.monitors:
         lines += ["", "## Monitors", "", *(f"- {line}" for line in monitor_lines(trace))]
     if loaded.record is not None and loaded.motion is not None:
         lines += ["", *_measurement(loaded.record, loaded.motion, trace)]
     return "\n".join(lines) + "\n"
+
+
+def _values(numbers: Mapping[str, float]) -> str:
+    """Return numbers by name."""
+    return ", ".join(f"{name} = {value:.6g}" for name, value in numbers.items())
+
+
+def _end_tables(trace: Trace, system: System) -> list[str]:
+    """Return where the bodies and the further values are at the end of a run."""
+    bodies = [(each.name, trace.body(each.name)) for each in system.bodies]
+    rows = [
+        [f"{name} ({each.x}, {each.v})", f"{body.x[-1]:.6g}", f"{body.v[-1]:.6g}"]
+        for each, (name, body) in zip(system.bodies, bodies, strict=True)
+    ]
+    lines = [f"At t = {trace.t[-1]:.6g} s:", "", *_table(["body", "position", "velocity"], rows)]
+    names = [*system.flow, *(name for each in system.sampled for name in each.updates)]
+    if names:
+        rows = [[f"{trace.value(name)[-1]:.6g}" for name in names]]
+        lines += ["", *_table(names, rows)]
+    return lines
+
+
+def _contact_lines(trace: Trace) -> list[str]:
+    """Return the section of one contact."""
+    velocities = trace.system.contact(trace.which).v if trace.system else ()
+    return [
+        "",
+        f"## Contact {plain(trace.model.title)}",
+        "",
+        f"- on: {', '.join(map(plain, velocities))}",
+        f"- parameters: {_parameters(trace)}",
+        f"- result: {len(trace.transitions)} transitions, F from {trace.F.min():.4g} to "
+        f"{trace.F.max():.4g}",
+        *(f"- note: {note}" for note in notes_on(trace)),
+        "",
+        *_element_table(trace),
+    ]
 
 
 def _setting(value: Setting) -> str:
@@ -320,12 +383,31 @@ def monitor_lines(trace: Trace) -> list[str]:
     ]
 
 
+def note_lines(trace: Trace) -> list[str]:
+    """Return the notes on a run, with the contact if there are several.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run.
+
+    Returns
+    -------
+    list of str
+        Lines for the user.
+    """
+    if len(trace.contacts) == 1:
+        return [*notes_on(trace)]
+    return [f"{name}: {note}" for name in trace.contacts for note in notes_on(trace.contact(name))]
+
+
 def _parameters(trace: Trace) -> str:
     model = trace.model
     numbers = [(each, model.values[each.name]) for each in model.chart.parameters]
     if model.stribeck is not None:
         numbers += [(each, getattr(model.stribeck, each.name)) for each in STRIBECK]
-    numbers.append((SIGMA_2, model.sigma_2))
+    if not (isinstance(model, Contact) and model.model is None):
+        numbers.append((SIGMA_2, model.sigma_2))
     if model.stribeck is not None:
         numbers.append((WEIGHTS, model.weights))
     shown = (f"{each.name} = {_number(value)} {each.unit}".rstrip() for each, value in numbers)
@@ -351,6 +433,10 @@ def _element_table(trace: Trace) -> list[str]:
         ]
         for i in range(trace.n)
     ]
+    return _table(head, rows)
+
+
+def _table(head: list[str], rows: list[list[str]]) -> list[str]:
     return ["| " + " | ".join(row) + " |" for row in [head, ["---"] * len(head), *rows]]
 
 

@@ -79,7 +79,7 @@ class Loaded:
         return self.scenario.title or name
 
     @property
-    def subject(self) -> tuple[Any, ...]:
+    def subject(self) -> Any:
         """The first arguments of `gms_fsm.simulate`: model and rig, or the system."""
         return (self.model, self.rig) if self.system is None else (self.system,)
 
@@ -168,10 +168,29 @@ def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
 
 
 def kind_of(data: Mapping[str, Any]) -> str:
-    """Return what a file describes, by its tables: ``"system"``, ``"chart"`` or ``"rig"``."""
-    if data.keys() & {"body", "bodies", "contact", "contacts"}:
-        return "system"
-    return "chart" if data.keys() & {"state", "states"} else "rig"
+    """Return what a file describes, by its tables.
+
+    Parameters
+    ----------
+    data : mapping
+        Contents of the file.
+
+    Returns
+    -------
+    str
+        ``"system"``, ``"chart"``, ``"rig"`` for a model on a rig; empty if it cannot be told.
+    """
+    for kind, tables in _TABLES.items():
+        if data.keys() & tables:
+            return kind
+    return ""
+
+
+_TABLES = {
+    "system": {"body", "bodies", "contact", "contacts"},
+    "rig": {"model", "rig"},
+    "chart": {"state", "states", "edge", "transitions"},
+}
 
 
 def schema() -> dict[str, Any]:
@@ -247,7 +266,8 @@ def _rows(path: Path, every: float, start: float, end: float) -> FloatArray:
             place=str(path),
             advice="use a larger value",
         )
-    return np.minimum(start + every * np.arange(int(wanted) + 1), end)
+    times: FloatArray = np.minimum(start + every * np.arange(int(wanted) + 1), end)
+    return times
 
 
 def _monitors(path: Path, given: Sequence[str], model: Model) -> tuple[Monitor, ...]:

@@ -202,9 +202,13 @@ class Recorder:
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """The latest row of a running simulation, computed on demand."""
+    """The latest row of a running simulation, computed on demand.
+
+    A system with several contacts has no states and values of its own; each `contact` has.
+    """
 
     _recording: Recording
+    _which: str = ""
 
     @property
     def t(self) -> float:
@@ -212,23 +216,44 @@ class Moment:
         return self._recording.latest[0]
 
     @property
+    def contacts(self) -> tuple[str, ...]:
+        """Names of the contacts."""
+        return tuple(bank.name for bank in self._recording.start.program.layout.banks)
+
+    def contact(self, name: str) -> Moment:
+        """Return the row as one contact sees it.
+
+        Parameters
+        ----------
+        name : str
+            The contact's.
+
+        Returns
+        -------
+        Moment
+            With its states and values.
+        """
+        return Moment(self._recording, name)
+
+    @property
     def states(self) -> list[str]:
         """Active state of each element."""
-        start, (_, _, mode) = self._recording.start, self._recording.latest
-        states = start.model.chart.states
-        return [states[each].name for each in mode[start.program.layout.elements]]
+        here: list[str] = scope_of(self._recording, self._which).states
+        return here
 
     @property
     def values(self) -> dict[str, Any]:
         """``x`` [m], ``v`` [m/s] and ``F`` [N]; ``z`` and ``s`` [m], one per element."""
-        here = scope_of(self._recording)
+        here = scope_of(self._recording, self._which)
         return {"x": here.x, "v": here.v, "F": here.F, "z": here.z, "s": here.s}
 
 
-def scope_of(recording: Recording) -> Scope:
-    """Return the values of the latest row."""
+def scope_of(recording: Recording, which: str = "") -> Scope:
+    """Return the values of the latest row; of a system with several contacts, one's."""
     start = recording.start
-    return Scope.of(start.model, start.program, *recording.latest)
+    bank = start.program.layout.contact(which)
+    model = start.system.contact(bank.name) if which else start.model
+    return Scope.of(model, start.program, *recording.latest, bank.name)
 
 
 # --------------------------------------------------------------------------- wording of errors
@@ -247,11 +272,12 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
     SimulationError
         With the trace.
     """
-    trace, chart = recorder.trace(), recorder.start.model.chart
+    trace = recorder.trace()
     if isinstance(error, NotFinite):
-        values = [float(f"{u:.6g}") for u in error.y]
+        start, values = recorder.start, [float(f"{u:.6g}") for u in error.y]
+        names = "x, v, z" if start.given is None else ", ".join(start.program.layout.y.shared)
         return NotFiniteError(
-            f"{_not_finite(error, recorder)} here or just after (x, v, z ... = {values}): {error}",
+            f"{_not_finite(error, recorder)} here or just after ({names} ... = {values}): {error}",
             trace,
             t=error.t,
             advice="look at the signals and parameters there",
@@ -276,17 +302,27 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
         )
     if not isinstance(error, Livelock):
         return SimulationError(str(error), trace, t=error.t)
-    start = recorder.start
-    scope = Scope.of(start.model, start.program, error.t, error.y, error.mode)
+    return _livelock(error, recorder, trace)
 
-    def described(i: int) -> str:
+
+def _livelock(error: Livelock, recorder: Recording, trace: Trace) -> LivelockError:
+    """Translate an endless sequence of switches."""
+    start = recorder.start
+    layout = start.program.layout
+    machine = _rough(recorder, error) if error.machine is None else error.machine
+    bank, name = layout.bank(machine), layout.bank(machine).name
+    chart, i = start.system.contact(name).chart, machine - bank.first
+    scope = Scope.of(start.system.contact(name), start.program, error.t, error.y, error.mode, name)
+    place = _element(layout, name, i)
+
+    def described() -> str:
         z = f"{chart.variables[0]} = {scope.z[i]:.6g}, " if chart.variables else ""
         s = f"s = {scope.s[i]:.6g}, " if "s" in chart.inputs else ""
         return f"{z}{s}v = {scope.v:.6g}"
 
     if error.machine is not None:
-        log = trace.transitions
-        taken = log[log.element == error.machine][-error.times :]
+        log = trace.contact(name).transitions
+        taken = log[log.element == i][-error.times :]
         last = taken[-1]
         guard = next(edge.guard for edge in chart.transitions if edge.name == last.edge)
         time = float(last.t - taken[0].t)
@@ -304,41 +340,54 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
         return LivelockError(
             f"switched {len(taken)} times{f' in {time:.3g} s' if time else ''}, "
             f"last by {str(last.edge)!r} from {last.source} to {last.target} "
-            f"({described(error.machine)}): {cause}",
+            f"({described()}): {cause}",
             trace,
             t=error.t,
-            place=f"element {error.machine + 1}",
+            place=place,
             advice=advice,
         )
-    rough = [
-        i
-        for i, state in enumerate(error.mode[start.program.layout.elements])
-        if any(rough_points(chart.flows[chart.states[state].name, u]) for u in chart.variables)
-    ]
-    i = rough[0] if rough else 0
-    state = chart.states[error.mode[i]]
+    state = chart.states[error.mode[machine]]
     edges = ", ".join(f"{edge.name} [{edge.guard}]" for _, edge in chart.leaving(state.name))
     return LivelockError(
         f"{' and '.join(error.relations)} changed {error.times} times: "
-        f"the element is in {state.name} ({described(i)}), its flow pushes back on both sides, "
+        f"the element is in {state.name} ({described()}), its flow pushes back on both sides, "
         f"no edge leaves ({edges or 'it has none'}), and no value of the sign between -1 and 1 "
         f"holds it there",
         trace,
         t=error.t,
-        place=f"element {i + 1}",
+        place=place,
         advice=f"look at the parameters and at the flow of {state.name}",
     )
 
 
+def _element(layout: Layout, contact: str, i: int) -> str:
+    """Return the words for an element, counted from 0: with its contact if there are several."""
+    return f"contact {contact}, element {i + 1}" if len(layout.banks) > 1 else f"element {i + 1}"
+
+
+def _rough(recorder: Recording, error: Livelock) -> int:
+    """Return the first machine whose flow is not smooth; 0 if there is none."""
+    start = recorder.start
+    for machine, state in enumerate(error.mode[start.program.layout.elements]):
+        chart = start.system.contact(start.program.layout.bank(machine).name).chart
+        here = chart.states[state].name
+        if any(rough_points(chart.flows[here, name]) for name in chart.variables):
+            return machine
+    return 0
+
+
 def _slow(recorder: Recording) -> tuple[str, str]:
     """Return a reason for a run's many steps, as far as it can be determined, and advice."""
-    log = recorder.trace().transitions
+    trace, layout = recorder.trace(), recorder.start.program.layout
     most = recorder.start.options.max_steps
-    if 10 * len(log) > most:
-        element, count = np.unique(log.element, return_counts=True)
-        worst = int(element[count.argmax()])
+    if 10 * len(trace.transitions) > most:
+        count, worst = max(
+            (int((trace.contact(bank.name).transitions.element == i).sum()), (bank.name, i))
+            for bank in layout.banks
+            for i in range(bank.n)
+        )
         return (
-            f": element {worst + 1} has switched {int(count.max())} times (chattering)",
+            f": {_element(layout, *worst)} has switched {count} times (chattering)",
             "separate its guards for the two directions by a gap, or give a larger max_steps",
         )
     return "", (
@@ -428,18 +477,20 @@ def _opposite_edge(chart: Chart, taken: Any) -> str:
 def _not_finite(error: NotFinite, recorder: Recording) -> str:
     """Name the quantity that is not finite where a run ended, if it can be determined."""
     start = recorder.start
-    scope = Scope.of(start.model, start.program, error.t, error.y, error.mode)
-    if not math.isfinite(scope.v):
-        return "the velocity v is not finite"
-    states = {state.name: state for state in start.model.chart.states}
-    for variable in start.model.chart.variables:
-        for i, name in enumerate(scope.states):
-            if not math.isfinite(scope.each(f"d{variable}")[i]):
-                state = states[name]
-                return (
-                    f"the flow of {variable} in state {state.name}, [{state.flow[variable]}], is "
-                    f"not finite in element {i + 1}"
-                )
+    for contact in start.system.contacts:
+        name, chart = contact.name, contact.chart
+        scope = Scope.of(contact, start.program, error.t, error.y, error.mode, name)
+        where = f" of contact {name}" if len(start.system.contacts) > 1 else ""
+        if not math.isfinite(scope.v):
+            return f"the velocity v{where} is not finite"
+        for variable in chart.variables:
+            for i, active in enumerate(scope.states):
+                if not math.isfinite(scope.each(f"d{variable}")[i]):
+                    state = next(each for each in chart.states if each.name == active)
+                    return (
+                        f"the flow of {variable} in state {state.name}, [{state.flow[variable]}], "
+                        f"is not finite in element {i + 1}{where}"
+                    )
     return "a signal or a flow is not finite"
 
 

@@ -1,0 +1,212 @@
+"""Files of the user's own where a verb takes a chart: a chart file, or a system that has charts."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from gms_fsm._toml import parsed
+from gms_fsm.app.scenario import kind_of, load_scenario, load_system
+from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.parameters import Parameter, checked_values
+from gms_fsm.charts.registry import registered
+from gms_fsm.charts.stribeck import Stribeck
+from gms_fsm.errors import GMSError, ParameterError
+from gms_fsm.systems.models import ChartModel
+from gms_fsm.systems.system import System, system_of
+
+__all__ = ["OwnFile", "any_model", "domain_of", "own_file"]
+
+
+@dataclass(frozen=True)
+class OwnFile:
+    """What a file describes: a chart, or a system.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    chart : Chart or None
+        The chart of a chart file.
+    system : System or None
+        The system of a system file, or of a scenario file, also of a model on a rig.
+    """
+
+    path: Path
+    chart: Chart | None = None
+    system: System | None = None
+
+    def charts(self, contact: str = "") -> dict[str, Chart]:
+        """Return its charts.
+
+        Parameters
+        ----------
+        contact : str
+            Which contact's; empty for all of them.
+
+        Returns
+        -------
+        dict of str to Chart
+            By the names of the contacts that have it, such as ``"pad1, pad2"``; a chart file has
+            one, by the name of the file.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such contact.
+        """
+        if self.chart is not None:
+            if contact:
+                raise ParameterError(
+                    "it is a chart file, which has no contacts",
+                    place=f"--contact {contact}: {self.path}",
+                    advice="leave --contact out",
+                )
+            return {self.path.stem: self.chart}
+        assert self.system is not None
+        chosen = [self.system.contact(contact)] if contact else self.system.contacts
+        found: list[tuple[list[str], Chart]] = []
+        for each in chosen:
+            names = next((names for names, chart in found if chart == each.chart), None)
+            if names is None:
+                found.append(([each.name], each.chart))
+            else:
+                names.append(each.name)
+        return {", ".join(names): chart for names, chart in found}
+
+    def only_chart(self, contact: str = "") -> Chart:
+        """Return its chart.
+
+        Parameters
+        ----------
+        contact : str
+            Which contact's; empty if all have the same.
+
+        Returns
+        -------
+        Chart
+            That one.
+
+        Raises
+        ------
+        ParameterError
+            If there are several.
+        """
+        found = self.charts(contact)
+        if len(found) > 1:
+            assert self.system is not None
+            names = ", ".join(repr(each.name) for each in self.system.contacts)
+            raise ParameterError(
+                f"it has the contacts {names}, with different charts",
+                place=str(self.path),
+                advice=f"give --contact {self.system.contacts[0].name}",
+            )
+        return next(iter(found.values()))
+
+
+def own_file(name: str, law: str = "") -> OwnFile | None:
+    """Return what a file describes, if a name on the command line is that of a file.
+
+    Parameters
+    ----------
+    name : str
+        The name of an included chart, or of a file: ending in ``.toml``, or an existing path.
+    law : str
+        Value of ``--law``, which a file does not take.
+
+    Returns
+    -------
+    OwnFile or None
+        None for the name of an included chart.
+
+    Raises
+    ------
+    GMSError
+        If the file is none of these; naming file, line, key, text and column.
+    """
+    path = Path(name)
+    if path.suffix != ".toml" and not (len(path.parts) > 1 and path.exists()):
+        return None
+    if law:
+        raise ParameterError(f"{name} is a file, which takes no --law", advice="leave --law out")
+    kind = kind_of(parsed(path)) or "chart"
+    if kind == "chart":
+        return OwnFile(path, chart=Chart.load(path))
+    if kind == "system":
+        return OwnFile(path, system=load_system(path))
+    loaded = load_scenario(path)
+    period = loaded.arguments.get("step") if loaded.scenario.run.events == "held" else None
+    return OwnFile(path, system=system_of(loaded.model, loaded.rig, period))
+
+
+def domain_of(chart: Chart) -> tuple[str, ...] | None:
+    """Return what a proof of a chart assumes, if it is an included one that says so.
+
+    Parameters
+    ----------
+    chart : Chart
+        Any chart.
+
+    Returns
+    -------
+    tuple of str or None
+        None for the default.
+    """
+    for each in registered().values():
+        if chart in [each.chart(law) for law in each.laws or ("",)]:
+            return each.domain
+    return None
+
+
+def any_model(chart: Chart) -> ChartModel:
+    """Return a model of a chart with some numbers; a program has them as arguments.
+
+    Parameters
+    ----------
+    chart : Chart
+        Any chart.
+
+    Returns
+    -------
+    ChartModel
+        With one element.
+
+    Raises
+    ------
+    ParameterError
+        If no numbers that satisfy the rules were found, or the chart reads inputs that no model
+        supplies.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts import CHARTS
+    >>> any_model(CHARTS["stiction"]).values
+    {'F_c': 1.0, 'F_s': 1.0, 'b': 1.0}
+    """
+    values: dict[str, float] = {}
+    for each in chart.parameters:
+        values[each.name] = next(_satisfying(each, values, chart.parameters), 1.0)
+    curve = Stribeck(1.0, 1.0, 1.0) if "s" in chart.inputs else None
+    return ChartModel(chart, dict(values), stribeck=curve)
+
+
+def _satisfying(
+    parameter: Parameter, before: dict[str, float], every: tuple[Parameter, ...]
+) -> Iterator[float]:
+    """Yield numbers that satisfy a rule, given those of the parameters before it."""
+    limits = sorted(
+        {
+            before.get(bound.limit, 1.0) if isinstance(bound.limit, str) else bound.limit
+            for bound in parameter.bounds
+        }
+    )
+    between = [0.5 * (a + b) for a, b in itertools.pairwise(limits)]
+    known = [each for each in every if each.name in before] + [parameter]
+    for value in (1.0, *limits, *between, *(u + d for u in limits for d in (1.0, -1.0))):
+        try:
+            checked_values(known, {**before, parameter.name: value})
+        except GMSError:
+            continue
+        yield value
