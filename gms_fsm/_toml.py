@@ -211,7 +211,7 @@ def _index(tables: Sequence[Mapping[str, Any]], part: str, here: str) -> int:
     if part.isdecimal() and int(part) < len(tables):
         return int(part)
     raise ScenarioError(
-        f"there is no {shown(part)}", place=here, advice=f"there are {', '.join(names)}"
+        f"there is no {shown(part)}", place=here, advice=f"choose from {', '.join(names)}"
     )
 
 

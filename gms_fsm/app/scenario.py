@@ -79,9 +79,10 @@ class Loaded:
         return self.scenario.title or name
 
     @property
-    def subject(self) -> Any:
-        """The first arguments of `gms_fsm.simulate`: model and rig, or the system."""
-        return (self.model, self.rig) if self.system is None else (self.system,)
+    def subject(self) -> tuple[Any, ...]:
+        """The first arguments of `gms_fsm.simulate`: model, rig and t_end, or system and t_end."""
+        what = (self.model, self.rig) if self.system is None else (self.system,)
+        return (*what, self.arguments["t_end"])
 
     @property
     def contacts(self) -> tuple[str, ...]:
@@ -102,8 +103,10 @@ class Loaded:
         Trace
             The run.
         """
-        options = {**self.arguments, **options}
-        return simulate(*self.subject, options.pop("t_end"), **options)
+        given: Any = {**self.arguments, **options}
+        if self.system is not None:
+            return simulate(self.system, given.pop("t_end"), **given)
+        return simulate(self.model, self.rig, **given)
 
 
 def load_scenario(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:

@@ -283,10 +283,10 @@ def run_debugger(loaded: Loaded, stdin: TextIO | None = None, stdout: TextIO | N
     ScenarioError
         If the run of the scenario cannot be set up.
     """
-    not_here = ("t_eval", "monitors")
+    not_here = ("t_end", "t_eval", "monitors")
     options = {name: value for name, value in loaded.arguments.items() if name not in not_here}
     try:
-        session = Session(*loaded.subject, options.pop("t_end"), **options)
+        session = Session(*loaded.subject, **options)
     except GMSError as error:
         raise ScenarioError.of(error).inside(loaded.path) from None
     return Debugger(session, loaded.title, stdin, stdout).run()
