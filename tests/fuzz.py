@@ -732,12 +732,13 @@ def _start_and_run(loaded: Any) -> None:
     """Run a few steps in the same way as `simulate`."""
     options = {name: value for name, value in loaded.arguments.items() if name != "monitors"}
     where = {name: options.pop(name) for name in ("t_end", "t_start", "initial") if name in options}
+    what = (loaded.model, loaded.rig) if loaded.system is None else (loaded.system, None)
     if np.size(options.get("t_eval", ())) < 10_000:
-        Start.of(loaded.model, loaded.rig, settings=Settings(**options), **where)
+        Start.of(*what, settings=Settings(**options), **where)
     # With requested times an arc runs to the last of them, and hostile numbers make stiff runs.
     options.pop("t_eval", None)
     settings = Settings(**options)
-    run = Run(Start.of(loaded.model, loaded.rig, settings=settings, rows_at_once=20, **where))
+    run = Run(Start.of(*what, settings=settings, rows_at_once=20, **where))
     for _ in range(5):
         if not run.advance():
             break

@@ -226,7 +226,7 @@ def load_system(path: str | Path, overrides: Sequence[str] = ()) -> System:
 
     Raises
     ------
-    GMSError
+    ScenarioError
         Naming file, line, key and text.
     """
     return _system_of(Path(path), overrides)[1]
@@ -236,7 +236,10 @@ def _system_of(path: Path, overrides: Sequence[str]) -> tuple[SystemScenario, Sy
     def build(table: SystemScenario) -> tuple[SystemScenario, System]:
         return table, table.chosen(path.parent)
 
-    return read_file(path, SystemScenario, ScenarioError, build, overrides)
+    try:
+        return read_file(path, SystemScenario, ScenarioError, build, overrides)
+    except GMSError as error:
+        raise ScenarioError.of(error) from None
 
 
 def _loaded_system(path: Path, overrides: Sequence[str]) -> Loaded:
