@@ -6,7 +6,7 @@ import csv
 import io
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from gms_fsm.app.scenario import Loaded
 from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.errors import ParameterError, cut
 from gms_fsm.run.sweep import Sweep, sweep
+from gms_fsm.systems._varied import numbers_in
 from gms_fsm.systems.models import parameters_of
 from gms_fsm.systems.rigs import numbers_of
 
@@ -143,8 +144,8 @@ def sweep_scenario(
         options.pop("t_eval", None)
     else:
         options["output"] = "t_eval"
-    t_end = options.pop("t_end")
-    result = sweep(loaded.model, loaded.rig, t_end, parameters, engine=engine, **options)
+    options.pop("t_end")
+    result = sweep(*(*loaded.subject, parameters), engine=engine, **options)
     saved = result.save(folder / "sweep.npz")  # first, so that no later failure can lose the runs
     table = _csv(result).encode()
     text = sweep_summary(loaded, axes, result, engine).encode()
@@ -157,6 +158,9 @@ def sweep_scenario(
 
 def _known(loaded: Loaded) -> tuple[Parameter, ...]:
     """Return the parameters that can be varied."""
+    if loaded.system is not None:
+        found = numbers_in(loaded.system).items()
+        return tuple(replace(each, name=name) for name, (each, _) in found)
     return (*parameters_of(loaded.model), *numbers_of(loaded.rig))
 
 
@@ -212,21 +216,25 @@ def sweep_summary(loaded: Loaded, axes: Sequence[Axis], result: Sweep, engine: s
     bad = int((result.outcome != "ok").sum())
     heads = [f"{each.name} [{units[each.name]}]".removesuffix(" []") for each in axes]
     numbers = [result.parameters[each.name] for each in axes]
-    heads += ["outcome", "transitions", "t [s]", "x [m]", "v [m/s]", "F [N]"]
+    if loaded.system is None:
+        ends = {"x [m]": result.x, "v [m/s]": result.v, "F [N]": result.F}
+    else:
+        ends = {f"{each.name}.x": result.ends[f"{each.name}.x"] for each in loaded.system.bodies}
+        ends |= {f"{name}.F": result.contact(name).F for name in result.contacts}
+    heads += ["outcome", "transitions", "t [s]", *ends]
     rows = [
         [
             *(f"{values[run]:.6g}" for values in numbers),
             str(result.outcome[run]),
             str(count),
-            *(f"{values[run]:.6g}" for values in (result.t, result.x, result.v, result.F)),
+            *(f"{values[run]:.6g}" for values in (result.t, *ends.values())),
         ]
         for run, count in enumerate(result.transition_count[:LONGEST_TABLE].tolist())
     ]
     lines = [
         f"# {plain(' '.join(loaded.title.split()))}, swept",
         "",
-        f"- model: {plain(loaded.model.title)}",
-        f"- rig: {plain(loaded.rig.title)}",
+        *_subject(loaded),
         *(f"- {_varied(each, units[each.name])}" for each in axes),
         f"- runs: {len(result)}, to t = {loaded.arguments['t_end']:g} s, engine {engine}",
         f"- result: {len(result.transitions)} transitions, {bad} runs failed",
@@ -237,6 +245,12 @@ def sweep_summary(loaded: Loaded, axes: Sequence[Axis], result: Sweep, engine: s
     if len(result) > LONGEST_TABLE:
         lines += ["", f"The first {LONGEST_TABLE} runs; `runs.csv` has all {len(result)}."]
     return "\n".join(lines) + "\n"
+
+
+def _subject(loaded: Loaded) -> list[str]:
+    if loaded.system is not None:
+        return [f"- system: {plain(loaded.system.name)}"]
+    return [f"- model: {plain(loaded.model.title)}", f"- rig: {plain(loaded.rig.title)}"]
 
 
 def _varied(one: Axis, unit: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ from gms_fsm._arguments import checked_path
 from gms_fsm._extras import require
 from gms_fsm._files import write_whole
 from gms_fsm.charts.parameters import QUANTITIES, FloatArray
-from gms_fsm.errors import OutputError, TraceFileError, cut, shown, why
+from gms_fsm.errors import OutputError, ParameterError, TraceFileError, cut, shown, why
 from gms_fsm.lowering.layout import LOG_NUMBERS
 from gms_fsm.traces._archives import member
 from gms_fsm.traces.rows import column_name
@@ -63,7 +63,15 @@ class Sweep:
     times : ndarray, shape (rows,)
         With ``output="t_eval"`` the times of the rows, otherwise empty.
     rows : mapping of str to ndarray
-        With ``output="t_eval"``: ``x, v, F`` of shape (runs, rows), ``z`` of shape (runs, rows, n).
+        With ``output="t_eval"``: ``x, v, F`` of shape (runs, rows), ``z`` of shape (runs, rows, n);
+        of a system also the values in `ends`, of shape (runs, rows).
+    ends : mapping of str to ndarray, shape (runs,)
+        Of a system: ``load.x`` and ``load.v`` for each body at the end, and the further states and
+        sampled values by name.
+    owners : ndarray of str, shape (n,)
+        Of a system: for each element the name of its contact. With several contacts, elements
+        count over all of them, ``x, v, F`` have one column per contact, and `edges` are named
+        ``gear.touch``; `contact` returns the results of one.
     """
 
     parameters: Mapping[str, FloatArray]
@@ -79,6 +87,8 @@ class Sweep:
     edges: tuple[str, ...]
     times: FloatArray
     rows: Mapping[str, FloatArray]
+    ends: Mapping[str, FloatArray] = field(default_factory=dict)
+    owners: NDArray[np.str_] = field(default_factory=lambda: np.empty(0, dtype=np.str_))
 
     def __len__(self) -> int:
         return int(self.t.size)
@@ -94,6 +104,56 @@ class Sweep:
     def transition_count(self) -> NDArray[np.int64]:
         """How often an edge fired in each run, shape (runs,)."""
         return np.bincount(self.transitions["run"], minlength=len(self))
+
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """Names of the contacts of a system."""
+        return tuple(dict.fromkeys(self.owners.tolist()))
+
+    def contact(self, name: str) -> Sweep:
+        """Return the results of one contact of a system.
+
+        Parameters
+        ----------
+        name : str
+            The contact's.
+
+        Returns
+        -------
+        Sweep
+            With its ``x, v, F, z, states`` and transitions only.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such contact.
+        """
+        if name not in self.contacts:
+            known = ", ".join(map(repr, self.contacts)) or "none, this is a model on a rig"
+            raise ParameterError(f"there is no contact {shown(name)}", advice=f"there are {known}")
+        if len(self.contacts) == 1:
+            return self
+        which, mine = self.contacts.index(name), np.flatnonzero(self.owners == name)
+        edges = [k for k, edge in enumerate(self.edges) if edge.startswith(f"{name}.")]
+        log = self.transitions[np.isin(self.transitions["element"], mine)].copy()
+        log["element"] -= mine[0]
+        log["edge"] = np.searchsorted(edges, log["edge"])
+        rows = {
+            key: values[..., mine] if key == "z" else values[..., which] if key in "xvF" else values
+            for key, values in self.rows.items()
+        }
+        return replace(
+            self,
+            x=self.x[:, which],
+            v=self.v[:, which],
+            F=self.F[:, which],
+            z=self.z[:, mine],
+            states=self.states[:, mine],
+            transitions=log,
+            edges=tuple(self.edges[k].removeprefix(f"{name}.") for k in edges),
+            rows=rows,
+            owners=self.owners[mine],
+        )
 
     def sequence(self, run: int) -> list[tuple[int, str]]:
         """Return the firings of a run in order, as element and edge.
@@ -118,7 +178,8 @@ class Sweep:
         -------
         dict of str to ndarray, shape (runs,)
             Parameters, outcome, end of the run; columns for elements are numbered from 1. A
-            parameter with the same name as a result is called ``parameter_<name>``.
+            parameter with the same name as a result is called ``parameter_<name>``. Of a system,
+            those of a contact have its name: ``gear.F``.
 
         Examples
         --------
@@ -132,11 +193,12 @@ class Sweep:
             "outcome": self.outcome,
             "message": self.message,
             "t": self.t,
-            "x": self.x,
-            "v": self.v,
-            "F": self.F,
         }
-        results |= _numbered("z", self.z) | _numbered("state", self.states)
+        results |= {_distinct(name, results): values for name, values in self.ends.items()}
+        for name in self.contacts or ("",):
+            part, lead = (self.contact(name), f"{name}.") if name else (self, "")
+            results |= {f"{lead}{each}": getattr(part, each) for each in ("x", "v", "F")}
+            results |= _numbered(f"{lead}z", part.z) | _numbered(f"{lead}state", part.states)
         results |= {"transitions": self.transition_count}
         parameters = {
             _distinct(column, results): numbers
@@ -168,13 +230,24 @@ class Sweep:
         units = {name: QUANTITIES[name].unit for name in ("t", "x", "v", "F", "z")}
         data: dict[str, Any] = {}
         for name in ("outcome", "message", "t", "x", "v", "F"):
-            data[f"{name}_end" if name in units else name] = ("run", getattr(self, name))
+            values = getattr(self, name)
+            dimensions = ("run", "contact")[: values.ndim]
+            data[f"{name}_end" if name in units else name] = (dimensions, values)
+        data |= {f"end.{name}": ("run", values) for name, values in self.ends.items()}
         data["z_end"] = (("run", "element"), self.z)
         data["state_end"] = (("run", "element"), self.states)
         data["transitions"] = ("run", self.transition_count)
         for name, values in self.rows.items():
-            data[name] = (("run", "time", "element")[: values.ndim], values)
-        coordinates = {"run": np.arange(len(self)), "element": np.arange(1, self.z.shape[1] + 1)}
+            last = "element" if name == "z" else "contact"
+            data[name] = (("run", "time", last)[: values.ndim], values)
+        coordinates: dict[str, Any] = {
+            "run": np.arange(len(self)),
+            "element": np.arange(1, self.z.shape[1] + 1),
+        }
+        if self.contacts:
+            coordinates["owner"] = ("element", self.owners)
+        if len(self.contacts) > 1:
+            coordinates["contact"] = list(self.contacts)
         if self.times.size:
             coordinates["time"] = self.times
         taken = {*data, *coordinates}
@@ -216,6 +289,8 @@ class Sweep:
             arrays |= {f"parameter_{name}": values for name, values in self.parameters.items()}
             arrays |= {f"rows_{name}": values for name, values in self.rows.items()}
             arrays |= {name: getattr(self, name) for name in _SAVED}
+            arrays |= {f"end_{name}": values for name, values in self.ends.items()}
+            arrays |= {"owners": self.owners} if self.contacts else {}
             arrays |= {"transitions": np.asarray(self.transitions), "elements": self.z.shape[1]}
             arrays["edges"] = np.array(self.edges, dtype=np.str_)
             return write_whole(path, lambda file: np.savez_compressed(file, **arrays))
@@ -283,14 +358,23 @@ def _read(file: Any) -> Sweep:
     t, times, edges = (member(file, name) for name in ("t", "times", "edges"))
     runs, rows, n = t.size, times.size, int(member(file, "elements", 8))
     texts = {"outcome": (runs,), "message": (runs,), "states": (runs, n)}
-    floats: dict[str, tuple[int, ...]] = dict.fromkeys(("x", "v", "F"), (runs,))
-    floats["z"] = (runs, n)
+    several: tuple[int, ...] = ()
+    if "owners" in file.files:
+        texts["owners"] = (n,)
+        contacts = len(set(member(file, "owners", 4 * LONGEST * n).tolist()))
+        several = (contacts,) if contacts > 1 else ()
+    ends = [name for name in file.files if name.startswith("end_")]
+    floats: dict[str, tuple[int, ...]] = dict.fromkeys(("x", "v", "F"), (runs, *several))
+    floats |= {"z": (runs, n), **dict.fromkeys(ends, (runs,))}
     if rows:
-        floats |= {f"rows_{name}": (runs, rows) for name in ("x", "v", "F")}
+        floats |= {f"rows_{name}": (runs, rows, *several) for name in ("x", "v", "F")}
         floats["rows_z"] = (runs, rows, n)
+        floats |= {f"rows_{row_name(name.removeprefix('end_'))}": (runs, rows) for name in ends}
     own = [name for name in file.files if name.startswith("parameter_")]
     found = {name: member(file, name, 8 * runs * n) for name in own}
-    floats |= {name: (runs, n)[: array.ndim] for name, array in found.items()}
+    for name, array in found.items():  # a contact has some of the elements of a system
+        width = min(n, *array.shape[1:2]) if "owners" in texts and array.ndim > 1 else n
+        floats[name] = (runs, width)[: array.ndim]
     for shapes, width in ((texts, 4 * LONGEST), (floats, 8)):
         for name in [name for name in shapes if name not in found]:
             found[name] = member(file, name, width * math.prod(shapes[name]))
@@ -311,11 +395,13 @@ def _read(file: Any) -> Sweep:
         raise ValueError("no runs, no parameters, or runs not in order")
     groups = {
         group: {name.removeprefix(group): found[name] for name in found if name.startswith(group)}
-        for group in ("parameter_", "rows_")
+        for group in ("parameter_", "rows_", "end_")
     }
     return Sweep(
         parameters=groups["parameter_"],
         rows=groups["rows_"],
+        ends=groups["end_"],
+        owners=found.get("owners", np.empty(0, dtype=np.str_)),
         edges=tuple(edges.tolist()),
         transitions=log.view(np.recarray),
         **{name: found[name] for name in _SAVED},
@@ -327,6 +413,11 @@ def _numbered(name: str, values: NDArray[Any]) -> dict[str, Any]:
     if values.ndim == 1:
         return {name: values}
     return {column_name(name, i): values[:, i] for i in range(values.shape[1])}
+
+
+def row_name(name: str) -> str:
+    """Return the name of a system's value among the rows: other than those of a contact."""
+    return f"system.{name}" if name in ("x", "v", "F", "z") else name
 
 
 def _distinct(name: str, taken: Collection[str]) -> str:

@@ -9,8 +9,8 @@ import threading
 import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor, as_completed
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Unpack
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypeAlias, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,15 +19,19 @@ from gms_fsm._arguments import checked_kind
 from gms_fsm.charts.parameters import WEIGHTS, FloatArray
 from gms_fsm.errors import GMSError, ParameterError, cut
 from gms_fsm.lowering._compiled import check_numba
+from gms_fsm.lowering.layout import LOG_NUMBERS
 from gms_fsm.run._compiled_run import CompiledRun
 from gms_fsm.run._recording import scope_of
-from gms_fsm.run._swept import LOG, LONGEST, Sweep
+from gms_fsm.run._swept import LOG, LONGEST, Sweep, row_name
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import Run
 from gms_fsm.run.start import Start
+from gms_fsm.systems._varied import numbers_in, with_numbers_of
 from gms_fsm.systems.models import Model, parameter_names, with_values
 from gms_fsm.systems.rigs import Rig, with_numbers
-from gms_fsm.traces.rows import column_name
+from gms_fsm.systems.system import Contact, System
+from gms_fsm.traces.rows import Rows, column_name
+from gms_fsm.traces.trace import Trace
 
 if TYPE_CHECKING:
     import pandas
@@ -38,10 +42,10 @@ AT_ONCE = 64  # maximum number of runs per task
 
 
 def sweep(
-    model: Model,
-    rig: Rig,
-    t_end: float,
-    parameters: Mapping[str, ArrayLike] | pandas.DataFrame,
+    model: Model | System,
+    rig: Rig | float,
+    t_end: float | Mapping[str, ArrayLike] | pandas.DataFrame,
+    parameters: Mapping[str, ArrayLike] | pandas.DataFrame | None = None,
     *,
     executor: Executor | None = None,
     t_start: float = 0.0,
@@ -50,7 +54,9 @@ def sweep(
     progress: bool | None = None,
     **options: Unpack[SettingOptions],
 ) -> Sweep:
-    """Run a model on a rig once for each set of parameters.
+    """Run a model on a rig once for each set of parameters, or a system.
+
+    ``sweep(model, rig, t_end, parameters)``, or ``sweep(system, t_end, parameters)``.
 
     Parameters
     ----------
@@ -60,7 +66,9 @@ def sweep(
         By name; the first axis is the run: shape (runs,) for one number or the same number in all
         elements, (runs, n) for one per element. Names are the chart's parameters (``k``, ``sigma``,
         ``C``, ``v_c``), ``weights``, ``sigma_2``, ``F_c``, ``F_s``, ``v_s``, and the rig's numbers
-        (``mass``, ``stiffness``, ``speed``). In a DataFrame, use ``k1``, ``k2`` ... for elements.
+        (``mass``, ``stiffness``, ``speed``). Of a system, ``numbers.m`` is one of its numbers, and
+        ``gear.F_s`` a parameter of the contact gear. In a DataFrame, use ``k1``, ``k2`` ... for
+        elements.
     executor : concurrent.futures.Executor, optional
         Where to run: a process pool, or the executor of a Dask ``Client`` (extra ``cluster``).
         Threads on this machine if omitted; compiled runs release the interpreter lock.
@@ -94,13 +102,14 @@ def sweep(
     >>> result.outcome.tolist(), result.transition_count.tolist()
     (['ok', 'ok'], [4, 4])
     """
-    begin = _Common(t_end, t_start, initial, _chosen(settings, options))
+    what, end, given = _arguments(model, rig, t_end, parameters)
+    begin = _Common(end, t_start, initial, _chosen(settings, options))
     if begin.settings.engine == "compiled":
         check_numba()
-    begin.start(model, rig)  # errors common to all runs are raised once, here
-    values = _values(model, rig, parameters)
+    begin.start(what)  # errors common to all runs are raised once, here
+    values = _values(what, given)
     runs = len(next(iter(values.values())))
-    collected = _Collected(model, runs, begin.settings.t_eval)
+    collected = _Collected(what, runs, begin.settings.t_eval)
     size = max(1, min(AT_ONCE, runs // AT_ONCE))
     chunks = [range(start, min(start + size, runs)) for start in range(0, runs, size)]
     # Dask treats tasks with equal arguments as one, and returns an earlier failure as their result.
@@ -115,7 +124,7 @@ def sweep(
                 for chunk in chunks:
                     part = {key: array[chunk.start : chunk.stop] for key, array in values.items()}
                     try:
-                        task = executor.submit(_run_chunk, model, rig, begin, part, name)
+                        task = executor.submit(_run_chunk, what, begin, part, name)
                     except Exception as error:
                         if not isinstance(error, BrokenExecutor):  # broken by an earlier task
                             error = _NotDelivered(f"{type(error).__name__}: {error}")
@@ -132,22 +141,100 @@ def sweep(
     return collected.sweep(values)
 
 
+def _arguments(model: Any, rig: Any, t_end: Any, parameters: Any) -> tuple[_What, float, Any]:
+    """Return what is run, the end of the runs, and the parameters; a system has no rig."""
+    if not isinstance(model, System):
+        return _OnRig(model, rig), t_end, parameters
+    if not isinstance(rig, float | int) or parameters is not None:
+        raise ParameterError(
+            "a system has no rig",
+            place="rig",
+            value=rig,
+            advice="write sweep(system, t_end, parameters)",
+        )
+    return _OfSystem(model), rig, t_end
+
+
+# --------------------------------------------------------------------------- what is run
+@dataclass(frozen=True, eq=False)
+class _OnRig:
+    """A model on a rig."""
+
+    model: Model
+    rig: Rig
+
+    @property
+    def contacts(self) -> tuple[Model, ...]:
+        """What has elements."""
+        return (self.model,)
+
+    @property
+    def known(self) -> dict[str, tuple[int, bool]]:
+        """By name of a parameter: how many elements there are, and whether each can have one."""
+        n, values = self.model.n, self.model.values
+        names = (*parameter_names(self.model), *self.rig.numbers)
+        return {
+            name: (n, name == WEIGHTS.name or np.ndim(values.get(name, 0.0)) > 0) for name in names
+        }
+
+    @property
+    def part_names(self) -> list[str]:
+        """Names of the values of the rest."""
+        return []
+
+    def varied(self, values: Mapping[str, ArrayLike]) -> _OnRig:
+        """Return the same with other numbers."""
+        return _OnRig(with_values(self.model, values), with_numbers(self.rig, values))
+
+
+@dataclass(frozen=True, eq=False)
+class _OfSystem:
+    """A system."""
+
+    system: System
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """What has elements."""
+        return self.system.contacts
+
+    @property
+    def known(self) -> dict[str, tuple[int, bool]]:
+        """By name of a parameter: how many elements there are, and whether each can have one."""
+        return {name: (n, n > 0) for name, (_, n) in numbers_in(self.system).items()}
+
+    @property
+    def part_names(self) -> list[str]:
+        """Names of the values of the rest: bodies, further states, sampled values."""
+        bodies = [f"{each.name}.{which}" for each in self.system.bodies for which in "xv"]
+        sampled = [name for each in self.system.sampled for name in each.updates]
+        return [*bodies, *self.system.flow, *sampled]
+
+    def varied(self, values: Mapping[str, ArrayLike]) -> _OfSystem:
+        """Return the same with other numbers."""
+        return _OfSystem(with_numbers_of(self.system, values))
+
+
+_What: TypeAlias = _OnRig | _OfSystem
+
+
 # --------------------------------------------------------------------------- parameters
 def _values(
-    model: Model, rig: Rig, parameters: Mapping[str, ArrayLike] | pandas.DataFrame
+    what: _What, parameters: Mapping[str, ArrayLike] | pandas.DataFrame
 ) -> dict[str, FloatArray]:
     """Check the names and shapes of the parameters."""
     if not hasattr(parameters, "keys"):
+        called = "model, rig" if isinstance(what, _OnRig) else "system"
         raise ParameterError(
             "it must give values by name, for example {'k': [1.0, 2.0]}: "
-            "sweep(model, rig, t_end, parameters)",
+            f"sweep({called}, t_end, parameters)",
             place="parameters",
             value=parameters,
         )
-    known = (*parameter_names(model), *rig.numbers)
+    known = what.known
     given = {str(name): parameters[name] for name in parameters}
     if not isinstance(parameters, Mapping):
-        given = _elements_joined(given, known, model.n)
+        given = _elements_joined(given, known)
     if not given:
         raise ParameterError("parameters is empty", advice="give at least one name with its values")
     arrays: dict[str, FloatArray] = {}
@@ -160,9 +247,9 @@ def _values(
             array = np.array(value, dtype=np.float64)
         except (TypeError, ValueError):
             raise ParameterError(f"parameters[{name!r}] is not an array of numbers") from None
-        wide = name == WEIGHTS.name or np.ndim(model.values.get(name, 0.0)) > 0
-        if array.shape[1:] not in (((), (model.n,)) if wide else ((),)) or array.ndim == 0:
-            wanted = f"(runs,) or (runs, {model.n})" if wide else "(runs,)"
+        n, wide = known[name]
+        if array.shape[1:] not in (((), (n,)) if wide else ((),)) or array.ndim == 0:
+            wanted = f"(runs,) or (runs, {n})" if wide else "(runs,)"
             raise ParameterError(
                 f"parameters[{name!r}] has shape {array.shape}", advice=f"it must be {wanted}"
             )
@@ -176,10 +263,12 @@ def _values(
     return arrays
 
 
-def _elements_joined(columns: Mapping[str, Any], known: Sequence[str], n: int) -> dict[str, Any]:
+def _elements_joined(
+    columns: Mapping[str, Any], known: Mapping[str, tuple[int, bool]]
+) -> dict[str, Any]:
     """Join the columns k1, k2 ... of a DataFrame into an array of shape (runs, n)."""
     joined: dict[str, Any] = {}
-    for name in known:
+    for name, (n, _) in known.items():
         parts = [column_name(name, i) for i in range(n)]
         if any(part in columns for part in parts) and name not in columns:
             missing = [part for part in parts if part not in columns]
@@ -189,7 +278,7 @@ def _elements_joined(columns: Mapping[str, Any], known: Sequence[str], n: int) -
                     f"{', '.join(missing)}"
                 )
             joined[name] = np.stack([np.asarray(columns[part]) for part in parts], axis=1)
-    taken = {column_name(name, i) for name in joined for i in range(n)}
+    taken = {column_name(name, i) for name in joined for i in range(known[name][0])}
     return {name: value for name, value in columns.items() if name not in taken} | joined
 
 
@@ -203,6 +292,7 @@ class _Result:
     end: Mapping[str, Any] | None  # t, x, v, F, z, mode
     log: NDArray[Any]
     rows: Mapping[str, FloatArray] | None
+    ends: Mapping[str, float] = field(default_factory=dict)  # of a system
 
 
 @dataclass(frozen=True)
@@ -214,9 +304,14 @@ class _Common:
     initial: Mapping[str, Any] | None
     settings: Settings
 
-    def start(self, model: Model, rig: Rig) -> Start:
+    def start(self, what: _What) -> Start:
         return Start.of(
-            model, rig, self.t_end, self.settings, t_start=self.t_start, initial=self.initial
+            what.model if isinstance(what, _OnRig) else what.system,
+            what.rig if isinstance(what, _OnRig) else None,
+            self.t_end,
+            self.settings,
+            t_start=self.t_start,
+            initial=self.initial,
         )
 
 
@@ -238,8 +333,7 @@ def _chosen(settings: Settings | None, options: SettingOptions) -> Settings:
 
 
 def _run_chunk(
-    model: Model,
-    rig: Rig,
+    what: _What,
     begin: _Common,
     part: Mapping[str, FloatArray],
     _sweep: str,
@@ -252,14 +346,14 @@ def _run_chunk(
         run: Run | CompiledRun | None = None
         outcome, message = "ok", ""
         try:
-            its_model, its_rig = with_values(model, values), with_numbers(rig, values)
-            if compiled is not None:  # the same buffers and machine code, different numbers
-                compiled.reset(its_model, its_rig)
+            its = what.varied(values)
+            if compiled is not None and isinstance(its, _OnRig):
+                compiled.reset(its.model, its.rig)  # the same buffers and machine code
                 run = compiled
             elif begin.settings.engine == "compiled":
-                run = compiled = CompiledRun(begin.start(its_model, its_rig))
+                run = compiled = CompiledRun(begin.start(its))
             else:
-                run = Run(begin.start(its_model, its_rig))
+                run = Run(begin.start(its))
             while run.advance():
                 pass
         except GMSError as error:
@@ -271,6 +365,8 @@ def _run_chunk(
 def _result(run: Run | CompiledRun | None, outcome: str, message: str) -> _Result:
     if run is None:
         return _Result(outcome, message, None, np.empty(0, dtype=LOG), None)
+    if run.start.given is not None:
+        return _result_of_system(run, outcome, message)
     recorder, trace = run.recorder, run.recorder.trace()
     edges = {edge.name: index for index, edge in enumerate(trace.model.chart.transitions)}
     log = np.empty(len(trace.transitions), dtype=LOG)
@@ -287,6 +383,51 @@ def _result(run: Run | CompiledRun | None, outcome: str, message: str) -> _Resul
     end = {name: getattr(here, name) for name in ("t", "x", "v", "F", "z")}
     end["mode"] = here.mode[here.layout.elements]
     return _Result(outcome, message, end, log, rows)
+
+
+def _result_of_system(run: Run | CompiledRun, outcome: str, message: str) -> _Result:
+    """Return the result of a system: values of each contact, and of everything else."""
+    start, recorder = run.start, run.recorder
+    trace, layout = recorder.trace(), start.program.layout
+    t, y, mode = recorder.latest
+    now = Rows(np.array([t]), np.zeros(1, dtype=np.int64), np.array([y]), np.array([mode]))
+    last = start.trace(now, now, trace.transitions)
+    log = np.empty(len(trace.transitions), dtype=LOG)
+    for name in ("t", "element", *LOG_NUMBERS):
+        log[name] = trace.transitions[name]
+    for bank, contact in zip(layout.banks, start.system.contacts, strict=True):
+        edges = {edge.name: bank.first_edge + k for k, edge in enumerate(contact.chart.transitions)}
+        here = trace.transitions.contact == bank.name if len(log) else []
+        log["element"][here] += bank.first
+        log["edge"][here] = [edges[edge] for edge in trace.transitions.edge[here].tolist()]
+    end = {name: values[0] for name, values in _of_contacts(last).items()}
+    end |= {"t": t, "mode": list(mode)[layout.elements]}
+    ends = {name: float(values[0]) for name, values in _of_parts(last).items()}
+    rows = None
+    if start.output == "t_eval":
+        rows = {row_name(name): values for name, values in _of_parts(trace).items()}
+        rows |= _of_contacts(trace)
+    return _Result(outcome, message, end, log, rows, ends)
+
+
+def _of_contacts(trace: Trace) -> dict[str, FloatArray]:
+    """Return the columns of the contacts side by side; x, v and F of a single one as they are."""
+    parts = [trace.contact(name) for name in trace.contacts]
+    found = {}
+    for name in ("x", "v", "F"):
+        columns = np.stack([getattr(part, name) for part in parts], axis=1)
+        found[name] = columns[:, 0] if len(parts) == 1 else columns
+    return found | {"z": np.concatenate([part.z for part in parts], axis=1)}
+
+
+def _of_parts(trace: Trace) -> dict[str, FloatArray]:
+    """Return the columns of the bodies, and the further states and sampled values."""
+    assert trace.system is not None
+    found: dict[str, FloatArray] = {}
+    for name in _OfSystem(trace.system).part_names:
+        body, _, which = name.rpartition(".")
+        found[name] = getattr(trace.body(body), which) if body else trace.value(name)
+    return found
 
 
 class _NotDelivered(Exception):
@@ -316,19 +457,25 @@ def _results(future: Future[list[_Result]], count: int) -> list[_Result]:
 class _Collected:
     """Preallocated columns, filled in any order."""
 
-    def __init__(self, model: Model, runs: int, t_eval: ArrayLike | None) -> None:
-        self.model = model
+    def __init__(self, what: _What, runs: int, t_eval: ArrayLike | None) -> None:
+        self.what = what
+        n, several = sum(each.n for each in what.contacts), len(what.contacts)
+        columns = (several,) if several > 1 else ()
         self.times = np.array([] if t_eval is None else t_eval, dtype=np.float64)
         self.outcome, self.message = ["lost"] * runs, [""] * runs
-        self.ends = np.full((runs, 4), np.nan)  # t, x, v, F
-        self.z = np.full((runs, model.n), np.nan)
-        self.mode = np.full((runs, model.n), -1, dtype=np.int64)
+        self.t = np.full(runs, np.nan)
+        self.end = {name: np.full((runs, *columns), np.nan) for name in ("x", "v", "F")}
+        self.end["z"] = np.full((runs, n), np.nan)
+        parts = what.part_names
+        self.ends = {name: np.full(runs, np.nan) for name in parts}
+        self.mode = np.full((runs, n), -1, dtype=np.int64)
         self.logs: list[NDArray[Any]] = [np.empty(0, dtype=LOG)] * runs
         rows = runs, self.times.size
         self.rows: dict[str, FloatArray] = {}
         if t_eval is not None:
-            self.rows = {name: np.full(rows, np.nan) for name in ("x", "v", "F")}
-            self.rows["z"] = np.full((*rows, model.n), np.nan)
+            self.rows = {name: np.full((*rows, *columns), np.nan) for name in ("x", "v", "F")}
+            self.rows["z"] = np.full((*rows, n), np.nan)
+            self.rows |= {row_name(name): np.full(rows, np.nan) for name in parts}
 
     def take(self, chunk: range, results: Sequence[_Result]) -> None:
         """Store results in their rows."""
@@ -337,31 +484,38 @@ class _Collected:
             result.log["run"] = run
             self.logs[run] = result.log
             if result.end is not None:
-                end = result.end
-                self.ends[run] = end["t"], end["x"], end["v"], end["F"]
-                self.z[run], self.mode[run] = end["z"], end["mode"]
+                self.t[run], self.mode[run] = result.end["t"], result.end["mode"]
+                for name, values in self.end.items():
+                    values[run] = result.end[name]
+            for name, value in result.ends.items():
+                self.ends[name][run] = value
             for name, values in (result.rows or {}).items():
                 self.rows[name][run, : len(values)] = values
 
     def sweep(self, parameters: Mapping[str, FloatArray]) -> Sweep:
         """Return the sweep with all results."""
-        chart = self.model.chart
-        names = np.array([*(state.name for state in chart.states), ""])
-        t, x, v, F = self.ends.T
+        contacts, states, edges, owners = self.what.contacts, [], list[str](), list[str]()
+        for each in contacts:
+            names = np.array([*(state.name for state in each.chart.states), ""])
+            states.append(names[self.mode[:, len(owners) : len(owners) + each.n]])
+            name = each.name if isinstance(each, Contact) else ""
+            owners += [name] * each.n
+            lead = f"{name}." if len(contacts) > 1 else ""
+            edges += [f"{lead}{edge.name}" for edge in each.chart.transitions]
+        of_system = isinstance(self.what, _OfSystem)
         return Sweep(
             parameters,
             np.array(self.outcome),
             np.array(self.message),
-            t,
-            x,
-            v,
-            F,
-            self.z,
-            names[self.mode],
-            np.concatenate(self.logs).view(np.recarray),
-            tuple(edge.name for edge in chart.transitions),
-            self.times,
-            self.rows,
+            self.t,
+            **self.end,
+            states=np.concatenate(states, axis=1),
+            transitions=np.concatenate(self.logs).view(np.recarray),
+            edges=tuple(edges),
+            times=self.times,
+            rows=self.rows,
+            ends=self.ends,
+            owners=np.array(owners if of_system else [], dtype=np.str_),
         )
 
 
