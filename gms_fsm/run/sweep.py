@@ -19,7 +19,7 @@ from gms_fsm._arguments import checked_kind
 from gms_fsm.charts.parameters import WEIGHTS, FloatArray
 from gms_fsm.errors import GMSError, ParameterError, cut
 from gms_fsm.lowering._compiled import check_numba
-from gms_fsm.lowering.layout import LOG_NUMBERS
+from gms_fsm.lowering.log_columns import LOG_NUMBERS
 from gms_fsm.run._compiled_run import CompiledRun
 from gms_fsm.run._recording import scope_of
 from gms_fsm.run._swept import LOG, LONGEST, Sweep, row_name
