@@ -243,9 +243,7 @@ def test_every_reference_of_the_schema_resolves(schema: dict[str, Any]) -> None:
         assert reference.removeprefix("#/$defs/") in schema["$defs"], reference
 
 
-def test_the_schema_marks_required_keys(
-    schema: dict[str, Any], on_a_rig: dict[str, Any]
-) -> None:
+def test_the_schema_marks_required_keys(schema: dict[str, Any], on_a_rig: dict[str, Any]) -> None:
     gms = schema["$defs"]["GMSTable"]
     assert set(gms["required"]) == {"kind", "law"}
     assert gms["properties"]["law"]["enum"] == ["signed", "published"]
