@@ -89,7 +89,7 @@ def test_run_writes_what_every_contact_did(verb: CommandLine) -> None:
     assert f"{len(trace.transitions)} transitions; 4 files in out\n" in done.out
     assert trace.body("one").x[0] == 1e-3
     assert trace.value("i")[0] == 0.01
-    assert "gear.F" in Path("out/trace.csv").read_text().splitlines()[0]
+    assert "gear.F" in Path("out/trace.csv").read_text().splitlines()[1]
 
 
 def test_set_changes_a_part_by_name_or_index(verb: CommandLine) -> None:
