@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gms_fsm.errors import ParameterError
 from gms_fsm.traces.trace import Trace, check_trace
 from plots import panels
-from plots._matplotlib import Axes, Figure, LineCollection, rc_context
+from plots._matplotlib import Axes, Figure, LineCollection, MaxNLocator, rc_context
 from plots.figures._parts import (
     element_legend,
     head,
@@ -116,6 +116,8 @@ def overview(
             ax.set_title(name + note)
         loop.set_title("hysteresis")
         portrait.set_title("friction against velocity")
+        for ax in (loop, portrait):  # narrow, and labels such as -0.35 are wide
+            ax.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
         figure.suptitle(head(trace, title), x=0.01, ha="left")
     return figure
 
