@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Mapping, Sequence
 from types import TracebackType
+from typing import Any
 
 from rich.console import Console, Group
 from rich.live import Live
@@ -99,17 +101,27 @@ class LiveView:
         list of rich.table.Table
             One, if there are not several contacts.
         """
-        if len(moment.contacts) == 1:
-            return [self.table(moment)]
-        return [self.table(moment.contact(name), f"{name}   ") for name in moment.contacts]
+        values, states, found = moment.values, moment.states, list[Table]()
+        for name in [key.removesuffix("F") for key in values if key.split(".")[-1] == "F"]:
+            own = {each: values[name + each] for each in ("v", "F", "z", "s")}
+            lead = f"{name.removesuffix('.')}   ".lstrip()
+            here, states = states[: len(own["z"])], states[len(own["z"]) :]
+            found.append(self.table(moment.t, here, own, lead))
+        return found
 
-    def table(self, moment: Moment, lead: str = "") -> Table:
+    def table(
+        self, t: float, states: Sequence[str], values: Mapping[str, Any], lead: str = ""
+    ) -> Table:
         """Return a table with one line per element.
 
         Parameters
         ----------
-        moment : Moment
-            The latest row.
+        t : float
+            Time, s.
+        states : sequence of str
+            State of each element.
+        values : mapping
+            ``v`` and ``F``; ``z`` and ``s``, one per element.
         lead : str
             Put in front of the title.
 
@@ -118,10 +130,7 @@ class LiveView:
         rich.table.Table
             State, |z|/s and z of each element; v and F in the title.
         """
-        values, states = moment.values, moment.states
-        title = (
-            f"{lead}t = {moment.t:10.4f} s   v = {values['v']:+.6f} m/s   F = {values['F']:+.5f} N"
-        )
+        title = f"{lead}t = {t:10.4f} s   v = {values['v']:+.6f} m/s   F = {values['F']:+.5f} N"
         bare = all(map(math.isnan, values["s"]))  # no threshold without a Stribeck curve
         still = all(map(math.isnan, values["z"]))  # a chart without variables
         table = Table("element", "state", title=title, title_justify="left", min_width=len(title))

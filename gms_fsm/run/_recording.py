@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -14,7 +15,7 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.language import rough_points
 from gms_fsm.lowering._observing import armed, rate
 from gms_fsm.lowering.layout import Layout
-from gms_fsm.lowering.log_columns import LogRecord
+from gms_fsm.lowering.log_columns import CONTACT, LogRecord
 from gms_fsm.run.machines import Interference
 from gms_fsm.run.start import Start
 from gms_fsm.traces._log import log_of
@@ -203,13 +204,9 @@ class Recorder:
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """The latest row of a running simulation, computed on demand.
-
-    A system with several contacts has no states and values of its own; each `contact` has.
-    """
+    """The latest row of a running simulation, computed on demand."""
 
     _recording: Recording
-    _which: str = ""
 
     @property
     def t(self) -> float:
@@ -217,44 +214,37 @@ class Moment:
         return self._recording.latest[0]
 
     @property
-    def contacts(self) -> tuple[str, ...]:
-        """Names of the contacts."""
-        return tuple(bank.name for bank in self._recording.start.program.layout.banks)
-
-    def contact(self, name: str) -> Moment:
-        """Return the row as one contact sees it.
-
-        Parameters
-        ----------
-        name : str
-            The contact's.
-
-        Returns
-        -------
-        Moment
-            With its states and values.
-        """
-        return Moment(self._recording, name)
-
-    @property
     def states(self) -> list[str]:
         """Active state of each element."""
-        here: list[str] = scope_of(self._recording, self._which).states
-        return here
+        start, (_, _, mode) = self._recording.start, self._recording.latest
+        return [
+            start.system.contact(bank.name).chart.states[each].name
+            for bank in start.program.layout.banks
+            for each in mode[bank.elements]
+        ]
 
     @property
     def values(self) -> dict[str, Any]:
-        """``x`` [m], ``v`` [m/s] and ``F`` [N]; ``z`` and ``s`` [m], one per element."""
-        here = scope_of(self._recording, self._which)
-        return {"x": here.x, "v": here.v, "F": here.F, "z": here.z, "s": here.s}
+        """``x`` [m], ``v`` [m/s] and ``F`` [N]; ``z`` and ``s`` [m], one per element.
+
+        With several contacts they have the contact's name before them: ``gear.F``.
+        """
+        start, found = self._recording.start, {}
+        banks = start.program.layout.banks
+        for bank in banks:
+            here = scope_of(start, *self._recording.latest, bank.name)
+            lead = f"{bank.name}." if len(banks) > 1 else ""
+            for name in ("x", "v", "F", "z", "s"):
+                found[f"{lead}{name}"] = getattr(here, name)
+        return found
 
 
-def scope_of(recording: Recording, which: str = "") -> Scope:
-    """Return the values of the latest row; of a system with several contacts, one's."""
-    start = recording.start
-    bank = start.program.layout.contact(which)
-    model = start.system.contact(bank.name) if which else start.model
-    return Scope.of(model, start.program, *recording.latest, bank.name)
+def scope_of(
+    start: Start, t: float, y: list[float], mode: Sequence[int], contact: str = ""
+) -> Scope:
+    """Return the values of a contact at a state of a run; without a name of the only one."""
+    bank = start.program.layout.contact(contact)
+    return Scope.of(start.system.contact(bank.name), start.program, t, y, mode, bank.name)
 
 
 # --------------------------------------------------------------------------- wording of errors
@@ -275,10 +265,9 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
     """
     trace = recorder.trace()
     if isinstance(error, NotFinite):
-        start, values = recorder.start, [float(f"{u:.6g}") for u in error.y]
-        names = "x, v, z" if start.given is None else ", ".join(start.program.layout.y.shared)
+        values = [float(f"{u:.6g}") for u in error.y]
         return NotFiniteError(
-            f"{_not_finite(error, recorder)} here or just after ({names} ... = {values}): {error}",
+            f"{_not_finite(error, recorder)} here or just after (x, v, z ... = {values}): {error}",
             trace,
             t=error.t,
             advice="look at the signals and parameters there",
@@ -303,27 +292,27 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
         )
     if not isinstance(error, Livelock):
         return SimulationError(str(error), trace, t=error.t)
-    return _livelock(error, recorder, trace)
+    return _livelock(error, recorder.start, trace)
 
 
-def _livelock(error: Livelock, recorder: Recording, trace: Trace) -> LivelockError:
-    """Translate an endless sequence of switches."""
-    start = recorder.start
-    layout = start.program.layout
-    machine = _rough(recorder, error) if error.machine is None else error.machine
-    bank, name = layout.bank(machine), layout.bank(machine).name
-    chart, i = start.system.contact(name).chart, machine - bank.first
-    scope = Scope.of(start.system.contact(name), start.program, error.t, error.y, error.mode, name)
-    place = _element(layout, name, i)
-
-    def described() -> str:
-        z = f"{chart.variables[0]} = {scope.z[i]:.6g}, " if chart.variables else ""
-        s = f"s = {scope.s[i]:.6g}, " if "s" in chart.inputs else ""
-        return f"{z}{s}v = {scope.v:.6g}"
-
+def _livelock(error: Livelock, start: Start, trace: Trace) -> LivelockError:
+    """Say which element switches without progress, and why."""
+    layout, machine = start.program.layout, error.machine
+    if machine is None:
+        machine = _pushed_back(error, start)
+    bank = layout.bank(machine)
+    i, chart = machine - bank.first, start.system.contact(bank.name).chart
+    scope = scope_of(start, error.t, error.y, error.mode, bank.name)
+    z = f"{chart.variables[0]} = {scope.z[i]:.6g}, " if chart.variables else ""
+    s = f"s = {scope.s[i]:.6g}, " if "s" in chart.inputs else ""
+    values = f"{z}{s}v = {scope.v:.6g}"
+    place = f"element {i + 1}" if start.given is None else f"{bank.name} {i + 1}"
     if error.machine is not None:
-        log = trace.contact(name).transitions
-        taken = log[log.element == i][-error.times :]
+        log = trace.transitions
+        mine = log.element == i
+        if len(layout.banks) > 1:
+            mine &= log.contact == bank.name
+        taken = log[mine][-error.times :]
         last = taken[-1]
         guard = next(edge.guard for edge in chart.transitions if edge.name == last.edge)
         time = float(last.t - taken[0].t)
@@ -341,7 +330,7 @@ def _livelock(error: Livelock, recorder: Recording, trace: Trace) -> LivelockErr
         return LivelockError(
             f"switched {len(taken)} times{f' in {time:.3g} s' if time else ''}, "
             f"last by {str(last.edge)!r} from {last.source} to {last.target} "
-            f"({described()}): {cause}",
+            f"({values}): {cause}",
             trace,
             t=error.t,
             place=place,
@@ -351,7 +340,7 @@ def _livelock(error: Livelock, recorder: Recording, trace: Trace) -> LivelockErr
     edges = ", ".join(f"{edge.name} [{edge.guard}]" for _, edge in chart.leaving(state.name))
     return LivelockError(
         f"{' and '.join(error.relations)} changed {error.times} times: "
-        f"the element is in {state.name} ({described()}), its flow pushes back on both sides, "
+        f"the element is in {state.name} ({values}), its flow pushes back on both sides, "
         f"no edge leaves ({edges or 'it has none'}), and no value of the sign between -1 and 1 "
         f"holds it there",
         trace,
@@ -361,34 +350,27 @@ def _livelock(error: Livelock, recorder: Recording, trace: Trace) -> LivelockErr
     )
 
 
-def _element(layout: Layout, contact: str, i: int) -> str:
-    """Return the words for an element, counted from 0: with its contact if there are several."""
-    return f"contact {contact}, element {i + 1}" if len(layout.banks) > 1 else f"element {i + 1}"
-
-
-def _rough(recorder: Recording, error: Livelock) -> int:
-    """Return the first machine whose flow is not smooth; 0 if there is none."""
-    start = recorder.start
-    for machine, state in enumerate(error.mode[start.program.layout.elements]):
-        chart = start.system.contact(start.program.layout.bank(machine).name).chart
-        here = chart.states[state].name
-        if any(rough_points(chart.flows[here, name]) for name in chart.variables):
-            return machine
+def _pushed_back(error: Livelock, start: Start) -> int:
+    """Return the first machine whose flow jumps or has a corner; the first one if none has."""
+    for bank in start.program.layout.banks:
+        chart = start.system.contact(bank.name).chart
+        for i, state in enumerate(error.mode[bank.elements]):
+            flows = (chart.flows[chart.states[state].name, name] for name in chart.variables)
+            if any(rough_points(flow) for flow in flows):
+                return bank.first + i
     return 0
 
 
 def _slow(recorder: Recording) -> tuple[str, str]:
     """Return a reason for a run's many steps, as far as it can be determined, and advice."""
-    trace, layout = recorder.trace(), recorder.start.program.layout
+    log = recorder.trace().transitions
     most = recorder.start.options.max_steps
-    if 10 * len(trace.transitions) > most:
-        count, worst = max(
-            (int((trace.contact(bank.name).transitions.element == i).sum()), (bank.name, i))
-            for bank in layout.banks
-            for i in range(bank.n)
-        )
+    if 10 * len(log) > most:
+        whose = log.contact.tolist() if CONTACT in log.dtype.names else ["element"] * len(log)
+        pairs = Counter(zip(whose, log.element.tolist(), strict=True))
+        (who, element), count = pairs.most_common(1)[0]
         return (
-            f": {_element(layout, *worst)} has switched {count} times (chattering)",
+            f": {who} {element + 1} has switched {count} times (chattering)",
             "separate its guards for the two directions by a gap, or give a larger max_steps",
         )
     return "", (
@@ -478,19 +460,21 @@ def _opposite_edge(chart: Chart, taken: Any) -> str:
 def _not_finite(error: NotFinite, recorder: Recording) -> str:
     """Name the quantity that is not finite where a run ended, if it can be determined."""
     start = recorder.start
-    for contact in start.system.contacts:
-        name, chart = contact.name, contact.chart
-        scope = Scope.of(contact, start.program, error.t, error.y, error.mode, name)
-        where = f" of contact {name}" if len(start.system.contacts) > 1 else ""
+    for bank in start.program.layout.banks:
+        chart = start.system.contact(bank.name).chart
+        scope = scope_of(start, error.t, error.y, error.mode, bank.name)
+        whose = "" if start.given is None else f" of {bank.name}"
         if not math.isfinite(scope.v):
-            return f"the velocity v{where} is not finite"
+            return f"the velocity v{whose} is not finite"
+        states = {state.name: state for state in chart.states}
         for variable in chart.variables:
-            for i, active in enumerate(scope.states):
+            for i, name in enumerate(scope.states):
                 if not math.isfinite(scope.each(f"d{variable}")[i]):
-                    state = next(each for each in chart.states if each.name == active)
+                    state = states[name]
                     return (
-                        f"the flow of {variable} in state {state.name}, [{state.flow[variable]}], "
-                        f"is not finite in element {i + 1}{where}"
+                        f"the flow of {variable} in state {state.name}, "
+                        f"[{state.flow.get(variable, '0')}], is not finite in "
+                        f"{bank.name if whose else 'element'} {i + 1}"
                     )
     return "a signal or a flow is not finite"
 

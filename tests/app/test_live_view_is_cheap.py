@@ -137,7 +137,7 @@ class Last:
         if moment.t > self.until:
             return
         console = screen()
-        console.print(LiveView(console, 0.0, 10.0, detail=True).table(moment))
+        console.print(*LiveView(console, 0.0, 10.0, detail=True).tables(moment))
         self.text, self.seen, self.states = console.export_text(), moment.values, moment.states
         self.t = moment.t
 
