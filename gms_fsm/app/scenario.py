@@ -259,7 +259,7 @@ def _loaded_system(path: Path, overrides: Sequence[str]) -> Loaded:
         arguments["t_eval"] = _rows(path, scenario.output.every, start, end)
     model, rig = origin_of(system)
     if run.monitors:
-        arguments["monitors"] = _monitors(path, run.monitors, model)
+        arguments["monitors"] = tuple(run.monitors)  # checked by the run
     return Loaded(path, scenario, model, rig, arguments, None, None, system)
 
 
