@@ -1,4 +1,4 @@
-"""Single panels: each takes an Axes and a Trace, draws, and returns its artists.
+"""Single panels: each takes an Axes and a Trace (or differences), draws, and returns its artists.
 
 They share three arguments. ``window = (t0, t1)`` [s] zooms: the run is sampled again inside it.
 ``elements`` selects elements, counted from 0 (labels count from 1). ``log`` requests a logarithmic

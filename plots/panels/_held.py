@@ -153,7 +153,7 @@ def lag_over_period(
                 sizes,
                 marker,
                 color=(INK, TEXT_GREY)[quantity],
-                fillstyle=fill,  # type: ignore[arg-type]
+                fillstyle=fill,
                 markersize=6,
                 label=f"{'Fx'[quantity]}, {name}",
             )

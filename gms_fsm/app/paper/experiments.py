@@ -74,7 +74,7 @@ def experiments(force: str = FORCE, velocity: str = VELOCITY) -> tuple[Experimen
     Returns
     -------
     tuple of Experiment
-        The runs, those of Fig. 3 first.
+        The runs, those of Fig. 3 first, and those with held outputs last.
 
     Examples
     --------
@@ -93,17 +93,17 @@ def experiments(force: str = FORCE, velocity: str = VELOCITY) -> tuple[Experimen
         Experiment("fig3_slipping_chart", signed3, push, FIG3_END),
         Experiment("fig3_slipping_ifelse", signed3, push, FIG3_END, engine="ifelse"),
         Experiment("fig3_step", fig3, push, FIG3_END, engine="ifelse", paper_settings=True),
-        *(
-            Experiment(f"fig3_held_chart_{1e6 * h:g}us", fig3, push, FIG3_END, held=h)
-            for h in HELD_STEPS
-        ),
-        Experiment("fig3_held_ifelse", fig3, push, FIG3_END, engine="ifelse", held=PAPER_STEP),
         Experiment("fig4_chart", fig4, move, FIG4_END),
         Experiment("fig4_ifelse", fig4, move, FIG4_END, engine="ifelse"),
         Experiment("fig4_lugre", lugre_like(slip), move, FIG4_END),
         Experiment("fig4_signed_chart", signed4, move, FIG4_END),
         Experiment("fig4_signed_ifelse", signed4, move, FIG4_END, engine="ifelse"),
         Experiment("fig4_step", fig4, move, FIG4_END, engine="ifelse", paper_settings=True),
+        *(
+            Experiment(f"fig3_held_chart_{1e6 * h:g}us", fig3, push, FIG3_END, held=h)
+            for h in HELD_STEPS
+        ),
+        Experiment("fig3_held_ifelse", fig3, push, FIG3_END, engine="ifelse", held=PAPER_STEP),
         Experiment("fig4_held_chart", fig4, move, FIG4_HELD_END, held=PAPER_STEP),
         Experiment("fig4_held_ifelse", fig4, move, FIG4_HELD_END, engine="ifelse", held=PAPER_STEP),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,10 @@ from gms_fsm.systems.signals import Formula
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["claims_text", "write"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["claims_text", "held_figure", "write"]
 
 CHARTS = ("chart_element", "chart_bank", "chart_lugre", "block_diagram")
 FIGURES = ("fig3", "fig3_slipping", "fig4", "fig4_laws", "residual", "residual_held")
@@ -157,20 +161,39 @@ def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list
             },
             "Guards evaluated once per step (max step 1e-3 s, rtol 1e-4) and located switches",
         ),
-        "residual_held": figures.held_residuals(
-            figure_3_lags(traces),
-            (PAPERS_FORCE, PAPERS_PLACE),
-            phases={"ramp": RAMP, "oscillation": OSCILLATION}
-            if force == FORCE
-            else {"whole run": (0.0, np.inf)},
-            title="Fig. 3 with outputs held between ticks, minus if-else evaluated inside the steps",
-        ),
+        "residual_held": held_figure(traces, force),
     }
     return [
         figures.save(figure, folder / file)  # type: ignore[arg-type]
         for name, figure in pictures.items()
         for file in formats.files(name, "figure")
     ]
+
+
+def held_figure(traces: Mapping[str, Trace], force: str) -> Figure:
+    """Draw the residual of held outputs in Fig. 3.
+
+    Parameters
+    ----------
+    traces : mapping of str to Trace
+        From `run`; the held charts of Fig. 3 and ``fig3_step`` are used.
+    force : str
+        The applied force of the runs; only the default one has phases.
+
+    Returns
+    -------
+    Figure
+        Panels a to d.
+    """
+    from plots import figures
+
+    known = {"ramp": RAMP, "oscillation": OSCILLATION}
+    return figures.held_residuals(
+        figure_3_lags(traces),
+        (PAPERS_FORCE, PAPERS_PLACE),
+        phases=known if force == FORCE else {"whole run": (0.0, np.inf)},
+        title="Fig. 3, outputs held between ticks, minus if-else evaluated inside the steps",
+    )
 
 
 def claims_text(traces: Mapping[str, Trace], force: str = FORCE, velocity: str = VELOCITY) -> str:
@@ -257,9 +280,9 @@ def claims_text(traces: Mapping[str, Trace], force: str = FORCE, velocity: str =
 
 def _decided_by(trace: Trace) -> str:
     """Return the engine, and when guards are evaluated."""
-    settings = trace.settings
-    held = f" for {1e3 * float(settings['step']):g} ms" if settings["events"] == "held" else ""
-    return f"{settings['engine']}, {settings['events']}{held}"
+    engine, events, step = (trace.settings[name] for name in ("engine", "events", "step"))
+    held = f" for {1e3 * step:g} ms" if events == "held" and isinstance(step, float) else ""
+    return f"{engine}, {events}{held}"
 
 
 def _table(claims: Sequence[Claim]) -> list[str]:
