@@ -18,20 +18,20 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.language import names_in
+from gms_fsm.lowering.log_columns import LOG_TEXTS
 from gms_fsm.systems._assembly import Assembly, Bank, of
 
 __all__ = [
-    "CONTACT",
-    "LOG_NUMBERS",
-    "LOG_TEXTS",
     "BankPlaces",
     "Block",
     "Layout",
-    "LogRecord",
     "Places",
 ]
 
@@ -354,6 +354,8 @@ class Layout:
     keys : mapping of str to str
         For what a user may call a component of the state vector its name there: ``load.x`` for the
         position of the body load, and where there is one contact ``z`` for its variable z.
+    edges : tuple of tuple of str
+        Name, source and target of each edge, over all contacts.
 
     Examples
     --------
@@ -372,6 +374,7 @@ class Layout:
     banks: tuple[BankPlaces, ...]
     surfaces: int
     keys: Mapping[str, str]
+    edges: tuple[tuple[str, str, str], ...]
 
     @classmethod
     def of(cls, read: Assembly, surfaces: int) -> Layout:
@@ -434,6 +437,7 @@ class Layout:
             tuple(banks),
             surfaces,
             {key: name for key, name in keys.items() if name in y.shared or name in y.own},
+            tuple((e.name, e.source, e.target) for bank in read.banks for e in bank.edges),
         )
 
     def label(self, name: str) -> str:
@@ -444,6 +448,17 @@ class Layout:
     def n(self) -> int:
         """Number of elements of all contacts."""
         return sum(bank.n for bank in self.banks)
+
+    @cached_property
+    def log_texts(self) -> tuple[NDArray[np.str_], ...]:
+        """The columns `LOG_TEXTS` of the log, for each edge."""
+        columns = zip(*self.edges, strict=True) if self.edges else ((),) * len(LOG_TEXTS)
+        return tuple(np.array(column, dtype=np.str_) for column in columns)
+
+    @cached_property
+    def firsts(self) -> NDArray[np.int64]:
+        """The first machine of each contact, over all contacts."""
+        return np.array([bank.first for bank in self.banks])
 
     def bank(self, machine: int) -> BankPlaces:
         """Return the contact of a machine, which are counted over all contacts."""
@@ -480,15 +495,12 @@ class Layout:
             )
         raise ParameterError(f"there is no contact {shown(name)}", advice=f"there are {known}")
 
+    @cached_property
     def recorded(self) -> tuple[list[int], list[list[int]]]:
-        """Return where the numbers of `LogRecord` are for each machine: in y, and observed.
+        """Where the numbers of `LogRecord` are for each machine.
 
-        Returns
-        -------
-        list of int
-            Place in y of its first variable; -1 if its chart has none.
-        list of list of int
-            Places of v, s and F among the observed quantities.
+        The place in y of its first variable (-1 if its chart has none), and the places of v, s and
+        F among the observed quantities.
         """
         own: list[int] = []
         seen: list[list[int]] = []
@@ -570,29 +582,3 @@ def shown_of(read: Assembly) -> Places[str]:
         threshold = of(bank.name, "s")
         blocks.append(Block(tuple(dict.fromkeys([threshold, *own])), bank.n, size))
     return Places(tuple(shared), tuple(blocks))
-
-
-class LogRecord(NamedTuple):
-    """One firing, as recorded in the transition log.
-
-    ``z``, ``v`` and ``s`` are the element's first variable, the velocity and the threshold before
-    it.
-    """
-
-    t: float
-    element: int  # from 0
-    edge: str
-    source: str
-    target: str
-    z: float
-    v: float
-    s: float
-    F_before: float
-    F_after: float
-    contact: str = ""  # in a run of a system; of one model there is one contact only
-
-
-LOG_TEXTS = ("edge", "source", "target")
-CONTACT = "contact"  # a column of the logs of systems only
-# In the order in which machine code stores them for a firing.
-LOG_NUMBERS = ("z", "v", "s", "F_before", "F_after")

@@ -15,15 +15,8 @@ from pathlib import Path
 import pytest
 
 from gms_fsm import ChartModel, Prescribed, Slider
-from gms_fsm.lowering.layout import (
-    CONTACT,
-    LOG_NUMBERS,
-    LOG_TEXTS,
-    Block,
-    Layout,
-    LogRecord,
-    Places,
-)
+from gms_fsm.lowering.layout import Block, Layout, Places
+from gms_fsm.lowering.log_columns import CONTACT, LOG_NUMBERS, LOG_TEXTS, LogRecord
 from gms_fsm.lowering.program import lower
 from gms_fsm.systems._assembly import assembled
 from gms_fsm.systems.system import system_of
@@ -246,7 +239,7 @@ def test_texts_name_the_same_places(shared: tuple[str, ...], n: int, others: int
 def test_machine_code_finds_what_it_writes_into_the_log() -> None:
     """`integrators.columns.record` is told where the numbers of a firing are."""
     layout = lower(stick_slip("signed"), pulled_mass()[1]).layout
-    own, seen = layout.recorded()
+    own, seen = layout.recorded
     names = list(layout.y)
     assert [names[place] for place in own] == [("friction.z", i) for i in range(4)]
     observed = [name for name, _ in layout.observed]
