@@ -283,7 +283,7 @@ def held_residuals(
         panels.lag_over_period(period, lags, papers, phases=phases)
         force.set_title("a) friction, at the ticks")
         place.set_title("b) position, at the ticks")
-        between.set_title("c) friction between ticks (dots), on the ramp")
+        between.set_title("c) friction; dots: at the ticks")
         period.set_title("d) largest at the ticks; lines: proportional to h")
         period.legend(loc="upper left", ncols=2)
         (paper,) = force.plot([], [], color=BLUE, linestyle="--", linewidth=0.9)

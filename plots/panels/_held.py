@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from plots._matplotlib import Axes
+from plots._matplotlib import Axes, LogLocator
 from plots.panels._axes import Artists, draw_curve, time_axis
 from plots.style import BLUE, INK, LINE_GREY, TEXT_GREY, VERMILION
 
@@ -139,6 +139,7 @@ def lag_over_period(
     """
     periods = MILLI * np.array([lag.period for lag in lags])
     marks: Artists = []
+    found: list[float] = []
     for (name, (begin, end)), fill in zip(phases.items(), ("full", "none"), strict=False):
         for quantity, marker in enumerate("os"):
             sizes = []
@@ -146,6 +147,7 @@ def lag_over_period(
                 inside = (lag.t >= begin) & (lag.t < end)
                 values = (lag.force, lag.place)[quantity]
                 sizes.append(float(np.abs(values[inside]).max()) / papers[quantity])
+            found += [size for size in sizes if size > 0]
             line = sizes[0] * periods / periods[0]  # a slope of exactly one
             ax.plot(periods, line, color=LINE_GREY, linewidth=0.9, zorder=1)
             marks += ax.plot(
@@ -158,9 +160,12 @@ def lag_over_period(
                 label=f"{'Fx'[quantity]}, {name}",
             )
     ax.axhline(1.0, color=BLUE, linestyle="--", linewidth=0.9)
-    ax.set(xscale="log", yscale="log")
+    ax.set(
+        xscale="log", yscale="log", xlabel="sample time h [ms]", ylabel="largest / the paper's [1]"
+    )
+    ax.set_ylim(0.7 * min([0.9, *found]), 1.5 * max([13.0, *found]))
     ax.set_xticks(periods, [f"{period:g}" for period in periods])
-    ax.set_yticks([1, 2, 5, 10], ["1", "2", "5", "10"])
+    ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    ax.yaxis.set_major_formatter("{x:g}")
     ax.minorticks_off()
-    ax.set(xlabel="sample time h [ms]", ylabel="largest / the paper's [1]", ylim=(0.6, 20))
     return marks
