@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -199,8 +200,11 @@ def test_a_run_that_fails_leaves_the_runs_before_it(tmp_path: Path) -> None:
     assert Trace.load(tmp_path / "traces" / "fig3_chart.npz").t[-1] == paper.FIG3_END
 
 
-def test_custom_signals_are_used_and_not_assessed() -> None:
-    text = claims_text(run("0.1*t", "0.1*sin(t)"), "0.1*t", "0.1*sin(t)")
+def test_custom_signals_are_used_and_not_assessed(monkeypatch: pytest.MonkeyPatch) -> None:
+    signals = ("0.1*t", "0.1*sin(t)")
+    short = [replace(each, t_end=0.5) for each in experiments(*signals)]
+    monkeypatch.setattr("gms_fsm.app.paper.experiments.experiments", lambda *_: short)
+    text = claims_text(run(*signals), *signals)
     assert "F_a = 0.1*t" in text
     assert "Not assessed" in text
     assert "| claim |" not in text
