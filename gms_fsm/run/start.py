@@ -57,6 +57,8 @@ class Start:
         As recorded in the trace.
     chosen : Settings
         As given.
+    initial : mapping
+        As given.
     """
 
     system: System
@@ -71,6 +73,7 @@ class Start:
     options: Options
     settings: Mapping[str, Setting]
     chosen: Settings
+    initial: Mapping[str, Any]
 
     @property
     def given(self) -> System | None:
@@ -170,7 +173,8 @@ class Start:
         program = _with_waking_times(program, system, t_start, last)
         if ticks := _ticks(system, t_start, last):
             program = replace(program, ticks=ticks)
-        y, mode = _initial(system, program, t_start, {} if initial is None else initial)
+        initial = {} if initial is None else initial
+        y, mode = _initial(system, program, t_start, initial)
         origin: tuple[Any, Any] = origin_of(system) if isinstance(model, System) else (model, rig)
         return cls(
             system=system,
@@ -185,6 +189,7 @@ class Start:
             options=options,
             settings=_recorded(chosen, used, t_start, t_end),
             chosen=chosen,
+            initial=initial,
         )
 
     def with_numbers(self, model: Model, rig: Rig) -> Start:
@@ -198,18 +203,22 @@ class Start:
         Returns
         -------
         Start
-            With the tolerances of the new model.
+            With the tolerances of the new model, and its entry of the default state.
         """
         system = with_model(self.system, model, rig)
         scales = scales_of_system(system)
         default = scales.tolerances(self.options.rtol)
         tolerances, used = _tolerances(self.program.layout, self.chosen.atol, default)
+        program, y = replace(self.program, p=arguments(system)), self.y
+        if _enters(system):
+            y, _ = _initial(system, program, self.t_start, self.initial)
         return replace(
             self,
             system=system,
             model=model,
             rig=rig,
-            program=replace(self.program, p=arguments(system)),
+            program=program,
+            y=y,
             options=replace(self.options, atol=tolerances, time_scale=scales.time),
             settings={**self.settings, "atol": used},
         )
@@ -426,6 +435,12 @@ def _initial(
     return _entered(system, program, t_start, state, mode, {*given}), mode
 
 
+def _enters(system: System) -> bool:
+    """Return whether the default state of some chart has an entry."""
+    charts = (contact.chart for contact in system.contacts)
+    return any(chart.assignments["entry", chart.default_state.name] for chart in charts)
+
+
 def _entered(
     system: System,
     program: Program,
@@ -439,10 +454,7 @@ def _entered(
     What the initial values give stays.
     """
     layout, out = program.layout, [0.0] * program.layout.shown.size
-    if not any(
-        contact.chart.assignments["entry", contact.chart.default_state.name]
-        for contact in system.contacts
-    ):
+    if not _enters(system):
         return y
     program.ieee["values"](t_start, y, mode, program.p, out)
     found: list[dict[str, Any]] = [{} for _ in mode]

@@ -5,6 +5,7 @@ What the initial values give stays, and an element that starts in another state 
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from gms_fsm import (
@@ -16,6 +17,7 @@ from gms_fsm import (
     State,
     Transition,
     simulate,
+    sweep,
 )
 
 MODEL = ChartModel(
@@ -55,6 +57,14 @@ def test_what_is_given_stays_and_is_what_later_steps_see() -> None:
 def test_another_state_is_not_entered() -> None:
     trace = simulate(MODEL, RIG, 1.0, initial={"states": ["other", "first"]})
     assert trace.z[0].tolist() == [0.0, 1.5]
+
+
+@pytest.mark.slow
+def test_a_compiled_sweep_enters_with_the_numbers_of_each_run() -> None:
+    pytest.importorskip("numba")
+    k = np.linspace(1.0, 2.0, 130)  # two runs per task, which share their buffers
+    found = sweep(MODEL, RIG, 0.1, {"k": k}, engine="compiled", progress=False)
+    np.testing.assert_allclose(found.z[:, 0] - found.z[0, 0], 0.5 * (k - 1.0), rtol=1e-9)
 
 
 def test_an_entry_that_sets_the_velocity_is_refused() -> None:
