@@ -34,7 +34,7 @@ from integrators import Arc, HybridError, hybrid
 from integrators.advance import ROW, STEPS
 from integrators.steps import T
 
-__all__ = ["Moment", "Run", "simulate"]
+__all__ = ["Moment", "Run", "mounted", "simulate"]
 
 
 def simulate(
@@ -124,7 +124,7 @@ def simulate(
     >>> len(trace.transitions)
     48
     """
-    on, end = _mounted(model, rig, t_end)
+    on, end = mounted("simulate", model, rig, t_end)
     if isinstance(engine, ElementMachines):
         if machines is not None:
             raise ParameterError(
@@ -169,15 +169,35 @@ def simulate(
     return watched(trace, watching) if watching else trace
 
 
-def _mounted(model: object, rig: Rig | float, t_end: float | None) -> tuple[Rig | None, float]:
-    """Return the rig, if there is one, and the end of the run."""
+def mounted(
+    caller: str, model: object, rig: Rig | float, t_end: float | None
+) -> tuple[Rig | None, float]:
+    """Return the rig, if there is one, and the end of the run.
+
+    Parameters
+    ----------
+    caller : str
+        Name of the function or class, for messages.
+    model, rig, t_end
+        As for `simulate`.
+
+    Returns
+    -------
+    (Rig or None, float)
+        The rig is None for a system.
+
+    Raises
+    ------
+    ParameterError
+        If a system has a rig, or the end of the run is missing.
+    """
     if isinstance(model, System):
         if t_end is not None and not isinstance(rig, float | int):
             raise ParameterError(
                 "a system has no rig",
                 place="rig",
                 value=rig,
-                advice="write simulate(system, t_end)",
+                advice=f"write {caller}(system, t_end)",
             )
         return None, rig if t_end is None else t_end  # type: ignore[return-value]
     if t_end is None:
@@ -185,7 +205,7 @@ def _mounted(model: object, rig: Rig | float, t_end: float | None) -> tuple[Rig 
             "it must be a number",
             place="t_end",
             value=None,
-            advice="write simulate(model, rig, t_end), or simulate(system, t_end)",
+            advice=f"write {caller}(model, rig, t_end), or {caller}(system, t_end)",
         )
     return rig, t_end  # type: ignore[return-value]
 

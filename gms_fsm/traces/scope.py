@@ -163,6 +163,7 @@ class Scope:
         y: list[float],
         mode: Sequence[int],
         contact: str = "",
+        observed: Mapping[str, Any] | None = None,
     ) -> Scope:
         """Return the scope of the present state of a run.
 
@@ -178,6 +179,10 @@ class Scope:
             State.
         mode : sequence of int, shape (modes,)
             Modes of the elements and the surfaces.
+        contact : str
+            The contact, of a system with several.
+        observed : mapping of str to float or list of float, optional
+            What is observed of this state, by name, if it has been computed.
 
         Returns
         -------
@@ -186,7 +191,9 @@ class Scope:
         """
         layout = program.layout
         places = layout.contact(contact)
-        seen = places.plain(layout.observed.named(observe(program, t, y, mode)))
+        if observed is None:
+            observed = layout.observed.named(observe(program, t, y, mode))
+        seen = places.plain(observed)
         return cls(model, layout, t, y, seen, mode, places, _read(program, places, t, y, mode))
 
     @classmethod
@@ -232,7 +239,8 @@ class Scope:
             With arrays as values, whose last axis is the row.
         """
         seen = {"F": trace.F, "x": trace.x, "s": trace.s.T, FORCE: trace.F_elements.T}
-        seen[trace.places.velocity] = trace.v
+        for name in (*trace.model.chart.velocities, *trace.model.chart.force_names):
+            seen[name] = trace.seen[trace.places.of(name)]
         rows, layout = trace.rows, trace.program.layout
         return cls(trace.model, layout, rows.t, rows.y.T, seen, rows.mode.T, trace.places)
 
