@@ -149,7 +149,7 @@ class Branch:
         return place
 
     def scope(self, row: Row, contact: str = "") -> Scope:
-        """Return the values of a contact at a row or point, by name; without a name the only one."""
+        """Return the values of a contact at a row or point; without a name of the only one."""
         start = self.run.start
         name = start.program.layout.contact(contact).name
         model = start.model if start.given is None else start.system.contact(name)

@@ -15,7 +15,7 @@ from gms_fsm.errors import SessionError, shown
 from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.run.start import Start
 
-__all__ = ["chart_of", "contact_named", "element_name", "machine_of", "source_of"]
+__all__ = ["chart_of", "contact_named", "element_name", "machine_of", "source_of", "title_of"]
 
 
 def machine_of(element: int | str, start: Start) -> int:
@@ -104,6 +104,13 @@ def element_name(start: Start, machine: int) -> str:
     bank = start.program.layout.bank(machine)
     number = machine - bank.first + 1
     return f"element {number}" if start.given is None else f"{bank.name} {number}"
+
+
+def title_of(start: Start) -> str:
+    """Return what runs: titles of model and rig, or of a system and its contacts."""
+    if start.given is None:
+        return f"{start.model.title}; {start.rig.title}"
+    return f"{start.system.name}; {'; '.join(each.title for each in start.system.contacts)}"
 
 
 def chart_of(start: Start, bank: BankPlaces) -> Chart:

@@ -7,7 +7,6 @@ from gms_fsm.inspection._branch import Branch
 from gms_fsm.inspection._elements import chart_of, element_name, source_of
 from gms_fsm.inspection._results import BodyHere, ContactHere, Here
 from gms_fsm.inspection.explain import Why, explain_state
-from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.traces.scope import Scope
 
 __all__ = ["here_at", "why_at"]
@@ -24,7 +23,7 @@ def here_at(branch: Branch, row: int) -> Here:
         row,
         place.t,
         place.microstep,
-        {bank.name: _contact(scope.contacts[bank.name], bank) for bank in banks},
+        {bank.name: _contact(scope.contacts[bank.name]) for bank in banks},
         {body.name: BodyHere(scope.value(body.x), scope.value(body.v)) for body in system.bodies},
         {name: scope.value(name) for name in further},
         located,
@@ -33,7 +32,7 @@ def here_at(branch: Branch, row: int) -> Here:
     )
 
 
-def _contact(scope: Scope, bank: BankPlaces) -> ContactHere:
+def _contact(scope: Scope) -> ContactHere:
     chart = scope.model.chart
     more = (*chart.velocities[1:], *chart.force_names[1:])
     return ContactHere(

@@ -300,7 +300,8 @@ def compared(numbers: tuple[int, int], first: Trace, second: Trace) -> BranchCom
 
 
 def _who(record: np.record) -> tuple[object, ...]:
-    names = [name for name in ("t", "contact", "element", "edge") if name in record.dtype.names]
+    columns = record.dtype.names or ()
+    names = [name for name in ("t", "contact", "element", "edge") if name in columns]
     return tuple(record[name].item() for name in names)
 
 

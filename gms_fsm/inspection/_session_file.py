@@ -91,6 +91,12 @@ class SessionRecord:
     breakpoints: Sequence[Breakpoint]
     watches: Sequence[str]
 
+    @property
+    def arguments(self) -> tuple[Any, ...]:
+        """The positional arguments of `Session`."""
+        rig = () if self.rig is None else (self.rig,)
+        return self.model, *rig, self.t_end
+
 
 def options_of(
     settings: Settings, t_start: float, initial: Mapping[str, Any] | None
@@ -134,8 +140,8 @@ def restore(session: Session, record: SessionRecord) -> None:
     for point in record.breakpoints:
         where: int | str | None = point.element
         if point.contact:
-            number = "" if point.element is None else f" {point.element + 1}"
-            where = f"{point.contact}{number}"
+            element = "" if point.element is None else f" {point.element + 1}"
+            where = f"{point.contact}{element}"
         found = session.break_on(point.kind, point.name, where, point.condition, point.hits)
         found.seen = point.seen
     session.watches = list(record.watches)

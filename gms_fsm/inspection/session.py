@@ -14,21 +14,14 @@ from typing import Any, Unpack
 from gms_fsm._arguments import checked_path
 from gms_fsm.errors import SessionError
 from gms_fsm.inspection import _breakpoints, _conditions, _session_file, _walker
-from gms_fsm.inspection._arguments import check_branch, check_row, checked_settings
+from gms_fsm.inspection._arguments import check_branch, check_row, checked_settings, chosen_pair
 from gms_fsm.inspection._branch import Branch
 from gms_fsm.inspection._breakpoints import KINDS, Breakpoint
 from gms_fsm.inspection._conditions import holds_at
-from gms_fsm.inspection._elements import machine_of
+from gms_fsm.inspection._elements import machine_of, title_of
 from gms_fsm.inspection._here import here_at, why_at
 from gms_fsm.inspection._poking import Edits, initial_with
-from gms_fsm.inspection._results import (
-    BodyHere,
-    BranchComparison,
-    ContactHere,
-    Fired,
-    Here,
-    compared,
-)
+from gms_fsm.inspection._results import BranchComparison, Fired, Here, compared
 from gms_fsm.inspection.explain import Why
 from gms_fsm.language import Condition
 from gms_fsm.run.settings import SettingOptions, Settings
@@ -38,17 +31,7 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
 
-__all__ = [
-    "KINDS",
-    "BodyHere",
-    "Branch",
-    "BranchComparison",
-    "Breakpoint",
-    "ContactHere",
-    "Fired",
-    "Here",
-    "Session",
-]
+__all__ = ["KINDS", "Branch", "BranchComparison", "Breakpoint", "Fired", "Here", "Session"]
 
 
 class Session:
@@ -158,11 +141,7 @@ class Session:
     @property
     def title(self) -> str:
         """One line on what runs, and until when."""
-        start = self.start
-        if start.given is None:
-            return f"{start.model.title}; {start.rig.title}, to t = {self.t_end:g} s"
-        contacts = ", ".join(each.title for each in self.system.contacts)
-        return f"{self.system.name}; {contacts}; to t = {self.t_end:g} s"
+        return f"{title_of(self.start)}, to t = {self.t_end:g} s"
 
     # ------------------------------------------------------------------ where we are
     @property
@@ -313,12 +292,12 @@ class Session:
         return _conditions.value_of(self.start, text, self.values())
 
     def until(self, condition: str) -> Here:
-        """Go forward to the next point where a condition becomes true, located between rows.
+        """Go forward as `reaches` does.
 
         Parameters
         ----------
         condition : str
-            See `parse`. If it is already true, it must first become false.
+            See `parse`.
 
         Returns
         -------
@@ -329,7 +308,7 @@ class Session:
         return self.here
 
     def reaches(self, condition: str) -> bool:
-        """Go forward as `until` does, and return whether the condition became true.
+        """Go forward to the next point where a condition becomes true, located between rows.
 
         Parameters
         ----------
@@ -563,16 +542,11 @@ class Session:
           first different transition at t = 12.4999735 s
           largest difference: z 0.599 m, F 0.375 N
         """
-        for number in (a, b):
-            if number is not None:
-                check_branch(number, len(self.branches))
-        b = self.current if b is None else b
-        a = self.branches[b].parent if a is None else a
-        if a is None:
-            raise SessionError(f"branch {b} has no parent", advice="give two branch numbers")
-        for number in (a, b):
+        pair = chosen_pair(a, b, self.current, [branch.parent for branch in self.branches])
+        for number in pair:
             self.branches[number].complete()
-        return compared((a, b), self.branches[a].trace(), self.branches[b].trace())
+        first, second = (self.branches[number].trace() for number in pair)
+        return compared(pair, first, second)
 
     # ------------------------------------------------------------------ files
     def save(self, path: str | Path) -> Path:
@@ -621,7 +595,6 @@ class Session:
         path = checked_path("path", path)
         with _session_file.blamed(path):
             record = _session_file.read(path)
-            rig: Any = record.t_end if record.rig is None else record.rig
-            session = cls(record.model, rig, record.t_end, **record.options)
+            session = cls(*record.arguments, **record.options)
             _session_file.restore(session, record)
             return session
