@@ -191,12 +191,16 @@ class Branch:
 
     def next_tick(self, machine: int) -> float | None:
         """Return when the guards of an element are evaluated next, if not at the cursor."""
-        program, t = self.run.start.program, self.here.t
-        bit = program.discrete[machine]
+        t, bit = self.here.t, self.run.start.program.discrete[machine]
         if bit == 0 or (self.between is None and self.asked(self.cursor, machine)):
             return None
-        ahead = (tick for tick, bits in program.ticks.items() if tick > t and bits & bit)
-        return next(ahead, math.inf)
+        found = self.tick_after(t, bit.bit_length() - 1)
+        return math.inf if found is None else found
+
+    def tick_after(self, t: float, clock: int) -> float | None:
+        """Return the next tick of a clock: the samplers, then the contacts with a period."""
+        ticks = self.run.start.program.ticks.items()
+        return next((tick for tick, bits in ticks if tick > t and bits & 1 << clock), None)
 
     # ------------------------------------------------------------------ firings
     def log(self) -> list[LogRecord]:

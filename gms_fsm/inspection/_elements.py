@@ -45,7 +45,7 @@ def machine_of(element: int | str, start: Start) -> int:
     whole = isinstance(element, int | np.integer) and not isinstance(element, bool)
     if len(banks) > 1:
         raise SessionError(
-            f"element {shown(element)} of which contact?",
+            f"element {shown(element)} names no contact",
             advice=f"write, for example, '{banks[0].name} 1'; {_known(banks)}",
         )
     if not whole or not 0 <= element < banks[0].n:

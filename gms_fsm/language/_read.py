@@ -367,7 +367,7 @@ class _Reader:
                 left=(ast.Name(id="state") | ast.Call(func=ast.Name(id="state"))) as left
             ) if self.owners:
                 some = next(iter(self.owners))
-                raise self.refuse("state of what?", left, f"for example {some}.state(1)")
+                raise self.refuse("state needs its owner", left, f"for example {some}.state(1)")
             case ast.Compare(left=left, ops=ops, comparators=comparators):
                 sides = [left, *comparators]
                 self.comparisons += len(ops)
