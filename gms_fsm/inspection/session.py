@@ -20,7 +20,7 @@ from gms_fsm.inspection._breakpoints import KINDS, Breakpoint
 from gms_fsm.inspection._conditions import holds_at
 from gms_fsm.inspection._elements import machine_of, title_of
 from gms_fsm.inspection._here import here_at, why_at
-from gms_fsm.inspection._poking import Edits, initial_with
+from gms_fsm.inspection._poking import Edits, check_locks, initial_with
 from gms_fsm.inspection._results import BranchComparison, Fired, Here, compared
 from gms_fsm.inspection.explain import Why
 from gms_fsm.language import Condition
@@ -63,8 +63,8 @@ class Session:
     >>> session
     <Session: GMS, 4 elements, published law; prescribed velocity, to t = 100 s; at t = 0 s>
 
-    A move returns the row at which it stopped, as an object that prints as readable text.
-    Elements are numbered from 0 in Python, and from 1 in printed text and in conditions.
+    A move returns the row at which it stopped, which prints as readable text. Elements are
+    numbered from 0 in Python, and from 1 in printed text and in conditions.
 
     >>> here = session.next_transition()
     >>> round(here.t, 3), here.fired.element, here.fired.edge, here.states[0]
@@ -73,7 +73,7 @@ class Session:
     row 12, t = 4.91276067 s, micro-step 1: v = 0.141608 m/s, F = 1.34657 N
       element 1: stick -> slip by break_away_forward
 
-    In a system the element of a contact is named in text, counted from 1: ``why("gear 1")``.
+    In a system elements are named in text, counted from 1: ``why("gear 1")``.
     """
 
     def __init__(
@@ -97,16 +97,8 @@ class Session:
 
     def _run(self, t_start: float, initial: Mapping[str, Any] | None) -> Run:
         """Return a run of this model from given values."""
-        return Run(
-            Start.of(
-                *self.made_of,
-                self.settings,
-                t_start=t_start,
-                initial=initial,
-                rows_at_once=1,
-                ticks_from=self.t_start,
-            )
-        )
+        options: Any = {"t_start": t_start, "initial": initial, "ticks_from": self.t_start}
+        return Run(Start.of(*self.made_of, self.settings, rows_at_once=1, **options))
 
     def __repr__(self) -> str:
         branch = f", branch {self.current}" if self.current else ""
@@ -461,8 +453,8 @@ class Session:
         Raises
         ------
         SessionError
-            If there is nothing to change, no such variable or element, or the cursor is at the
-            end of the run.
+            If there is nothing to change, no such variable or element, a locked contact would
+            move, or the cursor is at the end of the run.
         ParameterError, ChartError
             If a value violates its rule.
 
@@ -483,6 +475,7 @@ class Session:
             raise SessionError(f"t = {here.t!r} s is the end of the run", advice="go back first")
         run = self._run(here.t, initial_with(edits, self.start, here))
         new = Branch(run, self.current, branch.cursor, branch, edits, branch.between)
+        check_locks(branch, here, new.raw(new.offset))
         new.cursor = new.offset
         self.branches.append(new)
         self.current = len(self.branches) - 1

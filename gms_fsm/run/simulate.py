@@ -90,7 +90,8 @@ def simulate(
         Wall-clock time in s between two checkpoints.
     monitors : str or iterable of str or Monitor
         Checks of the run: ``"chattering"``, ``"passivity"``, ``"coverage"``, ``"all"`` of these,
-        invariants such as ``"abs(z) <= 2*s"``, or objects from `gms_fsm.traces.monitors`. Their
+        invariants such as ``"abs(z) <= 2*s"``, or objects from `gms_fsm.traces.monitors`; in a
+        system also those of one contact, such as ``"gear: passivity"``. Their
         verdicts are in ``Trace.monitors``. They examine the rows and the log after the run has
         ended or failed.
     **options
@@ -147,7 +148,9 @@ def simulate(
                 "engine 'ifelse' uses no machines", advice="leave machines=... out"
             )
     start = Start.of(model, on, end, chosen, t_start=t_start, initial=initial)
-    watching = checked(monitors, start.model, start.output).values() if monitors else ()
+    watching = (
+        checked(monitors, start.given or start.model, start.output).values() if monitors else ()
+    )
     run = CompiledRun(start, machines) if chosen.engine == "compiled" else Run(start, machines)
     keeper = None if path is None else Checkpointer(run, path, checkpoint_every)
     try:

@@ -173,7 +173,9 @@ def _whose(elements: Elements, name: str, contact: str | None, number: str) -> i
         raise SessionError(f"no contact {contact!r}", advice=f"the contacts are {known}")
     if contact is None and len(elements.banks) > 1:
         some = elements.banks[0].name
-        raise SessionError(f"{name!r} names no contact", advice=f"write, for example, {some}.state1")
+        raise SessionError(
+            f"{name!r} names no contact", advice=f"write, for example, {some}.state1"
+        )
     bank = elements.named[contact] if contact else elements.banks[0]
     if not number and bank.n > 1:
         raise SessionError(f"{name!r} cannot be poked", advice=f"for element 1 write {name}1")
