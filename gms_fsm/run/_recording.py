@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -13,7 +14,7 @@ import integrators
 from gms_fsm.charts.chart import Chart
 from gms_fsm.language import rough_points
 from gms_fsm.lowering._observing import armed, rate
-from gms_fsm.lowering.layout import Layout, LogRecord
+from gms_fsm.lowering.layout import CONTACT, Layout, LogRecord
 from gms_fsm.run.machines import Interference
 from gms_fsm.run.start import Start
 from gms_fsm.traces._log import log_of
@@ -215,20 +216,34 @@ class Moment:
     def states(self) -> list[str]:
         """Active state of each element."""
         start, (_, _, mode) = self._recording.start, self._recording.latest
-        states = start.model.chart.states
-        return [states[each].name for each in mode[start.program.layout.elements]]
+        return [
+            start.system.contact(bank.name).chart.states[each].name
+            for bank in start.program.layout.banks
+            for each in mode[bank.elements]
+        ]
 
     @property
     def values(self) -> dict[str, Any]:
-        """``x`` [m], ``v`` [m/s] and ``F`` [N]; ``z`` and ``s`` [m], one per element."""
-        here = scope_of(self._recording)
-        return {"x": here.x, "v": here.v, "F": here.F, "z": here.z, "s": here.s}
+        """``x`` [m], ``v`` [m/s] and ``F`` [N]; ``z`` and ``s`` [m], one per element.
+
+        With several contacts they have the contact's name before them: ``gear.F``.
+        """
+        start, found = self._recording.start, {}
+        banks = start.program.layout.banks
+        for bank in banks:
+            here = scope_of(start, *self._recording.latest, bank.name)
+            lead = f"{bank.name}." if len(banks) > 1 else ""
+            for name in ("x", "v", "F", "z", "s"):
+                found[f"{lead}{name}"] = getattr(here, name)
+        return found
 
 
-def scope_of(recording: Recording) -> Scope:
-    """Return the values of the latest row."""
-    start = recording.start
-    return Scope.of(start.model, start.program, *recording.latest)
+def scope_of(
+    start: Start, t: float, y: list[float], mode: Sequence[int], contact: str = ""
+) -> Scope:
+    """Return the values of a contact at a state of a run; without a name of the only one."""
+    bank = start.program.layout.contact(contact)
+    return Scope.of(start.system.contact(bank.name), start.program, t, y, mode, bank.name)
 
 
 # --------------------------------------------------------------------------- wording of errors
@@ -247,7 +262,7 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
     SimulationError
         With the trace.
     """
-    trace, chart = recorder.trace(), recorder.start.model.chart
+    trace = recorder.trace()
     if isinstance(error, NotFinite):
         values = [float(f"{u:.6g}") for u in error.y]
         return NotFiniteError(
@@ -276,17 +291,27 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
         )
     if not isinstance(error, Livelock):
         return SimulationError(str(error), trace, t=error.t)
-    start = recorder.start
-    scope = Scope.of(start.model, start.program, error.t, error.y, error.mode)
+    return _livelock(error, recorder.start, trace)
 
-    def described(i: int) -> str:
-        z = f"{chart.variables[0]} = {scope.z[i]:.6g}, " if chart.variables else ""
-        s = f"s = {scope.s[i]:.6g}, " if "s" in chart.inputs else ""
-        return f"{z}{s}v = {scope.v:.6g}"
 
+def _livelock(error: Livelock, start: Start, trace: Trace) -> LivelockError:
+    """Say which element switches without progress, and why."""
+    layout, machine = start.program.layout, error.machine
+    if machine is None:
+        machine = _pushed_back(error, start)
+    bank = layout.bank(machine)
+    i, chart = machine - bank.first, start.system.contact(bank.name).chart
+    scope = scope_of(start, error.t, error.y, error.mode, bank.name)
+    z = f"{chart.variables[0]} = {scope.z[i]:.6g}, " if chart.variables else ""
+    s = f"s = {scope.s[i]:.6g}, " if "s" in chart.inputs else ""
+    values = f"{z}{s}v = {scope.v:.6g}"
+    place = f"element {i + 1}" if start.given is None else f"{bank.name} {i + 1}"
     if error.machine is not None:
         log = trace.transitions
-        taken = log[log.element == error.machine][-error.times :]
+        mine = log.element == i
+        if len(layout.banks) > 1:
+            mine &= log.contact == bank.name
+        taken = log[mine][-error.times :]
         last = taken[-1]
         guard = next(edge.guard for edge in chart.transitions if edge.name == last.edge)
         time = float(last.t - taken[0].t)
@@ -304,30 +329,35 @@ def explained(error: HybridError, recorder: Recording) -> SimulationError:
         return LivelockError(
             f"switched {len(taken)} times{f' in {time:.3g} s' if time else ''}, "
             f"last by {str(last.edge)!r} from {last.source} to {last.target} "
-            f"({described(error.machine)}): {cause}",
+            f"({values}): {cause}",
             trace,
             t=error.t,
-            place=f"element {error.machine + 1}",
+            place=place,
             advice=advice,
         )
-    rough = [
-        i
-        for i, state in enumerate(error.mode[start.program.layout.elements])
-        if any(rough_points(chart.flows[chart.states[state].name, u]) for u in chart.variables)
-    ]
-    i = rough[0] if rough else 0
-    state = chart.states[error.mode[i]]
+    state = chart.states[error.mode[machine]]
     edges = ", ".join(f"{edge.name} [{edge.guard}]" for _, edge in chart.leaving(state.name))
     return LivelockError(
         f"{' and '.join(error.relations)} changed {error.times} times: "
-        f"the element is in {state.name} ({described(i)}), its flow pushes back on both sides, "
+        f"the element is in {state.name} ({values}), its flow pushes back on both sides, "
         f"no edge leaves ({edges or 'it has none'}), and no value of the sign between -1 and 1 "
         f"holds it there",
         trace,
         t=error.t,
-        place=f"element {i + 1}",
+        place=place,
         advice=f"look at the parameters and at the flow of {state.name}",
     )
+
+
+def _pushed_back(error: Livelock, start: Start) -> int:
+    """Return the first machine whose flow jumps or has a corner; the first one if none has."""
+    for bank in start.program.layout.banks:
+        chart = start.system.contact(bank.name).chart
+        for i, state in enumerate(error.mode[bank.elements]):
+            flows = (chart.flows[chart.states[state].name, name] for name in chart.variables)
+            if any(rough_points(flow) for flow in flows):
+                return bank.first + i
+    return 0
 
 
 def _slow(recorder: Recording) -> tuple[str, str]:
@@ -335,10 +365,11 @@ def _slow(recorder: Recording) -> tuple[str, str]:
     log = recorder.trace().transitions
     most = recorder.start.options.max_steps
     if 10 * len(log) > most:
-        element, count = np.unique(log.element, return_counts=True)
-        worst = int(element[count.argmax()])
+        whose = log.contact.tolist() if CONTACT in log.dtype.names else ["element"] * len(log)
+        pairs = Counter(zip(whose, log.element.tolist(), strict=True))
+        (who, element), count = pairs.most_common(1)[0]
         return (
-            f": element {worst + 1} has switched {int(count.max())} times (chattering)",
+            f": {who} {element + 1} has switched {count} times (chattering)",
             "separate its guards for the two directions by a gap, or give a larger max_steps",
         )
     return "", (
@@ -428,18 +459,22 @@ def _opposite_edge(chart: Chart, taken: Any) -> str:
 def _not_finite(error: NotFinite, recorder: Recording) -> str:
     """Name the quantity that is not finite where a run ended, if it can be determined."""
     start = recorder.start
-    scope = Scope.of(start.model, start.program, error.t, error.y, error.mode)
-    if not math.isfinite(scope.v):
-        return "the velocity v is not finite"
-    states = {state.name: state for state in start.model.chart.states}
-    for variable in start.model.chart.variables:
-        for i, name in enumerate(scope.states):
-            if not math.isfinite(scope.each(f"d{variable}")[i]):
-                state = states[name]
-                return (
-                    f"the flow of {variable} in state {state.name}, [{state.flow[variable]}], is "
-                    f"not finite in element {i + 1}"
-                )
+    for bank in start.program.layout.banks:
+        chart = start.system.contact(bank.name).chart
+        scope = scope_of(start, error.t, error.y, error.mode, bank.name)
+        whose = "" if start.given is None else f" of {bank.name}"
+        if not math.isfinite(scope.v):
+            return f"the velocity v{whose} is not finite"
+        states = {state.name: state for state in chart.states}
+        for variable in chart.variables:
+            for i, name in enumerate(scope.states):
+                if not math.isfinite(scope.each(f"d{variable}")[i]):
+                    state = states[name]
+                    return (
+                        f"the flow of {variable} in state {state.name}, "
+                        f"[{state.flow.get(variable, '0')}], is not finite in "
+                        f"{bank.name if whose else 'element'} {i + 1}"
+                    )
     return "a signal or a flow is not finite"
 
 

@@ -283,7 +283,7 @@ def _result(run: Run | CompiledRun | None, outcome: str, message: str) -> _Resul
     rows = None
     if recorder.start.output == "t_eval":
         rows = {name: getattr(trace, name) for name in ("x", "v", "F", "z")}
-    here = scope_of(recorder)
+    here = scope_of(recorder.start, *recorder.latest)
     end = {name: getattr(here, name) for name in ("t", "x", "v", "F", "z")}
     end["mode"] = here.mode[here.layout.elements]
     return _Result(outcome, message, end, log, rows)
