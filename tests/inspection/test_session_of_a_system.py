@@ -146,7 +146,8 @@ def test_a_poke_changes_what_it_names_and_no_tick() -> None:
         "q1 = 0.1, u = 0.3, bank.z2 = 0.2, bank.z4 = 0.1, state of bank 3 = slip"
     )
     assert session.reaches("count > 21.5")
-    assert session.here.t == pytest.approx(1.05, abs=1e-12)
+    assert (session.here.t, session.here.located) == (pytest.approx(1.05, abs=1e-12), False)
+    assert session.here.values["count"] == 22.0
 
 
 def test_at_its_tick_a_sampler_does_not_tick_again() -> None:

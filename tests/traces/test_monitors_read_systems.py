@@ -101,7 +101,7 @@ def test_passivity_of_a_relative_velocity_is_that_of_the_body_it_equals() -> Non
             "puck",
             "the contact moves by v and w, and only a spring force k * z [+ sigma * dz] along",
         ),
-        ("pulled_mass", "F depends on the state (F_c + b * v; -F_c + b * v), and only a spring"),
+        ("pulled_mass", "F depends on the state (F_c + b * v or -F_c + b * v), and only a spring"),
         ("gear_box", "F = 0 is not a spring force k * z [+ sigma * dz]"),
     ],
 )

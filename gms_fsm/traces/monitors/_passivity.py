@@ -91,7 +91,7 @@ def _why_not(trace: Trace) -> str:
     if not forces:
         return f"F is what holds the contact, not {spring}"
     if len(forces) > 1:
-        return f"F depends on the state ({'; '.join(forces)}), and only {spring} is checked"
+        return f"F depends on the state ({' or '.join(forces)}), and only {spring} is checked"
     if _spring(trace.model) is not None:
         return f"the contact has a period, and F is held between ticks, so it is not {spring}"
     return f"F = {forces[0]} is not {spring}"
