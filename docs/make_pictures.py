@@ -26,7 +26,9 @@ from gms_fsm import (
     sweep,
 )
 from gms_fsm._files import write_whole
-from gms_fsm.app.paper import FIG4_END, VELOCITY
+from gms_fsm.app.paper import FIG4_END, FORCE, VELOCITY
+from gms_fsm.app.paper.experiments import experiments, run_one
+from gms_fsm.app.paper.writing import held_figure
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.broken import BROKEN
@@ -55,6 +57,7 @@ def main() -> None:
     draw_figures(signed)
     draw_concepts(published)
     draw_howto()
+    draw_held()
 
 
 def draw_charts(published: Trace, signed: Trace) -> None:
@@ -75,6 +78,13 @@ def draw_charts(published: Trace, signed: Trace) -> None:
     live = plots.live_statechart(signed, row=row, elements=4, values=True)
     write_whole(FOLDER / "chart_live.svg", lambda file: file.write(live.encode()))
     plots.animate(signed, FOLDER / "film.gif", elements=[0], frames=50, t_end=50.0, fps=10)
+
+
+def draw_held() -> None:
+    """Write the picture of the residual of held outputs, as ``gms-fsm paper`` draws it."""
+    chosen = [e for e in experiments() if e.name.startswith(("fig3_step", "fig3_held_chart"))]
+    traces = {experiment.name: run_one(experiment) for experiment in chosen}
+    figures.save(held_figure(traces, FORCE), FOLDER / "residual_held.png")
 
 
 def draw_figures(signed: Trace) -> None:

@@ -129,7 +129,6 @@ SIGNATURES: Mapping[str, str] = {
 # not raise). No reference counting either, which is atomic and took half of the time: nothing is
 # allocated here, and all arrays belong to the caller.
 _OPTIONS: Mapping[str, Any] = {"error_model": "numpy", "_nrt": False}
-_hints: Callable[[type], Mapping[str, Any]] = functools.cache(typing.get_type_hints)
 
 
 def arrays(record: Any) -> Any:
@@ -152,14 +151,32 @@ def arrays(record: Any) -> Any:
     >>> arrays(coefficients(HEUN)).A.tolist()
     [[0.0], [1.0]]
     """
-    hints = _hints(type(record))
-    return type(record)(*(_array(value, hints[name]) for name, value in record._asdict().items()))
+    return _constant(record) if isinstance(record, steps.Coefficients) else _converted(record)
 
 
-def _array(value: Any, hint: Any) -> Any:
-    if hint not in _ARRAYS:
+def _converted(record: Any) -> Any:
+    kind: Any = type(record)
+    kinds = _kinds(kind)
+    return kind._make(_array(u, array) for u, array in zip(record, kinds, strict=True))
+
+
+@functools.cache
+def _kinds(record: Any) -> tuple[tuple[type[Any], int] | None, ...]:
+    """Return what array each field of a named tuple becomes; None if it is no list."""
+    hints = typing.get_type_hints(record)
+    return tuple(_ARRAYS.get(hints[name]) for name in record._fields)
+
+
+@functools.lru_cache(maxsize=32)
+def _constant(method: steps.Coefficients) -> Any:
+    """Return the arrays of a method, which no run writes to."""
+    return _converted(method)
+
+
+def _array(value: Any, kind: tuple[type[Any], int] | None) -> Any:
+    if kind is None:
         return arrays(value) if hasattr(value, "_fields") else value
-    dtype, dimensions = _ARRAYS[hint]
+    dtype, dimensions = kind
     if dimensions == 1:
         return np.array(value, dtype=dtype)
     table = np.zeros((len(value), max(map(len, value), default=0)), dtype=dtype)

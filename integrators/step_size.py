@@ -173,6 +173,8 @@ def starting_step(
     d2 = error_norm(f_try, 1.0, y, y, rtol, atol)
     if not d2 < INFINITY:
         return LEAST * h  # the trial step went too far
+    if not d2 * h * h < NO_TOLERANCE:  # as above, but it only begins to move: x at rest
+        return min(h, 1e-3 * time_scale)
     steepest = max(time_scale * d1, time_scale * time_scale * d2)
     better = 1e-3 * h if steepest <= 1e-15 else time_scale * (0.01 / steepest) ** (1.0 / order)
     return min(100.0 * h, better, longest)

@@ -24,7 +24,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, Rectangle
 from matplotlib.path import Path as Curve
 from matplotlib.text import Text
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator
 from PIL import Image
 
 __all__ = [
@@ -38,6 +38,7 @@ __all__ = [
     "Image",
     "LineCollection",
     "ListedColormap",
+    "LogLocator",
     "MaxNLocator",
     "Rectangle",
     "RendererBase",

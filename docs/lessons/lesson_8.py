@@ -16,3 +16,5 @@ print(source[source.index("def switch") :].split("\n\n\n")[0])
 #
 # - Run both drivers with `law="signed"`. Do they still diverge at the first reversal?
 # - How late must a guard be checked to produce the residual in the paper? Which step does that?
+# - Hold outputs for 0.7 ms (`events="held", step=7e-4`). Which transitions of `result.chart` are
+#   missed, and why?

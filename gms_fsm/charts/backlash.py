@@ -5,8 +5,8 @@ the flank would change its sign, which with damping is before the gap opens.
 
 References
 ----------
-M. Nordin, P.-O. Gutman, "Controlling Mechanical Systems with Backlash: A Survey", Automatica 38
-(2002), Section 2.
+M. Nordin, P.-O. Gutman, "Controlling Mechanical Systems with Backlash - A Survey", Automatica
+38(10), 1633-1649 (2002), doi:10.1016/S0005-1098(02)00047-X.
 """
 
 from __future__ import annotations

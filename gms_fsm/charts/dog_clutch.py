@@ -1,12 +1,14 @@
 """A dog clutch: from t_on to t_off the contact is locked, else it transmits nothing.
 
 Engagement is an impact that keeps the momentum of the bodies. With a ratio in the velocity of the
-contact, such as ``v="w_a - 3 * w_b"``, the clutch engages a gear.
+contact, such as ``v="w_a - 3 * w_b"``, the clutch engages a gear. That the claws mesh at any speed
+is a simplification of ours.
 
 References
 ----------
-C. Glocker, "Set-Valued Force Laws: Dynamics of Non-Smooth Systems", Springer (2001), for
-constraints that are imposed suddenly. That the claws mesh at any speed is a simplification.
+A. Benveniste, B. Caillaud, H. Elmqvist, K. Ghorbal, M. Otter, M. Pouzet, "Multi-Mode DAE Models -
+Challenges, Theory and Implementation", in "Computing and Software Science", LNCS 10000, Springer
+(2019), doi:10.1007/978-3-319-91908-9_16, on impulses where the number of equations changes.
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ DOG_CLUTCH = Chart(
         Transition("engage", "open", "engaged", guard="t_on <= t < t_off"),
         Transition("disengage", "engaged", "open", guard="t >= t_off"),
     ),
-    reference="Glocker (2001)",
+    reference="Benveniste et al. (2019)",
 )
 CHARTS = (
     Entry(

@@ -6,8 +6,9 @@ is locked instead, until the stop would have to pull.
 
 References
 ----------
-B. Brogliato, "Nonsmooth Mechanics", 3rd ed., Springer (2016), Chapter 4 (Newton's impact law).
-The rest speed is our way to end the sequence of impacts.
+B. Brogliato, "Nonsmooth Mechanics: Models, Dynamics and Control", 3rd ed., Springer (2016),
+doi:10.1007/978-3-319-28664-8, on impact laws. The rest speed is our way to end the sequence of
+impacts.
 """
 
 from __future__ import annotations

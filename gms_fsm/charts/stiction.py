@@ -10,8 +10,8 @@ a crossing of v = 0.
 
 References
 ----------
-H. Olsson, K. J. Astrom, C. Canudas de Wit, M. Gafvert, P. Lischinsky, "Friction Models and Friction
-Compensation", European Journal of Control 4 (1998), Section 2.
+H. Olsson, K. J. Åström, C. Canudas de Wit, M. Gäfvert, P. Lischinsky, "Friction Models and Friction
+Compensation", European Journal of Control 4(3), 176-195 (1998), doi:10.1016/S0947-3580(98)70113-X.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ import numpy as np
 from gms_fsm.inspection._poking import Edits
 from gms_fsm.inspection._results import Fired
 from gms_fsm.lowering._observing import sigmas
-from gms_fsm.lowering.layout import LogRecord
+from gms_fsm.lowering.log_columns import LogRecord
 from gms_fsm.run.simulate import Run
 from gms_fsm.traces._between import interpolated
 from gms_fsm.traces._log import log_of

@@ -74,20 +74,20 @@ def _table(rows: list[list[float]]) -> FloatArray:
     return np.array(padded, dtype=np.float64).reshape(len(rows), length)
 
 
-def machine_code(program: Program, name: str) -> Any:
-    """Return one of a program's functions, compiled to machine code.
+def machine_code(program: Program, *names: str) -> list[Any]:
+    """Return some of a program's functions, compiled to machine code.
 
     Parameters
     ----------
     program : Program
         From `gms_fsm.lowering.program.lower`.
-    name : str
+    *names : str
         For example ``"flow"``.
 
     Returns
     -------
-    callable
-        A function that takes the arrays from `packed`.
+    list of callable
+        Functions that take the arrays from `packed`.
 
     Raises
     ------
@@ -98,7 +98,8 @@ def machine_code(program: Program, name: str) -> Any:
     """
     check_numba()
     with _lock:
-        return _machine_code(program.source, tuple(program.callables.items()), name)
+        given = tuple(program.callables.items())
+        return [_machine_code(program.source, given, name) for name in names]
 
 
 @functools.lru_cache(maxsize=512)
@@ -229,8 +230,9 @@ def observe_rows(
     from integrators import compiled
 
     table = np.empty((t.size, program.layout.observed.size))
+    [observe] = machine_code(program, "observe")
     compiled.for_each_row(
-        machine_code(program, "observe"),
+        observe,
         (np.ascontiguousarray(t), np.ascontiguousarray(y), np.ascontiguousarray(mode)),
         np.array(program.live),
         packed(program.p),

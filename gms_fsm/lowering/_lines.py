@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 from gms_fsm.language import Binary, Name, Node, Value, spell
 from gms_fsm.lowering._names import computed_names
 from gms_fsm.lowering._plan import Computed, Plan, RoughCall
-from gms_fsm.lowering.layout import Places
+from gms_fsm.lowering.places import Places, total
 from integrators import LIVE
 
 __all__ = ["Line", "Signs", "Writer", "indented", "reads_of"]
@@ -216,25 +216,22 @@ class Writer:
             return []
         if len(filled) == 1:
             return next(iter(branches.values()))
-        mode, sizes = self.mode(bank)
+        mode = self.mode(bank)
         lines = []
         for number, (constant, body) in enumerate(filled):
             word = "if" if number == 0 else "elif"
             last = number == len(filled) - 1
             head = f"else:  # {constant}" if last else f"{word} {mode} == {constant}:"
-            lines += [Line(head, sizes), *indented(body)]
+            lines += [Line(head), *indented(body)]
         return lines
 
-    def mode(self, bank: int) -> tuple[str, frozenset[str]]:
-        """Spell the mode of element i of a contact, and say which sizes it reads."""
-        place, sizes = self.machine(bank)
-        return f"mode[{place}]", sizes
+    def mode(self, bank: int, element: str = "i") -> str:
+        """Spell the mode of an element of a contact."""
+        return f"mode[{self.machine(bank, element)}]"
 
-    def machine(self, bank: int) -> tuple[str, frozenset[str]]:
-        """Spell the number of element i among all machines, and say which sizes it reads."""
-        before = self.sizes[:bank]
-        text = " + ".join([*before, "i"])
-        return text, frozenset(f"#{size}" for size in before)
+    def machine(self, bank: int, element: str = "i") -> str:
+        """Spell the number of an element of a contact among all machines."""
+        return total([*self.sizes[:bank], element])
 
     # ------------------------------------------------------------------ functions
     def function(self, signature: str, doc: str, body: list[Line], signs: Signs) -> list[str]:
@@ -252,18 +249,17 @@ class Writer:
         needed = (needed | self.closure(reads_of(values))) - self.late
         shared = [(name, j) for j, name in enumerate(self.names.shared) if name in needed]
         own = [(name, j) for j, name in enumerate(self.names.own) if name in needed]
-        sizes = [size for size in self.sizes if f"#{size}" in needed]
+        # With several contacts their sizes are numerals.
+        sizes = [size for size in self.sizes if f"#{size}" in needed and len(self.sizes) == 1]
         lines = []
-        if shared or own or (sizes and len(self.sizes) == 1) or TABLES in needed:
+        if shared or own or sizes or TABLES in needed:
             lines.append(Line("shared, own, tables = p"))
         lines += [Line(f"{self.local(name)} = shared[{j}]") for name, j in shared]
         lines += [Line(f"{self.local(name)} = own[{j}]") for name, j in own]
         for size in sizes:
-            bank = self.read.banks[self.sizes.index(size)]
-            # After the elements' modes come those of the surfaces: len(mode) says nothing. With
-            # several contacts the shorter rows of `own` are padded in machine code.
-            alone = f"len(own[{self.names.own.index(bank.weight)}])"
-            lines.append(Line(f"{size} = {alone if len(self.sizes) == 1 else bank.n}"))
+            # After the elements' modes come those of the surfaces: len(mode) says nothing.
+            weight = self.names.own.index(self.read.banks[0].weight)
+            lines.append(Line(f"{size} = len(own[{weight}])"))
         y = self.layout.y
         lines += [
             Line(f"{self.local(name)} = y[{y.text(name)}]") for name in y.shared if name in needed

@@ -180,17 +180,16 @@ class Locks:
         return next(iter(free))
 
     # ------------------------------------------------------------------ forces and impulses
-    def flags(self) -> list[Line]:
-        """Write which locks hold in the present modes."""
+    def flags(self, *, kept: bool = False) -> list[Line]:
+        """Write which locks hold in the present modes; flags that are kept may be set already."""
         lines = []
         for r, each in enumerate(self.rows):
             bank = self.read.banks[each.bank]
-            place, sizes = self.writer.machine(each.bank)
-            place = place.removesuffix("i") + "0" if each.bank else "0"
-            states = self.writer.names.states[each.bank]
+            place, states = self.writer.mode(each.bank, "0"), self.writer.names.states[each.bank]
             locked = [states[state.name] for state in bank.chart.states if state.locked]
-            text = " or ".join(f"mode[{place}] == {state}" for state in locked) or "False"
-            lines.append(Line(f"l_{r} = 1.0 if {text} else 0.0", sizes))
+            text = " or ".join(f"{place} == {state}" for state in locked) or "False"
+            other = f"l_{r}" if kept else "0.0"
+            lines.append(Line(f"l_{r} = 1.0 if {text} else {other}"))
         return lines
 
     def forces(self) -> list[Line]:
@@ -214,27 +213,38 @@ class Locks:
             lines += [Line(f"if l_{r} > 0.0:"), *indented(inside)]
         return lines + self.exact(names)
 
-    def impulse(self, bank: int, targets: Mapping[int, str]) -> list[Line]:
-        """Write an impulse that sets velocities of a contact and keeps those of held locks.
+    def no_impulse(self) -> list[Line]:
+        """Write that no velocity is to be set."""
+        rows = range(len(self.rows))
+        return [
+            Line("hit = 0"),
+            *(Line(f"{name}_{r} = 0.0") for r in rows for name in ("l", "goal")),
+        ]
+
+    def hit(self, bank: int, targets: Mapping[int, Line]) -> list[Line]:
+        """Write that the next impulse sets velocities of a contact.
 
         Parameters
         ----------
         bank : int
             The contact.
-        targets : mapping of int to str
-            By velocity, the text of its new value.
+        targets : mapping of int to Line
+            By velocity, its new value.
         """
-        names = {name: self.velocity(body) for name, body in self.bodies.items()}
-        lines = self.flags()
-        goal: dict[int, str] = {}
-        for q, text in targets.items():
+        lines = [Line("hit = 1")]
+        for q, goal in targets.items():
             r = self.number(bank, q)
-            lines += [Line(f"l_{r} = 1.0"), Line(f"goal_{r} = {text}")]
-            goal[r] = f"goal_{r}"
+            lines += [Line(f"l_{r} = 1.0"), Line(f"goal_{r} = {goal.text}", goal.reads)]
+        return lines
+
+    def impulse(self) -> list[Line]:
+        """Write the impulse that sets the velocities asked for and keeps those of held locks."""
+        names = {name: self.velocity(body) for name, body in self.bodies.items()}
+        rows = range(len(self.rows))
+        lines = self.flags(kept=True)
         right: dict[int, Value] = {}
         for r, each in enumerate(self.rows):
-            value = self.relative(each.row, names)
-            right[r] = Binary("-", value, Name(goal[r])) if r in goal else value
+            right[r] = Binary("-", self.relative(each.row, names), Name(f"goal_{r}"))
         lines += self.solve(right)
         moved: dict[str, None] = {}
         for r, each in enumerate(self.rows):
@@ -251,12 +261,12 @@ class Locks:
                     Line(f"{v} = {v} - {share}hold_{r} / ({self.writer.spell(inertia)})", reads)
                 )
             lines += [Line(f"if l_{r} > 0.0:"), *indented(inside)]
-        lines += self.exact(names, goal)
+        lines += self.exact(names, {r: f"goal_{r}" for r in rows})
         y = self.writer.layout.y
         lines += [
             Line(f"y[{y.text(names[body])}] = {self.writer.local(names[body])}") for body in moved
         ]
-        return lines
+        return [Line("if hit == 1:"), *indented(lines)]
 
     @staticmethod
     def velocity(body: Body) -> str:

@@ -107,7 +107,7 @@ def names_of(read: Assembly) -> Names:
     ['F_c', 'F_s', 'v_s', 'v_dip', 'sigma_2', 'mass', 'v_c', 'weight', 'k', 'sigma', 'C']
     """
     system, choice = read.system, _Choice(len(read.banks) == 1)
-    choice.taken |= {*sizes_of(read.banks)}
+    choice.taken |= {*sizes_of(read.banks), *_names_of_locks(read)}
     choice.taken |= {f"{name}_signal" for name in system.signals}
     local: dict[str, str] = {"t": "t"}
     plain: dict[str, str] = {}
@@ -153,6 +153,14 @@ def names_of(read: Assembly) -> Names:
         edges=tuple(edges),
         plain=plain,
     )
+
+
+def _names_of_locks(read: Assembly) -> set[str]:
+    """Return the names in the equations of locks: a row for each velocity that can be set."""
+    setting = [bank for bank in read.banks if bank.chart.locks or bank.chart.sets_velocity]
+    rows = range(sum(len(bank.velocities) for bank in setting))
+    names = {f"{name}_{r}" for r in rows for name in ("D", "W", "goal", "hold", "l", "w")}
+    return names | {f"L_{r}_{s}" for r in rows for s in range(r)} | {"hit"}
 
 
 _SHORT = {"curve S": "S", "curve v dip": "v_dip", "threshold weight": "weight"}

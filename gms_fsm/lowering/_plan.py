@@ -27,7 +27,8 @@ from gms_fsm.language import (
 )
 from gms_fsm.language._functions import ROUGH
 from gms_fsm.lowering._names import Names, names_of
-from gms_fsm.lowering.layout import Block, Layout, Places, sizes_of
+from gms_fsm.lowering.layout import Layout, sizes_of
+from gms_fsm.lowering.places import Block, Places
 from gms_fsm.systems._assembly import ONE, Assembly, Bank, of
 from gms_fsm.systems.signals import Corners, Function
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 from gms_fsm.language import (
     Comparison,
@@ -19,6 +20,7 @@ from gms_fsm.lowering._forces import Forces
 from gms_fsm.lowering._lines import Line, Signs, indented, reads_of
 from gms_fsm.lowering._names import computed_names
 from gms_fsm.lowering._plan import Gradient, Plan, both_sides
+from gms_fsm.lowering.places import total
 from gms_fsm.systems._assembly import Bank, Edge, of
 from integrators import LIVE
 
@@ -36,6 +38,22 @@ FUNCTIONS = (
     "values",
     "tick",
 )
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A part of what happens when an edge is taken.
+
+    Parameters
+    ----------
+    lines : list of Line
+        Assignments.
+    hits : bool
+        An impulse follows them, and the next phase starts with the velocities after it.
+    """
+
+    lines: list[Line]
+    hits: bool
 
 
 def python(plan: Plan) -> str:
@@ -108,8 +126,7 @@ class _Printer(Forces):
                         Line(f"    edge = {constant}  # {state} -> {edge.target}"),
                     ]
                 branches[state] = rows
-            place, sizes = self.machine(bank.index)
-            after = [Line(f"out[{place}] = edge", sizes)]
+            after = [Line(f"out[{self.machine(bank.index)}] = edge")]
             lines += self.loop(
                 bank.index, "live", [Line("edge = -1")], branches if bank.edges else None, after
             )
@@ -137,24 +154,22 @@ class _Printer(Forces):
             for _, value in edge.steps
         ]
         lines, several = self.before_guards(steps), len(self.read.banks) > 1
-        for bank in self.read.banks:
-            inner: list[Line] = []
-            for edge, constant in zip(bank.edges, self.names.edges[bank.index], strict=True):
-                word = "elif" if inner else "if"
-                taken = self.taken(bank, edge)
-                inner += [Line(f"{word} edge == {constant}:"), *indented(taken)]
-            first = self.element(bank.index, self.own(bank.index, reads_of(inner)), "live")
-            body = self.outward(bank.index, [*first, *inner])
-            if several and inner:
-                before = self.sizes[: bank.index]
-                sizes = frozenset(f"#{size}" for size in before)
-                shift = "".join(f" - {size}" for size in before)
-                last = self.names.edges[bank.index][-1]
-                word = "if" if bank is next(b for b in self.read.banks if b.edges) else "elif"
-                lines.append(Line(f"{word} edge <= {last}:"))
-                body = [Line(f"i = machine{shift}", sizes), *body]
-                body = indented(body)
-            lines += body
+        phases = [
+            {edge.name: self.phases(bank, edge) for edge in bank.edges} for bank in self.read.banks
+        ]
+        last = max((len(each) for edges in phases for each in edges.values()), default=1)
+        if last > 1 or any(each[0].hits for edges in phases for each in edges.values()):
+            lines += self.locks.no_impulse()
+        for number in range(last):
+            found = [
+                {name: each[number] for name, each in edges.items() if number < len(each)}
+                for edges in phases
+            ]
+            lines += self.dispatched(found)
+            if any(each.hits for edges in found for each in edges.values()):
+                lines += self.locks.impulse()
+            if number + 1 < last:
+                lines += [*self.locks.no_impulse(), *self.velocities_again()]
         machine = "machine" if several else "i"
         return self.function(
             f"act(edge, {machine}, t, y, mode, p)",
@@ -163,41 +178,57 @@ class _Printer(Forces):
             "live",
         )
 
-    def taken(self, bank: Bank, edge: Edge) -> list[Line]:
-        """Write what happens when an edge is taken."""
+    def dispatched(self, phases: Sequence[Mapping[str, Phase]]) -> list[Line]:
+        """Write one phase of what the edges do, by contact and edge."""
+        lines, several, word = list[Line](), len(self.read.banks) > 1, "if"
+        for bank, found in zip(self.read.banks, phases, strict=True):
+            inner: list[Line] = []
+            for edge, constant in zip(bank.edges, self.names.edges[bank.index], strict=True):
+                if edge.name in found:
+                    test = f"{'elif' if inner else 'if'} edge == {constant}:"
+                    inner += [Line(test), *indented(found[edge.name].lines)]
+            first = self.element(bank.index, self.own(bank.index, reads_of(inner)), "live")
+            body = self.outward(bank.index, [*first, *inner])
+            if several and inner:
+                first_machine = total(self.sizes[: bank.index])
+                lines.append(Line(f"{word} edge <= {self.names.edges[bank.index][-1]}:"))
+                body = indented([Line(f"i = machine - {first_machine}"), *body])
+                word = "elif"
+            lines += body
+        return lines
+
+    def phases(self, bank: Bank, edge: Edge) -> list[Phase]:
+        """Write what happens when an edge is taken; every impulse ends a phase."""
         lines: list[Line] = []
-        locked = {state.name for state in bank.chart.states if state.locked}
-        targets: dict[int, str] = {}
+        found: list[Phase] = []
         for name, value in edge.steps:
+            # What is computed from variables is computed again from what they are now.
+            tree = self.fresh(value, bank, moved=bool(found))
             if name in bank.variables:
-                # What is computed from variables is computed again from what they are now.
-                tree = self.fresh(value, bank)
                 lines.append(self.put(self.local(name), tree))
                 place, sizes = self.at("y", self.layout.y, name)
                 lines.append(Line(f"{place} = {self.local(name)}", sizes))
             else:
-                targets[bank.velocities.index(name)] = name
-                lines += self.locks.impulse(
-                    bank.index, {bank.velocities.index(name): self.spell(value)}
-                )
-                lines[-1] = Line(lines[-1].text, lines[-1].reads | computed_names(value))
-                lines += self.velocities_again()
-        place, sizes = self.mode(bank.index)
-        constant = self.names.states[bank.index][edge.target]
-        lines.append(Line(f"{place} = {constant}", sizes))
-        if edge.target in locked:
-            lines += self.locks.impulse(
-                bank.index, dict.fromkeys(range(len(bank.velocities)), "0.0")
-            )
-        return lines
+                goal = Line(self.spell(tree), computed_names(tree))
+                targets = {bank.velocities.index(name): goal}
+                found.append(Phase([*lines, *self.locks.hit(bank.index, targets)], hits=True))
+                lines = []
+        target = self.names.states[bank.index][edge.target]
+        lines.append(Line(f"{self.mode(bank.index)} = {target}"))
+        arrests = edge.target in {state.name for state in bank.chart.states if state.locked}
+        if arrests:
+            every = dict.fromkeys(range(len(bank.velocities)), Line("0.0"))
+            lines += self.locks.hit(bank.index, every)
+        return [*found, Phase(lines, hits=arrests)]
 
-    def fresh(self, value: Value, bank: Bank) -> Value:
-        """Return a value with what is computed from variables expanded."""
+    def fresh(self, value: Value, bank: Bank, *, moved: bool) -> Value:
+        """Return a value with what is computed from variables expanded; and from velocities."""
+        changed = {*bank.variables, *(bank.velocities if moved else ())}
         inside = {
             each.name
             for each in self.read.definitions
-            if each.bank == bank.index and self.read.closure([each.name]) & {*bank.variables}
-        }
+            if each.bank == bank.index and self.read.closure([each.name]) & changed
+        } - changed
         if not names_in(value) & inside:
             return value
         return self.read.expanded(value)
@@ -267,16 +298,15 @@ class _Printer(Forces):
         """Store the force of a locked element, and whether others carry it."""
         seen, lines = self.layout.observed, []
         locked = [state.name for state in bank.chart.states if state.locked]
-        mode, sizes = self.mode(bank.index)
-        mode = mode.replace("i]", "0]")
+        mode = self.mode(bank.index, "0")
         states = " or ".join(f"{mode} == {self.names.states[bank.index][each]}" for each in locked)
         for q, force in enumerate(bank.forces):
             r = self.locks.number(bank.index, q)
-            place, more = self.at("out", seen, f"{force}_elements")
-            place = place.replace("i]", "0]")
+            _, more = self.at("out", seen, f"{force}_elements")
+            place = f"out[{seen.start_text(f'{force}_elements')}]"
             lines += [
                 Line(f"out[{seen.text(f'{force} shared')}] = 0.0"),
-                Line(f"if {states}:", sizes),
+                Line(f"if {states}:"),
                 Line(f"    {place} = {self.local(force)}", more),
                 Line(f"    out[{seen.text(f'{force} shared')}] = 1.0 - l_{r}"),
             ]
@@ -303,7 +333,7 @@ class _Printer(Forces):
         if lines:
             y = self.layout.y
             every = frozenset(f"#{block.size}" for block in y.blocks if block.names)
-            text = f"for j in range({self.size_text(1)}):"
+            text = f"for j in range({self.layout.y.size_text(1)}):"
             lines = [Line(text, every), Line("    out[j] = 0.0"), *lines]
         return self.function(
             "normal(surface, t, y, mode, p, out)",
@@ -311,13 +341,6 @@ class _Printer(Forces):
             lines,
             "live",
         )
-
-    def size_text(self, more: int = 0) -> str:
-        """Spell the size of the state vector, and some more."""
-        y = self.layout.y
-        terms = [str(len(y.shared) + more)]
-        terms += [f"{len(block.names)} * {block.size}" for block in y.blocks if block.names]
-        return " + ".join(terms)
 
     def gradient(self, gradient: Gradient) -> list[Line]:
         """Write the gradient of a value over y, and its rate in t."""
@@ -329,7 +352,9 @@ class _Printer(Forces):
         terms, reads = self.time_terms(gradient)
         if terms:
             every = frozenset(f"#{b.size}" for b in self.layout.y.blocks if b.names)
-            lines.append(Line(f"out[{self.size_text()}] = {' + '.join(terms)}", reads | every))
+            lines.append(
+                Line(f"out[{self.layout.y.size_text()}] = {' + '.join(terms)}", reads | every)
+            )
         return lines
 
     # ------------------------------------------------------------------ comparisons

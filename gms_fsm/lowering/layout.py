@@ -15,275 +15,21 @@ log          the fields of `LogRecord`
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.language import names_in
+from gms_fsm.lowering.log_columns import LOG_TEXTS
+from gms_fsm.lowering.places import Block, Places
 from gms_fsm.systems._assembly import Assembly, Bank, of
 
-__all__ = [
-    "CONTACT",
-    "LOG_NUMBERS",
-    "LOG_TEXTS",
-    "BankPlaces",
-    "Block",
-    "Layout",
-    "LogRecord",
-    "Places",
-]
-
-Name = TypeVar("Name", bound=Hashable)
-
-
-@dataclass(frozen=True)
-class Block(Generic[Name]):
-    """Names with one place per element each.
-
-    Parameters
-    ----------
-    names : tuple
-        One after the other.
-    n : int
-        Number of elements.
-    size : str
-        What their number is called in generated text.
-    """
-
-    names: tuple[Name, ...]
-    n: int
-    size: str = "n"
-
-
-@dataclass(frozen=True)
-class Places(Generic[Name]):
-    """The layout of an array: shared names first, then blocks of names with a place per element.
-
-    In generated text the element is called ``i``.
-
-    Parameters
-    ----------
-    shared : tuple
-        Names with one place each.
-    blocks : tuple of Block
-        Names with one place per element each.
-
-    Examples
-    --------
-    >>> y = Places(("x", "v"), (Block(("z", "w"), 3),))
-    >>> y.size, y.index("v"), y.index("w", 2), y.block("z")
-    (8, 1, 7, slice(2, 5, None))
-    >>> y.text("v"), y.text("z"), y.text("w"), y.size_text()
-    ('1', '2 + i', '2 + n + i', '2 + 2 * n')
-    >>> y.named([0.0, 0.1, 1, 2, 3, 4, 5, 6])
-    {'x': 0.0, 'v': 0.1, 'z': [1, 2, 3], 'w': [4, 5, 6]}
-    """
-
-    shared: tuple[Name, ...]
-    blocks: tuple[Block[Name], ...]
-
-    @cached_property
-    def own(self) -> tuple[Name, ...]:
-        """The names with one place per element."""
-        return tuple(name for block in self.blocks for name in block.names)
-
-    @cached_property
-    def size(self) -> int:
-        """The number of places."""
-        return len(self.shared) + sum(len(block.names) * block.n for block in self.blocks)
-
-    def __iter__(self) -> Iterator[tuple[Name, int | None]]:
-        """Yield for each place, in order, its name and its element (None if shared)."""
-        yield from ((name, None) for name in self.shared)
-        for block in self.blocks:
-            yield from ((name, i) for name in block.names for i in range(block.n))
-
-    def index(self, name: Name, element: int = 0) -> int:
-        """Return the place of a shared name, or of an own name of one element.
-
-        Parameters
-        ----------
-        name : str or other key
-            One of `shared` or `own`.
-        element : int
-            Counted from 0; ignored for a shared name.
-
-        Returns
-        -------
-        int
-            The place.
-        """
-        start, _ = self._spans[name]
-        return start if start < len(self.shared) else start + element
-
-    @cached_property
-    def _spans(self) -> Mapping[Name, tuple[int, int]]:
-        """First place and number of places of each name."""
-        spans = {name: (place, 1) for place, name in enumerate(self.shared)}
-        start = len(self.shared)
-        for block in self.blocks:
-            for name in block.names:
-                spans[name] = start, block.n
-                start += block.n
-        return spans
-
-    def block(self, name: Name) -> slice:
-        """Return the places of an own name, one per element.
-
-        Parameters
-        ----------
-        name : str or other key
-            One of `own`.
-
-        Returns
-        -------
-        slice
-            One place per element.
-        """
-        start, count = self._spans[name]
-        return slice(start, start + count)
-
-    def where(self, name: Name) -> int | slice:
-        """Return the subscript for an array that selects everything under a name.
-
-        Parameters
-        ----------
-        name : str or other key
-            One of `shared` or `own`.
-
-        Returns
-        -------
-        int or slice
-            As `index` for a shared name, as `block` for an own one.
-        """
-        return self._all[name]
-
-    @cached_property
-    def _all(self) -> Mapping[Name, int | slice]:
-        """The subscript of each name."""
-        shared: dict[Name, int | slice] = {name: self._spans[name][0] for name in self.shared}
-        return shared | {name: self.block(name) for name in self.own}
-
-    def all_of(self, name: Name) -> range:
-        """Return the places of a name: one if it is shared, else one per element.
-
-        Parameters
-        ----------
-        name : str or other key
-            One of `shared` or `own`.
-
-        Returns
-        -------
-        range
-            In order.
-        """
-        start, count = self._spans[name]
-        return range(start, start + count)
-
-    def named(self, values: Any) -> dict[Name, Any]:
-        """Return the values by name.
-
-        Parameters
-        ----------
-        values : sequence, or ndarray with the places as its first axis
-            One entry per place.
-
-        Returns
-        -------
-        dict
-            For a shared name its entry, for an own name its part of `values`, one per element.
-        """
-        return {name: values[where] for name, where in self._all.items()}
-
-    def joined(self, values: Mapping[Name, Any]) -> list[Any]:
-        """Return entries in the order of the places; the inverse of `named`.
-
-        Parameters
-        ----------
-        values : mapping
-            For a shared name its entry, for an own name a sequence with one entry per element.
-
-        Returns
-        -------
-        list
-            One entry per place.
-        """
-        return [values[name] if i is None else values[name][i] for name, i in self]
-
-    # ------------------------------------------------------------------ as text
-    def text(self, name: Name) -> str:
-        """Return a place as Python text over ``i`` and the sizes.
-
-        Parameters
-        ----------
-        name : str or other key
-            One of `shared` or `own`.
-
-        Returns
-        -------
-        str
-            Such as ``"1"`` or ``"2 + n + i"``.
-        """
-        if name in self.shared:
-            return str(self.shared.index(name))
-        return f"{self.start_text(name)} + i"
-
-    def start_text(self, name: Name, after: int = 0) -> str:
-        """Return the first place of a name as Python text over the sizes.
-
-        Parameters
-        ----------
-        name : str or other key
-            One of `shared` or `own`.
-        after : int
-            Of the names after it in its block instead, this many on.
-
-        Returns
-        -------
-        str
-            Such as ``"2 + n"``.
-        """
-        if name in self.shared:
-            return str(self.shared.index(name) + after)
-        terms = [str(len(self.shared))]
-        for block in self.blocks:
-            rows = block.names.index(name) + after if name in block.names else len(block.names)
-            if rows:
-                terms.append(block.size if rows == 1 else f"{rows} * {block.size}")
-            if name in block.names:
-                break
-        return " + ".join(terms)
-
-    def sizes(self, name: Name) -> frozenset[str]:
-        """Return which sizes the text of a place reads.
-
-        Parameters
-        ----------
-        name : str or other key
-            One of `shared` or `own`.
-
-        Returns
-        -------
-        frozenset of str
-            Empty for a shared name.
-        """
-        found = set[str]()
-        if name in self.shared:
-            return frozenset()
-        for block in self.blocks:
-            if name in block.names:
-                return frozenset(found | ({block.size} if block.names.index(name) else set()))
-            if block.names:
-                found.add(block.size)
-        raise KeyError(name)
-
-    def size_text(self, more: int = 0) -> str:
-        """Return how many places there are, and some more, as Python text over the sizes."""
-        terms = [str(len(self.shared) + more)]
-        terms += [f"{len(block.names)} * {block.size}" for block in self.blocks]
-        return " + ".join(terms)
+__all__ = ["BankPlaces", "Layout", "held_of", "sizes_of"]
 
 
 @dataclass(frozen=True)
@@ -354,6 +100,8 @@ class Layout:
     keys : mapping of str to str
         For what a user may call a component of the state vector its name there: ``load.x`` for the
         position of the body load, and where there is one contact ``z`` for its variable z.
+    edges : tuple of tuple of str
+        Name, source and target of each edge, over all contacts.
 
     Examples
     --------
@@ -372,6 +120,7 @@ class Layout:
     banks: tuple[BankPlaces, ...]
     surfaces: int
     keys: Mapping[str, str]
+    edges: tuple[tuple[str, str, str], ...]
 
     @classmethod
     def of(cls, read: Assembly, surfaces: int) -> Layout:
@@ -434,6 +183,7 @@ class Layout:
             tuple(banks),
             surfaces,
             {key: name for key, name in keys.items() if name in y.shared or name in y.own},
+            tuple((e.name, e.source, e.target) for bank in read.banks for e in bank.edges),
         )
 
     def label(self, name: str) -> str:
@@ -444,6 +194,17 @@ class Layout:
     def n(self) -> int:
         """Number of elements of all contacts."""
         return sum(bank.n for bank in self.banks)
+
+    @cached_property
+    def log_texts(self) -> tuple[NDArray[np.str_], ...]:
+        """The columns `LOG_TEXTS` of the log, for each edge."""
+        columns = zip(*self.edges, strict=True) if self.edges else ((),) * len(LOG_TEXTS)
+        return tuple(np.array(column, dtype=np.str_) for column in columns)
+
+    @cached_property
+    def firsts(self) -> NDArray[np.int64]:
+        """The first machine of each contact, over all contacts."""
+        return np.array([bank.first for bank in self.banks])
 
     def bank(self, machine: int) -> BankPlaces:
         """Return the contact of a machine, which are counted over all contacts."""
@@ -480,15 +241,12 @@ class Layout:
             )
         raise ParameterError(f"there is no contact {shown(name)}", advice=f"there are {known}")
 
+    @cached_property
     def recorded(self) -> tuple[list[int], list[list[int]]]:
-        """Return where the numbers of `LogRecord` are for each machine: in y, and observed.
+        """Where the numbers of `LogRecord` are for each machine.
 
-        Returns
-        -------
-        list of int
-            Place in y of its first variable; -1 if its chart has none.
-        list of list of int
-            Places of v, s and F among the observed quantities.
+        The place in y of its first variable (-1 if its chart has none), and the places of v, s and
+        F among the observed quantities.
         """
         own: list[int] = []
         seen: list[list[int]] = []
@@ -541,8 +299,8 @@ def held_of(bank: Bank) -> tuple[str, ...]:
 
 
 def sizes_of(banks: Sequence[Bank]) -> tuple[str, ...]:
-    """Return what the number of elements of each contact is called in generated text."""
-    return ("n",) if len(banks) == 1 else tuple(f"n_{bank.name}" for bank in banks)
+    """Return the number of elements of each contact in generated text: n if there is one only."""
+    return ("n",) if len(banks) == 1 else tuple(str(bank.n) for bank in banks)
 
 
 def observed_of(bank: Bank) -> tuple[str, ...]:
@@ -570,29 +328,3 @@ def shown_of(read: Assembly) -> Places[str]:
         threshold = of(bank.name, "s")
         blocks.append(Block(tuple(dict.fromkeys([threshold, *own])), bank.n, size))
     return Places(tuple(shared), tuple(blocks))
-
-
-class LogRecord(NamedTuple):
-    """One firing, as recorded in the transition log.
-
-    ``z``, ``v`` and ``s`` are the element's first variable, the velocity and the threshold before
-    it.
-    """
-
-    t: float
-    element: int  # from 0
-    edge: str
-    source: str
-    target: str
-    z: float
-    v: float
-    s: float
-    F_before: float
-    F_after: float
-    contact: str = ""  # in a run of a system; of one model there is one contact only
-
-
-LOG_TEXTS = ("edge", "source", "target")
-CONTACT = "contact"  # a column of the logs of systems only
-# In the order in which machine code stores them for a firing.
-LOG_NUMBERS = ("z", "v", "s", "F_before", "F_after")

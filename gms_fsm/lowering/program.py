@@ -143,7 +143,24 @@ def lower(system: System | Model, rig: Rig | None = None) -> Program:
     if not isinstance(system, System):
         assert rig is not None
         system = system_of(system, rig)
-    signals = system.signals.values()
+    shape = _Shape(_key(system), system)
+    corners = [s for s in system.signals.values() if isinstance(s, Corners)]
+    return dataclasses.replace(
+        _lowered(shape),
+        p=arguments(system),
+        knots=sorted({float(t) for s in corners for t in s.times}),
+        jumps=sorted({float(t) for s in corners for t in s.jumps}),
+    )
+
+
+def _key(system: System) -> tuple[Any, ...]:
+    """Return everything that the text of a system depends on, in hashable form."""
+    spelled = tuple(map(_spelling, system.signals.values()))
+    # A ratio that is 1 or 0 is left out of no text; a zero inertia is refused while reading.
+    zeros = tuple(name for name, value in system.numbers.items() if value == 0.0)
+    first = system.assembly.system
+    if first is not system:  # its texts are those of the system whose texts were read
+        return id(first), tuple(contact.n for contact in system.contacts), spelled, zeros
     contacts = [
         (
             contact.name,
@@ -158,24 +175,16 @@ def lower(system: System | Model, rig: Rig | None = None) -> Program:
         )
         for contact in system.contacts
     ]
-    shape = (
+    return (
         system.name,
         repr(system.bodies),
         tuple(contacts),
         tuple(system.numbers),
         tuple(system.signals),
-        tuple(map(_spelling, signals)),
+        spelled,
         tuple(system.flow.items()),
         repr(system.sampled),
-        # A ratio that is 1 or 0 is left out of no text; a zero inertia is refused while reading.
-        tuple(name for name, value in system.numbers.items() if value == 0.0),
-    )
-    corners = [s for s in signals if isinstance(s, Corners)]
-    return dataclasses.replace(
-        _lowered(_Shape(shape, system)),
-        p=arguments(system),
-        knots=sorted({float(t) for s in corners for t in s.times}),
-        jumps=sorted({float(t) for s in corners for t in s.jumps}),
+        zeros,
     )
 
 

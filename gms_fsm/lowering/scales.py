@@ -124,11 +124,11 @@ def _scales_of(key: _ByIdentity[Model | Contact]) -> Scales:
         curve, weights = model.stribeck, model.weights
     numbers = [as_floats(np.broadcast_to(value, model.n)) for value in model.values.values()]
     thresholds = [0.0] * model.n if curve is None else as_floats(weights * curve.F_c)
-    found: dict[str, list[float]] = {name: [] for name in ("x", "v", *chart.variables)}
+    found: dict[str, list[float]] = {name: [] for name in sizes.reach}
     lengths: list[float] = []
     for values in zip(thresholds, *numbers, strict=True):
         for name, row in found.items():
-            reaches = [_quotient(height, slope, values) for height, slope in sizes.reach[name]]
+            reaches = [_reach(margin, values) for margin in sizes.reach[name]]
             if curve is not None:
                 slopes = sizes.stiffness.get(name, ())
                 reaches += [_divided(curve.F_c, _number(slope, values)) for slope in slopes]
@@ -136,7 +136,8 @@ def _scales_of(key: _ByIdentity[Model | Contact]) -> Scales:
         for name, follows in sizes.follows.items():
             most = max(abs(_number(rate, values)) for rate in follows)
             lengths.append(_divided(found[name][-1], most))
-    windows = [WINDOW * u for u in found["v"]]
+    speeds = [u for name in chart.velocities for u in found[name]]
+    windows = [WINDOW * u for u in speeds]
     v = [*windows, curve.v_s] if curve is not None else windows
     least_x = min((u for u in [*found["x"], *lengths] if u > 0.0), default=0.0)
     least_v = min((u for u in v if u > 0.0), default=0.0)
@@ -148,7 +149,7 @@ def _scales_of(key: _ByIdentity[Model | Contact]) -> Scales:
     ]
     time = _divided(1.0, max(rates, default=0.0)) or _divided(least_x, speed)
     variables = {name: tuple(found[name]) for name in chart.variables}
-    slowest = min((u for u in found["v"] if u > 0.0), default=0.0)
+    slowest = min((u for u in speeds if u > 0.0), default=0.0)
     return Scales(least_x, least_v, variables, slowest, time)
 
 
@@ -194,10 +195,11 @@ def scales_of_system(system: System) -> SystemScales:
         times.append(scales.time)
         for name in bank.chart.variables:
             sizes[of(bank.name, name)] = [*scales.variables[name]]
-        for body, coefficient in bank.jacobian[0].items():
-            ratio = _constant(coefficient, system)
-            moved[body][0].append(_divided(scales.x, ratio))
-            moved[body][1].append(_divided(scales.v, ratio))
+        for row in bank.jacobian:
+            for body, coefficient in row.items():
+                ratio = _constant(coefficient, system)
+                moved[body][0].append(_divided(scales.x, ratio))
+                moved[body][1].append(_divided(scales.v, ratio))
     for each in system.bodies:
         for name, found in zip((each.x, each.v), moved[each.name], strict=True):
             sizes[name] = [min((u for u in found if u > 0.0), default=0.0)]
@@ -225,7 +227,7 @@ Numbers = Callable[..., float]  # of the threshold s and the parameters
 class _Sizes:
     """Functions of a chart's parameters, all evaluated at rest in the origin."""
 
-    reach: Mapping[str, Sequence[tuple[Numbers, Numbers]]]  # margins of guards, and their slopes
+    reach: Mapping[str, Sequence[tuple[Numbers, ...]]]  # margins of guards, slopes and bends
     stiffness: Mapping[str, Sequence[Numbers]]  # slopes of the forces
     follows: Mapping[str, Sequence[Numbers]]  # slope of a variable with respect to x, by state
     paces: Sequence[Numbers]  # relaxation rates of the variables and of v
@@ -247,7 +249,7 @@ class _ByIdentity(Generic[T]):
 @functools.lru_cache(maxsize=64)
 def _sizes(key: _ByIdentity[Chart]) -> _Sizes:
     chart = key.it
-    states = ("x", "v", *chart.variables)
+    states = tuple(dict.fromkeys(("x", "v", *chart.velocities, *chart.variables)))
     rates = [f"d{name}" for name in chart.variables]
     others = [name for name in (*chart.inputs, *chart.velocities) if name != "s"]
     zero_at_rest = ("t", *states, *rates, *others)
@@ -276,7 +278,7 @@ def _sizes(key: _ByIdentity[Chart]) -> _Sizes:
     flows = {key: renamed(tree, lets) for key, tree in chart.flows.items()}
     reach = {
         name: [
-            (function(margin), function(slope))
+            tuple(function(tree) for tree in (margin, slope, derivative(slope, name)) if tree)
             for margin in margins
             if name in names_in(margin) and (slope := derivative(margin, name)) is not None
         ]
@@ -318,8 +320,12 @@ def _number(function: Numbers, values: Sequence[float]) -> float:
     return number if math.isfinite(number) else 0.0
 
 
-def _quotient(height: Numbers, slope: Numbers, values: Sequence[float]) -> float:
-    return _divided(_number(height, values), _number(slope, values))
+def _reach(margin: Sequence[Numbers], values: Sequence[float]) -> float:
+    """Return where a margin is zero; by its bend if it is flat at rest, as v**2 + w**2 - e**2."""
+    height, slope, *bend = (_number(each, values) for each in margin)
+    if slope or not bend:
+        return _divided(height, slope)
+    return math.sqrt(_divided(2.0 * height, bend[0]))
 
 
 def _divided(a: float, b: float) -> float:

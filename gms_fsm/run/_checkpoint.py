@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from gms_fsm._files import write_whole
 from gms_fsm.errors import CheckpointError, ParameterError, SignalError, cut, shown, why
-from gms_fsm.lowering.layout import CONTACT, LOG_TEXTS
+from gms_fsm.lowering.log_columns import CONTACT, LOG_TEXTS
 from gms_fsm.run._identity import identity
 from gms_fsm.run.start import Start
 from gms_fsm.systems.signals import Function

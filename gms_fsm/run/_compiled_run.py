@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.lowering import _compiled as compiled
-from gms_fsm.lowering.layout import LOG_NUMBERS, LOG_TEXTS
+from gms_fsm.lowering.log_columns import LOG_NUMBERS, LOG_TEXTS
 from gms_fsm.lowering.program import equations
 from gms_fsm.run._recording import (
     PATIENCE,
@@ -54,7 +54,7 @@ class CompiledRun:
         program = start.program
         flow = "flow" if start.options.located else "flow_live"
         names = (flow, "arm", "margins", "normal", "switch", "act", "tick", "observe")
-        self.code = [compiled.machine_code(program, name) for name in names]
+        self.code = compiled.machine_code(program, *names)
         self.columns = Columns(start)
         self.recorder: Recording = self.columns
         self.engine: MachineEngine | None = None
@@ -197,7 +197,7 @@ class Columns:
             stops_y=floats((stops, size)),
             stops_mode=ints((stops, modes)),
         )
-        self.recorded = Recorded(*(ints_of(each) for each in layout.recorded()))
+        self.recorded = Recorded(*(ints_of(each) for each in layout.recorded))
         if stops:
             self.log.stops_t[0], self.log.stops_y[0] = start.t_start, self.buffers.now.y
             self.log.stops_mode[0] = list(layout.not_sliding(start.mode))
@@ -295,23 +295,17 @@ class Columns:
 
     def transitions(self) -> Any:
         """Return the transition log."""
-        start, log, count = self.start, self.log, int(self.log.counts[FIRINGS])
-        every = [edge for each in start.system.contacts for edge in each.chart.transitions]
-        edges, machines = log.edge[:count], np.asarray(log.machine[:count])
-        texts = [
-            np.array([getattr(edge, name) for edge in every], dtype=np.str_)[edges]
-            for name in ("name", "source", "target")
-            if every
-        ] or [np.empty(0, dtype=np.str_) for _ in LOG_TEXTS]
-        numbers: Any = log.numbers
-        banks = start.program.layout.banks
-        whose = np.searchsorted([bank.first for bank in banks], machines, "right") - 1
-        firsts = np.array([bank.first for bank in banks])
-        columns: dict[str, Any] = {"t": log.t[:count], "element": machines - firsts[whose]}
-        columns |= zip(LOG_TEXTS, texts, strict=True)
-        columns |= zip(LOG_NUMBERS, numbers[:count].T, strict=True)
+        start, count = self.start, int(self.log.counts[FIRINGS])
+        log: Any = self.log  # arrays
+        edges, machines = log.edge[:count], log.machine[:count]
+        layout = start.program.layout
+        whose = np.searchsorted(layout.firsts, machines, "right") - 1
+        columns: dict[str, Any] = {"t": log.t[:count], "element": machines - layout.firsts[whose]}
+        texts = zip(LOG_TEXTS, layout.log_texts, strict=True)
+        columns |= {name: text[edges] for name, text in texts}
+        columns |= zip(LOG_NUMBERS, log.numbers[:count].T, strict=True)
         if start.given is not None and count:
-            columns["contact"] = np.array([bank.name for bank in banks])[whose]
+            columns["contact"] = np.array([bank.name for bank in layout.banks])[whose]
         return log_from(columns)
 
     def trace(self) -> Trace:

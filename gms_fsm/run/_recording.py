@@ -14,7 +14,8 @@ import integrators
 from gms_fsm.charts.chart import Chart
 from gms_fsm.language import rough_points
 from gms_fsm.lowering._observing import armed, rate
-from gms_fsm.lowering.layout import CONTACT, Layout, LogRecord
+from gms_fsm.lowering.layout import Layout
+from gms_fsm.lowering.log_columns import CONTACT, LogRecord
 from gms_fsm.run.machines import Interference
 from gms_fsm.run.start import Start
 from gms_fsm.traces._log import log_of

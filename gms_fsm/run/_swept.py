@@ -16,7 +16,7 @@ from gms_fsm._extras import require
 from gms_fsm._files import write_whole
 from gms_fsm.charts.parameters import QUANTITIES, FloatArray
 from gms_fsm.errors import OutputError, TraceFileError, cut, shown, why
-from gms_fsm.lowering.layout import LOG_NUMBERS
+from gms_fsm.lowering.log_columns import LOG_NUMBERS
 from gms_fsm.traces._archives import member
 from gms_fsm.traces.rows import column_name
 

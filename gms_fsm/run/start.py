@@ -173,7 +173,8 @@ class Start:
         last = _covered(system, t_start, t_end)
         program = _with_waking_times(program, system, t_start, last)
         origin = t_start if ticks_from is None else ticks_from
-        program = replace(program, ticks=_ticks(system, origin, t_start, last))
+        if ticks := _ticks(system, origin, t_start, last):
+            program = replace(program, ticks=ticks)
         y, mode = _initial(system, program, t_start, {} if initial is None else initial)
         made: tuple[Any, Any] = origin_of(system) if isinstance(model, System) else (model, rig)
         return cls(

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from gms_fsm._files import folder_lock, leftovers, write_together
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import TraceFileError
-from gms_fsm.lowering.layout import CONTACT, LOG_NUMBERS, LOG_TEXTS
+from gms_fsm.lowering.log_columns import CONTACT, LOG_NUMBERS, LOG_TEXTS
 from gms_fsm.traces._columns import column_title
 from gms_fsm.traces._header import Header
 from gms_fsm.traces._log import log_from

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
-from gms_fsm.lowering.layout import CONTACT, LOG_TEXTS, LogRecord
+from gms_fsm.lowering.log_columns import CONTACT, LOG_TEXTS, LogRecord
 
 __all__ = ["is_log", "log_from", "log_of"]
 
@@ -38,6 +39,7 @@ def is_log(log: Any) -> bool:
     return bool(log.ndim == 1 and log.dtype == _of_width(width, CONTACT in fields))
 
 
+@functools.cache
 def _of_width(width: int, contacts: bool) -> np.dtype[Any]:
     kinds = {"t": "f8", "element": "i8", **dict.fromkeys((*LOG_TEXTS, CONTACT), f"U{width}")}
     names = [name for name in LogRecord._fields if contacts or name != CONTACT]

@@ -11,7 +11,8 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import TraceFileError
-from gms_fsm.lowering.layout import CONTACT, LOG_TEXTS, Layout
+from gms_fsm.lowering.layout import Layout
+from gms_fsm.lowering.log_columns import CONTACT, LOG_TEXTS
 from gms_fsm.lowering.program import lower
 from gms_fsm.lowering.scales import Setting
 from gms_fsm.systems.models import Model

@@ -5,7 +5,14 @@ Figures are made without pyplot, so there is no global state and no display.
 
 from __future__ import annotations
 
-from plots.figures._paper import FIG3_PHASES, compare_laws, figure_3, figure_4, residuals
+from plots.figures._paper import (
+    FIG3_PHASES,
+    compare_laws,
+    figure_3,
+    figure_4,
+    held_residuals,
+    residuals,
+)
 from plots.figures._runs import Measured, cascade_figure, overview, ribbons_figure
 from plots.figures._saving import save
 from plots.panels._shown import SMOOTH
@@ -18,6 +25,7 @@ __all__ = [
     "compare_laws",
     "figure_3",
     "figure_4",
+    "held_residuals",
     "overview",
     "residuals",
     "ribbons_figure",

@@ -12,10 +12,18 @@ from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots._matplotlib import Figure, rc_context
 from plots.figures._parts import element_legend
+from plots.panels._held import Lag
 from plots.panels._shown import Window, checked_window, scaled, shown
-from plots.style import INK, LINE_GREY, RC, TEXT_GREY
+from plots.style import BLUE, INK, LINE_GREY, RC, TEXT_GREY
 
-__all__ = ["FIG3_PHASES", "compare_laws", "figure_3", "figure_4", "residuals"]
+__all__ = [
+    "FIG3_PHASES",
+    "compare_laws",
+    "figure_3",
+    "figure_4",
+    "held_residuals",
+    "residuals",
+]
 
 FIG3_PHASES = (("rising", 2.0), ("falling", 4.0), ("oscillating", np.inf))
 
@@ -231,5 +239,59 @@ def residuals(
         for ax, (name, (times, difference)) in zip(axes, runs.items(), strict=True):
             panels.difference(ax, times, difference, log=log)
             ax.set_title(name)
+        figure.suptitle(title, x=0.01, ha="left")
+    return figure
+
+
+def held_residuals(
+    lags: Sequence[Lag],
+    papers: tuple[float, float],
+    *,
+    title: str,
+    phases: Mapping[str, tuple[float, float]],
+    until: float = 6.0,
+    zoom: float = 1.5,
+) -> Figure:
+    """Draw how a chart with held outputs differs from the law evaluated inside the steps.
+
+    Parameters
+    ----------
+    lags : sequence of Lag
+        Differences for at most three sample times, the longest first.
+    papers : (float, float)
+        Residuals that the paper reports, N and m.
+    title : str
+        Of the figure.
+    phases : mapping of str to (float, float)
+        Names and time intervals [s], at most two, in which the largest difference is taken.
+    until : float
+        s: end of the time shown in a and b.
+    zoom : float
+        s: begin of the time shown in c, which lasts two of the longest sample times.
+
+    Returns
+    -------
+    Figure
+        Panels a to d.
+    """
+    with rc_context(RC):
+        figure = Figure(figsize=(9.0, 6.2), layout="constrained")
+        force, place, between, period = figure.subplots(2, 2).ravel()
+        lines = panels.lag_over_time(force, lags, papers[0], window=(0.0, until))
+        panels.lag_over_time(place, lags, papers[1], window=(0.0, until), place=True)
+        panels.lag_between_ticks(between, lags, window=(zoom, zoom + 2 * lags[0].period))
+        panels.lag_over_period(period, lags, papers, phases=phases)
+        force.set_title("a) friction, at the ticks")
+        place.set_title("b) position, at the ticks")
+        between.set_title("c) friction; dots: at the ticks")
+        period.set_title("d) largest at the ticks; lines: proportional to h")
+        period.legend(loc="upper left", ncols=2)
+        (paper,) = force.plot([], [], color=BLUE, linestyle="--", linewidth=0.9)
+        figure.legend(
+            [*lines, paper],
+            [*(str(line.get_label()) for line in lines), "the paper's residual"],
+            loc="outside lower left",
+            ncols=4,
+        )
         figure.suptitle(title, x=0.01, ha="left")
     return figure

@@ -1,4 +1,4 @@
-"""Single panels: each takes an Axes and a Trace, draws, and returns its artists.
+"""Single panels: each takes an Axes and a Trace (or differences), draws, and returns its artists.
 
 They share three arguments. ``window = (t0, t1)`` [s] zooms: the run is sampled again inside it.
 ``elements`` selects elements, counted from 0 (labels count from 1). ``log`` requests a logarithmic
@@ -13,6 +13,7 @@ from __future__ import annotations
 from plots.panels import (
     _cascades,
     _differences,
+    _held,
     _over_time,
     _portraits,
     _shown,
@@ -21,6 +22,7 @@ from plots.panels import (
 )
 from plots.panels._cascades import *  # noqa: F403
 from plots.panels._differences import *  # noqa: F403
+from plots.panels._held import *  # noqa: F403
 from plots.panels._over_time import *  # noqa: F403
 from plots.panels._portraits import *  # noqa: F403
 from plots.panels._shown import *  # noqa: F403
@@ -30,6 +32,7 @@ from plots.panels._stribeck import *  # noqa: F403
 __all__: list[str] = []
 __all__ += _cascades.__all__
 __all__ += _differences.__all__
+__all__ += _held.__all__
 __all__ += _over_time.__all__
 __all__ += _portraits.__all__
 __all__ += _shown.__all__

@@ -1,6 +1,6 @@
-"""Lesson 8: chart and if-else code agree bit for bit; late guard evaluation causes the residual.
+"""Lesson 8: chart and if-else code agree bit for bit; late guards and held outputs differ.
 
-The spike and the residual after it are predicted from the delay.
+The spike and the residual after it are predicted from the delay, the lag from the sample time.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ def test_with_the_same_driver_they_are_identical(result: lesson.Result) -> None:
     same_bits(result.chart_once, result.ifelse_once)
     assert result.differ[0] == result.differ_once[0] == 0
     assert result.differ_once[1] > 300_000
+    assert result.differ_held[0] == 0
+    assert result.differ_held[1] > 100_000
 
 
 def test_the_spike_is_the_step_of_F(result: lesson.Result) -> None:
@@ -61,6 +63,28 @@ def test_evaluated_once_per_step_the_arrests_are_missed(result: lesson.Result) -
     assert set(result.ifelse_once.transitions.edge) == {"break_away_forward"}
     assert (result.chart.transitions.edge == "arrest").any()
     assert result.between(13.0, lesson.END).max() > 1.0
+
+
+def test_held_outputs_explain_the_papers_residuals_within_a_factor_of_10(
+    result: lesson.Result,
+) -> None:
+    ramp, swing = result.pushed_largest
+    for size, papers in ((ramp, 1e-4), (swing, 1e-4), (result.held.median[0], 1e-3)):
+        assert papers / 10 < size < 10 * papers
+    assert result.held.largest[0] == pytest.approx(0.25, abs=0.01)  # the spike, as located
+
+
+def test_the_residual_of_held_outputs_is_proportional_to_the_sample_time(
+    result: lesson.Result,
+) -> None:
+    """On the ramp the held force is off by half a step's rise of the applied 0.25 N/s."""
+    assert [lag.period for lag in result.pushed] == [2e-3, 1e-3, 5e-4]
+    sizes = np.array([lag.largest for lag in result.pushed])
+    np.testing.assert_allclose(sizes[:-1] / sizes[1:], 2.0, rtol=0.03)
+    for lag in result.pushed:
+        settled = lag.during((1.5, 2.0))
+        np.testing.assert_allclose(settled.force, 0.25 * lag.period / 2, rtol=0.01)
+        np.testing.assert_allclose(settled.before, -0.25 * lag.period / 2, rtol=0.01)
 
 
 def test_lines_and_picture(result: lesson.Result) -> None:

@@ -168,7 +168,7 @@ def observe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
 
     def once() -> Any:
         _forget_all()
-        code, found = compiled.machine_code(program, "observe"), np.zeros(14)
+        [code], found = compiled.machine_code(program, "observe"), np.zeros(14)
         live = np.array(program.live)
         code(2.0, np.array(y), np.array(mode), live, compiled.packed(program.p), found)
         assert found.tolist() == wanted

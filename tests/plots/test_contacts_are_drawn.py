@@ -22,7 +22,8 @@ from plots import figures, panels, schematic  # after the skip
 from plots._matplotlib import Axes, Figure
 
 FIGURES = ("overview", "ribbons_figure", "cascade_figure")
-OTHERS = {"cascade_window", "difference", "has_threshold", "residual", "shown", "slip_bar"}
+LAGS = {"lag_between_ticks", "lag_over_period", "lag_over_time"}
+OTHERS = {"cascade_window", "difference", "has_threshold", "residual", "shown", "slip_bar", *LAGS}
 PANELS = tuple(sorted({*panels.__all__} - OTHERS - {"stribeck"}))
 
 

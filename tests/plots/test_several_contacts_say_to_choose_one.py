@@ -20,6 +20,7 @@ AX = Figure().subplots()
 ON_AXES = sorted(
     {*panels.__all__}
     - {"difference", "residual", "slip_bar"}
+    - {"lag_between_ticks", "lag_over_period", "lag_over_time"}
     - {"cascade_window", "has_threshold", "shown"}
 )
 DRAWN: dict[str, Callable[..., object]] = {

@@ -22,7 +22,9 @@ TIMES = np.linspace(0.0, 20.0, 41)
 def read(monkeypatch: pytest.MonkeyPatch) -> None:
     """Make engine="compiled" run the Python source."""
     module = gms_fsm.lowering._compiled
-    monkeypatch.setattr(module, "machine_code", lambda program, name: program.ieee[name])
+    monkeypatch.setattr(
+        module, "machine_code", lambda program, *names: [program.ieee[name] for name in names]
+    )
     monkeypatch.setattr(module, "store", lambda: None)
     kernel = integrators.compiled
     monkeypatch.setattr(kernel, "record", lambda arguments, store, tell: columns.record(*arguments))

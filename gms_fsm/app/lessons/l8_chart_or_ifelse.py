@@ -9,6 +9,10 @@ that is evaluated once per step responds late. During the delay the force is tha
 which is a spike. After it the element is stretched too far, by the distance the slider moved in the
 meantime, and this excess decays only slowly. That is a residual like the one in the paper. Its size
 depends on the delay of the switch.
+
+A chart in a block diagram may also have a sample time: its outputs are then held between the ticks.
+The held force lags even where nothing switches, in proportion to the sample time. This explains the
+residuals of both figures of the paper within a factor of 10. What the paper ran is not printed.
 """
 
 from __future__ import annotations
@@ -18,10 +22,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gms_fsm import GMS, GMSParameters, Prescribed, Trace, simulate
-from gms_fsm.app.paper import PAPER_RTOL, PAPER_STEP, VELOCITY
+from gms_fsm import GMS, GMSParameters, Prescribed, Slider, Trace, simulate
+from gms_fsm.app.paper import FORCE, HELD_STEPS, PAPER_RTOL, PAPER_STEP, VELOCITY
 from gms_fsm.app.paper.claims import differing_numbers, force_difference
+from gms_fsm.app.paper.held import OSCILLATION, PAPERS_FORCE, PAPERS_PLACE, RAMP, Lag, lag_of
 from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.systems.rigs import Rig
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,6 +44,8 @@ END = 30.0  # s
 STEPS = (0.3e-3, 0.9e-3, 2.1e-3, 3.3e-3, 5e-3, 10e-3, 23e-3, 50e-3)  # s
 LOOK = 5.0  # s: time at which the residual is read, after the first break-away
 PAPERS = 1e-3  # N: the residual in the paper
+PUSHED = GMS(GMSParameters.paper("non-drifting"), law="published"), Slider(1.0, FORCE)
+HELD_END, PUSHED_END = 12.0, 6.0  # s: ends of the runs with held outputs, of both experiments
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +64,13 @@ class Result:
         Difference between if-else code once per step and the chart with located switches.
     late, left : ndarray, shape (8,), s and N
         Delay of the first break-away for each of `STEPS`, and the residual at `LOOK`.
+    differ_held : (int, int)
+        As `differ`, with outputs held for `PAPER_STEP`.
+    held : Lag
+        Difference between the chart with outputs held for `PAPER_STEP` and the chart with located
+        switches.
+    pushed : tuple of Lag
+        The same in the experiment of Fig. 3, where nothing switches, for each of `HELD_STEPS`.
     """
 
     chart: Trace
@@ -68,6 +83,9 @@ class Result:
     residual: FloatArray
     late: FloatArray
     left: FloatArray
+    differ_held: tuple[int, int]
+    held: Lag
+    pushed: tuple[Lag, ...]
 
     @property
     def replayed(self) -> dict[str, Trace]:
@@ -83,6 +101,15 @@ class Result:
         """Return the magnitude of the residual from begin to end [s], N."""
         return np.abs(self.residual[(self.t > begin) & (self.t < end)])
 
+    @property
+    def pushed_largest(self) -> tuple[float, float]:
+        """Largest difference of F at the ticks in Fig. 3, held for `PAPER_STEP`, N.
+
+        On the ramp, and while the force oscillates.
+        """
+        lag = self.pushed[HELD_STEPS.index(PAPER_STEP)]
+        return lag.during(RAMP).largest[0], lag.during(OSCILLATION).largest[0]
+
     def lines(self) -> tuple[str, ...]:
         """Return the lesson as five lines.
 
@@ -95,29 +122,37 @@ class Result:
         first, arrest = float(log.t[0]), float(log.t[log.edge == "arrest"][0])
         spike = np.abs(self.residual[self.t == first])[0]
         after = float(np.median(self.between(LOOK, arrest - 0.1)))
+        early, later = self.held.during((0.0, first)), self.held.during((LOOK, HELD_END))
+        near = self.held.during((first - 0.01, first + 0.01))
+        ramp, swing = self.pushed_largest
         return (
             f"Question: {QUESTION}",
             f"Run: {MODEL.title}, Table I (stick-slip), v = {VELOCITY} m/s (chosen by us), "
             f"{END:g} s; transitions machines and generated if-else code, with located switches, "
-            f"and with guards evaluated once per step (max step {1e3 * PAPER_STEP:g} ms, rtol "
-            f"{PAPER_RTOL:.0e}).",
+            f"with guards evaluated once per step (max step {1e3 * PAPER_STEP:g} ms, rtol "
+            f"{PAPER_RTOL:.0e}), and with outputs held for {1e3 * PAPER_STEP:g} ms.",
             f"Measured with the same driver: {self.differ[0]} of {self.differ[1]} numbers differ "
-            f"with located switches, {self.differ_once[0]} of {self.differ_once[1]} once per step.",
+            f"with located switches, {self.differ_once[0]} of {self.differ_once[1]} once per step, "
+            f"{self.differ_held[0]} of {self.differ_held[1]} with held outputs.",
             f"Measured, once per step minus located: {np.median(self.between(0.0, 4.9)):.0e} N "
             f"before the first break-away, a spike of {spike:.2f} N at it, then "
             f"{after:.0e} N; the arrests at {arrest:.1f} s "
             f"are missed, and the runs diverge by up to {self.between(arrest, END).max():.1f} N. "
             f"The paper's {PAPERS:.0e} N needs a switch that is "
-            f"{1e3 * self.late_for_the_papers:.1f} ms late.",
+            f"{1e3 * self.late_for_the_papers:.1f} ms late. Held minus located: "
+            f"{early.median[0]:.1e} N, {near.largest[0]:.2f} N, then {later.median[0]:.1e} N; in "
+            f"the experiment of Fig. 3 up to {ramp:.1e} N on the ramp and {swing:.1e} N while the "
+            "force oscillates, in proportion to the sample time.",
             "So: chart and if-else code are one program; what differs is when guards are "
-            "evaluated. "
-            f"Steps of {1e3 * PAPER_STEP:g} ms explain the shape of the paper's residual, "
-            f"including the spikes, but here it is {PAPERS / after:.0f} times smaller.",
+            f"evaluated and how long outputs are held. Steps of {1e3 * PAPER_STEP:g} ms explain "
+            "the shape of the paper's residual, including the spikes, but here it is "
+            f"{PAPERS / after:.0f} times smaller; outputs held for {1e3 * PAPER_STEP:g} ms explain "
+            f"it within a factor of {max(PAPERS / early.median[0], swing / PAPERS_FORCE):.0f}.",
         )
 
 
 def run() -> Result:
-    """Run the chart and the if-else code with both drivers, and with increasing delays.
+    """Run the chart and the if-else code with each driver, with delays, and with held outputs.
 
     Returns
     -------
@@ -133,6 +168,10 @@ def run() -> Result:
     )
     t, residual = force_difference(ifelse_once, chart)
     late, left = zip(*(_late(step, chart) for step in STEPS), strict=True)
+    held, held_ifelse = (
+        _held(MODEL, RIG, HELD_END, PAPER_STEP, engine) for engine in ("machines", "ifelse")
+    )
+    inside = simulate(*PUSHED, PUSHED_END, engine="ifelse", max_step=PAPER_STEP)
     return Result(
         chart=chart,
         ifelse=ifelse,
@@ -144,7 +183,16 @@ def run() -> Result:
         residual=residual,
         late=np.array(late),
         left=np.array(left),
+        differ_held=differing_numbers(held, held_ifelse),
+        held=lag_of(held, chart),
+        pushed=tuple(lag_of(_held(*PUSHED, PUSHED_END, h), inside) for h in HELD_STEPS),
     )
+
+
+def _held(model: GMS, rig: Rig, t_end: float, step: float, engine: str = "machines") -> Trace:
+    """Run with outputs held between ticks; the rows are the ticks and the end."""
+    ticks = np.append(step * np.arange(round(t_end / step)), t_end)
+    return simulate(model, rig, t_end, events="held", step=step, engine=engine, t_eval=ticks)
 
 
 def _late(step: float, chart: Trace) -> tuple[float, float]:
@@ -179,7 +227,7 @@ def predicted(late: FloatArray, chart: Trace) -> FloatArray:
 
 
 def figure(result: Result) -> Figure:
-    """Draw the friction, the residual over time, the spike, and the residual over the delay.
+    """Draw the friction, its residual over time and over the delay, and that of held outputs.
 
     Parameters
     ----------
@@ -189,7 +237,7 @@ def figure(result: Result) -> Figure:
     Returns
     -------
     Figure
-        Panels a to d.
+        Panels a to f.
     """
     from matplotlib import rc_context
     from matplotlib.figure import Figure
@@ -200,9 +248,9 @@ def figure(result: Result) -> Figure:
     log = result.chart.transitions
     first, arrest = float(log.t[0]), float(log.t[log.edge == "arrest"][0])
     with rc_context(RC):
-        sheet = Figure(figsize=(8.2, 7.8), layout="constrained")
+        sheet = Figure(figsize=(8.2, 10.6), layout="constrained")
         axes = sheet.subplot_mosaic(
-            [["a", "a"], ["b", "b"], ["c", "d"]], height_ratios=(1, 1.2, 1.5)
+            [["a", "a"], ["b", "b"], ["c", "d"], ["e", "f"]], height_ratios=(1, 1.2, 1.5, 1.5)
         )
         force, residual, zoom, lateness = (axes[letter] for letter in "abcd")
         looks = (
@@ -256,6 +304,7 @@ def figure(result: Result) -> Figure:
         )
 
         _draw_lateness(lateness, result)
+        _draw_held(axes["e"], axes["f"], result)
         sheet.suptitle(f"Lesson 8: {QUESTION}", x=0.01, ha="left", fontsize=12)
     return sheet
 
@@ -286,3 +335,31 @@ def _draw_lateness(ax: Axes, result: Result) -> None:
     )
     ax.set(xlabel="delay of the switch [ms]", ylabel=f"difference at {LOOK:g} s [N]")
     ax.set_title("d) residual of a late switch")
+
+
+def _draw_held(over_time: Axes, over_period: Axes, result: Result) -> None:
+    """Draw the residual of held outputs in the experiment of Fig. 3."""
+    from plots import panels
+    from plots.style import BLUE
+
+    panels.lag_over_time(over_time, result.pushed, PAPERS_FORCE, window=(0.0, PUSHED_END))
+    over_time.legend(loc="upper left")
+    over_time.annotate(
+        "the paper's $10^{-4}$ N",
+        (0.02, -1e3 * PAPERS_FORCE),
+        (2, -4),
+        xycoords=("axes fraction", "data"),
+        textcoords="offset points",
+        va="top",
+        color=BLUE,
+        fontsize=8,
+    )
+    over_time.set_title("e) outputs held for h, in Fig. 3")
+    panels.lag_over_period(
+        over_period,
+        result.pushed,
+        (PAPERS_FORCE, PAPERS_PLACE),
+        phases={"ramp": RAMP, "oscillation": OSCILLATION},
+    )
+    over_period.legend(loc="upper left", ncols=2)
+    over_period.set_title("f) the same at its largest, over h")

@@ -6,7 +6,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from gms_fsm.app.paper import FIG3_END, FIG4_END, FORCE, PAPER_RTOL, PAPER_STEP, VELOCITY
+import numpy as np
+
+from gms_fsm.app.paper import (
+    FIG3_END,
+    FIG4_END,
+    FIG4_HELD_END,
+    FORCE,
+    HELD_STEPS,
+    PAPER_RTOL,
+    PAPER_STEP,
+    VELOCITY,
+)
 from gms_fsm.charts.lugre import BENCHMARK
 from gms_fsm.run.simulate import Moment, simulate
 from gms_fsm.systems.gms_parameters import GMSParameters
@@ -36,6 +47,9 @@ class Experiment:
     paper_settings : bool
         Guards evaluated once per step, steps of at most 1e-3 s and rtol 1e-4, instead of located
         switches.
+    held : float, optional
+        Sample time of the chart, s: its outputs are held between the ticks. The rows are the ticks
+        and the end.
     """
 
     name: str
@@ -44,6 +58,7 @@ class Experiment:
     t_end: float
     engine: str = "machines"
     paper_settings: bool = False
+    held: float | None = None
 
 
 def experiments(force: str = FORCE, velocity: str = VELOCITY) -> tuple[Experiment, ...]:
@@ -59,7 +74,7 @@ def experiments(force: str = FORCE, velocity: str = VELOCITY) -> tuple[Experimen
     Returns
     -------
     tuple of Experiment
-        The runs, those of Fig. 3 first.
+        The runs, those of Fig. 3 first, and those with held outputs last.
 
     Examples
     --------
@@ -84,6 +99,13 @@ def experiments(force: str = FORCE, velocity: str = VELOCITY) -> tuple[Experimen
         Experiment("fig4_signed_chart", signed4, move, FIG4_END),
         Experiment("fig4_signed_ifelse", signed4, move, FIG4_END, engine="ifelse"),
         Experiment("fig4_step", fig4, move, FIG4_END, engine="ifelse", paper_settings=True),
+        *(
+            Experiment(f"fig3_held_chart_{1e6 * h:g}us", fig3, push, FIG3_END, held=h)
+            for h in HELD_STEPS
+        ),
+        Experiment("fig3_held_ifelse", fig3, push, FIG3_END, engine="ifelse", held=PAPER_STEP),
+        Experiment("fig4_held_chart", fig4, move, FIG4_HELD_END, held=PAPER_STEP),
+        Experiment("fig4_held_ifelse", fig4, move, FIG4_HELD_END, engine="ifelse", held=PAPER_STEP),
     )
 
 
@@ -147,5 +169,15 @@ def run_one(experiment: Experiment, progress: Progress | None = None) -> Trace:
             events="step",
             max_step=PAPER_STEP,
             rtol=PAPER_RTOL,
+        )
+    if experiment.held is not None:
+        ticks = experiment.held * np.arange(round(experiment.t_end / experiment.held))
+        return simulate(
+            *arguments,
+            engine=experiment.engine,
+            progress=reached,
+            events="held",
+            step=experiment.held,
+            t_eval=np.append(ticks, experiment.t_end),
         )
     return simulate(*arguments, engine=experiment.engine, progress=reached)

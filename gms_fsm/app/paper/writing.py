@@ -5,14 +5,16 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm._files import output_folder, write_whole
 from gms_fsm.app.paper import FORCE, VELOCITY
-from gms_fsm.app.paper.claims import Claim, differing_numbers, force_difference, judge
+from gms_fsm.app.paper.claims import PAIRS, Claim, differing_numbers, force_difference, judge
 from gms_fsm.app.paper.experiments import Progress, experiments, run_one
+from gms_fsm.app.paper.held import OSCILLATION, PAPERS_FORCE, PAPERS_PLACE, RAMP, figure_3_lags
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.lugre import BENCHMARK
 from gms_fsm.errors import MissingExtraError
@@ -21,10 +23,13 @@ from gms_fsm.systems.signals import Formula
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["claims_text", "write"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["claims_text", "held_figure", "write"]
 
 CHARTS = ("chart_element", "chart_bank", "chart_lugre", "block_diagram")
-FIGURES = ("fig3", "fig3_slipping", "fig4", "fig4_laws", "residual")
+FIGURES = ("fig3", "fig3_slipping", "fig4", "fig4_laws", "residual", "residual_held")
 
 
 def write(
@@ -156,12 +161,39 @@ def _draw_figures(folder: Path, traces: Mapping[str, Trace], force: str) -> list
             },
             "Guards evaluated once per step (max step 1e-3 s, rtol 1e-4) and located switches",
         ),
+        "residual_held": held_figure(traces, force),
     }
     return [
         figures.save(figure, folder / file)  # type: ignore[arg-type]
         for name, figure in pictures.items()
         for file in formats.files(name, "figure")
     ]
+
+
+def held_figure(traces: Mapping[str, Trace], force: str) -> Figure:
+    """Draw the residual of held outputs in Fig. 3.
+
+    Parameters
+    ----------
+    traces : mapping of str to Trace
+        From `run`; the held charts of Fig. 3 and ``fig3_step`` are used.
+    force : str
+        The applied force of the runs; only the default one has phases.
+
+    Returns
+    -------
+    Figure
+        Panels a to d.
+    """
+    from plots import figures
+
+    known = {"ramp": RAMP, "oscillation": OSCILLATION}
+    return figures.held_residuals(
+        figure_3_lags(traces),
+        (PAPERS_FORCE, PAPERS_PLACE),
+        phases=known if force == FORCE else {"whole run": (0.0, np.inf)},
+        title="Fig. 3, outputs held between ticks, minus if-else evaluated inside the steps",
+    )
 
 
 def claims_text(traces: Mapping[str, Trace], force: str = FORCE, velocity: str = VELOCITY) -> str:
@@ -182,10 +214,7 @@ def claims_text(traces: Mapping[str, Trace], force: str = FORCE, velocity: str =
     bad, total = (
         sum(counts)
         for counts in zip(
-            *(
-                differing_numbers(traces[f"{name}_chart"], traces[f"{name}_ifelse"])
-                for name in ("fig3", "fig3_slipping", "fig4", "fig4_signed")
-            ),
+            *(differing_numbers(traces[chart], traces[ifelse]) for chart, ifelse in PAIRS),
             strict=True,
         )
     )
@@ -200,8 +229,8 @@ def claims_text(traces: Mapping[str, Trace], force: str = FORCE, velocity: str =
         f"{each.name} = {BENCHMARK.values[each.name]:g} {each.unit}" for each in LUGRE.parameters
     )
     runs = [
-        f"| {name} | {trace.model.title} | {trace.settings['engine']}, {trace.settings['events']} "
-        f"| {len(trace)} | {len(trace.transitions)} |"
+        f"| {name} | {trace.model.title} | {_decided_by(trace)} | {len(trace)} "
+        f"| {len(trace.transitions)} |"
         for name, trace in traces.items()
     ]
     return "\n".join(
@@ -226,7 +255,8 @@ def claims_text(traces: Mapping[str, Trace], force: str = FORCE, velocity: str =
             "## Machines and if-else",
             "",
             "The `transitions` machines and the generated if-else text, under the same driver: "
-            f"**{bad} of {total} numbers differ** (t, x, v, z, F, F_i of the four pairs of runs).",
+            f"**{bad} of {total} numbers differ** (t, x, v, z, F, F_i of six pairs of runs, "
+            "two of them with outputs held between ticks).",
             "",
             "## Chosen by us, because the paper does not print it",
             "",
@@ -246,6 +276,13 @@ def claims_text(traces: Mapping[str, Trace], force: str = FORCE, velocity: str =
             "",
         ]
     )
+
+
+def _decided_by(trace: Trace) -> str:
+    """Return the engine, and when guards are evaluated."""
+    engine, events, step = (trace.settings[name] for name in ("engine", "events", "step"))
+    held = f" for {1e3 * step:g} ms" if events == "held" and isinstance(step, float) else ""
+    return f"{engine}, {events}{held}"
 
 
 def _table(claims: Sequence[Claim]) -> list[str]:

@@ -1,0 +1,294 @@
+"""Arrays whose places have names, and how these places read in generated text."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Generic, TypeVar
+
+__all__ = ["Block", "Places", "total"]
+
+Name = TypeVar("Name", bound=Hashable)
+
+
+@dataclass(frozen=True)
+class Block(Generic[Name]):
+    """Names with one place per element each.
+
+    Parameters
+    ----------
+    names : tuple
+        One after the other.
+    n : int
+        Number of elements.
+    size : str
+        Their number in generated text: a name, or a numeral.
+    """
+
+    names: tuple[Name, ...]
+    n: int
+    size: str = "n"
+
+
+@dataclass(frozen=True)
+class Places(Generic[Name]):
+    """The layout of an array: shared names first, then blocks of names with a place per element.
+
+    In generated text the element is called ``i``.
+
+    Parameters
+    ----------
+    shared : tuple
+        Names with one place each.
+    blocks : tuple of Block
+        Names with one place per element each.
+
+    Examples
+    --------
+    >>> y = Places(("x", "v"), (Block(("z", "w"), 3),))
+    >>> y.size, y.index("v"), y.index("w", 2), y.block("z")
+    (8, 1, 7, slice(2, 5, None))
+    >>> y.text("v"), y.text("z"), y.text("w"), y.size_text()
+    ('1', '2 + i', '2 + n + i', '2 + 2 * n')
+    >>> y.named([0.0, 0.1, 1, 2, 3, 4, 5, 6])
+    {'x': 0.0, 'v': 0.1, 'z': [1, 2, 3], 'w': [4, 5, 6]}
+    """
+
+    shared: tuple[Name, ...]
+    blocks: tuple[Block[Name], ...]
+
+    @cached_property
+    def own(self) -> tuple[Name, ...]:
+        """The names with one place per element."""
+        return tuple(name for block in self.blocks for name in block.names)
+
+    @cached_property
+    def size(self) -> int:
+        """The number of places."""
+        return len(self.shared) + sum(len(block.names) * block.n for block in self.blocks)
+
+    def __iter__(self) -> Iterator[tuple[Name, int | None]]:
+        """Yield for each place, in order, its name and its element (None if shared)."""
+        yield from ((name, None) for name in self.shared)
+        for block in self.blocks:
+            yield from ((name, i) for name in block.names for i in range(block.n))
+
+    def index(self, name: Name, element: int = 0) -> int:
+        """Return the place of a shared name, or of an own name of one element.
+
+        Parameters
+        ----------
+        name : str or other key
+            One of `shared` or `own`.
+        element : int
+            Counted from 0; ignored for a shared name.
+
+        Returns
+        -------
+        int
+            The place.
+        """
+        start, _ = self._spans[name]
+        return start if start < len(self.shared) else start + element
+
+    @cached_property
+    def _spans(self) -> Mapping[Name, tuple[int, int]]:
+        """First place and number of places of each name."""
+        spans = {name: (place, 1) for place, name in enumerate(self.shared)}
+        start = len(self.shared)
+        for block in self.blocks:
+            for name in block.names:
+                spans[name] = start, block.n
+                start += block.n
+        return spans
+
+    def block(self, name: Name) -> slice:
+        """Return the places of an own name, one per element.
+
+        Parameters
+        ----------
+        name : str or other key
+            One of `own`.
+
+        Returns
+        -------
+        slice
+            One place per element.
+        """
+        start, count = self._spans[name]
+        return slice(start, start + count)
+
+    def where(self, name: Name) -> int | slice:
+        """Return the subscript for an array that selects everything under a name.
+
+        Parameters
+        ----------
+        name : str or other key
+            One of `shared` or `own`.
+
+        Returns
+        -------
+        int or slice
+            As `index` for a shared name, as `block` for an own one.
+        """
+        return self._all[name]
+
+    @cached_property
+    def _all(self) -> Mapping[Name, int | slice]:
+        """The subscript of each name."""
+        shared: dict[Name, int | slice] = {name: self._spans[name][0] for name in self.shared}
+        return shared | {name: self.block(name) for name in self.own}
+
+    def all_of(self, name: Name) -> range:
+        """Return the places of a name: one if it is shared, else one per element.
+
+        Parameters
+        ----------
+        name : str or other key
+            One of `shared` or `own`.
+
+        Returns
+        -------
+        range
+            In order.
+        """
+        start, count = self._spans[name]
+        return range(start, start + count)
+
+    def named(self, values: Any) -> dict[Name, Any]:
+        """Return the values by name.
+
+        Parameters
+        ----------
+        values : sequence, or ndarray with the places as its first axis
+            One entry per place.
+
+        Returns
+        -------
+        dict
+            For a shared name its entry, for an own name its part of `values`, one per element.
+        """
+        return {name: values[where] for name, where in self._all.items()}
+
+    def joined(self, values: Mapping[Name, Any]) -> list[Any]:
+        """Return entries in the order of the places; the inverse of `named`.
+
+        Parameters
+        ----------
+        values : mapping
+            For a shared name its entry, for an own name a sequence with one entry per element.
+
+        Returns
+        -------
+        list
+            One entry per place.
+        """
+        return [values[name] if i is None else values[name][i] for name, i in self]
+
+    # ------------------------------------------------------------------ as text
+    def text(self, name: Name) -> str:
+        """Return a place as Python text over ``i`` and the sizes.
+
+        Parameters
+        ----------
+        name : str or other key
+            One of `shared` or `own`.
+
+        Returns
+        -------
+        str
+            Such as ``"1"`` or ``"2 + n + i"``.
+        """
+        if name in self.shared:
+            return str(self.shared.index(name))
+        return total([self.start_text(name), "i"])
+
+    def start_text(self, name: Name, after: int = 0) -> str:
+        """Return the first place of a name as Python text over the sizes.
+
+        Parameters
+        ----------
+        name : str or other key
+            One of `shared` or `own`.
+        after : int
+            Of the names after it in its block instead, this many on.
+
+        Returns
+        -------
+        str
+            Such as ``"2 + n"``.
+        """
+        if name in self.shared:
+            return str(self.shared.index(name) + after)
+        terms = [str(len(self.shared))]
+        for block in self.blocks:
+            rows = block.names.index(name) + after if name in block.names else len(block.names)
+            if rows:
+                terms.append(_times(rows, block.size))
+            if name in block.names:
+                break
+        return total(terms)
+
+    def sizes(self, name: Name) -> frozenset[str]:
+        """Return which sizes the text of a place reads.
+
+        Parameters
+        ----------
+        name : str or other key
+            One of `shared` or `own`.
+
+        Returns
+        -------
+        frozenset of str
+            Empty for a shared name.
+        """
+        found = set[str]()
+        if name in self.shared:
+            return frozenset()
+        for block in self.blocks:
+            if name in block.names:
+                return frozenset(found | ({block.size} if block.names.index(name) else set()))
+            if block.names:
+                found.add(block.size)
+        raise KeyError(name)
+
+    def size_text(self, more: int = 0) -> str:
+        """Return how many places there are, and some more, as Python text over the sizes."""
+        terms = [str(len(self.shared) + more)]
+        terms += [_times(len(block.names), block.size) for block in self.blocks if block.names]
+        return total(terms)
+
+
+def total(terms: Iterable[str]) -> str:
+    """Return a sum as Python text, with its numerals added up.
+
+    Parameters
+    ----------
+    terms : iterable of str
+        Numerals and names.
+
+    Returns
+    -------
+    str
+        The numeral comes first.
+
+    Examples
+    --------
+    >>> total(["2", "n", "i"]), total(["2", "3", "i"]), total([])
+    ('2 + n + i', '5 + i', '0')
+    """
+    numbers, names = 0, list[str]()
+    for term in terms:
+        if term.isdigit():
+            numbers += int(term)
+        else:
+            names.append(term)
+    return " + ".join([str(numbers), *names] if numbers or not names else names)
+
+
+def _times(rows: int, size: str) -> str:
+    """Return a product as Python text."""
+    if size.isdigit():
+        return str(rows * int(size))
+    return size if rows == 1 else f"{rows} * {size}"
