@@ -59,8 +59,8 @@ class Elements:
         return element_name(self.session.start, machine)
 
     def short(self, machine: int) -> str:
-        """Return how an element is written in a command: ``2``, ``gear 1``."""
-        return self.name(machine).removeprefix("element ")
+        """Return how a command takes an element: ``2``, with several contacts ``gear 1``."""
+        return self.name(machine) if len(self.banks) > 1 else str(machine + 1)
 
     def address(self, machine: int) -> int | str:
         """Return what methods of a session take for an element."""
