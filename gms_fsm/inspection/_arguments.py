@@ -1,16 +1,14 @@
-"""Checks of the arguments of a session: settings, counts, elements, edges, branches."""
+"""Checks of the arguments of a session: settings, counts, rows, branches."""
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
 
 from gms_fsm._arguments import checked_integer
-from gms_fsm.charts.chart import Chart
-from gms_fsm.errors import ParameterError, SessionError, shown
+from gms_fsm.errors import ParameterError, SessionError
 from gms_fsm.run.settings import SettingOptions, Settings
-from gms_fsm.systems.models import Model
 
-__all__ = ["check_branch", "check_count", "check_element", "checked_settings", "source_of"]
+__all__ = ["check_branch", "check_count", "check_row", "checked_settings", "chosen_pair"]
 
 
 def checked_settings(settings: Settings | None, options: SettingOptions) -> Settings:
@@ -49,28 +47,21 @@ def check_branch(number: int, branches: int) -> None:
         raise SessionError(f"no branch {number}", advice=f"there are 0 to {branches - 1}")
 
 
+def chosen_pair(
+    a: int | None, b: int | None, current: int, parents: Sequence[int | None]
+) -> tuple[int, int]:
+    """Return the branches to compare: by default the current one and its parent."""
+    for number in (a, b):
+        if number is not None:
+            check_branch(number, len(parents))
+    b = current if b is None else b
+    a = parents[b] if a is None else a
+    if a is None:
+        raise SessionError(f"branch {b} has no parent", advice="give two branch numbers")
+    return a, b
+
+
 def check_row(row: int, rows: int) -> None:
     """Raise `SessionError` unless this row has been computed."""
     if not 0 <= checked_integer("row", row, None, SessionError) < rows:
         raise SessionError(f"no row {row}", advice=f"rows 0 to {rows - 1} have been computed")
-
-
-def check_element(element: int, model: Model) -> None:
-    """Raise `SessionError` unless the model has this element."""
-    whole = isinstance(element, int | np.integer) and not isinstance(element, bool)
-    if not whole or not 0 <= element < model.n:
-        text = shown(element)
-        if text in [repr(edge.name) for edge in model.chart.transitions]:
-            text += f" (to name an edge, use edge={text})"
-        raise SessionError(
-            f"no element {text}",
-            advice=f"there are 0 to {model.n - 1} (counted from 0 in Python, from 1 in text)",
-        )
-
-
-def source_of(edge: str, chart: Chart) -> str:
-    """Return the source state of an edge; raise `SessionError` if there is no such edge."""
-    sources = {each.name: each.source for each in chart.transitions}
-    if edge not in sources:
-        raise SessionError(f"no edge {edge!r}", advice=f"there are {', '.join(sources) or 'none'}")
-    return sources[edge]

@@ -6,6 +6,7 @@ is not an exception here but an outcome of its branch.
 
 from __future__ import annotations
 
+import math
 import signal
 import threading
 from bisect import bisect_left, bisect_right
@@ -17,6 +18,7 @@ import numpy as np
 
 from gms_fsm.inspection._poking import Edits
 from gms_fsm.inspection._results import Fired
+from gms_fsm.lowering._observing import sigmas
 from gms_fsm.lowering.log_columns import LogRecord
 from gms_fsm.run.simulate import Run
 from gms_fsm.traces._between import interpolated
@@ -24,6 +26,7 @@ from gms_fsm.traces._log import log_of
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.scope import Scope
+from gms_fsm.traces.system_scope import SystemScope
 from gms_fsm.traces.trace import Trace
 from integrators import Firing, Stop
 
@@ -145,16 +148,59 @@ class Branch:
 
         return place
 
-    def scope(self, row: Row) -> Scope:
-        """Return the values at a row or point, by name."""
+    def scope(self, row: Row, contact: str = "") -> Scope:
+        """Return the values of a contact at a row or point; without a name of the only one."""
         start = self.run.start
-        return Scope.of(start.model, start.program, row.t, row.y, row.mode)
+        name = start.program.layout.contact(contact).name
+        model = start.model if start.given is None else start.system.contact(name)
+        return Scope.of(model, start.program, row.t, row.y, row.mode, name)
 
-    def state(self, row: Row, element: int) -> str:
-        """Return the active state of an element at a row."""
+    def system_scope(self, row: Row) -> SystemScope:
+        """Return all values at a row or point, by name."""
         start = self.run.start
-        active = row.mode[start.program.layout.elements][element]
-        return start.model.chart.states[active].name
+        return SystemScope.of(start.system, start.program, row.t, row.y, row.mode)
+
+    def watches(self, row: Row) -> dict[str, Any]:
+        """Return the values at a row or point of the names allowed in conditions."""
+        if self.run.start.given is None:
+            return self.scope(row).watches()
+        return self.system_scope(row).watches()
+
+    def state(self, row: Row, machine: int) -> str:
+        """Return the active state of an element, counted over all contacts, at a row."""
+        start = self.run.start
+        active = row.mode[start.program.layout.elements][machine]
+        bank = start.program.layout.bank(machine)
+        return start.system.contact(bank.name).chart.states[active].name
+
+    def sigma(self, row: Row) -> dict[str, float]:
+        """Return the signs held between -1 and 1 at a row, keyed by the quantity that is zero."""
+        program = self.run.start.program
+        found = zip(program.surface_names, sigmas(program, row.t, row.y, row.mode), strict=True)
+        return {name: sigma for name, sigma in found if not math.isnan(sigma)}
+
+    # ------------------------------------------------------------------ ticks
+    def asked(self, row: int, machine: int) -> bool:
+        """Return whether the guards of an element are evaluated at a row, as far as ticks allow."""
+        bit = self.run.start.program.discrete[machine]
+        if bit == 0:
+            return True
+        here = self.raw(row)
+        first = here.microstep == 0 and (row == 0 or self.raw(row - 1).t < here.t)
+        return first and bool(self.run.start.program.ticks.get(here.t, 0) & bit)
+
+    def next_tick(self, machine: int) -> float | None:
+        """Return when the guards of an element are evaluated next, if not at the cursor."""
+        t, bit = self.here.t, self.run.start.program.discrete[machine]
+        if bit == 0 or (self.between is None and self.asked(self.cursor, machine)):
+            return None
+        found = self.tick_after(t, bit.bit_length() - 1)
+        return math.inf if found is None else found
+
+    def tick_after(self, t: float, clock: int) -> float | None:
+        """Return the next tick of a clock: the samplers, then the contacts with a period."""
+        ticks = self.run.start.program.ticks.items()
+        return next((tick for tick, bits in ticks if tick > t and bits & 1 << clock), None)
 
     # ------------------------------------------------------------------ firings
     def log(self) -> list[LogRecord]:
@@ -181,7 +227,7 @@ class Branch:
         if row not in self.firing_rows(row + 1)[-1:]:
             return None
         record = self.record(row)
-        return Fired(record.element, record.edge, record.source, record.target)
+        return Fired(record.element, record.edge, record.source, record.target, record.contact)
 
     def trace(self) -> Trace:
         """Return the branch so far as a trace."""

@@ -1,4 +1,4 @@
-"""Conditions and watches of a session: parsed for a model, evaluated at a row or point."""
+"""Conditions and watches of a session: parsed for a run, evaluated at a row or point."""
 
 from __future__ import annotations
 
@@ -10,28 +10,38 @@ from gms_fsm.errors import ExpressionError, SessionError
 from gms_fsm.inspection._branch import Branch, Row
 from gms_fsm.inspection.explain import holds
 from gms_fsm.language import Condition, evaluate, parse_condition, parse_value
-from gms_fsm.systems.models import Model
+from gms_fsm.run.start import Start
 from gms_fsm.traces.scope import watch_names
+from gms_fsm.traces.system_scope import owners_of, system_names
 
-__all__ = ["holds_at", "read", "value_of"]
+__all__ = ["holds_at", "names_of", "read", "value_of"]
 
 
-def read(model: Model, text: str) -> Condition:
+def names_of(start: Start) -> list[str]:
+    """Return the names allowed in conditions and watches."""
+    return watch_names(start.model) if start.given is None else system_names(start.system)
+
+
+def read(start: Start, text: str) -> Condition:
     """Parse a condition such as ``"z1 > 0.3 and state(2) == slip"``."""
-    states = [state.name for state in model.chart.states]
-    with _numbered(model):
-        return parse_condition(text, watch_names(model), states, model.n, own_state=model.n == 1)
+    states, n, owners = [], 0, {}
+    if len(start.system.contacts) == 1:
+        states, n = [state.name for state in start.model.chart.states], start.model.n
+    if start.given is not None:
+        owners = owners_of(start.system)
+    with _explained(start):
+        return parse_condition(text, names_of(start), states, n, own_state=n == 1, owners=owners)
 
 
 def holds_at(condition: Condition, branch: Branch, row: Row) -> bool:
     """Return whether a condition holds at a row of a branch, or at a point between two rows."""
-    return holds(condition, branch.scope(row).watches())
+    return holds(condition, branch.watches(row))
 
 
-def value_of(model: Model, text: str, values: Mapping[str, Any]) -> float:
+def value_of(start: Start, text: str, values: Mapping[str, Any]) -> float:
     """Return the value of a watch expression, given the values of its names."""
-    with _numbered(model):
-        tree = parse_value(text, watch_names(model))
+    with _explained(start):
+        tree = parse_value(text, names_of(start))
     try:
         return float(evaluate(tree, values))
     except (ArithmeticError, ValueError) as error:
@@ -39,13 +49,27 @@ def value_of(model: Model, text: str, values: Mapping[str, Any]) -> float:
 
 
 @contextmanager
-def _numbered(model: Model) -> Iterator[None]:
-    """Explain that a variable without an element number needs one."""
+def _explained(start: Start) -> Iterator[None]:
+    """Say how to write a name that lacks the number of an element, or its contact."""
     try:
         yield
     except ExpressionError as error:
-        for name in model.chart.variables:
-            if error.reason == f"unknown name {name!r}":
-                reason = f"{error.reason}; for element 1 write {name}1"
+        for name, instead in _complete(start).items():
+            if error.reason.startswith(f"unknown name {name!r}"):
+                reason = f"unknown name {name!r}; {instead}"
                 raise ExpressionError(reason, error.text, error.column, error.allowed) from None
         raise
+
+
+def _complete(start: Start) -> dict[str, str]:
+    """Return how to complete names that are incomplete."""
+    known, found = names_of(start), dict[str, str]()
+    for contact in start.system.contacts:
+        lead = "" if start.given is None else f"{contact.name}."
+        for name in contact.chart.variables:
+            for each in (name, f"{lead}{name}"):
+                found.setdefault(each, f"for element 1 write {lead}{name}1")
+        for each in known:
+            if lead and each.startswith(lead):
+                found.setdefault(each.removeprefix(lead), f"write {each}")
+    return {name: text for name, text in found.items() if name not in known}

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from gms_fsm.errors import SessionError
-from gms_fsm.inspection._arguments import check_element
-from gms_fsm.systems.models import Model, parameter_names
-from gms_fsm.traces.scope import Scope
+from gms_fsm.errors import SessionError, shown
+from gms_fsm.inspection._elements import element_name, machine_of
+from gms_fsm.run.start import Start
+from gms_fsm.systems.models import parameter_names
 
-__all__ = ["Edits", "initial_with"]
+if TYPE_CHECKING:
+    from gms_fsm.inspection._branch import Branch, Row
+
+__all__ = ["Edits", "check_locks", "initial_with", "pokeable"]
+
+ROUNDING = 1e-9  # of a velocity, relative to those of the bodies
+AGE = "age"  # restarts in a state that was poked
 
 
 @dataclass(frozen=True)
@@ -20,27 +27,28 @@ class Edits:
 
     Parameters
     ----------
-    variables : mapping of str to mapping of int to float
-        New values of the variables of the chart, by element.
+    variables : mapping of str to float or mapping of int to float
+        New values by name; those of a chart's variables by element, from 0. In a system the names
+        are those of the state vector, such as ``x_l`` or ``gear.z``.
     v : float or None
-        New velocity, m/s.
-    state : mapping of int to str
-        New states by element.
+        New velocity of a model on a rig, m/s.
+    state : mapping of int or str to str
+        New states by element: by index for a model on a rig, in a system by text (``gear 1``).
     """
 
-    variables: Mapping[str, Mapping[int, float]]
+    variables: Mapping[str, float | Mapping[int, float]]
     v: float | None
-    state: Mapping[int, str]
+    state: Mapping[int | str, str]
 
     @classmethod
     def of(
         cls,
-        model: Model,
-        variables: Mapping[str, Mapping[int, float]] | None,
+        start: Start,
+        variables: Mapping[str, Any] | None,
         v: float | None,
-        state: Mapping[int, str] | None,
+        state: Mapping[int | str, str] | None,
     ) -> Edits:
-        """Return checked edits; raise `SessionError` for names that the model does not have."""
+        """Return checked edits; raise `SessionError` for names that the run does not have."""
         for what, given in (("variables", variables), ("state", state)):
             if given is not None and not isinstance(given, Mapping):
                 raise SessionError(
@@ -48,64 +56,213 @@ class Edits:
                     place=what,
                     value=given,
                 )
-        for name, values in (variables or {}).items():
-            if name in parameter_names(model):
-                raise SessionError(
-                    f"{name} is a parameter",
-                    advice="to change it, make another model and session",
-                )
-            if name not in model.chart.variables:
-                known = ", ".join(model.chart.variables)
-                raise SessionError(f"no variable {name!r}", advice=f"there are {known}")
-            if not isinstance(values, Mapping):
-                raise SessionError(
-                    f"give its values by element, for example {{{name!r}: {{0: 0.1}}}}",
-                    place=name,
-                    value=values,
-                )
-        own = {name: dict(values) for name, values in (variables or {}).items()}
-        edits = cls(own, v, dict(state or {}))
-        if not (any(edits.variables.values()) or edits.state or v is not None):
+        if start.given is None:
+            own = _of_model(start, variables or {})
+        else:
+            own, v = (
+                _of_system(start, {**(variables or {}), **({} if v is None else {"v": v})}),
+                None,
+            )
+        machines = {machine_of(element, start): name for element, name in (state or {}).items()}
+        states: dict[int | str, str] = {
+            machine if start.given is None else element_name(start, machine): name
+            for machine, name in machines.items()
+        }
+        edits = cls(own, v, states)
+        if not (any(each != {} for each in own.values()) or states or v is not None):
             raise SessionError("nothing to poke", advice="give variables, v or state")
-        for element in (*(i for values in own.values() for i in values), *edits.state):
-            check_element(element, model)
         return edits
 
     def __str__(self) -> str:
         """Text such as ``z1 = 0.2, state 2 = slip``, with elements numbered from 1."""
-        parts = [
-            f"{name}{i + 1} = {value:.6g}"
-            for name, values in self.variables.items()
-            for i, value in values.items()
-        ]
+        parts = []
+        for name, values in self.variables.items():
+            if isinstance(values, Mapping):
+                parts += [f"{name}{i + 1} = {value:.6g}" for i, value in values.items()]
+            else:
+                parts.append(f"{name} = {values:.6g}")
         if self.v is not None:
             parts.append(f"v = {self.v:.6g}")
-        parts += [f"state {i + 1} = {name}" for i, name in self.state.items()]
+        for i, name in self.state.items():
+            who = f"state {i + 1}" if isinstance(i, int) else f"state of {i}"
+            parts.append(f"{who} = {name}")
         return ", ".join(parts)
 
 
-def initial_with(edits: Edits, here: Scope, *, prescribed: bool) -> dict[str, Any]:
+def pokeable(start: Start) -> list[str]:
+    """Return the names in the state vector of a system that a poke can change."""
+    layout, system = start.program.layout, start.system
+    updated = (name for each in system.sampled for name in each.updates)
+    moved = (name for body in system.bodies for name in (body.x, body.v))
+    shared = [name for name in (*moved, *system.flow, *updated) if name in layout.y.shared]
+    own = [bank.of(name) for bank in layout.banks for name in bank.variables if name != AGE]
+    return [*shared, *own]
+
+
+def _of_model(start: Start, given: Mapping[str, Any]) -> dict[str, float | Mapping[int, float]]:
+    """Return the new values of the variables of a model on a rig, checked."""
+    known = [name for name in start.model.chart.variables if name != AGE]
+    found: dict[str, float | Mapping[int, float]] = {}
+    for name, values in given.items():
+        if name in parameter_names(start.model):
+            raise _constant(name, "parameter", "model")
+        if name not in known:
+            advice = f"there are {', '.join(known)}" if known else "the chart has none"
+            raise SessionError(f"no variable {name!r}", advice=advice)
+        if not isinstance(values, Mapping):
+            raise SessionError(
+                f"give its values by element, for example {{{name!r}: {{0: 0.1}}}}",
+                place=name,
+                value=values,
+            )
+        found[name] = {machine_of(i, start): value for i, value in values.items()}
+    return found
+
+
+def _of_system(start: Start, given: Mapping[str, Any]) -> dict[str, float | Mapping[int, float]]:
+    """Return the new values of the state vector of a system, checked."""
+    found: dict[str, float | Mapping[int, float]] = {}
+    for key, value in given.items():
+        name, i = _resolved(start, key)
+        if name in start.program.layout.y.shared:
+            found[name] = value
+            continue
+        block = start.program.layout.y.all_of(name)
+        several = {i: value} if i is not None else _by_element(key, value, len(block))
+        before = found.get(name, {})
+        found[name] = {**(before if isinstance(before, Mapping) else {}), **several}
+    return found
+
+
+def _resolved(start: Start, key: object) -> tuple[str, int | None]:
+    """Return the name in the state vector that a key means, and the element if it has a number."""
+    layout, known = start.program.layout, pokeable(start)
+    keys = {each: name for each, name in layout.keys.items() if name in known}
+    if isinstance(key, str):
+        if key in keys:
+            return keys[key], None
+        form = re.fullmatch(r"(.*?\D)(\d{1,9})", key)
+        name = keys.get(form[1], "") if form else ""
+        if form and name in layout.y.own and 1 <= int(form[2]) <= len(layout.y.all_of(name)):
+            return name, int(form[2]) - 1
+        if key in start.system.numbers:
+            raise _constant(key, "number", "system")
+        if key in start.system.signals:
+            raise _constant(key, "signal", "system")
+        for contact in start.system.contacts:
+            plain = key.removeprefix(f"{contact.name}.")
+            if plain in contact.chart.parameter_names:
+                raise _constant(key, "parameter", "system")
+        for body in start.system.bodies:
+            if body.driven and key in (body.v, f"{body.name}.v"):
+                raise SessionError(
+                    f"the velocity of {body.name} is given", advice="it cannot be poked"
+                )
+    raise SessionError(f"{shown(key)} cannot be poked", advice=f"there are {', '.join(known)}")
+
+
+def _constant(name: str, kind: str, whole: str) -> SessionError:
+    return SessionError(
+        f"{name} is a {kind}", advice=f"to change it, make another {whole} and session"
+    )
+
+
+def _by_element(key: object, value: Any, n: int) -> dict[int, float]:
+    """Return values by element: from a mapping, from one value each, or from that of the only."""
+    if isinstance(value, Mapping):
+        for i in value:
+            if not isinstance(i, int) or not 0 <= i < n:
+                raise SessionError(
+                    f"{key} of no element {shown(i)}", advice=f"there are 0 to {n - 1}"
+                )
+        return dict(value)
+    if isinstance(value, Iterable) and not isinstance(value, str):
+        several: Sequence[float] = list(value)
+        if len(several) == n:
+            return dict(enumerate(several))
+    elif n == 1:
+        return {0: value}
+    raise SessionError(
+        f"give {n} values, or some by element, for example {{{key!r}: {{0: 0.1}}}}",
+        place=str(key),
+        value=value,
+    )
+
+
+def initial_with(edits: Edits, start: Start, here: Row) -> dict[str, Any]:
     """Return the ``initial`` of a run that continues from a point with edits.
 
     Parameters
     ----------
     edits : Edits
         The changes.
-    here : Scope
-        The values at the point.
-    prescribed : bool
-        Whether the rig prescribes the velocity.
+    start : Start
+        Of the run.
+    here : Row
+        The point.
 
     Returns
     -------
     dict
-        In the form accepted by `gms_fsm.simulate`.
+        In the form accepted by `gms_fsm.simulate`: the whole state, with the changes.
     """
-    initial: dict[str, Any] = {"x": here.x}
-    for name in here.places.variables:
-        values = edits.variables.get(name, {})
-        initial[name] = [values.get(i, old) for i, old in enumerate(here.each(name))]
-    initial["states"] = [edits.state.get(i, name) for i, name in enumerate(here.states)]
-    if edits.v is not None or not prescribed:
-        initial["v"] = here.v if edits.v is None else edits.v
-    return initial
+    layout = start.program.layout
+    initial: dict[str, Any] = layout.y.named(here.y)
+    modes = list(here.mode[layout.elements])
+    poked = {machine_of(element, start): name for element, name in edits.state.items()}
+    for bank in layout.banks:
+        names = [state.name for state in start.system.contact(bank.name).chart.states]
+        active = enumerate(modes[bank.elements], start=bank.first)
+        initial[f"{bank.name}.states"] = [poked.get(i, names[mode]) for i, mode in active]
+        if AGE in bank.variables:
+            ages = enumerate(initial[bank.of(AGE)], start=bank.first)
+            initial[bank.of(AGE)] = [0.0 if i in poked else age for i, age in ages]
+    for name, values in edits.variables.items():
+        if isinstance(values, Mapping):
+            own = name if start.given is not None else layout.contact().of(name)
+            initial[own] = [values.get(i, old) for i, old in enumerate(initial[own])]
+        else:
+            initial[name] = values
+    return initial if edits.v is None else initial | {"v": edits.v}
+
+
+def check_locks(branch: Branch, here: Row, new: Row) -> None:
+    """Refuse a poke after which a contact moves in a state that holds its velocity at 0.
+
+    Parameters
+    ----------
+    branch : Branch
+        The branch in which the poke is made.
+    here, new : Row
+        The point, before and after.
+
+    Raises
+    ------
+    SessionError
+        If a locked contact moves that did not before.
+    """
+    moved = _locked_motion(branch, new)
+    for (contact, state, name), v in moved.items():
+        if (contact, state, name) not in _locked_motion(branch, here):
+            raise SessionError(
+                f"{contact} would be in {state}, which holds {name} at 0, with {name} = {v:.6g}",
+                advice=f"poke velocities for which {name} is 0, or another state",
+            )
+
+
+def _locked_motion(branch: Branch, row: Row) -> dict[tuple[str, str, str], float]:
+    """Return the velocities of locked contacts that are not 0."""
+    system, scope = branch.run.start.system, branch.system_scope(row)
+    fastest = max(abs(scope.value(body.v)) for body in system.bodies)
+    found: dict[tuple[str, str, str], float] = {}
+    for contact in system.contacts:
+        own = scope.contacts[contact.name]
+        for state in contact.chart.states:
+            if state.locked and state.name in own.states:
+                velocities = {name: own.seen[name] for name in contact.chart.velocities}
+                found |= {
+                    (contact.name, state.name, name): v
+                    for name, v in velocities.items()
+                    if abs(v) > ROUNDING * fastest
+                }
+    return found

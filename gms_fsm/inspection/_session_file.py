@@ -7,12 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gms_fsm._files import write_whole
 from gms_fsm.errors import SessionError, TraceFileError, why
+from gms_fsm.inspection import _walker
 from gms_fsm.inspection._branch import Branch
 from gms_fsm.inspection._breakpoints import Breakpoint
 from gms_fsm.inspection._poking import Edits
@@ -20,9 +21,13 @@ from gms_fsm.run.settings import Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Function
+from gms_fsm.systems.system import System, origin_of
 from gms_fsm.traces._header import Header
 
-__all__ = ["BranchRecord", "SessionRecord", "blamed", "options_of", "read", "write"]
+if TYPE_CHECKING:
+    from gms_fsm.inspection.session import Session
+
+__all__ = ["BranchRecord", "SessionRecord", "blamed", "read", "record_of", "restore", "write"]
 
 FORMAT = "gms-fsm session 1"
 
@@ -66,7 +71,7 @@ class SessionRecord:
     Parameters
     ----------
     model, rig, t_end, options
-        As for `Session`.
+        As for `Session`; of a system the rig is None.
     branches : sequence of BranchRecord
         The first is the original run.
     current : int
@@ -77,14 +82,20 @@ class SessionRecord:
         The watch expressions.
     """
 
-    model: Model
-    rig: Rig
+    model: Model | System
+    rig: Rig | None
     t_end: float
     options: Mapping[str, Any]
     branches: Sequence[BranchRecord]
     current: int
     breakpoints: Sequence[Breakpoint]
     watches: Sequence[str]
+
+    @property
+    def arguments(self) -> tuple[Any, ...]:
+        """The positional arguments of `Session`."""
+        rig = () if self.rig is None else (self.rig,)
+        return self.model, *rig, self.t_end
 
 
 def options_of(
@@ -102,16 +113,51 @@ def options_of(
     return chosen if initial is None else chosen | {"initial": dict(initial)}
 
 
+def record_of(session: Session) -> SessionRecord:
+    """Describe a session."""
+    return SessionRecord(
+        *session.made_of,
+        options_of(session.settings, session.t_start, session.initial),
+        [BranchRecord.of(branch) for branch in session.branches],
+        session.current,
+        session.breakpoints,
+        session.watches,
+    )
+
+
+def restore(session: Session, record: SessionRecord) -> None:
+    """Restore a session by moving to each of its cursors again."""
+    for branch in record.branches:
+        if branch.edits is not None:
+            assert branch.parent is not None
+            session.switch(branch.parent)
+            _walker.walk_to(session.branch, branch.fork, branch.begin)
+            session.poke(branch.edits.variables, branch.edits.v, branch.edits.state)
+    for number, branch in enumerate(record.branches):
+        session.switch(number)
+        _walker.walk_to(session.branch, branch.cursor, branch.between)
+    session.switch(record.current)
+    for point in record.breakpoints:
+        where: int | str | None = point.element
+        if point.contact:
+            element = "" if point.element is None else f" {point.element + 1}"
+            where = f"{point.contact}{element}"
+        found = session.break_on(point.kind, point.name, where, point.condition, point.hits)
+        found.seen = point.seen
+    session.watches = list(record.watches)
+
+
 def write(path: Path, record: SessionRecord) -> Path:
     """Write a session; raise `SessionError` for anything a file cannot store."""
-    if any(isinstance(signal, Function) for signal in record.rig.signals.values()):
+    signals = (record.model if record.rig is None else record.rig).signals  # type: ignore[union-attr]
+    if any(isinstance(signal, Function) for signal in signals.values()):
         raise SessionError("a signal is a Python function, which a file cannot store")
     for name, value in record.options.items():
         if not isinstance(value, str | int | float | dict | type(None)):
             raise SessionError(f"the option {name} = {value!r} cannot be written to a file")
     data = {
         "format": FORMAT,
-        "header": json.loads(Header.of(record.model, record.rig, None, {}).model_dump_json()),
+        "header": json.loads(_header(record).model_dump_json()),
         "t_end": record.t_end,
         "options": {name: _plain(value) for name, value in record.options.items()},
         "branches": [
@@ -133,15 +179,23 @@ def write(path: Path, record: SessionRecord) -> Path:
     return write_whole(path, lambda file: file.write(text))
 
 
+def _header(record: SessionRecord) -> Header:
+    if isinstance(record.model, System):
+        return Header.of(*origin_of(record.model), record.model, {})
+    assert record.rig is not None
+    return Header.of(record.model, record.rig, None, {})
+
+
 def read(path: Path) -> SessionRecord:
     """Read a session; a faulty file raises any kind of error."""
     data = json.loads(path.read_text(encoding="utf-8"))
     if data["format"] != FORMAT:
         raise ValueError(f"format is {data['format']!r}")
     header = Header.model_validate(data["header"])
+    system = header.to_system()
     return SessionRecord(
-        header.to_model(),
-        header.to_rig(),
+        header.to_model() if system is None else system,
+        header.to_rig() if system is None else None,
         data["t_end"],
         data["options"],
         [_branch(record) for record in data["branches"]],
@@ -154,7 +208,10 @@ def read(path: Path) -> SessionRecord:
 def _branch(record: Mapping[str, Any]) -> BranchRecord:
     edits, given = None, record["edits"]
     if given:
-        own = {name: _by_number(values) for name, values in given["variables"].items()}
+        own = {
+            name: _by_number(values) if isinstance(values, Mapping) else float(values)
+            for name, values in given["variables"].items()
+        }
         edits = Edits(own, given["v"], _by_number(given["state"]))
     return BranchRecord(
         record["parent"],
@@ -166,15 +223,17 @@ def _branch(record: Mapping[str, Any]) -> BranchRecord:
     )
 
 
-def _by_number(values: Mapping[str, Any]) -> dict[int, Any]:
-    """Return values by element, with the keys converted from JSON strings to integers."""
-    return {int(element): value for element, value in values.items()}
+def _by_number(values: Mapping[str, Any]) -> dict[Any, Any]:
+    """Return values by element, with keys that JSON made strings of converted to integers."""
+    return {int(key) if key.isdecimal() else key: value for key, value in values.items()}
 
 
 def _plain(value: Any) -> Any:
     """Return an option with its arrays as lists."""
     if isinstance(value, Mapping):
         return {name: _plain(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 

@@ -78,6 +78,9 @@ class Explanation:
         true; empty for none.
     past : bool
         Whether it led to this row; the values are then those before the firing.
+    tick : float or None
+        Of a contact with a period, away from its ticks: time of the next one, s (infinite after
+        the last). The guard is evaluated only then.
 
     Examples
     --------
@@ -97,6 +100,7 @@ class Explanation:
     holds: bool
     taken: str = ""
     past: bool = False
+    tick: float | None = None
 
     @property
     def fired(self) -> bool:
@@ -125,6 +129,10 @@ class Why:
         The explanations; empty if no edge leaves the state.
     sigma : mapping of str to float
         The signs held between -1 and 1, keyed by the quantity that is zero.
+    contact : str
+        The contact, in the run of a system; else empty.
+    tick : float or None
+        As in `Explanation`.
     """
 
     element: int
@@ -133,6 +141,8 @@ class Why:
     left: str
     edges: tuple[Explanation, ...]
     sigma: Mapping[str, float] = field(default_factory=dict)
+    contact: str = ""
+    tick: float | None = None
 
     def __iter__(self) -> Iterator[Explanation]:
         return iter(self.edges)
@@ -144,10 +154,14 @@ class Why:
         return self.edges[index]
 
     def __str__(self) -> str:
-        lines = [f"element {self.element + 1} is in {self.state} at t = {self.t:.9g} s"]
+        who = f"{self.contact or 'element'} {self.element + 1}"
+        lines = [f"{who} is in {self.state} at t = {self.t:.9g} s"]
         if self.left:
             lines.append(f"it has just left {self.left}; the values are those before the firing")
         lines += [f"held on {name} = 0, σ = {u:.2g}" for name, u in self.sigma.items()]
+        if self.tick is not None and self.edges:
+            when = f"at t = {self.tick:.9g} s" if math.isfinite(self.tick) else "after the run"
+            lines.append(f"its guards are evaluated at ticks only, the next time {when}")
         if not self.edges:
             lines.append("no edge leaves this state")
         return "\n".join([*lines, *map(_verdict, self.edges), *map(_detail, self.edges)])
@@ -218,11 +232,16 @@ def explain(trace: Trace, row: int, element: int) -> Why:
     now, source = (chart.states[int(modes[r])].name for r in (row, before))
     edges = explain_state(chart, source, values_at(trace, before, element), fired)
     left = source if fired else ""
-    return Why(element, float(trace.t[row]), now, left, tuple(edges), trace.sigma(row))
+    contact = "" if trace.system is None else trace.places.name
+    return Why(element, float(trace.t[row]), now, left, tuple(edges), trace.sigma(row), contact)
 
 
 def explain_state(
-    chart: Chart, state: str, values: Mapping[str, float], fired: str = ""
+    chart: Chart,
+    state: str,
+    values: Mapping[str, float],
+    fired: str = "",
+    tick: float | None = None,
 ) -> list[Explanation]:
     """Explain the edges that leave a state.
 
@@ -236,6 +255,8 @@ def explain_state(
         A value for every name in its guards.
     fired : str
         The edge that was taken, if any.
+    tick : float, optional
+        As in `Explanation`.
 
     Returns
     -------
@@ -253,6 +274,7 @@ def explain_state(
             true[edge.name],
             taken,
             bool(fired),
+            tick,
         )
         for priority, edge in enumerate(leaving, start=1)
     ]
@@ -324,6 +346,8 @@ def _verdict(each: Explanation) -> str:
     if each.holds:
         if each.taken != name:
             return f"{name} does not fire: its guard is true, but {each.taken} takes precedence."
+        if each.tick is not None:
+            return f"{name} fires at the next tick if its guard is then still true."
         return f"{name} fires next: every clause is true."
     parts = []
     for clause in each.clauses:

@@ -14,28 +14,28 @@ from typing import Any, Unpack
 from gms_fsm._arguments import checked_path
 from gms_fsm.errors import SessionError
 from gms_fsm.inspection import _breakpoints, _conditions, _session_file, _walker
-from gms_fsm.inspection._arguments import check_branch, check_element, check_row, checked_settings
+from gms_fsm.inspection._arguments import check_branch, check_row, checked_settings, chosen_pair
 from gms_fsm.inspection._branch import Branch
 from gms_fsm.inspection._breakpoints import KINDS, Breakpoint
 from gms_fsm.inspection._conditions import holds_at
+from gms_fsm.inspection._elements import machine_of, title_of
 from gms_fsm.inspection._here import here_at, why_at
-from gms_fsm.inspection._poking import Edits, initial_with
+from gms_fsm.inspection._poking import Edits, check_locks, initial_with
 from gms_fsm.inspection._results import BranchComparison, Fired, Here, compared
-from gms_fsm.inspection._session_file import BranchRecord, SessionRecord
 from gms_fsm.inspection.explain import Why
 from gms_fsm.language import Condition
 from gms_fsm.run.settings import SettingOptions, Settings
-from gms_fsm.run.simulate import Run
+from gms_fsm.run.simulate import Run, mounted
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
-from gms_fsm.traces.scope import watch_names
+from gms_fsm.systems.system import System
 
 __all__ = ["KINDS", "Branch", "BranchComparison", "Breakpoint", "Fired", "Here", "Session"]
 
 
 class Session:
-    """A simulation to step through.
+    """A simulation to step through: ``Session(model, rig, t_end)``, or ``Session(system, t_end)``.
 
     Parameters
     ----------
@@ -44,6 +44,8 @@ class Session:
 
     Attributes
     ----------
+    made_of : tuple
+        Model, rig and t_end; the rig of a system is None.
     branches : list of Branch
         The first is the original run; each poke adds one.
     current : int
@@ -61,8 +63,8 @@ class Session:
     >>> session
     <Session: GMS, 4 elements, published law; prescribed velocity, to t = 100 s; at t = 0 s>
 
-    A move returns the row at which it stopped, as an object that prints as readable text.
-    Elements are numbered from 0 in Python, and from 1 in printed text and in conditions.
+    A move returns the row at which it stopped, which prints as readable text. Elements are
+    numbered from 0 in Python, and from 1 in printed text and in conditions.
 
     >>> here = session.next_transition()
     >>> round(here.t, 3), here.fired.element, here.fired.edge, here.states[0]
@@ -70,13 +72,15 @@ class Session:
     >>> print(here)
     row 12, t = 4.91276067 s, micro-step 1: v = 0.141608 m/s, F = 1.34657 N
       element 1: stick -> slip by break_away_forward
+
+    In a system elements are named in text, counted from 1: ``why("gear 1")``.
     """
 
     def __init__(
         self,
-        model: Model,
-        rig: Rig,
-        t_end: float,
+        model: Model | System,
+        rig: Rig | float,
+        t_end: float | None = None,
         *,
         t_start: float = 0.0,
         initial: Mapping[str, Any] | None = None,
@@ -84,7 +88,7 @@ class Session:
         **options: Unpack[SettingOptions],
     ) -> None:
         self.settings = checked_settings(settings, options)
-        self.model, self.rig, self.t_end = model, rig, t_end
+        self.made_of = model, *mounted("Session", model, rig, t_end)
         self.t_start, self.initial = t_start, initial
         self.branches = [Branch(self._run(t_start, initial))]
         self.current = 0
@@ -93,24 +97,43 @@ class Session:
 
     def _run(self, t_start: float, initial: Mapping[str, Any] | None) -> Run:
         """Return a run of this model from given values."""
-        return Run(
-            Start.of(
-                self.model,
-                self.rig,
-                self.t_end,
-                self.settings,
-                t_start=t_start,
-                initial=initial,
-                rows_at_once=1,
-            )
-        )
+        options: Any = {"t_start": t_start, "initial": initial, "ticks_from": self.t_start}
+        return Run(Start.of(*self.made_of, self.settings, rows_at_once=1, **options))
 
     def __repr__(self) -> str:
         branch = f", branch {self.current}" if self.current else ""
-        return (
-            f"<Session: {self.model.title}; {self.rig.title}, to t = {self.t_end:g} s; "
-            f"at t = {self.here.t:.9g} s{branch}>"
-        )
+        return f"<Session: {self.title}; at t = {self.here.t:.9g} s{branch}>"
+
+    # ------------------------------------------------------------------ what runs
+    @property
+    def start(self) -> Start:
+        """The run, ready to start: its system, program and settings."""
+        return self.branches[0].run.start
+
+    @property
+    def t_end(self) -> float:
+        """End of the run, s."""
+        return self.made_of[-1]
+
+    @property
+    def system(self) -> System:
+        """The system that runs; of a model on a rig the one it is lowered to."""
+        return self.start.system
+
+    @property
+    def model(self) -> Model:
+        """The model; of a system its contact, if it has one only."""
+        return self.start.model
+
+    @property
+    def rig(self) -> Rig:
+        """The rig; of a system what moves its contacts."""
+        return self.start.rig
+
+    @property
+    def title(self) -> str:
+        """One line on what runs, and until when."""
+        return f"{title_of(self.start)}, to t = {self.t_end:g} s"
 
     # ------------------------------------------------------------------ where we are
     @property
@@ -208,9 +231,10 @@ class Session:
     def names(self) -> list[str]:
         """Names allowed in conditions and watches, with elements numbered from 1.
 
-        Variables of a single element need no number.
+        Variables of a single element need no number. In a system these are its own names, and those
+        of its contacts, such as ``gear.F``.
         """
-        return watch_names(self.model)
+        return _conditions.names_of(self.start)
 
     def parse(self, text: str) -> Condition:
         """Parse a condition such as ``"z1 > 0.3 and state(2) == slip"``.
@@ -219,7 +243,7 @@ class Session:
         ----------
         text : str
             In the expression language; ``s`` is the Stribeck curve at v, ``s1`` the threshold
-            of element 1.
+            of element 1. In a system: ``"x_l > 0.1 and gear.state(1) == left"``.
 
         Returns
         -------
@@ -231,11 +255,11 @@ class Session:
         ExpressionError
             If it cannot be parsed; the message names the column and what is allowed.
         """
-        return _conditions.read(self.model, text)
+        return _conditions.read(self.start, text)
 
     def values(self) -> dict[str, Any]:
         """Return the values at the cursor of all names allowed in conditions."""
-        return self.branch.scope(self.branch.here).watches()
+        return self.branch.watches(self.branch.here)
 
     def watch(self, text: str) -> float:
         """Return the value of an expression at the cursor.
@@ -257,15 +281,15 @@ class Session:
         SessionError
             If it cannot be computed here, for example because of a division by zero.
         """
-        return _conditions.value_of(self.model, text, self.values())
+        return _conditions.value_of(self.start, text, self.values())
 
     def until(self, condition: str) -> Here:
-        """Go forward to the next point where a condition becomes true, located between rows.
+        """Go forward as `reaches` does.
 
         Parameters
         ----------
         condition : str
-            See `parse`. If it is already true, it must first become false.
+            See `parse`.
 
         Returns
         -------
@@ -276,7 +300,7 @@ class Session:
         return self.here
 
     def reaches(self, condition: str) -> bool:
-        """Go forward as `until` does, and return whether the condition became true.
+        """Go forward to the next point where a condition becomes true, located between rows.
 
         Parameters
         ----------
@@ -303,7 +327,12 @@ class Session:
 
     # ------------------------------------------------------------------ breakpoints
     def break_on(
-        self, kind: str, name: str, element: int | None = None, condition: str = "", hits: int = 1
+        self,
+        kind: str,
+        name: str,
+        element: int | str | None = None,
+        condition: str = "",
+        hits: int = 1,
     ) -> Breakpoint:
         """Set a breakpoint.
 
@@ -313,8 +342,9 @@ class Session:
             See `Breakpoint`.
         name : str
             An edge (tested, valid, fires) or a state (enter, leave).
-        element : int, optional
-            Element index, from 0; all elements if omitted.
+        element : int or str, optional
+            Element index, from 0; in a system ``"gear 1"``, or ``"gear"`` for all elements of the
+            contact. All elements if omitted.
         condition : str, optional
             Additional condition that must hold.
         hits : int
@@ -332,12 +362,7 @@ class Session:
         ExpressionError
             If the condition cannot be parsed.
         """
-        chart = self.model.chart
-        found = _breakpoints.new_breakpoint(chart, kind, name, element, condition, hits)
-        if element is not None:
-            check_element(element, self.model)
-        if condition:
-            self.parse(condition)
+        found = _breakpoints.new_breakpoint(self.start, kind, name, element, condition, hits)
         self.breakpoints.append(found)
         return found
 
@@ -351,21 +376,21 @@ class Session:
         """
         for row in _walker.forward(self.branch):
             for point in self.breakpoints:
-                if _breakpoints.hits(point, self.model, self.branch, row):
+                if _breakpoints.hits(point, self.branch, row):
                     point.seen += 1
                     if point.seen >= point.hits:
                         return self.here, point
         return self.here, None
 
-    def why(self, element: int = 0, edge: str = "") -> Why:
+    def why(self, element: int | str = 0, edge: str = "") -> Why:
         """Explain the edges of an element at the cursor, clause by clause.
 
         On a row where it fired, these are the edges of the state it left; the edge taken is marked.
 
         Parameters
         ----------
-        element : int
-            Element index, from 0.
+        element : int or str
+            Element index, from 0; in a system the text ``"gear 1"``, counted from 1.
         edge : str, optional
             Explain only this edge; all if omitted. On a row where the element fired, the edge may
             also leave the state that was entered.
@@ -395,27 +420,30 @@ class Session:
         >>> session.why()[0].clauses[1].holds
         False
         """
-        check_element(element, self.model)
-        return why_at(self.branch, element, edge)
+        return why_at(self.branch, machine_of(element, self.start), edge)
 
     # ------------------------------------------------------------------ branches
     def poke(
         self,
-        variables: Mapping[str, Mapping[int, float]] | None = None,
+        variables: Mapping[str, Any] | None = None,
         v: float | None = None,
-        state: Mapping[int, str] | None = None,
+        state: Mapping[Any, str] | None = None,
     ) -> int:
         """Change values at the cursor and continue in a new branch; the present one is kept.
 
+        Ticks of samplers and of contacts with a period stay where they are.
+
         Parameters
         ----------
-        variables : mapping of str to mapping of int to float, optional
+        variables : mapping of str to float, or to mapping of int to float, optional
             New values of the variables of the chart, by element index, from 0:
-            ``{"z": {0: 0.1}, "w": {1: 2.0}}``.
+            ``{"z": {0: 0.1}, "w": {1: 2.0}}``. In a system by the names of ``initial``:
+            ``{"load.x": 0.1, "gear.z": {0: 0.1}, "gear.z2": 0.2, "u": 0.0}``.
         v : float, optional
             New velocity, m/s; not allowed if the velocity is prescribed.
-        state : mapping of int to str, optional
-            New states by element.
+        state : mapping of int or str to str, optional
+            New states by element; in a system ``{"gear 1": "left"}``. The time in the state is
+            then 0.
 
         Returns
         -------
@@ -425,8 +453,8 @@ class Session:
         Raises
         ------
         SessionError
-            If there is nothing to change, no such variable or element, or the cursor is at the
-            end of the run.
+            If there is nothing to change, no such variable or element, a locked contact would
+            move, or the cursor is at the end of the run.
         ParameterError, ChartError
             If a value violates its rule.
 
@@ -441,14 +469,13 @@ class Session:
         >>> session.here.z[:2], session.here.states[3]
         ((-1.4, 0.0), 'slip')
         """
-        edits = Edits.of(self.model, variables, v, state)
+        edits = Edits.of(self.start, variables, v, state)
         branch, here = self.branch, self.branch.here
         if not here.t < self.t_end:
             raise SessionError(f"t = {here.t!r} s is the end of the run", advice="go back first")
-        prescribed = self.rig.acceleration is None
-        initial = initial_with(edits, branch.scope(here), prescribed=prescribed)
-        run = self._run(here.t, initial)
+        run = self._run(here.t, initial_with(edits, self.start, here))
         new = Branch(run, self.current, branch.cursor, branch, edits, branch.between)
+        check_locks(branch, here, new.raw(new.offset))
         new.cursor = new.offset
         self.branches.append(new)
         self.current = len(self.branches) - 1
@@ -487,7 +514,8 @@ class Session:
         Returns
         -------
         BranchComparison
-            Transitions, and largest differences of the first variable and F.
+            Transitions, and largest differences of the first variable and F; of a system those of
+            every body and contact.
 
         Raises
         ------
@@ -507,16 +535,11 @@ class Session:
           first different transition at t = 12.4999735 s
           largest difference: z 0.599 m, F 0.375 N
         """
-        for number in (a, b):
-            if number is not None:
-                check_branch(number, len(self.branches))
-        b = self.current if b is None else b
-        a = self.branches[b].parent if a is None else a
-        if a is None:
-            raise SessionError(f"branch {b} has no parent", advice="give two branch numbers")
-        for number in (a, b):
+        pair = chosen_pair(a, b, self.current, [branch.parent for branch in self.branches])
+        for number in pair:
             self.branches[number].complete()
-        return compared((a, b), self.branches[a].trace(), self.branches[b].trace())
+        first, second = (self.branches[number].trace() for number in pair)
+        return compared(pair, first, second)
 
     # ------------------------------------------------------------------ files
     def save(self, path: str | Path) -> Path:
@@ -541,17 +564,7 @@ class Session:
         OutputError
             If the file cannot be written.
         """
-        record = SessionRecord(
-            self.model,
-            self.rig,
-            self.t_end,
-            _session_file.options_of(self.settings, self.t_start, self.initial),
-            [BranchRecord.of(branch) for branch in self.branches],
-            self.current,
-            self.breakpoints,
-            self.watches,
-        )
-        return _session_file.write(checked_path("path", path), record)
+        return _session_file.write(checked_path("path", path), _session_file.record_of(self))
 
     @classmethod
     def load(cls, path: str | Path) -> Session:
@@ -574,26 +587,7 @@ class Session:
         """
         path = checked_path("path", path)
         with _session_file.blamed(path):
-            return cls._of(_session_file.read(path))
-
-    @classmethod
-    def _of(cls, record: SessionRecord) -> Session:
-        """Restore a session by moving to each of its cursors again."""
-        session = cls(record.model, record.rig, record.t_end, **record.options)
-        for branch in record.branches:
-            if branch.edits is not None:
-                assert branch.parent is not None
-                session.switch(branch.parent)
-                _walker.walk_to(session.branch, branch.fork, branch.begin)
-                session.poke(branch.edits.variables, branch.edits.v, branch.edits.state)
-        for number, branch in enumerate(record.branches):
-            session.switch(number)
-            _walker.walk_to(session.branch, branch.cursor, branch.between)
-        session.switch(record.current)
-        for point in record.breakpoints:
-            found = session.break_on(
-                point.kind, point.name, point.element, point.condition, point.hits
-            )
-            found.seen = point.seen
-        session.watches = list(record.watches)
-        return session
+            record = _session_file.read(path)
+            session = cls(*record.arguments, **record.options)
+            _session_file.restore(session, record)
+            return session

@@ -40,7 +40,7 @@ from gms_fsm.language._normal import (
 )
 from gms_fsm.language._powers import LARGEST_PRODUCT_POWER, integer_power, product_power
 from gms_fsm.language._print import LEVELS, MATLAB_LIKE, PYTHON, Spelling, spell
-from gms_fsm.language._read import parse_condition, parse_value
+from gms_fsm.language._read import Owner, parse_condition, parse_value
 from gms_fsm.language._tree import (
     Binary,
     Both,
@@ -83,6 +83,7 @@ __all__ = [
     "Node",
     "Not",
     "Number",
+    "Owner",
     "Relation",
     "Requirement",
     "Spelling",

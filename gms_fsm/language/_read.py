@@ -12,6 +12,8 @@ import math
 import re
 import warnings
 from collections.abc import Iterable, Mapping
+from functools import cached_property
+from typing import NamedTuple
 
 from gms_fsm.errors import ExpressionError, shown
 from gms_fsm.language._functions import CONSTANTS, FUNCTIONS, NAMESPACE, SEVERAL
@@ -31,7 +33,7 @@ from gms_fsm.language._tree import (
     Value,
 )
 
-__all__ = ["parse_condition", "parse_value"]
+__all__ = ["Owner", "parse_condition", "parse_value"]
 
 LONGEST_TEXT = 10_000  # characters; a chart's text is a line, not a program
 DEEPEST_TREE = 60  # levels; keeps every recursive reader far below Python's recursion limit
@@ -73,6 +75,24 @@ _ALIASES: Mapping[str, str] = {"sign": "sgn", "signum": "sgn", "fabs": "abs"}
 _GRAMMAR = "numbers, names, + - * / **, < <= > >=, and or not, " + " ".join(FUNCTIONS) + " pi"
 
 
+class Owner(NamedTuple):
+    """Elements that belong to a name: ``gear.state(2) == slip``.
+
+    Parameters
+    ----------
+    first : int
+        How many elements come before its first one, counted over all owners.
+    n : int
+        Number of its elements.
+    states : tuple of str
+        Names of their states.
+    """
+
+    first: int
+    n: int
+    states: tuple[str, ...]
+
+
 def parse_value(text: str, names: Iterable[str]) -> Value:
     """Parse a text that stands for a number.
 
@@ -81,7 +101,7 @@ def parse_value(text: str, names: Iterable[str]) -> Value:
     text : str
         For example ``"C * (sgn(v) - z / s)"``.
     names : iterable of str
-        The names that may occur.
+        The names that may occur, also with a dot, such as ``gear.F``.
 
     Returns
     -------
@@ -109,6 +129,7 @@ def parse_condition(
     elements: int = 0,
     *,
     own_state: bool = False,
+    owners: Mapping[str, Owner] | None = None,
 ) -> Condition:
     """Parse a text that is true or false, such as a guard.
 
@@ -124,6 +145,9 @@ def parse_condition(
         Number of elements; i counts from 1.
     own_state : bool
         Whether ``state == name`` may refer to the current element (as in invariants).
+    owners : mapping of str to Owner, optional
+        Names whose elements ``gear.state(i) == name`` may use, and ``gear.state == name`` if there
+        is one. In the tree elements are counted over all owners.
 
     Returns
     -------
@@ -141,7 +165,8 @@ def parse_condition(
     >>> spell(parse_condition("0 < v < 1", ["v"]))
     '0.0 < v and v < 1.0'
     """
-    return _Reader(text, names, states, elements, own_state).condition(_parsed(text), 0)
+    reader = _Reader(text, names, states, elements, own_state, owners or {})
+    return reader.condition(_parsed(text), 0)
 
 
 def _parsed(text: str) -> ast.expr:
@@ -211,10 +236,12 @@ class _Reader:
         states: Iterable[str] = (),
         elements: int = 0,
         own_state: bool = False,
+        owners: Mapping[str, Owner] | None = None,
     ) -> None:
         self.text = text
         self.names = tuple(dict.fromkeys(names))
-        self.states, self.elements, self.own_state = tuple(states), elements, own_state
+        self.own = Owner(0, elements, tuple(states))
+        self.own_state, self.owners = own_state, owners or {}
         self.comparisons = 0
 
     def refuse(self, reason: str, node: ast.expr, allowed: str = _GRAMMAR) -> ExpressionError:
@@ -241,18 +268,9 @@ class _Reader:
                     raise self.refuse("the number is too large", node, "finite numbers")
                 return Number(real)
             case ast.Name(id=name):
-                if name in self.names:
-                    return Name(name)
-                if name in CONSTANTS:
-                    return Number(CONSTANTS[name])
-                if name in FUNCTIONS:
-                    raise self.refuse(f"the function {name!r} needs (...)", node, f"{name}(...)")
-                known = ", ".join(self.names) or "none"
-                raise self.refuse(
-                    f"unknown name {shown(name)}{_suggestion(name, self.names)}",
-                    node,
-                    f"the names {known}, and pi",
-                )
+                return self.name(node, name)
+            case ast.Attribute(value=ast.Name(id=owner), attr=attribute) if self.dotted:
+                return self.name(node, f"{owner}.{attribute}")
             case ast.UnaryOp(op=ast.USub(), operand=operand):
                 return Negative(self.value(operand, depth))
             case ast.UnaryOp(op=ast.UAdd(), operand=operand):
@@ -267,6 +285,25 @@ class _Reader:
             case ast.Compare() | ast.BoolOp() | ast.UnaryOp(op=ast.Not()):
                 raise self.refuse("found a comparison where a number is needed", node)
         raise self.refuse(f"{_plain(node)} is not part of the language", node)
+
+    def name(self, node: ast.expr, name: str) -> Value:
+        if name in self.names:
+            return Name(name)
+        if name in CONSTANTS:
+            return Number(CONSTANTS[name])
+        if name in FUNCTIONS:
+            raise self.refuse(f"the function {name!r} needs (...)", node, f"{name}(...)")
+        known = ", ".join(self.names) or "none"
+        raise self.refuse(
+            f"unknown name {shown(name)}{_suggestion(name, self.names)}",
+            node,
+            f"the names {known}, and pi",
+        )
+
+    @cached_property
+    def dotted(self) -> bool:
+        """Whether names with a dot may occur."""
+        return any("." in name for name in self.names)
 
     def known(self, node: ast.expr, function: str) -> None:
         if function not in NAMESPACE:
@@ -305,12 +342,32 @@ class _Reader:
         match node:
             case ast.Compare(
                 left=ast.Call(func=ast.Name(id="state")) as call, ops=[op], comparators=[name]
-            ) if self.states:
-                return self.in_state(self.numbered(call), op, name)
+            ) if self.own.states:
+                return self.in_state(self.own, self.numbered(call, self.own), op, name)
             case ast.Compare(left=ast.Name(id="state"), ops=[op], comparators=[name]) if (
                 self.own_state
             ):
-                return self.in_state(0, op, name)
+                return self.in_state(self.own, 0, op, name)
+            case ast.Compare(
+                left=ast.Call(func=ast.Attribute(value=ast.Name(id=of), attr="state")) as call,
+                ops=[op],
+                comparators=[name],
+            ) if of in self.owners:
+                element = self.numbered(call, self.owners[of], f"{of}.")
+                return self.in_state(self.owners[of], element, op, name)
+            case ast.Compare(
+                left=ast.Attribute(value=ast.Name(id=of), attr="state") as left,
+                ops=[op],
+                comparators=[name],
+            ) if of in self.owners:
+                if self.owners[of].n > 1:
+                    raise self.refuse(f"{of}.state needs a number", left, f"{of}.state(1)")
+                return self.in_state(self.owners[of], self.owners[of].first + 1, op, name)
+            case ast.Compare(
+                left=(ast.Name(id="state") | ast.Call(func=ast.Name(id="state"))) as left
+            ) if self.owners:
+                some = next(iter(self.owners))
+                raise self.refuse("state needs its owner", left, f"for example {some}.state(1)")
             case ast.Compare(left=left, ops=ops, comparators=comparators):
                 sides = [left, *comparators]
                 self.comparisons += len(ops)
@@ -354,18 +411,20 @@ class _Reader:
                 )
         raise self.refuse(f"{_plain(node)} is not part of the language", node)
 
-    def numbered(self, call: ast.Call) -> int:
+    def numbered(self, call: ast.Call, whose: Owner, lead: str = "") -> int:
         match call.args:
             case [ast.Constant(value=element)] if type(element) is int:  # True is not 1 here
-                if 1 <= element <= self.elements:
-                    return element
+                if 1 <= element <= whose.n:
+                    return whose.first + element
         raise self.refuse(
-            "state(...) takes an element number", call, f"state(1) to state({self.elements})"
+            f"{lead}state(...) takes an element number",
+            call,
+            f"{lead}state(1) to {lead}state({whose.n})",
         )
 
-    def in_state(self, element: int, op: ast.cmpop, name: ast.expr) -> Condition:
-        if not isinstance(name, ast.Name) or name.id not in self.states:
-            raise self.refuse("unknown state", name, "the states " + ", ".join(self.states))
+    def in_state(self, whose: Owner, element: int, op: ast.cmpop, name: ast.expr) -> Condition:
+        if not isinstance(name, ast.Name) or name.id not in whose.states:
+            raise self.refuse("unknown state", name, "the states " + ", ".join(whose.states))
         if not isinstance(op, ast.Eq | ast.NotEq):
             raise self.refuse("states are compared by == or !=", name, "state(1) == slip")
         found = InState(element, name.id)

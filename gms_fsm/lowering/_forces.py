@@ -182,13 +182,14 @@ class Forces(Writer):
         ]
 
     def threshold_seen(self, bank: Bank) -> Line:
-        """Store the threshold of an element: that of its model, or the chart's own."""
+        """Store the threshold of an element: that of its model, or what s means in its chart."""
         seen, s = self.layout.observed, of(bank.name, "s")
-        if not bank.threshold and s not in self.read.owner:
+        means = Name(bank.threshold) if bank.threshold else bank.means.get("s")
+        if means is None:
             return self.store("out", seen, s, "nan")
-        threshold = bank.threshold or s
         place, sizes = self.at("out", seen, s)
-        return Line(f"{place} = {self.local(threshold)}", sizes | {threshold})
+        line = self.put(place, means)
+        return Line(line.text, line.reads | sizes)
 
     def driven_accelerations(self) -> list[Line]:
         """Write the accelerations of driven bodies that locks refer to."""

@@ -492,7 +492,7 @@ class _Printer(Forces):
             for name in shown.blocks[bank.index].names:
                 place, sizes = self.at("out", shown, name)
                 means = bank.means.get(name.removeprefix(start))
-                if means is None or name not in self.read.owner:
+                if means is None:
                     rows.append(Line(f"{place} = nan", sizes))
                 else:
                     line = self.put(place, means)

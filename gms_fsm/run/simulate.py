@@ -34,7 +34,7 @@ from integrators import Arc, HybridError, hybrid
 from integrators.advance import ROW, STEPS
 from integrators.steps import T
 
-__all__ = ["Moment", "Run", "simulate"]
+__all__ = ["Moment", "Run", "mounted", "simulate"]
 
 
 def simulate(
@@ -90,7 +90,8 @@ def simulate(
         Wall-clock time in s between two checkpoints.
     monitors : str or iterable of str or Monitor
         Checks of the run: ``"chattering"``, ``"passivity"``, ``"coverage"``, ``"all"`` of these,
-        invariants such as ``"abs(z) <= 2*s"``, or objects from `gms_fsm.traces.monitors`. Their
+        invariants such as ``"abs(z) <= 2*s"``, or objects from `gms_fsm.traces.monitors`; in a
+        system also those of one contact, such as ``"gear: passivity"``. Their
         verdicts are in ``Trace.monitors``. They examine the rows and the log after the run has
         ended or failed.
     **options
@@ -124,7 +125,7 @@ def simulate(
     >>> len(trace.transitions)
     48
     """
-    on, end = _mounted(model, rig, t_end)
+    on, end = mounted("simulate", model, rig, t_end)
     if isinstance(engine, ElementMachines):
         if machines is not None:
             raise ParameterError(
@@ -147,7 +148,9 @@ def simulate(
                 "engine 'ifelse' uses no machines", advice="leave machines=... out"
             )
     start = Start.of(model, on, end, chosen, t_start=t_start, initial=initial)
-    watching = checked(monitors, start.model, start.output).values() if monitors else ()
+    watching = (
+        checked(monitors, start.given or start.model, start.output).values() if monitors else ()
+    )
     run = CompiledRun(start, machines) if chosen.engine == "compiled" else Run(start, machines)
     keeper = None if path is None else Checkpointer(run, path, checkpoint_every)
     try:
@@ -169,15 +172,35 @@ def simulate(
     return watched(trace, watching) if watching else trace
 
 
-def _mounted(model: object, rig: Rig | float, t_end: float | None) -> tuple[Rig | None, float]:
-    """Return the rig, if there is one, and the end of the run."""
+def mounted(
+    caller: str, model: object, rig: Rig | float, t_end: float | None
+) -> tuple[Rig | None, float]:
+    """Return the rig, if there is one, and the end of the run.
+
+    Parameters
+    ----------
+    caller : str
+        Name of the function or class, for messages.
+    model, rig, t_end
+        As for `simulate`.
+
+    Returns
+    -------
+    (Rig or None, float)
+        The rig is None for a system.
+
+    Raises
+    ------
+    ParameterError
+        If a system has a rig, or the end of the run is missing.
+    """
     if isinstance(model, System):
         if t_end is not None and not isinstance(rig, float | int):
             raise ParameterError(
                 "a system has no rig",
                 place="rig",
                 value=rig,
-                advice="write simulate(system, t_end)",
+                advice=f"write {caller}(system, t_end)",
             )
         return None, rig if t_end is None else t_end  # type: ignore[return-value]
     if t_end is None:
@@ -185,7 +208,7 @@ def _mounted(model: object, rig: Rig | float, t_end: float | None) -> tuple[Rig 
             "it must be a number",
             place="t_end",
             value=None,
-            advice="write simulate(model, rig, t_end), or simulate(system, t_end)",
+            advice=f"write {caller}(model, rig, t_end), or {caller}(system, t_end)",
         )
     return rig, t_end  # type: ignore[return-value]
 

@@ -120,6 +120,7 @@ class Start:
         t_start: float = 0.0,
         initial: Mapping[str, Any] | None = None,
         rows_at_once: int = integrators.ROWS_AT_ONCE,
+        ticks_from: float | None = None,
     ) -> Start:
         """Check the arguments of `gms_fsm.simulate`.
 
@@ -131,6 +132,9 @@ class Start:
             Method, tolerances and output; the defaults if omitted.
         rows_at_once : int
             Maximum number of steps in an arc.
+        ticks_from : float, optional
+            s: start of the run that this one continues, from which its ticks are counted. Samplers
+            that tick exactly at t_start have then done so; contacts with a period tick again.
 
         Returns
         -------
@@ -171,15 +175,16 @@ class Start:
         )
         last = _covered(system, t_start, t_end)
         program = _with_waking_times(program, system, t_start, last)
-        if ticks := _ticks(system, t_start, last):
+        origin = t_start if ticks_from is None else ticks_from
+        if ticks := _ticks(system, origin, t_start, last):
             program = replace(program, ticks=ticks)
         initial = {} if initial is None else initial
         y, mode = _initial(system, program, t_start, initial)
-        origin: tuple[Any, Any] = origin_of(system) if isinstance(model, System) else (model, rig)
+        made: tuple[Any, Any] = origin_of(system) if isinstance(model, System) else (model, rig)
         return cls(
             system=system,
-            model=origin[0],
-            rig=origin[1],
+            model=made[0],
+            rig=made[1],
             program=program,
             t_start=t_start,
             t_end=t_end,
@@ -341,22 +346,27 @@ def _with_waking_times(program: Program, system: System, t_start: float, t_end: 
 MOST_TICKS = 10_000_000  # of a run: their times are kept
 
 
-def _ticks(system: System, t_start: float, t_end: float) -> dict[float, int]:
-    """Return what ticks when: the samplers, then the contacts with a period, each as a bit."""
+def _ticks(system: System, origin: float, t_start: float, t_end: float) -> dict[float, int]:
+    """Return what ticks when: the samplers, then the contacts with a period, each as a bit.
+
+    Ticks are counted from the origin, which is earlier than t_start if the run continues another.
+    """
     clocks = [(each.name, each.period, each.offset) for each in system.sampled]
     clocks += [(each.name, each.period, 0.0) for each in system.contacts if each.period is not None]
     found: dict[float, int] = {}
     for bit, (name, period, offset) in enumerate(clocks):
-        count = math.ceil((t_end - t_start - offset) / period)
-        if count > MOST_TICKS:
+        count = math.ceil((t_end - origin - offset) / period)
+        first = max(0, math.floor((t_start - origin - offset) / period) - 1)
+        if count - first > MOST_TICKS:
             raise ParameterError(
                 f"its period of {period!r} s makes {count:.4g} ticks",
                 place=name,
                 advice=f"at most {MOST_TICKS:,} fit into a run",
             )
-        for k in range(count):
-            time = t_start + offset + k * period
-            if time < t_end:
+        done = origin < t_start and bit < len(system.sampled)  # a tick at t_start itself
+        for k in range(first, count):
+            time = origin + offset + k * period
+            if t_start <= time < t_end and not (done and time == t_start):
                 found[time] = found.get(time, 0) | 1 << bit
     return dict(sorted(found.items()))
 

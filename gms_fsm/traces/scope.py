@@ -12,21 +12,30 @@ invariants   as watches, but ``s``, variables and parameters without a number ar
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from gms_fsm.errors import SignalError
 from gms_fsm.lowering._observing import observe
 from gms_fsm.lowering.layout import BankPlaces, Layout
 from gms_fsm.lowering.program import Program
 from gms_fsm.systems.models import Model
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["GuardValues", "Scope", "invariant_names", "parameter_values", "watch_names"]
+__all__ = [
+    "GuardValues",
+    "Scope",
+    "guard_columns",
+    "invariant_names",
+    "parameter_values",
+    "watch_names",
+]
 
 FORCE = "F_elements"  # the observed quantity that F1, F2 ... refer to
 
@@ -163,6 +172,7 @@ class Scope:
         y: list[float],
         mode: Sequence[int],
         contact: str = "",
+        observed: Mapping[str, Any] | None = None,
     ) -> Scope:
         """Return the scope of the present state of a run.
 
@@ -178,6 +188,10 @@ class Scope:
             State.
         mode : sequence of int, shape (modes,)
             Modes of the elements and the surfaces.
+        contact : str
+            The contact, of a system with several.
+        observed : mapping of str to float or list of float, optional
+            What is observed of this state, by name, if it has been computed.
 
         Returns
         -------
@@ -186,7 +200,9 @@ class Scope:
         """
         layout = program.layout
         places = layout.contact(contact)
-        seen = places.plain(layout.observed.named(observe(program, t, y, mode)))
+        if observed is None:
+            observed = layout.observed.named(observe(program, t, y, mode))
+        seen = places.plain(observed)
         return cls(model, layout, t, y, seen, mode, places, _read(program, places, t, y, mode))
 
     @classmethod
@@ -232,7 +248,8 @@ class Scope:
             With arrays as values, whose last axis is the row.
         """
         seen = {"F": trace.F, "x": trace.x, "s": trace.s.T, FORCE: trace.F_elements.T}
-        seen[trace.places.velocity] = trace.v
+        for name in (*trace.model.chart.velocities, *trace.model.chart.force_names):
+            seen[name] = trace.seen[trace.places.of(name)]
         rows, layout = trace.rows, trace.program.layout
         return cls(trace.model, layout, rows.t, rows.y.T, seen, rows.mode.T, trace.places)
 
@@ -385,6 +402,38 @@ def _read(
     program.ieee["values"](t, y, mode, program.p, out)
     every = shown.named(out)
     return {name.removeprefix(start): every[name] for name in names}
+
+
+def guard_columns(trace: Trace, names: Iterable[str]) -> dict[str, Any]:
+    """Return the values of names in guards at all rows.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run of one contact.
+    names : iterable of str
+        Of its guards: also inputs, named expressions, forces and accelerations.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n, rows), (n, 1), (rows,) or ()
+        Values by name; NaN at a row where they cannot be computed.
+    """
+    wanted, columns = set(names), Scope.over(trace).invariants()
+    found = {name: columns[name] for name in wanted & columns.keys()}
+    program, rows, places = trace.program, trace.rows, trace.places
+    if missing := sorted(wanted - columns.keys()):
+        shown = program.layout.shown
+        table = np.full((len(rows), shown.size), np.nan)
+        modes = rows.mode.tolist()
+        for row, (t, y) in enumerate(zip(rows.t.tolist(), rows.y.tolist(), strict=True)):
+            out = [0.0] * shown.size
+            with contextlib.suppress(SignalError):  # a Python function failed, or is lost
+                program.ieee["values"](t, y, modes[row], program.p, out)
+                table[row] = out
+        every = shown.named(table.T)
+        found |= {name: every[places.of(name)] for name in missing}
+    return found
 
 
 class GuardValues:

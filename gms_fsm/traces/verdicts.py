@@ -36,7 +36,7 @@ class Episode:
     t_first, t_last : float
         First and last time, s.
     values : dict of str to float
-        First variable of the chart, v and s at the first time.
+        First variable of the chart (if it has one), v and s at the first time.
     """
 
     element: int

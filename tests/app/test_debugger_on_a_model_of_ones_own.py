@@ -88,9 +88,9 @@ def test_help_without_a_threshold_or_an_edge() -> None:
     assert made.reply("help").startswith(
         "To find out why an element switches or does not:  goto 1.25   then   why 1\n"
     )
-    assert help_of("print", made.session).examples == ("p state(2) == on",)
+    assert help_of("print", made.session).examples == ("print F1", "p state(2) == on")
     assert help_of("break", made.session).examples == ("b enter on if v < 0 hits 3",)
-    assert help_of("poke", made.session).examples == ("poke u1=0",)
+    assert help_of("poke", made.session).examples == ("poke u1=0", "poke state2=on")
     assert help_of("poke", made.session).usage.startswith("poke u1=VALUE")
     for name in COMMANDS:
         assert help_of(name, made.session).examples

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 
 import pytest
 
 from gms_fsm import Sweep, System, Trace
+from gms_fsm.app.debugger import run_debugger, scenario_to_debug
 from gms_fsm.app.scenario import load_scenario, load_system
 from gms_fsm.lowering.program import lower
 from tests import own_files
@@ -156,3 +158,11 @@ def test_replay_shows_the_chosen_contact(verb: CommandLine) -> None:
     done = verb("replay", "run.npz", "--contact", "gear", "-o", "page.html")
     assert done.code == 0, done.err
     assert "gear: Backlash" in Path("page.html").read_text(encoding="utf-8")
+
+
+def test_debug_steps_through_a_system(verb: CommandLine) -> None:
+    out = io.StringIO()
+    loaded = scenario_to_debug("pair.toml", ["run.t_end=9.0"])
+    assert run_debugger(loaded, io.StringIO("next\nwhy pad1 1\nquit\n"), out) == 0
+    assert "pad1 1: stuck -> forward by release_forward" in out.getvalue()
+    assert "error" not in out.getvalue()

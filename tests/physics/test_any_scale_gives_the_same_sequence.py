@@ -32,7 +32,10 @@ def engine_for(rig: Rig) -> str:
     return "compiled" if HAS_NUMBA and not texts else "ifelse"
 
 
-@pytest.fixture(params=SHIPPED, ids=lambda path: path.stem)
+ON_A_RIG = [path for path in SHIPPED if path.stem != "servo"]
+
+
+@pytest.fixture(params=ON_A_RIG, ids=lambda path: path.stem)
 def shipped(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Case:
     path: Path = request.param
     if path.stem == "tribometer":

@@ -7,17 +7,17 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from gms_fsm.app.debugger import _text as text_of
+from gms_fsm.app.debugger._elements import Elements, completions, integer, read_edits, spelled
 from gms_fsm.app.debugger._help import ALIASES, COMMANDS, help_of, overview
 from gms_fsm.app.debugger._view import branches, chart_states, ending, ribbons, view
 from gms_fsm.errors import GMSError, SessionError
 from gms_fsm.inspection.explain import holds
 from gms_fsm.inspection.session import KINDS, Breakpoint, Session
 from gms_fsm.language import evaluate
-from gms_fsm.systems.models import parameter_names
 
 __all__ = ["Commands"]
 
@@ -85,10 +85,9 @@ class Commands:
         sequence of str
             The words.
         """
-        chart, session = self.session.model.chart, self.session
-        states, edges = self._states, self._edges
-        elements = [str(i + 1) for i in range(session.model.n)]
-        names = [*session.names, *(f"state({i})" for i in elements)]
+        session, states, edges = self.session, self.states, self._edges
+        elements, inside, values = completions(session)
+        names = [*session.names, *inside]
         if before.endswith("="):
             return states
         match name:
@@ -97,7 +96,7 @@ class Commands:
             case "until" | "print" | "watch":
                 return [*names, *states]
             case "poke":
-                return [*(f"{u}{i}=" for u in (*chart.variables, "state") for i in elements), "v="]
+                return [f"{name}=" for name in values]
             case "why":
                 return [*elements, *edges]
             case "element":
@@ -113,12 +112,15 @@ class Commands:
         return ()
 
     @property
-    def _states(self) -> list[str]:
-        return [state.name for state in self.session.model.chart.states]
+    def states(self) -> list[str]:
+        """Names of the states of all charts."""
+        charts = (contact.chart for contact in self.session.system.contacts)
+        return list(dict.fromkeys(state.name for chart in charts for state in chart.states))
 
     @property
     def _edges(self) -> list[str]:
-        return [edge.name for edge in self.session.model.chart.transitions]
+        charts = (contact.chart for contact in self.session.system.contacts)
+        return list(dict.fromkeys(edge.name for chart in charts for edge in chart.transitions))
 
     def _usage(self, name: str) -> str:
         each = help_of(name, self.session)
@@ -226,7 +228,7 @@ class Commands:
         """Return a condition with the states spelled as in the chart."""
         return re.sub(
             r"(\bstate\b\s*(?:\(\s*\d+\s*\)\s*)?[=!]=\s*)(\w+)",
-            lambda found: found[1] + _spelled(found[2], self._states),
+            lambda found: found[1] + spelled(found[2], self.states),
             condition,
         )
 
@@ -253,35 +255,35 @@ class Commands:
     def do_where(self, arg: str) -> Iterator[str]:
         """Show everything."""
         _nothing("where", arg)
-        states = ribbons(self.session, text_of.RIBBON)
-        chart = self.session.model.chart
-        yield from text_of.screen_lines(view(self.session), states, chart, self.element, self.marks)
+        seen = view(self.session)
+        states = ribbons(self.session, text_of.ribbon_parts(seen))
+        yield from text_of.screen_lines(seen, states, self.element, self.marks)
 
     def do_why(self, arg: str) -> Iterator[str]:
         """Explain the guards of an element."""
-        i, edge, words = self.element, "", arg.split()
-        if words and words[0].isdigit():
-            i = self._element("why", words.pop(0))
+        words = arg.split()
+        i, edge = self.elements.taken("why", words), ""
         if words:
-            edge = _spelled(words.pop(0), self._edges)
+            edge = spelled(words.pop(0), self._edges)
             if edge not in self._edges or words:
                 raise SessionError(
                     f"{' '.join([edge, *words])!r} is not an edge",
                     advice=f"there are {', '.join(self._edges) or 'none'}; {self._usage('why')}",
                 )
-        found, branch = self.session.why(i, edge), self.session.branch
+        found, branch = self.session.why(self.elements.address(i), edge), self.session.branch
         yield str(found)
         if found.left and not edge and (branch.cursor + 1 < len(branch) or branch.pull()):
-            which = "" if i == self.element else f" {i + 1}"
+            which = "" if i == self.element else f" {self.elements.short(i)}"
             yield f"for the edges that leave {found.state}: step, then why{which}"
 
     def do_list(self, arg: str) -> Iterator[str]:
         """Draw the chart."""
         _nothing("list", arg)
-        i, session = self.element, self.session
-        name = session.model.chart.name
-        yield f"element {i + 1} of {session.model.n}: {name}, t = {session.here.t:.9g} s"
-        yield from text_of.chart_lines(chart_states(session, i), self.marks)
+        session, bank = self.session, self.elements.bank(self.element)
+        chart = session.system.contact(bank.name).chart
+        who = self.elements.name(self.element)
+        yield f"{who} of {bank.n}: {chart.name}, t = {session.here.t:.9g} s"
+        yield from text_of.chart_lines(chart_states(session, self.element), self.marks)
 
     def do_log(self, arg: str) -> Iterator[str]:
         """Show the last transitions."""
@@ -333,16 +335,18 @@ class Commands:
 
     def do_element(self, arg: str) -> Iterator[str]:
         """Choose an element."""
-        self.element = self._element("element", arg)
-        yield f"element {self.element + 1} is in {self.session.here.states[self.element]}"
+        words = arg.split()
+        found = self.elements.taken("element", words, needed=True)
+        if words:
+            raise SessionError(f"{arg!r} is not an element", advice=self._usage("element"))
+        self.element = found
+        branch = self.session.branch
+        yield f"{self.elements.name(found)} is in {branch.state(branch.here, found)}"
 
-    def _element(self, command: str, text: str) -> int:
-        number = _integer(text, help_of(command, self.session).usage)
-        if not 1 <= number <= self.session.model.n:
-            raise SessionError(
-                f"no element {number}", advice=f"there are 1 to {self.session.model.n}"
-            )
-        return number - 1
+    @property
+    def elements(self) -> Elements:
+        """The elements of the session, as they are written."""
+        return Elements(self.session, self.element)
 
     # ------------------------------------------------------------------ breakpoints
     def do_break(self, arg: str) -> Iterator[str]:
@@ -351,16 +355,16 @@ class Commands:
             yield from self.do_breaks("")
             return
         form = re.fullmatch(
-            rf"(?:({'|'.join(KINDS)})\s+)?(\w+)(?:\s+(?:element\s+)?(\d+|all))?"
+            rf"(?:({'|'.join(KINDS)})\s+)?(\w+)(?:\s+(?:element\s+)?({self.elements.pattern}))?"
             r"(?:\s+if\s+(.+?))?(?:\s+hits\s+(\d+))?",
             arg,
         )
         if form is None:
             raise SessionError(f"{arg!r} is not a breakpoint", advice=f"{self._usage('break')}")
         kind, name, element, condition, hits = form.groups()
-        states, edges = self._states, self._edges
+        states, edges = self.states, self._edges
         asked = {None: states + edges, "enter": states, "leave": states}.get(kind, edges)
-        name = _spelled(name, asked)
+        name = spelled(name, asked)
         if name not in states + edges:
             raise SessionError(
                 f"no edge or state {name!r}",
@@ -369,9 +373,9 @@ class Commands:
         point = self.session.break_on(
             kind or ("enter" if name in states else "fires"),
             name,
-            None if element in (None, "all") else self._element("break", element),
+            None if element in (None, "all") else self.elements.address_of("break", element),
             self._with_states(condition or ""),
-            _integer(hits, "hits K") if hits else 1,
+            integer(hits, "hits K") if hits else 1,
         )
         yield f"breakpoint {len(self.session.breakpoints)}: {text_of.breakpoint_text(point)}"
 
@@ -391,42 +395,11 @@ class Commands:
     # ------------------------------------------------------------------ branches
     def do_poke(self, arg: str) -> Iterator[str]:
         """Change values in a new branch."""
-        variables: dict[str, dict[int, float]] = {}
-        states: dict[int, str] = {}
-        v: float | None = None
-        for part in re.sub(r"\s*=\s*", "=", arg).split():
-            name, _, value = part.partition("=")
-            if name == "v" and value:
-                v = self.session.watch(value)
-                continue
-            what, i = self._pokeable(name)
-            if not what and name in parameter_names(self.session.model):
-                raise SessionError(
-                    f"{name} is a parameter",
-                    advice="to change it, start a session with another model",
-                )
-            if not value or not what:
-                raise SessionError(f"{part!r} cannot be poked", advice=f"{self._usage('poke')}")
-            if what == "state":
-                states[i] = _spelled(value, self._states)
-            else:
-                variables.setdefault(what, {})[i] = self.session.watch(value)
+        edits = read_edits(self.session, arg, self._usage("poke"), self.states)
         parent = self.session.current
-        number = self.session.poke(variables, v, states)
+        number = self.session.poke(edits.variables, edits.v, edits.state)
         yield f"branch {number}, from branch {parent}: {self.session.branch.edits}"
         yield from self.here()
-
-    def _pokeable(self, name: str) -> tuple[str, int]:
-        """Return variable (or 'state') and element; an empty string for any other name."""
-        known = (*self.session.model.chart.variables, "state")
-        form = re.fullmatch(rf"({'|'.join(map(re.escape, known))})(\d*)", name)
-        if form is None:
-            return "", 0
-        if form[2]:
-            return form[1], self._element("poke", form[2])
-        if self.session.model.n > 1:
-            raise SessionError(f"{name!r} cannot be poked", advice=f"for element 1 write {name}1")
-        return form[1], 0
 
     def do_branches(self, arg: str) -> Iterator[str]:
         """Show branches."""
@@ -435,13 +408,13 @@ class Commands:
 
     def do_branch(self, arg: str) -> Iterator[str]:
         """Switch to another branch."""
-        self.session.switch(_integer(arg, "branch N"))
+        self.session.switch(integer(arg, "branch N"))
         yield f"branch {self.session.current}"
         yield from self.here()
 
     def do_compare(self, arg: str) -> Iterator[str]:
         """Compare branches."""
-        numbers = [_integer(text, "compare A B") for text in arg.split()]
+        numbers = [integer(text, "compare A B") for text in arg.split()]
         if len(numbers) not in (0, 2):
             raise SessionError("two branches are needed", advice=f"{self._usage('compare')}")
         yield str(self.session.compare(*numbers))
@@ -463,6 +436,9 @@ class Commands:
                     f"branch {number} failed immediately", advice="there is nothing to draw"
                 )
             edits = f": {branch.edits}" if branch.edits else ""
+            bank = self.elements.bank(self.element)
+            if len(trace.contacts) > 1:
+                trace = trace.contact(bank.name)
             runs[text_of.short(f"branch {number}{edits}", 50)] = trace
         yield f"written to {figures.save(figures.compare_laws(runs), path)}"
 
@@ -474,8 +450,9 @@ class Commands:
     def do_load(self, arg: str) -> Iterator[str]:
         """Read a session."""
         self.session = Session.load(self._path("load", arg))
-        self.element = min(self.element, self.session.model.n - 1)
-        yield f"{self.session.model.title}, {len(self.session.branches)} branches"
+        self.element = min(self.element, self.session.start.program.layout.n - 1)
+        count = len(self.session.branches)
+        yield f"{self.session.title}; {count} branch{'es' if count > 1 else ''}"
         yield from self.here()
 
     def do_quit(self, arg: str) -> Iterator[str]:
@@ -484,14 +461,8 @@ class Commands:
         yield from ()
 
 
-def _integer(text: str, usage: str) -> int:
-    if not re.fullmatch(r"\d{1,9}", text):
-        raise SessionError(f"{text!r} is not an integer", advice=f"usage: {usage}")
-    return int(text)
-
-
 def _count(name: str, text: str, default: int = 1) -> int:
-    count = _integer(text, COMMANDS[name].usage) if text else default
+    count = integer(text, COMMANDS[name].usage) if text else default
     if count < 1:
         raise SessionError(
             f"{name} {count}: the count must be at least 1", advice=f"usage: {COMMANDS[name].usage}"
@@ -508,13 +479,7 @@ def _remove(where: list[Breakpoint] | list[str], name: str, arg: str) -> None:
     if arg == "all":
         where.clear()
         return
-    number = _integer(arg, COMMANDS[name].usage)
+    number = integer(arg, COMMANDS[name].usage)
     if not 1 <= number <= len(where):
         raise SessionError(f"there is no number {number}", advice=f"there are {len(where)}")
     del where[number - 1]
-
-
-def _spelled(name: str, known: Iterable[str]) -> str:
-    """Return the known name that differs only in case; the name itself unless there is one."""
-    same = [each for each in known if each.casefold() == name.casefold()]
-    return same[0] if len(same) == 1 else name

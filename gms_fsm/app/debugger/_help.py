@@ -5,6 +5,8 @@ from __future__ import annotations
 import string
 from dataclasses import dataclass
 
+from gms_fsm.inspection._here import why_at
+from gms_fsm.inspection._poking import pokeable
 from gms_fsm.inspection.session import Session
 
 __all__ = ["ALIASES", "COMMANDS", "MOVES", "Command", "help_of", "names_for", "overview"]
@@ -25,18 +27,18 @@ COMMANDS = {
     "where": Command(
         "look",
         "where",
-        "Show everything on one screen: state, variables, threshold s and |{z}|/s (if any), force "
-        "and edges of each element, by priority, with one mark per clause; below, the states over "
-        "time.",
+        "Show everything on one screen: {bodies}state, variables, threshold s and the ratio of the "
+        "first variable to it (if any), force and edges of each element, by priority, with one "
+        "mark per clause; below, the states over time.",
         ("where",),
         "w",
     ),
     "why": Command(
         "look",
-        "why [ELEMENT] [EDGE]",
+        "why [{ELEMENT}] [EDGE]",
         "Explain why the edges of an element fire or not, clause by clause: both sides, the margin "
         "(negative on the false side), and the truth. With the name of an edge, only that edge.",
-        ("why", "why {n}", "why {n} {leaving}"),
+        ("why", "why {element}", "why {element} {leaving}"),
     ),
     "list": Command(
         "look",
@@ -49,23 +51,22 @@ COMMANDS = {
     "print": Command(
         "look",
         "print EXPRESSION",
-        "Print the value of an expression or the truth of a condition. Names: t, x, v, F, s, and "
-        "with an element number {numbered}, s1, F1, state(1).",
-        ("print {z}1 / {s}1", "p state({n}) == {state}"),
+        "Print the value of an expression or the truth of a condition. Names: {names}.",
+        ("print {z}1 / {s}1", "print {lead}F1", "p {lead}state({n}) == {state}"),
         "p",
     ),
     "watch": Command(
         "look",
         "watch [EXPRESSION]",
         "Show an expression after every move; without an argument, show all watches.",
-        ("watch F{n}", "watch abs({z}1) / {s}1"),
+        ("watch {lead}F{n}", "watch abs({z}1) / {s}1"),
     ),
     "unwatch": Command("look", "unwatch N|all", "Remove a watch.", ("unwatch 1",)),
     "element": Command(
         "look",
-        "element N",
+        "element {NUMBER}",
         "Choose the element shown by list and why; elements are numbered from 1.",
-        ("element {n}",),
+        ("element {element}",),
     ),
     "step": Command(
         "move",
@@ -84,7 +85,11 @@ COMMANDS = {
         "move",
         "until CONDITION",
         "Go forward to the next point where a condition becomes true, also between rows.",
-        ("until abs({z}1) > 0.9*{s}1", "u state({n}) == {state} and v > 0"),
+        (
+            "until abs({z}1) > 0.9*{s}1",
+            "until {lead}F > 0",
+            "u {lead}state({n}) == {state} and {lead}{v} > 0",
+        ),
         "u",
     ),
     "continue": Command(
@@ -96,24 +101,27 @@ COMMANDS = {
     ),
     "break": Command(
         "stop",
-        "break [tested|valid|fires] EDGE [element N] [if CONDITION] [hits K], or "
+        "break [tested|valid|fires] EDGE [{at}] [if CONDITION] [hits K], or "
         "break [enter|leave] STATE ...",
         "Make continue stop where the guard of an edge is evaluated (tested) or becomes true "
         "(valid), or where the edge is taken (fires, the default); where a state is entered (the "
         "default) or left. The condition is evaluated after the event; with hits K, stop from the "
         "K-th hit on. Without an argument, show all breakpoints.",
-        ("break fires {edge} element {n}", "b enter {state} if v < 0 hits 3"),
+        ("break fires {edge} {where}", "b enter {state} if {lead}{v} < 0 hits 3"),
         "b",
     ),
     "breaks": Command("stop", "breaks", "Show all breakpoints and their hits.", ("breaks",)),
     "clear": Command("stop", "clear N|all", "Remove a breakpoint.", ("clear 1",)),
     "poke": Command(
         "change",
-        "poke {z}1=VALUE v=VALUE state1=STATE ...",
+        "poke {poked}=VALUE {lead}state1=STATE ...",
         "Change values here and continue in a new branch; the present one is kept. What can be "
-        "changed: {numbered}, state1, likewise for the other elements, and v if the rig has a "
-        "mass. A value can be an expression without spaces.",
-        ("poke {z}1=0", "poke {z}{n}=0.9*{s}{n} state{n}={state}"),
+        "changed: {pokeable}. A value can be an expression without spaces.",
+        (
+            "poke {z}1=0",
+            "poke {z}{n}=0.9*{s}{n} {lead}state{n}={state}",
+            "poke {lead}state{n}={state}",
+        ),
     ),
     "run": Command("change", "run", "Compute this branch to its end, without moving.", ("run",)),
     "branches": Command("change", "branches", "Show all branches.", ("branches",)),
@@ -140,7 +148,7 @@ COMMANDS = {
 ALIASES = {each.alias: name for name, each in COMMANDS.items() if each.alias} | {"?": "help"}
 MOVES = ("step", "back", "next", "prev", "until", "continue")
 OVERVIEW = """\
-To find out why an element switches or does not:  goto {t}   then   why 1
+To find out why an element switches or does not:  goto {t}   then   why {first}
 
 {groups}
 
@@ -163,22 +171,60 @@ def names_for(session: Session) -> dict[str, str]:
     dict
         Replacement text by name.
     """
-    chart = session.model.chart
-    start, n = session.branch.raw(0).t, min(2, session.model.n)
+    start, system = session.start, session.system
+    given, several = start.given is not None, len(system.contacts) > 1
+    contact = system.contacts[0]
+    chart, n = contact.chart, min(2, contact.n)
+    lead = f"{contact.name}." if several else ""
+    begin = session.branch.raw(0).t
+    own = [name for name in pokeable(start) if given or name not in start.program.layout.y.shared]
+    labels = [start.program.layout.label(name) if not several else name for name in own]
+    numbered = [
+        f"{label}1" if name in start.program.layout.y.own else label
+        for name, label in zip(own, labels, strict=True)
+    ]
     names = {
-        "t": f"{start + 0.25 * (session.t_end - start):.9g}",
+        "t": f"{begin + 0.25 * (session.t_end - begin):.9g}",
         "n": str(n),
-        "z": chart.variables[0],
-        "numbered": ", ".join(f"{name}1" for name in chart.variables),
+        "lead": lead,
+        "v": chart.velocities[0],
+        "bodies": "bodies, sampled values and signals, then the contacts: " if given else "",
+        "ELEMENT": "CONTACT [N]" if several else "ELEMENT",
+        "NUMBER": "CONTACT [N]" if several else "N",
+        "element": f"{contact.name} {n}" if several else str(n),
+        "first": f"{contact.name} 1" if several else "1",
+        "at": "CONTACT [N]" if several else "element N",
+        "where": f"{contact.name} {n}" if several else f"element {n}",
+        "names": _names(session),
+        "pokeable": ", ".join([*numbered, f"{lead}state1"])
+        + (", likewise for the other elements" if start.program.layout.n > 1 else "")
+        + ("" if given else ", and v if the rig has a mass"),
+        "poked": next(iter(numbered), "v"),
         "state": chart.states[0].name,
     }
-    if "s" in chart.inputs:
-        names["s"] = "s"
+    if chart.variables:
+        names["z"] = f"{lead}{chart.variables[0]}"
+        if "s" in chart.inputs and contact.stribeck is not None:
+            names["s"] = f"{lead}s"
     if chart.transitions:
         names |= {"edge": chart.transitions[0].name, "state": chart.transitions[0].target}
-    for each in session.why(n - 1):
+    for each in why_at(session.branch, n - 1, ""):
         names.setdefault("leaving", each.edge.name)
     return names
+
+
+def _names(session: Session) -> str:
+    """Return in words which names expressions can use."""
+    system, first = session.system, session.system.contacts[0]
+    own = [*first.chart.variables, *(["s"] if first.stribeck is not None else []), "F", "state"]
+    numbered = [f"{name}1" if name != "state" else "state(1)" for name in own]
+    if session.start.given is None:
+        curve = ", s" if first.stribeck is not None else ""
+        return f"t, x, v, F{curve}, and with an element number {', '.join(numbered)}"
+    lead = f"{first.name}."
+    contact = [f"{lead}{name}" for name in (*first.chart.velocities, *first.chart.force_names)]
+    inside = [f"{lead}{name}" for name in numbered]
+    return f"{', '.join(system.names)}; {', '.join([*contact, *inside])}"
 
 
 def help_of(name: str, session: Session) -> Command:

@@ -96,10 +96,9 @@ class Debugger(cmd.Cmd):
         int
             The exit code, 0.
         """
-        model, rig = self.session.model, self.session.rig
         if self.title:
             self.say(self.title)
-        self.say(f"{model.title}; {rig.title}, to t = {self.session.t_end:g} s")
+        self.say(self.session.title)
         self.say("help lists the commands, where shows everything, quit exits.")
         while True:
             try:
@@ -197,7 +196,7 @@ class Debugger(cmd.Cmd):
     def _painted(self, line: str) -> str:
         if not self.coloured:
             return line
-        states = [state.name for state in self.session.model.chart.states]
+        states = self.commands.states
         codes = WORDS | {name: COLOURS[i % len(COLOURS)] for i, name in enumerate(states)}
         words = "|".join(re.escape(word) for word in codes)
         return re.sub(

@@ -6,8 +6,7 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from gms_fsm.app.debugger._view import BranchView, Ribbons, StateView, View
-from gms_fsm.charts.chart import Chart
+from gms_fsm.app.debugger._view import BranchView, ContactView, Ribbons, StateView, View
 from gms_fsm.inspection.session import Breakpoint
 
 __all__ = [
@@ -20,13 +19,13 @@ __all__ = [
     "chart_lines",
     "ending_lines",
     "progress",
+    "ribbon_parts",
     "screen_lines",
     "short",
     "wrapped",
 ]
 
 WIDTH = 80
-RIBBON = WIDTH - 6
 BAR = 8  # characters for |z|/s = 1
 
 
@@ -45,19 +44,15 @@ PLAIN = Marks("ny", ".#", "-#=+%o", "+-+|++", "+=+|++")
 DRAWN = Marks("✗✓", "░█", "─▓═┼▒┄", "┌─┐│└┘", "╔═╗║╚╝")
 
 
-def screen_lines(
-    view: View, ribbons: Ribbons, chart: Chart, chosen: int, marks: Marks
-) -> Iterator[str]:
+def screen_lines(view: View, ribbons: Ribbons, chosen: int, marks: Marks) -> Iterator[str]:
     """Yield one screen: the position, each element with values and edges, the states over time.
 
     Parameters
     ----------
     view, ribbons : View, Ribbons
         The data to show.
-    chart : Chart
-        The chart of the session.
     chosen : int
-        Index of the marked element, from 0.
+        The marked element, counted over all contacts from 0.
     marks : Marks
         Drawing characters.
 
@@ -68,12 +63,44 @@ def screen_lines(
     """
     step = f", micro-step {view.microstep}" if view.microstep else ""
     yield f"t = {view.t:.9g} s, row {view.row}{step}, branch {view.branch}"
-    yield f"v = {view.v:.6g} m/s, x = {view.x:.6g} m, F = {view.F:.6g} N"
-    yield from ending_lines(view.ending)
+    yield from _body_lines(view)
+    for contact in view.contacts:
+        yield from _contact_lines(contact, view, chosen, marks)
+    no, yes = tuple(marks.truth)
+    yield f"edges by priority, one mark per clause: {yes} true, {no} false, * just taken; see why"
+    yield from _ribbon_lines(ribbons, view.contacts, marks)
+
+
+def _body_lines(view: View) -> Iterator[str]:
+    """Yield the bodies and the further values of a system."""
+    wide = max((len(body.name) for body in view.bodies), default=0)
+    for body in view.bodies:
+        (x, position), (v, velocity) = body.x, body.v
+        given = "  (given)" if body.driven else ""
+        yield f"{body.name:<{wide}}  {x} = {position:.6g}, {v} = {velocity:.6g}{given}"
+    for each in view.values:
+        values = ", ".join(f"{name} = {value:.6g}" for name, value in each.values.items())
+        tick = "" if each.tick is None else f"; next tick at t = {each.tick:.9g} s"
+        yield f"{each.title}: {values}{tick}"
+    if view.bodies:
+        yield from ending_lines(view.ending)
+
+
+def _contact_lines(contact: ContactView, view: View, chosen: int, marks: Marks) -> Iterator[str]:
+    """Yield a contact: its force, and each element with its values and edges."""
+    more = "".join(f", {name} = {value:.6g}" for name, value in contact.more.items())
+    shared = "  (shared with other locks)" if contact.shared else ""
+    if contact.name:
+        yield contact.title
+        yield f"  v = {contact.v:.6g} m/s, F = {contact.F:.6g} N{more}{shared}"
+    else:
+        yield f"v = {contact.v:.6g} m/s, x = {contact.x:.6g} m, F = {contact.F:.6g} N"
+        yield from ending_lines(view.ending)
+    chart = contact.chart
     wide = max(5, min(8, max(len(state.name) for state in chart.states)))
-    yield "  ".join(["  el", " ".join([f"{'state':<{wide}}", *_heads(chart)]), "edges"])
-    for each in view.elements:
-        lead = f"{'>' if each.number == chosen + 1 else ' '}{each.number:>3}  "
+    yield "  ".join(["  el", " ".join([f"{'state':<{wide}}", *_heads(contact)]), "edges"])
+    for i, each in enumerate(contact.elements, start=contact.first):
+        lead = f"{'>' if i == chosen else ' '}{each.number:>3}  "
         cells = [f"{value:>10.4g}" for value in each.variables]
         if each.s is not None and each.ratio is not None:
             shown = f"{each.ratio:.3f}" if each.ratio < 100 else f"{each.ratio:.1e}"
@@ -93,17 +120,15 @@ def screen_lines(
         else:
             yield line
             yield f"      {edges}"
-    no, yes = tuple(marks.truth)
-    yield f"edges by priority, one mark per clause: {yes} true, {no} false, * just taken; see why"
-    yield from _ribbon_lines(ribbons, chart, len(view.elements), marks)
 
 
-def _heads(chart: Chart) -> list[str]:
+def _heads(contact: ContactView) -> list[str]:
     """Return the headings of the values of an element, with the same widths."""
+    chart = contact.chart
     units = {name: chart.unit(name) for name in chart.variables}
     names = [f"{name} [{unit}]" if unit else name for name, unit in units.items()]
     heads = [f"{short(name, 10):>10}" for name in names]
-    if "s" in chart.inputs:
+    if contact.elements[0].ratio is not None:
         heads += [f"{'s [m]':>9}", f"{short(f'|{chart.variables[0]}|/s', 7):>7}"]
         if len(names) == 1:
             heads.append(" " * (BAR + 2))
@@ -116,17 +141,47 @@ def _bar(ratio: float, marks: Marks) -> str:
     return f"[{full * filled}{empty * (BAR - filled)}{'>' if ratio > 1 else ']'}"
 
 
-def _ribbon_lines(ribbons: Ribbons, chart: Chart, n: int, marks: Marks) -> Iterator[str]:
+def _ribbon_lines(ribbons: Ribbons, contacts: Sequence[ContactView], marks: Marks) -> Iterator[str]:
     """Yield the states of every element over time, and the current position."""
-    drawn = marks.ribbon
+    drawn, labels = marks.ribbon, _labels(contacts)
+    lead = _lead(labels)
     scale = f"{ribbons.start:g} s"
-    yield f"      {scale}{f'{ribbons.end:g} s':>{len(ribbons.modes) - len(scale)}}"
-    for i in range(n):
+    yield f"{' ' * lead}{scale}{f'{ribbons.end:g} s':>{len(ribbons.modes) - len(scale)}}"
+    for i, label in enumerate(labels):
         states = (" " if mode is None else drawn[mode[i] % len(drawn)] for mode in ribbons.modes)
-        yield f" E{i + 1:<3} {''.join(states)}".rstrip()
-    key = "  ".join(f"{drawn[j % len(drawn)]} {s.name}" for j, s in enumerate(chart.states))
-    yield f"      {' ' * ribbons.now}^"
-    yield f"      {key}  ^ now  (blank: not computed)"
+        yield f" {short(label, lead - 2):<{lead - 2}} {''.join(states)}".rstrip()
+    yield f"{' ' * lead}{' ' * ribbons.now}^"
+    keys: dict[tuple[str, ...], list[str]] = {}
+    for contact in contacts:
+        keys.setdefault(tuple(s.name for s in contact.chart.states), []).append(contact.name)
+    for number, (names, whose) in enumerate(keys.items(), start=1):
+        who = f"{', '.join(whose)}: " if len(keys) > 1 else ""
+        key = "  ".join(f"{drawn[j % len(drawn)]} {name}" for j, name in enumerate(names))
+        last = "  ^ now  (blank: not computed)" if number == len(keys) else ""
+        yield f"      {who}{key}{last}"
+
+
+def ribbon_parts(view: View) -> int:
+    """Return the number of characters for the states over time."""
+    return WIDTH - _lead(_labels(view.contacts))
+
+
+def _labels(contacts: Sequence[ContactView]) -> list[str]:
+    """Return the labels of all elements."""
+    return [
+        f"{contact.name} {each.number}" if contact.name else f"E{each.number}"
+        for contact in contacts
+        for each in contact.elements
+    ]
+
+
+def _lead(labels: Sequence[str]) -> int:
+    """Return the width of the labels of ribbons.
+
+    >>> _lead(["E1"]), _lead(["bearing 1"]), _lead(["a very long name of a contact 12"])
+    (6, 11, 22)
+    """
+    return min(22, max(6, 2 + max(map(len, labels))))
 
 
 def ending_lines(ending: str) -> Iterator[str]:
@@ -167,6 +222,8 @@ def chart_lines(states: Sequence[StateView], marks: Marks) -> Iterator[str]:
     for state in states:
         lines = [state.name + ("  ACTIVE" if state.active else "")]
         lines += [f"  d{name} = {text}" for name, text in state.flow]
+        lines += [f"  {name} = {text}" for name, text in state.forces]
+        lines += ["  locked: v = 0, F is what holds it"] * state.locked
         box, lead = (marks.active, "> ") if state.active else (marks.box, "  ")
         yield from _boxed(lines, box, lead)
         for edge in state.edges:
@@ -239,6 +296,8 @@ def breakpoint_text(point: Breakpoint) -> str:
         One line.
     """
     who = "all elements" if point.element is None else f"element {point.element + 1}"
+    if point.contact:
+        who = point.contact if point.element is None else f"{point.contact} {point.element + 1}"
     condition = f", if {point.condition}" if point.condition else ""
     hits = f", from hit {point.hits} on" if point.hits > 1 else ""
     return f"{point.kind} {point.name}, {who}{condition}{hits}"

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+from gms_fsm.charts.chart import Chart
 from gms_fsm.inspection._branch import Branch
+from gms_fsm.inspection._elements import chart_of
+from gms_fsm.inspection._here import why_at
 from gms_fsm.inspection.session import Session
+from gms_fsm.lowering.layout import BankPlaces
 
 __all__ = [
+    "BodyView",
     "BranchView",
+    "ContactView",
     "EdgeView",
     "ElementView",
     "Ribbons",
     "StateView",
+    "ValueView",
     "View",
     "branches",
     "chart_states",
@@ -77,6 +85,79 @@ class ElementView:
 
 
 @dataclass(frozen=True)
+class ContactView:
+    """One contact at the cursor; of a model on a rig there is one, without a name.
+
+    Parameters
+    ----------
+    name, title : str
+        Name, and what it is; both empty for a model on a rig.
+    chart : Chart
+        Its chart.
+    first : int
+        Number of its first element, counted over all contacts from 0.
+    x, v, F : float
+        Position, m; velocity, m/s; friction force, N.
+    more : mapping of str to float
+        Further velocities and forces of its chart.
+    shared : bool
+        Whether F is that of a lock which other locks share.
+    elements : tuple of ElementView
+        Its elements.
+    """
+
+    name: str
+    title: str
+    chart: Chart
+    first: int
+    x: float
+    v: float
+    F: float
+    more: Mapping[str, float]
+    shared: bool
+    elements: tuple[ElementView, ...]
+
+
+@dataclass(frozen=True)
+class BodyView:
+    """One body of a system at the cursor.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    x, v : (str, float)
+        Name and value of its position and of its velocity.
+    driven : bool
+        Whether its velocity is given.
+    """
+
+    name: str
+    x: tuple[str, float]
+    v: tuple[str, float]
+    driven: bool
+
+
+@dataclass(frozen=True)
+class ValueView:
+    """Further values of a system at the cursor.
+
+    Parameters
+    ----------
+    title : str
+        What they are, such as ``signals``.
+    values : mapping of str to float
+        By name.
+    tick : float or None
+        Of sampled values, when they change next, s; None if they never do, or are not sampled.
+    """
+
+    title: str
+    values: Mapping[str, float]
+    tick: float | None = None
+
+
+@dataclass(frozen=True)
 class View:
     """One screen: the current position of the session.
 
@@ -86,12 +167,16 @@ class View:
         The position.
     located : bool
         Whether the position is between this row and the next.
-    t, x, v, F : float
-        Time, s; position, m; velocity, m/s; friction force, N.
+    t : float
+        Time, s.
     ending : str
         ``"end"`` at the end of the run, the reason at a failure, else empty.
-    elements : tuple of ElementView
-        All elements.
+    contacts : tuple of ContactView
+        All contacts.
+    bodies : tuple of BodyView
+        The bodies of a system; none for a model on a rig.
+    values : tuple of ValueView
+        Further states, sampled values and signals of a system.
     """
 
     branch: int
@@ -99,11 +184,15 @@ class View:
     microstep: int
     located: bool
     t: float
-    x: float
-    v: float
-    F: float
     ending: str
-    elements: tuple[ElementView, ...]
+    contacts: tuple[ContactView, ...]
+    bodies: tuple[BodyView, ...] = ()
+    values: tuple[ValueView, ...] = ()
+
+    @property
+    def elements(self) -> tuple[ElementView, ...]:
+        """All elements of all contacts."""
+        return tuple(each for contact in self.contacts for each in contact.elements)
 
 
 @dataclass(frozen=True)
@@ -139,6 +228,10 @@ class StateView:
         Whether the element is in this state.
     flow : tuple of (str, str)
         Variables with the texts of their rates.
+    locked : bool
+        Whether it holds the velocity at 0.
+    forces : tuple of (str, str)
+        Forces with their texts, where the state gives its own.
     edges : tuple of EdgeView
         Edges that leave the state, by priority.
     """
@@ -146,6 +239,8 @@ class StateView:
     name: str
     active: bool
     flow: tuple[tuple[str, str], ...]
+    locked: bool
+    forces: tuple[tuple[str, str], ...]
     edges: tuple[EdgeView, ...]
 
 
@@ -203,19 +298,64 @@ def view(session: Session) -> View:
     >>> [each.state for each in view(session).elements]
     ['stick', 'stick', 'stick', 'stick']
     """
-    here = session.here
+    here, start = session.here, session.start
+    bodies: tuple[BodyView, ...] = ()
+    values: tuple[ValueView, ...] = ()
+    if start.given is not None:
+        bodies = tuple(
+            BodyView(
+                body.name,
+                (body.x, here.bodies[body.name].x),
+                (body.v, here.bodies[body.name].v),
+                body.driven,
+            )
+            for body in start.system.bodies
+        )
+        values = _values(session)
     return View(
         session.current,
         here.row,
         here.microstep,
         here.located,
         here.t,
+        ending(session),
+        tuple(_contact(session, bank) for bank in start.program.layout.banks),
+        bodies,
+        values,
+    )
+
+
+def _contact(session: Session, bank: BankPlaces) -> ContactView:
+    start, here = session.start, session.here.contacts[bank.name]
+    part = start.system.contact(bank.name)
+    name, title = (bank.name, part.title) if start.given is not None else ("", "")
+    elements = tuple(_element(session, bank.first + i) for i in range(bank.n))
+    return ContactView(
+        name,
+        title,
+        part.chart,
+        bank.first,
         here.x,
         here.v,
         here.F,
-        ending(session),
-        tuple(_element(session, i) for i in range(session.model.n)),
+        here.more,
+        here.shared,
+        elements,
     )
+
+
+def _values(session: Session) -> tuple[ValueView, ...]:
+    """Return further states, sampled values and signals of a system."""
+    system, here, values = session.system, session.here, session.values()
+    found = []
+    if system.flow:
+        found.append(ValueView("further states", {name: here.values[name] for name in system.flow}))
+    for bit, each in enumerate(system.sampled):
+        own = {name: here.values[name] for name in each.updates}
+        found.append(ValueView(f"sampled {each.name}", own, session.branch.tick_after(here.t, bit)))
+    if system.signals:
+        found.append(ValueView("signals", {name: values[name] for name in system.signals}))
+    return tuple(found)
 
 
 def ending(session: Session) -> str:
@@ -242,9 +382,12 @@ def _outcome(branch: Branch) -> str:
     return "end" if branch.ended else ""
 
 
-def _element(session: Session, i: int) -> ElementView:
-    here, chart, branch = session.here, session.model.chart, session.branch
-    scope = branch.scope(branch.here)
+def _element(session: Session, machine: int) -> ElementView:
+    start, branch = session.start, session.branch
+    bank = start.program.layout.bank(machine)
+    chart, i = chart_of(start, bank), machine - bank.first
+    here = session.here.contacts[bank.name]
+    scope = branch.scope(branch.here, bank.name)
     edges = tuple(
         EdgeView(
             each.edge.name,
@@ -254,43 +397,47 @@ def _element(session: Session, i: int) -> ElementView:
             tuple(clause.holds if clause.computable else None for clause in each.clauses),
             each.fired,
         )
-        for each in session.why(i)
+        for each in why_at(branch, machine, "")
     )
-    has_s = "s" in chart.inputs
+    threshold = here.s[i] if "s" in chart.inputs else None
+    comparable = threshold is not None and bool(chart.variables)
     return ElementView(
         i + 1,
         here.states[i],
         tuple(scope.each(name)[i] for name in chart.variables),
-        here.s[i] if has_s else None,
-        abs(here.z[i]) / here.s[i] if has_s else None,
+        threshold if comparable else None,
+        abs(here.z[i]) / here.s[i] if comparable else None,
         here.F_elements[i],
         edges,
     )
 
 
-def chart_states(session: Session, i: int) -> tuple[StateView, ...]:
+def chart_states(session: Session, machine: int) -> tuple[StateView, ...]:
     """Return the chart for an element: the active state, and the guards evaluated.
 
     Parameters
     ----------
     session : Session
         The session.
-    i : int
-        Element index, from 0.
+    machine : int
+        The element, counted over all contacts from 0.
 
     Returns
     -------
     tuple of StateView
         In the order of the chart.
     """
-    chart, element = session.model.chart, _element(session, i)
+    start, element = session.start, _element(session, machine)
+    chart = chart_of(start, start.program.layout.bank(machine))
     asked = {each.name: each for each in element.edges}
-    active = session.here.states[i]
+    active = element.state
     return tuple(
         StateView(
             state.name,
             state.name == active,
             tuple(state.flow.items()),
+            state.locked,
+            tuple(state.outputs.items()),
             tuple(
                 asked.get(edge.name)
                 or EdgeView(

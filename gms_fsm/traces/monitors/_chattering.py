@@ -18,7 +18,7 @@ __all__ = ["chattering"]
 
 
 def chattering(monitor: Chattering, trace: Trace, error: Exception | None) -> ChatteringVerdict:
-    livelock = isinstance(error, LivelockError)
+    livelock = isinstance(error, LivelockError) and _switched_last(trace)
     episodes = _episodes(monitor, trace) if len(trace.transitions) >= monitor.times else ()
     parts = [f"livelock: {error}"] if livelock else []
     for first in episodes[:1]:
@@ -34,13 +34,20 @@ def chattering(monitor: Chattering, trace: Trace, error: Exception | None) -> Ch
     return ChatteringVerdict(not parts, "; ".join(parts) or quiet, episodes, livelock)
 
 
+def _switched_last(trace: Trace) -> bool:
+    """Return whether the contact was among those that switched when the run ended."""
+    log, every = trace.transitions, trace.transitions if trace.every is None else trace.every
+    return not every.size or (log.size > 0 and bool(log.t[-1] == every.t[-1]))
+
+
 def _advice(trace: Trace, episode: Episode) -> str:
     texts = [
         f"{edge} [{trace.model.chart.guard_text(edge)}]" for edge in (episode.edge, *episode.back)
     ]
+    gap = ", as arrest does by |v| <= v_c, or raise v_c"
+    gap = gap if "v_c" in trace.model.chart.parameter_names else ""
     return (
-        f"the guards {' and '.join(texts)} hold alternately; leave a gap between them, as arrest "
-        "does by |v| <= v_c, or raise v_c"
+        f"the guards {' and '.join(texts)} hold alternately; leave a gap between them{gap}"
         if episode.back
         else f"the guard {texts[0]} is immediately true again; let the edge's target have another"
     )
@@ -48,7 +55,7 @@ def _advice(trace: Trace, episode: Episode) -> str:
 
 def _episodes(monitor: Chattering, trace: Trace) -> tuple[Episode, ...]:
     """Return the longest episode of each element that chattered."""
-    log, variable = trace.transitions, trace.model.chart.variables[0]
+    log, variables = trace.transitions, trace.model.chart.variables
     names, codes = np.unique(log["edge"], return_inverse=True)
     found: dict[int, tuple[int, NDArray[np.int64]]] = {}
     for i in np.flatnonzero(np.bincount(log["element"]) >= monitor.times).tolist():
@@ -64,7 +71,8 @@ def _episodes(monitor: Chattering, trace: Trace) -> tuple[Episode, ...]:
         meanwhile = log[taken[0] : taken[-1] + 1]
         others = np.unique(meanwhile["edge"][meanwhile["element"] == i]).tolist()
         edge = str(names[code])
-        seen = {variable: float(first.z), "s": float(first.s), "v": float(first.v)}
+        seen = {name: float(first.z) for name in variables[:1]}
+        seen |= {"s": float(first.s), "v": float(first.v)}
         values = {name: value for name, value in seen.items() if not math.isnan(value)}
         back, end = tuple(other for other in others if other != edge), float(log["t"][taken[-1]])
         episodes.append(Episode(i, edge, back, len(taken), float(first.t), end, values))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.language import MATLAB_LIKE, Condition, clauses, names_in, spell
 from gms_fsm.language._vectors import truths
-from gms_fsm.traces.scope import Scope
+from gms_fsm.traces.scope import guard_columns
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.verdicts import ClauseSeen, CoverageVerdict
 
@@ -26,7 +26,7 @@ def coverage(trace: Trace) -> CoverageVerdict:
         )
         for edge in chart.transitions
     }
-    columns = Scope.over(trace).invariants() if chart.transitions else {}
+    columns = guard_columns(trace, frozenset[str]().union(*map(names_in, chart.guards.values())))
     known: dict[Condition, NDArray[np.bool_]] = {}
     seen = []
     for edge in chart.transitions:

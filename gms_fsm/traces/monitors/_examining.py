@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from dataclasses import replace
 
 from gms_fsm._arguments import listed
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.systems.models import Model
+from gms_fsm.systems.system import System
 from gms_fsm.traces.monitors._chattering import chattering
 from gms_fsm.traces.monitors._coverage import coverage
 from gms_fsm.traces.monitors._invariants import invariant_verdict, read_invariant
@@ -28,7 +30,7 @@ __all__ = ["checked", "examine", "watched"]
 
 
 def checked(
-    monitors: str | Iterable[str | Monitor], model: Model, output: str = "all"
+    monitors: str | Iterable[str | Monitor], model: Model | System, output: str = "all"
 ) -> dict[str, Monitor]:
     """Check monitors and return them by name.
 
@@ -36,9 +38,10 @@ def checked(
     ----------
     monitors : str or iterable of str or Monitor
         ``"chattering"``, ``"passivity"``, ``"coverage"``, ``"all"`` for these three, or the text
-        of an invariant.
-    model : Model
-        The model to be monitored.
+        of an invariant; in a system also with a contact before it: ``"gear: passivity"``.
+    model : Model or System
+        The model or the system to be monitored. In a system with several contacts a monitor without
+        a contact, unless it is an invariant, stands for one of each.
     output : {"all", "t_eval", "end"}
         Rows that the run will have.
 
@@ -66,14 +69,15 @@ def checked(
         else listed("monitors", monitors, "names of monitors, or monitors")
     )
     found: dict[str, Monitor] = {}
+    system = model if isinstance(model, System) else None
     for each in given:
-        for monitor in ALL if each == "all" else (_monitor(each),):
+        for monitor in _monitors(each, system):
             if monitor.name in found:
                 raise ParameterError(
                     f"monitors contains {shown(monitor.name)} twice", advice="give it once"
                 )
             if isinstance(monitor, Invariant):
-                read_invariant(monitor, model)
+                read_invariant(monitor, model if system is None else system)
             if output == "end" and not isinstance(monitor, Chattering):
                 raise ParameterError(
                     f"the monitor {shown(monitor.name)} needs the rows of a run, but "
@@ -82,6 +86,34 @@ def checked(
                 )
             found[monitor.name] = monitor
     return found
+
+
+def _monitors(given: str | Monitor, system: System | None) -> list[Monitor]:
+    """Return the monitors that an entry stands for."""
+    contact, text = "", given
+    if isinstance(given, str) and ":" in given:
+        contact, _, text = (part.strip() for part in given.partition(":"))
+    elif isinstance(given, Monitor):
+        contact = given.contact
+    known = [] if system is None else [each.name for each in system.contacts]
+    if contact and contact not in known:
+        raise ParameterError(
+            f"monitors contains {shown(given if isinstance(given, str) else given.name)}: "
+            f"there is no contact {contact!r}",
+            advice=f"there are {', '.join(map(repr, known))}"
+            if known
+            else "a model on a rig has one contact, so leave its name out",
+        )
+    found = [*ALL] if text == "all" else [_monitor(text)]
+    if contact:
+        return [replace(each, contact=contact) for each in found]
+    every = known if len(known) > 1 else [""]
+    return [
+        replace(each, contact=name)
+        for name in every
+        for each in found
+        if not isinstance(each, Invariant)
+    ] + [each for each in found if isinstance(each, Invariant)]
 
 
 def _monitor(given: str | Monitor) -> Monitor:
@@ -140,12 +172,16 @@ def examine(
     >>> found["coverage"].never[0], round(found["z <= 0.3"].t, 9)
     ('edge break_away_backward', 1.5)
     """
-    rows = trace.whole()
+    whole = trace.whole()
     found: dict[str, Verdict] = {}
-    for name, monitor in checked(monitors, trace.model).items():
+    system = None if trace.which else trace.system
+    for name, monitor in checked(monitors, trace.model if system is None else system).items():
+        run, rows = trace, whole
+        if monitor.contact:
+            run, rows = (each.contact(monitor.contact) for each in (trace, whole))
         match monitor:
             case Chattering():
-                found[name] = chattering(monitor, trace, error)
+                found[name] = chattering(monitor, run, error)
             case Invariant():
                 found[name] = invariant_verdict(monitor, rows)
             case Passivity():

@@ -15,21 +15,37 @@ from gms_fsm.errors import ExpressionError, SignalError
 from gms_fsm.language import Condition, names_in, parse_condition, states_in
 from gms_fsm.language._vectors import truths
 from gms_fsm.systems.models import Model
+from gms_fsm.systems.system import System
 from gms_fsm.traces._between import first_true, interpolated
 from gms_fsm.traces.monitors._kinds import Invariant
 from gms_fsm.traces.monitors._words import elements_text, values_text
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.scope import Scope, invariant_names
+from gms_fsm.traces.system_scope import SystemScope, owners_of, system_names
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.verdicts import InvariantVerdict
 
 __all__ = ["invariant_verdict", "read_invariant"]
 
 
-def read_invariant(monitor: Invariant, model: Model) -> Condition:
-    names, states = invariant_names(model), [state.name for state in model.chart.states]
+def read_invariant(monitor: Invariant, of: Model | System) -> Condition:
+    """Parse an invariant of a model, or of a system or its contact."""
+    model, system = (None, of) if isinstance(of, System) else (of, None)
+    names, owners = [], {}
+    if system is not None and monitor.contact:
+        model, system = system.contact(monitor.contact), None
+    if system is not None:
+        names, owners = system_names(system), owners_of(system)
+        model = system.contacts[0] if len(system.contacts) == 1 else None
+    states: list[str] = []
+    if model is not None:
+        names += invariant_names(model)
+        states = [state.name for state in model.chart.states]
+    n = 0 if model is None else model.n
     try:
-        return parse_condition(monitor.text, names, states, model.n, own_state=True)
+        return parse_condition(
+            monitor.text, names, states, n, own_state=model is not None, owners=owners
+        )
     except ExpressionError as error:
         raise error.at("invariant") from None
 
@@ -40,12 +56,23 @@ class _Held:
 
     tree: Condition
     of_elements: bool
+    single: bool  # whether the run is that of one contact
+    whole: bool  # whether it is the whole run of a system
 
     def columns(self, trace: Trace) -> dict[str, NDArray[Any]]:
         """Return the columns it refers to."""
         asked = states_in(self.tree)
         names = [*sorted(names_in(self.tree)), *(f"state({i})" for i in sorted(asked))]
-        columns = Scope.over(trace).invariants(states=bool(asked))
+        if self.single:
+            columns = Scope.over(trace).invariants(states=bool(asked))
+            if not self.whole:
+                return {name: columns[name] for name in names}
+            shared = SystemScope.over(trace)
+            # A name of the system means what it means in its texts.
+            columns = {**shared.watches(), **columns}
+            columns |= {name: shared.value(name) for name in shared.system.names}
+        else:
+            columns = SystemScope.over(trace).watches()
         return {name: columns[name] for name in names}
 
     def at(self, trace: Trace) -> NDArray[np.bool_]:
@@ -61,16 +88,20 @@ def _of_elements(tree: Condition, model: Model) -> bool:
 
 
 def invariant_verdict(monitor: Invariant, trace: Trace) -> InvariantVerdict:
-    tree = read_invariant(monitor, trace.model)
-    invariant, rows = _Held(tree, _of_elements(tree, trace.model)), len(trace)
+    system = None if trace.which else trace.system
+    single = len(trace.contacts) == 1 or bool(trace.which)
+    of = trace.model if system is None else system
+    tree = read_invariant(replace(monitor, contact=""), of)
+    by_element = single and _of_elements(tree, trace.model)
+    invariant, rows = _Held(tree, by_element, single, system is not None), len(trace)
     broken = np.flatnonzero(~invariant.at(trace).all(axis=0))
     if not broken.size:
         text = f"held at all {rows} rows"
         return InvariantVerdict(True, text, monitor.text, rows, 0, None, None, "", {}, None)
     place = _located(invariant, trace, int(broken[0]))
-    i = int(np.argmin(invariant.at(place)[:, 0]))
+    i, n = int(np.argmin(invariant.at(place)[:, 0])), trace.n if single else 1
     values = {
-        name: float(np.broadcast_to(column, (trace.n, 1))[i, 0])
+        name: float(np.broadcast_to(column, (n, 1))[i, 0])
         for name, column in invariant.columns(place).items()
         if np.asarray(column).dtype.kind == "f"
     }

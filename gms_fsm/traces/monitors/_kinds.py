@@ -12,6 +12,11 @@ from gms_fsm.errors import ParameterError
 __all__ = ["ALL", "KNOWN", "Chattering", "Coverage", "Invariant", "Monitor", "Passivity"]
 
 
+def named(contact: str, name: str) -> str:
+    """Return the name of a monitor, with that of its contact: ``gear: passivity``."""
+    return f"{contact}: {name}" if contact else name
+
+
 @dataclass(frozen=True)
 class Chattering:
     """Repeated firing of one edge, back and forth, within a short time.
@@ -24,6 +29,8 @@ class Chattering:
         Number of firings, at least 2.
     within : float
         Length of the time window, s.
+    contact : str
+        The contact, in a system; without a name every one.
 
     Raises
     ------
@@ -33,6 +40,7 @@ class Chattering:
 
     times: int = 20
     within: float = 0.1
+    contact: str = ""
 
     def __post_init__(self) -> None:
         if not isinstance(self.times, int) or self.times < 2:
@@ -42,7 +50,7 @@ class Chattering:
     @property
     def name(self) -> str:
         """Name under which it is reported."""
-        return "chattering"
+        return named(self.contact, "chattering")
 
 
 @dataclass(frozen=True)
@@ -54,15 +62,19 @@ class Invariant:
     text : str
         Condition in the expression language. It can use t, x, v, F; variables (z), the threshold s
         and parameters of each element, and must then hold for every element; z1, s1, F1 for a
-        single element; and ``state == slip`` or ``state(1) == slip``.
+        single element; and ``state == slip`` or ``state(1) == slip``. In a system it can use the
+        system's names, and those of its contacts, such as ``gear.F``.
+    contact : str
+        A contact whose names it uses instead, in a system.
     """
 
     text: str
+    contact: str = ""
 
     @property
     def name(self) -> str:
         """Name under which it is reported."""
-        return self.text
+        return named(self.contact, self.text)
 
 
 @dataclass(frozen=True)
@@ -78,6 +90,8 @@ class Passivity:
     tolerance : float
         Allowed energy deficit as a fraction of the energy turned over. The uncertainty of the sums
         is added to it.
+    contact : str
+        The contact, in a system; without a name every one.
 
     Raises
     ------
@@ -86,6 +100,7 @@ class Passivity:
     """
 
     tolerance: float = 1e-4
+    contact: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "tolerance", checked_scalar("tolerance", self.tolerance, ">= 0"))
@@ -93,17 +108,25 @@ class Passivity:
     @property
     def name(self) -> str:
         """Name under which it is reported."""
-        return "passivity"
+        return named(self.contact, "passivity")
 
 
 @dataclass(frozen=True)
 class Coverage:
-    """The states, edges and guard clauses (true and false) that the run has exercised."""
+    """The states, edges and guard clauses (true and false) that the run has exercised.
+
+    Parameters
+    ----------
+    contact : str
+        The contact, in a system; without a name every one.
+    """
+
+    contact: str = ""
 
     @property
     def name(self) -> str:
         """Name under which it is reported."""
-        return "coverage"
+        return named(self.contact, "coverage")
 
 
 Monitor: TypeAlias = Chattering | Invariant | Passivity | Coverage

@@ -12,8 +12,9 @@ import numpy as np
 from gms_fsm.charts import GMS_ELEMENT
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import SignalError
-from gms_fsm.language import MATLAB_LIKE, Binary, Name, Value, spell
+from gms_fsm.language import MATLAB_LIKE, Binary, Name, Value, evaluate, spell
 from gms_fsm.systems.models import Model
+from gms_fsm.systems.system import system_of
 from gms_fsm.traces._between import slopes
 from gms_fsm.traces.monitors._kinds import Passivity
 from gms_fsm.traces.monitors._words import elements_text
@@ -25,13 +26,8 @@ __all__ = ["passivity"]
 
 def passivity(monitor: Passivity, trace: Trace) -> PassivityVerdict:
     spring = _spring(trace.model)
-    if spring is None:
-        forces = {spell(tree, MATLAB_LIKE): None for tree in _forces(trace.model) if tree}
-        return PassivityVerdict(
-            True,
-            f"not applicable: F = {' or '.join(forces)} is not a spring force k * z [+ sigma * dz]",
-            False,
-        )
+    if spring is None or _held(trace):
+        return PassivityVerdict(True, f"not applicable: {_why_not(trace)}", False)
     k, sigma = spring
     t, z = trace.t, trace.z
     with np.errstate(all="ignore"):  # the run may have grown without bound
@@ -43,7 +39,8 @@ def passivity(monitor: Passivity, trace: Trace) -> PassivityVerdict:
     turnover = np.abs(lost + wound).sum(axis=0)
     # The solver knows z only to its absolute tolerance.
     allowed: Any = trace.settings["atol"]
-    allowed = allowed[trace.model.chart.variables[0]] if isinstance(allowed, Mapping) else allowed
+    layout, first = trace.program.layout, trace.places.of(_z(trace))
+    allowed = allowed[layout.label(first)] if isinstance(allowed, Mapping) else allowed
     blur = k * np.abs(z[: end + 1]).max(axis=0, initial=0.0) * np.asarray(allowed or 0.0)
     tolerance = monitor.tolerance * turnover + doubt.sum(axis=0) + blur
     n = trace.n
@@ -77,6 +74,27 @@ def passivity(monitor: Passivity, trace: Trace) -> PassivityVerdict:
             "shorter steps"
         )
     return replace(verdict, text="; ".join(parts))
+
+
+def _held(trace: Trace) -> bool:
+    """Return whether the contact has a period, so that its force is not that of its variables."""
+    return getattr(trace.model, "period", None) is not None or trace.settings["events"] == "held"
+
+
+def _why_not(trace: Trace) -> str:
+    """Say why the energy of a contact cannot be computed."""
+    chart, spring = trace.model.chart, "a spring force k * z [+ sigma * dz]"
+    if len(chart.velocities) > 1:
+        along = " and ".join(chart.velocities)
+        return f"the contact moves by {along}, and only {spring} along one velocity is checked"
+    forces = [spell(tree, MATLAB_LIKE) for tree in _forces(trace.model) if tree is not None]
+    if not forces:
+        return f"F is what holds the contact, not {spring}"
+    if len(forces) > 1:
+        return f"F depends on the state ({' or '.join(forces)}), and only {spring} is checked"
+    if _spring(trace.model) is not None:
+        return f"the contact has a period, and F is held between ticks, so it is not {spring}"
+    return f"F = {forces[0]} is not {spring}"
 
 
 def _forces(model: Model) -> list[Value | None]:
@@ -124,12 +142,29 @@ def _lost(trace: Trace, k: FloatArray, sigma: FloatArray) -> tuple[FloatArray, F
         except SignalError:  # a trace from a file has lost a signal that was a Python function
             return lost, doubt
         right, places = left + 1, trace.program.layout.y
-        v0, v1 = np.moveaxis(rates[:, :, [places.index("x")]], 1, 0)
-        dz0, dz1 = np.moveaxis(rates[:, :, places.block(places.own[0])], 1, 0)
+        v0, v1 = np.moveaxis(_velocity(trace, rates)[:, :, np.newaxis], 1, 0)
+        dz0, dz1 = np.moveaxis(rates[:, :, places.block(trace.places.of(_z(trace)))], 1, 0)
         lost[left], doubt[left] = _heat(
             k, sigma, h[left], x[left], x[right], z[left], z[right], v0, v1, dz0, dz1
         )
     return lost, doubt
+
+
+def _velocity(trace: Trace, rates: FloatArray) -> FloatArray:
+    """Return the velocity of the contact, given the rates of the state vector on the last axis."""
+    system = trace.system or system_of(trace.model, trace.rig)
+    index = [contact.name for contact in system.contacts].index(trace.places.name)
+    row = system.assembly.banks[index].jacobian[0]
+    total = np.zeros(rates.shape[:-1])
+    for body in system.bodies:
+        if body.name in row:
+            place = trace.program.layout.y.index(body.x)
+            total = total + evaluate(row[body.name], dict(system.numbers)) * rates[..., place]
+    return total
+
+
+def _z(trace: Trace) -> str:
+    return trace.model.chart.variables[0]
 
 
 def _heat(
@@ -195,12 +230,12 @@ def _sentences(verdict: PassivityVerdict, trace: Trace, lost: FloatArray) -> lis
     if made:
         i = max(made, key=lambda i: verdict.made[i])
         state = chart.states[int(trace.modes[int(lost[:, i].argmin()), i])]
-        z = chart.variables[0]
+        z = _z(trace)
         parts.append(
             f"the most energy created between two times: {elements_text([i])}, "
             f"{verdict.made[i]:.6g} J from t = {verdict.made_from[i]:.6g} to "
             f"{verdict.made_until[i]:.6g} s, mostly in {state.name}, where "
-            f"d{z} = {state.flow[z]} moves {z} differently from the motion"
+            f"d{z} = {state.flow.get(z, '0')} moves {z} differently from the motion"
         )
     if over and chart == GMS_ELEMENT["published"]:
         parts.append(

@@ -1,0 +1,128 @@
+"""The debugger shows bodies, contacts, signals and sampled values; elements belong to contacts."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+
+import pytest
+
+from gms_fsm.app.debugger import COMMANDS, Debugger, help_of, view
+from gms_fsm.inspection.session import Session
+from tests.inspection.test_session_of_a_system import pushed
+from tests.systems_cases import CASES
+
+
+def made(period: float | None = None) -> Debugger:
+    return Debugger(Session(pushed(period), 2.0), "", io.StringIO(), io.StringIO())
+
+
+def pulled() -> Debugger:
+    session = Session(CASES["pulled_mass"]().system, 12.0)
+    return Debugger(session, "", io.StringIO(), io.StringIO())
+
+
+def test_where_shows_everything_in_80_columns() -> None:
+    debugger = made()
+    debugger.reply("goto 1.02")
+    said = debugger.reply("where").splitlines()
+    here = debugger.session.here
+    assert max(map(len, said)) <= 80
+    assert said[1].startswith(f"one  q1 = {here.body('one').x:.6g}, w1 = ")
+    assert said[3].startswith(f"further states: i = {here.values['i']:.6g}")
+    assert said[4].endswith("count = 21; next tick at t = 1.05 s")
+    assert said[5].startswith("signals: r = 0.0841471")
+    assert "pad: Coulomb friction with stiction" in said
+    assert "bank: GMS, 4 elements, signed law" in said
+    ribbons = [line.split()[:2] for line in said if line.startswith((" pad", " bank"))]
+    assert ribbons == [["pad", "1"], *(["bank", str(i)] for i in range(1, 5))]
+
+
+def test_the_view_is_plain_data() -> None:
+    debugger = made()
+    debugger.reply("goto 1.02")
+    seen = view(debugger.session)
+    assert [body.name for body in seen.bodies] == ["one", "two"]
+    assert [each.title for each in seen.values] == ["further states", "sampled pid", "signals"]
+    assert [contact.name for contact in seen.contacts] == ["pad", "bank"]
+    assert len(seen.elements) == 5
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ("why bank 2", "bank 2 is in stick at t = "),
+        ("why BANK 2 Break_Away_Forward", "bank 2 is in stick"),
+        ("why pad", "pad 1 is in stuck"),
+        ("why 1", "pad 1 is in stuck"),
+        ("why 2", "error: no element 2 of pad; there are 1 to 1"),
+        ("why bank 5", "error: no element 5 of bank; there are 1 to 4"),
+        ("why gear 1", "error: 'gear 1' is not an edge; there are release_forward"),
+        ("element bank 3", "bank 3 is in stick"),
+        ("break arrest bank", "breakpoint 1: fires arrest, bank"),
+        ("break arrest bank 2 if w2 > 0", "breakpoint 1: fires arrest, bank 2, if w2 > 0"),
+        ("break stuck", "breakpoint 1: enter stuck, all elements"),
+        ("poke q1=0.1 u=2*0.1 bank.z2=0.1", "branch 1, from branch 0: q1 = 0.1, u = 0.2, bank.z2"),
+        ("poke bank.state2=SLIP", "branch 1, from branch 0: state of bank 2 = slip"),
+        ("poke state2=slip", "error: 'state2' names no contact; write, for example, pad.state1"),
+        (
+            "poke bank.state=slip",
+            "error: 'bank.state' cannot be poked; for element 1 write bank.st",
+        ),
+        ("poke m=2", "error: m is a number; to change it, make another system and session"),
+        ("print pad.state == stuck", "true"),
+        ("print F", "error: column 1: unknown name 'F'; write pad.F"),
+    ],
+)
+def test_commands_name_elements_by_contact(command: str, said: str) -> None:
+    assert made().reply(command).replace("\n  ", " ").startswith(said)
+
+
+def test_the_chosen_element_is_explained_and_drawn() -> None:
+    debugger = made()
+    debugger.reply("element bank 3")
+    assert debugger.reply("why").startswith("bank 3 is in stick")
+    assert debugger.reply("why 2").startswith("bank 2 is in stick")
+    assert debugger.reply("list").startswith("bank 3 of 4: GMS element, signed law")
+
+
+def test_a_chart_without_variables() -> None:
+    debugger = pulled()
+    assert debugger.reply("why 1") == debugger.reply("why") == debugger.reply("why pad 1")
+    assert debugger.reply("next").splitlines()[1:] == [
+        "  pad 1: stuck -> forward by release_forward",
+        "  pad: v = 0 m/s, F = 1 N, forward",
+    ]
+    said = debugger.reply("where").splitlines()
+    assert said[4].split() == ["el", "state", "F_i", "[N]", "edges"]
+    listed = debugger.reply("list")
+    assert "locked: v = 0, F is what holds it" in listed
+    assert "F = F_c + b * v" in listed
+
+
+@pytest.mark.parametrize("name", ["why", "print", "watch", "element", "until", "break", "poke"])
+@pytest.mark.parametrize("which", [pulled, made])
+def test_help_has_examples_of_this_system(name: str, which: Callable[[], Debugger]) -> None:
+    debugger = which()
+    text = debugger.reply(f"help {name}")
+    assert "{" not in text
+    for example in help_of(name, debugger.session).examples:
+        assert f"example: {example}" in text
+        if not example.startswith("until"):  # to the end
+            assert "error:" not in debugger.reply(example), example
+
+
+@pytest.mark.parametrize("which", [pulled, made])
+def test_every_command_has_help(which: Callable[[], Debugger]) -> None:
+    session = which().session
+    for name in COMMANDS:
+        assert "{" not in str(help_of(name, session))
+        assert help_of(name, session).examples
+
+
+def test_completion_offers_names_of_the_system() -> None:
+    words = made().commands.words
+    assert "bank 2" in words("why", "why ")
+    assert "bank.state(2)" in words("until", "until ")
+    assert {"q1=", "u=", "bank.z4=", "bank.state4=", "pad.state1="} <= {*words("poke", "poke ")}
+    assert "r=" not in words("poke", "poke ")
