@@ -13,7 +13,7 @@ exactly, so that a stuck body is at rest to the last bit.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 
 from gms_fsm.language import Binary, Name, Negative, Number, Value
@@ -26,6 +26,7 @@ __all__ = ["Lock", "Locks"]
 
 # A pivot under this part of the diagonal is one that rounding has left of zero.
 DEPENDENT = 1e-9
+UNITS = (Number(1.0), Number(-1.0), Negative(Number(1.0)))
 
 
 @dataclass(frozen=True)
@@ -106,54 +107,97 @@ class Locks:
             for s in range(r + 1)
             if (value := self.weight(self.rows[r], self.rows[s])) is not None
         }
+        order = self.order({key for key in entries if key[0] != key[1]})
+        place = {r: k for k, r in enumerate(order)}
         # Which entries of L are not zero: those of the matrix, and what elimination fills in.
-        lower = {key for key in entries if key[0] != key[1]}
-        for k in rows:
-            below = [r for r in rows if (r, k) in lower]
-            lower |= {(r, s) for r in below for s in below if r > s}
+        lower = {
+            (r, s) if place[r] > place[s] else (s, r) for r, s in entries if place[r] != place[s]
+        }
+        for k in order:
+            below = [r for r in order if (r, k) in lower]
+            lower |= {(r, s) for r in below for s in below if place[r] > place[s]}
         lines: list[Line] = []
-        for s in rows:
+        for s in order:
             diagonal = entries[s, s]
             lines.append(put(f"W_{s}", diagonal))
-            less = "".join(f" - L_{s}_{k} * L_{s}_{k} * D_{k}" for k in rows if (s, k) in lower)
+            less = "".join(f" - L_{s}_{k} * L_{s}_{k} * D_{k}" for k in order if (s, k) in lower)
             lines += [
                 Line(f"D_{s} = W_{s}{less}"),
                 Line(f"if l_{s} == 0.0 or D_{s} <= {DEPENDENT} * W_{s}:"),
                 Line(f"    l_{s} = 0.0"),
                 Line(f"    D_{s} = 1.0"),
             ]
-            for r in rows:
+            for r in order:
                 if (r, s) in lower:
-                    entry = entries.get((r, s))
+                    entry = entries.get((max(r, s), min(r, s)))
                     text = "0.0" if entry is None else self.writer.spell(entry)
                     reads = frozenset() if entry is None else computed_names(entry)
                     less = "".join(
                         f" - L_{r}_{k} * L_{s}_{k} * D_{k}"
-                        for k in range(s)
+                        for k in order
                         if (r, k) in lower and (s, k) in lower
                     )
                     lines.append(Line(f"L_{r}_{s} = l_{r} * l_{s} * ({text}{less}) / D_{s}", reads))
-        for r in rows:
+        for r in order:
             value = right[r]
-            less = "".join(f" - L_{r}_{k} * w_{k}" for k in range(r) if (r, k) in lower)
+            less = "".join(f" - L_{r}_{k} * w_{k}" for k in order if (r, k) in lower)
             lines.append(
                 Line(f"w_{r} = l_{r} * ({self.writer.spell(value)}{less})", computed_names(value))
             )
-        for r in reversed(rows):
-            less = "".join(f" - L_{k}_{r} * hold_{k}" for k in rows if (k, r) in lower)
+        for r in reversed(order):
+            less = "".join(f" - L_{k}_{r} * hold_{k}" for k in order if (k, r) in lower)
             lines.append(Line(f"hold_{r} = w_{r} / D_{r}{less}"))
         return lines
+
+    def order(self, links: Set[tuple[int, int]]) -> list[int]:
+        """Return the order of elimination.
+
+        As listed, which decides who carries a force that several could carry. Where no lock can
+        repeat others, because the contacts join the bodies and the ground to trees, it is free:
+        the row with the fewest neighbours comes next, so that nothing is filled in.
+        """
+        rows = list(range(len(self.rows)))
+        if not self.joins_trees():
+            return rows
+        near: dict[int, set[int]] = {r: set() for r in rows}
+        for r, s in links:
+            near[r].add(s)
+            near[s].add(r)
+        order: list[int] = []
+        while near:
+            r = min(near, key=lambda each: (len(near[each]), each))
+            others = near.pop(r)
+            for s in others:
+                near[s] = (near[s] | others) - {r, s}
+            order.append(r)
+        return order
+
+    def joins_trees(self) -> bool:
+        """Return whether the rows join bodies and the ground without closing a loop."""
+        group: dict[str | None, str | None] = {None: None, **{name: name for name in self.bodies}}
+
+        def root(name: str | None) -> str | None:
+            while group[name] != name:
+                name = group[name]
+            return name
+
+        for each in self.rows:
+            ends: list[str | None] = [*self.free(each.row)]
+            if len(ends) == 1:
+                ends.append(None)
+            one, *others = map(root, ends)
+            if len(others) != 1 or one == others[0]:
+                return False
+            group[one if one is not None else others[0]] = others[0] if one is not None else one
+        return True
 
     def exact(
         self, name_of: Mapping[str, str], target: Mapping[int, str] | None = None
     ) -> list[Line]:
-        """Set the dependent accelerations, or velocities, exactly; forth and back along chains."""
+        """Set the dependent accelerations, or velocities, exactly."""
         lines: list[Line] = []
-        order = list(range(len(self.rows)))
-        passes = [*order, *reversed(order[:-1])] if len(order) > 1 else order
-        for r in passes:
+        for r, body in self.sequence():
             row = self.rows[r].row
-            body = self.dependent(row)
             others = {name: value for name, value in row.items() if name != body}
             goal = (target or {}).get(r, "0.0")
             text, reads = goal, frozenset[str]()
@@ -171,13 +215,31 @@ class Locks:
             lines += [Line(f"if l_{r} > 0.0:"), Line(f"    {local} = {text}", reads)]
         return lines
 
+    def sequence(self) -> list[tuple[int, str]]:
+        """Return the rows with the body that each sets, so that what a row reads was set before.
+
+        A body that only one row moves can follow its other bodies, and is taken off; so are those
+        that only one of the remaining rows moves. Where rows close a loop, these are gone through
+        as listed, and back again.
+        """
+        left = {r: list(self.free(each.row)) for r, each in enumerate(self.rows)}
+        last: list[tuple[int, str]] = []
+        while ends := [
+            (self.rows[r].row[body] not in UNITS, r, body)
+            for r, bodies in left.items()
+            for body in bodies
+            if sum(body in others for others in left.values()) == 1
+        ]:
+            _, r, body = min(ends)
+            last.insert(0, (r, body))
+            del left[r]
+        loops = [(r, self.dependent(self.rows[r].row)) for r in left]
+        return [*loops, *reversed(loops[:-1]), *last]
+
     def dependent(self, row: Mapping[str, Value]) -> str:
         """Choose the body that follows the others: one with coefficient 1 or -1 if there is one."""
         free = self.free(row)
-        for name, value in free.items():
-            if value in (Number(1.0), Number(-1.0), Negative(Number(1.0))):
-                return name
-        return next(iter(free))
+        return next((name for name, value in free.items() if value in UNITS), next(iter(free)))
 
     # ------------------------------------------------------------------ forces and impulses
     def flags(self, *, kept: bool = False) -> list[Line]:

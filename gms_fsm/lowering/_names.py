@@ -160,7 +160,7 @@ def _names_of_locks(read: Assembly) -> set[str]:
     setting = [bank for bank in read.banks if bank.chart.locks or bank.chart.sets_velocity]
     rows = range(sum(len(bank.velocities) for bank in setting))
     names = {f"{name}_{r}" for r in rows for name in ("D", "W", "goal", "hold", "l", "w")}
-    return names | {f"L_{r}_{s}" for r in rows for s in range(r)} | {"hit"}
+    return names | {f"L_{r}_{s}" for r in rows for s in rows} | {"hit"}
 
 
 _SHORT = {"curve S": "S", "curve v dip": "v_dip", "threshold weight": "weight"}

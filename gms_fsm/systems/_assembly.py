@@ -344,7 +344,7 @@ class Reader:
                     self.value(
                         text, [*system.names, "period"], owner.of(repr(name), "updates", name)
                     ),
-                    own if "period" not in system.names else {},
+                    own,
                 )
                 for name, text in each.updates.items()
             }

@@ -78,6 +78,11 @@ class System:
         If names clash, a text cannot be read, a velocity is not linear, an inertia is zero, or a
         lock cannot hold.
 
+    Notes
+    -----
+    Locked contacts may hold the same motion. The earlier ones, as listed, then carry the force, and
+    those that would repeat them carry none; `Trace.shared` marks these.
+
     Examples
     --------
     >>> from gms_fsm.charts.gms import gms_element
@@ -136,6 +141,8 @@ class System:
     def _check_names(self, here: str) -> None:
         # What has names, and the names, each with its key.
         groups: list[tuple[str, list[tuple[str, Key]]]] = [("time", [("t", ())])]
+        if self.sampled:
+            groups.append(("the period of sampled values", [("period", ())]))
         for i, body in enumerate(self.bodies):
             own: list[tuple[str, Key]] = [(body.x, ("bodies", i, "x"))]
             if not (body.velocity == body.v and body.v in self.signals):

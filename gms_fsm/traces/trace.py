@@ -209,12 +209,13 @@ class Trace:
         return BodyTrace(name, self._named(body.x), velocity)
 
     def value(self, name: str) -> FloatArray:
-        """Return a further state or a sampled value of the system, shape (rows,).
+        """Return a further state or a sampled value of the system; or a value of the contact.
 
         Parameters
         ----------
         name : str
-            As in the system's ``flow`` or in the updates of a `Sampled`.
+            As in the system's ``flow`` or in the updates of a `Sampled`; or what the chart calls a
+            velocity or a force, such as ``"F_w"`` of a contact in the plane.
 
         Returns
         -------
@@ -224,12 +225,19 @@ class Trace:
         Raises
         ------
         ParameterError
-            If there is no such state.
+            If there is no such value.
         """
-        if name not in self.program.layout.y.shared:
-            known = ", ".join(map(repr, self.program.layout.y.shared))
-            raise ParameterError(f"there is no state {shown(name)}", advice=f"there are {known}")
-        return self._named(name)
+        layout = self.program.layout
+        if name in layout.y.shared:
+            return self._named(name)
+        bank = self.places if self.which or len(layout.banks) == 1 else None
+        names = {} if bank is None else bank.plain({each: each for each in layout.observed.shared})
+        if name in names:
+            return self.seen[names[name]]
+        known = [*layout.y.shared, *(each for each in names if " " not in each)]
+        raise ParameterError(
+            f"there is no value {shown(name)}", advice=f"there are {', '.join(map(repr, known))}"
+        )
 
     @property
     def x(self) -> FloatArray:
@@ -306,6 +314,16 @@ class Trace:
     def F(self) -> FloatArray:
         """Friction force, shape (rows,), N."""
         return self.seen[self.places.of("F")]
+
+    @property
+    def shared(self) -> NDArray[np.bool_]:
+        """Whether earlier contacts carry what would hold this locked one, shape (rows,).
+
+        See the rule for locks that repeat each other in `gms_fsm.System`.
+        """
+        places = [self.places.of(f"{force} shared") for force in self.model.chart.force_names]
+        found = [self.seen[place] > 0.0 for place in places if place in self.seen]
+        return np.any(found, axis=0) if found else np.zeros(len(self.rows), dtype=bool)
 
     @property
     def F_elements(self) -> FloatArray:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+import random
 from itertools import pairwise
 
 import numpy as np
+import pytest
 
+from gms_fsm import Body, Chart, Contact, State, System, simulate
 from tests.helpers import FASTEST
 from tests.systems_cases import BALL, DRY, ball, gear_box, impact, pulled_mass
 
@@ -27,6 +30,33 @@ def test_a_pulled_mass_sticks_and_slips_at_the_times_of_its_closed_form() -> Non
     assert stuck.any()
     assert (trace.v[stuck] == 0.0).all()
     np.testing.assert_allclose(trace.F[stuck], K * (V * trace.t - trace.x)[stuck], atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_tree_of_locked_bodies_moves_as_one_whatever_the_order_of_its_contacts(seed: int) -> None:
+    """Each contact pulls all that hangs on it; the velocities are equal to the last bit."""
+    n, m = 15, 0.5
+    weld = Chart("weld", states=(State("held", locked=True),))
+    contacts = [Contact(f"c{i}", weld, v=f"v{i} - v{(i - 1) // 2}") for i in range(1, n)]
+    random.Random(seed).shuffle(contacts)
+    system = System(
+        "tree",
+        bodies=[
+            Body(f"b{i}", inertia=m, force="0" if i else "sin(t)", x=f"x{i}", v=f"v{i}")
+            for i in range(n)
+        ],
+        contacts=contacts,
+    )
+    trace = simulate(system, 5.0, rtol=1e-10, engine=FASTEST)
+    hanging = [1.0] * n
+    for i in reversed(range(1, n)):
+        hanging[(i - 1) // 2] += hanging[i]
+    for i in range(1, n):
+        assert trace.body(f"b{i}").v.tolist() == trace.body("b0").v.tolist()
+        pull = -hanging[i] / n * np.sin(trace.t)
+        np.testing.assert_allclose(trace.contact(f"c{i}").F, pull, rtol=0, atol=1e-14)
+    v = (1.0 - np.cos(trace.t)) / (n * m)
+    np.testing.assert_allclose(trace.body("b0").v, v, rtol=0, atol=1e-9)
 
 
 def test_a_ball_rests_after_finitely_many_bounces_and_its_weight_is_carried() -> None:

@@ -12,7 +12,7 @@ from tests.systems_cases import clutched_bearings, pushed_against_a_stop
 
 def shared(trace: Trace, contact: str) -> np.ndarray:
     """Return where the force of a locked contact is carried by earlier ones."""
-    found: np.ndarray = trace.seen[f"{contact}.F shared"]
+    found: np.ndarray = trace.contact(contact).shared
     return found
 
 
@@ -47,13 +47,13 @@ def test_two_bearings_and_a_clutch_let_go_one_after_the_other() -> None:
     np.testing.assert_allclose(log.t, [1.0, 1.5 / R, (1.0 + 3.0) / R], rtol=0, atol=1e-9)
     both = (trace.t > 1.0) & (trace.t < log.t[1])
     assert both.any()
-    np.testing.assert_array_equal(shared(trace, "bearing_b")[both], 1.0)
+    np.testing.assert_array_equal(shared(trace, "bearing_b")[both], True)
     np.testing.assert_array_equal(trace.contact("bearing_b").F[both], 0.0)
     np.testing.assert_allclose(trace.contact("bearing_a").F[both], R * trace.t[both], atol=1e-12)
     for earlier in ("bearing_a", "dog"):
-        np.testing.assert_array_equal(shared(trace, earlier), 0.0)
+        np.testing.assert_array_equal(shared(trace, earlier), False)
     later = trace.t > log.t[1]
-    np.testing.assert_array_equal(shared(trace, "bearing_b")[later], 0.0)
+    np.testing.assert_array_equal(shared(trace, "bearing_b")[later], False)
     moving = trace.t > log.t[2]
     np.testing.assert_array_equal(trace.body("a").v[moving], trace.body("b").v[moving])
     assert trace.body("b").v[-1] > 0.0

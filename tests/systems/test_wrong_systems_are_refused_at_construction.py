@@ -17,6 +17,7 @@ from gms_fsm import (
     GMSError,
     ParameterError,
     Prescribed,
+    Sampled,
     State,
     System,
     Transition,
@@ -78,6 +79,24 @@ REFUSED: dict[str, tuple[Callable[[], object], type[GMSError], str]] = {
         lambda: system(contacts=WELDS),
         ParameterError,
         "'a', 'b' are always locked",
+    ),
+    "a name in an update": (
+        lambda: system(sampled=(Sampled("pid", period=1e-3, updates={"u": "k * x"}),)),
+        ExpressionError,
+        "sampled 'pid', 'u', column 1: unknown name 'k'",
+    ),
+    "a force in an update": (
+        lambda: system(sampled=(Sampled("pid", period=1e-3, updates={"u": "2 * F"}),)),
+        ExpressionError,
+        "sampled 'pid', 'u', column 5: unknown name 'F'",
+    ),
+    "a number called period": (
+        lambda: system(
+            sampled=(Sampled("pid", period=1e-3, updates={"u": "x / period"}),),
+            numbers={"period": 2.0},
+        ),
+        ParameterError,
+        "the name 'period' is used twice",
     ),
     "a driven body alone": (
         lambda: system(body=Body("mass", velocity="1")),

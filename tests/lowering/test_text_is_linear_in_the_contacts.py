@@ -1,0 +1,27 @@
+"""The text of a program is linear in the number of contacts, for chains and trees of bodies."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+
+import pytest
+
+from benchmarks.bodies import KINDS, bodies
+from gms_fsm.lowering.program import lower
+
+
+def _lines(kind: str, n: int) -> Counter[str]:
+    """Count the lines of each function."""
+    found: Counter[str] = Counter()
+    for part in re.split(r"^def ", lower(bodies(kind, n)).source, flags=re.MULTILINE)[1:]:
+        found[part.partition("(")[0]] = len(part.splitlines())
+    return found
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_twice_as_many_contacts_add_twice_as_many_lines(kind: str) -> None:
+    few, more, most = (_lines(kind, n) for n in (7, 15, 31))
+    assert few["flow"] > 7 * 10
+    for name in few:
+        assert most[name] - more[name] <= 2.1 * (more[name] - few[name]), name
