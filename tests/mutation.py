@@ -40,6 +40,10 @@ NEAR = {  # module: its tests, those that detect most first
     "gms_fsm/charts/chart.py": [
         "charts/test_a_chart_cannot_be_changed",
         "charts/test_chart_refuses_contradictions",
+        "charts/test_broken_chart_files_say_what_is_wrong",
+        "charts/test_edges_by_time_and_from_several_states",
+        "charts/test_named_expressions_mean_what_they_stand_for",
+        "charts/test_chart_files_round_trip",
         "charts/test_gms_chart_is_the_papers",
         "run/test_elements_answer_for_themselves",
     ],
@@ -47,6 +51,8 @@ NEAR = {  # module: its tests, those that detect most first
         "run/test_elements_answer_for_themselves",
         "run/test_callbacks_run_once_per_firing",
         "run/test_callbacks_only_look",
+        "systems/test_engines_agree_on_systems",
+        "traces/test_traces_of_systems_round_trip",
         "charts/test_gms_chart_is_the_papers",
     ],
     "integrators/advance.py": [

@@ -13,11 +13,10 @@ from gms_fsm.run.start import Start
 from gms_fsm.systems.models import parameter_names
 
 if TYPE_CHECKING:
-    from gms_fsm.inspection._branch import Branch, Row
+    from gms_fsm.inspection._branch import Row
 
-__all__ = ["Edits", "check_locks", "initial_with", "pokeable"]
+__all__ = ["Edits", "initial_with", "pokeable"]
 
-ROUNDING = 1e-9  # of a velocity, relative to those of the bodies
 AGE = "age"  # restarts in a state that was poked
 
 
@@ -224,45 +223,3 @@ def initial_with(edits: Edits, start: Start, here: Row) -> dict[str, Any]:
         else:
             initial[name] = values
     return initial if edits.v is None else initial | {"v": edits.v}
-
-
-def check_locks(branch: Branch, here: Row, new: Row) -> None:
-    """Refuse a poke after which a contact moves in a state that holds its velocity at 0.
-
-    Parameters
-    ----------
-    branch : Branch
-        The branch in which the poke is made.
-    here, new : Row
-        The point, before and after.
-
-    Raises
-    ------
-    SessionError
-        If a locked contact moves that did not before.
-    """
-    moved = _locked_motion(branch, new)
-    for (contact, state, name), v in moved.items():
-        if (contact, state, name) not in _locked_motion(branch, here):
-            raise SessionError(
-                f"{contact} would be in {state}, which holds {name} at 0, with {name} = {v:.6g}",
-                advice=f"poke velocities for which {name} is 0, or another state",
-            )
-
-
-def _locked_motion(branch: Branch, row: Row) -> dict[tuple[str, str, str], float]:
-    """Return the velocities of locked contacts that are not 0."""
-    system, scope = branch.run.start.system, branch.system_scope(row)
-    fastest = max(abs(scope.value(body.v)) for body in system.bodies)
-    found: dict[tuple[str, str, str], float] = {}
-    for contact in system.contacts:
-        own = scope.contacts[contact.name]
-        for state in contact.chart.states:
-            if state.locked and state.name in own.states:
-                velocities = {name: own.seen[name] for name in contact.chart.velocities}
-                found |= {
-                    (contact.name, state.name, name): v
-                    for name, v in velocities.items()
-                    if abs(v) > ROUNDING * fastest
-                }
-    return found

@@ -20,7 +20,7 @@ from gms_fsm.inspection._breakpoints import KINDS, Breakpoint
 from gms_fsm.inspection._conditions import holds_at
 from gms_fsm.inspection._elements import machine_of, title_of
 from gms_fsm.inspection._here import here_at, why_at
-from gms_fsm.inspection._poking import Edits, check_locks, initial_with
+from gms_fsm.inspection._poking import Edits, initial_with
 from gms_fsm.inspection._results import BranchComparison, Fired, Here, compared
 from gms_fsm.inspection.explain import Why
 from gms_fsm.language import Condition
@@ -453,10 +453,10 @@ class Session:
         Raises
         ------
         SessionError
-            If there is nothing to change, no such variable or element, a locked contact would
-            move, or the cursor is at the end of the run.
+            If there is nothing to change, no such variable or element, or the cursor is at the
+            end of the run.
         ParameterError, ChartError
-            If a value violates its rule.
+            If a value violates its rule, or a locked contact would move.
 
         Examples
         --------
@@ -475,7 +475,6 @@ class Session:
             raise SessionError(f"t = {here.t!r} s is the end of the run", advice="go back first")
         run = self._run(here.t, initial_with(edits, self.start, here))
         new = Branch(run, self.current, branch.cursor, branch, edits, branch.between)
-        check_locks(branch, here, new.raw(new.offset))
         new.cursor = new.offset
         self.branches.append(new)
         self.current = len(self.branches) - 1

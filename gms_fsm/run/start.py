@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import integrators
-from gms_fsm.charts.chart import Transition
+from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.charts.parameters import as_floats, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError, SignalError, shown
 from gms_fsm.language import evaluate
@@ -343,6 +343,7 @@ def _with_waking_times(program: Program, system: System, t_start: float, t_end: 
     return replace(program, knots=sorted({*program.knots, *times})) if times else program
 
 
+ROUNDING = 1e-9  # of a velocity, relative to those of the bodies
 MOST_TICKS = 10_000_000  # of a run: their times are kept
 
 
@@ -442,7 +443,44 @@ def _initial(
                 f"it must list {bank.n} state names", place=f"initial[{label!r}]", value=wanted
             )
         mode += [chart.state_index(str(name)) for name in wanted]
-    return _entered(system, program, t_start, state, mode, {*given}), mode
+    state = _entered(system, program, t_start, state, mode, {*given})
+    _check_locks(system, program, t_start, state, mode)
+    return state, mode
+
+
+def _check_locks(
+    system: System, program: Program, t_start: float, y: list[float], mode: list[int]
+) -> None:
+    """Refuse a start in a state that holds a velocity at 0 while this is not 0."""
+    layout, out = program.layout, [0.0] * program.layout.shown.size
+    locked = [
+        (bank, contact.chart, state)
+        for bank, contact in zip(layout.banks, system.contacts, strict=True)
+        for state in [contact.chart.states[i] for i in mode[bank.elements]]
+        if state.locked
+    ]
+    if not locked:
+        return
+    program.ieee["values"](t_start, y, mode, program.p, out)
+    free = [body for body in system.bodies if not body.driven]
+    fastest = max((abs(y[layout.y.index(body.v)]) for body in free), default=0.0)
+    for bank, chart, state in locked:
+        for name in chart.velocities:
+            v = out[layout.shown.index(bank.of(name))]
+            if not abs(v) <= ROUNDING * fastest:
+                key = "states" if len(layout.banks) == 1 else f"{bank.name}.states"
+                raise ParameterError(
+                    f"contact {bank.name!r} starts in state {state.name!r}, which holds {name} at "
+                    f"0, with {name} = {v:.6g}",
+                    place="initial",
+                    advice=f"give velocities for which {name} is 0, or another state, for example "
+                    f"initial={{{key!r}: [{_not_locked(chart)!r}]}}",
+                )
+
+
+def _not_locked(chart: Chart) -> str:
+    """Return the name of a state that holds nothing, or of any."""
+    return next((each for each in chart.states if not each.locked), chart.states[0]).name
 
 
 def _enters(system: System) -> bool:

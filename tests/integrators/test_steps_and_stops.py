@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable
 
 import pytest
@@ -261,3 +262,25 @@ def test_a_tolerance_that_is_given_stays() -> None:
     kernel.raise_floor(run.b.plan.control, run.b.now)
     run.to(3.0)
     assert run.b.now.floor == [1e-3]
+
+
+def test_a_tick_is_four_units_in_the_last_place() -> None:
+    assert kernel.tick_at(-1.0) == kernel.tick_at(1.0) == 4 * sys.float_info.epsilon
+    assert kernel.tick_at(0.0) == 0.0
+
+
+@pytest.mark.parametrize("ticks", [0.5, 3.0])
+def test_a_step_does_not_end_a_tick_before_a_stop(ticks: float) -> None:
+    start, stop = 2.0**20, 2.0**20 + 1.0
+    run = _Run(t=start)
+    run.to(stop, h=1.0 - ticks * kernel.tick_at(stop))
+    assert run.b.out.cursor[kernel.STEPS] == (1 if ticks < 1.0 else 2)
+
+
+def test_every_attempted_step_is_counted_once() -> None:
+    run = _Run(lambda t, y: math.cos(50.0 * t), tolerance=1e-9)
+    run.to(1.0, h=0.5)
+    tried, kept = run.b.out.cursor[kernel.STEPS], len(run.rows)
+    flows = len(run.asked) // 6
+    assert tried > kept
+    assert flows in (tried, tried + 1)

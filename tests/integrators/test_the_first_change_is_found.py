@@ -166,3 +166,38 @@ def test_the_search_is_wary_of_a_bend_four_times_as_high() -> None:
 
     assert _first(dip(0.1601))[1] == 2
     assert _first(dip(0.1599))[1] > 2
+
+
+def _of_a_step(t: float, h: float, resolution: float) -> tuple[float, int]:
+    """Return where t**3 = 0.3 is crossed in a step of length h, as a share, and the probes."""
+    w, looks = watched([False], 1), []
+
+    def fill(_: float, y: list[float], mode: list, p: None, watch: list, out: list) -> None:
+        looks.append(y[0])
+        out[0] = y[0] ** 3 - 0.3
+
+    def interpolate(_: None, theta: float, out: list[float]) -> None:
+        out[0] = theta
+
+    w.watch[0] = 1
+    w.active.append(0)
+    w.start[0] = -0.3
+    path = Path(Motion(fill, fill, None), [], interpolate, None, t, t + h, [1.0])
+    return first_change(path, w, resolution), len(looks)
+
+
+@pytest.mark.parametrize(("t", "h"), [(0.0, 1.0), (64.0, 2.0**-10), (-3.0, 4096.0)])
+def test_the_resolution_is_a_time_whatever_the_step(t: float, h: float) -> None:
+    assert _of_a_step(t, h, 1e-6 * h) == _of_a_step(0.0, 1.0, 1e-6)
+    assert _of_a_step(t, h, 1e-9 * h)[1] > _of_a_step(t, h, 1e-3 * h)[1]
+
+
+def test_a_resolution_under_rounding_ends_too() -> None:
+    place, _ = _of_a_step(0.0, 1.0, 1e-300)
+    assert abs(place - 0.3 ** (1.0 / 3.0)) < 1e-15
+
+
+def test_a_window_in_the_second_half_is_closed_by_its_slope() -> None:
+    place, probes = _first(lambda t: (t - 0.6) * (0.8 - t), resolution=1e-12)
+    assert 0.6 <= place < 0.6 + 1e-11
+    assert probes <= 10

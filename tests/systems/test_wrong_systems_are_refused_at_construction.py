@@ -135,3 +135,10 @@ def test_several_sources_may_lead_to_a_lock() -> None:
         ),
         transitions=(Transition("hold", ("on", "off"), "held", guard="v < 0"),),
     )
+
+
+def test_a_run_cannot_start_locked_and_moving() -> None:
+    with pytest.raises(ParameterError, match=r"'pad' starts in state 'stuck', .* with v = 0.3;"):
+        simulate(system(), 1.0, initial={"v": 0.3})
+    trace = simulate(system(), 1.0, initial={"v": 0.3, "pad.states": ["forward"]})
+    assert trace.transitions.edge.tolist() == ["arrest_forward"]
