@@ -4,8 +4,8 @@ The force approaches F_c exponentially with the displacement since the last reve
 stiffness sigma_0 at F = 0. This is Dahl's equation with his exponent i = 1.
 
 It shows pre-sliding hysteresis that does not depend on the rate. It cannot show stiction above F_c,
-the Stribeck effect or frictional lag; it has no nonlocal memory, so inner loops do not close; and it
-drifts, because every load, however small, leaves some plastic displacement.
+the Stribeck effect or frictional lag; it has no nonlocal memory, so inner loops do not close; and
+it drifts, because every load, however small, leaves some plastic displacement.
 
 References
 ----------

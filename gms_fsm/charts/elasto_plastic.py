@@ -1,16 +1,16 @@
 """The elasto-plastic model of Dupont et al.: LuGre with a range in which the bristle is elastic.
 
-Up to the deflection z_ba the bristle only bends, and all displacement is recovered. Between z_ba and
-the steady-state deflection ``z_ss = s(v) / sigma_0`` a growing part of the motion is plastic, and
-beyond it the bristle yields as in LuGre. A contact that turns back is elastic again at once.
+Up to the deflection z_ba the bristle only bends, and all displacement is recovered. Between z_ba
+and the steady-state deflection ``z_ss = s(v) / sigma_0`` a growing part of the motion is plastic,
+and beyond it the bristle yields as in LuGre. A contact that turns back is elastic again at once.
 
 It shows what LuGre shows (stiction that depends on the force rate, the Stribeck effect, frictional
 lag, stick-slip), and it does not drift under loads below ``sigma_0 z_ba``. It cannot show nonlocal
 memory: it has one variable, so an inner loop does not return to the point where it began, unless it
 is elastic as a whole.
 
-z_ba must be less than ``F_c / sigma_0``. In steady sliding z is equal to z_ss; rounding then decides
-between the states *mixed* and *plastic*, whose flows agree there.
+z_ba must be less than ``F_c / sigma_0``. In steady sliding z is equal to z_ss; rounding then
+decides between the states *mixed* and *plastic*, whose flows agree there.
 
 References
 ----------

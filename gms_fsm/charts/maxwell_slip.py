@@ -1,14 +1,14 @@
 """Maxwell-slip (Iwan): a bank of springs, each of which slips at its own Coulomb force.
 
-An element is a spring of stiffness k that is stretched up to F_c and then dragged along: elastic and
-perfectly plastic, a generalized stop operator of the displacement. The sum over elements is any
+An element is a spring of stiffness k that is stretched up to F_c and then dragged along: elastic
+and perfectly plastic, a generalized stop operator of the displacement. The sum over elements is any
 convex initial-loading curve; each element also is a play operator, of the slider that it drags.
 
 It shows pre-sliding hysteresis with nonlocal memory: inner loops close exactly, and the branches
 after a reversal are the initial-loading curve, twice as large (Masing). It does not drift and does
-not depend on the rate. It cannot show stiction above the sum of F_c, the Stribeck effect, frictional
-lag, or a force that rises with speed. The GMS element is this one with a Stribeck curve and a slip
-law.
+not depend on the rate. It cannot show stiction above the sum of F_c, the Stribeck effect,
+frictional lag, or a force that rises with speed. The GMS element is this one with a Stribeck curve
+and a slip law.
 
 References
 ----------
@@ -31,14 +31,15 @@ MAXWELL_SLIP = Chart(
         Parameter("k", "N/m", "> 0", meaning="stiffness"),
         Parameter("F_c", "N", "> 0", meaning="Coulomb friction of the element"),
     ),
+    let={"z_c": "F_c / k"},
     states=(
         State("stick", flow={"z": "v"}),
-        State("slip_forward", entry={"z": "F_c / k"}),
-        State("slip_backward", entry={"z": "-F_c / k"}),
+        State("slip_forward", entry={"z": "z_c"}),
+        State("slip_backward", entry={"z": "-z_c"}),
     ),
     transitions=(
-        Transition("break_away_forward", "stick", "slip_forward", guard="k * z >= F_c and v > 0"),
-        Transition("break_away_backward", "stick", "slip_backward", guard="k * z <= -F_c and v < 0"),
+        Transition("break_away_forward", "stick", "slip_forward", guard="z >= z_c and v > 0"),
+        Transition("break_away_backward", "stick", "slip_backward", guard="z <= -z_c and v < 0"),
         Transition("turn_forward", "slip_forward", "stick", guard="v < 0"),
         Transition("turn_backward", "slip_backward", "stick", guard="v > 0"),
     ),
@@ -49,8 +50,6 @@ CHARTS = (
     Entry(
         "maxwell-slip",
         MAXWELL_SLIP,
-        Demonstration(
-            {"k": (4e4, 3e4, 2e4, 1e4), "F_c": (0.25, 0.25, 0.25, 0.25)}, "chosen by us"
-        ),
+        Demonstration({"k": (4e4, 3e4, 2e4, 1e4), "F_c": (0.25, 0.25, 0.25, 0.25)}, "chosen by us"),
     ),
 )

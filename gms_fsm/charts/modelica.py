@@ -5,8 +5,8 @@ Forward, StartBackward, Backward, and Free where nothing presses the surfaces to
 modes last for an instant, until v has left 0. A brake or a clutch is this chart with N as an input,
 a function of time or of the bodies' motion.
 
-The coefficient of friction is a Stribeck curve, mu_s at rest and mu_c at high speed. A stuck contact
-holds up to ``peak mu_s N``.
+The coefficient of friction is a Stribeck curve, mu_s at rest and mu_c at high speed. A stuck
+contact holds up to ``peak mu_s N``.
 
 It shows stiction, an exact rest, stick-slip, the Stribeck effect, and how a contact engages and
 comes free. It cannot show pre-sliding, frictional lag, or a break-away force that depends on the
@@ -14,8 +14,9 @@ rate: friction is a function of v and N alone, as soon as the contact moves.
 
 References
 ----------
-M. Otter, H. Elmqvist, S. E. Mattsson, "Hybrid Modeling in Modelica Based on the Synchronous Data Flow
-Principle", IEEE International Symposium on Computer Aided Control System Design, 151-157 (1999).
+M. Otter, H. Elmqvist, S. E. Mattsson, "Hybrid Modeling in Modelica Based on the Synchronous Data
+Flow Principle", IEEE International Symposium on Computer Aided Control System Design, 151-157
+(1999).
 """
 
 from __future__ import annotations

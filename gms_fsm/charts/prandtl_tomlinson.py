@@ -1,19 +1,20 @@
 """The Prandtl-Tomlinson model: a tip that slides over a sinusoidal potential.
 
-The contact is the surface. It acts on the tip with the force ``F_0 sin(2 pi x / a_0)``, the slope of
-a potential of the corrugation ``F_0 a_0 / pi`` (from valley to hill), and with a viscous damping.
-x is the position of the tip over the surface. The spring that pulls the tip belongs to the system
-around the contact, as the inertia of the tip does: a pulled slider is the textbook's picture.
+The contact is the surface. It acts on the tip with the force ``F_0 sin(2 pi x / a_0)``, the slope
+of a potential of the corrugation ``F_0 a_0 / pi`` (from valley to hill), and with a viscous
+damping. x is the position of the tip over the surface. The spring that pulls the tip belongs to the
+system around the contact, as the inertia of the tip does: a pulled slider is the textbook's
+picture.
 
-Nothing switches. Where the potential is steeper than the pulling spring, ``2 pi F_0 / a_0 > K``, the
-tip has several positions of rest. Pulled slowly it stays in one until that vanishes, and then jumps
-to the next: atomic stick-slip, a sawtooth whose tops are below F_0. A softer potential gives smooth
-sliding without static friction (superlubricity).
+Nothing switches. Where the potential is steeper than the pulling spring, ``2 pi F_0 / a_0 > K``,
+the tip has several positions of rest. Pulled slowly it stays in one until that vanishes, and then
+jumps to the next: atomic stick-slip, a sawtooth whose tops are below F_0. A softer potential gives
+smooth sliding without static friction (superlubricity).
 
-It shows stick-slip, static friction, hysteresis, and how friction vanishes when the spring is stiff.
-It cannot show thermal activation (the temperature is zero), a Stribeck effect, or memory: the tip
-forgets where it came from at each jump. In slow sliding the mean force does not depend on the
-damping, which says only how fast a jump is over.
+It shows stick-slip, static friction, hysteresis, and how friction vanishes when the spring is
+stiff. It cannot show thermal activation (the temperature is zero), a Stribeck effect, or memory:
+the tip forgets where it came from at each jump. In slow sliding the mean force does not depend on
+the damping, which says only how fast a jump is over.
 
 References
 ----------

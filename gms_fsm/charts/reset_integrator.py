@@ -56,8 +56,6 @@ CHARTS = (
     Entry(
         "reset-integrator",
         RESET_INTEGRATOR,
-        Demonstration(
-            {"sigma_0": 1e5, "sigma_1": 316.23, "a_0": 0.5, "z_0": 1e-5}, "chosen by us"
-        ),
+        Demonstration({"sigma_0": 1e5, "sigma_1": 316.23, "a_0": 0.5, "z_0": 1e-5}, "chosen by us"),
     ),
 )

@@ -67,7 +67,7 @@ def stribeck_text(
     'N * (mu_c + (mu_s - mu_c) * exp(-(abs(v) / v_s)**delta))'
     """
     F_c, F_s, v_s, v, load = (_part(each) for each in (F_c, F_s, v_s, v, load))
-    if delta == GAUSSIAN:
+    if str(delta) in ("2", "2.0"):
         power = f"({v} / {v_s})**2"
     else:
         power = f"(abs({v}) / {v_s})**{_part(str(delta))}"
@@ -140,9 +140,7 @@ class Stribeck:
 
     def __call__(self, v: ArrayLike) -> FloatArray:
         """Return s(v) [N] for velocities v [m/s] of any shape, computed exactly as in a run."""
-        return values_of(
-            _tree(self.text), {"v": np.asarray(v, dtype=np.float64), **self.numbers}
-        )
+        return values_of(_tree(self.text), {"v": np.asarray(v, dtype=np.float64), **self.numbers})
 
 
 @functools.cache

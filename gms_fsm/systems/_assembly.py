@@ -547,8 +547,8 @@ class Reader:
     def curve(self, contact: Contact, index: int, names: dict[str, Value]) -> str:
         """Define the Stribeck curve of a model and the thresholds; return their name."""
         c = contact.name
-        assert contact.model is not None
-        assert (given := contact.model.stribeck) is not None
+        given = contact.stribeck
+        assert given is not None
         tree = parse_value(given.text, [*given.numbers, "v"])
         numbers: dict[str, Value] = {name: Name(of(c, f"curve {name}")) for name in given.numbers}
         curve = of(c, "curve S")
