@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from gms_fsm import Trace
-from tests.helpers import FASTEST
 from tests.hybrid_reference import Modes, Switch, Way, reference
 from tests.zoo.zoo_cases import (
     CURVE,
@@ -93,7 +92,7 @@ def test_karnopp() -> None:
         "forward",
         "backward",
     }
-    trace = karnopp().run(FASTEST)
+    trace = karnopp().run("ifelse")
     agree(trace, wanted)
     assert set(trace.v[trace.states[:, 0] == "stuck"].tolist()) == {0.0}
 
@@ -144,7 +143,7 @@ def modelica_on_paper() -> list[Switch]:
 def test_modelica() -> None:
     wanted = modelica_on_paper()
     assert {each.target for each in wanted} == {"stuck", "forward", "backward", "free"}
-    log = modelica().run(FASTEST).transitions
+    log = modelica().run("ifelse").transitions
     start = np.char.startswith(log.source.astype(str), "start_")
     assert start.sum() > 5
     assert (np.diff(log.t)[np.flatnonzero(start) - 1] < 1e-9).all()  # over at once
@@ -193,4 +192,4 @@ def elasto_plastic_on_paper() -> list[Switch]:
 def test_elasto_plastic() -> None:
     wanted = elasto_plastic_on_paper()
     assert {each.target for each in wanted} == {"elastic", "mixed", "plastic"}
-    agree(elasto_plastic().run(FASTEST), wanted)
+    agree(elasto_plastic().run("ifelse"), wanted)

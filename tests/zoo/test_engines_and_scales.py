@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from tests.helpers import FASTEST
 from tests.systems_cases import same_system_bits
 from tests.zoo.zoo_cases import CASES
 
 MICROMETRE = 2.0**-20  # m, about
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("unit", [1.0, MICROMETRE])
 def test_engines_agree(name: str, unit: float) -> None:
@@ -24,7 +24,7 @@ def test_engines_agree(name: str, unit: float) -> None:
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("unit", [MICROMETRE, 2.0**-30, 2.0**10])
 def test_lengths_change_nothing_but_lengths(name: str, unit: float) -> None:
-    here, there = (CASES[name](each).run(FASTEST) for each in (1.0, unit))
+    here, there = (CASES[name](each).run("ifelse") for each in (1.0, unit))
     assert there.transitions.edge.tolist() == here.transitions.edge.tolist()
     assert there.t.tolist() == here.t.tolist()
     assert (there.F == here.F).all()
