@@ -8,6 +8,9 @@ a function of time or of the bodies' motion.
 The coefficient of friction is a Stribeck curve, mu_s at rest and mu_c at high speed. A stuck
 contact holds up to ``peak mu_s N``.
 
+Where N touches 0 and rises again at once, the contact is free for an instant; a proof reports this
+as the only statement that it refutes. Nothing switches endlessly there.
+
 It shows stiction, an exact rest, stick-slip, the Stribeck effect, and how a contact engages and
 comes free. It cannot show pre-sliding, frictional lag, or a break-away force that depends on the
 rate: friction is a function of v and N alone, as soon as the contact moves.
