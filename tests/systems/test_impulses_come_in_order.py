@@ -1,4 +1,4 @@
-"""What an edge does happens in written order: what follows an impulse reads the velocity after it."""
+"""What an edge does happens in written order: what follows an impulse reads the new velocity."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tests.helpers import FASTEST
 HIT = Chart(
     "hit",
     inputs=("x", "v"),
-    variables=("before", "after", "twice"),
+    variables=("old", "new", "twice"),
     parameters=(Parameter("e", rule=">= 0"), Parameter("x_s", "m", "> 0")),
     let={"w": "2 * v"},
     states=(State("free", outputs={"F": "0"}),),
@@ -20,7 +20,7 @@ HIT = Chart(
             "free",
             "free",
             guard="x >= x_s and v > 0",
-            actions={"before": "v", "v": "-e * v", "after": "v", "twice": "w"},
+            actions={"old": "v", "v": "-e * v", "new": "v", "twice": "w"},
         ),
     ),
 )
