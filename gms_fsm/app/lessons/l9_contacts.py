@@ -193,7 +193,8 @@ class Result:
     @property
     def speeds_while_stuck(self) -> FloatArray:
         """Velocity of the pulled mass at all rows at which it is stuck, m/s."""
-        return self.stiction.v[self.stiction.states[:, 0] == "stuck"]
+        stuck: FloatArray = self.stiction.v[self.stiction.states[:, 0] == "stuck"]
+        return stuck
 
     @property
     def released(self) -> float:
@@ -218,14 +219,12 @@ class Result:
     @property
     def momentum(self) -> FloatArray:
         """Momentum of the two masses, at all rows, kg m/s."""
-        v = (self.impact.body(name).v for name in ("one", "two"))
-        return np.sum([m * each for m, each in zip(MASSES, v, strict=True)], axis=0)
+        return _sum(MASSES, self.impact)
 
     @property
     def spin(self) -> FloatArray:
         """Angular momentum of the two shafts, at all rows, Nms."""
-        w = (self.clutch.body(name).v for name in ("one", "two"))
-        return np.sum([J * each for J, each in zip(INERTIAS, w, strict=True)], axis=0)
+        return _sum(INERTIAS, self.clutch)
 
     def lines(self) -> tuple[str, ...]:
         """Return the lesson as five lines.
@@ -239,7 +238,7 @@ class Result:
         slipped, crept = self.crept
         v = [self.impact.body(name).v for name in ("one", "two")]
         w = [self.clutch.body(name).v for name in ("one", "two")]
-        lost_v, lost_w = _lost(MASSES, v), _lost(INERTIAS, w)
+        lost_v, lost_w = _lost(MASSES, self.impact), _lost(INERTIAS, self.clutch)
         return (
             f"Question: {QUESTION}",
             f"Run: a mass of {MASS:g} kg, pulled through {STIFFNESS:g} N/m at {SPEED:g} m/s, with "
@@ -286,9 +285,16 @@ def dead_time(gap: float = FLANK["gap"]) -> float:
     return 2 * gap / MOTOR + FLANK["d"] / FLANK["k"]
 
 
-def _lost(inertias: tuple[float, float], speeds: list[FloatArray]) -> float:
+def _sum(inertias: tuple[float, float], trace: Trace, power: int = 1) -> FloatArray:
+    """Return inertia times speed**power, summed over the bodies, at all rows."""
+    one, two = (trace.body(name).v for name in ("one", "two"))
+    total: FloatArray = inertias[0] * one**power + inertias[1] * two**power
+    return total
+
+
+def _lost(inertias: tuple[float, float], trace: Trace) -> float:
     """Return the kinetic energy lost from the first to the last row, J."""
-    energy = np.sum([0.5 * m * v**2 for m, v in zip(inertias, speeds, strict=True)], axis=0)
+    energy = 0.5 * _sum(inertias, trace, power=2)
     return float(energy[0] - energy[-1])
 
 
