@@ -14,7 +14,7 @@ import re
 import tempfile
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import get_args
 
@@ -27,6 +27,7 @@ from gms_fsm.charts.parameters import ANY, Parameter, with_shared
 from gms_fsm.charts.registry import Demonstration, Entry
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.inspection._findings import Report, Status
+from gms_fsm.traces.failures import StepLimitError
 
 DOCS = Path(__file__).parent
 PAGES = DOCS / "zoo"
@@ -34,7 +35,8 @@ PICTURES = DOCS / "images" / "zoo"
 
 SUPPLIED = ("t", "x", "v", "s")  # inputs that every system has
 BINDINGS = {"N": "10"}  # for other inputs, a text over the names of the pulled mass
-T_END = 20.0  # s
+T_END = 12.0  # s: one cycle of stick-slip
+DRIVEN = "1e-3 * (1.5 + cos(t))"  # m/s
 CURVE = Stribeck(1.0, 1.0, 1.0).text
 INTRODUCTION = """# The friction zoo
 
@@ -84,7 +86,8 @@ class Item:
     @property
     def about(self) -> str:
         """Docstring without the references, as Markdown."""
-        return self.text.partition("\n\nReferences\n")[0]
+        text = self.text.partition("\n\nReferences\n")[0]
+        return re.sub(r"::\n\n(?= )", ":\n\n", text)  # a literal block
 
     @property
     def summary(self) -> str:
@@ -211,8 +214,7 @@ def demonstrated(given: Demonstration) -> dict[str, str]:
     """Return the demonstration values as texts."""
     values: dict[str, object] = {**given.values}
     if given.stribeck is not None:
-        curve = given.stribeck
-        values |= {"F_c": curve.F_c, "F_s": curve.F_s, "v_s": curve.v_s, "sigma_2": given.sigma_2}
+        values |= {**asdict(given.stribeck), "sigma_2": given.sigma_2}
         if given.weights is not None:
             values["weights"] = given.weights
     return {name: _short(value) for name, value in values.items()}
@@ -225,52 +227,52 @@ def _short(value: object) -> str:
 
 
 # --------------------------------------------------------------------------- the run
-def bodies(item: Item) -> tuple[str, ...]:
-    """Return the names of the pulled bodies: one per velocity of the chart."""
-    return ("mass", "side")[: len(item.chart.velocities)]
-
-
-def system_file(item: Item) -> str:
-    """Return a scenario file: a mass of 1 kg, pulled through a spring of 2 N/m at 0.1 m/s."""
-    chart, given = item.chart, item.entry.demonstration
-    lines = [f'name = "pulled mass, {item.name}"']
-    if len(chart.velocities) == 1:
-        lines += ["", "[[body]]", 'name = "mass"', "inertia = 1.0", 'force = "2 * (0.1 * t - x)"']
-    else:
-        for body, x, v, force in (
-            ("mass", "x", "v_x", "2 * (0.1 * t - x)"),
-            ("side", "y", "v_y", "2 * (0.05 * t - y)"),
-        ):
-            lines += ["", "[[body]]", f'name = "{body}"', "inertia = 1.0", f'force = "{force}"']
-            lines += [f'x = "{x}"', f'v = "{v}"']
-    lines += ["", "[[contact]]", 'name = "pad"']
-    if len(chart.velocities) > 1:
-        lines.append('v = ["v_x", "v_y"]')
-    bound = {name: BINDINGS.get(name, "1") for name in chart.inputs if name not in supplied(chart)}
-    if bound:
-        texts = ", ".join(f'{name} = "{text}"' for name, text in bound.items())
-        lines.append(f"inputs = {{ {texts} }}")
-    if item.entry.curve:
-        lines += ["", "[contact.model]", f'chart = "{item.entry.name}"']
-        lines += [f'law = "{item.law}"'] * bool(item.law)
-        lines += [f"{name} = {_number(value)}" for name, value in given.values.items()]
-        assert given.stribeck is not None
-        curve = {name: getattr(given.stribeck, name) for name in ("F_c", "F_s", "v_s")}
-        inside = ", ".join(f"{name} = {value!r}" for name, value in curve.items())
-        lines += [f"stribeck = {{ {inside} }}", f"sigma_2 = {given.sigma_2!r}"]
-        lines += [f"weights = {_number(given.weights)}"] if given.weights else []
-    else:
-        lines.append(f'chart = "{item.name}"')
-        lines += [f"n = {given.n}"] if given.n > 1 else []
-        lines += ["", "[contact.values]"]
-        lines += [f"{name} = {_number(value)}" for name, value in given.values.items()]
+def system_file(item: Item, *, driven: bool = False) -> str:
+    """Return a scenario file: a mass pulled through a spring, or driven at a given velocity."""
+    lines = [f'name = "{"driven" if driven else "pulled"} mass, {item.name}"']
+    for body, given in bodies(item.chart, driven=driven).items():
+        lines += ["", "[[body]]", f'name = "{body}"', *given]
+    lines += ["", "[[contact]]", 'name = "pad"', *contact(item)]
     lines += ["", "[run]", f"t_end = {T_END}", "", "[output]", "figures = []"]
     return "\n".join(lines) + "\n"
 
 
-def supplied(chart: Chart) -> tuple[str, ...]:
-    """Return the inputs that need no text."""
-    return (*SUPPLIED, *chart.velocities)
+def bodies(chart: Chart, *, driven: bool) -> dict[str, tuple[str, ...]]:
+    """Return the lines of each body; there is one for each velocity of the chart."""
+    if driven:
+        return {"mass": (f'velocity = "{DRIVEN}"',)}
+    if len(chart.velocities) == 1:
+        return {"mass": ("inertia = 1.0", 'force = "2 * (0.1 * t - x)"')}
+    return {
+        body: ("inertia = 1.0", f'force = "2 * ({V} * t - {x})"', f'x = "{x}"', f'v = "v_{x}"')
+        for body, x, V in (("mass", "x", 0.1), ("side", "y", 0.05))
+    }
+
+
+def contact(item: Item) -> Iterator[str]:
+    """Yield the lines of the contact after its name."""
+    chart, given = item.chart, item.entry.demonstration
+    if len(chart.velocities) > 1:
+        yield 'v = ["v_x", "v_y"]'
+    others = [name for name in chart.inputs if name not in (*SUPPLIED, *chart.velocities)]
+    if others:
+        texts = ", ".join(f'{name} = "{BINDINGS.get(name, "1")}"' for name in others)
+        yield f"inputs = {{ {texts} }}"
+    if item.entry.curve:
+        yield from ("", "[contact.model]", f'chart = "{item.entry.name}"')
+        if item.law:
+            yield f'law = "{item.law}"'
+    else:
+        yield f'chart = "{item.name}"'
+        if given.n > 1:
+            yield f"n = {given.n}"
+        yield from ("", "[contact.values]")
+    yield from (f"{name} = {_number(value)}" for name, value in given.values.items())
+    if given.stribeck is not None:
+        curve = ", ".join(f"{name} = {value!r}" for name, value in asdict(given.stribeck).items())
+        yield from (f"stribeck = {{ {curve} }}", f"sigma_2 = {given.sigma_2!r}")
+    if given.weights:
+        yield f"weights = {_number(given.weights)}"
 
 
 def _number(value: object) -> str:
@@ -279,26 +281,33 @@ def _number(value: object) -> str:
     )
 
 
-def pulled(text: str) -> Trace:
+def simulated(text: str) -> Trace:
     """Run a scenario file."""
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "pulled.toml"
+        path = Path(folder) / "run.toml"
         path.write_text(text, encoding="utf-8")
         return load_scenario(path).simulate()
 
 
 def example(item: Item) -> Iterator[str]:
-    """Yield the lines that run the chart, in Python and at the command line."""
-    text = system_file(item)
-    trace = pulled(text)
-    count = len(trace.transitions)
-    yield "A mass of 1 kg is pulled through a spring of 2 N/m, whose end moves at 0.1 m/s."
-    yield from ("", "<!-- file: pulled.toml -->", "```toml", *text.splitlines(), "```")
+    """Yield the lines that run the chart, at the command line and in Python."""
+    name, text = "pulled.toml", system_file(item)
+    try:
+        trace = simulated(text)
+        yield "A mass of 1 kg is pulled through a spring of 2 N/m, whose end moves at 0.1 m/s."
+        if len(item.chart.velocities) > 1:
+            yield "A second spring pulls it sideways, at 0.05 m/s."
+    except StepLimitError:
+        name, text = "driven.toml", system_file(item, driven=True)
+        trace = simulated(text)
+        yield f"The contact is driven at `v = {DRIVEN}`, in m/s. (A mass that is pulled makes this"
+        yield "model stiff: `dp45` would need more than a million steps.)"
+    yield from ("", f"<!-- file: {name} -->", "```toml", *text.splitlines(), "```")
     yield from (
         "",
         "```console",
-        "$ gms-fsm run pulled.toml -o out",
-        f"{count} transitions; 3 files in out",
+        f"$ gms-fsm run {name} -o out",
+        "...",
         "start with out/summary.md",
         "```",
         "",
@@ -307,18 +316,19 @@ def example(item: Item) -> Iterator[str]:
         "```python",
         "from gms_fsm.app.scenario import load_scenario",
         "",
-        'trace = load_scenario("pulled.toml").simulate()',
+        f'trace = load_scenario("{name}").simulate()',
         "for r in trace.transitions[:5]:",
         '    print(f"{r.t:8.4f} s: {r.edge}")',
-        'x = trace.body("mass").x',
-        'print(f"at {trace.t[-1]:g} s: x = {x[-1]:.4f} m")',
+        'x, F = trace.body("mass").x[-1], trace.contact("pad").F[-1]',
+        'print(f"at {trace.t[-1]:g} s: x = {x:.4f} m, F = {F:.4f} N")',
         "```",
         "",
         "```text",
     )
     for r in trace.transitions[:5]:
         yield f"{r.t:8.4f} s: {r.edge}"
-    yield f"at {trace.t[-1]:g} s: x = {trace.body('mass').x[-1]:.4f} m"
+    x, F = trace.body("mass").x[-1], trace.contact("pad").F[-1]
+    yield f"at {trace.t[-1]:g} s: x = {x:.4f} m, F = {F:.4f} N"
     yield "```"
 
 
@@ -334,13 +344,17 @@ def proofs(item: Item, report: Report) -> Iterator[str]:
     total = ", ".join(f"{count[status]} {status}" for status in get_args(Status))
     yield f"`gms-fsm check {verb(item)}`: {total}."
     yield from ("", f"Assumed: {', '.join(map(code, report.domain)) or 'nothing'}.")
+    if count["undecided"]:
+        yield ""
+        yield "A function that is not encoded is one that the solver does not have"
+        yield "([limitations](../howto/checking-charts.md#limitations))."
+    yield ""
     for status in ("refuted", "settled by order", "undecided"):
         for finding in report.findings:
             if finding.status == status:
                 where = ", ".join((*finding.where, *filter(None, (finding.case,))))
-                yield from ("", f"- **{status}**, {finding.check}, {where or 'the chart'}: ")
-                yield f"  {finding.text}"
-                if finding.counterexample:
+                yield f"- **{status}**, {finding.check}, {where or 'the chart'}: {finding.text}"
+                if status == "refuted" and finding.counterexample:
                     yield f"  (for example at `{finding.example}`)"
 
 
