@@ -6,9 +6,9 @@ equations, parameters, picture, proofs, and a run. Run it with ``make gallery``.
 
 from __future__ import annotations
 
+import functools
 import importlib
 import inspect
-import os
 import pkgutil
 import re
 import tempfile
@@ -17,6 +17,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import get_args
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
 
 import gms_fsm.charts
 import plots
@@ -28,6 +32,8 @@ from gms_fsm.charts.registry import Demonstration, Entry
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.inspection._findings import Report, Status
 from gms_fsm.traces.failures import StepLimitError
+from plots import figures
+from plots.style import BLUE, LINE_GREY, RC
 
 DOCS = Path(__file__).parent
 PAGES = DOCS / "zoo"
@@ -103,6 +109,7 @@ class Item:
         return "\n".join(f"- {' '.join(part.split())}" for part in parts if part.strip())
 
 
+@functools.cache
 def items() -> tuple[Item, ...]:
     """Return the charts that are models, in the order of their names."""
     found = []
@@ -281,6 +288,48 @@ def _number(value: object) -> str:
     )
 
 
+@dataclass(frozen=True, eq=False)
+class Run:
+    """The run of a page.
+
+    Parameters
+    ----------
+    name : str
+        File name of the scenario.
+    text : str
+        The scenario.
+    trace : Trace
+        The run.
+    about : str
+        What is run, in words.
+    """
+
+    name: str
+    text: str
+    trace: Trace
+    about: str
+
+
+@functools.cache
+def run_of(item: Item) -> Run:
+    """Run a chart: pulled, or driven where a pulled mass would take too many steps."""
+    about = "A mass of 1 kg is pulled through a spring of 2 N/m, whose end moves at 0.1 m/s."
+    if len(item.chart.velocities) > 1:
+        about += "\nA second spring pulls it sideways, at 0.05 m/s."
+    if item.chart.sets_velocity:
+        about += "\nF has no value during an impact, which takes no time."
+    text = system_file(item)
+    try:
+        return Run("pulled.toml", text, simulated(text), about)
+    except StepLimitError:
+        text = system_file(item, driven=True)
+        about = (
+            f"The contact is driven at `v = {DRIVEN}`, in m/s. (A mass that is pulled makes this"
+        )
+        about += "\nmodel stiff: `dp45` would need more than a million steps.)"
+        return Run("driven.toml", text, simulated(text), about)
+
+
 def simulated(text: str) -> Trace:
     """Run a scenario file."""
     with tempfile.TemporaryDirectory() as folder:
@@ -289,19 +338,28 @@ def simulated(text: str) -> Trace:
         return load_scenario(path).simulate()
 
 
+def run_figure(item: Item) -> Figure:
+    """Draw friction force and velocity of the run."""
+    trace = run_of(item).trace
+    pad = trace.sample(np.linspace(trace.t[0], trace.t[-1], 2001)).contact("pad")
+    with rc_context(RC):
+        figure = Figure(figsize=(6.4, 3.4), layout="constrained")
+        force, velocity = figure.subplots(2, 1, sharex=True)
+        force.plot(pad.t, pad.F, color=BLUE)
+        force.set(ylabel="F [N]", xlim=(0, T_END))
+        velocity.plot(pad.t, pad.v, color=BLUE)
+        velocity.set(xlabel="t [s]", ylabel="v [m/s]")
+        for ax in (force, velocity):
+            ax.axhline(0, color=LINE_GREY, linewidth=0.8, zorder=0)
+    return figure
+
+
 def example(item: Item) -> Iterator[str]:
     """Yield the lines that run the chart, at the command line and in Python."""
-    name, text = "pulled.toml", system_file(item)
-    try:
-        trace = simulated(text)
-        yield "A mass of 1 kg is pulled through a spring of 2 N/m, whose end moves at 0.1 m/s."
-        if len(item.chart.velocities) > 1:
-            yield "A second spring pulls it sideways, at 0.05 m/s."
-    except StepLimitError:
-        name, text = "driven.toml", system_file(item, driven=True)
-        trace = simulated(text)
-        yield f"The contact is driven at `v = {DRIVEN}`, in m/s. (A mass that is pulled makes this"
-        yield "model stiff: `dp45` would need more than a million steps.)"
+    run = run_of(item)
+    name, text, trace = run.name, run.text, run.trace
+    yield run.about
+    yield from ("", f"![Force and velocity of the run](../images/zoo/{item.name}_run.png)")
     yield from ("", f"<!-- file: {name} -->", "```toml", *text.splitlines(), "```")
     yield from (
         "",
@@ -450,10 +508,11 @@ def main() -> None:
         write_whole(PAGES / name, lambda file, text=text: file.write(text.encode()))
     for item in items():
         plots.render(plots.statechart(item.chart), PICTURES / f"{item.name}.png")
+        figures.save(run_figure(item), PICTURES / f"{item.name}_run.png")
     kept = {item.name for item in items()} | {"index"}
     for path in (*PAGES.glob("*.md"), *PICTURES.glob("*.png")):
-        if path.stem not in kept:
-            os.remove(path)
+        if path.stem.removesuffix("_run") not in kept:
+            path.unlink()
 
 
 if __name__ == "__main__":
