@@ -459,14 +459,13 @@ def index(reports: Mapping[Item, Report]) -> str:
     for item, report in reports.items():
         chart = item.chart
         count = Counter(finding.status for finding in report.findings)
-        proved = count["proved"] + count["settled by order"]
         rows.append(
             (
                 f"[{item.name}]({item.name}.md)",
                 item.title,
                 str(len(chart.states)),
                 str(len(chart.transitions)),
-                f"{proved} / {count['refuted']} / {count['undecided']}",
+                " / ".join(str(count[status]) for status in get_args(Status)),
             )
         )
         gallery += ["", f"### {item.title}", "", item.summary, ""]
@@ -475,10 +474,14 @@ def index(reports: Mapping[Item, Report]) -> str:
     undecided = sum(finding.status == "undecided" for finding in found)
     lines = [
         INTRODUCTION,
-        *table(("name", "model", "states", "edges", "proved / refuted / undecided"), rows),
+        *table(
+            ("name", "model", "states", "edges", "proved / settled / refuted / undecided"), rows
+        ),
         "",
         f"{undecided} of {len(found)} findings are undecided "
         f"({100 * undecided / len(found):.1f} %); the page of a chart gives the reasons.",
+        "*Settled* findings depend on the order of the edges",
+        "([how charts are checked](../howto/checking-charts.md)).",
         "",
         "## Gallery",
         *gallery,
