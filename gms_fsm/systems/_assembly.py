@@ -30,7 +30,7 @@ from gms_fsm.language import (
     renamed,
 )
 from gms_fsm.language._normal import renamed_in
-from gms_fsm.systems._given import derivative_free, is_zero
+from gms_fsm.systems._given import derivative_free, is_positive
 from gms_fsm.systems.signals import Formula, Signal
 from gms_fsm.systems.system import Body, Contact, System
 
@@ -280,8 +280,8 @@ def assembled(system: System) -> Assembly:
     Raises
     ------
     ExpressionError, ParameterError
-        If a text cannot be read, a velocity is not linear, an inertia is zero, or locks that
-        always hold depend on each other.
+        If a text cannot be read, a velocity is not linear, an inertia is not positive, or locks
+        that always hold depend on each other.
     """
     return Reader(system).read()
 
@@ -320,9 +320,9 @@ class Reader:
                 assert body.inertia is not None
                 forces[body.name] = self.value(body.force, system.names, owner.of("force", "force"))
                 tree = self.value(body.inertia, system.names, owner.of("inertia", "inertia"))
-                if is_zero(tree, numbers):
+                if not is_positive(tree, numbers):
                     raise ParameterError(
-                        f"the inertia {body.inertia!r} is zero, or not finite",
+                        f"the inertia {body.inertia!r} is not positive, or not finite",
                         place=owner.words,
                         advice="every free body needs one",
                         key=(*owner.key, "inertia"),
