@@ -405,6 +405,8 @@ class Reader:
             names[name], names[f"d{name}"] = Name(of(c, name)), Name(of(c, f"d{name}"))
             own_names[name] = of(c, name)
         self.lets(contact, index, names)
+        # A chart may have a parameter called a, for example; guards then cannot read this rate.
+        rates = [of(c, f"rate {name}" if name in names else name) for name in chart.rate_names]
         for name in (*chart.force_names, *chart.rate_names):
             names.setdefault(name, Name(of(c, name)))
 
@@ -429,7 +431,7 @@ class Reader:
             variables=tuple(of(c, name) for name in chart.variables),
             velocities=tuple(velocities),
             forces=tuple(of(c, name) for name in chart.force_names),
-            rates=tuple(of(c, name) for name in chart.rate_names),
+            rates=tuple(rates),
             position=position.id,
             threshold=threshold,
             jacobian=tuple(jacobian),
