@@ -25,6 +25,8 @@ from integrators.steps import Motion, Now, Scratch, T, Vector
 
 __all__ = [
     "DEEPEST",
+    "FOR_A_GUARD",
+    "FOR_A_SIGN",
     "NO_CHANGE",
     "Path",
     "Search",
@@ -39,6 +41,8 @@ __all__ = [
 NO_CHANGE = 2.0
 # A margin with a narrow hump between two of the points has more curvature than they show.
 WARY = 4.0
+# Why a relation is watched, as bits: a sign is held, or a guard is kept false by it.
+FOR_A_SIGN, FOR_A_GUARD = 1, 2
 DEEPEST = 8  # halvings of a step: windows down to 1/256 of it are found
 
 
@@ -57,7 +61,7 @@ class Search(NamedTuple):
 class Watched(NamedTuple):
     """The relations watched during an arc."""
 
-    watch: list[int]  # one flag per relation, shape (r,)
+    watch: list[int]  # why each relation is watched, 0 if it is not, shape (r,)
     room: list[int]  # space for the indices of the flagged ones, shape (r,)
     active: list[int]  # those indices
     truth: list[bool]  # truth values at the arc's start, shape (r,)

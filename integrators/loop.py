@@ -26,7 +26,7 @@ from integrators.advance import (
     put_row,
     raise_floor,
 )
-from integrators.crossings import Watched, listed
+from integrators.crossings import FOR_A_GUARD, Watched, listed
 from integrators.sliding import (
     Functions,
     Held,
@@ -293,9 +293,13 @@ def _rearm(
         g = w.start[r]
         w.truth[r] = g > 0.0 or (g == 0.0 and not w.strict[r])
     for k in range(len(surfaces.sign)):  # one met exactly is left on the side of its sign
-        sign = held[surfaces.sign[k]]
-        if watch[surfaces.above[k]] and sign != 0.0:
-            w.truth[surfaces.above[k]] = w.truth[surfaces.at_least[k]] = sign > 0.0
+        sign, above, at_least = held[surfaces.sign[k]], surfaces.above[k], surfaces.at_least[k]
+        if watch[above] and sign != 0.0:
+            # A guard that the same comparison keeps false has still to be asked on that side.
+            if not watch[above] & FOR_A_GUARD:
+                w.truth[above] = sign > 0.0
+            if not watch[at_least] & FOR_A_GUARD:
+                w.truth[at_least] = sign > 0.0
     if _undefined(w):
         counts[PHASE] = AFTER
         counts[STATUS] = NOT_FINITE

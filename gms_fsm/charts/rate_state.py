@@ -45,7 +45,7 @@ from gms_fsm.charts.registry import Demonstration, Entry
 __all__ = ["CHARTS", "RATE_STATE"]
 
 # dpsi/dt = dtheta/dt / theta. The logarithm of a square does not depend on the sign that abs(v)
-# keeps until the crossing of v = 0 is located; 1e-300 keeps it finite at v = 0, where its factor is 0.
+# keeps until the crossing of v = 0 is located; 1e-300 keeps it finite at v = 0.
 FLOWS = {
     "ageing": "1 / theta - abs(v) / D_c",
     "slip": "-abs(v) / D_c * 0.5 * log((v * theta / D_c)**2 + 1e-300)",

@@ -22,7 +22,7 @@ from gms_fsm.lowering._names import computed_names
 from gms_fsm.lowering._plan import Gradient, Plan, both_sides
 from gms_fsm.lowering.places import total
 from gms_fsm.systems._assembly import Bank, Edge, of
-from integrators import LIVE
+from integrators import FOR_A_GUARD, FOR_A_SIGN, LIVE
 
 __all__ = ["FUNCTIONS", "python"]
 
@@ -397,10 +397,10 @@ class _Printer(Forces):
         text = f"held[{held.text(u)}] = sgn({self.spell(u)})"
         return Line(text, sizes | computed_names(u))
 
-    def watch(self, relation: Comparison) -> Line:
+    def watch(self, relation: Comparison, why: int = FOR_A_SIGN) -> Line:
         relations = self.plan.relations
         sizes = frozenset(f"#{size}" for size in relations.sizes(relation))
-        return Line(f"watch[{relations.text(relation)}] = 1", sizes)
+        return Line(f"watch[{relations.text(relation)}] |= {why}", sizes)
 
     def witness(self, part: Split) -> list[Line]:
         """Write: if this part is false, watch what keeps it false."""
@@ -409,7 +409,7 @@ class _Printer(Forces):
             reads = computed_names(part.relation)
             return [
                 Line(f"if not {self.spell(part.relation)}:", reads),
-                *indented([self.watch(part.comparison)]),
+                *indented([self.watch(part.comparison, FOR_A_GUARD)]),
             ]
         word, parts = part
         if word == "either":
