@@ -11,7 +11,17 @@ SHIPPED = {
     "gms-published": GMS_ELEMENT["published"],
     "lugre": LUGRE,
 }
-NEW = {"stiction", "backlash", "end-stop", "dog-clutch"}
+NEW = {
+    "stiction",
+    "backlash",
+    "end-stop",
+    "dog-clutch",
+    "rate-state-ageing",
+    "rate-state-slip",
+    "bouc-wen",
+    "seven-parameter",
+    "planar-coulomb",
+}
 
 
 def test_the_names_are_those_of_the_models() -> None:
@@ -33,4 +43,4 @@ def test_the_registry_is_the_only_list() -> None:
 def test_new_charts_say_where_they_come_from_and_that_their_numbers_are_ours() -> None:
     for name in NEW:
         assert CHARTS[name].reference
-        assert registered()[name].demonstration.source == "chosen by us"
+        assert registered()[name].demonstration.source.startswith("chosen by us")
