@@ -9,6 +9,7 @@ import math
 from typing import Any
 
 import numpy as np
+import pytest
 
 from gms_fsm.app.scenario import load_scenario
 from tests.helpers import FASTEST, ROOT
@@ -49,6 +50,7 @@ def on_paper() -> list[Switch]:
     return reference(flow, ways, [0.0] * 3, ("stuck",), 60.0)[0]
 
 
+@pytest.mark.slow
 def test_the_bit_sticks_and_slips_as_in_an_independent_loop() -> None:
     loaded = load_scenario(ROOT / "scenarios" / "drill_string.toml", ["run.rtol=1e-10"])
     wanted, log = on_paper(), loaded.simulate(engine=FASTEST).transitions
