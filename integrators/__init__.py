@@ -4,7 +4,7 @@ This package knows nothing about what it integrates. `Equations` are a handful o
 plain indexable numbers (lists in Python, arrays when compiled); a loop over them yields events.
 """
 
-from integrators.crossings import FOR_GUARD, WAITING
+from integrators.crossings import FOR_A_GUARD, FOR_A_SIGN, WAITING
 from integrators.hybrid import (
     MOST_SWITCHES,
     ROWS_AT_ONCE,
@@ -30,7 +30,8 @@ __all__ = [
     "BS23",
     "DP45",
     "EULER",
-    "FOR_GUARD",
+    "FOR_A_GUARD",
+    "FOR_A_SIGN",
     "HEUN",
     "LIVE",
     "METHODS",

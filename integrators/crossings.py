@@ -27,6 +27,8 @@ from integrators.steps import Motion, Now, Scratch, T, Vector
 
 __all__ = [
     "DEEPEST",
+    "FOR_A_GUARD",
+    "FOR_A_SIGN",
     "NO_CHANGE",
     "Path",
     "Search",
@@ -42,9 +44,9 @@ __all__ = [
 NO_CHANGE = 2.0
 # A margin with a narrow hump between two of the points has more curvature than they show.
 WARY = 4.0
-# Flags of relations, besides 1: a side of a surface that is watched for a guard too; a relation
-# that can change while nothing moves (and perhaps is such a side).
-FOR_GUARD, WAITING = 2, 3
+# Why a relation is watched, as bits: a sign is held; it keeps a guard false; and this guard can
+# change while nothing moves.
+FOR_A_SIGN, FOR_A_GUARD, WAITING = 1, 2, 4
 # Bend of a margin over a step, as a share of its size, that limits the step's growth where nothing
 # else does. A sine is then sampled every 2 radians or more often.
 MOST_BENT = 0.1
@@ -66,7 +68,7 @@ class Search(NamedTuple):
 class Watched(NamedTuple):
     """The relations watched during an arc."""
 
-    watch: list[int]  # one flag per relation, 0 if not, shape (r,)
+    watch: list[int]  # why each relation is watched, 0 if it is not, shape (r,)
     room: list[int]  # space for the indices of the flagged ones, shape (r,)
     active: list[int]  # those indices
     truth: list[bool]  # truth values at the arc's start, shape (r,)
@@ -216,7 +218,7 @@ def longest_next(motion: Motion, now: Now, t_new: float, scratch: Scratch, w: Wa
     longest = INFINITY
     waiting = False
     for r in w.active:
-        waiting = waiting or w.watch[r] == WAITING
+        waiting = waiting or w.watch[r] & WAITING != 0
     if not waiting or any_changed(w, w.end):  # if one has changed, the step ends earlier
         return longest
     y, f, y_new, f_new = now.y, now.f, scratch.y_new, scratch.f_new
@@ -226,7 +228,7 @@ def longest_next(motion: Motion, now: Now, t_new: float, scratch: Scratch, w: Wa
         place[j] = 0.84375 * y[j] + 0.15625 * y_new[j] + h * (0.140625 * f[j] - 0.046875 * f_new[j])
     motion.margins(now.clock[T] + 0.25 * h, place, now.mode, motion.p, w.watch, quarter)
     for r in w.active:
-        if w.watch[r] == WAITING:
+        if w.watch[r] & WAITING:
             a, q, m, b = w.start[r], quarter[r], middle[r], w.end[r]
             size = max(abs(a), abs(m), abs(b))
             bend = max(abs((b - m) - (m - a)), 4.0 * abs((m - q) - (q - a)))

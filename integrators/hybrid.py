@@ -68,7 +68,8 @@ class Equations:
     flow_live : callable
         The same with signs evaluated live.
     arm : callable
-        ``arm(t, y, mode, p, held, watch)`` fills the held signs and flags relations.
+        ``arm(t, y, mode, p, held, watch)`` fills the held signs, and says why relations are watched
+        (`FOR_A_SIGN`, `FOR_A_GUARD` and `WAITING`, as bits).
     margins : callable
         ``margins(t, y, mode, p, watch, out)`` fills the margins of flagged relations.
     normal : callable

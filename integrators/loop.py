@@ -26,7 +26,7 @@ from integrators.advance import (
     put_row,
     raise_floor,
 )
-from integrators.crossings import FOR_GUARD, Watched, listed
+from integrators.crossings import FOR_A_GUARD, Watched, listed
 from integrators.sliding import (
     Functions,
     Held,
@@ -297,7 +297,7 @@ def _rearm(
         if watch[surfaces.above[k]] and sign != 0.0:
             for r in (surfaces.above[k], surfaces.at_least[k]):
                 # A guard that is false on the surface itself turns true just after it.
-                if watch[r] < FOR_GUARD or w.start[r] != 0.0:
+                if not watch[r] & FOR_A_GUARD or w.start[r] != 0.0:
                     w.truth[r] = sign > 0.0
     if _undefined(w):
         counts[PHASE] = AFTER

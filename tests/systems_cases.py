@@ -8,22 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm import (
-    Body,
-    Chart,
-    Contact,
-    Parameter,
-    State,
-    System,
-    Trace,
-    Transition,
-    simulate,
-)
+from gms_fsm import Body, Contact, System, Trace, simulate
 from gms_fsm.charts import CHARTS
 from tests.helpers import FASTEST
 
 STICTION, BACKLASH = CHARTS["stiction"], CHARTS["backlash"]
 END_STOP, DOG_CLUTCH = CHARTS["end-stop"], CHARTS["dog-clutch"]
+PLANAR = CHARTS["planar-coulomb"]
 DRY = {"F_c": 1.0, "F_s": 1.5, "b": 0.0}
 
 
@@ -85,38 +76,7 @@ def two_blocks() -> Case:
     )
 
 
-PLANAR = Chart(
-    "Coulomb friction in the plane",
-    inputs=(),
-    velocities=("v", "w"),
-    variables=("h", "g"),
-    parameters=(
-        Parameter("F_c", "N", "> 0"),
-        Parameter("F_s", "N", ">= F_c"),
-        Parameter("e", "m/s", "> 0"),
-    ),
-    states=(
-        State(
-            "stuck",
-            locked=True,
-            exit={"h": "F / sqrt(F**2 + F_w**2)", "g": "F_w / sqrt(F**2 + F_w**2)"},
-        ),
-        State("start", outputs={"F": "F_c * h", "F_w": "F_c * g"}),
-        State(
-            "slip",
-            outputs={
-                "F": "F_c * v / sqrt(v**2 + w**2)",
-                "F_w": "F_c * w / sqrt(v**2 + w**2)",
-            },
-        ),
-    ),
-    transitions=(
-        Transition("release", "stuck", "start", guard="F**2 + F_w**2 > F_s**2"),
-        Transition("moves", "start", "slip", guard="v**2 + w**2 > e**2"),
-        Transition("arrest", "slip", "stuck", guard="v**2 + w**2 < 0.25 * e**2"),
-    ),
-)
-PUCK = {"F_c": 1.15, "F_s": 1.3, "e": 1e-4}
+PUCK = {"F_c": 1.15, "F_s": 1.3, "v_c": 1e-4}
 
 
 def puck() -> Case:

@@ -252,13 +252,18 @@ def code_command(
         RigName.pulled: PulledSlider(1.0, 2.0, 0.1),
     }
     if own is None:
-        found, _ = chosen("code", name, law)
+        found, chart = chosen("code", name, law)
+    else:
+        chart = own.only_chart()
     try:
-        model = demonstration(found, law) if own is None else any_model(own.only_chart())
+        model = demonstration(found, law) if own is None else any_model(chart)
         program = lower(model, rigs[rig or RigName.prescribed])
     except ParameterError as error:
         if rig is not None:
             raise
-        advice = f"{error.advice}; here, give --rig slider, or a system file instead of a chart"
+        other = "a system file instead of a chart"
+        if len(chart.velocities) == 1:
+            other = f"--rig slider, or {other}"
+        advice = f"{error.advice}; here, give {other}"
         raise error.replaced(advice=advice).inside(name) from None
     typer.echo(standalone(program.source), nl=False)

@@ -23,7 +23,7 @@ from gms_fsm.lowering._names import computed_names
 from gms_fsm.lowering._plan import Gradient, Plan, both_sides
 from gms_fsm.lowering.places import total
 from gms_fsm.systems._assembly import Bank, Edge, of
-from integrators import FOR_GUARD, LIVE, WAITING
+from integrators import FOR_A_GUARD, FOR_A_SIGN, LIVE, WAITING
 
 __all__ = ["FUNCTIONS", "python"]
 
@@ -396,16 +396,10 @@ class _Printer(Forces):
         text = f"held[{held.text(u)}] = sgn({self.spell(u)})"
         return Line(text, sizes | computed_names(u))
 
-    def watch(self, relation: Comparison, flag: int = 1) -> Line:
+    def watch(self, relation: Comparison, why: int = FOR_A_SIGN) -> Line:
         relations = self.plan.relations
         sizes = frozenset(f"#{size}" for size in relations.sizes(relation))
-        return Line(f"watch[{relations.text(relation)}] = {flag}", sizes)
-
-    def watch_for_guard(self, relation: Comparison, waits: bool) -> Line:
-        """Watch what keeps a guard false; the driver must know if it is a side of a surface too."""
-        surfaces = self.plan.surfaces
-        sides = (side for u in (*surfaces.shared, *surfaces.own) for side in both_sides(u))
-        return self.watch(relation, WAITING if waits else FOR_GUARD if relation in sides else 1)
+        return Line(f"watch[{relations.text(relation)}] |= {why}", sizes)
 
     def waits(self, bank: Bank, state: str, edge: Edge) -> bool:
         """Return whether a guard can change while nothing that it reads moves.
@@ -429,7 +423,7 @@ class _Printer(Forces):
             reads = computed_names(part.relation)
             return [
                 Line(f"if not {self.spell(part.relation)}:", reads),
-                *indented([self.watch_for_guard(part.comparison, waits)]),
+                *indented([self.watch(part.comparison, FOR_A_GUARD | (WAITING if waits else 0))]),
             ]
         word, parts = part
         if word == "either":

@@ -156,7 +156,7 @@ def lower(system: System | Model, rig: Rig | None = None) -> Program:
 def _key(system: System) -> tuple[Any, ...]:
     """Return everything that the text of a system depends on, in hashable form."""
     spelled = tuple(map(_spelling, system.signals.values()))
-    # A ratio that is 1 or 0 is left out of no text; a zero inertia is refused while reading.
+    # A ratio that is 1 or 0 is left out of no text; an inertia that is not positive is refused.
     zeros = tuple(name for name, value in system.numbers.items() if value == 0.0)
     first = system.assembly.system
     if first is not system:  # its texts are those of the system whose texts were read

@@ -25,7 +25,7 @@ from gms_fsm.systems.signals import Function
 from gms_fsm.systems.system import Contact
 from gms_fsm.traces._archives import member
 from gms_fsm.traces._header import Header
-from integrators import hybrid, loop
+from integrators import FOR_A_GUARD, FOR_A_SIGN, WAITING, hybrid, loop
 from integrators.advance import NEXT_KNOT, NEXT_TIME, ROW
 from integrators.steps import T
 
@@ -202,7 +202,7 @@ def _check(run: Resumable, state: Mapping[str, Any], kept: Mapping[str, Any]) ->
         "edges": (state["edges"], -1, last_edge),
         "enabled edges": (state["edges"][enabled], first_edge[enabled], last_edge[enabled]),
         "room": (state["room"], 0, len(b.relations.watch) - 1),
-        "watch": (state["watch"], 0, 1),
+        "watch": (state["watch"], 0, FOR_A_SIGN | FOR_A_GUARD | WAITING),
         "due": (state["due"], 0, 1),
         "held": (counts[loop.HOLD], 0, sum({*start.program.discrete})),
         "phase": (counts[loop.PHASE], loop.START, loop.END),

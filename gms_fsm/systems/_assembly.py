@@ -30,7 +30,7 @@ from gms_fsm.language import (
     renamed,
 )
 from gms_fsm.language._normal import renamed_in
-from gms_fsm.systems._given import derivative_free, is_zero
+from gms_fsm.systems._given import derivative_free, is_positive
 from gms_fsm.systems.signals import Formula, Signal
 from gms_fsm.systems.system import Body, Contact, System
 
@@ -280,8 +280,8 @@ def assembled(system: System) -> Assembly:
     Raises
     ------
     ExpressionError, ParameterError
-        If a text cannot be read, a velocity is not linear, an inertia is zero, or locks that
-        always hold depend on each other.
+        If a text cannot be read, a velocity is not linear, an inertia is not positive, or locks
+        that always hold depend on each other.
     """
     return Reader(system).read()
 
@@ -320,9 +320,9 @@ class Reader:
                 assert body.inertia is not None
                 forces[body.name] = self.value(body.force, system.names, owner.of("force", "force"))
                 tree = self.value(body.inertia, system.names, owner.of("inertia", "inertia"))
-                if is_zero(tree, numbers):
+                if not is_positive(tree, numbers):
                     raise ParameterError(
-                        f"the inertia {body.inertia!r} is zero, or not finite",
+                        f"the inertia {body.inertia!r} is not positive, or not finite",
                         place=owner.words,
                         advice="every free body needs one",
                         key=(*owner.key, "inertia"),
@@ -400,6 +400,8 @@ class Reader:
             names[name], names[f"d{name}"] = Name(of(c, name)), Name(of(c, f"d{name}"))
             own_names[name] = of(c, name)
         self.lets(contact, index, names)
+        # A chart may have a parameter called a, for example; guards then cannot read this rate.
+        rates = [of(c, f"rate {name}" if name in names else name) for name in chart.rate_names]
         for name in (*chart.force_names, *chart.rate_names):
             names.setdefault(name, Name(of(c, name)))
 
@@ -424,7 +426,7 @@ class Reader:
             variables=tuple(of(c, name) for name in chart.variables),
             velocities=tuple(velocities),
             forces=tuple(of(c, name) for name in chart.force_names),
-            rates=tuple(of(c, name) for name in chart.rate_names),
+            rates=tuple(rates),
             position=position.id,
             threshold=threshold,
             jacobian=tuple(jacobian),

@@ -23,7 +23,7 @@ from gms_fsm.language import (
 )
 
 __all__ = ["Text", "check_name", "check_text", "checked_numbers"]
-__all__ += ["derivative_free", "is_zero", "mapping_of", "several", "texts_of"]
+__all__ += ["derivative_free", "is_positive", "mapping_of", "several", "texts_of"]
 
 Text: TypeAlias = str | float  # an expression, or just a number
 
@@ -212,8 +212,8 @@ def checked_numbers(
     return checked_values(chart.parameters, values, n)
 
 
-def is_zero(tree: Value, numbers: Mapping[str, float]) -> bool:
-    """Tell whether a value is zero, or not finite, whatever the state is.
+def is_positive(tree: Value, numbers: Mapping[str, float]) -> bool:
+    """Tell whether a value is positive and finite, as far as numbers alone decide.
 
     Parameters
     ----------
@@ -225,15 +225,15 @@ def is_zero(tree: Value, numbers: Mapping[str, float]) -> bool:
     Returns
     -------
     bool
-        False if it depends on the state.
+        True if it depends on the state.
     """
     if names_in(tree) - {*numbers}:
-        return False
+        return True
     try:
         value = float(evaluate(tree, numbers))
     except (ArithmeticError, ValueError):
-        return True
-    return value == 0.0 or not math.isfinite(value)
+        return False
+    return 0.0 < value < math.inf
 
 
 def derivative_free(rest: Value) -> bool:

@@ -68,7 +68,7 @@ def with_numbers_of(system: System, values: Mapping[str, ArrayLike]) -> System:
     Raises
     ------
     ParameterError
-        If a value breaks its rule, or an inertia becomes zero.
+        If a value breaks its rule, or an inertia is no longer positive.
     """
     groups: dict[str, dict[str, ArrayLike]] = {}
     for name, value in values.items():

@@ -75,8 +75,8 @@ class System:
     Raises
     ------
     ParameterError, ExpressionError
-        If names clash, a text cannot be read, a velocity is not linear, an inertia is zero, or a
-        lock cannot hold.
+        If names clash, a text cannot be read, a velocity is not linear, an inertia is not
+        positive, or a lock cannot hold.
 
     Notes
     -----

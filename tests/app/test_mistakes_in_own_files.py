@@ -124,7 +124,7 @@ def test_a_mistake_in_a_file(case: str, gms_fsm: CommandLine, tmp_path: Path) ->
         ("sweep own.toml --over F_s=1:2:2", ("own.toml: this is a chart file",)),
         ("run pair.toml --set body.tow.inertia=1", ("no 'tow'", "choose from one, two")),
         ("run pair.toml --set body.two.inertia=q", ("--set, body.1.inertia", "name 'q'", "    q")),
-        ("run pair.toml --set body.two.inertia=0", ("--set, body.1.inertia", "is zero")),
+        ("run pair.toml --set body.two.inertia=0", ("--set, body.1.inertia", "is not positive")),
         ("run pair.toml --set body.2.inertia=1", ("no '2'", "choose from one, two")),
         ("run pair.toml --set contact.gear=1", ("--set: contact.2 = 1", "must be a table")),
         ("blocks own", ("own: it is not a file",)),

@@ -18,7 +18,16 @@ pytestmark = pytest.mark.slow
 
 RECORD = "reciprocating_friction.tsv"
 SHIPPED = sorted((ROOT / "scenarios").glob("*.toml"))
-OPEN = [path for path in SHIPPED if path.stem != "tribometer"]
+# Systems with the number of their transitions; tests/zoo and tests/systems run them.
+SYSTEMS = {
+    "ball_screw_table": 137,
+    "belt_driven_mass": 124,
+    "brake_squeal": 54,
+    "drill_string": 25,
+    "friction_damper": 278,
+    "two_blocks_on_a_belt": 51,
+}
+OPEN = [path for path in SHIPPED if path.stem not in {"tribometer", *SYSTEMS}]
 TRANSITIONS = {"paper_fig3_non_drifting": 0, "pulled_mass": 72, "stribeck_sweep": 4}
 
 
@@ -63,9 +72,26 @@ def check_report(loaded: Loaded, trace: Trace, files: list[Path], folder: Path) 
     return summary
 
 
-def test_there_are_seven() -> None:
-    assert len(SHIPPED) == 7
+def test_there_are_thirteen() -> None:
+    assert len(SHIPPED) == 13
     assert len(OPEN) == 6
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_a_shipped_system_runs(name: str, tmp_path: Path) -> None:
+    loaded = load_scenario(ROOT / "scenarios" / f"{name}.toml", ["run.engine='ifelse'"])
+    trace, files = run_scenario(loaded, tmp_path / "out")
+    contacts = trace.system.contacts
+    names = {path.name for path in files}
+    several = len(contacts) > 1
+    pictures = {f"overview-{each.name}.png" if several else "overview.png" for each in contacts}
+    assert {"summary.md", "trace.npz", "transitions.csv"} | pictures <= names
+    assert len(trace.transitions) == SYSTEMS[name]
+    summary = (tmp_path / "out" / "summary.md").read_text(encoding="utf-8")
+    assert summary.startswith(f"# {loaded.title}\n")
+    assert plain(loaded.scenario.notes.strip()) in summary
+    assert "chosen by us" in summary
+    assert all(f"## Contact {each.name}" in summary for each in contacts)
 
 
 @pytest.mark.parametrize("path", OPEN, ids=lambda path: path.stem)

@@ -24,6 +24,11 @@ NEW = {
     "elasto-plastic",
     "maxwell-slip",
     "prandtl-tomlinson",
+    "rate-state-ageing",
+    "rate-state-slip",
+    "bouc-wen",
+    "seven-parameter",
+    "planar-coulomb",
 }
 
 
@@ -46,4 +51,4 @@ def test_the_registry_is_the_only_list() -> None:
 def test_new_charts_say_where_they_come_from_and_that_their_numbers_are_ours() -> None:
     for name in NEW:
         assert CHARTS[name].reference
-        assert registered()[name].demonstration.source == "chosen by us"
+        assert registered()[name].demonstration.source.startswith("chosen by us")

@@ -52,8 +52,10 @@ def test_every_parameter_has_a_unit_and_a_meaning(name: str, law: str) -> None:
 
 @pytest.mark.parametrize(("name", "law"), every())
 def test_every_demonstration_runs_alike_on_two_engines(name: str, law: str) -> None:
-    model = demonstration(entry(name), law)
     assert entry(name).demonstration.source
+    if len(entry(name).chart(law).velocities) > 1:
+        pytest.skip("no rig moves it in two directions; tests/zoo runs it in a system")
+    model = demonstration(entry(name), law)
     held = model.chart.locks or model.chart.sets_velocity  # needs a free body
     rig = PulledSlider(1.0, 2.0, 0.1) if held else Prescribed("0.2*sin(t)")
     runs = []

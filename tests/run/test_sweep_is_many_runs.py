@@ -201,7 +201,7 @@ def test_a_charts_own_parameter_takes_precedence_over_a_shared_one() -> None:
         {"F": "F_c * weights * sgn(v)"},
     )
     model = ChartModel(chart, {"F_c": 2.0, "weights": 3.0}, n=2, stribeck=Stribeck(1.0, 1.5, 0.1))
-    assert parameter_names(model) == ("F_c", "weights", "sigma_2", "F_s", "v_s")
+    assert parameter_names(model) == ("F_c", "weights", "sigma_2", "F_s", "v_s", "delta")
     other = with_values(model, {"F_c": 5.0, "weights": 7.0, "F_s": 1.25})
     assert (other.values["F_c"], other.values["weights"]) == (5.0, 7.0)
     assert (other.stribeck.F_c, other.stribeck.F_s) == (1.0, 1.25)

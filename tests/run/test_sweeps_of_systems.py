@@ -103,7 +103,7 @@ def test_a_value_that_breaks_its_rule_is_the_outcome_of_its_run() -> None:
         _system(), 0.1, {"numbers.m": [0.0, 1.0], "pad.F_s": [1.5, 0.5]}, engine="ifelse"
     )
     assert result.outcome.tolist() == ["ParameterError", "ParameterError"]
-    assert "is zero" in result.message[0]
+    assert "is not positive" in result.message[0]
     assert "(F_s >= F_c)" in result.message[1]
     assert np.isnan(result.ends["one.x"]).all()
 

@@ -46,7 +46,7 @@ def _pulled(length: float, rtol: float) -> Trace:
 
 
 def _puck(length: float, rtol: float) -> Trace:
-    values = PUCK | {"e": PUCK["e"] * length}
+    values = PUCK | {"v_c": PUCK["v_c"] * length}
     system = System(
         "puck",
         bodies=(

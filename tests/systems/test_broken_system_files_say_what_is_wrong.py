@@ -50,7 +50,7 @@ updates.u = "m * x1"
 CASES = {
     "an inertia": ('"m"\nforce', '"mm"\nforce', 11, "body.0.inertia", "unknown name 'mm'"),
     "no inertia": ("inertia = 2\n", "", 15, "body.1", "neither an inertia nor a velocity"),
-    "zero inertia": ("inertia = 2", "inertia = 0", 17, "body.1.inertia", "is zero"),
+    "zero inertia": ("inertia = 2", "inertia = 0", 17, "body.1.inertia", "is not positive"),
     "a force": ("q - x1", "q - x9", 12, "body.0.force", "column 5"),
     "a velocity": ("v1 - 2 * v2", "v1 * v2", 22, "contact.0.v", "not linear"),
     "an unknown velocity": ('v = "v2"\n[contact', 'v = "v3"\n[contact', 28, "contact.1.v", "'v3'"),

@@ -96,7 +96,7 @@ def test_two_blocks_on_a_belt() -> None:
 
 # --------------------------------------------------------------------------- a puck in the plane
 def puck_on_paper() -> list[Switch]:
-    A, F_c, F_s, e = 1.4, PUCK["F_c"], PUCK["F_s"], PUCK["e"]
+    A, F_c, F_s, e = 1.4, PUCK["F_c"], PUCK["F_s"], PUCK["v_c"]
 
     def push(t: float) -> tuple[float, float]:
         return A * math.cos(0.2 * t), A * math.sin(0.4 * t)

@@ -57,7 +57,17 @@ REFUSED: dict[str, tuple[Callable[[], object], type[GMSError], str]] = {
     "zero inertia": (
         lambda: system(body=Body("mass", inertia="J"), numbers={"J": 0.0}),
         ParameterError,
-        "body 'mass': the inertia 'J' is zero",
+        "body 'mass': the inertia 'J' is not positive",
+    ),
+    "negative inertia": (
+        lambda: system(body=Body("mass", inertia=-1.0)),
+        ParameterError,
+        r"body 'mass': the inertia -1\.0 is not positive",
+    ),
+    "negative inertia by numbers": (
+        lambda: system(body=Body("mass", inertia="a - b"), numbers={"a": 1.0, "b": 2.0}),
+        ParameterError,
+        "body 'mass': the inertia 'a - b' is not positive",
     ),
     "F in a flow": (
         lambda: one_state(flow={"z": "F"}, outputs={"F": "z"}),
