@@ -1,0 +1,164 @@
+"""Pre-sliding: hysteresis, nonlocal memory, and rest under bias and ripple."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.phenomena._bench import Motion, ramps
+from gms_fsm.phenomena.limits import LIMITS
+from gms_fsm.phenomena.results import Curve, Measured, Number, Phenomenon, Verdict
+
+if TYPE_CHECKING:
+    from gms_fsm.phenomena._specimens import Specimen
+
+__all__ = ["PHENOMENA"]
+
+# Forces in units of the break-away force, rates in units of it per s.
+RATE = 0.095
+OUTER = (0.95, -0.95, 0.95)
+HOLD = 5.0  # s
+NESTED = (0.9, -0.6, 0.6, -0.6, 0.9)
+POINTS = 200  # per branch
+BIAS_RAMP = ((0.0, 0.0), (2.0, 0.6), (4.0, 0.3), (5.0, 0.3))
+RIPPLE, FREQUENCY = 0.1, 2.0  # Hz
+PERIODS = (20, 40)  # after the start of the ripple; the drift is measured between them
+
+
+def _branches(corners: list[tuple[float, float]]) -> list[FloatArray]:
+    """Return times along each ramp."""
+    times = [t for t, _ in corners]
+    return [
+        np.linspace(a, b, POINTS) for a, b in zip(times[0::2], times[1::2], strict=False)
+    ]
+
+
+def _at(force: float, F: FloatArray, x: FloatArray) -> float:
+    """Return where a branch, on which F is applied monotonically, crosses a force."""
+    order = np.argsort(F, kind="stable")
+    return float(np.interp(force, F[order], x[order]))
+
+
+def _hysteresis(specimen: Specimen) -> Measured:
+    force = specimen.break_away
+    corners, ends = ramps(RATE * force, [each * force for each in OUTER], HOLD)
+    branches = _branches(corners)
+    trace = specimen.run(Motion(force=corners), float(ends[-1]), _times(branches, ends))
+    x = dict(zip(trace.t.tolist(), trace.x.tolist(), strict=True))
+    applied = np.interp(trace.t, *np.array(corners).T)
+    down, up = (np.array([x[t] for t in branch.tolist()]) for branch in branches[1:])
+    load = np.linspace(OUTER[0], OUTER[1], POINTS) * force
+    width = _at(0.0, load, down) - _at(0.0, load[::-1], up)
+    stroke = float(max(down.max(), up.max()) - min(down.min(), up.min()))
+    loss = float(np.trapezoid(load, down) + np.trapezoid(load[::-1], up))
+    share = abs(width) / stroke if stroke > 0.0 else 0.0
+    if share <= LIMITS["hysteresis.width"].value:
+        verdict: Verdict = "does not show"
+        said = "force and displacement are on one line" if stroke > 0.0 else "it does not move"
+    elif width < 0.0:
+        verdict, said = "shows wrongly", "the loop is run through the wrong way: it makes energy"
+    else:
+        verdict, said = "shows", "unloading does not follow the line of loading"
+    numbers = (
+        Number("width of the loop at F = 0", 1e6 * width, "µm"),
+        Number("stroke", 1e6 * stroke, "µm"),
+        Number("width over stroke", share, "1"),
+        Number("energy lost per cycle", 1e6 * loss, "µJ"),
+    )
+    return Measured(verdict, numbers, said, (Curve("", 1e6 * trace.x, applied),))
+
+
+def _times(branches: list[FloatArray], ends: FloatArray) -> FloatArray:
+    return np.unique(np.concatenate([*branches, ends]))
+
+
+def _memory(specimen: Specimen) -> Measured:
+    force = specimen.break_away
+    corners, ends = ramps(RATE * force, [each * force for each in NESTED], HOLD)
+    branches = _branches(corners)
+    trace = specimen.run(Motion(force=corners), float(ends[-1]), _times(branches, ends))
+    x = dict(zip(trace.t.tolist(), trace.x.tolist(), strict=True))
+    outer, inner, top, inner_again, outer_again = (x[t] for t in ends.tolist())
+    stroke = top - inner
+    gaps = (inner_again - inner, outer_again - outer)
+    gap = max(gaps, key=abs)
+    up, down = (np.array([x[t] for t in branch.tolist()]) for branch in branches[2:4])
+    load = np.linspace(NESTED[1], NESTED[2], POINTS) * force
+    width = _at(0.0, load[::-1], down) - _at(0.0, load, up)
+    open_by, wide = (abs(u) / stroke if stroke > 0.0 else 0.0 for u in (gap, width))
+    if wide <= LIMITS["memory.width"].value and open_by <= LIMITS["memory.gap"].value:
+        verdict: Verdict = "does not show"
+        said = "there is no inner loop" if stroke > 0.0 else "it does not move"
+    elif open_by > LIMITS["memory.gap"].value:
+        verdict, said = "does not show", "the inner loop does not close: it forgets where it turned"
+    else:
+        verdict, said = "shows", "the inner loops close where they began"
+    numbers = (
+        Number("gap of the inner loops over their stroke", 100.0 * open_by, "%"),
+        Number("gap", 1e6 * abs(gap), "µm"),
+        Number("stroke of the inner loop", 1e6 * stroke, "µm"),
+        Number("width of the inner loop at F = 0", 1e6 * width, "µm"),
+    )
+    applied = np.interp(trace.t, *np.array(corners).T)
+    return Measured(verdict, numbers, said, (Curve("", 1e6 * trace.x, applied),))
+
+
+def _drift(specimen: Specimen) -> Measured:
+    bench, force = specimen.bench, specimen.break_away
+    start = BIAS_RAMP[2][0]
+    motion = Motion(
+        force=[(t, share * force) for t, share in BIAS_RAMP],
+        vibration=RIPPLE * force,
+        start=start,
+        omega=2 * math.pi * FREQUENCY,
+    )
+    whole = start + np.arange(PERIODS[1] + 1) / FREQUENCY
+    times = np.unique(np.concatenate([np.linspace(0.0, whole[-1], 2401), whole]))
+    trace = specimen.run(motion, float(whole[-1]), times)
+    x = dict(zip(trace.t.tolist(), trace.x.tolist(), strict=True))
+    first, last = (x[whole[k]] for k in PERIODS)
+    drift = (last - first) / (PERIODS[1] - PERIODS[0])
+    verdict: Verdict = (
+        "shows" if abs(drift) <= LIMITS["drift.rate"].value * bench.bristle else "shows wrongly"
+    )
+    said = "it stays in place" if verdict == "shows" else "it drifts, far below break-away"
+    numbers = (
+        Number("drift per period", 1e6 * drift, "µm"),
+        Number("drift rate", 1e6 * drift * FREQUENCY, "µm/s"),
+    )
+    return Measured(verdict, numbers, said, (Curve("", trace.t, 1e6 * trace.x),))
+
+
+PHENOMENA = (
+    Phenomenon(
+        "hysteresis",
+        "Pre-sliding hysteresis",
+        "pre-sliding hysteresis",
+        "The force goes to +0.95, -0.95 and +0.95 of the break-away force, with holds of 5 s. "
+        "Measured is the width of the last loop at F = 0.",
+        ("x [µm]", "applied force [N]"),
+        _hysteresis,
+    ),
+    Phenomenon(
+        "memory",
+        "Nonlocal memory: nested reversals of the force",
+        "nonlocal memory: gap of inner loops",
+        "The force goes to 0.9, -0.6, 0.6, -0.6 and 0.9 of the break-away force. A contact that "
+        "remembers where it turned is then back at the same places. Measured is the larger "
+        "of the two gaps, over the stroke of the inner loop.",
+        ("x [µm]", "applied force [N]"),
+        _memory,
+    ),
+    Phenomenon(
+        "drift",
+        "Rest under bias and ripple",
+        "rests under bias and ripple: drift per period",
+        "The force rises to 0.6 of the break-away force, falls to 0.3, and then has a ripple of "
+        "0.1 at 2 Hz. Measured is the displacement per period from period 20 to 40.",
+        ("t [s]", "x [µm]"),
+        _drift,
+    ),
+)
