@@ -108,9 +108,7 @@ def _break_away(specimen: Specimen) -> Measured:
 def _vibration(specimen: Specimen) -> Measured:
     bench, force = specimen.bench, specimen.break_away
     bias, growth = BIAS * force, MOST * force / GROWTH
-    motion = Motion(
-        force=((0.0, 0.0), (0.5, bias), (1.0, bias)), growth=growth, omega=VIBRATION
-    )
+    motion = Motion(force=((0.0, 0.0), (0.5, bias), (1.0, bias)), growth=growth, omega=VIBRATION)
     trace = specimen.run(motion, GROWTH)
     gone = np.flatnonzero(trace.x > TRAVEL * bench.bristle)
     end = int(gone[0]) if gone.size else len(trace) - 1
@@ -121,7 +119,10 @@ def _vibration(specimen: Specimen) -> Measured:
         verdict: Verdict = "does not show"
         said = "it is not released, although the peak force is far above the break-away force"
     elif ratio < LIMITS["vibration.early"].value:
-        verdict, said = "shows wrongly", "it creeps away although the break-away force is not reached"
+        verdict, said = (
+            "shows wrongly",
+            "it creeps away although the break-away force is not reached",
+        )
     else:
         verdict, said = "shows", "it is released when the peak force reaches the break-away force"
     numbers = (

@@ -95,9 +95,7 @@ def _stribeck(specimen: Specimen) -> Measured:
 
 def _stick_slip(specimen: Specimen) -> Measured:
     bench = specimen.bench
-    motion = Motion(
-        spring=bench.stiffness, velocity=((0.0, bench.speed), (1.0, bench.speed))
-    )
+    motion = Motion(spring=bench.stiffness, velocity=((0.0, bench.speed), (1.0, bench.speed)))
     trace = specimen.run(motion, PULLED)
     t, pull = trace.t, bench.stiffness * (bench.speed * trace.t - trace.x)
     cycle = _last_cycle(t, trace.v, bench.speed)

@@ -9,21 +9,24 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm.charts.chart import SUPPLIED, Chart
-from gms_fsm.charts.gms import gms_element
+from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.registry import Entry, registered
 from gms_fsm.charts.stribeck import Stribeck
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.errors import ExpressionError, ParameterError, shown
+from gms_fsm.language import parse_value
 from gms_fsm.phenomena._bench import Bench, Motion, run
 from gms_fsm.systems.gms_parameters import GMSParameters
-from gms_fsm.systems.models import ChartModel, Model
+from gms_fsm.systems.models import ChartModel, Model, demonstration
 from gms_fsm.systems.system import Contact
 
 __all__ = ["Specimen", "specimens_of"]
 
-NOT_FRICTION = {
+# Charts that do not take part, with the reason.
+UNFIT = {
     "backlash": "backlash is play with elastic flanks, not friction",
     "end-stop": "an end stop transmits a force on one side only and is not friction",
+    "prandtl-tomlinson": "its force is the slope of a periodic potential plus damping: it has no "
+    "pre-sliding of its own, and the period of the potential sets the scale of all signals",
     "dog-clutch": "a dog clutch is locked or open by time and has no friction force of its own",
 }
 V_C = 1e-8  # m/s: far below the speed of the slowest ramp in pre-sliding, rate / sigma_0 = 1e-6 m/s
@@ -97,7 +100,7 @@ def bench_bank(bench: Bench, n: int) -> GMSParameters:
 def _gms(entry: Entry, law: str, bench: Bench) -> ChartModel:
     p = bench_bank(bench, entry.demonstration.n)
     return ChartModel(
-        gms_element(law),  # type: ignore[arg-type]
+        entry.chart(law),
         {"k": p.k, "sigma": p.sigma, "C": p.C, "v_c": p.v_c},
         n=p.n,
         stribeck=p.stribeck,
@@ -117,19 +120,24 @@ def _lugre(entry: Entry, law: str, bench: Bench) -> ChartModel:
     )
 
 
-# The demonstrations of these are the paper's columns; the bench gives them its own numbers.
-RENUMBERED: Mapping[str, Callable[[Entry, str, Bench], ChartModel]] = {"gms": _gms, "lugre": _lugre}
+# The demonstrations of these are on scales of their own, such as the paper's columns; the bench
+# gives them its numbers. All others run with those of their demonstration.
+RENUMBERED: Mapping[str, Callable[[Entry, str, Bench], ChartModel]] = {
+    "gms": _gms,
+    "lugre": _lugre,
+}
 
 
 def specimens_of(
-    models: Iterable[str] | Mapping[str, Model | Contact] | None, bench: Bench
+    models: Iterable[str] | Mapping[str, str | Model | Contact] | None, bench: Bench
 ) -> tuple[Specimen, ...]:
     """Return the models to be compared.
 
     Parameters
     ----------
     models : iterable of str, mapping, or None
-        Names of included charts; or models or contacts by a name; None for all included charts.
+        Names of included charts; or by any name such a name, a model or a contact; None for all
+        included charts.
     bench : Bench
         Numbers of the signals.
 
@@ -143,42 +151,43 @@ def specimens_of(
     ParameterError
         If there is no such chart, or a model of the user's own cannot be put on the bench.
     """
-    if isinstance(models, Mapping):
-        return tuple(_own(name, model, bench) for name, model in models.items())
     known = {
         "-".join(filter(None, (each.name, law))): (each, law)
         for each in registered().values()
         if not each.wrong
         for law in each.laws or ("",)
     }
-    names = known if models is None else [models] if isinstance(models, str) else list(models)
-    for name in names:
-        if name not in known:
+    given: Mapping[str, str | Model | Contact]
+    if isinstance(models, Mapping):
+        given = models
+    elif isinstance(models, str):
+        given = {models: models}
+    else:
+        given = {name: name for name in (known if models is None else models)}
+    found = []
+    for name, model in given.items():
+        if not isinstance(model, str):
+            found.append(_own(name, model, bench))
+        elif model in known:
+            found.append(_included(name, *known[model], bench))
+        else:
             raise ParameterError(
-                f"there is no model {shown(name)}", advice=f"there are {', '.join(known)}"
+                f"there is no model {shown(model)}", advice=f"there are {', '.join(known)}"
             )
-    return tuple(_included(name, *known[name], bench) for name in names)
+    return tuple(found)
 
 
 def _included(name: str, entry: Entry, law: str, bench: Bench) -> Specimen:
     chart = entry.chart(law)
-    title = chart.name
-    why_not = NOT_FRICTION.get(entry.name, "") or unfit(chart)
+    why_not = UNFIT.get(entry.name, "") or unfit(chart)
     if why_not:
-        return Specimen(name, title, None, bench, why_not)
-    given = entry.demonstration
-    if entry.name in RENUMBERED:
-        model = RENUMBERED[entry.name](entry, law, bench)
-        return Specimen(name, model.title, Contact("friction", model), bench)
-    inputs = normal_force(chart, given.values, bench)
-    if inputs:
-        contact = Contact("friction", chart, given.values, n=given.n, inputs=inputs)
-        return Specimen(name, title, contact, bench)
-    numbers: Any = {"values": given.values, "weights": given.weights}
-    model = ChartModel(
-        chart, **numbers, n=given.n, stribeck=given.stribeck, sigma_2=given.sigma_2
-    )
-    return Specimen(name, title, Contact("friction", model), bench)
+        return Specimen(name, chart.name, None, bench, why_not)
+    make = RENUMBERED.get(entry.name)
+    try:
+        model = demonstration(entry, law) if make is None else make(entry, law, bench)
+    except ParameterError as error:  # it reads an input for which there is no number
+        return Specimen(name, chart.name, None, bench, str(error))
+    return Specimen(name, model.title, Contact("friction", model), bench)
 
 
 def unfit(chart: Chart) -> str:
@@ -195,35 +204,9 @@ def unfit(chart: Chart) -> str:
         Empty if it can.
     """
     if len(chart.velocities) > 1:
-        along = ", ".join(chart.velocities)
-        return f"it moves along {along}; the bench has one direction"
-    unknown = [name for name in chart.inputs if name not in (*SUPPLIED, "N")]
-    if unknown:
-        return f"it reads the input {unknown[0]}, which the bench does not supply"
+        along = " and ".join(chart.velocities)
+        return f"it moves along {along}, and the bench has one direction"
     return ""
-
-
-def normal_force(chart: Chart, values: Mapping[str, Any], bench: Bench) -> dict[str, float]:
-    """Return the constant normal force for a chart that reads one.
-
-    Parameters
-    ----------
-    chart : Chart
-        Any chart.
-    values : mapping
-        Its parameters; with a coefficient ``mu`` the friction mu N is F_c.
-    bench : Bench
-        With N and F_c.
-
-    Returns
-    -------
-    dict of str to float
-        The input N; empty for other charts.
-    """
-    if "N" not in chart.inputs:
-        return {}
-    coefficient = float(np.mean(values["mu"])) if "mu" in values else 0.0
-    return {"N": bench.F_c / coefficient if coefficient > 0.0 else bench.N}
 
 
 def _own(name: str, model: Model | Contact, bench: Bench) -> Specimen:
@@ -235,20 +218,26 @@ def _own(name: str, model: Model | Contact, bench: Bench) -> Specimen:
                 value=model,
             )
         return Specimen(name, model.title, Contact("friction", model), bench)
-    why_not = unfit(model.chart)
-    missing = [each for each in model.inputs if each not in (*SUPPLIED, "N")]
-    if why_not and not missing:
+    if why_not := unfit(model.chart):
         raise ParameterError(why_not, place=f"models[{name!r}]")
-    inputs = {**normal_force(model.chart, model.values, bench), **model.inputs}
-    for each, text in inputs.items():
-        if not isinstance(text, int | float):
+    for each, text in model.inputs.items():
+        if not _constant(text):
             raise ParameterError(
                 f"the input {each} of its contact is {shown(text)}",
                 place=f"models[{name!r}]",
                 advice="on the bench an input must be a number",
             )
+    inputs = dict(model.inputs)
     if model.model is not None:
         contact = Contact("friction", model.model, inputs=inputs)
     else:
         contact = Contact("friction", model.chart, model.values, n=model.n, inputs=inputs)
     return Specimen(name, model.chart.name, contact, bench)
+
+
+def _constant(text: Any) -> bool:
+    try:
+        parse_value(str(text), ())
+    except ExpressionError:
+        return False
+    return True

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.errors import GMSError, ParameterError, shown
 from gms_fsm.phenomena import _break_away, _presliding, _sliding
 from gms_fsm.phenomena._bench import Bench
 from gms_fsm.phenomena._specimens import Specimen, specimens_of
 from gms_fsm.phenomena.results import Cell, Measured, PhenomenaTable, Phenomenon
-from gms_fsm.errors import GMSError
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 
@@ -21,7 +20,7 @@ Progress = Callable[[str, float], None]
 
 
 def measure_phenomena(
-    models: Iterable[str] | Mapping[str, Model | Contact] | None = None,
+    models: Iterable[str] | Mapping[str, str | Model | Contact] | None = None,
     phenomena: Iterable[str] | None = None,
     *,
     bench: Bench | None = None,
@@ -31,9 +30,9 @@ def measure_phenomena(
 
     Parameters
     ----------
-    models : iterable of str, or mapping of str to Model or Contact, optional
-        Names of included charts, as in ``gms_fsm.charts.CHARTS``; or models of your own by a name.
-        All included charts if omitted.
+    models : iterable of str, or mapping of str to str, Model or Contact, optional
+        Names of included charts, as in ``gms_fsm.charts.CHARTS``; or such names and models of your
+        own, each by the name that it has in the table. All included charts if omitted.
     phenomena : iterable of str, optional
         Names from ``gms_fsm.phenomena.measure.PHENOMENA``; all if omitted.
     bench : Bench, optional
