@@ -133,7 +133,7 @@ def page(table: PhenomenaTable) -> str:
     return "\n".join(lines)
 
 
-# --------------------------------------------------------------------------- files of the user's own
+# --------------------------------------------------------------------------- files
 def own_models(
     names: Sequence[str], contact: str = "", values: Mapping[str, float] | None = None
 ) -> dict[str, Model | Contact]:

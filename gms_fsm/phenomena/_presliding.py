@@ -167,7 +167,8 @@ PHENOMENA = (
         "Rest under bias and ripple",
         "rests under bias and ripple: drift per period",
         "The force rises to 0.6 of the break-away force, falls to 0.3, and then has a ripple of "
-        "0.1 at 2 Hz. Measured is how far the mean of a period moves from period 20 to 40, per period.",
+        "0.1 at 2 Hz. Measured is how far the mean of a period moves from period 20 to 40, per "
+        "period.",
         ("t [s]", "x [µm]"),
         _drift,
     ),

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.phenomena._bench import Bench, Motion
@@ -130,7 +131,7 @@ def _last_cycle(t: FloatArray, v: FloatArray, speed: float) -> tuple[float, floa
     return float(times[-2]), float(times[-1])
 
 
-def _share(t: FloatArray, true: FloatArray) -> float:
+def _share(t: FloatArray, true: NDArray[np.bool_]) -> float:
     """Return the share of the time in which something is true at both ends of a step."""
     steps = np.diff(t)
     return float(steps[true[:-1] & true[1:]].sum() / steps.sum())
@@ -185,9 +186,9 @@ PHENOMENA = (
         "stick-slip",
         "Mass pulled through a spring",
         "stick-slip: amplitude",
-        "A spring of 2 N/m, whose end moves at 0.1 m/s, pulls the slider of 1 kg for 40 s. Measured "
-        "are the period and the amplitude of the spring force in the last cycle, and the share of "
-        "the period in stick.",
+        "A spring of 2 N/m, whose end moves at 0.1 m/s, pulls the slider of 1 kg for 40 s. "
+        "Measured are the period and the amplitude of the spring force in the last cycle, and "
+        "the share of the period in stick.",
         ("t [s]", "spring force [N]"),
         _stick_slip,
     ),

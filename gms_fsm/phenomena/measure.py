@@ -1,4 +1,4 @@
-"""The bench as one function: models × phenomena."""
+"""The bench as one function: models by phenomena."""
 
 from __future__ import annotations
 

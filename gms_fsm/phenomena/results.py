@@ -18,6 +18,9 @@ Verdict = Literal["shows", "does not show", "shows wrongly", "does not apply", "
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
 
+SMALLEST = 1e-3  # in its unit: a smaller number is printed as 0.000; tables in CSV have all digits
+
+
 @dataclass(frozen=True)
 class Number:
     """A measured number.
@@ -37,8 +40,9 @@ class Number:
     unit: str
 
     def __str__(self) -> str:
-        value = 0.0 if abs(self.value) < 1e-12 else self.value
-        return f"{value:.3g} {self.unit}".removesuffix(" 1")
+        value = self.value
+        text = f"{value:.3g}" if value == 0.0 or abs(value) >= SMALLEST else "0.000"
+        return f"{text} {self.unit}".removesuffix(" 1")
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm.phenomena.results import MARKS, Measured, PhenomenaTable, Phenomenon
-from plots._matplotlib import Axes, Figure, rc_context
+from gms_fsm.phenomena.results import MARKS, VERDICTS, Measured, PhenomenaTable, Phenomenon
+from plots._matplotlib import Axes, Figure, Rectangle, rc_context
 from plots.style import (
     BLUE,
     BLUE_TINT,
@@ -107,8 +107,6 @@ def _panel(
         low, high = _range([found], axis)
         if limit is None or low < limit[0] or high > limit[1]:
             own = own or limit is not None
-        elif high > low:
-            ax.set(**{f"{axis}lim": limit})
         else:
             ax.set(**{f"{axis}lim": limit})
     if not phenomenon.log:
@@ -147,8 +145,6 @@ def _common(
     kept = [each for each, size in zip(ranges, sizes, strict=True) if size <= TOO_LARGE * usual]
     low, high = min(each[0] for each in kept), max(each[1] for each in kept)
     margin = 0.06 * (high - low) or 1.0
-    if axis == "y" and low >= 0.0:
-        return -0.02 * high, high + margin
     return low - margin, high + margin
 
 
@@ -165,18 +161,16 @@ def phenomena_matrix(table: PhenomenaTable) -> Figure:
     Figure
         Models that take part in no experiment are left out.
     """
-    from matplotlib.patches import Rectangle
-
     models = [model for model in table.models if model not in table.left_out()]
     wide, high = 1.28, 0.46  # in, of a cell
     left = 0.11 * max([8, *map(len, models)])
-    size = (left + wide * len(table.phenomena) + 0.2, 1.55 + high * max(1, len(models)))
+    size = (left + wide * len(table.phenomena) + 0.2, 1.4 + high * max(1, len(models)))
     with rc_context(RC):
         sheet = Figure(figsize=size)
         ax = sheet.add_axes((0.0, 0.0, 1.0, 1.0))
         ax.set(xlim=(0.0, size[0]), ylim=(0.0, size[1]))
         ax.set_axis_off()
-        top = size[1] - 0.85
+        top = size[1] - 0.7
         for column, phenomenon in enumerate(table.phenomena):
             x = left + (column + 0.5) * wide
             ax.text(x, top + 0.1, _folded(phenomenon.short), ha="center", va="bottom", fontsize=8)
@@ -194,7 +188,10 @@ def phenomena_matrix(table: PhenomenaTable) -> Figure:
                 if found.numbers:
                     ax.text(corner[0] + 0.36, y, str(found.numbers[0]), va="center", fontsize=8.5)
         x = left + 0.2
-        for verdict in dict.fromkeys(each.measured.verdict for each in table):
+        found_any = {
+            table.cell(model, one.name).verdict for model in models for one in table.phenomena
+        }
+        for verdict in (each for each in VERDICTS if each in found_any):
             _symbol(ax, x, 0.3, verdict)
             ax.text(x + 0.16, 0.3, verdict, va="center", fontsize=8.5)
             x += 0.45 + 0.075 * len(verdict)
