@@ -25,7 +25,7 @@ from gms_fsm.systems.system import Body, Contact, System
 from gms_fsm.traces.failures import StepLimitError
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["Bench", "Motion", "fastest_engine", "run"]
+__all__ = ["Bench", "Motion", "Path", "fastest_engine", "path", "run"]
 
 MOST_STEPS = 1_000_000
 # A run that needs more is stiff, or chatters; it is then made with an implicit method, whose steps
@@ -231,32 +231,66 @@ def run(
     )
 
 
-def ramps(
-    rate: float, stops: Sequence[float], hold: float
-) -> tuple[list[tuple[float, float]], FloatArray]:
-    """Return ramps from 0 through some values, with a hold at each.
+@dataclass(frozen=True, eq=False)
+class Path:
+    """A force that goes from 0 through some values and stays at each for a while.
+
+    Parameters
+    ----------
+    corners : list of (float, float)
+        Time [s] and N.
+    branches : tuple of ndarray
+        Times along each ramp, evenly spaced, s.
+    ends : ndarray
+        The end of each hold, s.
+    """
+
+    corners: list[tuple[float, float]]
+    branches: tuple[FloatArray, ...]
+    ends: FloatArray
+
+    @property
+    def times(self) -> FloatArray:
+        """All times of branches and ends, s."""
+        return np.unique(np.concatenate([*self.branches, self.ends]))
+
+    def force(self, times: FloatArray) -> FloatArray:
+        """Return the force at some times, N."""
+        known, values = np.array(self.corners).T
+        return np.asarray(np.interp(times, known, values))
+
+
+def path(rate: float, stops: Sequence[float], hold: float, *, smooth: bool = False) -> Path:
+    """Return a force that goes through some values.
 
     Parameters
     ----------
     rate : float
-        Slope of the ramps, per s.
+        Mean slope of the ramps, N/s.
     stops : sequence of float
-        The values.
+        The values, N.
     hold : float
         Time at each, s.
+    smooth : bool
+        Whether the ramps begin and end slowly, like half a cosine, so that the mass does not
+        overshoot. They then have 64 pieces.
 
     Returns
     -------
-    list of (float, float), ndarray
-        The corners, and the time at the end of each hold.
+    Path
+        With 200 times on each branch.
     """
     t = last = 0.0
-    corners, ends = [(0.0, 0.0)], []
+    corners, ends, branches = [(0.0, 0.0)], [], []
+    share = np.linspace(0.0, 1.0, 65 if smooth else 2)
+    shape = 0.5 - 0.5 * np.cos(np.pi * share) if smooth else share
     for value in stops:
-        t += abs(value - last) / rate
-        corners.append((t, value))
-        t += hold
+        length = abs(value - last) / rate
+        branches.append(np.linspace(t, t + length, 200))
+        times, values = t + length * share, last + (value - last) * shape
+        corners += list(zip(times[1:].tolist(), values[1:].tolist(), strict=True))
+        t += length + hold
         corners.append((t, value))
         ends.append(t)
         last = value
-    return corners, np.array(ends)
+    return Path(corners, tuple(branches), np.array(ends))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.phenomena._bench import Motion, ramps
+from gms_fsm.phenomena._bench import Motion, path
 from gms_fsm.phenomena.limits import LIMITS
 from gms_fsm.phenomena.results import Curve, Measured, Number, Phenomenon, Verdict
 
@@ -22,18 +22,11 @@ RATE = 0.095
 OUTER = (0.95, -0.95, 0.95)
 HOLD = 5.0  # s
 NESTED = (0.95, -0.8, 0.8, -0.8, 0.95)
-POINTS = 200  # per branch
 SLIDING = 20.0  # in F_s / sigma_0: a longer stroke is not pre-sliding
 BIAS_RAMP = ((0.0, 0.0), (2.0, 0.6), (4.0, 0.3), (5.0, 0.3))
 RIPPLE, FREQUENCY = 0.1, 2.0  # Hz
 PER_PERIOD = 50  # samples
 PERIODS = (20, 40)  # of the ripple; the drift is measured between their means
-
-
-def _branches(corners: list[tuple[float, float]]) -> list[FloatArray]:
-    """Return times along each ramp."""
-    times = [t for t, _ in corners]
-    return [np.linspace(a, b, POINTS) for a, b in zip(times[0::2], times[1::2], strict=False)]
 
 
 def _at(force: float, F: FloatArray, x: FloatArray) -> float:
@@ -42,18 +35,22 @@ def _at(force: float, F: FloatArray, x: FloatArray) -> float:
     return float(np.interp(force, F[order], x[order]))
 
 
+def work(force: FloatArray, x: FloatArray) -> float:
+    """Return the work of a force along a branch, J."""
+    return float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(x)))
+
+
 def _hysteresis(specimen: Specimen) -> Measured:
     force = specimen.break_away
-    corners, ends = ramps(RATE * force, [each * force for each in OUTER], HOLD)
-    branches = _branches(corners)
-    trace = specimen.run(Motion(force=corners), float(ends[-1]), _times(branches, ends))
+    way = path(RATE * force, [each * force for each in OUTER], HOLD)
+    trace = specimen.run(Motion(force=way.corners), float(way.ends[-1]), way.times)
     x = dict(zip(trace.t.tolist(), trace.x.tolist(), strict=True))
-    applied = np.interp(trace.t, *np.array(corners).T)
-    down, up = (np.array([x[t] for t in branch.tolist()]) for branch in branches[1:])
-    load = np.linspace(OUTER[0], OUTER[1], POINTS) * force
-    width = _at(0.0, load, down) - _at(0.0, load[::-1], up)
+    applied = way.force(trace.t)
+    down, up = (np.array([x[t] for t in branch.tolist()]) for branch in way.branches[1:])
+    load, back = (way.force(branch) for branch in way.branches[1:])
+    width = _at(0.0, load, down) - _at(0.0, back, up)
     stroke = float(max(down.max(), up.max()) - min(down.min(), up.min()))
-    loss = float(np.trapezoid(load, down) + np.trapezoid(load[::-1], up))
+    loss = work(load, down) + work(back, up)
     share = abs(width) / stroke if stroke > 0.0 else 0.0
     if stroke > SLIDING * specimen.bench.bristle:
         verdict: Verdict = "shows wrongly"
@@ -74,23 +71,18 @@ def _hysteresis(specimen: Specimen) -> Measured:
     return Measured(verdict, numbers, said, (Curve("", 1e6 * trace.x, applied),))
 
 
-def _times(branches: list[FloatArray], ends: FloatArray) -> FloatArray:
-    return np.unique(np.concatenate([*branches, ends]))
-
-
 def _memory(specimen: Specimen) -> Measured:
     force = specimen.break_away
-    corners, ends = ramps(RATE * force, [each * force for each in NESTED], HOLD)
-    branches = _branches(corners)
-    trace = specimen.run(Motion(force=corners), float(ends[-1]), _times(branches, ends))
+    way = path(RATE * force, [each * force for each in NESTED], HOLD, smooth=True)
+    trace = specimen.run(Motion(force=way.corners), float(way.ends[-1]), way.times)
     x = dict(zip(trace.t.tolist(), trace.x.tolist(), strict=True))
-    outer, inner, top, inner_again, outer_again = (x[t] for t in ends.tolist())
+    outer, inner, top, inner_again, outer_again = (x[t] for t in way.ends.tolist())
     stroke = top - inner
     gaps = (inner_again - inner, outer_again - outer)
     gap = max(gaps, key=abs)
-    up, down = (np.array([x[t] for t in branch.tolist()]) for branch in branches[2:4])
-    load = np.linspace(NESTED[1], NESTED[2], POINTS) * force
-    width = _at(0.0, load[::-1], down) - _at(0.0, load, up)
+    up, down = (np.array([x[t] for t in branch.tolist()]) for branch in way.branches[2:4])
+    rising, falling = (way.force(branch) for branch in way.branches[2:4])
+    width = _at(0.0, falling, down) - _at(0.0, rising, up)
     open_by, wide = (abs(u / stroke) if stroke else 0.0 for u in (gap, width))
     if abs(stroke) > SLIDING * specimen.bench.bristle:
         verdict: Verdict = "does not show"
@@ -108,7 +100,7 @@ def _memory(specimen: Specimen) -> Measured:
         Number("stroke of the inner loop", 1e6 * stroke, "µm"),
         Number("width of the inner loop at F = 0", 1e6 * width, "µm"),
     )
-    applied = np.interp(trace.t, *np.array(corners).T)
+    applied = way.force(trace.t)
     return Measured(verdict, numbers, said, (Curve("", 1e6 * trace.x, applied),))
 
 
@@ -156,9 +148,9 @@ PHENOMENA = (
         "memory",
         "Nonlocal memory: nested reversals of the force",
         "nonlocal memory: gap of inner loops",
-        "The force goes to 0.95, -0.8, 0.8, -0.8 and 0.95 of the break-away force. A contact that "
-        "remembers where it turned is then back at the same places. Measured is the larger "
-        "of the two gaps, over the stroke of the inner loop.",
+        "The force goes smoothly to 0.95, -0.8, 0.8, -0.8 and 0.95 of the break-away force. A "
+        "contact that remembers where it turned is then back at the same places. Measured is the "
+        "larger of the two gaps, over the stroke of the inner loop.",
         ("x [µm]", "applied force [N]"),
         _memory,
     ),

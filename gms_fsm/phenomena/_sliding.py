@@ -97,7 +97,7 @@ def _stribeck(specimen: Specimen) -> Measured:
 def _stick_slip(specimen: Specimen) -> Measured:
     bench = specimen.bench
     motion = Motion(spring=bench.stiffness, velocity=((0.0, bench.speed), (1.0, bench.speed)))
-    trace = specimen.run(motion, PULLED)
+    trace = specimen.run(motion, PULLED).refined(4000)
     t, pull = trace.t, bench.stiffness * (bench.speed * trace.t - trace.x)
     cycle = _last_cycle(t, trace.v, bench.speed)
     last = (t >= cycle[0]) & (t <= cycle[1]) if cycle else t >= 0.5 * PULLED
