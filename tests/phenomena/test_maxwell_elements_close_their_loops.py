@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -21,9 +23,9 @@ def test_on_the_bench() -> None:
 
 @pytest.mark.slow
 def test_in_prescribed_motion_to_rounding() -> None:
-    stops = np.array([0.0, 40e-6, 5e-6, 30e-6, 5e-6, 40e-6])  # m; dyadic speeds are not needed
+    stops = np.array([0.0, 40e-6, 5e-6, 30e-6, 5e-6, 40e-6])  # m
     velocity, t = [], 0.0
-    for one, after in zip(stops[:-1], stops[1:], strict=True):
+    for one, after in itertools.pairwise(stops.tolist()):
         velocity += [(t, np.sign(after - one) * 1e-5)]
         t += abs(after - one) / 1e-5
         velocity += [(t, np.sign(after - one) * 1e-5)]

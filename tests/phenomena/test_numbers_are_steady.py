@@ -1,4 +1,4 @@
-"""Claim: the third digit of a number depends neither on the tolerance nor on the scale of forces."""
+"""Claim: the third digit of a number does not depend on the tolerance or on the scale of forces."""
 
 from __future__ import annotations
 
