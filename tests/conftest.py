@@ -9,6 +9,13 @@ import pytest
 from tests.scenario_files import CommandLine, command_line
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the examples of lessons as slow: each one runs its lesson."""
+    for item in items:
+        if item.nodeid.startswith("gms_fsm/app/lessons/"):
+            item.add_marker(pytest.mark.slow)
+
+
 @pytest.fixture
 def gms_fsm(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path

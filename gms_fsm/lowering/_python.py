@@ -225,9 +225,7 @@ class _Printer(Forces):
         """Return a value with what is computed from variables expanded; and from velocities."""
         changed = {*bank.variables, *(bank.velocities if moved else ())}
         inside = {
-            each.name
-            for each in self.read.definitions
-            if each.bank == bank.index and self.read.closure([each.name]) & changed
+            each.name for each in self.read.definitions if self.read.closure([each.name]) & changed
         } - changed
         if not names_in(value) & inside:
             return value

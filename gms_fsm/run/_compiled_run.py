@@ -19,7 +19,7 @@ from gms_fsm.run._recording import (
     explained,
     interference_error,
 )
-from gms_fsm.run.machines import ElementMachines, Interference, MachineEngine
+from gms_fsm.run.machines import Interference, MachineEngine
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
@@ -45,11 +45,11 @@ class CompiledRun:
     ----------
     start : Start
         The run to perform.
-    machines : ElementMachines, optional
-        The user's own machines: each firing is replayed through them.
+    machines : MachineEngine, optional
+        With the user's own machines: each firing is replayed through them.
     """
 
-    def __init__(self, start: Start, machines: ElementMachines | None = None) -> None:
+    def __init__(self, start: Start, machines: MachineEngine | None = None) -> None:
         self.start = start
         program = start.program
         flow = "flow" if start.options.located else "flow_live"
@@ -57,9 +57,7 @@ class CompiledRun:
         self.code = compiled.machine_code(program, *names)
         self.columns = Columns(start)
         self.recorder: Recording = self.columns
-        self.engine: MachineEngine | None = None
-        if machines is not None:
-            self.engine = MachineEngine([machines], program, start.mode)
+        self.engine = machines
 
     @property
     def buffers(self) -> hybrid.Buffers:

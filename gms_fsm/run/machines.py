@@ -79,8 +79,8 @@ class ElementMachines:
 
     Parameters
     ----------
-    model : Model
-        The model whose elements are created.
+    model : Model or Contact
+        The model, or the contact of a system, whose elements are created.
     element : type, optional
         Class of the element objects: `Element` or a class derived from it.
 
@@ -314,8 +314,7 @@ class MachineEngine:
         """
         bank = self.program.layout.bank(machine)
         row = self.parts[machine].model.chart.transitions[edge - bank.first_edge]
-        whose = "" if len(self.banks) == 1 else f"contact {bank.name!r}, "
-        place = f"{whose}element {machine - bank.first + 1}, edge {row.name!r}"
+        place = f"{self.called(machine)}, edge {row.name!r}"
         # The trigger evaluates the guard once more; assignments follow, as in Stateflow, where the
         # whole set is selected before any of them.
         try:
@@ -335,11 +334,17 @@ class MachineEngine:
         for i, (element, state) in enumerate(zip(self.elements, self.states, strict=True)):
             if element.state != state:
                 raise Interference(
-                    f"a callback put element {i + 1} into state {shown(element.state)}, "
+                    f"a callback put {self.called(i)} into state {shown(element.state)}, "
                     f"but the chart has it in {state!r}; {ONLY_LOOK}",
                     place,
                     t,
                 )
+
+    def called(self, machine: int) -> str:
+        """Return what an element is called in messages, with its contact if there are several."""
+        bank = self.program.layout.bank(machine)
+        whose = "" if len(self.banks) == 1 else f"contact {bank.name!r}, "
+        return f"{whose}element {machine - bank.first + 1}"
 
 
 def _numbered(machines: ElementMachines, first: int) -> list[list[tuple[int, Guard]]]:

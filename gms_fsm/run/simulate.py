@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any, Unpack
 
 import integrators
-from gms_fsm._arguments import checked_kind, checked_path
+from gms_fsm._arguments import checked_path
 from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.lowering.program import equations
 from gms_fsm.run._checkpoint import Checkpointer
 from gms_fsm.run._compiled_run import CompiledRun
+from gms_fsm.run._own_machines import engine_of, own_machines
 from gms_fsm.run._recording import (
     PATIENCE,
     Moment,
@@ -46,7 +47,7 @@ def simulate(
     initial: Mapping[str, Any] | None = None,
     settings: Settings | None = None,
     engine: str | ElementMachines | None = None,
-    machines: ElementMachines | None = None,
+    machines: ElementMachines | Mapping[str, ElementMachines] | None = None,
     progress: Callable[[Moment], object] | None = None,
     checkpoint: str | Path | None = None,
     checkpoint_every: float = 60.0,
@@ -76,9 +77,10 @@ def simulate(
     engine : {"machines", "ifelse", "compiled"} or ElementMachines, optional
         Field of `Settings`. Your own machines, with callbacks, may be given instead of
         ``"machines"``.
-    machines : ElementMachines, optional
+    machines : ElementMachines or mapping of str to ElementMachines, optional
         Your own machines; with the compiled engine each firing is replayed through them, so that
-        callbacks run and their states are correct at the end.
+        callbacks run and their states are correct at the end. In a system by contact:
+        ``{"gear": ElementMachines(system.contact("gear"))}``.
     progress : callable, optional
         Called at intervals with the `Moment` reached.
     checkpoint : str or Path, optional
@@ -139,19 +141,18 @@ def simulate(
             "it must be a function of the moment reached", place="progress", value=progress
         )
     path = None if checkpoint is None else checked_path("checkpoint", checkpoint)
-    if machines is not None:
-        checked_kind("machines", machines, ElementMachines, "an ElementMachines, or left out")
-        if machines.model is not model:
-            raise ParameterError("machines: these ElementMachines were made for a different model")
-        if chosen.engine == "ifelse":
-            raise ParameterError(
-                "engine 'ifelse' uses no machines", advice="leave machines=... out"
-            )
+    if machines is not None and chosen.engine == "ifelse":
+        raise ParameterError("engine 'ifelse' uses no machines", advice="leave machines=... out")
     start = Start.of(model, on, end, chosen, t_start=t_start, initial=initial)
     watching = (
         checked(monitors, start.given or start.model, start.output).values() if monitors else ()
     )
-    run = CompiledRun(start, machines) if chosen.engine == "compiled" else Run(start, machines)
+    own = {} if machines is None else own_machines(machines, start)
+    run: CompiledRun | Run
+    if chosen.engine == "compiled":
+        run = CompiledRun(start, engine_of(start, own) if own else None)
+    else:
+        run = Run(start, own)
     keeper = None if path is None else Checkpointer(run, path, checkpoint_every)
     try:
         while run.advance():
@@ -220,8 +221,8 @@ class Run:
     ----------
     start : Start
         The run to perform; for the engine ``"compiled"``, machines run it, with the same result.
-    machines : ElementMachines, optional
-        The user's own machines.
+    machines : mapping of str to ElementMachines, optional
+        The user's own machines, by contact.
 
     Examples
     --------
@@ -232,14 +233,12 @@ class Run:
     (True, 1)
     """
 
-    def __init__(self, start: Start, machines: ElementMachines | None = None) -> None:
+    def __init__(self, start: Start, machines: Mapping[str, ElementMachines] | None = None) -> None:
         self.start = start
         switch: MachineEngine | IfElse = IfElse(start.program)
         self.engine: MachineEngine | None = None
         if start.chosen.engine != "ifelse":
-            whose = [start.model] if start.given is None else start.system.contacts
-            parts = [ElementMachines(each) for each in whose] if machines is None else [machines]
-            switch = self.engine = MachineEngine(parts, start.program, start.mode)
+            switch = self.engine = engine_of(start, machines or {})
         self.recorder, self.next_look = Recorder(start), PATIENCE
         self.event: integrators.Event | None = None  # the latest
         made, options = equations(start.program), start.options

@@ -495,9 +495,10 @@ class _Collected:
     def sweep(self, parameters: Mapping[str, FloatArray]) -> Sweep:
         """Return the sweep with all results."""
         contacts, states, edges, owners = self.what.contacts, [], list[str](), list[str]()
-        for each in contacts:
+        borders = np.cumsum([each.n for each in contacts])[:-1]
+        for each, modes in zip(contacts, np.split(self.mode, borders, axis=1), strict=True):
             names = np.array([*(state.name for state in each.chart.states), ""])
-            states.append(names[self.mode[:, len(owners) : len(owners) + each.n]])
+            states.append(names[modes])
             name = each.name if isinstance(each, Contact) else ""
             owners += [name] * each.n
             lead = f"{name}." if len(contacts) > 1 else ""

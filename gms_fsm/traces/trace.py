@@ -232,7 +232,7 @@ class Trace:
             return self._named(name)
         bank = self.places if self.which or len(layout.banks) == 1 else None
         names = {} if bank is None else bank.plain({each: each for each in layout.observed.shared})
-        if name in names:
+        if isinstance(name, str) and name in names:
             return self.seen[names[name]]
         known = [*layout.y.shared, *(each for each in names if " " not in each)]
         raise ParameterError(

@@ -220,6 +220,7 @@ TABLES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("broken", CONTENTS)
 def test_a_broken_table(broken: str, gms_fsm: CommandLine, tmp_path: Path) -> None:
     content, said = CONTENTS[broken]

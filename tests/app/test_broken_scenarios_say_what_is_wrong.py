@@ -336,6 +336,7 @@ def process(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 def test_the_program_prints_one_line(tmp_path: Path) -> None:
     (tmp_path / "broken.toml").write_text(changed(OPEN_LOOP, "v_c = 1e-6", "vc = 1e-6"))
     done = process("run", "broken.toml", cwd=tmp_path)

@@ -179,6 +179,7 @@ def test_a_faulty_state_is_marked(gms_fsm: CommandLine, tmp_path: Path) -> None:
     assert "C = 1, v = -1, s = 1, z = 1" in said
 
 
+@pytest.mark.slow
 def test_with_nothing_refuted_there_is_a_report_and_no_chart(
     gms_fsm: CommandLine, tmp_path: Path
 ) -> None:

@@ -35,6 +35,7 @@ def test_version_and_help(gms_fsm: CommandLine) -> None:
     assert "code" in help_text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

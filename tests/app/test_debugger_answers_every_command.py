@@ -189,6 +189,7 @@ def test_until_reports_where_and_whether() -> None:
     assert said[2].startswith("it does not become true before the end\nrow 349, t = 100 s")
 
 
+@pytest.mark.slow
 def test_until_stays_if_the_condition_is_always_true() -> None:
     said = answers(FIG_4, "goto 25", "u t > 1", "s", "u t > 30", "u t > 30", "u t > 30.1")
     stays = "it is already true here and does not become true again; until stops where it becomes"

@@ -198,6 +198,7 @@ def test_why_takes_an_edge() -> None:
     assert "'let' is not an edge; there are break_away, let_go, arrest" in made.reply("why 1 let")
 
 
+@pytest.mark.slow
 def test_after_a_firing_why_says_how_to_explain_the_new_state() -> None:
     made = own(2)
     assert "element 1: static -> rising by break_away" in made.reply("next")

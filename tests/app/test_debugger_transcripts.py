@@ -148,6 +148,7 @@ def test_every_transition_of_the_log_is_shown(scenario: str) -> None:
     assert len(said[-1].splitlines()) == len(log)
 
 
+@pytest.mark.slow
 def test_the_same_script_gives_the_same_transcript() -> None:
     script = ("until z2 < -0.3", "poke z1=0.1", "next", "where", "list", "prev", "compare")
     assert talk(FIG_4, *script) == talk(FIG_4, *script)

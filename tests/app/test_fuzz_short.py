@@ -15,18 +15,21 @@ from hypothesis import strategies as st
 from tests import fuzz
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None, derandomize=True)
 @given(st.binary(max_size=200))
 def test_expressions(data: bytes) -> None:
     fuzz.one_expression(data)
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(st.binary(max_size=200))
 def test_scenario_files(data: bytes) -> None:
     fuzz.one_scenario(data)
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(st.binary(max_size=200))
 def test_trace_files(data: bytes) -> None:

@@ -51,6 +51,7 @@ def test_help_lists_every_verb() -> None:
         assert f" {verb} " in said
 
 
+@pytest.mark.slow
 def test_imports_of_a_verb_are_detected() -> None:
     _, names = loaded("code", "--law", "signed")
     assert "numpy" in names

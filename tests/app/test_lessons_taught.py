@@ -81,6 +81,7 @@ def test_a_mistake_is_reported_before_anything_runs(
         lessons.teach(7, tmp_path / "file" / "out")
 
 
+@pytest.mark.slow
 def test_without_the_extras_there_is_the_text_and_a_note(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -384,6 +384,7 @@ def _noisy_scenario(tmp_path: Path, v_c: str) -> Path:
     return tmp_path / "noisy.toml"
 
 
+@pytest.mark.slow
 def test_the_command_line_warns_of_a_v_c_below_the_noise(
     gms_fsm: CommandLine, tmp_path: Path
 ) -> None:
@@ -397,6 +398,7 @@ def test_the_command_line_warns_of_a_v_c_below_the_noise(
     assert "Parameters not identifiable from this record" in summary
 
 
+@pytest.mark.slow
 def test_the_suggested_v_c_causes_no_warning(gms_fsm: CommandLine, tmp_path: Path) -> None:
     v_c = repr(dwelling(5e-6).fitting_v_c())
     done = gms_fsm("run", _noisy_scenario(tmp_path, v_c), "-o", tmp_path / "out")

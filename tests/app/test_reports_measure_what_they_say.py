@@ -213,6 +213,7 @@ def test_only_selected_rows_are_compared() -> None:
     np.testing.assert_array_equal(force, record.columns["force"][chosen])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "rows",
     [None, TIMES[::4], np.linspace(0.0, 10.0, 333), np.linspace(2.0, 8.0, 100)],
@@ -259,6 +260,7 @@ def test_a_constant_force_has_an_rmse_but_no_r2() -> None:
     assert not np.isfinite(found.r2)
 
 
+@pytest.mark.slow
 def test_the_summary_prints_these_numbers(tmp_path: Path) -> None:
     trace, record = measured(NOISE)
     x = 1e3 * motion_of(record).position
@@ -277,6 +279,7 @@ def test_the_summary_prints_these_numbers(tmp_path: Path) -> None:
     assert len(trace) == len(ran)
 
 
+@pytest.mark.slow
 def test_rows_every_so_often_change_the_file_not_the_comparison(tmp_path: Path) -> None:
     _, record = measured(NOISE)
     x = 1e3 * motion_of(record).position

@@ -135,6 +135,7 @@ def test_sweep_varies_numbers_and_contacts(verb: CommandLine) -> None:
     one_message(wrong, "--over pad3.F_s: unknown name", "pad2.F_s [N]")
 
 
+@pytest.mark.slow
 def test_the_schema_knows_the_keys_of_systems(verb: CommandLine) -> None:
     schema = json.loads(verb("schema").out)
     keys = set(schema["$defs"]["SystemScenario"]["properties"])

@@ -150,7 +150,7 @@ def test_the_live_table_shows_no_ratio(model: ChartModel) -> None:
     view = LiveView(console, 0.0, 5.0, detail=True)
     moments: list[Moment] = []
     simulate(model, RIG, 5.0, progress=moments.append)
-    console.print(view.table(moments[-1]))
+    console.print(*view.tables(moments[-1]))
     said = console.export_text()
     assert "E2" in said
     assert "nan" not in said

@@ -51,6 +51,7 @@ def as_a_system() -> System:
     )
 
 
+@pytest.mark.slow
 def test_a_gms_bank_in_words_is_the_gms_model() -> None:
     model, rig = pulled_mass()
     one = simulate(model, rig, 40.0, rtol=1e-9)

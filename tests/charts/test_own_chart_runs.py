@@ -310,6 +310,7 @@ def test_a_name_is_refused_or_changes_nothing(name: str, kind: str, plain: list[
     _equal_but_for_names(model, plain)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("states", "edge"),
     [

@@ -72,6 +72,7 @@ def test_the_papers_guards_pass(law: str) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_the_published_law_is_unstable_for_v_below_0_and_the_signed_law_is_not() -> None:
     published = gms_element("published")
     finding = only(prove(published), "stability")
@@ -106,6 +107,7 @@ def test_lugre_has_nothing_to_contradict() -> None:
 
 
 # --------------------------------------------------------------------------- broken readings
+@pytest.mark.slow
 def test_break_away_by_z_with_arrest_by_v_livelocks() -> None:
     found = report("overlap")
     finding = only(found, "livelock")
@@ -116,6 +118,7 @@ def test_break_away_by_z_with_arrest_by_v_livelocks() -> None:
     passes(found, "determinism", "reachability", "chattering", "stability")
 
 
+@pytest.mark.slow
 def test_the_paper_read_literally_livelocks_at_z_equal_s_and_v_equal_0() -> None:
     found = report("literal")
     finding = only(found, "livelock")
@@ -127,6 +130,7 @@ def test_the_paper_read_literally_livelocks_at_z_equal_s_and_v_equal_0() -> None
     assert (point["v"], point["z"]) == (0, point["s"])
 
 
+@pytest.mark.slow
 def test_memoryless_guards_chatter_while_s_rises() -> None:
     found = report("memoryless")
     finding = only(found, "chattering")
@@ -142,6 +146,7 @@ def test_memoryless_guards_chatter_while_s_rises() -> None:
         assert not evaluate(found.chart.guards[edge], other)
 
 
+@pytest.mark.slow
 def test_with_s_equal_0_both_arms_hold_unless_the_velocity_separates_them() -> None:
     arms = ("break_away_forward", "break_away_backward")
     found = report("arms")
@@ -161,6 +166,7 @@ def test_with_s_equal_0_both_arms_hold_unless_the_velocity_separates_them() -> N
     assert both_hold(loose.chart, arms, point)
 
 
+@pytest.mark.slow
 def test_each_faulty_reading_describes_its_fault() -> None:
     for name, broken in BROKEN.items():
         found = report(name)
@@ -212,6 +218,7 @@ def test_a_guard_that_is_not_encoded_leaves_dependent_statements_undecided() -> 
     }
 
 
+@pytest.mark.slow
 def test_a_quotient_is_accepted_only_with_a_nonzero_denominator() -> None:
     assert prove(chart(go="z / s >= 1")).of("livelock")[0].status == "proved"
     (finding,) = prove(chart(go="z / v >= 1")).of("livelock")
@@ -228,6 +235,7 @@ def test_edges_enabled_together_name_the_one_taken_and_a_model_is_not_a_chart() 
         prove(LuGre(sigma_0=1, sigma_1=1, sigma_2=1, stribeck=Stribeck(1, 2, 3)))  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_hysteresis_ends_chattering() -> None:
     passes(prove(chart()), "livelock", "chattering")
     (finding,) = prove(chart(back="z < s")).of("chattering")
@@ -277,6 +285,7 @@ def test_at_a_corner_what_comes_next_counts(corner: str, one: str, two: str, sta
     assert finding.status == status
 
 
+@pytest.mark.slow
 def test_t_runs_and_x_moves_with_v() -> None:
     for surface, one, two in (("t", "2", "0.5"), ("x", "v + 1", "v - 1")):
         pair = (f"z >= {surface}", f"z < {surface}")
@@ -304,6 +313,7 @@ def test_states_and_guards_without_use_are_found() -> None:
     }
 
 
+@pytest.mark.slow
 def test_order_settles_which_edge_is_taken_and_can_hide_one() -> None:
     first, second, back = (
         Transition("far", "one", "two", "z >= 2 * s"),
@@ -341,6 +351,7 @@ def test_a_state_behind_a_hidden_edge_is_never_entered() -> None:
     assert dead == {("leave",), ("three",)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("action", "status", "words"),
     [
@@ -362,6 +373,7 @@ def test_what_an_edge_assigns_can_end_a_livelock(
     assert prove(chart(transitions=edges)).of("chattering")[0].status == "undecided"
 
 
+@pytest.mark.slow
 def test_an_edge_from_a_state_to_itself_livelocks() -> None:
     edges = (Transition("again", "one", "one", "z > s"),)
     (finding,) = prove(chart(transitions=edges)).of("livelock")

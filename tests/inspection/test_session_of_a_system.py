@@ -254,6 +254,7 @@ def test_a_session_of_a_system_comes_back_from_its_file(tmp_path: Path) -> None:
     assert again.read_text() == (tmp_path / "walk.json").read_text()
 
 
+@pytest.mark.slow
 def test_a_comparison_names_bodies_and_contacts() -> None:
     session = _session(0.6)
     session.goto(0.3)

@@ -120,6 +120,7 @@ def test_between_rows_comparing_shows_a_difference_only_after_the_poke() -> None
     assert first.sample(times).z[:, 0] == pytest.approx(second.sample(times).z[:, 0], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_compare() -> None:
     session = _open_loop()
     session.goto(25.0)

@@ -36,6 +36,7 @@ MOVES: list[Callable[[Session], object]] = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("move", MOVES, ids=["goto", "until", "proceed", "step"])
 def test_an_interrupted_move_can_be_repeated(move: Callable[[Session], object]) -> None:
     session = Session(stick_slip("published"), Prescribed(_velocity(40.0)), 100.0)
@@ -51,6 +52,7 @@ def test_an_interrupted_move_can_be_repeated(move: Callable[[Session], object]) 
     same_bits(session.branch.trace(), whole)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["continue", "goto 100", "run", "until z1 > 99", "step 9999"])
 def test_the_debugger_returns_to_its_prompt_at_the_row_reached(command: str) -> None:
     session = Session(stick_slip("published"), Prescribed(_velocity(40.0)), 100.0)

@@ -42,6 +42,7 @@ def test_it_stops_just_after_the_crossing_never_before() -> None:
     assert session.at(here.row + 1).t > here.t
 
 
+@pytest.mark.slow
 def test_true_already_must_first_become_false() -> None:
     session = _stuck(max_step=0.01)
     first = session.until("v > 0.05")
@@ -66,6 +67,7 @@ def test_a_condition_that_never_holds_ends_at_the_end_of_the_run() -> None:
     assert (here.t, here.located, session.branch.ended) == (6.0, False, True)
 
 
+@pytest.mark.slow
 def test_a_state_becomes_true_on_the_row_of_its_firing() -> None:
     model, rig = pulled_mass()
     session = Session(model, rig, 60.0)

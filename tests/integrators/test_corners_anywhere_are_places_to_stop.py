@@ -45,6 +45,7 @@ def needs(engine):
     return engine
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_steps_end_exactly_on_a_buffer_in_a_rigs_equation(engine):
     """Free flight at 1 m/s, half a swing of 10 rad/s in the spring, flight back."""
@@ -62,6 +63,7 @@ def test_steps_end_exactly_on_a_buffer_in_a_rigs_equation(engine):
     assert trace.x[-1] == pytest.approx(0.5 - (2.0 - 0.5 - np.pi / 10), abs=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(
     ("text", "place"),

@@ -82,6 +82,7 @@ def test_a_window_of_a_256th_of_a_step_is_found_wherever_it_lies(
     assert place == pytest.approx(middle - half, abs=1e-11)
 
 
+@pytest.mark.slow
 def test_a_margin_that_is_never_quiet_is_evaluated_512_times_per_step() -> None:
     def rough(t: float, window: float) -> float:
         halvings = Fraction(t).denominator.bit_length() - 1

@@ -87,6 +87,7 @@ def test_the_loss_is_that_of_the_two_loops(result: lesson.Result) -> None:
     assert result.loss == pytest.approx(expected, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_lines_and_picture(result: lesson.Result) -> None:
     check_lines(result)
     check_figure(lesson, result)

@@ -25,6 +25,7 @@ def F_a(t: float) -> float:
     return ramps + (0.1 * math.sin(4 * math.pi * (t - 4)) if t > 4 else 0.0)
 
 
+@pytest.mark.slow
 def test_lugre_drifts_as_in_scipy(result: lesson.Result) -> None:
     def flow(t, y):
         _, v, z = y

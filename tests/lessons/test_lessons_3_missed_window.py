@@ -13,6 +13,8 @@ import pytest
 from gms_fsm.app.lessons import l3_missed_window as lesson
 from tests.lesson_checks import check_figure, check_lines
 
+pytestmark = pytest.mark.slow  # they share one run of the lesson
+
 
 @pytest.fixture(scope="module")
 def result() -> lesson.Result:
@@ -29,7 +31,6 @@ def met(step: float) -> list[float]:
     return found
 
 
-@pytest.mark.slow
 def test_the_switches_found_follow_from_the_grid(result: lesson.Result) -> None:
     """Four break-aways; then at a reversal that is hit four arrests, and until 61 s four more."""
     for step, count, reversals in zip(lesson.STEPS, result.counts, result.met, strict=True):

@@ -26,6 +26,7 @@ def test_both_laws_agree_for_forward_motion(result: lesson.Result) -> None:
     )
 
 
+@pytest.mark.slow
 def test_z_diverges_as_the_eigenvalue_predicts(result: lesson.Result) -> None:
     """After its break-away at -s: z = s + (z0 - s) exp(+C t / s), until the Stribeck dip."""
     log = result.published.transitions
@@ -53,6 +54,7 @@ def dissipated(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
     return fine.t, heat
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["published", "signed"])
 def test_the_balance_closes(result: lesson.Result, law: str) -> None:
     balance = getattr(result, f"{law}_energy")
@@ -73,6 +75,7 @@ def test_the_signed_law_creates_a_little_only_in_the_stribeck_dip(result: lesson
     assert result.outside_dip[1] == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_lines_and_picture(result: lesson.Result) -> None:
     check_lines(result)
     check_figure(lesson, result)

@@ -24,6 +24,7 @@ def test_the_first_loading_is_a_chain_of_chords(result: lesson.Result) -> None:
         np.testing.assert_allclose(fine.F, chain, rtol=0, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_its_error_is_a_quarter_over_n_squared(result: lesson.Result) -> None:
     expected = lesson.F_c / (4 * np.array(lesson.COUNTS) ** 2)
     np.testing.assert_allclose(result.errors, expected, rtol=1e-3)
@@ -57,6 +58,7 @@ def test_the_smooth_loop_is_masings() -> None:
     assert area == pytest.approx(lesson.smooth_loss(a), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_lines_and_picture(result: lesson.Result) -> None:
     check_lines(result)
     check_figure(lesson, result)

@@ -11,13 +11,14 @@ from gms_fsm import PulledSlider, simulate
 from gms_fsm.app.lessons import l6_stick_slip as lesson
 from tests.lesson_checks import check_figure, check_lines
 
+pytestmark = pytest.mark.slow  # they share one run of the lesson
+
 
 @pytest.fixture(scope="module")
 def result() -> lesson.Result:
     return lesson.run()
 
 
-@pytest.mark.slow
 def test_the_known_run(result: lesson.Result) -> None:
     log = result.portrait.transitions
     assert Counter(log.edge.tolist()) == {"break_away_forward": 38, "arrest": 34}

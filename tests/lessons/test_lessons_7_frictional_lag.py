@@ -14,6 +14,8 @@ from scipy.integrate import solve_ivp
 from gms_fsm.app.lessons import l7_frictional_lag as lesson
 from tests.lesson_checks import check_figure, check_lines
 
+pytestmark = pytest.mark.slow  # they share one run of the lesson
+
 
 @pytest.fixture(scope="module")
 def result() -> lesson.Result:

@@ -14,13 +14,14 @@ from gms_fsm.app.lessons import l8_chart_or_ifelse as lesson
 from tests.helpers import same_bits
 from tests.lesson_checks import check_figure, check_lines
 
+pytestmark = pytest.mark.slow  # they share one run of the lesson
+
 
 @pytest.fixture(scope="module")
 def result() -> lesson.Result:
     return lesson.run()
 
 
-@pytest.mark.slow
 def test_with_the_same_driver_they_are_identical(result: lesson.Result) -> None:
     same_bits(result.chart, result.ifelse)
     same_bits(result.chart_once, result.ifelse_once)

@@ -24,6 +24,7 @@ def store(tmp_path: Path) -> Store:
     return made
 
 
+@pytest.mark.slow
 def test_every_single_bit_is_checked(store: Store) -> None:
     store.put("one", CONTENT)
     path = store.folder / "one"
@@ -70,6 +71,7 @@ def test_on_a_full_disk_nothing_is_stored_or_raised(
     assert list(store.folder.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_concurrent_readers_see_only_complete_content(store: Store) -> None:
     contents = [bytes([number]) * 100_000 for number in range(3)]
     store.put("one", contents[0])

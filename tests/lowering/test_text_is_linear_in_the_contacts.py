@@ -19,6 +19,7 @@ def _lines(kind: str, n: int) -> Counter[str]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_twice_as_many_contacts_add_twice_as_many_lines(kind: str) -> None:
     few, more, most = (_lines(kind, n) for n in (7, 15, 31))

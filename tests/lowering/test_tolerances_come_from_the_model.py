@@ -40,6 +40,7 @@ CARRIAGE = GMS(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["machines", "ifelse", "compiled"])
 def test_a_carriage_on_micrometres_creeps_and_does_not_break_away(engine):
     """k = 4e6 N/m, thresholds of 2 um: atol = 1e-9 made a break-away at 3.826 s."""

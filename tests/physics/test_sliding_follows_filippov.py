@@ -63,6 +63,7 @@ def needs(engine: str) -> str:
 
 
 # --------------------------------------------------------------------------- the bank
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_slipping_element_holds_v_at_zero_until_it_arrests(engine):
     """Times from an independent hybrid loop around DOP853."""
@@ -93,6 +94,7 @@ def test_finer_tolerances_move_sliding_as_little_as_the_rest():
 
 
 # --------------------------------------------------------------------------- Coulomb friction
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_mass_on_coulomb_friction_waits_for_its_spring(engine):
     """At rest until the spring pulls with F_c, then v = speed (1 - cos): exact."""
@@ -159,6 +161,7 @@ class Belt:
         self.numbers = {"mass": 1.0, "stiffness": 4.0, "F_b": 1.0}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(
     ("w", "place"), [("0.1", lambda t: 0.1 * t), ("0.1 * cos(t)", lambda t: 0.1 * np.sin(t))]
@@ -175,6 +178,7 @@ def test_a_mass_rides_on_a_belt_along_a_surface_that_moves(engine, w, place):
     same_bits(trace, simulate(free, Belt(w), 1.2, engine="ifelse", initial=initial))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_elements_come_to_rest_on_their_own_surfaces(engine):
     """dz = -C sgn(z) reaches 0 in a finite time, each element by itself, two of them together."""
@@ -198,6 +202,7 @@ def test_elements_come_to_rest_on_their_own_surfaces(engine):
     assert trace.z[-1] == pytest.approx([0.0, 0.0, 0.0, 0.8], abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("guard", ["v >= 0 and z > 4", "abs(v) <= 0 and z > 4", "v <= 0 and z > 4"])
 @pytest.mark.parametrize("v0", [2.0, 1.7, -1.7, 0.3])
@@ -240,6 +245,7 @@ def test_sigma_at_the_end_is_that_before_a_firing_or_a_jump():
     assert jump.sliding.sigma_end[0] == pytest.approx(0.5, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_twenty_elements_slide_at_once():
     chart = Chart(
         "runs down",

@@ -35,6 +35,7 @@ def test_no_power_is_left_in_the_text(law):
     assert "pow" not in source
 
 
+@pytest.mark.slow
 def test_powers_are_products_to_the_last_bit():
     """F = z**3 + z**2 equals the products for every row; the C library's power does not."""
     model = ChartModel(CUBE, {"k": 1.0}, n=1, stribeck=Stribeck(1.0, 1.5, 1e-3))

@@ -29,6 +29,7 @@ def test_settling_on_the_threshold_makes_no_stop(law, start):
     assert len(rows) < 250  # explicit steps are limited by stability, not by stops
 
 
+@pytest.mark.slow
 def test_a_threshold_that_moves_is_not_followed():
     """v wobbles inside the dip, and s with it; z crosses s twice per wave without a stop."""
     rig, T = Prescribed("0.05 + 0.03*sin(3*t)"), 40.0

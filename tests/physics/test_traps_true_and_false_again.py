@@ -105,6 +105,7 @@ def test_a_window_between_two_steep_relations():
     assert located(hump(0.35, 0.5), lambda x: 1e6 * (x - 0.99)) == pytest.approx(0.35, abs=1e-13)
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None, derandomize=True)
 @given(st.floats(0.02, 0.9), st.floats(0.01, 0.5), st.floats(0.05, 1.0), st.floats(0.1, 10.0))
 def test_random_windows_and_lines(a, width, late, steepness):

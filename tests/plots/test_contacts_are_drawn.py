@@ -44,6 +44,7 @@ def stored(trace: Trace) -> dict[str, Any]:
     return only  # type: ignore[no-any-return]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FIGURES)
 @pytest.mark.parametrize(
     ("system", "contact"), [(PULLED, "pad"), (BALL, "floor"), (BLOCKS, "pad2")]
@@ -86,6 +87,7 @@ def test_a_live_chart_marks_guards_that_read_the_force() -> None:
     assert before.marks == {"release_f": (False,), "release_b": (False,)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("contact", ["pad1", "pad2"])
 def test_a_firing_belongs_to_its_own_contact(contact: str) -> None:
     """A row made by another contact's firing is not taken for one of this contact."""
@@ -108,6 +110,7 @@ def test_a_page_of_a_chart_without_variables_has_no_plot_of_elements() -> None:
     assert {edge["name"] for edge in page["edges"]} == {e.name for e in STICTION.transitions}
 
 
+@pytest.mark.slow
 def test_a_page_shows_the_force_that_guards_read() -> None:
     """The left side of F > F_s is the force of the row, at every row."""
     trace = run(PULLED)

@@ -93,6 +93,7 @@ def test_a_new_format_of_figures_in_the_debugger(
     assert Path("a.new").read_text() == "Figure"
 
 
+@pytest.mark.slow
 def test_a_new_format_of_animations(gms_fsm: CommandLine, trace: Trace) -> None:
     pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
     pytest.importorskip("pygraphviz", reason="charts need Graphviz, extra 'render'")
@@ -105,6 +106,7 @@ def test_a_new_format_of_animations(gms_fsm: CommandLine, trace: Trace) -> None:
     one_message(gms_fsm("animate", "t.npz", "-o", "a.mp4"), "it must end in", ".new")
 
 
+@pytest.mark.slow
 def test_a_new_format_of_pages(gms_fsm: CommandLine, trace: Trace) -> None:
     pytest.importorskip("uplot", reason="the page needs the extra 'replay'")
     pytest.importorskip("pygraphviz", reason="charts need Graphviz, extra 'render'")
@@ -178,6 +180,7 @@ def lists_of_endings(text: str) -> Iterator[str]:
                 yield f"line {node.lineno}: {sorted(named & KNOWN)}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "path",
     [p for room in ("gms_fsm", "plots") for p in sorted((ROOT / room).rglob("*.py"))],

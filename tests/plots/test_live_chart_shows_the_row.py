@@ -105,6 +105,7 @@ def some_rows(trace: Trace) -> list[int]:
     return sorted({0, len(trace) - 1, *range(0, len(trace), 25), *near})[:150]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_the_look_agrees_with_the_log_and_the_explanation(name: str) -> None:
     trace, chart = run(name), live(name)
@@ -133,6 +134,7 @@ def test_the_look_agrees_with_the_log_and_the_explanation(name: str) -> None:
         assert fired_rows == len(trace.transitions)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_the_svg_shows_the_look(name: str) -> None:
     trace, chart = run(name), live(name)
@@ -176,6 +178,7 @@ def test_a_frame_depends_on_its_row_only() -> None:
     assert chart.frame(-1) == chart.frame(len(run("bank")) - 1)
 
 
+@pytest.mark.slow
 def test_one_layout_serves_all_frames(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = []
     real = plots.live_chart.picture

@@ -47,6 +47,7 @@ def test_systems_and_contacts_are_svg() -> None:
         assert [g for g in root.iter() if kind in g.get("class", "").split()]
 
 
+@pytest.mark.slow
 def test_a_trace_is_a_png() -> None:
     pytest.importorskip("matplotlib", reason="the overview needs the extra 'plots'")
     trace = simulate(stick_slip("signed"), Prescribed("0.2"), 3.0)
@@ -59,6 +60,7 @@ def test_without_graphviz_a_notebook_falls_back_to_text(monkeypatch: pytest.Monk
     assert notebook.model_svg(stick_slip("signed")) is None
 
 
+@pytest.mark.slow
 def test_gms_fsm_alone_shows_no_pictures() -> None:
     """The methods come with `plots`, not with `gms_fsm`."""
     code = (

@@ -48,6 +48,7 @@ def spans_of(artists: list[object]) -> list[list[tuple[float, float]]]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("window", [None, (14.0, 31.0)])
 @pytest.mark.parametrize("elements", [None, [2, 0]])
 def test_spans(run: Trace, window: tuple[float, float] | None, elements: list[int] | None) -> None:

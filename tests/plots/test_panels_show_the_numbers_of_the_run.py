@@ -81,6 +81,7 @@ def test_lugre_has_no_threshold(lugre: Trace, ax: Axes) -> None:
     assert "no threshold:\nthis chart has no edges" in note.get_text()
 
 
+@pytest.mark.slow
 def test_a_chart_without_s_has_no_threshold_line(ax: Axes) -> None:
     stop = Chart(
         "stop",
@@ -162,6 +163,7 @@ def test_portrait_counts_slipping_elements(run: Trace, ax: Axes) -> None:
     assert all(rows[point] == n for point, n in starts.items() if point in rows)
 
 
+@pytest.mark.slow
 def test_hysteresis_in_phases_and_by_slipping(run: Trace, ax: Axes) -> None:
     (line,) = panels.hysteresis(ax, run)
     assert holds_all(*drawn(line), run.x - run.x[0], run.F)

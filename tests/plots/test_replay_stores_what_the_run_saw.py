@@ -102,6 +102,7 @@ def test_the_log_is_complete_and_points_at_the_rows_that_firings_made() -> None:
     assert page["events"] == sorted({entry["frame"] for entry in run["log"]})
 
 
+@pytest.mark.slow
 @uplot
 @pytest.mark.parametrize("law", ["published", "signed"])
 def test_a_breakpoint_stops_before_every_firing(law: str) -> None:
@@ -114,6 +115,7 @@ def test_a_breakpoint_stops_before_every_firing(law: str) -> None:
         assert set(mode[stop : entry["row"]]) == {run["edges"][entry["edge"]]["source"]}
 
 
+@pytest.mark.slow
 @uplot
 def test_the_page_of_fig_4_is_small_and_complete() -> None:
     page = replay_html(fig4("published"), title="Fig. 4")
@@ -124,6 +126,7 @@ def test_the_page_of_fig_4_is_small_and_complete() -> None:
     assert "{{" not in re.sub(r"<script>.*?</script>", "", page, flags=re.S)
 
 
+@pytest.mark.slow
 @uplot
 def test_long_runs_are_thinned_but_keep_all_transitions() -> None:
     trace = simulate(*pulled_mass(), 60.0, t_eval=np.linspace(0.0, 60.0, 20_001))
@@ -199,6 +202,7 @@ def test_a_hostile_name_stays_a_text() -> None:
     assert data_of(page)["title"] == evil
 
 
+@pytest.mark.slow
 @uplot
 def test_nan_and_infinities_are_distinguished() -> None:
     trace = fig4("signed")
@@ -211,6 +215,7 @@ def test_nan_and_infinities_are_distinguished() -> None:
     assert run["truth"][0][0][1][5] == "0"  # a comparison with no number does not hold
 
 
+@pytest.mark.slow
 @uplot
 def test_a_failed_run_has_a_page() -> None:
     with pytest.raises(SimulationError) as stopped:
@@ -225,6 +230,7 @@ def test_without_uplot_the_message_names_the_extra(monkeypatch: pytest.MonkeyPat
         replay_html(fig4("signed"))
 
 
+@pytest.mark.slow
 @uplot
 def test_a_page_in_a_missing_folder_is_one_clear_error(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="cannot write"):
@@ -244,6 +250,7 @@ def test_two_runs_of_one_model_are_distinguished_by_their_names() -> None:
         replay_html(coarse, fine, names=["one"])
 
 
+@pytest.mark.slow
 @uplot
 def test_a_log_with_an_edge_of_another_chart_is_rejected() -> None:
     trace = fig4("signed")
@@ -253,6 +260,7 @@ def test_a_log_with_an_edge_of_another_chart_is_rejected() -> None:
         replay_html(replace(trace, transitions=log))
 
 
+@pytest.mark.slow
 @uplot
 def test_a_chart_without_edges_and_a_model_of_many_elements_have_pages() -> None:
     rig = Prescribed(FIG4_SINE)
@@ -267,6 +275,7 @@ def test_a_chart_without_edges_and_a_model_of_many_elements_have_pages() -> None
     assert len(data_of(page)["runs"][0]["mode"]) == 9
 
 
+@pytest.mark.slow
 @uplot
 def test_without_graphviz_the_page_has_a_note(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(_replay_chart, "drawn", lambda graph, form: None)

@@ -47,6 +47,7 @@ def test_it_says_to_choose_a_contact(name: str) -> None:
         DRAWN[name](run(BLOCKS))
 
 
+@pytest.mark.slow
 def test_a_notebook_shows_text() -> None:
     assert run(BLOCKS)._repr_png_() is None  # type: ignore[attr-defined]
     assert run(BLOCKS).contact("pad1")._repr_png_() is not None  # type: ignore[attr-defined]

@@ -160,6 +160,7 @@ def test_a_function_that_calls_itself_has_an_identity() -> None:
     assert identity(names["call"]) == identity(names["call"])
 
 
+@pytest.mark.slow
 def test_another_process_gives_the_same_identity() -> None:
     code = """
 import math, numpy as np

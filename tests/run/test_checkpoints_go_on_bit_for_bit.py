@@ -84,6 +84,7 @@ def test_repeated_interruptions_change_nothing(
     np.testing.assert_array_equal(trace.stops.y, whole.stops.y)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["machines", "compiled"])
 def test_user_machines_continue_in_their_states(engine: str, tmp_path: Path) -> None:
     if engine == "compiled":

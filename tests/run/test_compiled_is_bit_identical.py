@@ -617,6 +617,7 @@ def test_failures_have_identical_messages(case: str) -> None:
     _same_logs(sampled, whole)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", FAILURES)
 def test_failures_keep_the_state_reached(case: str) -> None:
     """With output="end" the recorded row is the last one that output="all" would record."""

@@ -67,6 +67,7 @@ def test_fig_4(law):
     assert len(both(stick_slip(law), Prescribed(FIG4_SINE), 100.0).transitions) > 30
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slipping", [False, True])
 @pytest.mark.parametrize("law", ["signed", "published"])
 def test_fig_3(law, slipping):

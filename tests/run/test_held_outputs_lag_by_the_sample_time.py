@@ -19,6 +19,7 @@ def _fig3(**options: object) -> Trace:
     return simulate(model, rig, 8.0, t_eval=T, engine="ifelse", **options)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_the_lag_is_proportional_to_the_sample_time() -> None:
     exact = _fig3(rtol=1e-9)
     ramp = T < 2.0
@@ -56,6 +57,7 @@ def test_machines_fire_at_ticks_only_and_once_each() -> None:
     assert len(set(pairs)) == len(pairs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["machines", "compiled"])
 def test_engines_agree_bit_for_bit(engine: str) -> None:
     if engine == "compiled":

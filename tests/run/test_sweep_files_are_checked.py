@@ -104,6 +104,7 @@ def test_a_sweep_file_needs_runs_and_parameters(arrays: dict[str, Any], tmp_path
         _load(empty, tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["t", "z", "message", "states", "rows_z", "transitions"])
 def test_data_that_unpacks_to_more_than_a_sweep_has_is_not_unpacked(
     name: str, arrays: dict[str, Any], tmp_path: Path

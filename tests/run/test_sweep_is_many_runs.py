@@ -167,6 +167,7 @@ def test_each_row_is_a_run(case: str, options: dict[str, Any], engine: str) -> N
     assert not ends.rows
 
 
+@pytest.mark.slow
 def test_more_runs_than_a_task_holds_and_more_firings_than_a_column() -> None:
     """Buffers are reused by the next run of a task; nothing of the previous run shows."""
     pytest.importorskip("numba", reason="needs the extra fast")

@@ -67,6 +67,7 @@ def test_the_import_contracts_hold() -> None:
     assert int(kept[1]) >= 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", _sources("integrators"), ids=lambda p: p.name)
 def test_integrators_know_nothing_about_friction(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
@@ -115,6 +116,7 @@ def test_the_search_by_tokens_finds_calls(tmp_path: Path) -> None:
     assert _bare(path, "compile") == [3]
 
 
+@pytest.mark.slow
 def test_simulating_loads_neither_matplotlib_nor_graphviz_nor_plots() -> None:
     code = """
 import json, sys
@@ -140,6 +142,7 @@ def test_integrators_load_no_other_package_of_ours() -> None:
 CORE = [p for p in _sources("gms_fsm") if p.parent.name != "paper"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", CORE, ids=lambda p: p.name)
 def test_no_switching_outside_the_charts(path: Path) -> None:
     # States are named only in charts; code that compares with such a name has its own rule.

@@ -76,6 +76,7 @@ def test_a_function_names_the_module_and_the_extra(
         call(tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("absent", ["matplotlib", "PIL"])
 @pytest.mark.parametrize("module", ["figures", "panels", "schematic", "animation"])
 def test_a_module_names_the_module_and_the_extra(absent: str, module: str) -> None:

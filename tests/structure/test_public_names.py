@@ -25,6 +25,7 @@ def _python(code: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", gms_fsm.__all__)
 def test_a_fresh_process_has_the_name_before_and_after_its_module(name: str) -> None:
     home = gms_fsm._HOME[name]

@@ -9,6 +9,7 @@ from tests.helpers import stick_slip
 from tests.systems_cases import CASES, same_system_bits
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_engines_agree(name: str) -> None:
     pytest.importorskip("numba", reason="needs numba (extra: fast)")

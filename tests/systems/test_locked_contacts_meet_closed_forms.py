@@ -32,6 +32,7 @@ def test_a_pulled_mass_sticks_and_slips_at_the_times_of_its_closed_form() -> Non
     np.testing.assert_allclose(trace.F[stuck], K * (V * trace.t - trace.x)[stuck], atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_a_tree_of_locked_bodies_moves_as_one_whatever_the_order_of_its_contacts(seed: int) -> None:
     """Each contact pulls all that hangs on it; the velocities are equal to the last bit."""

@@ -107,6 +107,7 @@ def test_any_system_has_the_same_program_and_numbers(
     assert (again.bodies, again.sampled, again.flow) == (system.bodies, system.sampled, system.flow)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("contact", CONTACTS)
 def test_it_runs_as_before(contact: str, tmp_path: Path) -> None:
     system = system_with([contact])

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import pytest
 
 from gms_fsm import Trace
 from tests.hybrid_reference import Modes, Switch, Way, reference
@@ -85,6 +86,7 @@ def blocks() -> list[Switch]:
     return reference(flow, ways, [0.0, p["V"], 0.2, p["V"]], ("stuck", "stuck"), 60.0)[0]
 
 
+@pytest.mark.slow
 def test_two_blocks_on_a_belt() -> None:
     wanted = blocks()
     assert len(wanted) > 40
@@ -131,6 +133,7 @@ def puck_on_paper() -> list[Switch]:
     return reference(flow, ways, [0.0] * 6, ("stuck",), 60.0, max_step=0.01)[0]
 
 
+@pytest.mark.slow
 def test_coulomb_friction_in_the_plane() -> None:
     wanted = puck_on_paper()
     assert sum(each.target == "stuck" for each in wanted) >= 4
@@ -211,6 +214,7 @@ def servo_on_paper(t_end: float) -> list[Switch]:
     return reference(flow, ways, [0.0] * 6, start, t_end, max_step=2e-3)[0]
 
 
+@pytest.mark.slow
 def test_a_two_mass_servo_without_sampling() -> None:
     wanted = servo_on_paper(3.0)
     assert {each.contact for each in wanted} == {0, 1, 2}

@@ -106,6 +106,7 @@ def test_samples_that_overflow_are_not_finite(value: float, saved: bytes, tmp_pa
     assert not np.isfinite(sampled.z).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["header", "rows_t", "rows_y", "transitions", "observed_F"])
 def test_an_array_that_unpacks_to_a_thousand_times_its_size_is_rejected(
     name: str, saved: bytes, tmp_path: Path
@@ -133,6 +134,7 @@ def test_an_array_that_unpacks_to_a_thousand_times_its_size_is_rejected(
         Trace.load(path)
 
 
+@pytest.mark.slow
 def test_a_long_run_at_rest_is_accepted(tmp_path: Path) -> None:
     """Everything but the times of such a trace is compressed a thousandfold, and it must load."""
     trace = simulate(stick_slip("signed"), Prescribed("0"), 1.0, t_eval=np.linspace(0, 1, 300_000))

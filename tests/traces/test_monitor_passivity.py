@@ -153,6 +153,7 @@ def test_a_phase_of_slip_creates_at_most_what_the_stribeck_rise_stores(
         assert found.made[i] <= phases * rise[i] + found.tolerance[i]
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(
     stroke=st.floats(3.0, 30.0),
@@ -234,6 +235,7 @@ def test_the_signed_law_creates_none_in_fig_4() -> None:
     assert found.made[0] == pytest.approx(6.58e-4, rel=0.01)
 
 
+@pytest.mark.slow
 @settings(max_examples=20, deadline=None, derandomize=True)
 @given(v=st.floats(0.05, 0.5), z0=st.floats(-0.9, 0.9), t=st.floats(20.0, 40.0))
 def test_the_published_law_creates_energy_in_every_backward_slip(

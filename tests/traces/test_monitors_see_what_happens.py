@@ -118,6 +118,7 @@ def test_memoryless_guards_chatter() -> None:
         assert part in found.text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("events", ["located", "step"])
 def test_sound_guards_do_not_chatter(events: str) -> None:
     options: dict[str, Any] = {} if events == "located" else {"step": 1e-3, "method": "rk4"}
@@ -357,6 +358,7 @@ def test_the_verdict_at_a_row_depends_only_on_that_row(text: str) -> None:
         assert trace.t[max(0, first - 1)] <= found.t <= trace.t[first]
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(bound=st.floats(0.01, 0.55), v=st.floats(0.05, 0.5))
 def test_any_bound_is_found_where_it_is_crossed(bound: float, v: float) -> None:

@@ -26,6 +26,7 @@ def assert_close(sampled, wanted, bound):
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dense", [False, True])
 @cases
 def test_a_sample_is_what_t_eval_gives(case, dense):
