@@ -148,7 +148,7 @@ PHENOMENA = (
     Phenomenon(
         "vibration",
         "Release by vibration",
-        "released by vibration: peak force / break-away force",
+        "released by vibration: peak / break-away force",
         "Under a bias of half the break-away force, a vibration of 10 Hz grows by 5 % of the "
         "break-away force per second. Measured is the peak force (bias plus amplitude) when the "
         "slider has moved by 10 F_s / sigma_0, over the break-away force.",

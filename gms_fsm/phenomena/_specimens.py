@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from gms_fsm._arguments import checked_kind, listed
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.registry import Entry, registered
 from gms_fsm.charts.stribeck import Stribeck
@@ -163,7 +164,10 @@ def specimens_of(
     elif isinstance(models, str):
         given = {models: models}
     else:
-        given = {name: name for name in (known if models is None else models)}
+        names = (
+            known if models is None else listed("models", models, "names of models, or a mapping")
+        )
+        given = {checked_kind("models", name, str, "names of models"): name for name in names}
     found = []
     for name, model in given.items():
         if not isinstance(model, str):

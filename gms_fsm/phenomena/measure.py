@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
+from gms_fsm._arguments import checked_kind, listed
 from gms_fsm.errors import GMSError, ParameterError, shown
 from gms_fsm.phenomena import _break_away, _presliding, _sliding
 from gms_fsm.phenomena._bench import Bench
@@ -56,9 +57,13 @@ def measure_phenomena(
     >>> table = measure_phenomena(["stiction"], ["stick-slip"])
     >>> found = table.cell("stiction", "stick-slip")
     >>> found.verdict, [str(each) for each in found.numbers]
-    ('shows', ['0.588 N', '5.31 s', '0.627'])
+    ('shows', ['0.483 N', '7.26 s', '0.637'])
     """
     chosen = chosen_phenomena(phenomena)
+    if bench is not None:
+        checked_kind("bench", bench, Bench, "a Bench, for example Bench(F_s=1.5)")
+    if progress is not None:
+        checked_kind("progress", progress, Callable, "a function, or None")  # type: ignore[arg-type]
     specimens = specimens_of(models, bench or Bench())
     cells = []
     for specimen in specimens:
@@ -92,9 +97,12 @@ def chosen_phenomena(names: Iterable[str] | None) -> tuple[Phenomenon, ...]:
     >>> [each.name for each in chosen_phenomena(["lag", "drift"])]
     ['drift', 'lag']
     """
-    wanted = PHENOMENA if names is None else [names] if isinstance(names, str) else list(names)
+    wanted = list(PHENOMENA)
+    if names is not None:
+        given = [names] if isinstance(names, str) else names
+        wanted = listed("phenomena", given, "names of phenomena")
     for name in wanted:
-        if name not in PHENOMENA:
+        if not isinstance(name, str) or name not in PHENOMENA:
             raise ParameterError(
                 f"there is no phenomenon {shown(name)}", advice=f"there are {', '.join(PHENOMENA)}"
             )

@@ -164,16 +164,18 @@ def phenomena_matrix(table: PhenomenaTable) -> Figure:
     models = [model for model in table.models if model not in table.left_out()]
     wide, high = 1.28, 0.46  # in, of a cell
     left = 0.11 * max([8, *map(len, models)])
-    size = (left + wide * len(table.phenomena) + 0.2, 1.4 + high * max(1, len(models)))
+    heads = [_folded(each.short) for each in table.phenomena]
+    above = 0.25 + 0.14 * max(head.count("\n") + 1 for head in heads)
+    size = (left + wide * len(heads) + 0.2, above + 0.7 + high * max(1, len(models)))
     with rc_context(RC):
         sheet = Figure(figsize=size)
         ax = sheet.add_axes((0.0, 0.0, 1.0, 1.0))
         ax.set(xlim=(0.0, size[0]), ylim=(0.0, size[1]))
         ax.set_axis_off()
-        top = size[1] - 0.7
-        for column, phenomenon in enumerate(table.phenomena):
+        top = size[1] - above
+        for column, head in enumerate(heads):
             x = left + (column + 0.5) * wide
-            ax.text(x, top + 0.1, _folded(phenomenon.short), ha="center", va="bottom", fontsize=8)
+            ax.text(x, top + 0.1, head, ha="center", va="bottom", fontsize=8)
         for row, model in enumerate(models):
             y = top - (row + 0.5) * high
             ax.text(left - 0.1, y, model, ha="right", va="center", fontsize=9)
