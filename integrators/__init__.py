@@ -4,6 +4,7 @@ This package knows nothing about what it integrates. `Equations` are a handful o
 plain indexable numbers (lists in Python, arrays when compiled); a loop over them yields events.
 """
 
+from integrators.crossings import FOR_GUARD, WAITING
 from integrators.hybrid import (
     MOST_SWITCHES,
     ROWS_AT_ONCE,
@@ -29,12 +30,14 @@ __all__ = [
     "BS23",
     "DP45",
     "EULER",
+    "FOR_GUARD",
     "HEUN",
     "LIVE",
     "METHODS",
     "MOST_SWITCHES",
     "RK4",
     "ROWS_AT_ONCE",
+    "WAITING",
     "Arc",
     "Equations",
     "Event",

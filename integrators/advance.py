@@ -15,6 +15,7 @@ from integrators.crossings import (
     copy_margins,
     first_change,
     is_quiet_step,
+    longest_next,
 )
 from integrators.step_size import INFINITY, Control, error_norm, next_factor, retry_factor
 from integrators.steps import (
@@ -180,6 +181,8 @@ def advance(
         wanted = cursor[NEXT_TIME] < len(times) and times[cursor[NEXT_TIME]] < t_new
         theta = NO_CHANGE
         near = watching and not is_quiet_step(motion, now, t_new, scratch, w)
+        if watching and adaptive:
+            clock[H] = min(clock[H], longest_next(motion, now, t_new, scratch, w))
         if near or wanted:
             fit_dense(plan.method, h, y, scratch)
         if near:

@@ -55,6 +55,7 @@ _OF_A_STEP: tuple[Callable[..., Any], ...] = (
     crossings.copy_margins,
     crossings.first_change,
     crossings.is_quiet_step,
+    crossings.longest_next,
     sliding.flow_on,
     sliding.margins_on,
     step_size.error_norm,

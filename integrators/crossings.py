@@ -18,9 +18,11 @@ relation after another misses one that becomes true and false again before the f
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from integrators.step_size import INFINITY
 from integrators.steps import Motion, Now, Scratch, T, Vector
 
 __all__ = [
@@ -33,12 +35,19 @@ __all__ = [
     "first_change",
     "is_quiet_step",
     "listed",
+    "longest_next",
     "watched",
 ]
 
 NO_CHANGE = 2.0
 # A margin with a narrow hump between two of the points has more curvature than they show.
 WARY = 4.0
+# Flags of relations, besides 1: a side of a surface that is watched for a guard too; a relation
+# that can change while nothing moves (and perhaps is such a side).
+FOR_GUARD, WAITING = 2, 3
+# Bend of a margin over a step, as a share of its size, that limits the step's growth where nothing
+# else does. A sine is then sampled every 2 radians or more often.
+MOST_BENT = 0.1
 DEEPEST = 8  # halvings of a step: windows down to 1/256 of it are found
 
 
@@ -57,7 +66,7 @@ class Search(NamedTuple):
 class Watched(NamedTuple):
     """The relations watched during an arc."""
 
-    watch: list[int]  # one flag per relation, shape (r,)
+    watch: list[int]  # one flag per relation, 0 if not, shape (r,)
     room: list[int]  # space for the indices of the flagged ones, shape (r,)
     active: list[int]  # those indices
     truth: list[bool]  # truth values at the arc's start, shape (r,)
@@ -184,6 +193,46 @@ def is_quiet_step(motion: Motion, now: Now, t_new: float, scratch: Scratch, w: W
         middle[j] = 0.5 * (y[j] + y_new[j]) + 0.125 * h * (f[j] - f_new[j])
     margins(t + 0.5 * h, middle, mode, p, w.watch, probe)
     return not any_changed(w, probe) and _is_quiet(w, w.start, probe, w.end)
+
+
+def longest_next(motion: Motion, now: Now, t_new: float, scratch: Scratch, w: Watched) -> float:
+    """Return how long the next step may be, from how waiting margins bend in this one.
+
+    Where nothing moves, the error of a step is zero, and steps would grow over whole periods of
+    what depends on time alone, such as the load of a body that is held. The quarter point is there
+    because a sine does not bend where it is steepest.
+
+    Parameters
+    ----------
+    motion, now, t_new, scratch, w
+        As in `is_quiet_step`, which has been called before.
+
+    Returns
+    -------
+    float
+        At least this step's length, since a margin that starts at zero bends by as much as it
+        grows; infinity if no relation waits.
+    """
+    longest = INFINITY
+    waiting = False
+    for r in w.active:
+        waiting = waiting or w.watch[r] == WAITING
+    if not waiting or any_changed(w, w.end):  # if one has changed, the step ends earlier
+        return longest
+    y, f, y_new, f_new = now.y, now.f, scratch.y_new, scratch.f_new
+    place, quarter, middle = w.search.y_probe, w.search.low, w.search.probe
+    h = t_new - now.clock[T]
+    for j in range(len(y)):  # of the same cubic
+        place[j] = 0.84375 * y[j] + 0.15625 * y_new[j] + h * (0.140625 * f[j] - 0.046875 * f_new[j])
+    motion.margins(now.clock[T] + 0.25 * h, place, now.mode, motion.p, w.watch, quarter)
+    for r in w.active:
+        if w.watch[r] == WAITING:
+            a, q, m, b = w.start[r], quarter[r], middle[r], w.end[r]
+            size = max(abs(a), abs(m), abs(b))
+            bend = max(abs((b - m) - (m - a)), 4.0 * abs((m - q) - (q - a)))
+            if bend > 1e-9 * size:  # not just rounding
+                longest = min(longest, h * math.sqrt(MOST_BENT * size / bend))
+    return max(longest, h)
 
 
 def first_change(path: Path, w: Watched, resolution: float) -> float:

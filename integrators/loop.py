@@ -26,7 +26,7 @@ from integrators.advance import (
     put_row,
     raise_floor,
 )
-from integrators.crossings import Watched, listed
+from integrators.crossings import FOR_GUARD, Watched, listed
 from integrators.sliding import (
     Functions,
     Held,
@@ -295,7 +295,10 @@ def _rearm(
     for k in range(len(surfaces.sign)):  # one met exactly is left on the side of its sign
         sign = held[surfaces.sign[k]]
         if watch[surfaces.above[k]] and sign != 0.0:
-            w.truth[surfaces.above[k]] = w.truth[surfaces.at_least[k]] = sign > 0.0
+            for r in (surfaces.above[k], surfaces.at_least[k]):
+                # A guard that is false on the surface itself turns true just after it.
+                if watch[r] < FOR_GUARD or w.start[r] != 0.0:
+                    w.truth[r] = sign > 0.0
     if _undefined(w):
         counts[PHASE] = AFTER
         counts[STATUS] = NOT_FINITE

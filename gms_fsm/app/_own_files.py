@@ -9,7 +9,7 @@ from pathlib import Path
 
 from gms_fsm._toml import parsed
 from gms_fsm.app.scenario import kind_of, load_scenario, load_system
-from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.chart import SUPPLIED, Chart
 from gms_fsm.charts.parameters import Parameter, checked_values
 from gms_fsm.charts.registry import registered
 from gms_fsm.charts.stribeck import Stribeck
@@ -176,8 +176,7 @@ def any_model(chart: Chart) -> ChartModel:
     Raises
     ------
     ParameterError
-        If no numbers that satisfy the rules were found, or the chart reads inputs that no model
-        supplies.
+        If no numbers that satisfy the rules were found.
 
     Examples
     --------
@@ -189,7 +188,8 @@ def any_model(chart: Chart) -> ChartModel:
     for each in chart.parameters:
         values[each.name] = next(_satisfying(each, values, chart.parameters), 1.0)
     curve = Stribeck(1.0, 1.0, 1.0) if "s" in chart.inputs else None
-    return ChartModel(chart, dict(values), stribeck=curve)
+    inputs = {name: 1.0 for name in chart.inputs if name not in SUPPLIED}
+    return ChartModel(chart, dict(values), stribeck=curve, inputs=inputs)
 
 
 def _satisfying(

@@ -405,7 +405,8 @@ def _parameters(trace: Trace) -> str:
     model = trace.model
     numbers = [(each, model.values[each.name]) for each in model.chart.parameters]
     if model.stribeck is not None:
-        numbers += [(each, getattr(model.stribeck, each.name)) for each in STRIBECK]
+        own = model.stribeck.numbers
+        numbers += [(each, own[each.name]) for each in STRIBECK if each.name in own]
     if not (isinstance(model, Contact) and model.model is None):
         numbers.append((SIGMA_2, model.sigma_2))
     if model.stribeck is not None:

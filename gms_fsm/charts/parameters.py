@@ -231,6 +231,8 @@ STRIBECK = (
     Parameter("F_c", "N", "> 0", per_element=False, meaning="Coulomb friction"),
     Parameter("F_s", "N", ">= F_c", per_element=False, meaning="stiction"),
     Parameter("v_s", "m/s", "> 0", per_element=False, meaning="Stribeck velocity"),
+    # The bounds keep abs(v / v_s)**delta and the width of the dip within the range of floats.
+    Parameter("delta", "1", ">= 0.1 and <= 20", per_element=False, meaning="Stribeck exponent"),
 )
 
 

@@ -10,7 +10,7 @@ import functools
 import importlib
 import pkgutil
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import gms_fsm.charts
@@ -22,7 +22,7 @@ from gms_fsm.errors import ChartError, GMSError, ParameterError, shown, why
 __all__ = ["Demonstration", "Entry", "chart_named", "charts", "entry", "registered"]
 
 # Keys of a scenario's table [model] that are not parameters.
-KEYS = ("chart", "law", "n", "stribeck")
+KEYS = ("chart", "law", "n", "stribeck", "inputs")
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,8 @@ class Demonstration:
         Viscous friction, Ns/m.
     weights : tuple of float, optional
         Threshold weights, m/N; 1 if omitted.
+    inputs : mapping of str to str
+        What the chart's other inputs are, over t: a normal force ``{"N": "10"}``.
     """
 
     values: Mapping[str, float | tuple[float, ...]]
@@ -48,6 +50,7 @@ class Demonstration:
     stribeck: Stribeck | None = None
     sigma_2: float = 0.0
     weights: tuple[float, ...] | None = None
+    inputs: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def n(self) -> int:
@@ -150,6 +153,11 @@ class Entry:
     def curve(self) -> bool:
         """Whether its charts need a Stribeck curve."""
         return "s" in self._any.inputs
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The inputs of its charts."""
+        return self._any.inputs
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

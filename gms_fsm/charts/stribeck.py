@@ -1,8 +1,19 @@
-"""The Stribeck curve, common to all elements of a model."""
+"""The Stribeck curve: friction in steady sliding, which falls from F_s at rest to F_c at speed.
+
+`Stribeck` is the curve common to all elements of a model, the input ``s`` of their charts.
+`stribeck_text` is its text, for charts that name the curve themselves, for example with a load.
+
+References
+----------
+B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, "A Survey of Models, Analysis Tools and
+Compensation Methods for the Control of Machines with Friction", Automatica 30(7), 1083-1138 (1994),
+doi:10.1016/0005-1098(94)90209-7, for the exponent and the load.
+"""
 
 from __future__ import annotations
 
 import functools
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -12,14 +23,69 @@ from gms_fsm.charts.parameters import STRIBECK, FloatArray, checked_values
 from gms_fsm.language import Value, parse_value
 from gms_fsm.language._vectors import values_of
 
-__all__ = ["Stribeck"]
+__all__ = ["Stribeck", "stribeck_text"]
 
 DIP_WIDTH = 6.1  # in v_s: beyond this exp(-(v/v_s)**2) is below 1e-16 and the curve is flat
+GAUSSIAN = 2.0  # the exponent of eq. (2)
+
+
+def stribeck_text(
+    F_c: str = "F_c",
+    F_s: str = "F_s",
+    v_s: str = "v_s",
+    delta: str | float = GAUSSIAN,
+    *,
+    v: str = "v",
+    load: str = "",
+    stops: bool = False,
+) -> str:
+    """Return the text ``F_c + (F_s - F_c) * exp(-(abs(v) / v_s)**delta)`` of a Stribeck curve.
+
+    Parameters
+    ----------
+    F_c, F_s, v_s, v : str
+        Names or texts: friction at high speed and at rest, Stribeck velocity, velocity.
+    delta : str or float
+        The exponent: a name, or a number; 2 gives the text of eq. (2), without ``abs``.
+    load : str, optional
+        A factor: the normal force if F_c and F_s are coefficients, ``"N"``; or the dependence on it
+        if they are forces, ``"(N / N_0)**n"``.
+    stops : bool
+        Whether to limit the exponent of e, which makes the run stop where the curve becomes flat,
+        so that no step misses it. A chart with the input ``s`` does so without.
+
+    Returns
+    -------
+    str
+        For a chart's `let`, or anywhere else in the expression language.
+
+    Examples
+    --------
+    >>> stribeck_text()
+    'F_c + (F_s - F_c) * exp(-(v / v_s)**2)'
+    >>> stribeck_text("mu_c", "mu_s", delta="delta", load="N")
+    'N * (mu_c + (mu_s - mu_c) * exp(-(abs(v) / v_s)**delta))'
+    """
+    F_c, F_s, v_s, v, load = (_part(each) for each in (F_c, F_s, v_s, v, load))
+    if str(delta) in ("2", "2.0"):
+        power = f"({v} / {v_s})**2"
+    else:
+        power = f"(abs({v}) / {v_s})**{_part(str(delta))}"
+    if stops:
+        power = f"min({power}, {DIP_WIDTH**2:g})"
+    curve = f"{F_c} + ({F_s} - {F_c}) * exp(-{power})"
+    return f"{load} * ({curve})" if load else curve
+
+
+def _part(text: str) -> str:
+    """Return a text that can be multiplied."""
+    simple = not text or text.isidentifier() or text.replace(".", "", 1).isdigit()
+    return text if simple else f"({text})"
 
 
 @dataclass(frozen=True)
 class Stribeck:
-    """The Stribeck curve ``s(v) = F_c + (F_s - F_c) * exp(-(v / v_s)**2)``, eq. (2).
+    """The Stribeck curve ``s(v) = F_c + (F_s - F_c) * exp(-abs(v / v_s)**delta)``, eq. (2).
 
     Parameters
     ----------
@@ -29,6 +95,8 @@ class Stribeck:
         Stiction, N, >= F_c.
     v_s : float
         Stribeck velocity, m/s, > 0.
+    delta : float
+        Exponent, 0.1 to 20; that of eq. (2) is 2, the default.
 
     Raises
     ------
@@ -46,24 +114,33 @@ class Stribeck:
     F_c: float
     F_s: float
     v_s: float
+    delta: float = GAUSSIAN
 
     def __post_init__(self) -> None:
         for name, value in checked_values(STRIBECK, asdict(self)).items():
             object.__setattr__(self, name, value)
 
     @property
+    def numbers(self) -> Mapping[str, float]:
+        """The numbers that the text names."""
+        found: dict[str, float] = asdict(self)
+        if self.delta == GAUSSIAN:
+            del found["delta"]
+        return found
+
+    @property
     def text(self) -> str:
         """The curve in the expression language; every reader evaluates this text."""
-        return "F_c + (F_s - F_c) * exp(-(v / v_s)**2)"
+        return stribeck_text(delta=GAUSSIAN if self.delta == GAUSSIAN else "delta")
 
     @property
     def dip(self) -> float:
         """Speed [m/s] beyond which the curve is flat; integrators stop at +dip and -dip."""
-        return DIP_WIDTH * self.v_s
+        return float(DIP_WIDTH ** (GAUSSIAN / self.delta) * self.v_s)
 
     def __call__(self, v: ArrayLike) -> FloatArray:
         """Return s(v) [N] for velocities v [m/s] of any shape, computed exactly as in a run."""
-        return values_of(_tree(self.text), {"v": np.asarray(v, dtype=np.float64), **asdict(self)})
+        return values_of(_tree(self.text), {"v": np.asarray(v, dtype=np.float64), **self.numbers})
 
 
 @functools.cache

@@ -240,8 +240,7 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
     decided to first order.
     """
     subject, z3 = prover.subject, prover.z3
-    if subject.assigned(there) or subject.assigned(back):
-        raise Undecided("an edge assigns variables; the flow after a jump is not followed")
+    jumps = subject.assigned(there) or subject.assigned(back)
     guards = [subject.guard(edge) for edge in (there, back)]
     resting = prover.at_rest(there.source, back.source)
     of_flows, of_guards = Reading(), Reading()
@@ -251,6 +250,8 @@ def _pushed(prover: Prover, there: Transition, back: Transition) -> Answer:
     for pair in product(*(ways(split(guard)) for guard in guards)):
         if not _at_one_time(prover, [*pair[0], *pair[1]]):
             continue
+        if jumps:
+            raise Undecided("an edge assigns variables; the flow after a jump is not followed")
         crossed, touched, growing, not_falling, reached = [], [], [], [], []
         for way, own, other in zip(pair, moved, reversed(moved), strict=True):
             here = [of_guards.margin(part, own) for part in way]

@@ -28,10 +28,11 @@ order decides which is taken. *livelock*: no cycle of edges is enabled at one po
 from the graph and the guards alone: every state can be entered and left, and every guard can hold
 where no earlier edge takes precedence. *chattering*: no two states have flows that cross the
 surfaces of the guards between them in opposite directions, each into the other's guard (to first
-order in time; edges that assign variables are undecided). *stability*: no state has an unstable
-equilibrium, for flows linear in the variable. *release*, for charts with locked states: whoever
-lets go is not pushed back at once, into the guard of an edge that locks it again (to first order
-in time). If it could be, the contact would chatter between stuck and moving.
+order in time; edges that assign variables are undecided, unless their inputs exclude each other).
+*stability*: no state has an unstable equilibrium, for flows linear in the variable. *release*, for
+charts with locked states: whoever lets go is not pushed back at once, into the guard of an edge
+that locks it again (to first order in time). If it could be, the contact would chatter between
+stuck and moving.
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from gms_fsm.charts.chart import SUPPLIED
 from gms_fsm.language import (
     Comparison,
     Name,
@@ -22,7 +23,7 @@ from gms_fsm.lowering._names import computed_names
 from gms_fsm.lowering._plan import Gradient, Plan, both_sides
 from gms_fsm.lowering.places import total
 from gms_fsm.systems._assembly import Bank, Edge, of
-from integrators import LIVE
+from integrators import FOR_GUARD, LIVE, WAITING
 
 __all__ = ["FUNCTIONS", "python"]
 
@@ -377,7 +378,7 @@ class _Printer(Forces):
                     rows += [self.watch(relation) for relation in both_sides(u)]
                 for edge, _ in self.leaving(bank, state) if not bank.periodic else ():
                     rows.append(Line(f"# {edge.name}: {self.spell(edge.guard)}"))
-                    rows += self.witness(split(edge.guard))
+                    rows += self.witness(split(edge.guard), self.waits(bank, state, edge))
                 branches[state] = rows
             if any(branches.values()):
                 lines += self.loop(bank.index, "live", (), branches)
@@ -395,28 +396,49 @@ class _Printer(Forces):
         text = f"held[{held.text(u)}] = sgn({self.spell(u)})"
         return Line(text, sizes | computed_names(u))
 
-    def watch(self, relation: Comparison) -> Line:
+    def watch(self, relation: Comparison, flag: int = 1) -> Line:
         relations = self.plan.relations
         sizes = frozenset(f"#{size}" for size in relations.sizes(relation))
-        return Line(f"watch[{relations.text(relation)}] = 1", sizes)
+        return Line(f"watch[{relations.text(relation)}] = {flag}", sizes)
 
-    def witness(self, part: Split) -> list[Line]:
+    def watch_for_guard(self, relation: Comparison, waits: bool) -> Line:
+        """Watch what keeps a guard false; the driver must know if it is a side of a surface too."""
+        surfaces = self.plan.surfaces
+        sides = (side for u in (*surfaces.shared, *surfaces.own) for side in both_sides(u))
+        return self.watch(relation, WAITING if waits else FOR_GUARD if relation in sides else 1)
+
+    def waits(self, bank: Bank, state: str, edge: Edge) -> bool:
+        """Return whether a guard can change while nothing that it reads moves.
+
+        So can the force that holds a contact, and an input.
+        """
+        if any(bank.outputs[state, force] is None for force in bank.forces):
+            return True
+        inputs = {
+            name
+            for each in bank.chart.inputs
+            if each not in SUPPLIED
+            for name in names_in(bank.means[each])
+        }
+        return bool(inputs & self.read.closure(names_in(edge.guard)))
+
+    def witness(self, part: Split, waits: bool) -> list[Line]:
         """Write: if this part is false, watch what keeps it false."""
         if isinstance(part, Requirement):
             # Not the opposite comparison: of NaN neither is true, and it has to be watched.
             reads = computed_names(part.relation)
             return [
                 Line(f"if not {self.spell(part.relation)}:", reads),
-                *indented([self.watch(part.comparison)]),
+                *indented([self.watch_for_guard(part.comparison, waits)]),
             ]
         word, parts = part
         if word == "either":
-            return [line for each in parts for line in self.witness(each)]
+            return [line for each in parts for line in self.witness(each, waits)]
         lines: list[Line] = []
         for each in parts:
             other = "el" if lines else ""
             if isinstance(each, Requirement):
-                first, *rest = self.witness(each)
+                first, *rest = self.witness(each, waits)
                 lines += [Line(other + first.text, first.reads), *rest]
             else:
                 reads = frozenset(
@@ -425,7 +447,7 @@ class _Printer(Forces):
                     for side in (r.left, r.right)
                     for name in computed_names(side)
                 )
-                inner = self.witness(each) or [Line("pass")]
+                inner = self.witness(each, waits) or [Line("pass")]
                 lines += [Line(f"{other}if not ({self.truth(each)}):", reads), *indented(inner)]
         return lines
 

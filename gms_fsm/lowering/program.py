@@ -171,7 +171,7 @@ def _key(system: System) -> tuple[Any, ...]:
             tuple(np.ndim(contact.values[name]) for name in contact.chart.parameter_names),
             contact.model is None,
             contact.period is None,
-            contact.model is None or contact.model.stribeck is None,
+            contact.stribeck and contact.stribeck.text,
         )
         for contact in system.contacts
     ]

@@ -65,10 +65,10 @@ def sweep(
     parameters : mapping of str to array_like, or DataFrame
         By name; the first axis is the run: shape (runs,) for one number or the same number in all
         elements, (runs, n) for one per element. Names are the chart's parameters (``k``, ``sigma``,
-        ``C``, ``v_c``), ``weights``, ``sigma_2``, ``F_c``, ``F_s``, ``v_s``, and the rig's numbers
-        (``mass``, ``stiffness``, ``speed``). Of a system, ``numbers.m`` is one of its numbers, and
-        ``gear.F_s`` a parameter of the contact gear. In a DataFrame, use ``k1``, ``k2`` ... for
-        elements.
+        ``C``, ``v_c``), ``weights``, ``sigma_2``, ``F_c``, ``F_s``, ``v_s``, ``delta``, and the
+        rig's numbers (``mass``, ``stiffness``, ``speed``). Of a system, ``numbers.m`` is one of its
+        numbers, and ``gear.F_s`` a parameter of the contact gear. In a DataFrame, use ``k1``,
+        ``k2`` ... for elements.
     executor : concurrent.futures.Executor, optional
         Where to run: a process pool, or the executor of a Dask ``Client`` (extra ``cluster``).
         Threads on this machine if omitted; compiled runs release the interpreter lock.

@@ -368,12 +368,7 @@ class Reader:
         if model is None:
             return
         if (curve := model.stribeck) is not None:
-            for name, value in (
-                ("F_c", curve.F_c),
-                ("F_s", curve.F_s),
-                ("v_s", curve.v_s),
-                ("v dip", curve.dip),
-            ):
+            for name, value in {**curve.numbers, "v dip": curve.dip}.items():
                 self.shared[of(contact.name, f"curve {name}")] = value
         self.shared[of(contact.name, "model sigma_2")] = model.sigma_2
 
@@ -552,12 +547,10 @@ class Reader:
     def curve(self, contact: Contact, index: int, names: dict[str, Value]) -> str:
         """Define the Stribeck curve of a model and the thresholds; return their name."""
         c = contact.name
-        assert contact.model is not None
-        assert contact.model.stribeck is not None
-        tree = parse_value(contact.model.stribeck.text, ["F_c", "F_s", "v_s", "v"])
-        numbers: dict[str, Value] = {
-            name: Name(of(c, f"curve {name}")) for name in ("F_c", "F_s", "v_s")
-        }
+        given = contact.stribeck
+        assert given is not None
+        tree = parse_value(given.text, [*given.numbers, "v"])
+        numbers: dict[str, Value] = {name: Name(of(c, f"curve {name}")) for name in given.numbers}
         curve = of(c, "curve S")
         self.definitions.append(Definition(curve, renamed(tree, numbers | {"v": names["v"]})))
         threshold = of(c, "s")

@@ -22,6 +22,8 @@ from pydantic import (
 )
 
 from gms_fsm._records import Numbers, Table
+from gms_fsm._records import Value as TextOrNumber
+from gms_fsm.charts.chart import SUPPLIED
 from gms_fsm.charts.gms import PARAMETERS, Law
 from gms_fsm.charts.lugre import LUGRE
 from gms_fsm.charts.parameters import SIGMA_2, WEIGHTS, Parameter
@@ -184,6 +186,7 @@ class ChartTable(Table):
             stribeck=None if curve is None else curve.build(),
             sigma_2=given.get("sigma_2") or 0.0,
             weights=weights,
+            inputs=given.get("inputs", {}),
         )
 
 
@@ -209,6 +212,9 @@ def _chart_table(entry: Entry) -> type[ChartTable]:
         shared: tuple[Parameter, ...] = (SIGMA_2, WEIGHTS)
     else:
         shared = (SIGMA_2,)
+    if others := [name for name in entry.inputs if name not in SUPPLIED]:
+        bound = f"what the inputs {', '.join(others)} are, over t and the names of the rig"
+        fields["inputs"] = (dict[str, TextOrNumber], Field(description=bound))
     for each in shared:
         if each.name not in entry.parameter_names:
             optional: Any = (list[float] if each.per_element else float) | None

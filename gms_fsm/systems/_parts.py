@@ -145,6 +145,7 @@ class Contact:
                     "a model brings its values and its number of elements", place=here
                 )
             chart, values, n = model.chart, model.values, model.n
+            inputs = {**getattr(model, "inputs", {}), **({} if inputs is None else inputs)}
         else:
             raise ParameterError(
                 "it must be a Chart, or a model such as GMS(parameters, law='signed')",

@@ -149,6 +149,7 @@ class StribeckTable(Table):
     F_c: float = Field(description=_DESCRIBED["F_c"])
     F_s: float = Field(description=_DESCRIBED["F_s"])
     v_s: float = Field(description=_DESCRIBED["v_s"])
+    delta: float = Field(2.0, description=_DESCRIBED["delta"])
 
     @classmethod
     def of(cls, curve: Stribeck) -> StribeckTable:
@@ -157,7 +158,7 @@ class StribeckTable(Table):
 
     def build(self) -> Stribeck:
         """Return the curve."""
-        return Stribeck(self.F_c, self.F_s, self.v_s)
+        return Stribeck(self.F_c, self.F_s, self.v_s, self.delta)
 
 
 class ModelTable(Table):
@@ -170,6 +171,7 @@ class ModelTable(Table):
     weights: list[float] | None = None
     stribeck: StribeckTable | None = None
     sigma_2: float = 0.0
+    inputs: dict[str, Value] = Field({})
 
     @classmethod
     def of(cls, model: Model) -> ModelTable:
@@ -182,6 +184,7 @@ class ModelTable(Table):
             weights=model.weights.tolist(),
             stribeck=None if model.stribeck is None else StribeckTable.of(model.stribeck),
             sigma_2=model.sigma_2,
+            inputs=dict(getattr(model, "inputs", {})),
         )
 
     def build(self) -> ChartModel:
@@ -194,6 +197,7 @@ class ModelTable(Table):
             sigma_2=self.sigma_2,
             weights=None if self.weights is None else np.array(self.weights),  # type: ignore[arg-type]
             title=self.title,
+            inputs=self.inputs,
         )
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -29,6 +29,7 @@ from gms_fsm.charts.parameters import (
 from gms_fsm.charts.registry import Entry
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError, shown
+from gms_fsm.systems._given import Text, texts_of
 from gms_fsm.systems.gms_parameters import GMSParameters
 
 __all__ = [
@@ -232,6 +233,9 @@ class ChartModel:
         Threshold weights, m/N; 1 if omitted.
     title : str, optional
         For figures; the chart's name if omitted.
+    inputs : mapping of str to str or float, optional
+        What the chart's other inputs are: ``{"N": "10 + sin(t)"}``, over t and the names of the rig
+        or system.
 
     Raises
     ------
@@ -254,6 +258,7 @@ class ChartModel:
     sigma_2: float = field(default=0.0, kw_only=True)
     weights: FloatArray = field(default=None, kw_only=True)  # type: ignore[arg-type]
     title: str = field(default="", kw_only=True)
+    inputs: Mapping[str, Text] = field(default_factory=dict, kw_only=True)
 
     def __post_init__(self) -> None:
         if not isinstance(self.chart, Chart):
@@ -275,11 +280,13 @@ class ChartModel:
                 advice="if the chart has the input s, give its curve, stribeck=Stribeck(F_c, F_s, "
                 "v_s); otherwise leave it out",
             )
+        inputs = texts_of(self.inputs, f"chart {self.chart.name!r}: inputs")
+        object.__setattr__(self, "inputs", inputs)
         for name in self.chart.inputs:
-            if name not in SUPPLIED:
+            if name not in SUPPLIED and name not in inputs:
                 raise ParameterError(
                     f"chart {self.chart.name!r} needs the input {name!r}",
-                    advice=f"a model supplies {', '.join(SUPPLIED)}",
+                    advice=f"a model supplies {', '.join(SUPPLIED)}; give inputs={{{name!r}: ...}}",
                 )
         if not isinstance(self.values, Mapping):
             raise ParameterError(
@@ -365,7 +372,12 @@ def demonstration(entry: Entry, law: str = "") -> ChartModel:
     given = entry.demonstration
     numbers: dict[str, Any] = {"values": given.values, "weights": given.weights}
     return ChartModel(
-        entry.chart(law), **numbers, n=given.n, stribeck=given.stribeck, sigma_2=given.sigma_2
+        entry.chart(law),
+        **numbers,
+        n=given.n,
+        stribeck=given.stribeck,
+        sigma_2=given.sigma_2,
+        inputs=given.inputs,
     )
 
 
@@ -387,7 +399,7 @@ def parameters_of(model: Model) -> tuple[Parameter, ...]:
     Examples
     --------
     >>> [each.unit for each in parameters_of(GMS(GMSParameters.paper("stick-slip"), law="signed"))]
-    ['N/m', 'Ns/m', 'm/s', 'm/s', 'm/N', 'Ns/m', 'N', 'N', 'm/s']
+    ['N/m', 'Ns/m', 'm/s', 'm/s', 'm/N', 'Ns/m', 'N', 'N', 'm/s', '1']
     """
     every = with_shared(model.chart.parameters, curve=model.stribeck is not None)
     fixed = isinstance(model, LuGre)  # its bristle uses the curve unweighted
@@ -410,7 +422,7 @@ def parameter_names(model: Model) -> tuple[str, ...]:
     Examples
     --------
     >>> parameter_names(GMS(GMSParameters.paper("stick-slip"), law="signed"))
-    ('k', 'sigma', 'C', 'v_c', 'weights', 'sigma_2', 'F_c', 'F_s', 'v_s')
+    ('k', 'sigma', 'C', 'v_c', 'weights', 'sigma_2', 'F_c', 'F_s', 'v_s', 'delta')
     """
     return tuple(each.name for each in parameters_of(model))
 
@@ -454,7 +466,7 @@ def with_values(model: Model, values: Mapping[str, ArrayLike]) -> Model:
 
     stribeck = old = model.stribeck
     if old is not None:
-        stribeck = Stribeck(common("F_c", old.F_c), common("F_s", old.F_s), common("v_s", old.v_s))
+        stribeck = Stribeck(**{name: common(name, value) for name, value in asdict(old).items()})
     shared: Any = {"stribeck": stribeck, "sigma_2": common("sigma_2", model.sigma_2)}
     if isinstance(model, LuGre):
         own: Any = {name: number(name, float(value)) for name, value in model.values.items()}
@@ -470,4 +482,5 @@ def with_values(model: Model, values: Mapping[str, ArrayLike]) -> Model:
         name: number(name, value) if isinstance(value, float) else array(name, value)
         for name, value in model.values.items()
     }
-    return ChartModel(model.chart, new, n=model.n, weights=weights, title=model.title, **shared)
+    kept: Any = {"title": model.title, "inputs": getattr(model, "inputs", {})}
+    return ChartModel(model.chart, new, n=model.n, weights=weights, **kept, **shared)

@@ -433,7 +433,8 @@ def system_of(model: Model, rig: Rig, period: float | None = None) -> System:
     key = (
         id(chart),  # the cache keeps this chart, so that no other one gets its id
         tuple(np.ndim(values[name]) for name in chart.parameter_names),
-        model.stribeck is None,
+        None if model.stribeck is None else model.stribeck.text,
+        tuple(getattr(model, "inputs", {}).items()),
         rig.title,
         rig.acceleration,
         tuple(rig.numbers),

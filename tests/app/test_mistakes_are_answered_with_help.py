@@ -166,7 +166,7 @@ def test_an_unknown_lesson_lists_the_lessons(gms_fsm: CommandLine, asked: str) -
         (("code", "--law", "foo"), "error: code gms has no law 'foo'; give --law signed"),
         (
             ("chart", "foo"),
-            "error: name is 'foo'; it must be one of backlash, dog-clutch, end-stop, gms, lugre",
+            "error: name is 'foo'; it must be one of backlash, dahl, dog-clutch, elasto-plastic,",
         ),
         (("blocks", "--elements", "x"), "Invalid value"),
     ],

@@ -12,6 +12,7 @@ import pytest
 from gms_fsm import Prescribed
 from gms_fsm.app._tables import Scenario, SystemScenario
 from gms_fsm.app.scenario import load_scenario
+from gms_fsm.charts.chart import SUPPLIED
 from gms_fsm.charts.registry import registered
 from gms_fsm.errors import ScenarioError
 from gms_fsm.systems.signals import Corners, Formula
@@ -263,8 +264,10 @@ def test_a_chart_s_keys_are_its_parameters_with_units_and_rules(
         keys = table["properties"]
         own = {each.name for each in entry.parameters}
         shared = {"chart", "n", "sigma_2"} | ({"stribeck", "weights"} if entry.curve else set())
-        assert set(keys) == own | shared | ({"law"} if entry.laws else set())
-        wanted = {"chart", *own, *(["law"] if entry.laws else [])}
+        shared |= {"law"} if entry.laws else set()
+        others = ["inputs"] if {*entry.inputs} - {*SUPPLIED} else []
+        assert set(keys) == own | shared | {*others}
+        wanted = {"chart", *own, *others, *(["law"] if entry.laws else [])}
         assert set(table["required"]) == wanted | ({"stribeck"} if entry.curve else set())
         for each in entry.parameters:
             said = keys[each.name]["description"]

@@ -11,7 +11,20 @@ SHIPPED = {
     "gms-published": GMS_ELEMENT["published"],
     "lugre": LUGRE,
 }
-NEW = {"stiction", "backlash", "end-stop", "dog-clutch"}
+NEW = {
+    "stiction",
+    "backlash",
+    "end-stop",
+    "dog-clutch",
+    "karnopp",
+    "modelica",
+    "dahl",
+    "lugre-sigma1",
+    "reset-integrator",
+    "elasto-plastic",
+    "maxwell-slip",
+    "prandtl-tomlinson",
+}
 
 
 def test_the_names_are_those_of_the_models() -> None:

@@ -83,8 +83,8 @@ def test_a_law_is_chosen_where_there_are_several_and_only_there(
 
 
 def test_an_unknown_name_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(ParameterError, match=r"name is 'dahl'; it must be one of .*gms.*lugre"):
-        entry("dahl")
+    with pytest.raises(ParameterError, match=r"name is 'coulomb'; it must be one of .*gms.*lugre"):
+        entry("coulomb")
 
 
 # --------------------------------------------------------------------------- invalid entries
