@@ -25,7 +25,7 @@ from gms_fsm.systems.system import Body, Contact, System
 from gms_fsm.traces.failures import StepLimitError
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["Bench", "Motion", "Path", "fastest_engine", "path", "run"]
+__all__ = ["Bench", "ForcePath", "Motion", "fastest_engine", "path", "run"]
 
 MOST_STEPS = 1_000_000
 # A run that needs more is stiff, or chatters; it is then made with an implicit method, whose steps
@@ -232,7 +232,7 @@ def run(
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class ForcePath:
     """A force that goes from 0 through some values and stays at each for a while.
 
     Parameters
@@ -260,7 +260,7 @@ class Path:
         return np.asarray(np.interp(times, known, values))
 
 
-def path(rate: float, stops: Sequence[float], hold: float, *, smooth: bool = False) -> Path:
+def path(rate: float, stops: Sequence[float], hold: float, *, smooth: bool = False) -> ForcePath:
     """Return a force that goes through some values.
 
     Parameters
@@ -277,7 +277,7 @@ def path(rate: float, stops: Sequence[float], hold: float, *, smooth: bool = Fal
 
     Returns
     -------
-    Path
+    ForcePath
         With 200 times on each branch.
     """
     t = last = 0.0
@@ -293,4 +293,4 @@ def path(rate: float, stops: Sequence[float], hold: float, *, smooth: bool = Fal
         corners.append((t, value))
         ends.append(t)
         last = value
-    return Path(corners, tuple(branches), np.array(ends))
+    return ForcePath(corners, tuple(branches), np.array(ends))

@@ -12,7 +12,8 @@ from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.phenomena.limits import LIMITS, Limit
 
-__all__ = ["VERDICTS", "Cell", "Curve", "Measured", "Number", "PhenomenaTable", "Verdict"]
+__all__ = ["MARKS", "VERDICTS", "Cell", "Curve", "Measured", "Number", "PhenomenaTable"]
+__all__ += ["Phenomenon", "Verdict"]
 
 Verdict = Literal["shows", "does not show", "shows wrongly", "does not apply", "failed"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
