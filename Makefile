@@ -10,7 +10,7 @@
 #   make bench   speed and error compared with C, SciPy, CVODE and PathSim
 #   make soak    stress tests: fuzzing, kills, a million transitions, 2,000 runs checked against a
 #                reference; SOAK_MINUTES=10 for each fuzzer
-#   make gallery the pictures in docs/images, shown in docs/gallery.md
+#   make gallery the pictures in docs/images, shown in docs/gallery.md, and the pages in docs/zoo
 #   make docs    the documentation -> folder site/, which can be opened from disk
 #   make wheel   a wheel -> folder dist/, installed and tested outside the checkout
 #   make clean   removes what the other targets created
@@ -101,6 +101,7 @@ soak: $(VENV)/dev.stamp
 
 gallery: $(VENV)/all.stamp
 	$(RUN)/python docs/make_pictures.py
+	$(RUN)/python docs/make_zoo.py
 	$(RUN)/python docs/make_phenomena.py
 
 docs: $(VENV)/docs.stamp

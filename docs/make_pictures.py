@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from textwrap import wrap
+from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
@@ -13,6 +14,7 @@ import plots
 from gms_fsm import (
     GMS,
     Chart,
+    ChartModel,
     GMSParameters,
     Prescribed,
     PulledSlider,
@@ -267,6 +269,34 @@ def draw_howto() -> None:
     graph = plots.statechart(report.chart, marked=marked, note="\n".join(note))
     plots.render(graph, FOLDER / "howto_refuted.png")
     figures.save(sweep_figure(), FOLDER / "howto_sweep.png")
+    bilinear = tutorial_chart()
+    plots.render(plots.statechart(bilinear), FOLDER / "howto_bilinear.png")
+    figures.save(loops_figure(bilinear), FOLDER / "howto_bilinear_loop.png")
+
+
+def tutorial_chart() -> Chart:
+    """Return the chart that docs/howto/add-a-model.md adds."""
+    page = (Path(__file__).parent / "howto" / "add-a-model.md").read_text(encoding="utf-8")
+    file = page.partition("<!-- file: bilinear.py -->\n```python\n")[2].partition("\n```\n")[0]
+    names: dict[str, Any] = {"__name__": "bilinear"}
+    exec(file, names)
+    chart: Chart = names["BILINEAR"]
+    return chart
+
+
+def loops_figure(bilinear: Chart) -> Figure:
+    """Draw the loops of bilinear hysteresis, with and without hardening."""
+    rig = Prescribed("2*pi*4e-5*cos(2*pi*t)")
+    with rc_context(RC):
+        figure = Figure(figsize=(5.4, 3.6), layout="constrained")
+        ax = figure.subplots()
+        for H, colour, look in ((1e4, BLUE, "-"), (0.0, VERMILION, "--")):
+            model = ChartModel(bilinear, {"k": 1e5, "H": H, "F_y": 1.0})
+            trace = simulate(model, rig, 1.75)
+            ax.plot(1e6 * trace.x, trace.F, look, color=colour, label=f"H = {H:g} N/m")
+        ax.set(xlabel="x [µm]", ylabel="F [N]", title="k = 1e5 N/m, F_y = 1 N, X = 40 µm")
+        ax.legend(loc="upper left")
+    return figure
 
 
 def sweep_figure() -> Figure:

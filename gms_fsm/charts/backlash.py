@@ -3,6 +3,9 @@
 A flank pushes and never pulls: contact begins when the gap is closed and ends when the force of
 the flank would change its sign, which with damping is before the gap opens.
 
+It shows the dead time at a reversal, impacts with finite stiffness, and limit cycles in a control
+loop. It cannot show friction or wear on the flanks, or a flank whose stiffness depends on the load.
+
 References
 ----------
 M. Nordin, P.-O. Gutman, "Controlling Mechanical Systems with Backlash - A Survey", Automatica

@@ -1,8 +1,11 @@
 """A dog clutch: from t_on to t_off the contact is locked, else it transmits nothing.
 
 Engagement is an impact that keeps the momentum of the bodies. With a ratio in the velocity of the
-contact, such as ``v="w_a - 3 * w_b"``, the clutch engages a gear. That the claws mesh at any speed
-is a simplification of ours.
+contact, such as ``v="w_a - 3 * w_b"``, the clutch engages a gear.
+
+It shows the common speed after engagement and the energy lost in it. It cannot show slip, a limit
+of the torque, or claws that meet tooth on tooth: that they mesh at any speed is a simplification of
+ours.
 
 References
 ----------

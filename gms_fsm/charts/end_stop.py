@@ -4,6 +4,10 @@ An impact reverses the velocity and keeps the momentum of the bodies. Impacts at
 speed would follow each other without end in a finite time; below the rest speed v_r the contact
 is locked instead, until the stop would have to pull.
 
+It shows rebound, the loss of energy in an impact, and rest in finite time. It cannot show the force
+and the duration of an impact (the chart ``backlash`` has an elastic flank), or a restitution that
+depends on the speed.
+
 References
 ----------
 B. Brogliato, "Nonsmooth Mechanics: Models, Dynamics and Control", 3rd ed., Springer (2016),

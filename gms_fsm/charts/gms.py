@@ -1,15 +1,22 @@
-"""The Generalized Maxwell Slip element: all of the model's switching is defined in this file.
+"""The Generalized Maxwell Slip element: a spring that sticks, breaks away and slips.
 
-The file does not know how the chart will be run. It says when an element sticks, when it slips, and
-how its deflection evolves meanwhile; it corresponds to Fig. 2b and 2c of the paper.
+All of the model's switching is defined in this file, which does not know how the chart will be run.
+It says when an element sticks, when it slips, and how its deflection evolves meanwhile; it
+corresponds to Fig. 2b and 2c of the paper.
+
+A bank of elements shows pre-sliding with nonlocal memory (inner loops close), the Stribeck effect,
+frictional lag and stick-slip, and does not drift. The published law agrees with the signed law only
+for v > 0: for v < 0 it makes energy. Neither shows an exact rest, because a sticking element is a
+spring. One element alone has no smooth transition from sticking to slipping.
 
 References
 ----------
 K. Roffi, "State Transition Block Diagram of the Generalized Maxwell Slip Friction Model",
-arXiv 2512.03049 (2025), eq. (1)-(4), Fig. 2. Its figures print no guard text; the guards below are
+arXiv 2512.03049 (2025), eq. (1)-(4), Fig. 2. Its figures print no guard text; the guards here are
 our reading of its Section II-D.
 F. Al-Bender, V. Lampaert, J. Swevers, "The Generalized Maxwell-Slip Model: A Novel Model for
-Friction Simulation and Compensation", IEEE Trans. Automatic Control 50 (2005), for the signed law.
+Friction Simulation and Compensation", IEEE Trans. Automatic Control 50(11), 1883-1887 (2005),
+doi:10.1109/TAC.2005.858676, for the signed law.
 """
 
 from __future__ import annotations

@@ -1,9 +1,16 @@
-"""LuGre, the paper's benchmark: one state and no edges, run by the same code as every chart.
+"""LuGre: one elastic bristle that bends and yields, without any switching.
+
+It is the paper's benchmark, and runs by the same code as every chart. Its chart has one state and
+no edges.
+
+It shows pre-sliding, the Stribeck effect, frictional lag, stick-slip, and a break-away force that
+falls with the force rate. It cannot show an exact rest: under a load below break-away that varies,
+it drifts. It has no nonlocal memory: an inner loop does not return to the point where it began.
 
 References
 ----------
-C. Canudas de Wit, H. Olsson, K. J. Astrom, P. Lischinsky, "A New Model for Control of Systems with
-Friction", IEEE Trans. Automatic Control 40 (1995).
+C. Canudas de Wit, H. Olsson, K. J. Åström, P. Lischinsky, "A New Model for Control of Systems with
+Friction", IEEE Trans. Automatic Control 40(3), 419-425 (1995), doi:10.1109/9.376053.
 """
 
 from __future__ import annotations

@@ -4,6 +4,9 @@ At rest the friction force is whatever holds the contact, up to the stiction F_s
 the Coulomb friction F_c against the motion, plus viscous friction. There is no regularization: a
 stuck contact is at rest exactly.
 
+It shows stiction, an exact rest, and stick-slip. It cannot show pre-sliding, a Stribeck effect
+other than the step from F_s to F_c, frictional lag, or a break-away force that depends on the rate.
+
 Limitation: where an impact at another contact reverses the velocity, this contact is arrested, and
 its lock takes the remaining velocity as an impulse; the chart cannot distinguish a reversal from
 a crossing of v = 0.

@@ -1,4 +1,4 @@
-"""`gms-fsm lesson` lists eight lessons, and writes the text, figure and replay page of one."""
+"""`gms-fsm lesson` lists nine lessons, and writes the text, figure and replay page of one."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
 from tests.scenario_files import CommandLine
 
 
-def test_there_are_eight_each_a_plain_module() -> None:
-    assert list(lessons.LESSONS) == [1, 2, 3, 4, 5, 6, 7, 8]
+def test_there_are_nine_each_a_plain_module() -> None:
+    assert list(lessons.LESSONS) == [1, 2, 3, 4, 5, 6, 7, 8, 9]
     for number, lesson in lessons.LESSONS.items():
         assert isinstance(lesson, types.ModuleType)
         assert lesson.__name__.startswith(f"gms_fsm.app.lessons.l{number}_")
         assert (lesson.__doc__ or "").startswith(f"Lesson {number}: ")
-    assert len({lesson.QUESTION for lesson in lessons.LESSONS.values()}) == 8
+    assert len({lesson.QUESTION for lesson in lessons.LESSONS.values()}) == 9
 
 
 def test_without_a_number_they_are_listed(gms_fsm: CommandLine) -> None:
     done = gms_fsm("lesson")
     assert done.code == 0, done.err
     lines = done.out.splitlines()
-    assert [line[0] for line in lines] == list("12345678")
+    assert [line[0] for line in lines] == list("123456789")
     for line, lesson in zip(lines, lessons.LESSONS.values(), strict=True):
         assert lesson.QUESTION in line
 
@@ -55,7 +55,7 @@ def test_one_is_run_and_written(gms_fsm: CommandLine) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["9"], "no lesson '9'"),
+        (["99"], "no lesson '99'"),
         (["0"], "no lesson '0'"),
         (["one"], "no lesson 'one'"),
         (["7", "-o", "file/out"], "choose another folder"),
@@ -74,8 +74,8 @@ def test_a_mistake_is_reported_before_anything_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(lessons.l7_frictional_lag, "run", lambda: pytest.fail("it was run"))
-    with pytest.raises(ParameterError, match="8  Chart or if-else"):
-        lessons.teach(9, tmp_path)
+    with pytest.raises(ParameterError, match="9  Contacts"):
+        lessons.teach(99, tmp_path)
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(OutputError):
         lessons.teach(7, tmp_path / "file" / "out")

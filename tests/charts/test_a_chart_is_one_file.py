@@ -6,20 +6,13 @@ Tested in a copy of the packages, in a separate process that answers one command
 from __future__ import annotations
 
 import json
-import os
-import shutil
-import subprocess
-import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from gms_fsm import Sweep, Trace
-from tests.helpers import ROOT
+from tests.package_copy import Copy, packages_with
 
 pytestmark = pytest.mark.slow
 
@@ -81,67 +74,14 @@ t_end = 10.0
 [output]
 figures = []
 """
-ANSWER = """
-import contextlib, io, json, sys
-import gms_fsm
-from gms_fsm.app.cli import main
-print(json.dumps(gms_fsm.__file__), flush=True)
-for line in sys.stdin:
-    sys.argv[1:], said = json.loads(line)
-    out, err, code = io.StringIO(), io.StringIO(), 0
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        sys.stdin = io.StringIO(said)
-        try:
-            main()
-        except SystemExit as end:
-            code = end.code or 0
-    print(json.dumps([code, out.getvalue(), err.getvalue()]), flush=True)
-"""
-
-
-@dataclass(frozen=True)
-class Copy:
-    """A copy of the packages with one additional file, and a process that runs it."""
-
-    folder: Path
-    process: subprocess.Popen[str]
-
-    def read(self) -> Any:
-        assert self.process.stdout is not None
-        return json.loads(self.process.stdout.readline())
-
-    def gms_fsm(self, *arguments: str, said: str = "", code: int = 0) -> str:
-        """Run a command and return its output; `said` is its standard input."""
-        assert self.process.stdin is not None
-        self.process.stdin.write(json.dumps([arguments, said]) + "\n")
-        self.process.stdin.flush()
-        ended, out, err = self.read()
-        assert ended == code, out + err
-        return out if code == 0 else err
 
 
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Copy]:
     """A copy of the packages with one additional file, and a scenario next to it."""
-    folder = tmp_path_factory.mktemp("copy")
-    skip = shutil.ignore_patterns("__pycache__")
-    for package in ("gms_fsm", "integrators", "plots"):
-        shutil.copytree(ROOT / package, folder / package, ignore=skip)
-    (folder / "gms_fsm" / "charts" / "x.py").write_text(PAGE, encoding="utf-8")
-    (folder / "x.toml").write_text(SCENARIO, encoding="utf-8")
-    with subprocess.Popen(
-        [sys.executable, "-c", ANSWER],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(folder), "COLUMNS": "200"},
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as process:
-        made = Copy(folder, process)
-        assert Path(made.read()).parent == folder / "gms_fsm", "the copy is what runs"
+    with packages_with(PAGE, "x.py", tmp_path_factory.mktemp("copy")) as made:
+        (made.folder / "x.toml").write_text(SCENARIO, encoding="utf-8")
         yield made
-        assert process.stdin is not None
-        process.stdin.close()
 
 
 def test_chart_lists_and_draws_it(copy: Copy) -> None:

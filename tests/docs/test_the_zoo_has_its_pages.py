@@ -1,0 +1,60 @@
+"""The pages in docs/zoo are what ``docs/make_zoo.py`` makes, one for each chart that is a model."""
+
+from __future__ import annotations
+
+import re
+import runpy
+
+import pytest
+
+from gms_fsm.charts import CHARTS
+from tests.helpers import ROOT
+
+PAGES = ROOT / "docs" / "zoo"
+
+
+def test_each_chart_has_a_page_and_pictures() -> None:
+    """A missing page is made by ``make gallery``, or by ``python docs/make_zoo.py`` alone."""
+    assert {path.stem for path in PAGES.glob("*.md")} == {*CHARTS, "index"}
+    pictures = {path.stem for path in (ROOT / "docs/images/zoo").glob("*.png")}
+    assert pictures == {*CHARTS} | {f"{name}_run" for name in CHARTS}
+
+
+@pytest.mark.parametrize("name", CHARTS)
+def test_a_page_says_what_the_model_shows_and_where_it_is_published(name: str) -> None:
+    text = (PAGES / f"{name}.md").read_text(encoding="utf-8")
+    parts = re.findall(r"^## (.+)\n\n(.+)", text, re.MULTILINE)
+    assert [head for head, _ in parts] == [
+        "What it shows",
+        "Equations",
+        "Parameters",
+        "Run it",
+        "Proofs",
+        "References",
+    ]
+    assert dict(parts)["References"].startswith("- ")
+
+
+@pytest.mark.slow
+def test_the_pages_are_what_the_script_makes() -> None:
+    for module in ("matplotlib", "pygraphviz", "z3"):
+        pytest.importorskip(module, reason="the pages have pictures and proofs")
+    pages = runpy.run_path(str(ROOT / "docs" / "make_zoo.py"))["pages"]
+    for name, text in pages().items():
+        assert (PAGES / name).read_text(encoding="utf-8") == text, f"{name}: run make gallery"
+
+
+def test_less_than_a_tenth_of_all_findings_is_undecided() -> None:
+    """The committed reports; the test above holds them to the charts."""
+    total = undecided = 0
+    for name in CHARTS:
+        text = (PAGES / f"{name}.md").read_text(encoding="utf-8")
+        counts = re.search(
+            r"(\d+) proved, (\d+) settled by order, (\d+) refuted, (\d+) undecided", text
+        )
+        assert counts, name
+        total += sum(map(int, counts.groups()))
+        undecided += int(counts[4])
+        reasons = text.count("- **undecided**")
+        assert reasons == int(counts[4]), f"{name}: each undecided finding gives its reason"
+    assert undecided < 0.1 * total
