@@ -102,6 +102,7 @@ soak: $(VENV)/dev.stamp
 gallery: $(VENV)/all.stamp
 	$(RUN)/python docs/make_pictures.py
 	$(RUN)/python docs/make_zoo.py
+	$(RUN)/python docs/make_phenomena.py
 
 docs: $(VENV)/docs.stamp
 	$(RUN)/sphinx-build --quiet --fail-on-warning --keep-going -d .docs-cache/doctrees docs site

@@ -41,6 +41,9 @@ if TYPE_CHECKING:
     from gms_fsm.inspection.prove import Report as Report
     from gms_fsm.inspection.prove import prove as prove
     from gms_fsm.inspection.session import Session as Session
+    from gms_fsm.phenomena.measure import Bench as Bench
+    from gms_fsm.phenomena.measure import PhenomenaTable as PhenomenaTable
+    from gms_fsm.phenomena.measure import measure_phenomena as measure_phenomena
     from gms_fsm.run.machines import Element as Element
     from gms_fsm.run.machines import ElementMachines as ElementMachines
     from gms_fsm.run.settings import Settings as Settings
@@ -79,6 +82,7 @@ _HOMES = {
     "ParameterError RecordError ScenarioError SessionError SignalError TraceFileError UnitError",
     "inspection.prove": "Finding Report prove",
     "inspection.session": "Session",
+    "phenomena.measure": "Bench PhenomenaTable measure_phenomena",
     "run.machines": "Element ElementMachines",
     "run.settings": "Settings",
     "run.simulate": "simulate",

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import collections
 import enum
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from gms_fsm.app._console import messages, note, progress_bars
-from gms_fsm.app._options import INTERRUPTED, Overrides, ScenarioFile
+from gms_fsm.app._options import INTERRUPTED, ContactName, Overrides, ScenarioFile
 from gms_fsm.app.paper import FORCE, VELOCITY
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ __all__ = [
     "debug_command",
     "lesson_command",
     "paper_command",
+    "phenomena_command",
     "run_command",
     "schema_command",
     "sweep_command",
@@ -145,6 +147,69 @@ def sweep_command(
     for run, message in failures(result, most=1):
         typer.echo(f"first failure: run {run}: {message}")
     typer.echo(f"start with {files[0]}")
+
+
+def phenomena_command(
+    files: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="Files of your own: system files, scenario files, or chart files with --value.",
+            show_default=False,
+        ),
+    ] = None,
+    model: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--model",
+            help="Included model, such as lugre or gms-signed; repeat for several. All by default.",
+        ),
+    ] = None,
+    phenomenon: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--phenomenon", help="Such as lag or drift; repeat for several. All by default."
+        ),
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Output folder.")] = Path(
+        "phenomena"
+    ),
+    bench: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", help="Number of the bench, such as F_s=0.4: the signals follow these scales."
+        ),
+    ] = None,
+    value: Annotated[
+        list[str] | None,
+        typer.Option("--value", help="Parameter of a chart file, such as F_c=1.0."),
+    ] = None,
+    contact: ContactName = "",
+) -> None:
+    """Measure which phenomena friction models show; write a table and figures."""
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+
+    from gms_fsm.app import phenomena as room
+    from gms_fsm.phenomena.measure import Bench
+    from gms_fsm.phenomena.results import VERDICTS
+
+    own = room.own_models(files or (), contact, room.numbers_given("--value", value or []))
+    models: dict[str, Any] | None = {**{name: name for name in model or ()}, **own} or None
+    columns = (TextColumn("{task.description:<22}"), BarColumn(), TimeElapsedColumn())
+    with progress_bars(*columns) as bars:
+        tasks: dict[str, TaskID] = {}
+
+        def show(name: str, done: float) -> None:
+            if name not in tasks:
+                bars.start()
+                tasks[name] = bars.add_task(name, total=1.0)
+            bars.update(tasks[name], completed=done)
+
+        numbers = Bench.of(room.numbers_given("--set", bench or []))
+        table, written = room.write(output, models, phenomenon, bench=numbers, progress=show)
+    counts = collections.Counter(cell.measured.verdict for cell in table)
+    said = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
+    typer.echo(f"{len(table.models)} models, {len(table.phenomena)} phenomena: {said}")
+    typer.echo(f"{len(written)} files in {output}; start with {written[0]}")
 
 
 def schema_command() -> None:

@@ -21,6 +21,7 @@ from gms_fsm.app._run_verbs import (
     debug_command,
     lesson_command,
     paper_command,
+    phenomena_command,
     run_command,
     schema_command,
     sweep_command,
@@ -106,6 +107,7 @@ def root(
 app.command("paper")(paper_command)
 app.command("run")(run_command)
 app.command("sweep")(sweep_command)
+app.command("phenomena")(phenomena_command)
 app.command("schema")(schema_command)
 app.command("chart", cls=_Drawing)(chart_command)
 app.command("check")(check_command)

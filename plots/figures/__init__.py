@@ -13,6 +13,7 @@ from plots.figures._paper import (
     held_residuals,
     residuals,
 )
+from plots.figures._phenomena import phenomena_matrix, phenomenon_figure
 from plots.figures._runs import Measured, cascade_figure, overview, ribbons_figure
 from plots.figures._saving import save
 from plots.panels._shown import SMOOTH
@@ -27,6 +28,8 @@ __all__ = [
     "figure_4",
     "held_residuals",
     "overview",
+    "phenomena_matrix",
+    "phenomenon_figure",
     "residuals",
     "ribbons_figure",
     "save",

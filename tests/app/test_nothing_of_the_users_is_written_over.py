@@ -156,6 +156,7 @@ OTHERS = {
     "figures": (["plot", "t.npz"], "ribbons.svg"),
     "lesson": (["lesson", "1"], "lesson_1.txt"),
     "paper": (["paper"], "fig4_laws.svg"),
+    "phenomena": (["phenomena"], "phenomena.csv"),
     "traces of the paper": (["paper"], "traces/fig4_chart.npz"),
 }
 

@@ -21,6 +21,7 @@ import gms_fsm
 import plots
 from gms_fsm import (
     GMS,
+    Bench,
     Body,
     Chart,
     ChartModel,
@@ -60,7 +61,7 @@ CHART = Chart("one", ("v",), ("z",), ("k",), (STATE,), (EDGE,), {"F": "k * z"})
 BODY, CONTACT = Body("mass", inertia=1.0), Contact("pad", CHART, {"k": 1.0})
 SYSTEM = System("one mass", bodies=(BODY,), contacts=(CONTACT,))
 # Classes that only the package creates, for users to read.
-RECORDS = {"Finding", "Report", "Sweep", "Trace", "Model", "Rig", "Signal"}
+RECORDS = {"Finding", "PhenomenaTable", "Report", "Sweep", "Trace", "Model", "Rig", "Signal"}
 
 
 @dataclass(frozen=True)
@@ -92,6 +93,7 @@ def _entries(tmp: Path) -> Iterator[Entry]:
     view |= {"direction": "TB"}
     edge = {"name": "go", "source": "on", "target": "on", "guard": "z > 1", "actions": {}}
     right: dict[str, dict[str, Any]] = {
+        "Bench": {each.name: each.default for each in fields(Bench)},
         "Body": {"name": "mass", "inertia": 1.0, "force": "0", "velocity": None}
         | {"x": "x", "v": "v"},
         "Chart": _chart_parts(),
@@ -120,6 +122,8 @@ def _entries(tmp: Path) -> Iterator[Entry]:
         "System": {"name": "one mass", "bodies": (BODY,), "contacts": (CONTACT,), "signals": {}}
         | {"numbers": {}, "flow": {}, "sampled": ()},
         "Transition": edge,
+        "measure_phenomena": {"models": ["stiction"], "phenomena": ["stick-slip"]}
+        | {"bench": None, "progress": None},
         "prove": {"chart": CHART, "domain": None},
         "simulate": run
         | options

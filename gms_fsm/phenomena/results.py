@@ -1,0 +1,289 @@
+"""Results of the bench: curves, measured numbers with units, verdicts, and the table of them."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.errors import ParameterError, shown
+from gms_fsm.phenomena.limits import LIMITS, Limit
+
+__all__ = ["MARKS", "VERDICTS", "Cell", "Curve", "Measured", "Number", "PhenomenaTable"]
+__all__ += ["Phenomenon", "Verdict"]
+
+Verdict = Literal["shows", "does not show", "shows wrongly", "does not apply", "failed"]
+VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
+
+
+SMALLEST = 1e-3  # in its unit: a smaller number is printed as 0.000; tables in CSV have all digits
+
+
+@dataclass(frozen=True)
+class Number:
+    """A measured number.
+
+    Parameters
+    ----------
+    name : str
+        What was measured.
+    value : float
+        In the unit.
+    unit : str
+        ``"1"`` for a ratio.
+    """
+
+    name: str
+    value: float
+    unit: str
+
+    def __str__(self) -> str:
+        value = self.value
+        text = f"{value:.3g}" if value == 0.0 or abs(value) >= SMALLEST else "0.000"
+        return f"{text} {self.unit}".removesuffix(" 1")
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A measured curve, in the units of its phenomenon's axes.
+
+    Parameters
+    ----------
+    label : str
+        For the legend.
+    x, y : ndarray, shape (points,)
+        The points.
+    """
+
+    label: str
+    x: FloatArray
+    y: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What one model does in one experiment.
+
+    Parameters
+    ----------
+    verdict : str
+        One of `VERDICTS`.
+    numbers : tuple of Number
+        The measured numbers, the one that is shown in the table first. Empty only if the
+        experiment does not apply or failed.
+    said : str
+        One sentence; the reason, where there is no number.
+    curves : tuple of Curve
+        For the picture.
+    """
+
+    verdict: Verdict
+    numbers: tuple[Number, ...]
+    said: str
+    curves: tuple[Curve, ...] = field(default=(), repr=False)
+
+    def number(self, name: str) -> float:
+        """Return a measured number.
+
+        Parameters
+        ----------
+        name : str
+            Name of one of `numbers`.
+
+        Returns
+        -------
+        float
+            Its value.
+
+        Raises
+        ------
+        ParameterError
+            If there is none of this name.
+        """
+        for each in self.numbers:
+            if each.name == name:
+                return each.value
+        known = ", ".join(repr(each.name) for each in self.numbers) or "none"
+        raise ParameterError(f"there is no number {shown(name)}", advice=f"there are: {known}")
+
+
+@dataclass(frozen=True)
+class Phenomenon:
+    """An experiment, and what it decides.
+
+    Parameters
+    ----------
+    name : str
+        As on the command line.
+    title : str
+        Of the picture.
+    short : str
+        Of the column in a table.
+    experiment : str
+        What is done and what is measured, in one or two sentences.
+    axes : (str, str)
+        Labels of the curves' axes, with units.
+    measure : callable
+        ``measure(specimen)`` returns a `Measured`.
+    log : bool
+        Whether the horizontal axis is logarithmic.
+    """
+
+    name: str
+    title: str
+    short: str
+    experiment: str
+    axes: tuple[str, str]
+    measure: Callable[..., Measured] = field(repr=False)
+    log: bool = False
+
+    @property
+    def limits(self) -> dict[str, Limit]:
+        """The limits of its verdict, by name."""
+        return {name: each for name, each in LIMITS.items() if name.startswith(f"{self.name}.")}
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """A measurement, with the model and the phenomenon it belongs to.
+
+    Parameters
+    ----------
+    model : str
+        Name of the model.
+    phenomenon : Phenomenon
+        The experiment.
+    measured : Measured
+        The result.
+    """
+
+    model: str
+    phenomenon: Phenomenon
+    measured: Measured
+
+
+@dataclass(frozen=True, eq=False)
+class PhenomenaTable:
+    """Models against phenomena: the result of `measure_phenomena`.
+
+    Parameters
+    ----------
+    titles : mapping of str to str
+        Titles of the models by name.
+    phenomena : tuple of Phenomenon
+        The experiments.
+    cells : tuple of Cell
+        One per model and phenomenon.
+    """
+
+    titles: dict[str, str]
+    phenomena: tuple[Phenomenon, ...]
+    cells: tuple[Cell, ...] = field(repr=False)
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """Names of the models."""
+        return tuple(self.titles)
+
+    def cell(self, model: str, phenomenon: str) -> Measured:
+        """Return what was measured.
+
+        Parameters
+        ----------
+        model, phenomenon : str
+            The names.
+
+        Returns
+        -------
+        Measured
+            Verdict, numbers and curves.
+
+        Raises
+        ------
+        ParameterError
+            If the table has no such model or phenomenon.
+        """
+        for each in self.cells:
+            if (each.model, each.phenomenon.name) == (model, phenomenon):
+                return each.measured
+        raise ParameterError(
+            f"the table has no cell {shown((model, phenomenon))}",
+            advice=f"models: {', '.join(self.models)}; "
+            f"phenomena: {', '.join(each.name for each in self.phenomena)}",
+        )
+
+    def markdown(self) -> str:
+        """Return the verdicts and first numbers as a Markdown table.
+
+        Returns
+        -------
+        str
+            A row per model that takes part, a column per phenomenon.
+        """
+        head = ["model", *(each.short for each in self.phenomena)]
+        lines = [_row(head), _row(["---"] * len(head))]
+        for model in self.models:
+            found = [self.cell(model, each.name) for each in self.phenomena]
+            if any(each.verdict != "does not apply" for each in found):
+                lines.append(_row([model, *map(_brief, found)]))
+        return "\n".join(lines) + "\n"
+
+    def left_out(self) -> dict[str, str]:
+        """Return the models to which no phenomenon applies, with the reason.
+
+        Returns
+        -------
+        dict of str to str
+            Reasons by the name of the model.
+        """
+        return {
+            model: self.cell(model, self.phenomena[0].name).said
+            for model in self.models
+            if all(
+                self.cell(model, each.name).verdict == "does not apply" for each in self.phenomena
+            )
+        }
+
+    def csv(self) -> str:
+        """Return all numbers as CSV, one row per number.
+
+        Returns
+        -------
+        str
+            With a header line; models without a number have a row with the reason.
+        """
+        text = io.StringIO()
+        table = csv.writer(text, lineterminator="\n")
+        table.writerow(["model", "phenomenon", "verdict", "quantity", "value", "unit", "said"])
+        for each in self.cells:
+            found = each.measured
+            start = [each.model, each.phenomenon.name, found.verdict]
+            for number in found.numbers:
+                table.writerow([*start, number.name, repr(number.value), number.unit, found.said])
+            if not found.numbers:
+                table.writerow([*start, "", "", "", found.said])
+        return text.getvalue()
+
+    def __iter__(self) -> Iterator[Cell]:
+        return iter(self.cells)
+
+
+MARKS = {
+    "shows": "●",
+    "does not show": "○",
+    "shows wrongly": "✗",
+    "does not apply": "–",
+    "failed": "?",
+}
+
+
+def _brief(found: Measured) -> str:
+    mark = MARKS[found.verdict]
+    return f"{mark} {found.numbers[0]}" if found.numbers else mark
+
+
+def _row(cells: list[str]) -> str:
+    return "| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |"

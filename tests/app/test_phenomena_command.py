@@ -1,0 +1,115 @@
+"""Claim: ``gms-fsm phenomena`` writes the table and a figure per phenomenon, also for own files."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gms_fsm import Contact, System
+from gms_fsm.app.phenomena import write_table
+from gms_fsm.charts import CHARTS
+from gms_fsm.phenomena.measure import PHENOMENA
+from gms_fsm.phenomena.results import Cell, Curve, Measured, Number, PhenomenaTable
+from gms_fsm.systems.system import Body
+from tests.scenario_files import CommandLine
+
+DRY = {"F_c": 1.0, "F_s": 1.5, "b": 0.0}
+
+
+def small_table() -> PhenomenaTable:
+    """Return a table that needs no run: each verdict once per phenomenon."""
+    cells, points = [], np.linspace(1.0, 2.0, 5)
+    for phenomenon in PHENOMENA.values():
+        curve = Curve("", points, points)
+        numbers = (Number("what", 0.25, "N"), Number("other", 1e-9, "1"))
+        cells += [
+            Cell("one", phenomenon, Measured("shows", numbers, "it does", (curve,))),
+            Cell("two", phenomenon, Measured("shows wrongly", numbers, "it errs", (curve,))),
+            Cell("three", phenomenon, Measured("failed", (), "t = 1 s: it chatters")),
+            Cell("four", phenomenon, Measured("does not apply", (), "it is a gear")),
+        ]
+    titles = {name: name for name in ("one", "two", "three", "four")}
+    return PhenomenaTable(titles, tuple(PHENOMENA.values()), tuple(cells))
+
+
+@pytest.mark.slow
+def test_a_table_becomes_a_page_numbers_and_pictures(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    files = write_table(small_table(), tmp_path)
+    assert files[0] == tmp_path / "phenomena.md"
+    assert {each.name for each in files} == {
+        "phenomena.md",
+        "phenomena.csv",
+        *(f"{name}.{end}" for name in ("matrix", *PHENOMENA) for end in ("png", "svg")),
+    }
+    page = files[0].read_text(encoding="utf-8")
+    assert "| one | ● 0.25 N |" in page
+    assert "| two | ✗ 0.25 N |" in page
+    assert "- four does not take part: it is a gear." in page
+    assert "- **three** failed: t = 1 s: it chatters" in page
+    assert "Limit: 0.02 for change of the break-away force" in page
+    assert "other 0.000" in page  # small, but not exactly 0
+    svg = (tmp_path / "matrix.svg").read_text(encoding="utf-8")
+    assert svg.count("0.25 N") >= 2 * len(PHENOMENA)
+    assert "four" not in svg
+
+
+@pytest.mark.slow
+def test_a_model_and_a_file(gms_fsm: CommandLine) -> None:
+    System(
+        "pulled mass",
+        bodies=(Body("mass", inertia="m", force="-x"),),
+        contacts=(Contact("pad", CHARTS["stiction"], DRY),),
+        numbers={"m": 1.0},
+    ).save("mine.toml")
+    done = gms_fsm("phenomena", "mine.toml", "--model", "lugre", "--phenomenon", "drift", "-o", "o")
+    assert done.code == 0, done.err
+    first, last = done.out.splitlines()
+    assert first == "2 models, 1 phenomena: 1 shows, 1 shows wrongly"
+    assert last.endswith(f"start with {Path('o/phenomena.md')}")
+    with open("o/phenomena.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["model"]: row["verdict"] for row in rows} == {
+        "lugre": "shows wrongly",
+        "mine": "shows",
+    }
+
+
+@pytest.mark.slow
+def test_a_chart_file_takes_values(gms_fsm: CommandLine) -> None:
+    CHARTS["stiction"].save("own.toml")
+    given = [f"--value={name}={value}" for name, value in DRY.items()]
+    done = gms_fsm("phenomena", "own.toml", *given, "--phenomenon", "break-away", "-o", "o")
+    assert done.code == 0, done.err
+    assert "1.5 N" in Path("o/phenomena.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--model", "lugree"], "there is no model 'lugree'"),
+        (["--phenomenon", "lagg"], "there is no phenomenon 'lagg'"),
+        (["--set", "F_s"], "--set 'F_s': it must be name=number, for example F_s=1.5"),
+        (["--set", "F_x=1"], "the bench has no number 'F_x'"),
+        (["own.toml"], "own.toml: it is a chart file, and F_c [N], F_s [N], b [Ns/m] have no"),
+        (["two.toml"], "two.toml: it has the contacts 'a', 'b'; say which one: --contact a"),
+        (["lugre"], "'lugre' is not a file; included charts are named by --model"),
+    ],
+)
+def test_mistakes_are_named(gms_fsm: CommandLine, arguments: list[str], message: str) -> None:
+    CHARTS["stiction"].save("own.toml")
+    System(
+        "two",
+        bodies=(Body("mass", inertia="1"),),
+        contacts=tuple(
+            Contact(name, CHARTS["lugre"], {"sigma_0": 1.0, "sigma_1": 1.0}, inputs={"s": 1.0})
+            for name in "ab"
+        ),
+    ).save("two.toml")
+    done = gms_fsm("phenomena", *arguments, "-o", "o")
+    assert done.code == 2
+    assert message in done.err.replace("\n", " ")
+    assert not Path("o").exists() or not list(Path("o").glob("*.md"))

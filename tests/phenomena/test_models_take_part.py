@@ -1,0 +1,73 @@
+"""Claim: every included chart is on the bench or left out with a reason, and so is one's own."""
+
+from __future__ import annotations
+
+import pytest
+
+from gms_fsm import Chart, Contact, State, measure_phenomena
+from gms_fsm.charts import CHARTS
+from gms_fsm.errors import GMSError
+from gms_fsm.phenomena._specimens import specimens_of
+from gms_fsm.phenomena.measure import Bench, chosen_phenomena
+from tests.phenomena.cases import BENCH, DRY
+
+LOADED = Chart(
+    "loaded",
+    inputs=("v", "N"),
+    parameters=("mu",),
+    states=(State("slip", outputs={"F": "mu * N * v"}),),
+)
+
+
+def test_every_included_chart() -> None:
+    specimens = specimens_of(None, BENCH)
+    assert {each.name for each in specimens} == set(CHARTS)
+    for each in specimens:
+        assert (each.contact is None) == bool(each.why_not), each.name
+
+
+def test_the_paper_models_have_the_numbers_of_the_bench() -> None:
+    gms, lugre = specimens_of(["gms-signed", "lugre"], BENCH)
+    assert gms.contact is not None
+    assert lugre.contact is not None
+    assert sum(gms.contact.values["k"]) == pytest.approx(1e5)
+    assert gms.contact.n == 4
+    assert lugre.contact.values["sigma_0"] == 1e5
+    assert lugre.contact.stribeck == gms.contact.stribeck
+
+
+def test_a_contact_of_ones_own_needs_constant_inputs() -> None:
+    (held,) = specimens_of({"mine": Contact("pad", LOADED, {"mu": 0.1}, inputs={"N": 2.0})}, BENCH)
+    assert held.contact is not None
+    with pytest.raises(GMSError, match=r"the input N of its contact is 'N_0 \+ x'"):
+        specimens_of({"mine": Contact("pad", LOADED, {"mu": 0.1}, inputs={"N": "N_0 + x"})}, BENCH)
+
+
+@pytest.mark.parametrize(
+    ("models", "message"),
+    [
+        (["lugree"], "there is no model 'lugree'; there are "),
+        ({"mine": 3}, r"models\['mine'\] is 3; it must be a model"),
+    ],
+)
+def test_what_is_no_model_is_refused(models: object, message: str) -> None:
+    with pytest.raises(GMSError, match=message):
+        measure_phenomena(models)  # type: ignore[arg-type]
+
+
+def test_unknown_phenomena_and_numbers_are_refused() -> None:
+    with pytest.raises(GMSError, match="there is no phenomenon 'lagg'; there are break-away, "):
+        chosen_phenomena(["lagg"])
+    with pytest.raises(GMSError, match="the bench has no number 'F_x'; it has F_c, F_s"):
+        Bench.of({"F_x": 1.0})
+    with pytest.raises(GMSError, match="bench: F_s is -1"):
+        Bench(F_s=-1.0)
+
+
+@pytest.mark.slow
+def test_a_model_that_cannot_be_measured_fails_with_the_reason() -> None:
+    stiff = Bench(F_s=1e-3)  # a break-away of 1.5 N is then out of reach
+    found = measure_phenomena({"dry": DRY}, ["break-away"], bench=stiff).cell("dry", "break-away")
+    assert found.verdict == "failed"
+    assert "it did not break away" in found.said
+    assert not found.numbers

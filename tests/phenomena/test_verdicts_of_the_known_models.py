@@ -1,0 +1,78 @@
+"""Claim: LuGre drifts and forgets; GMS remembers, lags and rests; its published law makes energy.
+
+With every verdict comes a number, or the reason why there is none.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from gms_fsm import PhenomenaTable, measure_phenomena
+from gms_fsm.phenomena.limits import LIMITS
+from gms_fsm.phenomena.measure import PHENOMENA
+
+pytestmark = pytest.mark.slow
+MODELS = ("lugre", "gms-signed", "gms-published", "stiction", "backlash")
+
+
+@pytest.fixture(scope="module")
+def table() -> PhenomenaTable:
+    return measure_phenomena(MODELS)
+
+
+@pytest.mark.parametrize(
+    ("model", "phenomenon", "verdict"),
+    [
+        ("lugre", "drift", "shows wrongly"),
+        ("lugre", "memory", "does not show"),
+        ("lugre", "lag", "shows"),
+        ("lugre", "break-away", "shows"),
+        ("lugre", "vibration", "shows wrongly"),
+        ("gms-signed", "drift", "shows"),
+        ("gms-signed", "memory", "shows"),
+        ("gms-signed", "hysteresis", "shows"),
+        ("gms-signed", "lag", "shows"),
+        ("gms-signed", "passivity", "shows"),
+        ("gms-published", "passivity", "shows wrongly"),
+        ("stiction", "hysteresis", "does not show"),
+        ("stiction", "lag", "does not show"),
+        ("stiction", "stick-slip", "shows"),
+        ("backlash", "lag", "does not apply"),
+    ],
+)
+def test_the_verdict(table: PhenomenaTable, model: str, phenomenon: str, verdict: str) -> None:
+    assert table.cell(model, phenomenon).verdict == verdict
+
+
+def test_no_verdict_without_a_number(table: PhenomenaTable) -> None:
+    for cell in table:
+        found = cell.measured
+        assert found.said
+        assert bool(found.numbers) == (found.verdict != "does not apply"), cell.model
+        assert bool(found.curves) == bool(found.numbers)
+        assert all(number.unit for number in found.numbers)
+
+
+def test_the_published_law_makes_more_than_it_takes(table: PhenomenaTable) -> None:
+    signed, published = (table.cell(f"gms-{law}", "passivity") for law in ("signed", "published"))
+    assert signed.number("energy made") == 0.0
+    assert published.number("energy made") > 1.0  # mJ
+    assert published.number("energy taken in all cycles") < 0.0
+
+
+def test_every_limit_is_used_and_has_a_reason(table: PhenomenaTable) -> None:
+    used = {name for each in table.phenomena for name in each.limits}
+    assert used == set(LIMITS)
+    assert all(each.meaning and each.reason and each.value > 0.0 for each in LIMITS.values())
+
+
+def test_the_table_is_complete(table: PhenomenaTable) -> None:
+    assert table.models == MODELS
+    assert [each.name for each in table.phenomena] == list(PHENOMENA)
+    lines = table.markdown().splitlines()
+    assert len(lines) == 2 + 4  # without backlash
+    assert all(line.count(" | ") == len(PHENOMENA) for line in lines)
+    assert table.left_out() == {"backlash": "backlash is play with elastic flanks, not friction"}
+    rows = table.csv().splitlines()
+    assert rows[0] == "model,phenomenon,verdict,quantity,value,unit,said"
+    assert len(rows) == 1 + sum(max(1, len(cell.measured.numbers)) for cell in table)
