@@ -102,6 +102,7 @@ _OF_AN_ARC: tuple[Callable[..., Any], ...] = (
     sliding.look,
     sliding.seize,
     sliding.slope_on,
+    step_size.scaled_size,
     step_size.starting_step,
 )
 _INLINED = (*_OF_A_STEP, *_OF_AN_EVENT)

@@ -17,7 +17,6 @@ __all__ = ["Control", "error_norm", "next_factor", "retry_factor", "starting_ste
 SAFETY = 0.9
 LEAST, MOST = 0.2, 10.0  # limits of the change from one step to the next
 INFINITY = float("inf")
-NO_TOLERANCE = 1e100
 
 
 class Control(NamedTuple):
@@ -72,6 +71,36 @@ def error_norm(
         if ratio > worst:
             worst = ratio
     return worst
+
+
+def scaled_size(u: Vector, y: Vector, control: Control, floor: Vector) -> float:
+    """Return the largest component of u in units of its tolerance at y, if it has a scale.
+
+    A component without a scale may only just have left 0. Steps chosen from its size would then be
+    so short that the error is all rounding, which no shorter step makes smaller.
+
+    Parameters
+    ----------
+    u, y : list of float, shape (m,)
+        What is measured, and the state.
+    control : Control
+        Tolerances.
+    floor : list of float, shape (m,)
+        Absolute tolerances.
+
+    Returns
+    -------
+    float
+        -1 if no component has a scale; infinity if one is not finite.
+    """
+    largest = -1.0
+    for j in range(len(y)):
+        if control.atol[j] > 0.0:
+            size = abs(u[j]) / (floor[j] + control.rtol * abs(y[j]))
+            if not size < INFINITY:
+                return INFINITY
+            largest = max(largest, size)
+    return largest
 
 
 def next_factor(error: float, error_before: float, order: int) -> float:
@@ -155,11 +184,11 @@ def starting_step(
     time_scale = control.time_scale if control.time_scale > 0.0 else now.clock[T_STOP] - t
     y, f = now.y, now.f
     y_try, f_try = scratch.y_new, scratch.f_new
-    rtol, atol, longest = control.rtol, now.floor, control.max_step
-    d0 = error_norm(y, 1.0, y, y, rtol, atol)
-    d1 = error_norm(f, 1.0, y, y, rtol, atol)
+    longest = control.max_step
     h = min(time_scale, longest)
-    if not d1 * h < NO_TOLERANCE:  # y is 0 and has no scale: there is no reference size
+    d0 = scaled_size(y, y, control, now.floor)
+    d1 = scaled_size(f, y, control, now.floor)
+    if d0 < 0.0:  # no component has a scale: there is no reference size
         return 1e-3 * h
     if d1 > 0.0:  # until y has moved by a hundredth, or by a tolerance if it is almost zero
         h = min(h, 0.01 * max(d0, 100.0) / d1)
@@ -170,11 +199,9 @@ def starting_step(
     motion.flow(t + h, y_try, now.mode, now.held, motion.p, f_try)
     for j in range(len(y)):
         f_try[j] = (f_try[j] - f[j]) / h
-    d2 = error_norm(f_try, 1.0, y, y, rtol, atol)
+    d2 = scaled_size(f_try, y, control, now.floor)
     if not d2 < INFINITY:
         return LEAST * h  # the trial step went too far
-    if not d2 * h * h < NO_TOLERANCE:  # as above, but it only begins to move: x at rest
-        return min(h, 1e-3 * time_scale)
     steepest = max(time_scale * d1, time_scale * time_scale * d2)
     better = 1e-3 * h if steepest <= 1e-15 else time_scale * (0.01 / steepest) ** (1.0 / order)
     return min(100.0 * h, better, longest)

@@ -9,8 +9,9 @@ lag, stick-slip), and it does not drift under loads below ``sigma_0 z_ba``. It c
 memory: it has one variable, so an inner loop does not return to the point where it began, unless it
 is elastic as a whole.
 
-z_ba must be less than ``F_c / sigma_0``. In steady sliding z is equal to z_ss; rounding then
-decides between the states *mixed* and *plastic*, whose flows agree there.
+z_ba must be less than ``F_c / sigma_0``. In steady sliding z is equal to z_ss, where the flows of
+*mixed* and *plastic* agree and rounding would decide between them. A plastic bristle is therefore
+mixed again below 0.999999999 z_ss only, where the flows still agree to the last digits.
 
 References
 ----------
@@ -49,7 +50,7 @@ ELASTO_PLASTIC = Chart(
         Transition("bend", "elastic", "mixed", guard="abs(z) > z_ba and v * z > 0"),
         Transition("yield_", "mixed", "plastic", guard="abs(z) >= z_ss and v * z > 0"),
         Transition("turn", ("mixed", "plastic"), "elastic", guard="v * z <= 0"),
-        Transition("recover", "plastic", "mixed", guard="abs(z) < z_ss and v * z > 0"),
+        Transition("recover", "plastic", "mixed", guard="abs(z) < 0.999999999 * z_ss and v * z > 0"),
     ),
     outputs={"F": "sigma_0 * z + sigma_1 * dz"},
     reference="Dupont et al. (2002)",

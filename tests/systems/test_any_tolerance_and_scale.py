@@ -8,6 +8,8 @@ from typing import TypeAlias
 import pytest
 
 from gms_fsm import Body, Chart, Contact, Parameter, State, System, Trace, Transition, simulate
+from gms_fsm.charts import CHARTS
+from gms_fsm.charts.registry import entry
 from tests.helpers import FASTEST
 from tests.systems_cases import PLANAR, PUCK
 
@@ -31,6 +33,7 @@ WINDOW = Chart(
         Transition("zone", "forward", "stuck", guard="v < D"),
     ),
 )
+MODES = entry("modelica").demonstration
 Run: TypeAlias = Callable[[float, float], Trace]  # of the scale of length and rtol
 LENGTHS = [1.0, 2.0**-20, 2.0**-30, 2.0**10]
 
@@ -74,3 +77,19 @@ def test_lengths_change_nothing_but_lengths(run: Run, length: float) -> None:
     here, there = run(1.0, 1e-6), run(length, 1e-6)
     assert there.transitions.t.tolist() == here.transitions.t.tolist()
     assert there.t.tolist() == here.t.tolist()
+
+
+@pytest.mark.parametrize("t_end", [12.0, 40.0])
+@pytest.mark.parametrize("rtol", [1e-5, 1e-8, 1e-10])
+def test_a_mass_that_has_only_just_left_rest_goes_on(t_end: float, rtol: float) -> None:
+    """After the release v is 1e-30 m/s, with an acceleration that is all rounding."""
+    system = System(
+        "pulled mass",
+        bodies=(Body("mass", inertia="m", force="K * (V * t - x)"),),
+        contacts=(Contact("pad", CHARTS["modelica"], MODES.values, inputs=dict(MODES.inputs)),),
+        numbers={"m": 1.0, "K": 2.0, "V": 0.1},
+    )
+    log = simulate(system, t_end, rtol=rtol, engine=FASTEST).transitions
+    fine = simulate(system, 40.0, rtol=1e-11, engine=FASTEST).transitions
+    assert log.edge.tolist() == fine.edge[: len(log)].tolist()
+    assert len(log) == (3 if t_end == 12.0 else len(fine))

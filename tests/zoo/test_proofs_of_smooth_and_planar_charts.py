@@ -31,7 +31,7 @@ def test_what_is_proved_and_why_the_rest_is_not(name: str) -> None:
     proved, others = EXPECTED[name]
     findings = prove(CHARTS[name]).findings
     undecided = [each for each in findings if each.status == "undecided"]
-    assert {each.status for each in findings} == {"proved", "undecided"}
+    assert {each.status for each in findings} <= {"proved", "undecided"}
     assert (len(findings) - len(undecided), len(undecided)) == (proved, sum(others.values()))
     for (check, words), number in others.items():
         assert sum(each.check == check and words in each.text for each in undecided) == number
