@@ -17,6 +17,7 @@ __all__ = ["Control", "error_norm", "next_factor", "retry_factor", "starting_ste
 SAFETY = 0.9
 LEAST, MOST = 0.2, 10.0  # limits of the change from one step to the next
 INFINITY = float("inf")
+NO_TOLERANCE = 1e100
 
 
 class Control(NamedTuple):
@@ -188,7 +189,12 @@ def starting_step(
     h = min(time_scale, longest)
     d0 = scaled_size(y, y, control, now.floor)
     d1 = scaled_size(f, y, control, now.floor)
-    if d0 < 0.0:  # no component has a scale: there is no reference size
+    scaleless = False
+    for j in range(len(y)):
+        scaleless = scaleless or (control.atol[j] == 0.0 and f[j] != 0.0)
+    # What moves has no scale, so there is no reference size. A long step can be shortened; a short
+    # one would measure rounding.
+    if (d1 <= 0.0 and scaleless) or d0 < 0.0 or not d1 * h < NO_TOLERANCE:
         return 1e-3 * h
     if d1 > 0.0:  # until y has moved by a hundredth, or by a tolerance if it is almost zero
         h = min(h, 0.01 * max(d0, 100.0) / d1)

@@ -37,6 +37,7 @@ def test_chart_draws_the_chart_of_a_contact(verb: CommandLine) -> None:
 
 
 def test_check_proves_the_chart_of_every_contact_once(verb: CommandLine) -> None:
+    pytest.importorskip("z3", reason="needs z3 (extra: check)")
     alone, both = verb("check", "own.toml"), verb("check", "pair.toml")
     assert (alone.code, both.code) == (0, 0)
     assert both.out.startswith(f"contact pad1, pad2:\n{alone.out}\ncontact gear:\nBacklash")
@@ -46,6 +47,7 @@ def test_check_proves_the_chart_of_every_contact_once(verb: CommandLine) -> None
 
 
 def test_check_refutes_a_chart_file_by_a_counterexample(verb: CommandLine) -> None:
+    pytest.importorskip("z3", reason="needs z3 (extra: check)")
     text = own_files.STICTION.replace('rule = ">= F_c"\n', "")
     Path("own.toml").write_text(text)
     done = verb("check", "pulled.toml")

@@ -16,7 +16,7 @@ def result() -> lesson.Result:
 
 
 def test_the_mass_is_at_rest_exactly_while_it_is_stuck(result: lesson.Result) -> None:
-    assert result.speeds_while_stuck.size > 20
+    assert result.speeds_while_stuck.size >= 10
     assert set(result.speeds_while_stuck.tolist()) == {0.0}
     assert result.released == pytest.approx(1.5 / (2.0 * 0.1), abs=1e-9)
     before = result.stiction.t <= result.released
