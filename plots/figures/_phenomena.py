@@ -202,7 +202,9 @@ def phenomena_matrix(
                 if found.numbers:
                     ax.text(corner[0] + 0.36, y, str(found.numbers[0]), va="center", fontsize=8.5)
         for column, note in enumerate(notes):
-            x, side = (left - 0.1, "right") if column == 0 else (left + (column - 0.5) * wide, "center")
+            x, side = (
+                (left - 0.1, "right") if column == 0 else (left + (column - 0.5) * wide, "center")
+            )
             ax.text(x, 0.56, note, ha=side, va="center", fontsize=7.5, color=TEXT_GREY)
         x = left + 0.2
         found_any = {

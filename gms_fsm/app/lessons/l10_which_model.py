@@ -1,22 +1,22 @@
 """Lesson 10: which friction model shows what.
 
-No friction model is the best one. Each leaves something out, and a model with more states costs
-more: more parameters to identify, more equations to integrate. The question is therefore what a
-model must show. Five models with the same friction, stiffness and damping are put on one bench, and
-five phenomena are measured:
+No friction model is the best one. Each leaves something out, and one with more state variables
+costs more: more parameters to identify, more equations to integrate. So ask what a model must show.
+Five models with the same friction, and the same stiffness and damping where they have any, are put
+on one bench, and five phenomena are measured:
 
-- **Break-away over the force rate.** A slow pull meets more friction than a fast one.
-- **Nonlocal memory.** An inner loop of force and displacement closes where it began.
-- **Rest under bias and ripple.** A load far below break-away must not move the contact.
-- **Frictional lag.** Friction is higher while the speed rises than while it falls.
-- **Passivity.** A contact never gives back more energy than it has taken.
+- Break-away over the force rate: a slow pull meets more friction than a fast one.
+- Nonlocal memory: an inner loop of force and displacement closes where it began.
+- Rest under bias and ripple: a load far below break-away must not move the contact.
+- Frictional lag: friction is higher while the speed rises than while it falls.
+- Passivity: a contact never gives back more energy than it has taken.
 
-Each verdict is a number against a threshold. The reason is the state of the model. A model that
-locks has no deflection, hence neither a pre-sliding loop nor lag. LuGre has one deflection, which
-yields under any load: it lags, but it drifts, and it forgets where the force turned. The
-elasto-plastic model is LuGre with an elastic range: it rests, but with one state it still forgets.
-A GMS bank has one deflection per element: it remembers as many reversals as it has elements. Its
-published law has the wrong sign for v < 0 (lesson 4), and makes energy.
+Each verdict is a number against a threshold, and its reason lies in the state of the model. A
+contact that locks has no deflection: no loop in pre-sliding, no lag, and the same break-away force
+at every rate. LuGre has one deflection, which yields under any load: it lags, but it drifts, and it
+forgets where the force turned. The elasto-plastic model is LuGre with an elastic range: it rests,
+but its single deflection still forgets. A GMS bank has one deflection per element; those that stick
+remember the reversal. Its published law has the wrong sign for v < 0 (lesson 4): it makes energy.
 """
 
 from __future__ import annotations
@@ -24,8 +24,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from gms_fsm import PhenomenaTable, Trace, measure_phenomena
 from gms_fsm.phenomena._presliding import nested
@@ -116,7 +114,9 @@ class Result:
         return LIMITS["passivity.made"].value * self.number(model, phenomenon, "energy exchanged")
 
     def choice(self, wanted: Iterable[str]) -> str:
-        """Return the model with the fewest states that shows what is wanted, and nothing wrongly.
+        """Return the smallest model that shows what is wanted, and nothing wrongly.
+
+        The smallest is the one with the fewest state variables.
 
         Parameters
         ----------
@@ -150,10 +150,8 @@ class Result:
             return ", ".join(f"{value + 0.0:.{digits}f}" for value in values)  # no -0.0
 
         elements = self.states["gms-signed"]
-        chosen = [
-            f"{model} ({self.states[model]} state{'s'[: self.states[model] != 1]})"
-            for model in map(self.choice, (["drift"], ["drift", "lag"], ["drift", "lag", "memory"]))
-        ]
+        wanted = (["drift"], ["drift", "lag"], ["drift", "lag", "memory"])
+        chosen = [f"{model} ({self.states[model]})" for model in map(self.choice, wanted)]
         exchanged = [self.number(model, "passivity", "energy exchanged") for model in MODELS]
         return (
             f"Question: {QUESTION}",
@@ -162,7 +160,7 @@ class Result:
             "N/m on one bench (all values chosen by us). Numbers below are in this order.",
             f"Measured: a ripple below break-away moves the slider by {each('drift', 2)} µm per "
             f"period (threshold {self.threshold('lugre', 'drift'):g} µm). The inner loops miss "
-            f"their beginning by {each('memory', 3)} % of their stroke (threshold "
+            f"their beginning by {each('memory', 2)} % of their stroke (threshold "
             f"{self.threshold('lugre', 'memory'):g} %; the first and the last have no inner "
             f"loop). In three cycles the contacts make {each('passivity', 2)} mJ (threshold "
             f"{100 * LIMITS['passivity.made'].value:g} % of the {min(exchanged):.2f} to "
@@ -171,9 +169,9 @@ class Result:
             f"{each('break-away', 2)} N (threshold {self.threshold('stiction', 'break-away'):.2f} "
             f"N). At 25 rad/s friction lags by {each('lag', 1, 'width of the loop at 25 rad/s')} "
             f"mN (threshold {self.threshold('lugre', 'lag'):g} mN).",
-            "So: choose the model with the fewest states that shows what matters and nothing "
-            f"wrongly. For a contact that rests: {chosen[0]}. That rests and lags: {chosen[1]}. "
-            f"That also remembers reversals: {chosen[2]}.",
+            "So: choose the model with the fewest state variables that shows what matters and "
+            f"nothing wrongly. For a contact that rests: {chosen[0]}; that also lags: {chosen[1]}; "
+            f"that also remembers reversals: {chosen[2]}.",
         )
 
 
@@ -190,9 +188,7 @@ def run() -> Result:
     return Result(
         table=measure_phenomena(MODELS, PHENOMENA, bench=BENCH),
         nested=runs,
-        states={
-            name: len(trace.places.variables) * trace.places.n for name, trace in runs.items()
-        },
+        states={name: len(trace.places.variables) * trace.places.n for name, trace in runs.items()},
     )
 
 
@@ -216,7 +212,7 @@ def figure(result: Result) -> Figure:
 
     notes = ["threshold", *_thresholds(result)]
     title = f"Lesson 10: {QUESTION}"
-    sheet = figures.phenomena_matrix(result.table, title=title, notes=notes, below=2.9)
+    sheet = figures.phenomena_matrix(result.table, title=title, notes=notes, below=2.7)
     with rc_context(RC):
         height = sheet.get_figheight()
         places = [(left, 0.5 / height, 0.235, 1.95 / height) for left in (0.085, 0.41, 0.745)]
@@ -242,35 +238,44 @@ def _thresholds(result: Result) -> list[str]:
 def _draw_drift(ax: Axes, result: Result) -> None:
     from plots.style import BLUE, TEXT_GREY, TEXT_ORANGE, VERMILION
 
-    grey, low, high = TEXT_GREY, -1.0, 55.0
-    for model, look, colour, text, tint, height in (
-        ("lugre", "-", VERMILION, "LuGre", TEXT_ORANGE, 46.0),
-        ("gms-signed", "-", BLUE, "GMS, signed law", BLUE, 15.5),
-        ("elasto-plastic", "--", grey, "elasto-plastic", grey, 0.0),
+    grey = TEXT_GREY
+    for model, look, colour, text, tint, place in (
+        ("lugre", "-", VERMILION, NAMES["lugre"], TEXT_ORANGE, (6.5, 55.0)),
+        ("gms-signed", "-", BLUE, NAMES["gms-signed"], BLUE, (10.5, 14.0)),
+        ("elasto-plastic", "--", grey, "elasto-plastic", grey, (10.5, -6.5)),
     ):
         curve = result.table.cell(model, "drift").curves[0]
         ax.plot(curve.x, curve.y, look, color=colour, linewidth=0.9)
-        ax.annotate(text, (9.0, height), color=tint, fontsize=8)
-    ax.set(xlabel="t [s]", ylabel="x [µm]", xlim=(0, 24), ylim=(low, high))
-    ax.set_title("a) rest under bias and ripple")
+        ax.annotate(text, place, color=tint, fontsize=8)
+    ax.set(xlabel="t [s]", ylabel="x [µm]", xlim=(0, 24), ylim=(-10, 95))
+    ax.set_title("a) bias and ripple: LuGre drifts")
 
 
 def _draw_memory(ax: Axes, result: Result) -> None:
-    from plots.style import BLUE, VERMILION
+    from plots.style import BLUE, INK, TEXT_ORANGE, VERMILION
 
     for model, look, colour in (("lugre", "--", VERMILION), ("gms-signed", "-", BLUE)):
         curve = result.table.cell(model, "memory").curves[0]
         ax.plot(curve.x, curve.y, look, color=colour)
-    ax.set(xlabel="x [µm]", ylabel="applied force [N]")
-    ax.set_title("b) nested reversals")
+    gap, end = result.number("lugre", "memory", "gap"), result.nested["lugre"].x[-1] * 1e6
+    arrow = {"arrowstyle": "<->", "color": INK, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
+    ax.annotate("", (end, 1.55), (end - gap, 1.55), arrowprops=arrow)
+    ax.annotate(f"LuGre: gap {gap:.1f} µm", (end, 1.68), color=TEXT_ORANGE, fontsize=8, ha="right")
+    ax.annotate(NAMES["gms-signed"], (17.0, -1.38), color=BLUE, fontsize=8)
+    ax.set(xlabel="x [µm]", ylabel="applied force [N]", xlim=(-15, 66), ylim=(-1.5, 1.95))
+    ax.set_title("b) reversals: GMS remembers")
 
 
 def _draw_energy(ax: Axes, result: Result) -> None:
-    from plots.style import BLUE, LINE_GREY, VERMILION
+    from plots.style import BLUE, LINE_GREY, TEXT_ORANGE, VERMILION
 
-    for model, look, colour in (("gms-published", "--", VERMILION), ("gms-signed", "-", BLUE)):
+    for model, look, colour, tint, place in (
+        ("gms-published", "--", VERMILION, TEXT_ORANGE, (10.0, -3.6)),
+        ("gms-signed", "-", BLUE, BLUE, (10.0, 0.75)),
+    ):
         curve = result.table.cell(model, "passivity").curves[0]
         ax.plot(curve.x, curve.y, look, color=colour)
+        ax.annotate(NAMES[model], place, color=tint, fontsize=8)
     ax.axhline(0, color=LINE_GREY, linewidth=0.8, zorder=0)
-    ax.set(xlabel="t [ms]", ylabel="energy taken [mJ]")
-    ax.set_title("c) three cycles")
+    ax.set(xlabel="t [ms]", ylabel="energy taken [mJ]", xlim=(0, 450), ylim=(-4.2, 1.3))
+    ax.set_title("c) energy in three cycles")
