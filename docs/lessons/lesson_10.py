@@ -70,9 +70,9 @@ _ = interact(nested, n=n)
 # %% [markdown]
 # ## Try
 #
-# - Add Dahl's model, Maxwell slip and Karnopp to the table
-#   (`measure_phenomena(["dahl", "maxwell-slip", "karnopp"], ...)`). Which of them would you take for
-#   a contact that must rest and remember reversals, and need not lag?
+# - Measure Dahl's model, Maxwell slip and Karnopp, too
+#   (`measure_phenomena(["dahl", "maxwell-slip", "karnopp"], ...)`). Which of them would you take
+#   for a contact that must rest and remember reversals, and need not lag?
 # - Double sigma_1 of LuGre (`LuGre(...)` as a model of your own). Which numbers change, and does a
 #   verdict change?
 # - Which value of C of the bank halves the lag? Does the break-away force still fall with the rate?

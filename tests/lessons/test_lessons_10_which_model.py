@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gms_fsm import GMS, measure_phenomena
 from gms_fsm.app.lessons import l10_which_model as lesson
+from gms_fsm.phenomena._specimens import bench_bank
 from tests.lesson_checks import check_figure, check_lines
 
 pytestmark = pytest.mark.slow
@@ -60,6 +62,12 @@ def test_no_gap_is_no_memory_without_a_loop(result: lesson.Result, model: str) -
     assert result.number(model, "memory") < result.threshold(model, "memory")
     width = result.number(model, "memory", "width of the inner loop at F = 0")
     assert width == pytest.approx(0.0, abs=1e-3)  # µm
+
+
+def test_a_bank_of_one_element_is_a_spring_without_a_loop() -> None:
+    one = GMS(bench_bank(lesson.BENCH, 1), law="signed")
+    found = measure_phenomena({"one": one}, ["memory"]).cell("one", "memory")
+    assert (found.verdict, found.said) == ("does not show", "there is no inner loop")
 
 
 def test_the_replayed_runs_are_those_of_the_table(result: lesson.Result) -> None:
