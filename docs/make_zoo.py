@@ -39,8 +39,6 @@ DOCS = Path(__file__).parent
 PAGES = DOCS / "zoo"
 PICTURES = DOCS / "images" / "zoo"
 
-SUPPLIED = ("t", "x", "v", "s")  # inputs that every system has
-BINDINGS = {"N": "10"}  # for other inputs, a text over the names of the pulled mass
 T_END = 12.0  # s: one cycle of stick-slip
 DRIVEN = "1e-3 * (1.5 + cos(t))"  # m/s
 CURVE = Stribeck(1.0, 1.0, 1.0).text
@@ -261,9 +259,8 @@ def contact(item: Item) -> Iterator[str]:
     chart, given = item.chart, item.entry.demonstration
     if len(chart.velocities) > 1:
         yield 'v = ["v_x", "v_y"]'
-    others = [name for name in chart.inputs if name not in (*SUPPLIED, *chart.velocities)]
-    if others:
-        texts = ", ".join(f'{name} = "{BINDINGS.get(name, "1")}"' for name in others)
+    if given.inputs:
+        texts = ", ".join(f'{name} = "{text}"' for name, text in given.inputs.items())
         yield f"inputs = {{ {texts} }}"
     if item.entry.curve:
         yield from ("", "[contact.model]", f'chart = "{item.entry.name}"')

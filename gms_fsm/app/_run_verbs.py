@@ -208,7 +208,10 @@ def phenomena_command(
         table, written = room.write(output, models, phenomenon, bench=numbers, progress=show)
     counts = collections.Counter(cell.measured.verdict for cell in table)
     said = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
-    typer.echo(f"{len(table.models)} models, {len(table.phenomena)} phenomena: {said}")
+    models_said = "1 model" if len(table.models) == 1 else f"{len(table.models)} models"
+    measured = len(table.phenomena)
+    phenomena_said = "1 phenomenon" if measured == 1 else f"{measured} phenomena"
+    typer.echo(f"{models_said}, {phenomena_said}: {said}")
     typer.echo(f"{len(written)} files in {output}; start with {written[0]}")
 
 

@@ -50,7 +50,9 @@ ELASTO_PLASTIC = Chart(
         Transition("bend", "elastic", "mixed", guard="abs(z) > z_ba and v * z > 0"),
         Transition("yield_", "mixed", "plastic", guard="abs(z) >= z_ss and v * z > 0"),
         Transition("turn", ("mixed", "plastic"), "elastic", guard="v * z <= 0"),
-        Transition("recover", "plastic", "mixed", guard="abs(z) < 0.999999999 * z_ss and v * z > 0"),
+        Transition(
+            "recover", "plastic", "mixed", guard="abs(z) < 0.999999999 * z_ss and v * z > 0"
+        ),
     ),
     outputs={"F": "sigma_0 * z + sigma_1 * dz"},
     reference="Dupont et al. (2002)",

@@ -68,7 +68,7 @@ def test_a_model_and_a_file(gms_fsm: CommandLine) -> None:
     done = gms_fsm("phenomena", "mine.toml", "--model", "lugre", "--phenomenon", "drift", "-o", "o")
     assert done.code == 0, done.err
     first, last = done.out.splitlines()
-    assert first == "2 models, 1 phenomena: 1 shows, 1 shows wrongly"
+    assert first == "2 models, 1 phenomenon: 1 shows, 1 shows wrongly"
     assert last.endswith(f"start with {Path('o/phenomena.md')}")
     with open("o/phenomena.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))

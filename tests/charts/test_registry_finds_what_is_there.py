@@ -13,7 +13,18 @@ from typing import Any
 import pytest
 
 import gms_fsm.charts
-from gms_fsm import Chart, ChartModel, Parameter, Prescribed, PulledSlider, Stribeck, simulate
+from gms_fsm import (
+    Body,
+    Chart,
+    ChartModel,
+    Contact,
+    Parameter,
+    Prescribed,
+    PulledSlider,
+    Stribeck,
+    System,
+    simulate,
+)
 from gms_fsm.charts import GMS_ELEMENT, LAWS, LUGRE
 from gms_fsm.charts.broken import BROKEN
 from gms_fsm.charts.registry import Demonstration, Entry, entry, registered
@@ -50,18 +61,30 @@ def test_every_parameter_has_a_unit_and_a_meaning(name: str, law: str) -> None:
         assert each.meaning
 
 
+def mounted(found: Entry, law: str) -> tuple[Any, ...]:
+    """Return a chart on a rig, or in a system if it has several velocities."""
+    chart = found.chart(law)
+    if len(chart.velocities) > 1:
+        names = [f"v{i}" for i, _ in enumerate(chart.velocities)]
+        bodies = [
+            Body(f"b{v}", inertia=1.0, force=f"2 * sin(t + {i})", x=f"x{v}", v=v)
+            for i, v in enumerate(names)
+        ]
+        contact = Contact("pad", chart, dict(found.demonstration.values), v=names)
+        return (System("plane", bodies=bodies, contacts=[contact]),)
+    held = chart.locks or chart.sets_velocity  # needs a free body
+    rig = PulledSlider(1.0, 2.0, 0.1) if held else Prescribed("0.2*sin(t)")
+    return demonstration(found, law), rig
+
+
 @pytest.mark.parametrize(("name", "law"), every())
 def test_every_demonstration_runs_alike_on_two_engines(name: str, law: str) -> None:
     assert entry(name).demonstration.source
-    if len(entry(name).chart(law).velocities) > 1:
-        pytest.skip("no rig moves it in two directions; tests/zoo runs it in a system")
-    model = demonstration(entry(name), law)
-    held = model.chart.locks or model.chart.sets_velocity  # needs a free body
-    rig = PulledSlider(1.0, 2.0, 0.1) if held else Prescribed("0.2*sin(t)")
+    what = mounted(entry(name), law)
     runs = []
     for engine in ("machines", "ifelse"):
         try:
-            runs.append(simulate(model, rig, 8.0, engine=engine))
+            runs.append(simulate(*what, 8.0, engine=engine))
         except LivelockError as error:
             assert entry(name).wrong
             runs.append(error.trace)
