@@ -52,7 +52,7 @@ def composed(number: int) -> str:
     Parameters
     ----------
     number : int
-        1 to 9.
+        1 to 10.
 
     Returns
     -------

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.phenomena._bench import Motion, path
+from gms_fsm.phenomena._bench import ForcePath, Motion, path
 from gms_fsm.phenomena.limits import LIMITS
 from gms_fsm.phenomena.results import Curve, Measured, Number, Phenomenon, Verdict
 
 if TYPE_CHECKING:
     from gms_fsm.phenomena._specimens import Specimen
+    from gms_fsm.traces.trace import Trace
 
-__all__ = ["PHENOMENA"]
+__all__ = ["PHENOMENA", "nested"]
 
 # Forces in units of the break-away force, rates in units of it per s.
 RATE = 0.095
@@ -71,10 +72,16 @@ def _hysteresis(specimen: Specimen) -> Measured:
     return Measured(verdict, numbers, said, (Curve("", 1e6 * trace.x, applied),))
 
 
-def _memory(specimen: Specimen) -> Measured:
+def nested(specimen: Specimen) -> tuple[ForcePath, Trace]:
+    """Return the force with nested reversals, and the run under it."""
     force = specimen.break_away
     way = path(RATE * force, [each * force for each in NESTED], HOLD, smooth=True)
-    trace = specimen.run(Motion(force=way.corners), float(way.ends[-1]), way.times)
+    trace: Trace = specimen.run(Motion(force=way.corners), float(way.ends[-1]), way.times)
+    return way, trace
+
+
+def _memory(specimen: Specimen) -> Measured:
+    way, trace = nested(specimen)
     x = dict(zip(trace.t.tolist(), trace.x.tolist(), strict=True))
     outer, inner, top, inner_again, outer_again = (x[t] for t in way.ends.tolist())
     stroke = top - inner

@@ -148,13 +148,21 @@ def _common(
     return low - margin, high + margin
 
 
-def phenomena_matrix(table: PhenomenaTable) -> Figure:
+def phenomena_matrix(
+    table: PhenomenaTable, *, title: str = "", notes: Sequence[str] = (), below: float = 0.0
+) -> Figure:
     """Draw models against phenomena, with a symbol and a number in each cell.
 
     Parameters
     ----------
     table : PhenomenaTable
         From `gms_fsm.measure_phenomena`.
+    title : str
+        Above the matrix.
+    notes : sequence of str
+        Short texts under the columns, such as thresholds; the first is under the models' names.
+    below : float
+        Height of the empty space under the matrix for panels of your own, in.
 
     Returns
     -------
@@ -166,12 +174,16 @@ def phenomena_matrix(table: PhenomenaTable) -> Figure:
     left = 0.11 * max([8, *map(len, models)])
     heads = [_folded(each.short) for each in table.phenomena]
     above = 0.25 + 0.14 * max(head.count("\n") + 1 for head in heads)
+    above += 0.3 if title else 0.0
     size = (left + wide * len(heads) + 0.2, above + 0.7 + high * max(1, len(models)))
     with rc_context(RC):
-        sheet = Figure(figsize=size)
-        ax = sheet.add_axes((0.0, 0.0, 1.0, 1.0))
+        total = size[1] + below
+        sheet = Figure(figsize=(size[0], total))
+        ax = sheet.add_axes((0.0, below / total, 1.0, size[1] / total))
         ax.set(xlim=(0.0, size[0]), ylim=(0.0, size[1]))
         ax.set_axis_off()
+        if title:
+            ax.text(0.1, size[1] - 0.08, title, ha="left", va="top", fontsize=12)
         top = size[1] - above
         for column, head in enumerate(heads):
             x = left + (column + 0.5) * wide
@@ -189,6 +201,11 @@ def phenomena_matrix(table: PhenomenaTable) -> Figure:
                 _symbol(ax, corner[0] + 0.2, y, found.verdict)
                 if found.numbers:
                     ax.text(corner[0] + 0.36, y, str(found.numbers[0]), va="center", fontsize=8.5)
+        for column, note in enumerate(notes):
+            x, side = (
+                (left - 0.1, "right") if column == 0 else (left + (column - 0.5) * wide, "center")
+            )
+            ax.text(x, 0.56, note, ha=side, va="center", fontsize=7.5, color=TEXT_GREY)
         x = left + 0.2
         found_any = {
             table.cell(model, one.name).verdict for model in models for one in table.phenomena

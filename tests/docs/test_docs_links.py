@@ -17,7 +17,7 @@ TEXTS = [
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 CODE = re.compile(r"^```.*?^```$", re.DOTALL | re.MULTILINE)
 # Generated from docs/lessons/lesson_N.py.
-MADE = re.compile(r"docs/lessons/(lesson_\d)\.md$")
+MADE = re.compile(r"docs/lessons/(lesson_\d+)\.md$")
 OUTSIDE = (
     "https://arxiv.org/",
     "https://github.com/pytransitions/",

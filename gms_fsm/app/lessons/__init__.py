@@ -1,4 +1,4 @@
-"""Nine lessons: the behaviour of friction models, and the pitfalls of simulating them.
+"""Ten lessons: the behaviour of friction models, and the pitfalls of simulating them.
 
 Each lesson is a module that answers one question: ``run()`` makes the runs, measures, and returns a
 result; ``figure(result)`` draws it; ``result.lines()`` summarizes it in five lines, in which every
@@ -15,6 +15,7 @@ number is measured in that run.
 7 Why does friction lag behind the speed?
 8 Does it matter whether a chart or if-else code decides?
 9 What counts as a contact?
+10 Which friction model shows what?
 """
 
 from __future__ import annotations
@@ -98,7 +99,7 @@ def lesson(number: int) -> Lesson:
     Parameters
     ----------
     number : int
-        1 to 9.
+        1 to 10.
 
     Returns
     -------
@@ -159,7 +160,7 @@ def teach(number: int, folder: str | Path) -> Taught:
     Parameters
     ----------
     number : int
-        1 to 9.
+        1 to 10.
     folder : str or Path
         Output folder for ``lesson_N.txt``, the figure and the replay page; created before the run
         if it does not exist.
