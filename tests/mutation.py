@@ -83,6 +83,7 @@ LANGUAGE = [
 NEAR |= {
     f"gms_fsm/language/_{name}.py": [
         "language/test_limits_and_columns",
+        "language/test_states_of_owners",
         "language/test_printed_text_is_exact",
         "language/test_conditions_are_split",
         "language/test_trees_cannot_be_changed",
