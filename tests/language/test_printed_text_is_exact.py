@@ -107,3 +107,24 @@ def test_conditions_have_exactly_the_parentheses_they_need(
 ) -> None:
     tree = parse_condition(text, "abc", ["stick", "slip"], 2, own_state=True)
     assert (spell(tree), spell(tree, MATLAB_LIKE)) == (python, matlab)
+
+
+@pytest.mark.parametrize(
+    ("text", "in_charts", "in_code"),
+    [
+        ("after(0.2)", "after(0.2)", "age >= 0.2"),
+        ("age >= 2 * v", "after(2 * v)", "age >= 2.0 * v"),
+        ("age > 0.2", "age > 0.2", "age > 0.2"),
+        ("age < 0.2", "age < 0.2", "age < 0.2"),
+        ("age <= 0.2", "age <= 0.2", "age <= 0.2"),
+        ("v >= 0.2", "v >= 0.2", "v >= 0.2"),
+        ("0.2 >= age", "0.2 >= age", "0.2 >= age"),
+        ("v > pi", "v > pi", "v > 3.141592653589793"),
+        ("v > 3", "v > 3", "v > 3.0"),
+    ],
+)
+def test_times_in_a_state_and_pi_have_their_names_in_charts_only(
+    text: str, in_charts: str, in_code: str
+) -> None:
+    tree = parse_condition(text, ["age", "v"])
+    assert (spell(tree, MATLAB_LIKE), spell(tree)) == (in_charts, in_code)
