@@ -58,8 +58,10 @@ __all__ = [
 ]
 
 MOST_SWITCHES = 100  # of one machine, or of one relation, without progress
-# Switches make no progress if successive ones are closer than this part of the time itself
+# Switches make no progress if successive ones are closer than this part of the time itself, or of
+# the run's end (at the start of a run nothing is small compared with the time itself),
 CLOCK_STANDS = 1e-9
+END_STANDS = 2.0**-53
 # ... or closer than this, while the state moves by less than a tenth of its tolerance per switch.
 CLOCK_CRAWLS = 1e-6
 STATE_STANDS = 0.1
@@ -240,7 +242,7 @@ def _fired(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> int:
     counts[FIRED_ONE] = 1
     counts[FRESH] = 1
     counts[PHASE] = PICK
-    _reset_if_advanced(now, memory)
+    _reset_if_advanced(plan, now, memory)
     memory.switches[i] += 1
     if memory.switches[i] >= MOST_SWITCHES and _no_progress(plan, now, memory, scratch):
         counts[PHASE] = AFTER
@@ -423,10 +425,10 @@ def _finish(now: Now, counts: list[int], out: Output) -> None:
 
 
 # --------------------------------------------------------------------------- progress
-def _reset_if_advanced(now: Now, memory: Memory) -> None:
+def _reset_if_advanced(plan: Plan, now: Now, memory: Memory) -> None:
     """Restart the count of switches if time has advanced since the last one."""
     t = now.clock[T]
-    if t - now.clock[SWITCHED] > CLOCK_CRAWLS * abs(t):
+    if t - now.clock[SWITCHED] > max(CLOCK_CRAWLS * abs(t), END_STANDS * abs(plan.t_end)):
         _reset_counts(now, memory)
     now.clock[SWITCHED] = t
 
@@ -445,7 +447,7 @@ def _no_progress(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> bool
     """Return whether the counted switches made no progress; otherwise restart the count here."""
     y, anchor, moved = now.y, memory.anchor, scratch.error
     t, elapsed = now.clock[T], now.clock[T] - now.clock[ANCHOR]
-    stands = elapsed <= MOST_SWITCHES * CLOCK_STANDS * abs(t)
+    stands = elapsed <= MOST_SWITCHES * max(CLOCK_STANDS * abs(t), END_STANDS * abs(plan.t_end))
     if not stands and elapsed <= MOST_SWITCHES * CLOCK_CRAWLS * abs(t):
         for j in range(len(y)):
             moved[j] = y[j] - anchor[j]
@@ -467,7 +469,7 @@ def _often_changed(
 ) -> bool:
     """Count the relations that have just changed; return whether one has changed too often."""
     changes, probe, surfaces = memory.changes, w.search.probe, sliding.surfaces
-    _reset_if_advanced(now, memory)
+    _reset_if_advanced(plan, now, memory)
     motion.margins(now.clock[T], now.y, now.mode, motion.p, w.watch, probe)
     often = False
     for r in w.active:

@@ -182,7 +182,7 @@ def test_before_the_first_row_nothing_is_written(
             error.trace = ()  # type: ignore[attr-defined]
         raise error
 
-    monkeypatch.setattr("gms_fsm.app.report.simulate", at_once)
+    monkeypatch.setattr("gms_fsm.app.scenario.simulate", at_once)
     with pytest.raises(KeyboardInterrupt, match="before the first row"):
         run_scenario(load_scenario(_file(tmp_path, LONG)), tmp_path / "out")
     assert list((tmp_path / "out").iterdir()) == []
