@@ -77,6 +77,7 @@ def mounted(found: Entry, law: str) -> tuple[Any, ...]:
     return demonstration(found, law), rig
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "law"), every())
 def test_every_demonstration_runs_alike_on_two_engines(name: str, law: str) -> None:
     assert entry(name).demonstration.source
