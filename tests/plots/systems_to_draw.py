@@ -5,77 +5,14 @@ from __future__ import annotations
 from functools import cache
 
 from gms_fsm import simulate
+from gms_fsm.charts import CHARTS
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.charts.parameters import Parameter
 from gms_fsm.systems.system import Body, Contact, Sampled, System
 from gms_fsm.traces.trace import Trace
 
-STICTION = Chart(
-    "Coulomb friction with stiction",
-    parameters=("F_c", "F_s", "b"),
-    states=(
-        State("stuck", locked=True),
-        State("forward", outputs={"F": "F_c + b * v"}),
-        State("backward", outputs={"F": "-F_c + b * v"}),
-    ),
-    transitions=(
-        Transition("release_f", "stuck", "forward", guard="F > F_s"),
-        Transition("release_b", "stuck", "backward", guard="F < -F_s"),
-        Transition("arrest_f", "forward", "stuck", guard="v < 0"),
-        Transition("arrest_b", "backward", "stuck", guard="v > 0"),
-    ),
-)
-END_STOP = Chart(
-    "End stop",
-    inputs=("x", "v"),
-    parameters=("x_s", "e", "v_r"),
-    states=(State("free", outputs={"F": "0"}), State("rest", locked=True)),
-    transitions=(
-        Transition("bounce", "free", "free", guard="x >= x_s and v > v_r", actions={"v": "-e * v"}),
-        Transition("settle", "free", "rest", guard="x >= x_s and 0 < v <= v_r"),
-        Transition("lift", "rest", "free", guard="F < 0"),
-    ),
-)
-BACKLASH = Chart(
-    "Backlash",
-    inputs=("x", "v"),
-    parameters=("k", "d", "gap"),
-    states=(
-        State("between", outputs={"F": "0"}),
-        State("right", outputs={"F": "k * (x - gap) + d * v"}),
-        State("left", outputs={"F": "k * (x + gap) + d * v"}),
-    ),
-    transitions=(
-        Transition("touch_r", "between", "right", guard="x >= gap and v > 0"),
-        Transition("touch_l", "between", "left", guard="x <= -gap and v < 0"),
-        Transition("leave_r", "right", "between", guard="F < 0"),
-        Transition("leave_l", "left", "between", guard="F > 0"),
-    ),
-)
-PLANAR = Chart(
-    "Coulomb in the plane",
-    inputs=(),
-    velocities=("v", "w"),
-    variables=("h", "g"),
-    parameters=("F_c", "F_s", "e"),
-    states=(
-        State(
-            "stuck",
-            locked=True,
-            exit={"h": "F / sqrt(F**2 + F_w**2)", "g": "F_w / sqrt(F**2 + F_w**2)"},
-        ),
-        State("start", outputs={"F": "F_c * h", "F_w": "F_c * g"}),
-        State(
-            "slip",
-            outputs={"F": "F_c * v / sqrt(v**2 + w**2)", "F_w": "F_c * w / sqrt(v**2 + w**2)"},
-        ),
-    ),
-    transitions=(
-        Transition("release", "stuck", "start", guard="F**2 + F_w**2 > F_s**2"),
-        Transition("moves", "start", "slip", guard="v**2 + w**2 > e**2"),
-        Transition("arrest", "slip", "stuck", guard="v**2 + w**2 < 0.25 * e**2"),
-    ),
-)
+STICTION, END_STOP = CHARTS["stiction"], CHARTS["end-stop"]
+BACKLASH, PLANAR = CHARTS["backlash"], CHARTS["planar-coulomb"]
 TIMED = Chart(
     "Timed rest",
     parameters=("T_d", "F_c", "F_s"),

@@ -82,9 +82,13 @@ def test_a_live_chart_marks_guards_that_read_the_force() -> None:
     trace = run(PULLED)
     shown, (first, *_) = LiveChart(trace), np.flatnonzero(trace.microstep > 0)
     (look,) = shown.look(int(first))
-    assert (look.fired, look.source, look.marks["release_f"]) == ("release_f", "stuck", (True,))
+    assert (look.fired, look.source, look.marks["release_forward"]) == (
+        "release_forward",
+        "stuck",
+        (True,),
+    )
     (before,) = shown.look(int(first) - 2)
-    assert before.marks == {"release_f": (False,), "release_b": (False,)}
+    assert before.marks == {"release_forward": (False,), "release_backward": (False,)}
 
 
 @pytest.mark.slow

@@ -53,7 +53,7 @@ def test_the_parts_of_a_servo() -> None:
         "body-motor": "motor  body | J_m * dw_m/dt = k_t * i - bearing.F - gear.F",
         "body-load": "load  body | J_l * dw_l/dt = 3 * gear.F",
         "contact-bearing": f"bearing  contact | {STICTION.name} | velocity: w_m",
-        "contact-gear": "gear  contact | Backlash | velocity: w_m - 3 * w_l",
+        "contact-gear": "gear  contact | Backlash with elastic flanks | velocity: w_m - 3 * w_l",
     }
 
 
