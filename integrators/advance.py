@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from integrators.crossings import (
     NO_CHANGE,
+    WAITING,
     Path,
     Watched,
     copy_margins,
@@ -154,6 +155,9 @@ def advance(
     clock, cursor, times = now.clock, out.cursor, out.times
     adaptive = not plan.control.step > 0.0
     watching = len(w.active) > 0
+    waiting = False
+    for r in w.active:
+        waiting = waiting or w.watch[r] & WAITING != 0
     scaleless = False
     for j in range(len(y)):
         scaleless = scaleless or plan.control.atol[j] == 0.0
@@ -181,7 +185,7 @@ def advance(
         wanted = cursor[NEXT_TIME] < len(times) and times[cursor[NEXT_TIME]] < t_new
         theta = NO_CHANGE
         near = watching and not is_quiet_step(motion, now, t_new, scratch, w)
-        if watching and adaptive:
+        if waiting and adaptive:
             clock[H] = min(clock[H], longest_next(motion, now, t_new, scratch, w))
         if near or wanted:
             fit_dense(plan.method, h, y, scratch)

@@ -216,10 +216,7 @@ def longest_next(motion: Motion, now: Now, t_new: float, scratch: Scratch, w: Wa
         grows; infinity if no relation waits.
     """
     longest = INFINITY
-    waiting = False
-    for r in w.active:
-        waiting = waiting or w.watch[r] & WAITING != 0
-    if not waiting or any_changed(w, w.end):  # if one has changed, the step ends earlier
+    if any_changed(w, w.end):  # the step ends earlier
         return longest
     y, f, y_new, f_new = now.y, now.f, scratch.y_new, scratch.f_new
     place, quarter, middle = w.search.y_probe, w.search.low, w.search.probe
