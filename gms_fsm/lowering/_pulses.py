@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.language import Value
-from gms_fsm.language._vectors import values_of
+from gms_fsm.language import values_of
 
 __all__ = ["SAMPLES", "waking_times"]
 

@@ -12,10 +12,9 @@ from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.errors import shown as written
 from gms_fsm.traces._views import picked
 from gms_fsm.traces.trace import Trace, check_trace
+from plots._window import Window, window_of
 
 __all__ = ["has_threshold", "shown"]
-
-Window = tuple[float, float]
 
 SCALES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
 SMOOTH = 2000  # points per curve
@@ -126,20 +125,7 @@ def checked_window(trace: Trace, window: Window | None) -> Window:
         If it is not two increasing times that overlap the run, or if there is no run.
     """
     check_trace(trace)
-    first, last = float(trace.t[0]), float(trace.t[-1])
-    if window is None:
-        return first, last
-    try:
-        begin, end = (float(t) for t in window)
-    except (TypeError, ValueError):
-        begin, end = last, first
-    if not (first <= begin < end <= last):
-        raise ParameterError(
-            f"window is {written(window)}",
-            advice=f"it must be two times (t0, t1) with t0 < t1 inside the run, {first:g} "
-            f"to {last:g} s",
-        )
-    return begin, end
+    return window_of(trace, window)
 
 
 def checked_elements(trace: Trace, elements: Iterable[int] | None) -> list[int]:
