@@ -54,6 +54,8 @@ SCRIPTS = (
     "chart.js",
     "plots.js",
     "views.js",
+    "phase.js",
+    "regions.js",
     "landscape.js",
     "microscope.js",
     "page.js",

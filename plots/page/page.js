@@ -28,7 +28,7 @@ function show(k, words = "") {
 function pointAt(k) {
   if (pointed === k) return;
   pointed = k;
-  eachPlots((pane) => pane.show());
+  for (const view of views) for (const pane of Object.values(view.open)) pane.point?.();
 }
 
 function eachPlots(act) {

@@ -110,6 +110,8 @@ class TimePlots {
 
   show() { this.tell(); this.placeCursor(); }
 
+  point() { this.show(); }
+
   tell() {
     const row = pointed === null ? this.view.row : frames.rows[this.view.place][pointed];
     for (const { value, at, unit, digits } of this.plots) {

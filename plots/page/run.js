@@ -48,6 +48,7 @@ class Contact {
     this.forces = stored.forces.map((each) => run.column(each));
     this.edges = stored.edges.map((edge) => ({
       ...edge,
+      tree: edge.guard,
       guard: compiled(edge.guard),
       clauses: edge.clauses.map((clause) => ({
         ...clause, holds: compiled(clause.tree),
@@ -55,6 +56,7 @@ class Contact {
       })),
     }));
     this.lets = Object.fromEntries(Object.entries(stored.let).map(([name, tree]) => [name, compiled(tree)]));
+    this.flowTrees = stored.flows;
     this.flows = stored.flows.map((flows) => Object.fromEntries(Object.entries(flows).map(([name, tree]) => [name, compiled(tree)])));
     this.curveAt = stored.curve && compiled(stored.curve.tree);
     this.readSwitches(stored);

@@ -60,3 +60,20 @@ function valueOf(f, scope) {
 function truthOf(f, scope) {
   try { return f(scope) ? 1 : 0; } catch (error) { if (error === UNDEFINED) return -1; throw error; }
 }
+
+// The names that a tree reads.
+function namesIn(tree, found = new Set()) {
+  if (typeof tree === "string") found.add(tree);
+  if (!Array.isArray(tree)) return found;
+  const [op, ...rest] = tree;
+  if (op === "state") return found.add(`state(${rest[0]})`);
+  const parts = op === "stored" ? [rest[1]] : op === "product" ? [rest[0]] : rest;
+  for (const part of parts) namesIn(part, found);
+  return found;
+}
+
+// The comparisons in a condition, as trees.
+function comparisonsIn([op, ...rest]) {
+  if (["<", "<=", ">", ">="].includes(op)) return [[op, ...rest]];
+  return ["and", "or", "not"].includes(op) ? rest.flatMap(comparisonsIn) : [];
+}
