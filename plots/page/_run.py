@@ -168,7 +168,7 @@ def _clause(chart: Chart, part: Condition, stored: Stored) -> dict[str, Any]:
 def _values(trace: Trace, stored: Stored, pool: Pool) -> dict[str, Any]:
     """Return the columns of what guards read and plots show, by name: one, or one per element."""
     chart, n = trace.model.chart, trace.n
-    read = {name for tree in chart.guards.values() for name in names_in(tree)}
+    read = _read(chart)
     read -= {*chart.parameter_names, *chart.variables, "t", "x", "v", "s"}
     found: dict[str, Any] = {
         "t": {"all": pool.add(trace.t)},
@@ -199,6 +199,14 @@ def _values(trace: Trace, stored: Stored, pool: Pool) -> dict[str, Any]:
         else:
             found[name] = {"all": pool.add(table)}
     return found
+
+
+def _read(chart: Chart) -> set[str]:
+    """Return the names that guards read, and what flows and named expressions read besides."""
+    read = {name for tree in chart.guards.values() for name in names_in(tree)}
+    # At other points than those of the run, the page computes named expressions itself.
+    inner = (*chart.lets.values(), *chart.flows.values())
+    return read | {name for tree in inner for name in names_in(tree)} - chart.lets.keys()
 
 
 def _thresholds(trace: Trace, pool: Pool) -> list[Any]:

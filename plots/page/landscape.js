@@ -113,13 +113,13 @@ class LandscapePane {
     this.drawPins();
   }
 
+  // Pins and places where guards turn are in view, except those far away from the run.
   axes() {
-    const { contact, element } = this.view, { names: [v, z], threshold } = contact.plane;
-    const speeds = extent([{ get: (row) => contact.value(v, element, row), rows: contact.run.rows }]);
-    const fastest = Math.max(1.5 * Math.max(Math.abs(speeds.low), Math.abs(speeds.high)), 100 * threshold);
-    const seen = extent([{ get: (row) => contact.value(z, element, row), rows: contact.run.rows }]), all = [seen.low, seen.high];
-    const widest = Math.max(Math.abs(seen.low), Math.abs(seen.high)) || 1;
-    // Places where guards turn are in view, except those far away from the run.
+    const { contact, element } = this.view, { names: [v, z], threshold, pins } = contact.plane, { rows } = contact.run;
+    const speeds = extent([{ get: (row) => contact.value(v, element, row), rows }]), top = Math.max(Math.abs(speeds.low), Math.abs(speeds.high));
+    const fastest = Math.max(3 * top, 100 * threshold, ...pins.map(({ at }) => 1.5 * Math.abs(at[0])).filter((speed) => speed <= 100 * top));
+    const seen = extent([{ get: (row) => contact.value(z, element, row), rows }]), widest = Math.max(Math.abs(seen.low), Math.abs(seen.high)) || 1;
+    const all = [seen.low, seen.high, ...pins.map(({ at }) => at[1]).filter((u) => Math.abs(u) <= 4 * widest)];
     const wide = { h: 1600, up: new Axis({ name: z, low: -4 * widest, high: 4 * widest }) };
     contact.states.forEach((_, state) => {
       const points = new PlaneScope(contact, element, 0, state);
@@ -182,8 +182,9 @@ class LandscapePane {
     plane.svg.setAttribute("aria-label", `Plane of ${points.v} and ${points.z}: guards of the edges that leave ${view.contact.states[state]}`);
     if (this.drawings.size > MOST) this.drawings.clear();
     const known = this.drawings.get(key);
-    if (known) known.forEach((node, k) => [this.regions, this.lines][k].replaceChildren(node));
-    else this.drawings.set(key, this.drawAnew());
+    if (!known) this.drawings.set(key, this.drawAnew());
+    else { this.regions.replaceChildren(known.below); this.lines.replaceChildren(known.above); }
+    this.boxes = this.drawings.get(key).boxes;
   }
 
   drawAnew() {
@@ -197,7 +198,7 @@ class LandscapePane {
     this.drawCurves(boxes);
     map.regions.forEach(({ places }, i) => this.nameRegion(edges[points.edges[i]].name, places, boxes));
     points.at(points.v0, points.z0);
-    return [below, above];
+    return { below, above, boxes };
   }
 
   // A text where it covers no other; without a free place it is left out.
@@ -223,12 +224,14 @@ class LandscapePane {
   }
 
   nameRegion(text, places, boxes) {
-    const tall = places.filter(({ height }) => height > 16), found = [];
-    for (const part of [0.5, 0.35, 0.65, 0.2, 0.8, 0.1, 0.9]) {
+    const half = (text.length * 6.6) / 2, tall = places.filter(({ height }) => height > 18), all = [];
+    const covers = (x, y) => places.some((each) => Math.abs(each.x - x) < 1.5 && Math.abs(each.y - y) < each.height / 2 - 8);
+    for (const part of [0.5, 0.75, 0.25, 0.62, 0.38, 0.85, 0.15, 0.95, 0.05]) {
       const each = tall[Math.floor(part * tall.length)];
-      if (each) for (const shift of [0, 0.25, -0.25]) found.push([each.x, each.y + shift * each.height + 4]);
+      if (each) for (const shift of [0, 0.25, -0.25]) all.push([each.x, each.y + shift * each.height + 4]);
     }
-    this.nameAt(text, "edge-name", boxes, found);
+    const inner = all.filter(([x, y]) => [x - half, x, x + half].every((at) => covers(at, y - 4)));
+    this.nameAt(text, "edge-name", boxes, [...inner, ...all]);
   }
 
   // s(v) and -s(v), where edges turn at them.
@@ -273,6 +276,7 @@ class LandscapePane {
         const dy = -valueOf(points.flow, points.scope) * plane.up.rate(z) * h, length = Math.hypot(dx, dy);
         if (!Number.isFinite(length)) continue;
         const x = MARGINS.left + ((i + 0.5) / columns) * w, y = MARGINS.top + (1 - (k + 0.5) / rows) * h;
+        if (!this.boxes.free(x - 5, y - 5, 10, 10)) continue; // not through a text
         d += length === 0 ? `M${x - 1} ${y}h2` : arrowAt(x, y, dx / length, dy / length);
       }
     }
@@ -285,13 +289,13 @@ class LandscapePane {
     pinList.replaceChildren();
     pinList.hidden = !contact.plane.pins.length;
     contact.plane.pins.forEach(({ at: [v, z], text, status, where }, k) => {
-      const x = clamp(plane.x(v), MARGINS.left + 8, MARGINS.left + plane.w - 8), y = clamp(plane.y(z), MARGINS.top + 8, MARGINS.top + plane.h - 8);
+      const x = clamp(plane.x(v), MARGINS.left, MARGINS.left + plane.w), y = clamp(plane.y(z), MARGINS.top, MARGINS.top + plane.h);
       const mark = draw("g", pins, { class: "pinned-at", transform: `translate(${x.toFixed(1)} ${y.toFixed(1)})` });
       draw("title", mark, {}, `${status}: ${text}`);
       draw("circle", mark, { r: 8 });
       draw("text", mark, { y: 4, "text-anchor": "middle" }, `${k + 1}`);
-      const out = Math.abs(plane.x(v) - x) + Math.abs(plane.y(z) - y) > 0.1;
-      make("li", pinList, `${status}: ${text} (${[where.join(", "), `${plane.across.name} = ${eng(v, plane.across.unit)}, ${plane.up.name} = ${eng(z, plane.up.unit)}`, out ? "outside of the plane" : ""].filter(Boolean).join("; ")})`);
+      const at = `${plane.across.name} = ${eng(v, plane.across.unit)}, ${plane.up.name} = ${eng(z, plane.up.unit)}`, out = Math.abs(plane.x(v) - x) + Math.abs(plane.y(z) - y) > 0.1;
+      make("li", pinList, `${status}: ${text} (${[where.join(", "), at, out ? "outside of the plane" : ""].filter(Boolean).join("; ")})`);
     });
   }
 }
@@ -326,7 +330,8 @@ class Race {
       const edge = contact.edges[k], lane = make("div", this.box, "", { class: "lane" }), head = make("h3", lane);
       const swatch = draw("svg", head, { width: 16, height: 12, "aria-hidden": "true" });
       draw("rect", swatch, { width: 16, height: 12, class: `guarded edge${i % HATCHING.length}`, fill: `url(#${this.planeId}-hatch${i % HATCHING.length})` });
-      make("span", head, `${edge.priority} ${edge.name} → ${contact.states[edge.target]}`);
+      make("span", head, `${edge.priority} ${edge.name}`);
+      make("small", head, `→ ${contact.states[edge.target]}`);
       const word = make("em", head), list = make("ul", lane);
       const rows = edge.clauses.map(({ text }) => {
         const row = make("li", list), mark = make("span", row, "", { class: "mark" });

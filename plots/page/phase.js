@@ -18,6 +18,7 @@ class PhasePane {
   fit() {
     const { box, plots } = this;
     this.listLevels();
+    this.told = make("output", this.legend);
     const width = box.clientWidth, beside = width >= 560, head = this.legend.offsetHeight;
     const each = beside ? Math.floor(width / 2) - 4 : width;
     const height = WIDE.matches ? Math.max(box.clientHeight - head - 6, 150) / (beside ? 1 : 2) : Math.min(each * 0.8, 420);
@@ -28,7 +29,6 @@ class PhasePane {
   listLevels() {
     const { contact } = this.view, { n, states } = contact, step = Math.ceil(n / (LEVELS - 1));
     this.legend.replaceChildren();
-    this.legend.hidden = states.length < 2;
     if (states.length < 2) return;
     make("span", this.legend, n > 1 ? `elements not in ${states[0]}:` : "state:");
     for (let level = 0, from = 0; from <= n; level++) {
@@ -47,7 +47,12 @@ class PhasePane {
 
   show() { for (const plot of this.plots) plot.show(); }
 
-  point() { for (const plot of this.plots) plot.show(); }
+  // The row under the mouse, here or in the pane of the other run.
+  point() {
+    const { contact, run, place: at } = this.view, row = pointed === null ? -1 : frames.rows[at][pointed];
+    for (const plot of this.plots) plot.show();
+    say(this.told, row < 0 ? "" : `t = ${written(run.t(row), 6)} s, F = ${eng(contact.value("F", 0, row), "N")}`);
+  }
 }
 PANES.push(PhasePane);
 

@@ -1,6 +1,6 @@
 "use strict";
 // An SVG plane with two axes. Each axis is linear, or linear near zero and logarithmic beyond.
-const MARGINS = { left: 62, right: 14, top: 8, bottom: 34 }; // px
+const MARGINS = { left: 62, right: 20, top: 8, bottom: 34 }; // px
 const LETTER = 6.2; // px, the mean width of a letter of a mark
 const STEPS = [1, 2, 5, 10];
 let planes = 0; // so that each has its own ids
@@ -42,7 +42,7 @@ class Axis {
 
   // Values with grid lines, and the texts of those that get one, most important first.
   marks(pixels, space) {
-    return this.linear ? this.decades() : this.steps((this.length * space) / pixels);
+    return this.linear ? this.decades(pixels / this.length < space ? 3 : 1) : this.steps((this.length * space) / pixels);
   }
 
   steps(least) {
@@ -54,11 +54,12 @@ class Axis {
     return found.sort((a, b) => Math.abs(a.u) - Math.abs(b.u));
   }
 
-  decades() {
+  // Every decade has a grid line, and every so many a text.
+  decades(apart) {
     const found = [{ u: 0, text: "0" }], first = Math.round(Math.log10(this.linear)), last = Math.floor(Math.log10(Math.max(-this.low, this.high)) + 1e-9);
     for (let e = last; e >= first; e--) {
-      const power = powerOf(10 ** e, this.unit), text = `${10 ** (e - power)} ${PREFIXES[power]}${this.unit}`.trim();
-      for (const [u, sign] of [[10 ** e, ""], [-(10 ** e), "−"]]) if (u >= this.low && u <= this.high) found.push({ u, text: last - first > 3 && e % 3 ? "" : sign + text });
+      const power = powerOf(10 ** e, this.unit), text = e % apart ? "" : `${10 ** (e - power)} ${PREFIXES[power]}${this.unit}`.trim();
+      for (const [u, sign] of [[10 ** e, ""], [-(10 ** e), "−"]]) if (u >= this.low && u <= this.high) found.push({ u, text: text && sign + text });
     }
     return found;
   }
@@ -103,7 +104,7 @@ class Plane {
     for (const { u, text } of this.across.marks(w, 64)) {
       const x = this.x(u), half = (text.length * LETTER) / 2;
       lines.push(`M${x.toFixed(1)} ${top}V${base}`);
-      if (text && x - half > left - 20 && x + half < width && free.take(x - half - 5, 0, 2 * half + 10, 1)) draw("text", texts, { x, y: base + 14, "text-anchor": "middle" }, text);
+      if (text && x - half > left - 20 && x + half < width + 2 && free.take(x - half - 5, 0, 2 * half + 10, 1)) draw("text", texts, { x, y: base + 14, "text-anchor": "middle" }, text);
     }
     for (const { u, text } of this.up.marks(h, 34)) {
       const y = this.y(u);
@@ -120,8 +121,12 @@ class Plane {
 class Boxes {
   constructor() { this.taken = []; }
 
+  free(x, y, width, height) {
+    return this.taken.every((each) => x >= each.x + each.width || x + width <= each.x || y >= each.y + each.height || y + height <= each.y);
+  }
+
   take(x, y, width, height) {
-    const free = this.taken.every((each) => x >= each.x + each.width || x + width <= each.x || y >= each.y + each.height || y + height <= each.y);
+    const free = this.free(x, y, width, height);
     if (free) this.taken.push({ x, y, width, height });
     return free;
   }
