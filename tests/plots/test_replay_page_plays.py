@@ -70,7 +70,7 @@ def test_playing_stays_at_every_micro_step_and_is_uniform_between(open_page: Ope
     moving = [
         (now, times[k], times[after])
         for (now, k), (_, after) in zip(shown, shown[60:], strict=False)
-        if not any(k < event <= after for event in transitions) and after < page.evaluate("last")
+        if not any(k <= event <= after for event in transitions) and after < page.evaluate("last")
     ]
     assert len(moving) > 100
     for _, begin, end in moving[:: len(moving) // 40]:
