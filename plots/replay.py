@@ -24,6 +24,8 @@ from typing import Any
 from gms_fsm._arguments import checked_kind, listed
 from gms_fsm._extras import missing
 from gms_fsm.errors import ParameterError
+from gms_fsm.inspection.explain import ROUNDING
+from gms_fsm.inspection.prove import Report
 from gms_fsm.language import (
     COMPARISONS,
     CONSTANTS,
@@ -32,14 +34,12 @@ from gms_fsm.language import (
     OPERATIONS,
     SEVERAL,
 )
-from gms_fsm.inspection.explain import ROUNDING
-from gms_fsm.inspection.prove import Report
 from gms_fsm.traces.trace import Trace
 from plots import formats
+from plots._window import window_of
 from plots.page._chart import chart_svg
 from plots.page._rows import page_rows
 from plots.page._run import stored_run, views_of
-from plots._window import window_of
 from plots.style import CHART_THEMES, ELEMENT_COLOURS, PAGE_THEMES
 
 __all__ = ["Replay", "replay", "replay_html", "write_replay"]
@@ -249,6 +249,12 @@ def replay_html(
     checked_kind("title", title, str, "a text")
     if checks is not None:
         checked_kind("checks", checks, Report, "a Report, from prove(chart)")
+        known = [view.model.chart for each in traces for view in views_of(each)]
+        if checks.chart not in known:
+            raise ParameterError(
+                f"checks is a Report of another chart, {checks.chart.name!r}",
+                advice=f"these runs have {', '.join(sorted({chart.name for chart in known}))}",
+            )
     names = [checked_kind("names", each, str, "texts") for each in listed("names", names, "texts")]
     plot_script, plot_style = _uplot()
     if len(names) not in (0, len(traces)):
@@ -269,7 +275,6 @@ def replay_html(
         "runs": runs,
         "language": _language(),
         "rounding": ROUNDING,
-
     }
     script = "".join(map(_part, SCRIPTS))
     style = _theme() + plot_style + _part("page.css")
@@ -369,9 +374,7 @@ def _theme() -> str:
 def _hatched(k: int, angle: int | None) -> str:
     if angle is None:
         return f"var(--fill{k})"
-    return (
-        f"repeating-linear-gradient({angle}deg,var(--edge{k}) 0 1px,var(--fill{k}) 1px 6px)"
-    )
+    return f"repeating-linear-gradient({angle}deg,var(--edge{k}) 0 1px,var(--fill{k}) 1px 6px)"
 
 
 def _inert(data: object) -> str:
