@@ -131,7 +131,7 @@ def replay(
     title: str = "",
     names: Sequence[str] = (),
     window: tuple[float, float] | None = None,
-    checks: Report | None = None,
+    checks: Report | Sequence[Report] = (),
 ) -> Replay:
     """Make a replay page, for a notebook.
 
@@ -148,9 +148,9 @@ def replay(
     window : (float, float), optional
         Time interval to show, s; by default the whole run. A run with more transitions than a page
         can hold needs one.
-    checks : Report, optional
-        From `gms_fsm.inspection.prove.prove`; its counterexamples are pinned in the landscape of
-        that chart.
+    checks : Report or sequence of Report, optional
+        From `gms_fsm.inspection.prove.prove`; the counterexamples are pinned in the landscapes of
+        their charts.
 
     Returns
     -------
@@ -184,7 +184,7 @@ def write_replay(
     title: str = "",
     names: Sequence[str] = (),
     window: tuple[float, float] | None = None,
-    checks: Report | None = None,
+    checks: Report | Sequence[Report] = (),
 ) -> Path:
     """Write a replay page: a single file that needs neither a network nor a server.
 
@@ -221,7 +221,7 @@ def replay_html(
     title: str = "",
     names: Sequence[str] = (),
     window: tuple[float, float] | None = None,
-    checks: Report | None = None,
+    checks: Report | Sequence[Report] = (),
 ) -> str:
     """Return a replay page as text.
 
@@ -247,12 +247,13 @@ def replay_html(
         checked_kind("trace", each, Trace, "a Trace, from simulate(...) or Trace.load(path)")
         window_of(each, window)
     checked_kind("title", title, str, "a text")
-    if checks is not None:
-        checked_kind("checks", checks, Report, "a Report, from prove(chart)")
-        known = [view.model.chart for each in traces for view in views_of(each)]
-        if checks.chart not in known:
+    reports = [checks] if isinstance(checks, Report) else listed("checks", checks, "Reports")
+    known = [view.model.chart for each in traces for view in views_of(each)]
+    for report in reports:
+        checked_kind("checks", report, Report, "a Report, from prove(chart)")
+        if report.chart not in known:
             raise ParameterError(
-                f"checks is a Report of another chart, {checks.chart.name!r}",
+                f"checks has a Report of another chart, {report.chart.name!r}",
                 advice=f"these runs have {', '.join(sorted({chart.name for chart in known}))}",
             )
     names = [checked_kind("names", each, str, "texts") for each in listed("names", names, "texts")]
@@ -267,7 +268,7 @@ def replay_html(
         page = page_rows(each, window)
         pictures = [chart_svg(view.model.chart, view.n) for view in views_of(each)]
         charts += [picture for picture in dict.fromkeys(pictures) if picture not in charts]
-        run = stored_run(page, [charts.index(picture) for picture in pictures], checks)
+        run = stored_run(page, [charts.index(picture) for picture in pictures], reports)
         head = [*names[i : i + 1], each.title]
         runs.append({"title": ": ".join(head), "of": len(each), **run})
     data = {
@@ -349,7 +350,7 @@ def _copyright(script: str) -> str:
 
 
 def _theme() -> str:
-    """Return the colours of both themes as variables of the style sheet, and the looks of states."""
+    """Return the colours of both themes as variables, and the looks of states."""
     texts = {}
     for name, theme in CHART_THEMES.items():
         page = PAGE_THEMES[name]

@@ -35,7 +35,7 @@ __all__ = ["stored_run"]
 FORCE = "F"  # names of forces begin like this; they are shown, not read by guards, in seven digits
 
 
-def stored_run(page: PageRows, charts: Sequence[int], report: Report | None) -> dict[str, Any]:
+def stored_run(page: PageRows, charts: Sequence[int], reports: Sequence[Report]) -> dict[str, Any]:
     """Return the data of a run.
 
     Parameters
@@ -44,8 +44,8 @@ def stored_run(page: PageRows, charts: Sequence[int], report: Report | None) -> 
         The rows to show.
     charts : sequence of int
         Number of the picture of each contact's chart.
-    report : Report, optional
-        Counterexamples of the checks of a chart, to be pinned in its plane.
+    reports : sequence of Report
+        Their counterexamples are pinned in the planes of their charts.
 
     Returns
     -------
@@ -53,11 +53,11 @@ def stored_run(page: PageRows, charts: Sequence[int], report: Report | None) -> 
         Data for JSON.
     """
     trace = page.trace
-    instants = np.cumsum(np.diff(trace.t, prepend=trace.t[0]) > 0)
+    instants = np.cumsum(np.diff(trace.t, prepend=trace.t[0]) > 0, dtype=np.int64)
     pool = Pool(instants)
     views = views_of(trace)
     contacts = [
-        _contact(view, pool, picture, report) for view, picture in zip(views, charts, strict=True)
+        _contact(view, pool, picture, reports) for view, picture in zip(views, charts, strict=True)
     ]
     whole = trace.system is None or bool(trace.which)
     return {
@@ -83,7 +83,7 @@ def views_of(trace: Trace) -> list[Trace]:
 
 
 # --------------------------------------------------------------------------- a contact
-def _contact(trace: Trace, pool: Pool, picture: int, report: Report | None) -> dict[str, Any]:
+def _contact(trace: Trace, pool: Pool, picture: int, reports: Sequence[Report]) -> dict[str, Any]:
     chart, model, n = trace.model.chart, trace.model, trace.n
     stored: Stored = {}
     edges = _edges(chart, stored)
@@ -123,7 +123,7 @@ def _contact(trace: Trace, pool: Pool, picture: int, report: Report | None) -> d
         else {
             "names": plane,
             "threshold": plane_threshold(trace),
-            "pins": _pins(chart, plane, report),
+            "pins": _pins(chart, plane, reports),
         },
         "units": {
             name: unit
@@ -217,10 +217,8 @@ def _thresholds(trace: Trace, pool: Pool) -> list[Any]:
     return [pool.add(s) for s in trace.s.T]
 
 
-def _pins(chart: Chart, plane: tuple[str, str], report: Report | None) -> list[dict[str, Any]]:
+def _pins(chart: Chart, plane: tuple[str, str], reports: Sequence[Report]) -> list[dict[str, Any]]:
     """Return the counterexamples that have a place in the plane of the chart."""
-    if report is None or report.chart != chart:
-        return []
     return [
         {
             "at": [each.counterexample[name] for name in plane],
@@ -228,6 +226,8 @@ def _pins(chart: Chart, plane: tuple[str, str], report: Report | None) -> list[d
             "status": each.status,
             "where": list(each.where),
         }
+        for report in reports
+        if report.chart == chart
         for each in report.findings
         if all(name in each.counterexample for name in plane)
     ]

@@ -80,8 +80,9 @@ class RunView {
 
   show(row) {
     this.row = row;
-    const { contact, run } = this, fired = run.fired.get(row);
+    const { run } = this, fired = run.fired.get(row);
     if (fired && following) this.choose(fired.contact, fired.element);
+    const { contact } = this;
     const get = (name, unit) => eng(contact.value(name, 0, row), unit, 5);
     const number = `row ${run.number[row]}`;
     $(".values", this.root).textContent = [

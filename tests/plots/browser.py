@@ -168,16 +168,19 @@ def in_view(page: Page, selector: str) -> bool:
                 const node = document.querySelector(selector);
                 if (!node) return false;
                 const inner = node.getBoundingClientRect();
-                let box = { left: 0, top: 0, right: innerWidth,
-                            bottom: document.querySelector("#controls").getBoundingClientRect().top };
+                const controls = document.querySelector("#controls").getBoundingClientRect();
+                let box = { left: 0, top: 0, right: innerWidth, bottom: controls.top };
                 for (let outer = node.parentElement; outer; outer = outer.parentElement) {
                     if (getComputedStyle(outer).overflow === "visible") continue;
                     if (outer === document.body || outer === document.documentElement) continue;
                     const of = outer.getBoundingClientRect();
-                    box = { left: Math.max(box.left, of.left), right: Math.min(box.right, of.right),
-                            top: Math.max(box.top, of.top), bottom: Math.min(box.bottom, of.bottom) };
+                    box = {
+                        left: Math.max(box.left, of.left), right: Math.min(box.right, of.right),
+                        top: Math.max(box.top, of.top), bottom: Math.min(box.bottom, of.bottom),
+                    };
                 }
-                return inner.width + inner.height > 0 && inner.top >= box.top - 1 && inner.bottom <= box.bottom + 1
+                return inner.width + inner.height > 0
+                    && inner.top >= box.top - 1 && inner.bottom <= box.bottom + 1
                     && inner.left >= box.left - 1 && inner.left < box.right;
             }""",
             selector,

@@ -1,4 +1,4 @@
-"""The page explains every row as `gms_fsm.inspection.explain` does, and shows what has just fired."""
+"""The page explains every row as `gms_fsm.inspection.explain` does, and shows what fired."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Everybody can use the page: every size of screen, by keyboard, and without faults that axe finds."""
+"""Everybody can use the page: on every screen, by keyboard, without faults that axe finds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Breakpoints and the `until` condition stop where they become true, and are read as the language is."""
+"""Breakpoints and `until` stop where they become true; `until` is read as the language is."""
 
 from __future__ import annotations
 

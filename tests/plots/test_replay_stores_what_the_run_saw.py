@@ -242,7 +242,7 @@ def test_counterexamples_are_pinned_where_they_have_a_place() -> None:
         [f.counterexample["v"], f.counterexample["z"]] for f in wanted
     ]
     assert len(pins) > 0
-    with pytest.raises(ParameterError, match="checks is a Report of another chart"):
+    with pytest.raises(ParameterError, match="checks has a Report of another chart"):
         replay_html(fig4("signed"), checks=report)
 
 
