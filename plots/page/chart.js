@@ -31,7 +31,7 @@ class RunView {
         tab.addEventListener("click", () => openPane(side, Pane.key));
         tab.addEventListener("keydown", (event) => {
           const way = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
-          if (!way) return;
+          if (!way || event.shiftKey) return; // with Shift: the next transition
           event.preventDefault();
           event.stopPropagation();
           const tabs = [...list.children], to = tabs[(number + way + tabs.length) % tabs.length];
