@@ -121,21 +121,29 @@ class LandscapePane {
     const seen = extent([{ get: (row) => contact.value(z, element, row), rows }]), widest = Math.max(Math.abs(seen.low), Math.abs(seen.high)) || 1;
     const all = [seen.low, seen.high, ...pins.map(({ at }) => at[1]).filter((u) => Math.abs(u) <= 4 * widest)];
     const wide = { h: 1600, up: new Axis({ name: z, low: -4 * widest, high: 4 * widest }) };
-    contact.states.forEach((_, state) => {
-      const points = new PlaneScope(contact, element, 0, state);
-      for (const tree of points.edges.flatMap((k) => comparisonsIn(contact.edges[k].tree))) {
-        const each = new Comparison(tree, points);
-        if (!each.up) continue;
-        for (const speed of [0.5 * threshold, fastest, -fastest]) {
-          points.column(speed);
-          all.push(...each.cuts(wide).parts.map((part) => wide.up.at(part)));
-        }
+    for (const state of contact.states.keys()) {
+      for (const part of [0, 0.25, 0.5, 0.75, 1]) { // what is held may move them
+        const points = new PlaneScope(contact, element, Math.round(part * (rows - 1)), state);
+        all.push(...this.turns(points, wide, [0.5 * threshold, fastest, -fastest]));
+        if (!points.key) break;
       }
-    });
+    }
     return [
       new Axis({ name: v, unit: unitOf(contact, v), low: -fastest, high: fastest, linear: threshold }),
       new Axis({ name: z, unit: unitOf(contact, z), ...roomy(Math.min(...all), Math.max(...all), 0.14) }),
     ];
+  }
+
+  // Values of the second quantity at which guards turn, at some velocities.
+  turns(points, plane, speeds) {
+    const trees = points.edges.flatMap((k) => comparisonsIn(points.contact.edges[k].tree)), found = [];
+    for (const each of trees.map((tree) => new Comparison(tree, points)).filter(({ up }) => up)) {
+      for (const speed of speeds) {
+        points.column(speed);
+        found.push(...each.cuts(plane).parts.map((part) => plane.up.at(part)));
+      }
+    }
+    return found;
   }
 
   // ---------------------------------------------------------------- the row

@@ -13,10 +13,11 @@ class PlaneScope {
     const guards = this.readBy(this.edges.map((k) => contact.edges[k].tree));
     this.read = this.flow ? new Set([...guards, ...this.readBy([contact.flowTrees[state][z]])]) : guards;
     this.scope = contact.scopeWith(element, row, this.given);
-    this.again = [...this.read].filter((name) => this.varies(name));
+    this.again = [...this.read].filter((name) => this.inner(name) && [v, z].some((each) => this.readBy([name]).has(each)));
     this.byColumn = this.again.filter((name) => !this.readBy([name]).has(z));
-    const fixed = [...this.read].filter((name) => !this.again.includes(name) && name !== v && name !== z);
+    const fixed = [...this.read].filter((name) => !this.inner(name) && name !== v && name !== z);
     for (const name of fixed) this.given[name] = contact.value(name, element, row);
+    for (const name of this.read) if (this.inner(name) && !this.again.includes(name)) this.keep(name);
     this.held = fixed.filter((name) => !Object.hasOwn(contact.parameters, name));
     this.key = this.held.filter((name) => guards.has(name)).map((name) => this.given[name]).join();
     this.v0 = contact.value(v, element, row);
@@ -25,8 +26,8 @@ class PlaneScope {
     this.given[z] = this.z0;
   }
 
-  // Named expressions and the curve are computed again at each point.
-  varies(name) { return Object.hasOwn(this.contact.lets, name) || (name === "s" && this.contact.curveAt !== null); }
+  // Named expressions and the curve are computed from other names.
+  inner(name) { return Object.hasOwn(this.contact.lets, name) || (name === "s" && this.contact.curveAt !== null); }
 
   // All names that trees read, also through named expressions and the curve.
   readBy(trees) {
@@ -36,18 +37,21 @@ class PlaneScope {
       if (found.has(name)) continue;
       found.add(name);
       if (Object.hasOwn(this.contact.lets, name)) todo.push(...namesIn(this.contact.let[name]));
-      else if (this.varies(name)) todo.push(this.contact.velocity);
+      else if (this.inner(name)) todo.push(this.contact.velocity);
     }
     return found;
+  }
+
+  // A name that cannot be computed fails where it is read.
+  keep(name) {
+    const u = valueOf(this.scope, name);
+    if (!Number.isNaN(u)) this.given[name] = u;
   }
 
   column(v) {
     for (const name of this.byColumn) delete this.given[name];
     this.given[this.v] = v;
-    for (const name of this.byColumn) {
-      const u = valueOf(this.scope, name);
-      if (!Number.isNaN(u)) this.given[name] = u; // else it is computed, and fails, where it is read
-    }
+    for (const name of this.byColumn) this.keep(name);
   }
 
   at(v, z) { this.column(v); this.given[this.z] = z; return this.scope; }

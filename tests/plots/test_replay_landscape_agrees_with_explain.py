@@ -35,14 +35,16 @@ SHOWN = """([asked, far]) => asked.map(([row, element]) => {
 })"""
 
 
-@pytest.mark.parametrize("size", ["laptop", "phone"])
+@pytest.mark.parametrize(("size", "rows"), [("laptop", 1000), ("phone", 200)])
 @pytest.mark.parametrize("name", NAMES)
-def test_truths_at_random_rows(open_page: Open, tmp_path: Path, name: str, size: str) -> None:
+def test_truths_at_random_rows(
+    open_page: Open, tmp_path: Path, name: str, size: str, rows: int
+) -> None:
     page, (_, trace) = opened(open_page, tmp_path, name, size), run(name)
     numbers, between = page.evaluate("[[...runs[0].number], [...runs[0].between]]")
     own = [row for row, sample in enumerate(between) if not sample]
     rng = np.random.default_rng(18)
-    asked = [(int(rng.choice(own)), int(rng.integers(trace.n))) for _ in range(1000)]
+    asked = [(int(rng.choice(own)), int(rng.integers(trace.n))) for _ in range(rows)]
     seen = set()
     for (row, element), lanes in zip(asked, page.evaluate(SHOWN, [asked, 0.6]), strict=True):
         why = explain(trace, numbers[row], element)
