@@ -25,6 +25,7 @@ from gms_fsm.language import (
     Comparison,
     Condition,
     Name,
+    Node,
     Number,
     Relation,
     Value,
@@ -201,14 +202,30 @@ class Plane:
         return self.values[self.names[0]], self.values[self.names[1]]
 
     @property
+    def _read(self) -> frozenset[str]:
+        """The names in the edges and the flow of the state, and in what these read in turn."""
+        trees: list[Node] = [self.chart.guards[edge.name] for edge in self.edges]
+        flow = self.chart.flows.get((self.state, self.names[1]))
+        trees += [] if flow is None else [flow]
+        read = frozenset[str]().union(*map(names_in, trees))
+        for name in reversed(self.chart.lets):
+            read |= names_in(self.chart.lets[name]) if name in read else frozenset()
+        return read
+
+    @property
+    def again(self) -> list[str]:
+        """Which named expressions the state reads, and s, that are computed at every point."""
+        return [
+            name
+            for name, tree in self.inner.items()
+            if name in self._read and names_in(tree) & {*self.names}
+        ]
+
+    @property
     def held(self) -> dict[str, float]:
         """What the edges and the flow of the state read besides, by name, as at the row."""
-        trees = [self.expanded(self.chart.guards[edge.name]) for edge in self.edges]
-        flow = self.chart.flows.get((self.state, self.names[1]))
-        read = frozenset[str]().union(*map(names_in, trees))
-        read |= names_in(self.expanded_value(flow)) if flow is not None else frozenset()
-        others = sorted(read - {*self.names, *self.chart.parameter_names})
-        return {name: self.values[name] for name in others if name in self.values}
+        known = {*self.names, *self.chart.parameter_names, *self.inner}
+        return {name: self.values[name] for name in sorted(self._read - known) if name in self.values}
 
     @property
     def threshold(self) -> Value | None:

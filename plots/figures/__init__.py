@@ -5,6 +5,7 @@ Figures are made without pyplot, so there is no global state and no display.
 
 from __future__ import annotations
 
+from plots.figures._landscapes import landscape
 from plots.figures._paper import (
     FIG3_PHASES,
     compare_laws,
@@ -27,6 +28,7 @@ __all__ = [
     "figure_3",
     "figure_4",
     "held_residuals",
+    "landscape",
     "overview",
     "phenomena_matrix",
     "phenomenon_figure",

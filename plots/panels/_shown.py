@@ -171,6 +171,41 @@ def checked_elements(trace: Trace, elements: Iterable[int] | None) -> list[int]:
     return [int(i) for i in chosen]
 
 
+def one_element(trace: Trace, element: object) -> int:
+    """Return the number of an element; raise `ParameterError` if there is no such one."""
+    whole = isinstance(element, (int, np.integer)) and not isinstance(element, bool)
+    if whole and 0 <= element < trace.n:  # type: ignore[operator]
+        return int(element)  # type: ignore[call-overload]
+    raise ParameterError(
+        f"it must be an integer from 0 to {trace.n - 1} (labels count from 1)",
+        place="element",
+        value=element,
+    )
+
+
+def checked_row(trace: Trace, row: object, t: object = None) -> int:
+    """Return the number of a row, from 0; with a time, that of the last row at or before it.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such row.
+    """
+    if t is not None:
+        first, last = float(trace.t[0]), float(trace.t[-1])
+        if not is_number(t) or not first <= t <= last:  # type: ignore[operator]
+            raise ParameterError(
+                f"it must be a time in the run, {first:g} to {last:g} s", place="t", value=t
+            )
+        return int(np.searchsorted(trace.t, t, side="right")) - 1
+    whole = isinstance(row, (int, np.integer)) and not isinstance(row, bool)
+    if not whole or not -len(trace) <= row < len(trace):  # type: ignore[operator]
+        raise ParameterError(
+            f"it must be an integer from {-len(trace)} to {len(trace) - 1}", place="row", value=row
+        )
+    return int(row) % len(trace)  # type: ignore[call-overload]
+
+
 def is_number(value: object) -> bool:
     return isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
 
