@@ -14,9 +14,11 @@ from plots.figures._paper import (
     held_residuals,
     residuals,
 )
+from plots.figures._phase import phase
 from plots.figures._phenomena import phenomena_matrix, phenomenon_figure
 from plots.figures._runs import Measured, cascade_figure, overview, ribbons_figure
 from plots.figures._saving import save
+from plots.figures._unfold import unfold
 from plots.panels._shown import SMOOTH
 
 __all__ = [
@@ -30,9 +32,11 @@ __all__ = [
     "held_residuals",
     "landscape",
     "overview",
+    "phase",
     "phenomena_matrix",
     "phenomenon_figure",
     "residuals",
     "ribbons_figure",
     "save",
+    "unfold",
 ]

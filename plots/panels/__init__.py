@@ -21,6 +21,7 @@ from plots.panels import (
     _shown,
     _states,
     _stribeck,
+    _unfolded,
 )
 from plots.panels._cascades import *  # noqa: F403
 from plots.panels._differences import *  # noqa: F403
@@ -32,6 +33,7 @@ from plots.panels._race import *  # noqa: F403
 from plots.panels._shown import *  # noqa: F403
 from plots.panels._states import *  # noqa: F403
 from plots.panels._stribeck import *  # noqa: F403
+from plots.panels._unfolded import *  # noqa: F403
 
 __all__: list[str] = []
 __all__ += _cascades.__all__
@@ -44,3 +46,4 @@ __all__ += _race.__all__
 __all__ += _shown.__all__
 __all__ += _states.__all__
 __all__ += _stribeck.__all__
+__all__ += _unfolded.__all__
