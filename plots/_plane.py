@@ -208,7 +208,7 @@ class Plane:
         flow = self.chart.flows.get((self.state, self.names[1]))
         trees += [] if flow is None else [flow]
         read = frozenset[str]().union(*map(names_in, trees))
-        for name in reversed(self.chart.lets):
+        for name in reversed([*self.chart.lets]):
             read |= names_in(self.chart.lets[name]) if name in read else frozenset()
         return read
 
@@ -225,7 +225,9 @@ class Plane:
     def held(self) -> dict[str, float]:
         """What the edges and the flow of the state read besides, by name, as at the row."""
         known = {*self.names, *self.chart.parameter_names, *self.inner}
-        return {name: self.values[name] for name in sorted(self._read - known) if name in self.values}
+        return {
+            name: self.values[name] for name in sorted(self._read - known) if name in self.values
+        }
 
     @property
     def threshold(self) -> Value | None:
@@ -287,7 +289,8 @@ class Plane:
     def margin(self, comparison: Comparison | Relation, v: ArrayLike, z: ArrayLike) -> Floats:
         """Return left - right of a comparison at points; NaN where it cannot be computed."""
         left, right = (self.numbers(each, v, z) for each in (comparison.left, comparison.right))
-        assert left is not None and right is not None  # guards read nothing else
+        assert left is not None  # guards read nothing else
+        assert right is not None
         with np.errstate(invalid="ignore"):
             return left - right
 
@@ -299,7 +302,7 @@ class Plane:
         found = (comparisons(split(self.chart.guards[edge.name])) for edge in edges)
         return tuple(dict.fromkeys(each for parts in found for each in parts))
 
-    def reads(self, comparison: Comparison) -> frozenset[str]:
+    def reads(self, comparison: Comparison | Relation) -> frozenset[str]:
         """Return the names that a comparison depends on."""
         sides = (comparison.left, comparison.right)
         return frozenset[str]().union(*(names_in(self.expanded_value(side)) for side in sides))
@@ -313,9 +316,7 @@ def _threshold(curve: Stribeck, weight: float, velocity: str) -> Value:
 
 
 # --------------------------------------------------------------------------- its axes
-def turning_points(
-    plane: Plane, edges: Iterable[Transition], axis: int, at: float = 0.0
-) -> Floats:
+def turning_points(plane: Plane, edges: Iterable[Transition], axis: int, at: float = 0.0) -> Floats:
     """Return where comparisons of guards turn along one axis of the plane.
 
     Parameters
@@ -332,8 +333,8 @@ def turning_points(
     Returns
     -------
     ndarray
-        Both signs, without 0, to two digits. Along the velocity, only comparisons that do not read the second
-        quantity are asked.
+        Both signs, without 0, to two digits. Along the velocity, only comparisons that do not read
+        the second quantity are asked.
     """
     own, other = plane.names[axis], plane.names[1 - axis]
     found: list[float] = []

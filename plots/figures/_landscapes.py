@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from textwrap import wrap
 
-import numpy as np
-
 from gms_fsm.errors import ParameterError
 from gms_fsm.inspection._findings import Report
 from gms_fsm.traces.trace import Trace, check_trace
@@ -20,7 +18,12 @@ from plots.style import INK, LINE_GREY, RC
 
 __all__ = ["landscape"]
 
-WIDTH, PLOT, TOP, LINE = 11.6, 5.2, 0.95, 0.165  # inches: figure, panels, above them, a line of text
+WIDTH, PLOT, TOP, LINE = (
+    11.6,
+    5.2,
+    0.95,
+    0.165,
+)  # inches: figure, panels, above them, a line of text
 LANE = 0.56  # inches: a row of the race, if there is room
 LETTERS = 165  # of the caption, per line
 
@@ -103,14 +106,17 @@ def landscape(
         if checks is not None:
             panels.pins(left, trace, element, checks, row=row)
         panels.race(right, trace, element, row=row)
-        left.set_title(f"a) guards that leave {plane.state}")
+        shown = "guards that leave" if plane.edges else "flow of"
+        left.set_title(f"a) {shown} {plane.state}")
         right.set_title("b) race to fire")
         looks = [("path before", INK, "-"), ("after", INK, DASHED)]
         handles = [Line2D([], [], color=c, linestyle=dash, label=n) for n, c, dash in looks]
         if plane.threshold is not None:
             handles.append(Line2D([], [], color=LINE_GREY, linewidth=5, alpha=0.45, label="±s(v)"))
         left.legend(handles=handles, loc="lower right", bbox_to_anchor=(1, 1), ncols=3)
-        figure.suptitle(_title(trace, plane, title), x=0.02, y=1 - 0.12 / height, ha="left", va="top")
+        figure.suptitle(
+            _title(trace, plane, title), x=0.02, y=1 - 0.12 / height, ha="left", va="top"
+        )
         for number, line in enumerate(lines):
             place = (LINE * (len(lines) - number) + 0.06) / height
             figure.text(0.02, place, line, fontsize=8, va="top", color=INK)
@@ -132,7 +138,9 @@ def _caption(trace: Trace, plane: Plane) -> list[str]:
             f"Row {plane.row + 1} was made by {edge}; shown is row {plane.row} before it, with the "
             "values that the guards saw."
         )
-    held = ", ".join(f"{name} = {quantity(chart, name, value)}" for name, value in plane.held.items())
+    held = ", ".join(
+        f"{name} = {quantity(chart, name, value)}" for name, value in plane.held.items()
+    )
     again = [f"{name}({plane.names[0]})" if name == "s" else name for name in plane.again]
     lines.append(
         f"Held as at the row: {held or 'nothing'}."
@@ -146,8 +154,8 @@ def _caption(trace: Trace, plane: Plane) -> list[str]:
         lines.append("No arrows: the arc of this row has no second time.")
     else:
         lines.append(
-            f"Arrows: direction of the flow, d{second}/dt of {plane.state} and "
-            f"d{plane.names[0]}/dt = {quantity(chart, 'a', dv)} as at this row, everywhere the same."
+            f"Arrows: direction of the flow; d{second}/dt is that of {plane.state}, "
+            f"d{plane.names[0]}/dt = {quantity(chart, 'a', dv)} as at this row everywhere."
         )
     return lines
 
@@ -157,7 +165,9 @@ def _pins_listed(plane: Plane, checks: Report) -> list[str]:
     found = pinned(plane, checks)
     if not found:
         return [f"No finding of the checks has a point with {' and '.join(plane.names)}."]
-    lines = ["Pins: counterexamples, with numbers of their own; on the frame if they lie outside it."]
+    lines = [
+        "Pins: counterexamples, with numbers of their own; on the frame if they lie outside it."
+    ]
     for number, each in enumerate(found, start=1):
         where = ", ".join(each.where)
         lines.append(f"{number}  {each.check} {each.status}, {where}: {each.text} ({each.example})")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -96,7 +97,7 @@ def phase(
 def _dot(ax: Axes, here: float, values: np.ndarray, unit: str, F: float) -> None:
     """Draw the dot in the unit of the axis, which is that of the values shown."""
     factor, _ = scaled(values, unit)
-    look = {"color": VERMILION, "markersize": 9, "markeredgecolor": PAPER}
+    look: Any = {"color": VERMILION, "markersize": 9, "markeredgecolor": PAPER}
     ax.plot(factor * here, F, "o", zorder=8, clip_on=False, **look)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -93,7 +94,7 @@ def unfold(
 
 
 def _swatch(mode: int, name: str) -> Rectangle:
-    look = {
+    look: Any = {
         "facecolor": STATE_FILLS[mode % len(STATE_FILLS)],
         "edgecolor": STATE_EDGES[mode % len(STATE_EDGES)],
         "hatch": HATCHES[mode % len(HATCHES)],

@@ -1,9 +1,9 @@
-"""The panel of one element's guards: regions in the plane of v and z, with the flow and the path."""
+"""The panel of one element's guards: regions in the plane of v and z, with flow and path."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,7 @@ __all__ = ["landscape", "pins"]
 GRID = (801, 401)  # points of the plane at which guards are evaluated
 ARROWS = (19, 13)  # of the flow field
 DASHES = ("-", "--", "-.", ":")
-DASHED = (0, (2, 1.4))  # the path after the row
+DASHED: Any = (0, (2, 1.4))  # the path after the row
 
 Floats = NDArray[np.float64]
 
@@ -241,9 +241,11 @@ def _regions(ax: Axes, plane: Plane, v: Floats, z: Floats, factor: float) -> Art
         if not inside.any():
             continue
         colour = EDGE_COLOURS[number % len(EDGE_COLOURS)]
-        look = {"zorder": 1, "levels": [0.5, 1.5]}
+        look: Any = {"zorder": 1, "levels": [0.5, 1.5]}
         values = inside.astype(float)
-        drawn.append(ax.contourf(v[0], factor * z[:, 0], values, colors=[colour], alpha=0.16, **look))
+        drawn.append(
+            ax.contourf(v[0], factor * z[:, 0], values, colors=[colour], alpha=0.16, **look)
+        )
         hatch = EDGE_HATCHES[number % len(EDGE_HATCHES)]
         lines = ax.contourf(v[0], factor * z[:, 0], values, colors="none", hatches=[hatch], **look)
         lines.set(facecolor="none", edgecolor=to_rgb(colour) + (0.5,), linewidth=0.0)
@@ -386,9 +388,7 @@ def pinned(plane: Plane, checks: Report) -> list[Finding]:
         If the report is that of another chart.
     """
     if not isinstance(checks, Report):
-        raise ParameterError(
-            "it must be a Report, from prove(chart)", place="checks", value=checks
-        )
+        raise ParameterError("it must be a Report, from prove(chart)", place="checks", value=checks)
     if checks.chart != plane.chart:
         raise ParameterError(
             f"checks is the report of the chart {checks.chart.name!r}",
@@ -397,9 +397,7 @@ def pinned(plane: Plane, checks: Report) -> list[Finding]:
     return [each for each in checks.findings if {*plane.names} <= each.counterexample.keys()]
 
 
-def pins(
-    ax: Axes, trace: Trace, element: int, checks: Report, *, row: int = -1
-) -> Artists:
+def pins(ax: Axes, trace: Trace, element: int, checks: Report, *, row: int = -1) -> Artists:
     """Draw the counterexamples of a chart's checks as numbered pins, on top of a landscape.
 
     Parameters

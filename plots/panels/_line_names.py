@@ -100,7 +100,7 @@ class LineNames(Artist):
         list of Text
             No two of them overlap.
         """
-        ax, unit = self._owner, renderer.points_to_pixels(1.0)
+        ax, unit = self._owner, float(renderer.points_to_pixels(1.0))  # type: ignore[arg-type]
         taken = _Taken()
         for point in self.avoid:
             x, y = ax.transData.transform(point)
@@ -110,7 +110,10 @@ class LineNames(Artist):
         others = [_dense(ax, curve, unit) for curve in self.curves]
         found: list[Text] = []
         for number, line in enumerate(self.lines):
-            taken.points = [*others, *(p for k, each in enumerate(dense) if k != number for p in each)]
+            taken.points = [
+                *others,
+                *(p for k, each in enumerate(dense) if k != number for p in each),
+            ]
             text = self._text(line)
             spots = self._spots(text, dense[number], taken, renderer)
             if not spots:
@@ -123,7 +126,7 @@ class LineNames(Artist):
 
     @property
     def _owner(self) -> Axes:
-        assert self.axes is not None
+        assert isinstance(self.axes, Axes)
         return self.axes
 
     def _text(self, line: NamedLine) -> Text:
@@ -144,7 +147,8 @@ class LineNames(Artist):
         self, text: Text, pieces: list[Floats], taken: _Taken, renderer: RendererBase
     ) -> list[_Spot]:
         """Return the free places on the pieces of a line."""
-        whole, unit = self._owner.bbox, renderer.points_to_pixels(1.0)
+        whole = self._owner.bbox
+        unit = float(renderer.points_to_pixels(1.0))  # type: ignore[arg-type]
         extent = text.get_window_extent(renderer)
         long, tall = extent.width + 2 * PAD * unit, extent.height + 2 * PAD * unit
         covered = np.concatenate([*taken.points, np.empty((0, 2))])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -99,7 +100,7 @@ def race(ax: Axes, trace: Trace, element: int, *, row: int = -1) -> Artists:
     ax.set(xlim=(-1.04, 1.04), ylim=(y - 0.75, -0.6), yticks=[])
     ax.set_xticks([-1, -0.5, 0, 0.5, 1], ["−1", "−0.5", "0", "0.5", "1"])
     ax.set_xlabel(
-        "open: false    ←    margin / larger side    →    filled: true\n"
+        "open: false   ←   margin / larger side [–]   →   filled: true\n"
         "bold: the clause that holds an edge back"
     )
     return drawn
@@ -111,13 +112,15 @@ def _lane(ax: Axes, each: Explanation, number: int, y: float) -> Artists:
     hatch = EDGE_HATCHES[number % len(EDGE_HATCHES)]
     drawn: Artists = []
     for fill, alpha, pattern in ((colour, 0.16, ""), ("none", 0.6, hatch)):
-        box = Rectangle((-1.03, y - 0.28), 0.16, 0.56, facecolor=fill, edgecolor=colour, alpha=alpha)
+        box = Rectangle(
+            (-1.03, y - 0.28), 0.16, 0.56, facecolor=fill, edgecolor=colour, alpha=alpha
+        )
         box.set(hatch=pattern, linewidth=0.0)
         drawn.append(ax.add_patch(box))
     name = f"{each.priority}  {each.edge.name} → {each.edge.target}"
     verdict = _verdict(each)
     size = 9.0 if len(name) + len(verdict) < LONGEST else 9.0 * LONGEST / (len(name) + len(verdict))
-    look = {"va": "center", "fontsize": size}
+    look: Any = {"va": "center", "fontsize": size}
     drawn.append(ax.text(-0.82, y, name, color=INK, **look))
     drawn.append(ax.text(1.03, y, verdict, ha="right", color=colour, **look))
     back = held_back_by(each)
@@ -139,10 +142,12 @@ def _clause(ax: Axes, clause: Clause, colour: str, y: float, *, bold: bool) -> A
     """Draw one clause: its text and numbers above its bar."""
     weight = "bold" if bold else "normal"
     mark = TRUE if clause.holds else FALSE
-    look = {"fontsize": 8, "va": "center", "fontweight": weight}
+    look: Any = {"fontsize": 8, "va": "center", "fontweight": weight}
     drawn: Artists = [
         ax.text(-1.03, y - 0.22, f"{mark}  {clause.text}", color=INK, **look),
-        ax.text(1.03, y - 0.22, _amount(clause), ha="right", color=INK if bold else TEXT_GREY, **look),
+        ax.text(
+            1.03, y - 0.22, _amount(clause), ha="right", color=INK if bold else TEXT_GREY, **look
+        ),
     ]
     margin = relative_margin(clause)
     if math.isnan(margin):

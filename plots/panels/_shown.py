@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -156,7 +157,7 @@ def checked_elements(trace: Trace, elements: Iterable[int] | None) -> list[int]:
         chosen = list(elements)
     except TypeError:
         chosen = []
-    whole = all(isinstance(i, (int, np.integer)) and not isinstance(i, bool) for i in chosen)
+    whole = all(map(is_whole, chosen))
     if (
         not chosen
         or not whole
@@ -171,19 +172,19 @@ def checked_elements(trace: Trace, elements: Iterable[int] | None) -> list[int]:
     return [int(i) for i in chosen]
 
 
-def one_element(trace: Trace, element: object) -> int:
+def one_element(trace: Trace, element: Any) -> int:
     """Return the number of an element; raise `ParameterError` if there is no such one."""
-    whole = isinstance(element, (int, np.integer)) and not isinstance(element, bool)
-    if whole and 0 <= element < trace.n:  # type: ignore[operator]
-        return int(element)  # type: ignore[call-overload]
-    raise ParameterError(
-        f"it must be an integer from 0 to {trace.n - 1} (labels count from 1)",
-        place="element",
-        value=element,
-    )
+    check_trace(trace)
+    if not is_whole(element) or not 0 <= element < trace.n:
+        raise ParameterError(
+            f"it must be an integer from 0 to {trace.n - 1} (labels count from 1)",
+            place="element",
+            value=element,
+        )
+    return int(element)
 
 
-def checked_row(trace: Trace, row: object, t: object = None) -> int:
+def checked_row(trace: Trace, row: Any, t: Any = None) -> int:
     """Return the number of a row, from 0; with a time, that of the last row at or before it.
 
     Raises
@@ -193,17 +194,20 @@ def checked_row(trace: Trace, row: object, t: object = None) -> int:
     """
     if t is not None:
         first, last = float(trace.t[0]), float(trace.t[-1])
-        if not is_number(t) or not first <= t <= last:  # type: ignore[operator]
+        if not is_number(t) or not first <= t <= last:
             raise ParameterError(
                 f"it must be a time in the run, {first:g} to {last:g} s", place="t", value=t
             )
         return int(np.searchsorted(trace.t, t, side="right")) - 1
-    whole = isinstance(row, (int, np.integer)) and not isinstance(row, bool)
-    if not whole or not -len(trace) <= row < len(trace):  # type: ignore[operator]
+    if not is_whole(row) or not -len(trace) <= row < len(trace):
         raise ParameterError(
             f"it must be an integer from {-len(trace)} to {len(trace) - 1}", place="row", value=row
         )
-    return int(row) % len(trace)  # type: ignore[call-overload]
+    return int(row) % len(trace)
+
+
+def is_whole(value: object) -> bool:
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
 
 
 def is_number(value: object) -> bool:

@@ -1,4 +1,4 @@
-"""Panels of micro-steps: every instant with transitions takes as many columns as it has micro-steps.
+"""Panels of micro-steps: every instant with transitions takes one column per micro-step.
 
 So a cascade of milliseconds, or of no time at all, can be read.
 """
@@ -24,6 +24,7 @@ __all__ = ["Unfolded", "unfolded", "unfolded_force", "unfolded_states"]
 
 MOST_COLUMNS = 24  # more cannot be read side by side
 GAP = 0.55  # width of the gap between instants, in columns
+TURNS = 10  # of a zigzag, per inch
 FEW = 8  # elements; of more, only new states are named
 LETTER = 0.075  # inches: width of a letter of 8 points
 LINE = 0.15  # inches: height of a line of 8 points
@@ -141,7 +142,7 @@ def unfolded(
     log = trace.transitions
     mine = np.isin(log.element, chosen) & (log.t >= begin) & (log.t <= end)
     if not mine.any():
-        raise ParameterError(_nothing(trace, begin, end), advice=_nearest(log, begin, end))
+        raise ParameterError(_nothing(begin, end), advice=_nearest(log, begin, end))
     steps, where = steps_of(trace), np.flatnonzero(mine)
     modes = {i: _mode_before(trace, i, int(where[0])) for i in chosen}
     times = np.unique(log.t[mine])
@@ -179,7 +180,7 @@ def _mode_before(trace: Trace, i: int, position: int) -> int:
     return chart.state_index(str(name))
 
 
-def _nothing(trace: Trace, begin: float, end: float) -> str:
+def _nothing(begin: float, end: float) -> str:
     return f"there is no transition from {begin:.9g} to {end:.9g} s"
 
 
@@ -266,12 +267,12 @@ def unfolded_force(ax: Axes, part: Unfolded) -> Artists:
 
 
 def _written(values: NDArray[np.float64]) -> list[str]:
-    """Return numbers with as many digits as it takes to tell successive ones apart."""
+    """Return numbers with as many digits, 3 to 6, as it takes to tell successive ones apart."""
     largest = float(np.nanmax(np.abs(values), initial=0.0))
     whole = int(np.floor(np.log10(largest))) if largest > 0 else 0
-    differ = np.diff(values) != 0
+    differ = np.abs(np.diff(values)) > 1e-6 * largest
     texts: list[str] = []
-    for digits in range(3, 8):
+    for digits in range(3, 7):
         texts = [f"{value:.{max(0, digits - 1 - whole)}f}" for value in values]
         same = [a == b for a, b in zip(texts[1:], texts[:-1], strict=True)]
         if not (differ & same).any():
@@ -328,7 +329,10 @@ def unfolded_states(ax: Axes, part: Unfolded) -> Artists:
     ax.set_xticks([each.left + 0.5 for each in part.columns], [str(c.step) for c in part.columns])
     ax.tick_params(length=0)
     ax.spines[:].set_visible(False)
-    ax.set_xlabel("micro-step at each instant (0: before the first firing); time", labelpad=20 if part.times.size == 1 else 33)
+    ax.set_xlabel(
+        "micro-step at each instant (0: before the first firing); time",
+        labelpad=20 if part.times.size == 1 else 33,
+    )
     return [*cells, *drawn, *_times(ax, part), *_breaks(ax, part)]
 
 
@@ -404,8 +408,8 @@ def _edge_names(ax: Axes, part: Unfolded, wide: float) -> Artists:
 def _times(ax: Axes, part: Unfolded) -> Artists:
     """Write the time of the first instant, and the time between instants."""
     places, texts = list(part.gaps), []
-    for step in np.diff(part.times):
-        factor, unit = scaled(np.array([step]), "s")
+    for step in np.diff(part.times).tolist():
+        factor, unit = scaled(np.array([step]), "s") if step >= 1e-10 else (1.0, "s")
         texts.append(f"+{factor * step:.4g} {unit}")
     look: dict[str, Any] = {
         "xycoords": ax.get_xaxis_transform(),
@@ -424,7 +428,8 @@ def _times(ax: Axes, part: Unfolded) -> Artists:
 
 def _breaks(ax: Axes, part: Unfolded) -> Artists:
     """Mark each gap by a zigzag, since time is not continuous there."""
-    heights = np.linspace(0.0, 1.0, 25)
+    tall = ax.get_window_extent().height / ax.figure.dpi
+    heights = np.linspace(0.0, 1.0, max(4, round(TURNS * tall)))
     turns = 0.07 * np.where(np.arange(heights.size) % 2, 1.0, -1.0)
     drawn: Artists = []
     for middle in part.gaps:

@@ -22,6 +22,8 @@ ON_AXES = sorted(
     - {"difference", "residual", "slip_bar"}
     - {"lag_between_ticks", "lag_over_period", "lag_over_time"}
     - {"cascade_window", "has_threshold", "shown"}
+    - {"landscape", "pins", "race"}  # of one element
+    - {"Unfolded", "arrows", "unfolded", "unfolded_force", "unfolded_states"}
 )
 DRAWN: dict[str, Callable[..., object]] = {
     "LiveChart": LiveChart,
@@ -34,6 +36,12 @@ DRAWN: dict[str, Callable[..., object]] = {
     "shown": panels.shown,
     **{name: partial(getattr(panels, name), AX) for name in ON_AXES},
     **{name: getattr(figures, name) for name in ("overview", "ribbons_figure", "cascade_figure")},
+    "landscape": partial(figures.landscape, element=0),
+    "landscape, panel": partial(panels.landscape, AX, element=0),
+    "race": partial(panels.race, AX, element=0),
+    "pins": partial(panels.pins, AX, element=0, checks=None),
+    "unfold": partial(figures.unfold, t0=0.0, t1=1.0),
+    "phase": figures.phase,
 }
 
 
