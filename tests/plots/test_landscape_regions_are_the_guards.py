@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -82,3 +83,21 @@ def test_random_rows(run: Callable[[], Trace]) -> None:
             seen |= {(each.edge.name, each.holds)}
     assert len({name for name, _ in seen}) >= 2
     assert {truth for _, truth in seen} == {True, False}
+
+
+def test_elsewhere_named_expressions_and_s_are_computed_again() -> None:
+    """At other points of the plane, limits are those of that velocity; w is held."""
+    trace = fading()
+    plane = Plane.of(trace, int(np.flatnonzero(trace.states[:, 0] == "stick")[-1]), 0)
+    guard = plane.chart.guards["go"]
+    w = plane.held["w"]
+    assert w > 0.1
+    for v in (1e-3, 0.1, 0.3, 2.0):
+        limit = 0.1 * (0.2 + 0.8 * math.exp(-v / 0.2)) / (1 + w)
+        assert plane.truths(guard, v, [0.999 * limit, 1.001 * limit]).tolist() == [False, True]
+    trace = gms()
+    plane = Plane.of(trace, 100, 2)
+    guard, model = plane.chart.guards["break_away_forward"], trace.model
+    for v in (1e-3, 0.05, 1.0):
+        s = model.weights[2] * (1 + 0.5 * math.exp(-((v / 0.05) ** 2)))
+        assert plane.truths(guard, v, [0.999 * s, 1.001 * s]).tolist() == [False, True]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -21,7 +23,8 @@ from matplotlib.text import Annotation
 
 from plots import figures, panels
 from plots._plane import Plane, linear_threshold, plane_axes
-from plots.panels._line_names import LineNames
+from plots.panels._line_names import LineNames, NamedLine
+from plots.panels._race import held_back_by
 from tests.helpers import FASTEST, one_element, pulled_mass, stick_slip, wear
 from tests.helpers import open_loop as sine
 from tests.zoo.zoo_cases import elasto_plastic, karnopp, modelica
@@ -148,6 +151,17 @@ def test_what_holds_an_edge_back_is_bold(run: Trace) -> None:
     assert not [text for text in bold if text.startswith("✓")]
 
 
+def test_the_smallest_relative_margin_holds_back(run: Trace) -> None:
+    """In slip at speed, |v| <= v_c is far from true, and |z| < s false by little."""
+    rows = np.flatnonzero((run.states[:, 0] == "slip") & (run.v > 0))
+    row = next(k for k in rows.tolist() if not any(c.holds for c in explain(run, k, 0)[0].clauses))
+    told = explain(run, row, 0)[0]
+    for each in (told, replace(told, clauses=told.clauses[::-1])):
+        back = held_back_by(each)
+        assert back is not None
+        assert back.text == "|v| <= v_c"
+
+
 def test_compound_clauses_have_a_mark_only() -> None:
     trace = simulate(wear(), sine(), 30.0)
     row = int(np.flatnonzero(trace.states[:, 1] == "creep")[2])
@@ -172,6 +186,18 @@ def test_names_of_clauses_do_not_overlap(run: Trace, row: int) -> None:
         assert not any(box.overlaps(other) for other in boxes[:i])
         assert figure.axes[0].bbox.contains(*box.min)
         assert figure.axes[0].bbox.contains(*box.max)
+
+
+def test_names_of_one_line_stand_side_by_side() -> None:
+    figure = Figure()
+    ax = figure.subplots()
+    names = LineNames(ax)
+    line = np.array([[0.0, 0.5], [1.0, 0.5]])
+    names.lines += [NamedLine(f"line {k}", "black", (line,)) for k in range(60)]
+    placed = names.placed(FigureCanvasAgg(figure).get_renderer())
+    boxes = [text.get_window_extent() for text in placed]
+    assert 4 <= len(placed) < 60  # the others have no place
+    assert not any(b.overlaps(a) for k, b in enumerate(boxes) for a in boxes[:k])
 
 
 def test_the_caption_says_what_is_held() -> None:

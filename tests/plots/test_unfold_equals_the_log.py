@@ -151,16 +151,16 @@ def test_written_values_tell_before_from_after(make: Make) -> None:
 
 def test_firings_of_others_are_one_column() -> None:
     trace, t, _ = one_time()
-    part = panels.unfolded(trace, t, t, elements=[0, 3])
+    part = panels.unfolded(trace, t, t, elements=[0, 2])
     assert [(each.step, each.element) for each in part.columns] == [
         (0, -1),
         (1, 0),
-        (3, -1),
-        (4, 3),
+        (2, -1),
+        (3, 2),
     ]
     log = trace.transitions
-    assert [each.F for each in part.columns[2:]] == [log.F_before[3], log.F_after[3]]
-    figure = figures.unfold(trace, t, t, elements=[0, 3])
+    assert [each.F for each in part.columns[2:]] == [log.F_before[2], log.F_after[2]]
+    figure = figures.unfold(trace, t, t, elements=[0, 2])
     assert "others" in [each.get_text() for each in figure.axes[1].texts]
 
 
