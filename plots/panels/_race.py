@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm.inspection.explain import Clause, Explanation, Why, explain
+from gms_fsm.inspection.explain import ROUNDING, Clause, Explanation, Why, explain
 from gms_fsm.traces.trace import Trace
 from plots._labels import FALSE, TRUE
 from plots._matplotlib import Axes, Rectangle
@@ -20,7 +20,6 @@ __all__ = ["race"]
 LONGEST = 44  # letters of a lane's name and verdict, before they become smaller
 GAP = 0.35  # rows between lanes
 SHORTEST = 0.015  # length of a bar that would otherwise be invisible
-ROUNDING = 1e-8  # as in `explain`: a smaller relative margin is due to the clock and floats
 
 
 def relative_margin(clause: Clause) -> float:

@@ -21,10 +21,13 @@ pytest.importorskip("matplotlib", reason="figures need the extra 'plots'")
 from plots import figures, panels, schematic  # after the skip
 from plots._matplotlib import Axes, Figure
 
-FIGURES = ("overview", "ribbons_figure", "cascade_figure")
+FIGURES = ("overview", "ribbons_figure", "cascade_figure", "phase")
 LAGS = {"lag_between_ticks", "lag_over_period", "lag_over_time"}
 OTHERS = {"cascade_window", "difference", "has_threshold", "residual", "shown", "slip_bar", *LAGS}
-PANELS = tuple(sorted({*panels.__all__} - OTHERS - {"stribeck"}))
+OF_AN_ELEMENT = {"landscape", "pins", "race"}
+UNFOLDED = {"Unfolded", "unfolded", "unfolded_force", "unfolded_states"}
+OTHERS |= {"arrows", "stribeck", *OF_AN_ELEMENT, *UNFOLDED}
+PANELS = tuple(sorted({*panels.__all__} - OTHERS))
 
 
 @pytest.fixture
@@ -57,6 +60,19 @@ def test_every_figure_takes_a_contact(name: str, system: System, contact: str) -
 @pytest.mark.parametrize("name", PANELS)
 def test_every_panel_takes_a_contact(name: str, ax: Axes) -> None:
     assert getattr(panels, name)(ax, run(BLOCKS).contact("pad2"))
+
+
+@pytest.mark.parametrize(
+    ("system", "contact"), [(PULLED, "pad"), (BALL, "floor"), (BLOCKS, "pad2")]
+)
+def test_landscape_and_micro_steps_take_a_contact(system: System, contact: str) -> None:
+    trace = run(system).contact(contact)
+    t = trace.transitions.t
+    for figure in (
+        figures.landscape(trace, 0, row=len(trace) // 2),
+        figures.unfold(trace, float(t[0]), float(t[min(4, t.size - 1)])),
+    ):
+        assert figure.get_suptitle().startswith(f"{contact}: ")
 
 
 @pytest.mark.parametrize("name", ["deflections", "ratio"])
