@@ -5,6 +5,9 @@ They share three arguments. ``window = (t0, t1)`` [s] zooms: the run is sampled 
 axis where one makes sense. Times of switches and the forces on both sides of them come from the
 transition log, which is complete even if the rows are not.
 
+`landscape`, `race` and `pins` are about one element at one row. `unfolded_force` and
+`unfolded_states` take what `unfolded` returns.
+
 A panel is defined in the module of its family and listed in ``__all__`` there.
 """
 
