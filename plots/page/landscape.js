@@ -50,6 +50,7 @@ class LandscapePane {
     let held = false;
     const follow = (event) => this.moveTo(...plane.point(event));
     dot.addEventListener("pointerdown", (event) => { held = true; dot.setPointerCapture(event.pointerId); event.preventDefault(); dot.focus({ preventScroll: true }); });
+    dot.addEventListener("touchstart", (event) => event.preventDefault(), { passive: false }); // else the page scrolls
     dot.addEventListener("pointermove", (event) => { if (held) follow(event); });
     for (const end of ["pointerup", "pointercancel"]) dot.addEventListener(end, () => { held = false; });
     for (const each of [plane.ground, plane.inside]) each.addEventListener("click", follow);
@@ -92,10 +93,12 @@ class LandscapePane {
     const beside = box.clientWidth >= 560, width = beside ? Math.floor(box.clientWidth * 0.6) : box.clientWidth;
     body.classList.toggle("narrow", !beside);
     plane.svg.parentNode.style.width = `${width}px`;
-    this.size = [width, WIDE.matches && beside ? Math.max(box.clientHeight - 4, 180) : Math.min(width * 0.85, 400)];
-    this.layouts.clear();
-    this.drawings.clear();
-    this.laid = "";
+    const height = WIDE.matches && beside ? Math.max(box.clientHeight - 4, 180) : Math.min(width * 0.85, 400), key = `${view.contact.name}/${width}/${height}`;
+    if (this.fitted !== key) { // a page that scrolls also asks when only its texts grow
+      Object.assign(this, { fitted: key, size: [width, height], laid: "" });
+      this.layouts.clear();
+      this.drawings.clear();
+    }
     this.lay();
     this.show();
   }
@@ -104,7 +107,8 @@ class LandscapePane {
   lay() {
     const { view, plane, layouts } = this, { contact, element } = view, key = `${contact.name}/${element}`, [v, z] = contact.plane.names;
     if (this.laid === key) return;
-    Object.assign(this, { laid: key, drawn: "", moved: null });
+    if (this.of !== key) this.moved = null;
+    Object.assign(this, { laid: key, of: key, drawn: "" });
     if (!layouts.has(key)) layouts.set(key, { axes: this.axes() });
     const layout = layouts.get(key);
     plane.lay(...this.size, ...layout.axes);

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gms_fsm import Trace
 from gms_fsm.inspection.explain import values_at
@@ -28,9 +28,9 @@ def run(name: str) -> tuple[Trace, Trace]:
     return trace, trace.contact(trace.contacts[0])
 
 
-def opened(open_page: Open, folder: Path, name: str, size: str = "laptop") -> Page:
+def opened(open_page: Open, folder: Path, name: str, size: str = "laptop", **options: Any) -> Page:
     """Open the landscape of a run."""
-    page = open_page(write_replay(folder / f"{name}.html", run(name)[0]), size)
+    page = open_page(write_replay(folder / f"{name}.html", run(name)[0]), size, **options)
     page.keyboard.press("f")  # the selected element stays selected
     page.get_by_role("tab", name="Landscape", exact=True).click()
     return page
