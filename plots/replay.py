@@ -56,6 +56,7 @@ SCRIPTS = (
     "views.js",
     "landscape.js",
     "microscope.js",
+    "bristles.js",
     "page.js",
 )
 HATCH_ANGLES = (None, 45, 135, 0, 90)  # of the states' ribbons, degrees

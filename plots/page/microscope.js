@@ -2,7 +2,7 @@
 // The microscope: a time axis that unfolds at transitions. Every firing is a column of the same width, whatever the time
 // between them; firings with other rows between them are separated by a gap with a broken axis. Columns are placed once
 // for the whole run, so that nothing jumps while stepping; nodes exist only for those in view.
-const COLUMN = { least: 76, most: 140, gap: 70, head: 18, foot: 34 }; // px
+const COLUMN = { least: 80, most: 140, gap: 70, head: 18, foot: 34 }; // px
 const LINE_HEIGHT = { least: 18, two: 28, most: 36, page: 30 }; // px; from `two` on for names on two lines; `page` where that scrolls
 const STAIRS = { least: 96, most: 330, page: 150, above: 18, below: 8, step: 12 }; // px, with the head; the space for values above
 const F_DIGITS = 5;
@@ -123,7 +123,7 @@ class MicroscopePane {
     this.through = draw("path", this.svg, { class: "through" });
     this.mark = draw("path", this.svg, { class: "mark" });
     this.cover = draw("rect", this.svg, { class: "cover", width: this.labels });
-    this.title = draw("text", this.svg, { class: "title", x: 2, y: 13 }, "F");
+    this.title = draw("text", this.svg, { class: "title", x: 2, y: 13 });
     this.body = make("div", this.wide, "", { class: "rows" });
     this.here = make("div", this.body, "", { class: "here" });
     const names = make("div", this.body, "", { class: "names" });
@@ -143,7 +143,9 @@ class MicroscopePane {
   fit() {
     if (!this.scroller || !this.box.clientWidth) return;
     const count = this.lines.length, rest = this.box.clientHeight - COLUMN.foot - 14; // 14: the bar to scroll
-    this.height = WIDE.matches ? clamp(Math.floor((rest - 150) / count), LINE_HEIGHT.least, LINE_HEIGHT.most) : LINE_HEIGHT.page;
+    const { least, two, most, page } = LINE_HEIGHT, fits = Math.floor((rest - STAIRS.page) / count);
+    const height = fits < two && rest - count * two >= STAIRS.least ? two : clamp(fits, least, most);
+    this.height = WIDE.matches ? height : page;
     this.top = WIDE.matches ? clamp(rest - count * this.height, STAIRS.least, STAIRS.most) : STAIRS.page;
     this.unfold(this.height >= LINE_HEIGHT.two);
     for (const [name, value] of [["--row", this.height], ["--top", this.top], ["--foot", COLUMN.foot]]) this.scroller.style.setProperty(name, `${value}px`);
@@ -281,7 +283,7 @@ class MicroscopePane {
     for (let k = first; k <= last; k++) {
       const apart = strip.apart(k), { run } = view, t = run.t(strip.rows[k] ?? run.rows - 1);
       if (apart) say(`+${eng(t - run.t(strip.rows[k - 1] ?? 0), "s", 3)}`, strip.gaps[k] + COLUMN.gap / 2, 13, "time");
-      if (k < strip.rows.length) say(apart ? `${written(t, 7)} s` : "+0", strip.middle(k), 13, apart ? "time first" : "time");
+      if (k < strip.rows.length) say(apart ? eng(t, "s", 7) : "+0", strip.middle(k), 13, apart ? "time first" : "time");
     }
     this.drawStairs(left, strip.levels(first, last), say);
     const here = strip.place(view.row) - left;
@@ -295,7 +297,9 @@ class MicroscopePane {
   }
 
   drawStairs(left, levels, say) {
-    const F = this.view.contact.columns.F, values = levels.map(({ row }) => F(row));
+    const { contact } = this.view, F = contact.columns.F, title = `F ${contact.name}`;
+    this.title.textContent = textWidth(title) * 1.1 < this.labels ? title : "F";
+    const values = levels.map(({ row }) => F(row));
     const texts = values.map((u) => eng(u, "N", F_DIGITS)), floor = this.top - STAIRS.below;
     // Values that are written alike are drawn alike.
     const known = new Map(texts.map((text, k) => [text, values[k]]).filter(([, u]) => Number.isFinite(u)));
