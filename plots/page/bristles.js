@@ -153,7 +153,7 @@ class BristlesPane {
   // The element that fires, or the selected one, is in view.
   reveal(i) {
     const { box, height } = this, down = box.clientHeight - BRISTLE.head - (this.note() ? 18 : 0);
-    if (!WIDE.matches || this.elements.length * height <= down) return;
+    if (this.elements.length * height <= down) return;
     const to = clamp(box.scrollTop, (i + 1) * height - down, i * height);
     if (Math.abs(to - box.scrollTop) > 0.5) box.scrollTop = to;
   }

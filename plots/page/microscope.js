@@ -3,8 +3,9 @@
 // between them; firings with other rows between them are separated by a gap with a broken axis. Columns are placed once
 // for the whole run, so that nothing jumps while stepping; nodes exist only for those in view.
 const COLUMN = { least: 80, most: 140, gap: 70, head: 18, foot: 34 }; // px
-const LINE_HEIGHT = { least: 18, two: 28, most: 36, page: 30 }; // px; from `two` on for names on two lines; `page` where that scrolls
-const STAIRS = { least: 96, most: 330, page: 150, above: 18, below: 8, step: 12 }; // px, with the head; the space for values above
+const LINE_HEIGHT = { least: 18, two: 28, most: 48, page: 30, count: 8 }; // px; from `two` on for names on two lines; where the page
+// scrolls, `count` lines of height `page`
+const STAIRS = { least: 96, most: 460, page: 150, above: 18, below: 8, step: 12 }; // px, with the head; the space for values above
 const F_DIGITS = 5;
 
 // Width of a text in the font of the drawings, px.
@@ -149,6 +150,7 @@ class MicroscopePane {
     this.top = WIDE.matches ? clamp(rest - count * this.height, STAIRS.least, STAIRS.most) : STAIRS.page;
     this.unfold(this.height >= LINE_HEIGHT.two);
     for (const [name, value] of [["--row", this.height], ["--top", this.top], ["--foot", COLUMN.foot]]) this.scroller.style.setProperty(name, `${value}px`);
+    this.scroller.style.height = WIDE.matches ? "" : `${this.top + COLUMN.foot + 14 + Math.min(count, LINE_HEIGHT.count) * this.height}px`;
     this.across = this.scroller.clientWidth - this.labels;
     this.down = this.scroller.clientHeight - this.top - COLUMN.foot;
     place(this.svg, { width: this.scroller.clientWidth, height: this.top });
