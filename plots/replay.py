@@ -24,6 +24,8 @@ from typing import Any
 from gms_fsm._arguments import checked_kind, listed
 from gms_fsm._extras import missing
 from gms_fsm.errors import ParameterError
+from gms_fsm.inspection.explain import ROUNDING
+from gms_fsm.inspection.prove import Report
 from gms_fsm.language import (
     COMPARISONS,
     CONSTANTS,
@@ -32,14 +34,12 @@ from gms_fsm.language import (
     OPERATIONS,
     SEVERAL,
 )
-from gms_fsm.inspection.explain import ROUNDING
-from gms_fsm.inspection.prove import Report
 from gms_fsm.traces.trace import Trace
 from plots import formats
+from plots._window import window_of
 from plots.page._chart import chart_svg
 from plots.page._rows import page_rows
 from plots.page._run import stored_run, views_of
-from plots._window import window_of
 from plots.style import CHART_THEMES, ELEMENT_COLOURS, PAGE_THEMES
 
 __all__ = ["Replay", "replay", "replay_html", "write_replay"]
@@ -132,7 +132,7 @@ def replay(
     title: str = "",
     names: Sequence[str] = (),
     window: tuple[float, float] | None = None,
-    checks: Report | None = None,
+    checks: Report | Sequence[Report] = (),
 ) -> Replay:
     """Make a replay page, for a notebook.
 
@@ -149,9 +149,9 @@ def replay(
     window : (float, float), optional
         Time interval to show, s; by default the whole run. A run with more transitions than a page
         can hold needs one.
-    checks : Report, optional
-        From `gms_fsm.inspection.prove.prove`; its counterexamples are pinned in the landscape of
-        that chart.
+    checks : Report or sequence of Report, optional
+        From `gms_fsm.inspection.prove.prove`; the counterexamples are pinned in the landscapes of
+        their charts.
 
     Returns
     -------
@@ -185,7 +185,7 @@ def write_replay(
     title: str = "",
     names: Sequence[str] = (),
     window: tuple[float, float] | None = None,
-    checks: Report | None = None,
+    checks: Report | Sequence[Report] = (),
 ) -> Path:
     """Write a replay page: a single file that needs neither a network nor a server.
 
@@ -222,7 +222,7 @@ def replay_html(
     title: str = "",
     names: Sequence[str] = (),
     window: tuple[float, float] | None = None,
-    checks: Report | None = None,
+    checks: Report | Sequence[Report] = (),
 ) -> str:
     """Return a replay page as text.
 
@@ -248,8 +248,15 @@ def replay_html(
         checked_kind("trace", each, Trace, "a Trace, from simulate(...) or Trace.load(path)")
         window_of(each, window)
     checked_kind("title", title, str, "a text")
-    if checks is not None:
-        checked_kind("checks", checks, Report, "a Report, from prove(chart)")
+    reports = [checks] if isinstance(checks, Report) else listed("checks", checks, "Reports")
+    known = [view.model.chart for each in traces for view in views_of(each)]
+    for report in reports:
+        checked_kind("checks", report, Report, "a Report, from prove(chart)")
+        if report.chart not in known:
+            raise ParameterError(
+                f"checks has a Report of another chart, {report.chart.name!r}",
+                advice=f"these runs have {', '.join(sorted({chart.name for chart in known}))}",
+            )
     names = [checked_kind("names", each, str, "texts") for each in listed("names", names, "texts")]
     plot_script, plot_style = _uplot()
     if len(names) not in (0, len(traces)):
@@ -262,7 +269,7 @@ def replay_html(
         page = page_rows(each, window)
         pictures = [chart_svg(view.model.chart, view.n) for view in views_of(each)]
         charts += [picture for picture in dict.fromkeys(pictures) if picture not in charts]
-        run = stored_run(page, [charts.index(picture) for picture in pictures], checks)
+        run = stored_run(page, [charts.index(picture) for picture in pictures], reports)
         head = [*names[i : i + 1], each.title]
         runs.append({"title": ": ".join(head), "of": len(each), **run})
     data = {
@@ -270,7 +277,6 @@ def replay_html(
         "runs": runs,
         "language": _language(),
         "rounding": ROUNDING,
-
     }
     script = "".join(map(_part, SCRIPTS))
     style = _theme() + plot_style + _part("page.css")
@@ -345,7 +351,7 @@ def _copyright(script: str) -> str:
 
 
 def _theme() -> str:
-    """Return the colours of both themes as variables of the style sheet, and the looks of states."""
+    """Return the colours of both themes as variables, and the looks of states."""
     texts = {}
     for name, theme in CHART_THEMES.items():
         page = PAGE_THEMES[name]
@@ -370,9 +376,7 @@ def _theme() -> str:
 def _hatched(k: int, angle: int | None) -> str:
     if angle is None:
         return f"var(--fill{k})"
-    return (
-        f"repeating-linear-gradient({angle}deg,var(--edge{k}) 0 1px,var(--fill{k}) 1px 6px)"
-    )
+    return f"repeating-linear-gradient({angle}deg,var(--edge{k}) 0 1px,var(--fill{k}) 1px 6px)"
 
 
 def _inert(data: object) -> str:

@@ -24,7 +24,16 @@ from gms_fsm.traces._views import steps_of
 from gms_fsm.traces.scope import Scope
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["Clause", "Explanation", "Why", "clause_unit", "explain", "explain_state", "holds", "values_at"]
+__all__ = [
+    "Clause",
+    "Explanation",
+    "Why",
+    "clause_unit",
+    "explain",
+    "explain_state",
+    "holds",
+    "values_at",
+]
 
 ROUNDING = 1e-8  # relative to both sides; a smaller margin is due to the clock and floats
 

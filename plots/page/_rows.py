@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.errors import ParameterError, SignalError
+from gms_fsm.lowering.layout import Layout
 from gms_fsm.traces._views import picked
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
@@ -21,6 +22,8 @@ __all__ = ["PageRows", "page_rows"]
 
 MOST_ROWS, FEWEST_ROWS = 4000, 200  # away from transitions; the first is for one element
 MOST_AT_TRANSITIONS = 80_000  # of a page, at and next to instants with transitions
+VALUES = 20_000  # of a long run away from transitions, about
+MOST_COMPONENTS = 12  # with more, the elements' variables are not searched for extremes
 SMALL = 10_000  # so many rows of transitions also keep the rows next to their instants
 
 
@@ -99,22 +102,27 @@ def page_rows(trace: Trace, window: tuple[float, float] | None = None) -> PageRo
         kept[:-1] |= instants[1:]
     kept[[0, -1]] = True
     others = np.flatnonzero(~kept)
-    kept[others if others.size <= wanted else others[_seen(run.rows.y[others], wanted)]] = True
+    kept[others if others.size <= wanted else others[_seen(run.rows.y[others], layout)]] = True
     return found if kept.all() else found.at(kept)
 
 
-def _seen(y: NDArray[np.float64], wanted: int) -> NDArray[np.int64]:
-    """Return the rows with the lowest and highest values of each component in short intervals."""
-    count = max(1, wanted // (2 * max(1, y.shape[1])))
+def _seen(y: NDArray[np.float64], layout: Layout) -> NDArray[np.int64]:
+    """Return the rows with the lowest and highest values of components in short intervals.
+
+    Of many elements only what they share is asked; their variables turn where it does.
+    """
+    places = [layout.y.index(name) for name in layout.y.shared]
+    if y.shape[1] <= MOST_COMPONENTS:
+        places = list(range(y.shape[1]))
+    count = min(max(VALUES // (2 * max(len(places), 1) * (layout.n + 3)), 50), len(y))
     bounds = np.linspace(0, len(y), count + 1).astype(int)[:-1]
+    sizes = np.diff(np.append(bounds, len(y)))
     keep = [bounds]
-    for column in y.T:
-        for most in (np.fmax, np.fmin):
-            extreme = np.repeat(
-                most.reduceat(column, bounds), np.diff(np.append(bounds, len(y)))
-            )
-            at = np.flatnonzero(column == extreme)
-            keep.append(at[np.unique(np.searchsorted(bounds, at, side="right"), return_index=True)[1]])
+    for column in y[:, places].T:
+        for extreme in (np.fmax, np.fmin):
+            at = np.flatnonzero(column == np.repeat(extreme.reduceat(column, bounds), sizes))
+            _, first = np.unique(np.searchsorted(bounds, at, side="right"), return_index=True)
+            keep.append(at[first])
     return np.unique(np.concatenate(keep))
 
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import TraceFileError
@@ -23,8 +22,8 @@ from gms_fsm.language import (
     values_of,
 )
 from gms_fsm.traces._views import steps_of
+from gms_fsm.traces.scope import Scope, guard_columns, watch_names
 from gms_fsm.traces.system_scope import SystemScope
-from gms_fsm.traces.scope import Scope, guard_columns, parameter_values, watch_names
 from gms_fsm.traces.trace import Trace
 from plots._plane import plane_axes, plane_threshold
 from plots.page._columns import Pool, packed
@@ -36,7 +35,7 @@ __all__ = ["stored_run"]
 FORCE = "F"  # names of forces begin like this; they are shown, not read by guards, in seven digits
 
 
-def stored_run(page: PageRows, charts: Sequence[int], report: Report | None) -> dict[str, Any]:
+def stored_run(page: PageRows, charts: Sequence[int], reports: Sequence[Report]) -> dict[str, Any]:
     """Return the data of a run.
 
     Parameters
@@ -45,8 +44,8 @@ def stored_run(page: PageRows, charts: Sequence[int], report: Report | None) -> 
         The rows to show.
     charts : sequence of int
         Number of the picture of each contact's chart.
-    report : Report, optional
-        Counterexamples of the checks of a chart, to be pinned in its plane.
+    reports : sequence of Report
+        Their counterexamples are pinned in the planes of their charts.
 
     Returns
     -------
@@ -54,12 +53,11 @@ def stored_run(page: PageRows, charts: Sequence[int], report: Report | None) -> 
         Data for JSON.
     """
     trace = page.trace
-    instants = np.cumsum(np.diff(trace.t, prepend=trace.t[0]) > 0)
+    instants = np.cumsum(np.diff(trace.t, prepend=trace.t[0]) > 0, dtype=np.int64)
     pool = Pool(instants)
     views = views_of(trace)
     contacts = [
-        _contact(view, pool, picture, report)
-        for view, picture in zip(views, charts, strict=True)
+        _contact(view, pool, picture, reports) for view, picture in zip(views, charts, strict=True)
     ]
     whole = trace.system is None or bool(trace.which)
     return {
@@ -85,7 +83,7 @@ def views_of(trace: Trace) -> list[Trace]:
 
 
 # --------------------------------------------------------------------------- a contact
-def _contact(trace: Trace, pool: Pool, picture: int, report: Report | None) -> dict[str, Any]:
+def _contact(trace: Trace, pool: Pool, picture: int, reports: Sequence[Report]) -> dict[str, Any]:
     chart, model, n = trace.model.chart, trace.model, trace.n
     stored: Stored = {}
     edges = _edges(chart, stored)
@@ -123,7 +121,11 @@ def _contact(trace: Trace, pool: Pool, picture: int, report: Report | None) -> d
         ],
         "plane": None
         if plane is None
-        else {"names": plane, "threshold": plane_threshold(trace), "pins": _pins(plane, report)},
+        else {
+            "names": plane,
+            "threshold": plane_threshold(trace),
+            "pins": _pins(chart, plane, reports),
+        },
         "units": {
             name: unit
             for name in (*chart.inputs, *chart.variables, *chart.parameter_names)
@@ -208,17 +210,26 @@ def _thresholds(trace: Trace, pool: Pool) -> list[Any]:
     if curve is None:
         return []
     base = curve(trace.v)
-    if all(np.array_equal(w * base, s, equal_nan=True) for w, s in zip(weights, trace.s.T, strict=True)):
+    if all(
+        np.array_equal(w * base, s, equal_nan=True) for w, s in zip(weights, trace.s.T, strict=True)
+    ):
         column = pool.add(base)
         return [[column, weight] for weight in weights]
     return [pool.add(s) for s in trace.s.T]
 
 
-def _pins(plane: tuple[str, str], report: Report | None) -> list[dict[str, Any]]:
-    """Return the counterexamples that have a place in the plane."""
+def _pins(chart: Chart, plane: tuple[str, str], reports: Sequence[Report]) -> list[dict[str, Any]]:
+    """Return the counterexamples that have a place in the plane of the chart."""
     return [
-        {"at": [each.counterexample[name] for name in plane], "text": each.text, "status": each.status, "where": list(each.where)}
-        for each in (() if report is None else report.findings)
+        {
+            "at": [each.counterexample[name] for name in plane],
+            "text": each.text,
+            "status": each.status,
+            "where": list(each.where),
+        }
+        for report in reports
+        if report.chart == chart
+        for each in report.findings
         if all(name in each.counterexample for name in plane)
     ]
 
@@ -244,7 +255,9 @@ def _log(trace: Trace, edges: Sequence[Mapping[str, Any]]) -> list[Any]:
     # Micro-steps count the rows of an instant, but a slide begins or ends in one more row.
     rows = before.copy()
     after = np.searchsorted(t, log.t, side="right")
-    for i, (low, high, step) in enumerate(zip(before.tolist(), after.tolist(), steps.tolist(), strict=True)):
+    for i, (low, high, step) in enumerate(
+        zip(before.tolist(), after.tolist(), steps.tolist(), strict=True)
+    ):
         made = low + np.searchsorted(microstep[low:high], step)
         rows[i] = made if made < high and microstep[made] == step else -1
     made = rows >= 0

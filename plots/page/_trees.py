@@ -15,7 +15,6 @@ from gms_fsm.language import (
     Binary,
     Both,
     Call,
-    Condition,
     Either,
     Negative,
     Node,
@@ -109,5 +108,3 @@ class _Data:
 
     def either(self, _: Either, parts: Iterator[Any]) -> Any:
         return ["or", *parts]
-
-

@@ -80,8 +80,9 @@ class RunView {
 
   show(row) {
     this.row = row;
-    const { contact, run } = this, fired = run.fired.get(row);
+    const { run } = this, fired = run.fired.get(row);
     if (fired && following) this.choose(fired.contact, fired.element);
+    const { contact } = this;
     const get = (name, unit) => eng(contact.value(name, 0, row), unit, 5);
     const number = `row ${run.number[row]}`;
     $(".values", this.root).textContent = [
@@ -94,16 +95,20 @@ class RunView {
     for (const pane of Object.values(this.open)) pane.show();
   }
 
-  // What happened at this row, or what holds back the selected element.
+  // What happened at this row, and what the selected element waits for, if it did not just fire.
   verdict() {
     const { contact, element, row, run } = this, fired = run.fired.get(row);
-    const shown = run.log.filter((entry) => !entry.made && entry.row === row); // requested times only
-    if (fired || shown.length) return [fired, ...shown].filter(Boolean).map((entry) => entry.contact.sentence(entry)).join("; ");
-    const state = contact.modes[element][row], leaving = contact.leaving(state), who = `${nameOf(contact, element)} is in ${contact.states[state]}`;
+    const happened = [fired, ...(run.late.get(row) ?? [])].filter(Boolean);
+    const own = happened.some((entry) => entry.contact === contact && entry.element === element);
+    return [...happened.map((entry) => entry.contact.sentence(entry)), ...(own ? [] : [this.waits()])].join("; ");
+  }
+
+  waits() {
+    const { contact, element, row } = this, state = contact.modes[element][row], leaving = contact.leaving(state);
+    const who = `${nameOf(contact, element)} is in ${contact.states[state]}`;
     if (!leaving.length) return contact.edges.length ? `${who}; no edge leaves it` : who;
     const scope = contact.scope(element, row), next = contact.firesNext(state, scope);
-    if (next >= 0) return `${who}; ${contact.edges[next].name} fires next`;
-    return `${who}; ${heldBack(contact, leaving, scope)}`;
+    return `${who}; ${next >= 0 ? `${contact.edges[next].name} fires next` : heldBack(contact, leaving, scope)}`;
   }
 
   // ---------------------------------------------------------------- tokens: the active state of every element

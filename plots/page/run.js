@@ -28,8 +28,12 @@ class RunData {
     this.contacts = stored.contacts.map((each) => new Contact(each, this));
     this.names = Object.fromEntries(Object.entries(stored.names).map(([name, each]) => [name, this.column(each)]));
     this.fired = new Map(); // by row: the firing that made it
-    this.contacts.forEach((contact) => contact.log.forEach((entry) => { if (entry.made) this.fired.set(entry.row, { ...entry, contact }); }));
+    this.late = new Map(); // by row: firings between requested times, which have no row of their own
     this.log = this.contacts.flatMap((contact) => contact.log).sort((a, b) => a.row - b.row || a.t - b.t);
+    for (const entry of this.log) {
+      if (entry.made) this.fired.set(entry.row, entry);
+      else this.late.set(entry.row, [...(this.late.get(entry.row) ?? []), entry]);
+    }
   }
 
   // A column by row: the number of a stored one, or that and a factor.

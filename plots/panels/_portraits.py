@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Axes, BoundaryNorm, LineCollection, ListedColormap, colormaps
+from plots._window import Window
 from plots.panels._axes import VECTOR_ROWS, Artists, draw_curve, log_axis
-from plots.panels._shown import Window, checked_elements, scaled, shown
+from plots.panels._shown import checked_elements, scaled, shown
 from plots.style import BLUE, LINE_GREY, VERMILION
 
 __all__ = ["hysteresis", "portrait", "slip_bar"]

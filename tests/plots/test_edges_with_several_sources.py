@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from plots._replay_run import stored_run
 
 from gms_fsm import simulate
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.systems.system import Body, Contact, System
 from gms_fsm.traces.trace import Trace
 from plots import LiveChart, mermaid, statechart
-from plots._replay_run import stored_run
 
 RESET = Chart(
     "reset",
