@@ -63,8 +63,9 @@ class BristlesPane {
   build(width, forces) {
     const { box, view: { contact, place: number }, height, wall } = this, tall = contact.n * height, ground = `ground${number}`;
     box.replaceChildren();
-    const top = make("div", box, "", { class: "motion" }), head = draw("svg", top, { width, height: BRISTLE.head, "aria-hidden": "true" });
+    const top = make("div", box, "", { class: "motion" });
     if (this.note()) make("p", top, this.note());
+    const head = draw("svg", top, { width, height: BRISTLE.head, "aria-hidden": "true" });
     const middle = wall + BRISTLE.slider / 2, from = middle - BRISTLE.arrow - 8;
     draw("path", head, { class: "slider", d: `M${wall} ${BRISTLE.head}V${BRISTLE.head - 8}H${wall + BRISTLE.slider}V${BRISTLE.head}` });
     this.speed = { text: draw("text", head, { x: from, y: 13, "text-anchor": "end" }), arrow: draw("path", head, { class: "arrow", transform: `translate(${middle} 9)` }) };

@@ -2,7 +2,7 @@
 // The microscope: a time axis that unfolds at transitions. Every firing is a column of the same width, whatever the time
 // between them; firings with other rows between them are separated by a gap with a broken axis. Columns are placed once
 // for the whole run, so that nothing jumps while stepping; nodes exist only for those in view.
-const COLUMN = { least: 80, most: 160, gap: 70, head: 18, foot: 34 }; // px
+const COLUMN = { least: 80, most: 160, gap: 74, head: 18, foot: 34 }; // px
 const LINE_HEIGHT = { least: 18, two: 28, most: 48, page: 30, count: 8 }; // px; from `two` on for names on two lines; where the page
 // scrolls, `count` lines of height `page`
 const STAIRS = { least: 96, most: 460, page: 150, above: 18, below: 8, step: 12 }; // px, with the head; the space for values above
@@ -172,10 +172,10 @@ class MicroscopePane {
     this.wide.style.width = `${this.labels + this.strip.width}px`;
   }
 
-  choose() { if (this.scroller) { this.drawn = ""; this.drawView(); this.markLine(); } }
+  choose() { if (this.strip) { this.drawn = ""; this.drawView(); this.markLine(); } }
 
   show() {
-    if (!this.scroller) return;
+    if (!this.strip) return;
     const { view, strip, scroller } = this;
     if (this.row !== view.row) {
       this.row = view.row;

@@ -17,6 +17,7 @@ from gms_fsm import Prescribed, Trace, simulate
 from plots.replay import write_replay
 from tests.helpers import SINE, bank, open_loop, stick_slip
 from tests.plots.browser import (
+    Axe,
     Open,
     browser,
     events,
@@ -345,6 +346,19 @@ def test_all_contacts_of_a_system_have_lines(open_page: Open, tmp_path: Path) ->
             "[document.querySelector('.micro .names .chosen').textContent, views[0].contact.name]"
         )
         assert name.startswith(contact)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("name", ["mass", "many"])
+def test_axe_finds_no_accessibility_problem(
+    open_page: Open, tmp_path: Path, name: str, scheme: str
+) -> None:
+    page = opened(open_page, tmp_path, name, color_scheme=scheme)
+    open_tab(page, "Bristles")
+    for k in events(page)[4:6]:
+        go(page, k)
+        found = Axe().run(page).response["violations"]
+        assert [(v["id"], [n["target"] for n in v["nodes"]][:3]) for v in found] == []
 
 
 def test_a_picture_takes_less_than_10_ms(open_page: Open, tmp_path: Path) -> None:
