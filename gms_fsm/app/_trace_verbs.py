@@ -14,7 +14,7 @@ from gms_fsm.app._options import ContactName, End, Start, TraceFile
 from gms_fsm.errors import ParameterError, shown
 
 if TYPE_CHECKING:
-    from gms_fsm import Trace
+    from gms_fsm import Chart, Trace
 
 __all__ = ["animate_command", "plot_command", "replay_command"]
 
@@ -128,7 +128,10 @@ def replay_command(
     refuse_input(output, *chain(*map(files_of, files)))
     runs = [_of_contact(each, contact) if contact else _loaded(each) for each in files]
     names = [] if other is None else [each.stem for each in files]
-    charts = dict.fromkeys(run.contact(name).model.chart for run in runs for name in run.contacts)
+    charts: list[Chart] = []
+    for view in (run.contact(name) for run in runs for name in run.contacts):
+        if view.model.chart not in charts:
+            charts.append(view.model.chart)
     reports = [prove(chart) for chart in charts] if check else []
     window = _window(runs[0], start, end)
     page = write_replay(output, *runs, title=title, names=names, window=window, checks=reports)

@@ -154,9 +154,9 @@ class RunView {
         const head = make("th", line, "", { rowspan: edge.clauses.length, scope: "rowgroup" });
         found.button = make("button", head, "○", { "aria-label": `Breakpoint on ${edge.name}` });
         found.button.addEventListener("click", () => toggleBreak(this, this.element, k));
-        head.append(` ${edge.priority} ${edge.name} `);
-        found.word = make("em", head);
-        make("small", head, `${contact.states[edge.source]} → ${contact.states[edge.target]}`);
+        head.append(` ${edge.priority} ${edge.name}`);
+        const small = make("small", head, `${contact.states[edge.source]} → ${contact.states[edge.target]} `);
+        found.word = make("em", small);
       }
       make("td", line, clause.text);
       found.truth = make("td", line);

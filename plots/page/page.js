@@ -106,8 +106,9 @@ function zoom(factor) {
 
 // ------------------------------------------------------------------ playing
 // The clock of the run moves on by the time since the last picture. At a transition it stays for a moment at every
-// micro-step, so that each can be seen; in a run with many transitions for a shorter one.
-const HOLD = 400; // ms
+// micro-step, so that each can be seen; in a run with many transitions for a shorter one, or not at all where that
+// would be less than a picture.
+const HOLD = 400, PICTURE = 1000 / 60; // ms
 const play = { on: false, t: 0, held: 0, at: 0 };
 
 function setPlaying(on) {
@@ -133,15 +134,14 @@ function tick(now) {
 }
 
 function move(passed, speed) {
-  const slowly = speed === "rows", duration = Number(speed) * 1000;
+  const slowly = speed === "rows", duration = Number(speed) * 1000, hold = slowly ? 500 : Math.min(HOLD, duration / events.length);
   const target = slowly ? Infinity : play.t + (passed * (whole.max - whole.min)) / duration;
+  const stays = (row) => slowly || (hold >= PICTURE && eventFrames.has(row));
   let k = frame;
-  for (;;) { // to the last row before the clock, but not past a transition or a breakpoint
-    if (k === last || (!slowly && frames.t[k + 1] > target)) break;
+  while (k < last && (slowly || frames.t[k + 1] <= target)) { // to the last row before the clock
     k += 1;
-    if (slowly) play.held = 500;
-    else if (eventFrames.has(k)) play.held = Math.min(HOLD, duration / events.length);
-    if (slowly || eventFrames.has(k) || stopsAt(k)) break;
+    if (stays(k)) play.held = hold;
+    if (stays(k) || stopsAt(k)) break;
   }
   play.t = slowly || play.held > 0 ? frames.t[k] : Math.min(target, frames.t[last]);
   const stop = k !== frame && stopsAt(k), ended = k === last && !(play.held > 0);

@@ -5,6 +5,7 @@ const AXIS = 58, GAP = 10, TIME_AXIS = 20; // px to the left and to the right of
 const DASHES = [[], [7, 4], [2, 3], [8, 3, 2, 3], [12, 4], [4, 2, 1, 2, 1, 2]];
 const COLOURS = 7, STATES = 5; // of the style sheet: --e0 ..., --state0 ...
 const WIDE = matchMedia("(min-width: 1000px)"); // there the page fills the screen and does not scroll
+const MOST_POINTS = 60000; // of lines that are drawn again when another element is selected
 let pointed = null, pinned = null; // frames: under the mouse, and where two runs first differ
 
 // Decimals that tell neighbouring marks of an axis apart.
@@ -132,6 +133,7 @@ class TimePlots {
         piece.style.width = `${100 * width}%`;
         if (width > 0.06) make("span", piece, contact.states[pieces[k].mode]);
       }
+      if (!track.children.length) make("span", track, "changes too often to be seen: zoom in", { class: "note" });
     }
   }
 
@@ -215,7 +217,7 @@ class TimePane extends TimePlots {
       this.lit = element;
       const { series } = this.inner, first = series.length - contact.n;
       for (let i = 0; i < contact.n; i++) series[first + i].width = i === element ? 2.6 : 1.2;
-      this.inner.redraw(false, false);
+      if (frames.t.length * contact.n < MOST_POINTS) this.inner.redraw(false, false); // else with the next zoom
     }
     this.tracks.forEach(({ ribbon, i }) => {
       const on = i === element;
