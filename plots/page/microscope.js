@@ -2,7 +2,7 @@
 // The microscope: a time axis that unfolds at transitions. Every firing is a column of the same width, whatever the time
 // between them; firings with other rows between them are separated by a gap with a broken axis. Columns are placed once
 // for the whole run, so that nothing jumps while stepping; nodes exist only for those in view.
-const COLUMN = { least: 80, most: 160, gap: 74, head: 18, foot: 34 }; // px
+const COLUMN = { least: 82, most: 160, gap: 62, head: 18, foot: 34 }; // px
 const LINE_HEIGHT = { least: 18, two: 28, most: 48, page: 30, count: 8 }; // px; from `two` on for names on two lines; where the page
 // scrolls, `count` lines of height `page`
 const STAIRS = { least: 96, most: 460, page: 150, above: 18, below: 8, step: 12 }; // px, with the head; the space for values above
@@ -166,7 +166,7 @@ class MicroscopePane {
     this.two = two;
     const lines = this.names.flatMap((name) => (two ? folded(name).split("\n") : [name]));
     const widest = Math.max(...lines.map((each) => textWidth(each))) * 1.08; // they are bold
-    this.strip = new Unfolded(this.view.run, Math.ceil(clamp(widest + 14, COLUMN.least, COLUMN.most)));
+    this.strip = new Unfolded(this.view.run, Math.ceil(clamp(widest + 12, COLUMN.least, COLUMN.most)));
     for (const node of this.nodes.values()) for (const each of Object.values(node)) each.remove();
     this.nodes.clear();
     this.wide.style.width = `${this.labels + this.strip.width}px`;

@@ -1,4 +1,7 @@
-"""The bristles of the replay page move with the row: contacts by z, pegs by state, the ground by x."""
+"""The bristles of the replay page move with the row.
+
+Contacts are where z puts them, pegs show the default state, the ground moves with x.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ __all__ = ["browser", "open_page", "pages"]
 
 pytestmark = pytest.mark.slow
 
-# Of each element: x of its contact, whether it has a peg, whether it is open with an arrow, its texts.
+# Of each element: x of its contact, peg, arrow and its direction, springs, texts.
 ELEMENTS = """() => [...document.querySelectorAll(".bristles .element")].map((element) => {
     const seen = (query) => {
         const node = element.querySelector(query);
@@ -32,7 +35,8 @@ ELEMENTS = """() => [...document.querySelectorAll(".bristles .element")].map((el
     const way = element.querySelector(".way");
     return {
         x: at(".foot"), peg: seen(".peg"), arrow: seen(".way"),
-        way: way.getAttribute("transform") ? -1 : 1, springs: element.querySelectorAll(".link path").length,
+        way: way.getAttribute("transform") ? -1 : 1,
+        springs: element.querySelectorAll(".link path").length,
         end: element.querySelector(".link").getBoundingClientRect().right,
         texts: [...element.querySelectorAll("text")].map((node) => node.textContent),
     };
@@ -48,7 +52,9 @@ def many() -> Trace:
     return simulate(bank(20), Prescribed(SINE), 20.0)
 
 
-def opened(open_page: Open, folder: Path, trace: Trace, size: str = "laptop", **options: Any) -> Any:
+def opened(
+    open_page: Open, folder: Path, trace: Trace, size: str = "laptop", **options: Any
+) -> Any:
     page = open_page(write_replay(folder / "page.html", trace), size, **options)
     open_tab(page, "Bristles")
     return page
@@ -129,9 +135,11 @@ def test_values_are_those_of_the_run(open_page: Open, tmp_path: Path) -> None:
     page = opened(open_page, tmp_path, trace)
     for row, number in own_rows(page, 20):
         page.evaluate(f"go({row})")
-        v, F = page.locator(".bristles .motion text").all_text_contents()
-        assert v == page.evaluate(f"'v = ' + eng({float(trace.v[number])!r}, 'm/s', 4)")
-        assert F == page.evaluate(f"'F = ' + eng({float(np.float32(trace.F[number]))!r}, 'N', 4)")
+        speed, push = page.locator(".bristles .motion text").all_text_contents()
+        assert speed == page.evaluate(f"'v = ' + eng({float(trace.v[number])!r}, 'm/s', 4)")
+        assert push == page.evaluate(
+            f"'F = ' + eng({float(np.float32(trace.F[number]))!r}, 'N', 4)"
+        )
         for i, element in enumerate(page.evaluate(ELEMENTS)):
             z = float(trace.z[number, i])
             assert element["texts"][1] == page.evaluate(f"'z ' + eng({z!r}, 'm', 4)")
@@ -213,4 +221,3 @@ def test_a_row_is_drawn_in_less_than_10_ms(open_page: Open, tmp_path: Path) -> N
     )
     # The median, because other programs may interrupt some.
     assert float(np.median(times)) < 10.0
-

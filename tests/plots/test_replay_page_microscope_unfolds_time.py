@@ -87,14 +87,17 @@ COLUMNS = """() => {
 # Texts in view, with their boxes: [text, kind, left, top, right, bottom], without what is scrolled
 # away, which the box of the strip and its labels cover.
 TEXTS = """() => {
-    const of = (node) => node.getBoundingClientRect(), box = of(document.querySelector(".micro .strip"));
+    const of = (node) => node.getBoundingClientRect();
+    const box = of(document.querySelector(".micro .strip"));
     const labels = of(document.querySelector(".micro .names")).right;
     const top = of(document.querySelector(".micro .top")).bottom;
     const foot = of(document.querySelector(".micro .foot")).top;
-    const walker = document.createTreeWalker(document.querySelector(".micro"), NodeFilter.SHOW_TEXT);
+    const pane = document.querySelector(".micro");
+    const walker = document.createTreeWalker(pane, NodeFilter.SHOW_TEXT);
     const found = [];
     while (walker.nextNode()) {
-        const node = walker.currentNode, range = document.createRange(), parent = node.parentElement;
+        const node = walker.currentNode, parent = node.parentElement;
+        const range = document.createRange(), kind = parent.getAttribute("class") ?? "";
         if (!node.textContent.trim()) continue;
         range.selectNodeContents(node);
         const fixed = parent.closest(".names, .corner, .title"), inside = parent.closest(".rows");
@@ -107,7 +110,7 @@ TEXTS = """() => {
             const upper = Math.max(one.top, inside ? top : box.top);
             const lower = Math.min(one.bottom, inside ? foot : box.bottom);
             if (right - left < 1 || lower - upper < 1) continue;
-            found.push([node.textContent, parent.getAttribute("class") ?? "", left, upper, right, lower]);
+            found.push([node.textContent, kind, left, upper, right, lower]);
         }
     }
     return found;
@@ -143,7 +146,9 @@ def four(page: Any, trace: Trace, first: int) -> list[Any]:
     row = page.evaluate(f"runs[0].log[{first + 1}].row")
     go(page, row)
     columns = page.evaluate(COLUMNS)
-    numbers = [int(page.evaluate(f"runs[0].number[runs[0].log[{first + k}].row]")) for k in range(4)]
+    numbers = [
+        int(page.evaluate(f"runs[0].number[runs[0].log[{first + k}].row]")) for k in range(4)
+    ]
     at = [int(column[2].split("\n")[0]) for column in columns]
     columns = columns[at.index(numbers[0]) :][:4]
     assert [int(column[2].split("\n")[0]) for column in columns] == numbers
@@ -215,7 +220,7 @@ def test_a_text_that_would_be_cut_off_is_left_out(open_page: Open, tmp_path: Pat
         box = page.locator(".micro .strip").bounding_box()
         widths = page.evaluate(
             """() => views[0].open.right.texts.filter((node) => node.textContent)
-                .map((node) => [node.getBoundingClientRect().left, node.getBoundingClientRect().right])"""
+                .map((node) => node.getBoundingClientRect()).map((box) => [box.left, box.right])"""
         )
         assert len(widths) > 5
         labels = page.locator(".micro .names").bounding_box()["width"]
@@ -277,8 +282,8 @@ def test_a_click_on_a_column_goes_to_its_row(open_page: Open, tmp_path: Path) ->
     # In a gap: the last row before the next firing.
     gap, after = page.evaluate(
         """() => {
-            const { strip, nodes } = views[0].open.right;
-            const k = [...nodes.keys()].find((k) => nodes.get(k).gap && strip.place(views[0].row) < strip.gaps[k]);
+            const { strip, nodes } = views[0].open.right, here = strip.place(views[0].row);
+            const k = [...nodes.keys()].find((k) => nodes.get(k).gap && here < strip.gaps[k]);
             const box = nodes.get(k).gap.getBoundingClientRect();
             return [[box.left + box.width / 2, box.right], strip.rows[k]];
         }"""
