@@ -54,6 +54,7 @@ PLAY = """(seconds) => new Promise((done) => {
 
 
 def at(times: list[float], share: float) -> float:
+    """Return the time that this share of the times does not exceed."""
     return sorted(times)[int(share * (len(times) - 1))]
 
 

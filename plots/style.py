@@ -43,6 +43,9 @@ ELEMENT_DASHES: tuple[str | tuple[int, tuple[float, ...]], ...] = (
 STATE_FILLS = ("#CFE3F2", "#F7CDB0", "#CDEBE0", "#F1D9E7", "#FAE8C0")
 STATE_EDGES = (BLUE, VERMILION, "#009E73", "#CC79A7", "#E69F00")
 HATCHES = ("", "////", "....", "xxxx", "\\\\\\\\")
+# Edges that leave one state, by priority; the tints are light enough for lines on top of them.
+EDGE_COLOURS = (BLUE, VERMILION, "#00795A", "#A8487F", "#8A6100", INK, LINE_GREY)
+EDGE_HATCHES = ("////", "\\\\\\\\", "....", "||||", "----", "xxxx", "oooo")
 
 RC: Any = {  # matplotlib types each key separately
     "font.family": "sans-serif",

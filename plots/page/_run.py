@@ -25,7 +25,7 @@ from gms_fsm.traces._views import steps_of
 from gms_fsm.traces.scope import Scope, guard_columns, watch_names
 from gms_fsm.traces.system_scope import SystemScope
 from gms_fsm.traces.trace import Trace
-from plots._plane import plane_axes, plane_threshold
+from plots._plane import Plane, linear_threshold, plane_axes
 from plots.page._columns import Pool, packed
 from plots.page._rows import PageRows
 from plots.page._trees import Stored, tree_of
@@ -90,7 +90,6 @@ def _contact(trace: Trace, pool: Pool, picture: int, reports: Sequence[Report]) 
     values = _values(trace, stored, pool)
     modes = trace.modes
     rows, elements = np.nonzero(np.diff(modes, axis=0, prepend=modes[:1]))
-    plane = plane_axes(chart)
     curve = model.stribeck
     return {
         "name": trace.places.name if trace.system is not None else "",
@@ -119,13 +118,7 @@ def _contact(trace: Trace, pool: Pool, picture: int, reports: Sequence[Report]) 
             {name: tree_of(chart.flows[state.name, name]) for name in chart.variables}
             for state in chart.states
         ],
-        "plane": None
-        if plane is None
-        else {
-            "names": plane,
-            "threshold": plane_threshold(trace),
-            "pins": _pins(chart, plane, reports),
-        },
+        "plane": _plane(trace, reports),
         "units": {
             name: unit
             for name in (*chart.inputs, *chart.variables, *chart.parameter_names)
@@ -216,6 +209,17 @@ def _thresholds(trace: Trace, pool: Pool) -> list[Any]:
         column = pool.add(base)
         return [[column, weight] for weight in weights]
     return [pool.add(s) for s in trace.s.T]
+
+
+def _plane(trace: Trace, reports: Sequence[Report]) -> dict[str, Any] | None:
+    """Return the names of the plane of the guards, where its axis is linear, and the pins."""
+    chart = trace.model.chart
+    names = plane_axes(chart)
+    if names is None:
+        return None
+    speeds = np.abs(trace.v[np.isfinite(trace.v)])
+    threshold = linear_threshold(Plane.of(trace, 0, 0), float(speeds.max(initial=0.0)))
+    return {"names": names, "threshold": threshold, "pins": _pins(chart, names, reports)}
 
 
 def _pins(chart: Chart, plane: tuple[str, str], reports: Sequence[Report]) -> list[dict[str, Any]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,7 +143,7 @@ def checked_elements(trace: Trace, elements: Iterable[int] | None) -> list[int]:
         chosen = list(elements)
     except TypeError:
         chosen = []
-    whole = all(isinstance(i, (int, np.integer)) and not isinstance(i, bool) for i in chosen)
+    whole = all(map(is_whole, chosen))
     if (
         not chosen
         or not whole
@@ -155,6 +156,44 @@ def checked_elements(trace: Trace, elements: Iterable[int] | None) -> list[int]:
             "(labels count from 1)",
         )
     return [int(i) for i in chosen]
+
+
+def one_element(trace: Trace, element: Any) -> int:
+    """Return the number of an element; raise `ParameterError` if there is no such one."""
+    check_trace(trace)
+    if not is_whole(element) or not 0 <= element < trace.n:
+        raise ParameterError(
+            f"it must be an integer from 0 to {trace.n - 1} (labels count from 1)",
+            place="element",
+            value=element,
+        )
+    return int(element)
+
+
+def checked_row(trace: Trace, row: Any, t: Any = None) -> int:
+    """Return the number of a row, from 0; with a time, that of the last row at or before it.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such row.
+    """
+    if t is not None:
+        first, last = float(trace.t[0]), float(trace.t[-1])
+        if not is_number(t) or not first <= t <= last:
+            raise ParameterError(
+                f"it must be a time in the run, {first:g} to {last:g} s", place="t", value=t
+            )
+        return int(np.searchsorted(trace.t, t, side="right")) - 1
+    if not is_whole(row) or not -len(trace) <= row < len(trace):
+        raise ParameterError(
+            f"it must be an integer from {-len(trace)} to {len(trace) - 1}", place="row", value=row
+        )
+    return int(row) % len(trace)
+
+
+def is_whole(value: object) -> bool:
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
 
 
 def is_number(value: object) -> bool:
