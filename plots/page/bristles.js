@@ -29,7 +29,7 @@ class BristlesPane {
   fit() {
     const { box, view } = this, { contact } = view, width = box.clientWidth;
     if (!width) return;
-    const z = this.deflection(), label = Math.max(...contact.states.map((state) => textWidth(`E${contact.n} ${state}`))) * 1.1 + 12;
+    const z = this.deflection(), label = Math.max(...contact.states.map((state) => textWidth(`E${contact.n} ${state}`))) * BOLD + 12;
     const value = z ? textWidth(`${z} −000.0 mm`) + 12 : 0;
     const room = Math.floor((box.clientHeight - BRISTLE.head - (this.note() ? 20 : 2)) / contact.n);
     this.height = WIDE.matches ? clamp(room, BRISTLE.least, BRISTLE.most) : contact.n > 6 ? BRISTLE.least + 4 : BRISTLE.page;

@@ -11,7 +11,7 @@ const F_DIGITS = 5;
 // Width of a text in the font of the drawings, px.
 const pen = document.createElement("canvas").getContext("2d");
 pen.font = "11px system-ui, sans-serif";
-const widths = new Map();
+const widths = new Map(), BOLD = 1.1; // times as wide
 function textWidth(text) {
   if (!widths.has(text)) {
     if (widths.size > 5000) widths.clear();
@@ -109,7 +109,7 @@ class MicroscopePane {
     this.lines = shown.flatMap((contact) => contact.modes.map((_, element) => ({
       contact, element, label: many ? `${contact.name}${contact.n > 1 ? ` ${element + 1}` : ""}` : `E${element + 1}`,
     })));
-    this.labels = Math.ceil(clamp(Math.max(...this.lines.map(({ label }) => textWidth(label) * 1.1)) + 10, 46, 120));
+    this.labels = Math.ceil(clamp(Math.max(...this.lines.map(({ label }) => textWidth(label) * BOLD)) + 10, 46, 120));
     this.names = shown.flatMap(({ edges }) => edges.map(({ name }) => name));
     this.build();
   }
@@ -165,7 +165,7 @@ class MicroscopePane {
     if (this.two === two) return;
     this.two = two;
     const lines = this.names.flatMap((name) => (two ? folded(name).split("\n") : [name]));
-    const widest = Math.max(...lines.map((each) => textWidth(each))) * 1.08; // they are bold
+    const widest = Math.max(...lines.map((each) => textWidth(each))) * BOLD;
     this.strip = new Unfolded(this.view.run, Math.ceil(clamp(widest + 12, COLUMN.least, COLUMN.most)));
     for (const node of this.nodes.values()) for (const each of Object.values(node)) each.remove();
     this.nodes.clear();
@@ -279,7 +279,7 @@ class MicroscopePane {
   drawTop(left, first, last) {
     const { strip, labels, view } = this, said = [];
     const say = (text, middle, level, kind) => {
-      const half = textWidth(text) / 2;
+      const half = (kind === "time first" ? BOLD : 1) * textWidth(text) / 2;
       if (middle - half >= left + 1 && middle + half <= left + this.across - 1) said.push([text, labels + middle - left, level, kind]);
     };
     for (let k = first; k <= last; k++) {
@@ -300,7 +300,7 @@ class MicroscopePane {
 
   drawStairs(left, levels, say) {
     const { contact } = this.view, F = contact.columns.F, title = `F ${contact.name}`;
-    this.title.textContent = textWidth(title) * 1.1 < this.labels ? title : "F";
+    this.title.textContent = textWidth(title) * BOLD < this.labels ? title : "F";
     const values = levels.map(({ row }) => F(row));
     const texts = values.map((u) => eng(u, "N", F_DIGITS)), floor = this.top - STAIRS.below;
     // Values that are written alike are drawn alike.
@@ -314,7 +314,8 @@ class MicroscopePane {
       if (begins && before) through += `M${x(before.to)} ${before.level.toFixed(1)}L${x(from)} ${level.toFixed(1)}`;
       path += begins || !before ? `M${x(from)} ${level.toFixed(1)}H${x(to)}` : `V${level.toFixed(1)}H${x(to)}`;
       before = { to, level };
-      if (textWidth(texts[k]) <= to - from - 4) say(texts[k], (from + to) / 2, level - 4, "value");
+      const shown = [texts[k], eng(values[k], "N", F_DIGITS - 1)].find((text) => textWidth(text) <= to - from - 4);
+      if (shown) say(shown, (from + to) / 2, level - 4, "value");
     });
     place(this.path, { d: path });
     place(this.through, { d: through });
