@@ -90,8 +90,8 @@ def page_rows(trace: Trace, window: tuple[float, float] | None = None) -> PageRo
     at_transitions = int(instants.sum())
     if at_transitions > MOST_AT_TRANSITIONS:
         raise ParameterError(
-            f"this part of the run has {at_transitions} rows at transitions; a page holds "
-            f"{MOST_AT_TRANSITIONS}",
+            f"this part of the run has {at_transitions} rows at transitions, more than the "
+            f"{MOST_AT_TRANSITIONS} that a page holds",
             place="window",
             value=window,
             advice="give a shorter window = (t0, t1), in s",
