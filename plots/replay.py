@@ -58,6 +58,7 @@ SCRIPTS = (
     "regions.js",
     "landscape.js",
     "microscope.js",
+    "bristles.js",
     "page.js",
 )
 HATCH_ANGLES = (None, 45, 135, 0, 90)  # of the states' ribbons, degrees

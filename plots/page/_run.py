@@ -104,6 +104,7 @@ def _contact(trace: Trace, pool: Pool, picture: int, reports: Sequence[Report]) 
         "values": values,
         "forces": [pool.add(column, exact=False) for column in trace.F_elements.T],
         "velocity": chart.velocities[0],
+        "velocities": list(chart.velocities),
         "variables": list(chart.variables),
         "curve": None
         if curve is None

@@ -196,14 +196,14 @@ class RunView {
   // The rows of the edge that fired, or else of the first that is checked, are in view.
   fitTable() {
     const lines = $$("tbody tr", this.root), first = lines.find((line) => line.matches(".fired")) ?? lines.find((line) => line.matches(".asked"));
-    if (first) reveal(first, $(".why", this.root), first.querySelector("th")?.rowSpan ?? 1);
+    if (first) reveal(first, $(".why", this.root), first.querySelector("th")?.rowSpan ?? 1, $("caption", this.root).offsetHeight);
   }
 }
 
 // Scrolls only the box, and only if needed: the page itself stays where it is.
-function reveal(node, box, lines = 1) {
-  const outer = box.getBoundingClientRect(), inner = node.getBoundingClientRect(), height = inner.height * lines;
-  if (inner.top < outer.top || inner.top + height > outer.bottom) box.scrollTop += inner.top - outer.top - 24;
+function reveal(node, box, lines = 1, covered = 0) {
+  const outer = box.getBoundingClientRect(), inner = node.getBoundingClientRect(), height = inner.height * lines, top = outer.top + covered;
+  if (inner.top < top || inner.top + height > outer.bottom) box.scrollTop += inner.top - top - 2;
   if (inner.left < outer.left || inner.right > outer.right) box.scrollLeft += inner.left - outer.left;
 }
 

@@ -5,6 +5,7 @@ const ARROW = 13; // px, the length of an arrow of the flow
 const PIXELS = 5, FAR = 30; // a step of the dot by an arrow key; with Shift
 const MOST = 80; // drawings that are kept
 const KEPT = 300; // ms between new regions while the run is playing
+const LETTERS = { "clause-name": 6.8, "curve-name": 6.2, "edge-name": 7.8 }; // px, mean widths
 const HATCHING = [45, 135, 0, 90, 20]; // degrees, of the edges of a state in order of priority
 
 class LandscapePane {
@@ -215,7 +216,7 @@ class LandscapePane {
 
   // A text where it covers no other; without a free place it is left out.
   nameAt(text, kind, boxes, candidates) {
-    const width = text.length * 6.6 + 4, { left, top } = MARGINS, { w, h } = this.plane;
+    const width = text.length * LETTERS[kind] + 4, { left, top } = MARGINS, { w, h } = this.plane;
     for (const [x, y] of candidates) {
       const from = x - width / 2;
       if (from < left || from + width > left + w || y - 12 < top || y + 3 > top + h || !boxes.take(from, y - 12, width, 15)) continue;
@@ -225,7 +226,7 @@ class LandscapePane {
   }
 
   nameLine(line, text, kind, boxes) {
-    const length = line.getTotalLength(), half = (text.length * 6.6) / 2 + 6, found = [];
+    const length = line.getTotalLength(), half = (text.length * LETTERS[kind]) / 2 + 6, found = [];
     for (const part of [0.97, 0.03, 0.9, 0.1, 0.8, 0.2, 0.5, 0.7, 0.3, 0.6, 0.4]) {
       const { x, y } = line.getPointAtLength(part * length), next = line.getPointAtLength(part * length + 1);
       const steep = Math.abs(next.y - y) > Math.abs(next.x - x), inward = x < MARGINS.left + half ? half : 0;
@@ -236,7 +237,7 @@ class LandscapePane {
   }
 
   nameRegion(text, places, boxes) {
-    const half = (text.length * 6.6) / 2, tall = places.filter(({ height }) => height > 18), all = [];
+    const half = (text.length * LETTERS["edge-name"]) / 2, tall = places.filter(({ height }) => height > 18), all = [];
     const covers = (x, y) => places.some((each) => Math.abs(each.x - x) < 1.5 && Math.abs(each.y - y) < each.height / 2 - 8);
     for (const part of [0.5, 0.75, 0.25, 0.62, 0.38, 0.85, 0.15, 0.95, 0.05]) {
       const each = tall[Math.floor(part * tall.length)];

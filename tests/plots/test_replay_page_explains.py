@@ -109,6 +109,10 @@ def test_what_fired_its_guard_and_the_cursor_are_in_view(
         assert in_view(page, f"#{element}-guard-{record.edge}.fired")
         assert in_view(page, f"#{element}-state-{record.target}.active")
         assert in_view(page, "tbody tr.fired")
+        line, caption = (page.locator(q).bounding_box() for q in ("tr.fired >> nth=0", "caption"))
+        assert line is not None
+        assert caption is not None
+        assert line["y"] >= caption["y"] + caption["height"] - 1
         assert in_view(page, ".token.fired")
         assert in_view(page, ".plot")  # the cursor crosses all plots
         cursor, plot = (page.locator(q).first.bounding_box() for q in (".cursor", ".plot"))
