@@ -20,7 +20,8 @@ from gms_fsm.traces.trace import Trace
 
 __all__ = ["PageRows", "page_rows"]
 
-MOST_ROWS, FEWEST_ROWS = 4000, 200  # away from transitions; the first is for one element
+SMOOTH, FEWEST_ROWS = 4000, 200  # samples are added up to these; the first is for one element
+MOST_ROWS = 20_000  # away from transitions, for one element; a longer run is thinned
 MOST_AT_TRANSITIONS = 80_000  # of a page, at and next to instants with transitions
 VALUES = 20_000  # of a long run away from transitions, about
 MOST_COMPONENTS = 12  # with more, the elements' variables are not searched for extremes
@@ -82,9 +83,9 @@ def page_rows(trace: Trace, window: tuple[float, float] | None = None) -> PageRo
         t = found.trace.t
         found = found.at((t >= window[0]) & (t <= window[1]))
     layout = trace.program.layout
-    wanted = max(FEWEST_ROWS, MOST_ROWS // (layout.n + 1))
-    if len(found.trace) < wanted:
-        found = _refined(found, wanted)
+    smooth = max(FEWEST_ROWS, SMOOTH // (layout.n + 1))
+    if len(found.trace) < smooth:
+        found = _refined(found, smooth)
     run = found.trace
     instants = np.isin(run.t, run.t[run.microstep > 0])
     at_transitions = int(instants.sum())
@@ -102,7 +103,8 @@ def page_rows(trace: Trace, window: tuple[float, float] | None = None) -> PageRo
         kept[:-1] |= instants[1:]
     kept[[0, -1]] = True
     others = np.flatnonzero(~kept)
-    kept[others if others.size <= wanted else others[_seen(run.rows.y[others], layout)]] = True
+    few = others.size <= MOST_ROWS // (layout.n + 1)
+    kept[others if few else others[_seen(run.rows.y[others], layout)]] = True
     return found if kept.all() else found.at(kept)
 
 
