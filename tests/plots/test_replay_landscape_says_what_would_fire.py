@@ -37,7 +37,7 @@ def test_dragging_to_random_points(open_page: Open, tmp_path: Path, name: str) -
     box = plane.bounding_box()
     assert box is not None
     rng, fired = np.random.default_rng(18), []
-    for _ in range(120):
+    for _ in range(60):
         page.evaluate("(row) => show(row)", int(rng.choice(own)))
         dot.hover(force=True)
         page.mouse.down()

@@ -23,8 +23,9 @@ def test_axe_finds_no_accessibility_problem(
         page.click("#more")
     for _ in range(5):
         page.keyboard.press("Shift+ArrowRight")
-    for tab in range(page.locator(".run").first.get_by_role("tab").count()):
-        page.locator(".run").first.get_by_role("tab").nth(tab).click()
+    tabs = page.locator(".run").first.get_by_role("tab")
+    for tab in tabs.all() if size in ("laptop", "phone") else [tabs.first]:
+        tab.click()
         found = Axe().run(page).response["violations"]
         assert [(v["id"], [n["target"] for n in v["nodes"]][:3]) for v in found] == []
     page.keyboard.press("?")
