@@ -496,7 +496,10 @@ class Forks:
         early = before.made <= place
         logs = [before.trace.transitions[early], after.trace.transitions]
         log = np.concatenate([each for each in logs if len(each)] or logs[:1]).view(np.recarray)
-        rows = _joined(shared, after.trace.rows)
+        new = after.trace.rows
+        # Micro-steps count the firings at one time, also those before the poke.
+        more = np.where(new.t == here.t, here.microstep, 0)
+        rows = _joined(shared, replace(new, microstep=new.microstep + more))
         made = np.concatenate([before.made[early], after.made + len(shared)])
         return _Ran(after.start, after.start.trace(rows, rows, log), made, after.failure)
 

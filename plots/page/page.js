@@ -226,17 +226,18 @@ function difference() {
   let k = 0;
   while (k < Math.min(a.length, b.length) && text(a[k]) === text(b[k])) k += 1;
   if (k === Math.max(a.length, b.length)) return { frame: null, told: "both runs make the same transitions in the same order" };
-  const told = [a[k], b[k]].map((entry, i) => `run ${i + 1}: ${entry ? `${text(entry)} at ${written(entry.t, 7)} s` : "no further transition"}`);
-  const at = [a[k], b[k]].flatMap((entry, i) => (entry ? [frames.of[i][entry.row]] : []));
-  const least = Math.min(...at), waits = heldInOther([a[k], b[k]], least);
-  return { frame: least, told: `first difference, transition ${k + 1}: ${told.join("; ")}${waits && `; there ${waits}`}` };
+  const entries = [a[k], b[k]], at = entries.map((entry, i) => (entry ? frames.of[i][entry.row] : Infinity)), least = Math.min(...at);
+  const told = entries.map((entry, i) => `run ${i + 1}: ${entry ? `${text(entry)} at ${written(entry.t, 7)} s` : "no further transition"}`);
+  // Why the later run did not do the same then; of two at one time, the one that was held back.
+  const words = entries.map((entry, i) => (frames.t[at[i]] === frames.t[least] ? heldInOther(entry, i, at[i]) : ""));
+  const why = words.find((each) => each && !each.endsWith("fires next")) ?? words.find(Boolean);
+  return { frame: least, told: `first difference, transition ${k + 1}: ${told.join("; ")}${why ? `; ${why}` : ""}` };
 }
 
-// Why the run that is later did not make the transition when the other one did.
-function heldInOther(entries, k) {
-  const i = entries.findIndex((entry, place) => entry && frames.of[place][entry.row] === k), { contact, element } = entries[i];
+// What the element of a firing waits for in the other run, at the row where it fired.
+function heldInOther({ contact, element }, i, at) {
   const same = runs[1 - i].contacts.find(({ name, n }) => name === contact.name && n > element);
-  return same ? waiting(same, element, frames.rows[1 - i][k]) : "";
+  return same ? `in run ${2 - i} ${waiting(same, element, frames.rows[1 - i][at])}` : "";
 }
 
 function firstDifference() {
