@@ -341,7 +341,8 @@ class Forks:
         heirs = [str(k) for k, each in self.branches.items() if each.parent == number]
         if heirs:
             raise SessionError(
-                f"other branches come from branch {number}", advice=f"delete {', '.join(heirs)} first"
+                f"other branches come from branch {number}",
+                advice=f"delete {', '.join(heirs)} first",
             )
         del self.branches[number]
         if self.current == number:
@@ -490,7 +491,7 @@ class Forks:
         subject = Subject(was.given or was.model, None if was.given else was.rig)
         after = self._from(subject, here.t, initial_with(poke.edits, was, here))
         shared = before.trace.rows.at(slice(place + 1))
-        if not here.t == shared.t[-1]:  # between two rows: the point is a row of this branch
+        if here.t != shared.t[-1]:  # between two rows: the point is a row of this branch
             own = [here.t], [0], [here.y], [here.mode]
             shared = _joined(shared, Rows(*map(np.array, own)))
         early = before.made <= place

@@ -52,7 +52,7 @@ class Explorer(anywidget.AnyWidget):
     _css = HERE / "widget.css"
     page = traitlets.Unicode().tag(sync=True)
     runs = traitlets.Dict().tag(sync=True)
-    charts = traitlets.List().tag(sync=True)
+    charts: traitlets.List[str] = traitlets.List().tag(sync=True)
     panel = traitlets.Dict().tag(sync=True)
     height = traitlets.Int().tag(sync=True)
     request = traitlets.Dict().tag(sync=True)
@@ -389,7 +389,9 @@ class Explorer(anywidget.AnyWidget):
         elif element >= 0:
             edits = {"variables": {f"{contact}.{what}" if contact else what: {element: value}}}
         else:
-            edits = {"v": value} if self._forks.start().given is None else {"variables": {what: value}}
+            edits = (
+                {"v": value} if self._forks.start().given is None else {"variables": {what: value}}
+            )
         self.poke(**edits, t=t, microstep=microstep)
 
 

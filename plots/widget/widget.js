@@ -230,7 +230,9 @@ class Poke {
 class Workbench {
   constructor(model, el) {
     Object.assign(this, { model, told: null, ready: false, exporting: false });
-    this.root = make("div", el, "", { class: "gms-explore" });
+    // Keys are for the controls: JupyterLab would take the arrows of a slider, and a letter in a box would be a command.
+    this.root = make("div", el, "", { class: "gms-explore", "data-lm-suppress-shortcuts": "true" });
+    this.root.addEventListener("keydown", (event) => event.stopPropagation());
     this.requests = new Requests(model, (busy) => this.root.classList.toggle("gms-busy", busy));
     const ask = (request) => this.requests.ask(request), panel = model.get("panel");
     const top = make("div", this.root, "", { class: "gms-top" });

@@ -1,11 +1,12 @@
 """A widget in a browser without Jupyter: a small page that imitates anywidget's host.
 
-Its model forwards requests to the Python widget and fires the changes of the traits, all at once, as
-Jupyter does.
+Its model forwards requests to the Python widget and fires the changes of the traits, all at once,
+as Jupyter does.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from playwright.sync_api import Browser, FrameLocator, Page
@@ -17,6 +18,7 @@ SETUP = """async ([code, style, traits]) => {
   const module = await import(URL.createObjectURL(new Blob([code], { type: "text/javascript" })));
   document.head.appendChild(document.createElement("style")).textContent = style;
   const heard = {}, given = {};
+  window.host_traits = traits;
   const model = {
     get: (name) => traits[name],
     set: (name, value) => { given[name] = value; },
@@ -24,11 +26,13 @@ SETUP = """async ([code, style, traits]) => {
     off: (name, call) => heard[name]?.delete(call),
     save_changes: async () => {
       const changed = await window.asked(given.request);
+      while (window.held) await new Promise((go) => setTimeout(go, 10));
       Object.assign(traits, changed);
-      for (const name of Object.keys(changed)) for (const call of heard[`change:${name}`] ?? []) call();
+      const names = Object.keys(changed).map((name) => `change:${name}`);
+      for (const name of names) for (const call of heard[name] ?? []) call();
     },
   };
-  window.close_widget = module.default.render({ model, el: document.body });
+  module.default.render({ model, el: document.body });
 }"""
 
 
@@ -66,6 +70,23 @@ class Host:
         self.requests.append(request)
         self.widget.request = request
         return {name: getattr(self.widget, name) for name in ("runs", "charts", "panel")}
+
+    def wait(self, condition: Callable[[], bool]) -> None:
+        """Wait until a condition holds."""
+        for _ in range(500):
+            if condition():
+                return
+            self.page.wait_for_timeout(20)
+        raise AssertionError("waited in vain")
+
+    @property
+    def busy(self) -> bool:
+        """Whether a request has not been answered."""
+        return self.page.locator(".gms-busy").count() > 0
+
+    def hold(self, on: bool) -> None:
+        """Keep answers back, or let them go."""
+        self.page.evaluate(f"window.held = {str(on).lower()}")
 
     @property
     def inner(self) -> FrameLocator:
