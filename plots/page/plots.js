@@ -65,6 +65,7 @@ class TimePlots {
       cursor: { y: false, x: false, points: { show: false } },
       hooks: { setScale: [(u, key) => key === "x" && zoomTo(u.scales.x.min, u.scales.x.max, u)] },
     }, [frames.t, ...lines.map(alongFrames)], make("div", this.body, "", { role: "img", "aria-label": `${title} over time`, class: "plot" }));
+    if (isLast) make("span", plot.root, `t [${PREFIXES[TIME_POWER]}s]`, { class: "time-unit" });
     let down = 0;
     plot.over.addEventListener("mousedown", (event) => { down = event.clientX; });
     plot.over.addEventListener("click", (event) => { // the end of a drag is also a click
