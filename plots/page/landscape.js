@@ -162,9 +162,9 @@ class LandscapePane {
     this.drawGuards();
     this.drawFlow();
     place(this.trail, { d: this.track.before(asked.row, RECENT * (whole.max - whole.min)) });
-    const [x, y] = this.placeOfDot(), here = [plane.x(points.v0), plane.y(points.z0)];
-    place(this.dot, { transform: `translate(${x.toFixed(2)} ${y.toFixed(2)})` });
-    place(this.origin, { cx: here[0], cy: here[1], opacity: this.moved ? 1 : 0 });
+    const at = this.placeOfDot(), here = [plane.x(points.v0), plane.y(points.z0)], known = (point) => point.every(Number.isFinite);
+    place(this.dot, { visibility: known(at) ? "inherit" : "hidden", ...(known(at) && { transform: `translate(${at.map((u) => u.toFixed(2)).join(" ")})` }) });
+    place(this.origin, { opacity: this.moved && known(here) ? 1 : 0, ...(known(here) && { cx: here[0], cy: here[1] }) });
     this.dot.classList.toggle("moved", this.moved !== null);
     this.tell();
   }

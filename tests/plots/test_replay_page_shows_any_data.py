@@ -78,6 +78,21 @@ def test_values_that_are_not_numbers_are_shown_as_words(open_page: Open, tmp_pat
     assert frame(page) > 2
 
 
+def test_views_leave_out_values_that_are_not_numbers(open_page: Open, tmp_path: Path) -> None:
+    trace = fig4("signed")
+    stored = {name: np.array(values) for name, values in trace.seen.items()}
+    stored["friction.F"][20:40] = math.inf
+    stored["friction.v"][50:60] = math.nan
+    page = open_page(write_replay(tmp_path / "gaps.html", replace(trace, stored=stored)))
+    for key in ("phase", "landscape", "microscope"):  # a drawing with NaN is a console message
+        page.evaluate(f"openPane('right', '{key}')")
+        for row in (30, 55, 70):
+            page.evaluate(f"go({row})")
+            if key == "landscape":
+                seen = page.locator(".probe").get_attribute("visibility") != "hidden"
+                assert seen == (row != 55)
+
+
 @pytest.mark.parametrize(("scale", "unit"), [(1.0, "s"), (1e-6, "µs"), (1e6, "Ms")])
 def test_the_time_axis_has_its_unit(
     open_page: Open, tmp_path: Path, scale: float, unit: str
