@@ -62,7 +62,6 @@ def stored_run(page: PageRows, charts: Sequence[int], reports: Sequence[Report])
     whole = trace.system is None or bool(trace.which)
     return {
         "rows": len(trace),
-        "last": int(page.number[-1]),
         "instants": packed(instants),
         "number": packed(page.number),
         "between": packed(page.between),

@@ -156,6 +156,9 @@ function extent(columns) {
   return low <= high ? { low, high } : { low: -1, high: 1 };
 }
 
+// The largest distance from 0 in a range.
+const largest = ({ low, high }) => Math.max(Math.abs(low), Math.abs(high));
+
 // The path of a run in a plane, in px, by row.
 class Track {
   constructor(plane, across, up, run) {

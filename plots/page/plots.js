@@ -45,12 +45,7 @@ class TimePlots {
 
   made({ title, note = "", unit = "", lines, at, digits = 5, step = false }, isLast) {
     const head = make("h3", this.body, ""), name = make("span", head), value = make("output", head);
-    const largest = lines.reduce((most, { get, run }) => {
-      let found = most;
-      for (let row = 0; row < run.rows; row++) { const u = Math.abs(get(row)); if (u > found && Number.isFinite(u)) found = u; }
-      return found;
-    }, 0);
-    const power = powerOf(largest, unit);
+    const power = powerOf(largest(extent(lines.map(({ get, run }) => ({ get, rows: run.rows })))), unit);
     name.textContent = unit ? `${title} [${PREFIXES[power]}${unit}]` : title;
     const ink = (stroke) => () => colour(stroke);
     const axis = { stroke: ink("--ink"), grid: { stroke: ink("--grid"), width: 1 }, ticks: { show: false }, font: "11px system-ui, sans-serif" };
@@ -118,7 +113,7 @@ class TimePlots {
     const row = pointed === null ? this.view.row : frames.rows[this.view.place][pointed];
     for (const { value, at, unit, digits } of this.plots) {
       const u = at(row), text = typeof u === "string" ? u : eng(u, unit, digits);
-      if (value.textContent !== text) value.textContent = text;
+      say(value, text);
     }
   }
 
