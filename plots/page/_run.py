@@ -95,6 +95,7 @@ def _contact(trace: Trace, pool: Pool, picture: int, reports: Sequence[Report]) 
         "chart": picture,
         "n": n,
         "states": [state.name for state in chart.states],
+        "locked": [state.locked for state in chart.states],
         "edges": edges,
         "parameters": {
             name: float(value) if np.ndim(value) == 0 else np.asarray(value).tolist()

@@ -131,8 +131,12 @@ class BristlesPane {
     this.reveal(fired?.contact === contact ? fired.element : view.element);
   }
 
+  // Whether a contact does not move on the ground. A bristle sticks in the default state; without one, as in an end stop or
+  // a block on a belt, only a state that locks the motion holds it.
+  held(mode) { return this.z ? mode === 0 : this.view.contact.locked[mode]; }
+
   restyle({ group, label, way }, i, mode, now, v) {
-    const { contact, element } = this.view, held = mode === 0;
+    const { contact, element } = this.view, held = this.held(mode);
     group.setAttribute("class", ["element", `mode${mode % STATES}`, held ? "held" : "open", now && "fired", i === element && "chosen",
       !contact.edges.length && "alone"].filter(Boolean).join(" "));
     say(label, `E${i + 1} ${contact.states[mode]}`);
