@@ -1,6 +1,6 @@
 """A run as a single web page to step, scrub and explain it, without a network.
 
-Python stores the values of the run, its transitions, the charts as pictures and the guards as trees.
+Python stores the values of the run, its transitions, charts as pictures and guards as trees.
 The page computes truths, margins and regions from these trees, with one function for all of them;
 it has no switching rules of its own. The only text it parses is the condition that a user types
 into its `until` box. The plot library (uPlot) is read from the installed package and written into

@@ -84,21 +84,27 @@ class RunView {
     if (fired && following) this.choose(fired.contact, fired.element);
     const { contact } = this;
     const get = (name, unit) => eng(contact.value(name, 0, row), unit, 5);
-    const number = `row ${run.number[row]}`;
+    const number = `row ${run.number[row]}`, ended = run.ended(frames.t[frame]) && `ended at ${eng(run.t(row), "s", 5)}`;
     $(".values", this.root).textContent = [
       `F = ${get("F", "N")}`, `v = ${eng(contact.value(contact.velocity, 0, row), "m/s", 5)}`, `x = ${get("x", "m")}`,
       run.between[row] ? `after ${number}` : `${number} of ${run.of}`,
-      run.between[row] ? "" : `micro-step ${run.microstep[row]}`,
+      ended || (run.between[row] ? "" : `micro-step ${run.microstep[row]}`),
     ].filter(Boolean).join("   ");
     this.showTokens();
     this.explain();
     for (const pane of Object.values(this.open)) pane.show();
   }
 
+  happened() {
+    const { row, run } = this;
+    return run.ended(frames.t[frame]) ? [] : [run.fired.get(row), ...(run.late.get(row) ?? [])].filter(Boolean);
+  }
+
   // What happened at this row, and what the selected element waits for, if it did not just fire.
   verdict() {
-    const { contact, element, row, run } = this, fired = run.fired.get(row);
-    const happened = [fired, ...(run.late.get(row) ?? [])].filter(Boolean);
+    const { contact, element, run } = this;
+    if (run.ended(frames.t[frame])) return "ended";
+    const happened = this.happened();
     const own = happened.some((entry) => entry.contact === contact && entry.element === element);
     return [...happened.map((entry) => entry.contact.sentence(entry)), ...(own ? [] : [this.waits()])].join("; ");
   }

@@ -2,6 +2,7 @@
 // The plots over time. All share one time axis, a cursor at the row shown and a crosshair under the mouse; the head of
 // each plot tells its value at the crosshair, or else at the cursor.
 const AXIS = 58, GAP = 10, TIME_AXIS = 20; // px to the left and to the right of the plots, and below them
+const LEAST = { 1: 46, 2: 34 }; // px, of a plot of one run or of two, so that the time axis stays in view
 const DASHES = [[], [7, 4], [2, 3], [8, 3, 2, 3], [12, 4], [4, 2, 1, 2, 1, 2]];
 const COLOURS = 7, STATES = 5; // of the style sheet: --e0 ..., --state0 ...
 const WIDE = matchMedia("(min-width: 1000px)"); // there the page fills the screen and does not scroll
@@ -88,7 +89,7 @@ class TimePlots {
     if (!width || !this.plots.length) return;
     const heads = this.plots.reduce((sum, { value }) => sum + value.parentNode.offsetHeight, 0);
     const left = this.box.clientHeight - heads - (this.ribbons?.offsetHeight ?? 0) - TIME_AXIS - 2;
-    const height = WIDE.matches ? Math.max(Math.floor(left / this.plots.length), 46) : 92;
+    const height = WIDE.matches ? Math.max(Math.floor(left / this.plots.length), LEAST[runs.length]) : 92;
     for (const each of this.plots) {
       const own = each === last ? height + TIME_AXIS : height;
       if (each.plot.width !== width || each.plot.height !== own) each.plot.setSize({ width, height: own });

@@ -36,6 +36,9 @@ class RunData {
     }
   }
 
+  // Whether a time is after the last row; the page of a longer run goes on, with the last values of this one.
+  ended(t) { return t > this.t(this.rows - 1); }
+
   // A column by row: the number of a stored one, or that and a factor.
   column(each) {
     if (!Array.isArray(each)) return this.pool[each];
