@@ -213,17 +213,23 @@ function reveal(node, box, lines = 1, covered = 0) {
   if (inner.left < outer.left || inner.right > outer.right) box.scrollLeft += inner.left - outer.left;
 }
 
-// The clause that holds back an edge: the false one that is furthest from its boundary, relative to its sides.
+// The clause that holds back an edge: the false one that is furthest from its boundary, relative to its sides. One without
+// a margin is named only if all others are true, as in the race of plots/panels/_race.py.
 function worstClause(clauses) {
-  return clauses.filter(({ truth }) => truth !== 1).sort((a, b) => relative(a) - relative(b))[0];
+  const place = (clause) => (Number.isNaN(clause.margin) ? Infinity : relative(clause));
+  return clauses.filter(({ truth }) => truth !== 1).reduce((worst, each) => (worst && place(worst) <= place(each) ? worst : each), null);
 }
-function relative({ left, right, margin }) {
-  const size = Math.max(Math.abs(left), Math.abs(right));
-  return Number.isNaN(margin) ? -Infinity : size === 0 ? 0 : margin / size;
+// From -1 to 1; a clause without a margin is further away than any other.
+function relative(clause) {
+  const { left, right, margin } = clause;
+  if (Number.isNaN(margin)) return -Infinity;
+  return isZero(clause) ? 0 : clamp(margin / Math.max(Math.abs(left), Math.abs(right)), -1, 1);
 }
 // A margin due to the clock and floats is zero, as in the debugger.
-function marginText({ left, right, margin, unit }) {
-  if (Math.abs(margin) <= data.rounding * Math.max(Math.abs(left), Math.abs(right))) return "0";
+function isZero({ left, right, margin }) { return Math.abs(margin) <= data.rounding * Math.max(Math.abs(left), Math.abs(right)); }
+function marginText(clause) {
+  const { margin, unit } = clause;
+  if (isZero(clause)) return "0";
   return `${margin > 0 ? "+" : ""}${eng(margin, unit)}`;
 }
 // In words, of the edge that is nearest to firing.

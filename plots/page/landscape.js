@@ -362,7 +362,7 @@ class Race {
       say(word, k === told.edge ? told.word : fires ? "true, after the first" : "");
       lane.classList.toggle("fires", k === told.edge);
       clauses.forEach((clause, c) => {
-        const { row, mark, bar, margin } = rows[c], compared = !Number.isNaN(clause.margin), part = compared ? clamp(relative(clause), -1, 1) : 0;
+        const { row, mark, bar, margin } = rows[c], compared = !Number.isNaN(clause.margin), part = compared ? relative(clause) : 0;
         say(mark, `${MARKS[clause.truth]}`);
         say(margin, compared ? marginText(clause) : { 1: "true", 0: "false" }[clause.truth] ?? "not computable");
         row.className = `${clause.truth === 1 ? "true" : "false"}${clause === worst ? " worst" : ""}`;
