@@ -84,10 +84,10 @@ class RunView {
     if (fired && following) this.choose(fired.contact, fired.element);
     const { contact } = this;
     const get = (name, unit) => eng(contact.value(name, 0, row), unit, 5);
-    const number = `row ${run.number[row]}`, ended = run.ended(frames.t[frame]) && `ended at ${eng(run.t(row), "s", 5)}`;
+    const ended = run.ended(frames.t[frame]) && `ended at ${eng(run.t(row), "s", 5)}`;
     $(".values", this.root).textContent = [
       `F = ${get("F", "N")}`, `v = ${eng(contact.value(contact.velocity, 0, row), "m/s", 5)}`, `x = ${get("x", "m")}`,
-      run.between[row] ? `after ${number}` : `${number} of ${run.of}`,
+      run.rowName(row) + (run.between[row] ? "" : ` of ${run.of}`),
       ended || (run.between[row] ? "" : `micro-step ${run.microstep[row]}`),
     ].filter(Boolean).join("   ");
     this.showTokens();

@@ -36,6 +36,8 @@ class RunData {
     }
   }
 
+  rowName(row) { return `${this.between[row] ? "after " : ""}row ${this.number[row]}`; }
+
   // Whether a time is after the last row; the page of a longer run goes on, with the last values of this one.
   ended(t) { return t > this.t(this.rows - 1); }
 

@@ -178,6 +178,8 @@ def test_numbers_of_rows_are_those_of_the_trace(open_page: Open) -> None:
     page.evaluate(f"show({sample})")
     before = int(np.searchsorted(trace.t, page.evaluate("frames.t[frame]"))) - 1
     assert f"after row {before} " in page.locator(".values").inner_text() + " "
+    heard = page.locator("#scrubber").get_attribute("aria-valuetext")
+    assert (heard or "").endswith(f" s, after row {before}")
 
 
 def test_a_pinned_element_stays_selected(open_page: Open) -> None:
