@@ -97,7 +97,8 @@ class RunView {
 
   happened() {
     const { row, run } = this;
-    return run.ended(frames.t[frame]) ? [] : [run.fired.get(row), ...(run.late.get(row) ?? [])].filter(Boolean);
+    if (run.t(row) !== frames.t[frame]) return []; // the other run is further on, and this one has no row there
+    return [run.fired.get(row), ...(run.late.get(row) ?? [])].filter(Boolean);
   }
 
   // What happened at this row, and what the selected element waits for, if it did not just fire.
@@ -226,7 +227,7 @@ function relative(clause) {
   return isZero(clause) ? 0 : clamp(margin / Math.max(Math.abs(left), Math.abs(right)), -1, 1);
 }
 // A margin due to the clock and floats is zero, as in the debugger.
-function isZero({ left, right, margin }) { return Math.abs(margin) <= data.rounding * Math.max(Math.abs(left), Math.abs(right)); }
+function isZero({ left, right, margin }) { return Number.isFinite(margin) && Math.abs(margin) <= data.rounding * Math.max(Math.abs(left), Math.abs(right)); }
 function marginText(clause) {
   const { margin, unit } = clause;
   if (isZero(clause)) return "0";

@@ -266,7 +266,7 @@ class MicroscopePane {
 
   button(k, { row, contact, element, edge }) {
     const { strip, view: { run } } = this, at = contact.columns.F;
-    const node = make("button", this.foot, `${run.between[row] ? "after " : ""}${run.number[row]}\n${run.microstep[row]}`, {
+    const node = make("button", this.foot, `${BETWEEN[run.between[row]]}${run.number[row]}\n${run.microstep[row]}`, {
       tabindex: -1, "aria-label": `Row ${run.number[row]}, micro-step ${run.microstep[row]}: ${contact.sentence({ element, edge })}, `
         + `F ${eng(at(row - 1), "N", F_DIGITS)} before, ${eng(at(row), "N", F_DIGITS)} after`,
     });

@@ -15,6 +15,8 @@ function integers([kind, text]) {
   return found;
 }
 
+const BETWEEN = ["", "after ", "before "]; // where a row of the page lies, seen from a row of the trace
+
 class RunData {
   constructor(stored, place) {
     Object.assign(this, { place, title: stored.title, of: stored.of, rows: stored.rows, system: stored.system });
@@ -36,7 +38,7 @@ class RunData {
     }
   }
 
-  rowName(row) { return `${this.between[row] ? "after " : ""}row ${this.number[row]}`; }
+  rowName(row) { return `${BETWEEN[this.between[row]]}row ${this.number[row]}`; }
 
   // Whether a time is after the last row; the page of a longer run goes on, with the last values of this one.
   ended(t) { return t > this.t(this.rows - 1); }
