@@ -97,8 +97,10 @@ class Subject:
 
     def with_numbers(self, values: Mapping[str, float]) -> Subject:
         """Return the same with other numbers."""
+        if not values:
+            return self
         given: dict[str, Any] = {}
-        numbers = self.numbers if values else {}
+        numbers = self.numbers
         for name, value in values.items():
             number = numbers[name]
             if number.element is None:
@@ -113,7 +115,7 @@ class Subject:
                 given[number.whole] = [given[number.whole]] * n if number.whole in given else each
             given[number.whole][number.element] = value
         if isinstance(self.model, System):
-            return Subject(with_numbers_of(self.model, given), None) if given else self
+            return Subject(with_numbers_of(self.model, given), None)
         assert self.rig is not None
         return Subject(with_values(self.model, given), with_numbers(self.rig, given))
 

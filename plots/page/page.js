@@ -17,9 +17,9 @@ function show(k, words = "") {
   const scrubber = $("#scrubber");
   scrubber.value = inTime ? t : frame;
   const verdicts = views.map((view) => (views.length > 1 ? `run ${view.place + 1}: ` : "") + view.verdict());
-  if (!play.on) scrubber.setAttribute("aria-valuetext", `${place}, row ${runs[0].number[frames.rows[0][frame]]}`);
+  if (!play.on) scrubber.setAttribute("aria-valuetext", `${place}, ${runs[0].rowName(frames.rows[0][frame])}`);
   $("#say").textContent = words && views.length > 1 ? words : [words, ...verdicts].filter(Boolean).join("; ");
-  $("#say").classList.toggle("fired", views.some(({ run, row }) => run.fired.has(row) || run.late.has(row)));
+  $("#say").classList.toggle("fired", views.some((view) => view.happened().length));
   tell();
 }
 
@@ -237,7 +237,7 @@ function difference() {
 // What the element of a firing waits for in the other run, at the row where it fired.
 function heldInOther({ contact, element }, i, at) {
   const same = runs[1 - i].contacts.find(({ name, n }) => name === contact.name && n > element);
-  return same ? `in run ${2 - i} ${waiting(same, element, frames.rows[1 - i][at])}` : "";
+  return same && !runs[1 - i].ended(frames.t[at]) ? `in run ${2 - i} ${waiting(same, element, frames.rows[1 - i][at])}` : "";
 }
 
 function firstDifference() {

@@ -156,7 +156,7 @@ def test_a_system() -> None:
     before, after = trace.body("mass").x[trace.t == 3.0]
     assert after == 0.1
     moved = trace.body("mass").x[-1] - expected.body("mass").x[-1]  # nothing depends on x
-    assert moved == pytest.approx(after - before, rel=1e-6)
+    assert moved == pytest.approx(after - before, rel=1e-4)
     with pytest.raises(ParameterError, match="only a GMS model has a slip law"):
         forks.fork(law="signed")
 
