@@ -113,7 +113,7 @@ class RunView {
 
   // What happened at this row, and what the selected element waits for, if it did not just fire.
   verdict() {
-    const { contact, element, run } = this;
+    const { contact, element, row, run } = this;
     if (run.ended(frames.t[frame])) return "ended";
     const happened = this.happened();
     const own = happened.some((entry) => entry.contact === contact && entry.element === element);
