@@ -1,8 +1,8 @@
 """Pictures: charts drawn by Graphviz, figures drawn by matplotlib.
 
 Importing this package needs neither a Graphviz program nor matplotlib; drawing does. Figures are in
-`plots.figures`, single panels in `plots.panels` (extra ``plots``). Once it is imported, charts,
-models, systems and traces display themselves in a notebook.
+`plots.figures`, single panels in `plots.panels` (extra ``plots``). What notebooks show of charts,
+models, systems and runs is made by `plots.notebook`; they need no import of this package.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 from plots.block_diagram import block_diagram
 from plots.live_chart import LiveChart, live_statechart
 from plots.mermaid import mermaid
-from plots.notebook import register
 from plots.render import render
 from plots.replay import replay, write_replay
 from plots.statechart import statechart
@@ -35,8 +34,6 @@ __all__ = [
     "statechart",
     "write_replay",
 ]
-
-register()
 
 
 def animate(trace: Trace, path: str | Path, **options: Any) -> Path:
