@@ -96,7 +96,7 @@ def composed(number: int) -> tuple[Cell, ...]:
     before, found, after = own.read_text(encoding="utf-8").partition(f"{RUN}\n")
     if not found:
         raise ParameterError(f"the line {RUN} is missing", place=str(own))
-    text = inspect.getdoc(module).partition("\n\n")[2]  # without the first line, a title
+    text = inspect.cleandoc(module.__doc__).partition("\n\n")[2]  # without the first line, a title
     replay = f'"lesson_{number}_replay.html"'
     return (
         ("markdown", f"# Lesson {number}: {module.TITLE}\n\n**{module.QUESTION}**"),
@@ -199,7 +199,7 @@ def notebook(cells: tuple[Cell, ...]) -> str:
 
 
 def _cell(place: int, kind: str, text: str) -> Mapping[str, Any]:
-    outputs = {"execution_count": None, "outputs": []} if kind == "code" else {}
+    outputs: Mapping[str, Any] = {"execution_count": None, "outputs": []} if kind == "code" else {}
     return {
         "cell_type": kind,
         "id": f"cell-{place}",

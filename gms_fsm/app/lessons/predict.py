@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable
+from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
 
@@ -74,8 +75,7 @@ def vary(
     log : bool
         Whether the slider is logarithmic.
     """
-    from IPython.display import display
-
+    display: Any = import_module("IPython.display").display
     if find_spec("ipywidgets") is None:
         display(draw(initial))
         print(
@@ -83,8 +83,7 @@ def vary(
             "(value). With ipywidgets (pip install ipywidgets) there is a slider here."
         )
         return
-    import ipywidgets
-
+    ipywidgets: Any = import_module("ipywidgets")
     numbers = (initial, least, most, step)
     whole = all(isinstance(each, int) for each in numbers)
     kind = "FloatLogSlider" if log else "IntSlider" if whole else "FloatSlider"
