@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from contextlib import chdir
+from contextlib import chdir, redirect_stdout
+from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from textwrap import wrap
@@ -292,7 +293,7 @@ def desk_figure() -> Figure:
     """Return the figure of docs/howto/desk-experiment.md, whose code it runs."""
     page = (Path(__file__).parent / "howto" / "desk-experiment.md").read_text(encoding="utf-8")
     names: dict[str, Any] = {}
-    with TemporaryDirectory() as folder, chdir(folder):
+    with TemporaryDirectory() as folder, chdir(folder), redirect_stdout(StringIO()):
         for kind, text in cells_of(page):
             if kind == "code":
                 exec(text, names)
