@@ -60,6 +60,7 @@ SHOWN = {
     "plots.block_diagram(system_of(model, rig))": SVG,
     "plots.overview(trace)": PNG,
     "plots.mermaid(chart)": "text/markdown",
+    "plots.replay(trace)": HTML,
     "rig": TEXT,
     "Prescribed(lambda t: 0.1 * t)": TEXT,
     "Slider(1.0, [(i, 0.1) for i in range(10000)])": TEXT,
@@ -76,7 +77,7 @@ def executed(begin: str, shown: Iterable[str], folder: Path) -> dict[str, Any]:
     """Run each text as the last line of a cell, and return its output by mime type."""
     nbclient = pytest.importorskip("nbclient", reason="running a notebook needs nbclient")
     pytest.importorskip("ipykernel", reason="running a notebook needs ipykernel")
-    for module in ("matplotlib", "z3"):
+    for module in ("matplotlib", "uplot", "z3"):
         pytest.importorskip(module, reason="one of each needs the extra 'all'")
     import nbformat
 
@@ -110,9 +111,9 @@ def test_each_shows_itself(shown: str, outputs: dict[str, Any]) -> None:
         assert "max-width:100%" in root.get("style", "")
         assert len(data[SVG]) < 100_000
     if SHOWN[shown] == HTML:
-        assert re.search(r"<(table|pre|p)\b", data[HTML])
+        assert re.search(r"<(table|pre|p|iframe)\b", data[HTML])
         assert " at 0x" not in data[HTML]
-        assert len(data[HTML]) < 100_000
+        assert len(data[HTML]) < (1_000_000 if "replay" in shown else 100_000)
 
 
 @pytest.mark.slow

@@ -1,0 +1,60 @@
+"""A dot dragged away from the row says "... would fire" exactly where Python finds a guard true."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.plots.browser import Open, browser, open_page, pages
+from tests.plots.landscape_cases import NAMES, first_to_fire, opened, run
+
+__all__ = ["browser", "open_page", "pages"]
+
+pytestmark = pytest.mark.slow
+
+POINT = """() => {
+    const pane = views[0].open.right;
+    const [x, y] = pane.placeOfDot(), { edges } = views[0].contact;
+    const inside = (region) => [-0.6, 0, 0.6].flatMap((dx) => [-0.6, 0, 0.6].map((dy) =>
+        region.isPointInFill(new DOMPoint(x + dx, y + dy))));
+    const regions = $$(".guarded", pane.regions);
+    return {
+        row: pane.asked.row, state: views[0].contact.states[pane.state], point: pane.moved,
+        regions: Object.fromEntries(
+            regions.map((each) => [edges[each.dataset.edge].name, inside(each)])),
+    };
+}"""
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_dragging_to_random_points(open_page: Open, tmp_path: Path, name: str) -> None:
+    page, (_, trace) = opened(open_page, tmp_path, name), run(name)
+    numbers, between = page.evaluate("[[...runs[0].number], [...runs[0].between]]")
+    own = [row for row, sample in enumerate(between) if not sample]
+    plane, dot, answer = (page.locator(q) for q in (".plane .ground", ".probe", ".answer"))
+    box = plane.bounding_box()
+    assert box is not None
+    rng, fired = np.random.default_rng(18), []
+    for _ in range(60):
+        page.evaluate("(row) => show(row)", int(rng.choice(own)))
+        dot.hover(force=True)
+        page.mouse.down()
+        x, y = rng.uniform(size=2)
+        page.mouse.move(box["x"] + x * box["width"], box["y"] + y * box["height"], steps=2)
+        page.mouse.up()
+        found = page.evaluate(POINT)
+        row, state, (v, z) = found["row"], found["state"], found["point"]
+        if between[row]:
+            continue
+        edge, text = first_to_fire(trace, numbers[row], 0, state, v, z), answer.first.inner_text()
+        drawn = [name for name, inside in found["regions"].items() if all(inside)]
+        near = [name for name, inside in found["regions"].items() if any(inside)]
+        assert edge in near if edge else not drawn
+        if edge:
+            assert text == f"{edge} would fire"
+        else:
+            assert text.startswith(("nothing would fire: ", "no edge leaves "))
+        fired.append(edge)
+    assert 10 < sum(map(bool, fired)) < len(fired) - 10
