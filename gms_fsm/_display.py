@@ -145,7 +145,7 @@ def full_text(value: Any) -> str:
 
     Examples
     --------
-    >>> from gms_fsm.charts import State
+    >>> from gms_fsm import State
     >>> full_text(State("stick", flow={"z": "v"}))
     "State('stick', {'z': 'v'}, {}, {}, {}, False)"
     """

@@ -121,8 +121,8 @@ def chart_in_words(chart: Chart) -> str:
       1 -> slip [z >= s && v > v_c]
       2 -> slip [z <= -s && v < -v_c]
     slip
-      during: dz = sign(v) * C * (1 - z / s);
-      1 -> stick [-v_c <= v && v <= v_c]
+      during: dz = C * (sgn(v) - z / s);
+      1 -> stick [|v| <= v_c && |z| < s]
     """
     write, lines = Writer(chart, "stateflow"), [chart.name]
     for state in chart.states:

@@ -86,7 +86,7 @@ class Block:
         return f"{self.kind}-{self.name}"
 
 
-def system_diagram(system: System) -> graphviz.Digraph:
+def system_diagram(system: System) -> DrawnGraph:
     """Draw a system.
 
     Parameters

@@ -56,7 +56,7 @@ INTEGRATOR = (
 )
 
 
-def block_diagram(elements: int | System = 4) -> graphviz.Digraph:
+def block_diagram(elements: int | System = 4) -> DrawnGraph:
     """Draw the block diagram of a system, or of a GMS model.
 
     Parameters
@@ -98,7 +98,7 @@ def block_diagram(elements: int | System = 4) -> graphviz.Digraph:
     return _model_diagram(int(elements))
 
 
-def _model_diagram(elements: int) -> graphviz.Digraph:
+def _model_diagram(elements: int) -> DrawnGraph:
     graph = DrawnGraph(
         name="block diagram",
         engine="neato",

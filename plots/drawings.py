@@ -2,39 +2,39 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Container
+from base64 import b64encode
+from html import escape
 
 import graphviz
 
-__all__ = ["DrawnGraph", "MermaidText", "Svg", "fitted"]
-
-FITTED = "max-width:100%;height:auto;"
+__all__ = ["DrawnGraph", "MermaidText", "Svg", "image"]
 
 
-def fitted(svg: str) -> str:
-    """Return an SVG document that is no wider than the page it is in.
+def image(svg: str, words: str) -> str:
+    """Return an SVG document as an image in HTML, no wider than the page.
+
+    JupyterLab cuts off the right side of a wide SVG document that is not in HTML.
 
     Parameters
     ----------
     svg : str
-        The document, with a size and a viewBox.
+        The document.
+    words : str
+        What it shows, for readers who do not see it.
 
     Returns
     -------
     str
-        The same with a style.
+        An ``img`` element.
 
     Examples
     --------
-    >>> fitted('<svg width="10pt" style="background:#FFF">')
-    '<svg style="max-width:100%;height:auto;background:#FFF" width="10pt" >'
+    >>> image("<svg></svg>", "nothing")
+    '<img style="max-width:100%" alt="nothing" src="data:image/svg+xml;base64,PHN2Zz48L3N2Zz4=">'
     """
-    before, _, rest = svg.partition("<svg ")
-    tag, _, after = rest.partition(">")
-    own = re.search(r'style="([^"]*)"', tag)
-    tag = tag.replace(own[0], "") if own else tag
-    return f'{before}<svg style="{FITTED}{own[1] if own else ""}" {tag}>{after}'
+    data = b64encode(svg.encode()).decode()
+    words = escape(words)
+    return f'<img style="max-width:100%" alt="{words}" src="data:image/svg+xml;base64,{data}">'
 
 
 class DrawnGraph(graphviz.Digraph):  # type: ignore[misc]
@@ -54,19 +54,16 @@ class DrawnGraph(graphviz.Digraph):  # type: ignore[misc]
 
     def _repr_mimebundle_(
         self,
-        include: Container[str] | None = None,
-        exclude: Container[str] | None = None,
-        **_: object,
+        **_: object,  # include, exclude: the caller selects again
     ) -> dict[str, str]:
         # graphviz would run the program dot, and raise an error where there is none.
         from plots import notebook
 
-        form = "image/svg+xml"
-        if (include is None or form in include) and (exclude is None or form not in exclude):
-            picture = notebook.svg_of(self)
-            if picture is not None:
-                return {form: picture, "text/plain": repr(self)}
-        return {"text/plain": self.text or repr(self)}
+        picture = notebook.svg_of(self)
+        if picture is None:
+            return {"text/plain": self.text or repr(self)}
+        html = image(picture, self.text)
+        return {"text/html": html, "image/svg+xml": picture, "text/plain": repr(self)}
 
 
 class Svg(str):
@@ -84,7 +81,10 @@ class Svg(str):
         return f"<SVG document of {len(self)} characters>"
 
     def _repr_svg_(self) -> str:
-        return fitted(self)
+        return str(self)
+
+    def _repr_html_(self) -> str:
+        return image(self, "a picture")
 
 
 class MermaidText(str):

@@ -25,7 +25,7 @@ from gms_fsm.language import Condition, clauses, evaluate, names_in
 from gms_fsm.traces._views import steps_of
 from gms_fsm.traces.trace import Trace, check_trace
 from plots._labels import FALSE, TRUE, UNKNOWN, Piece, Row, edge_id, element_id, part_id
-from plots.drawings import Svg, fitted
+from plots.drawings import Svg, image
 from plots.render import picture
 from plots.statechart import Sheet, chosen
 
@@ -260,7 +260,12 @@ class LiveChart:
 
     def _repr_svg_(self) -> str:
         """Return the last row, for a notebook."""
-        return fitted(self.frame(-1))
+        return self.frame(-1)
+
+    def _repr_html_(self) -> str:
+        row = len(self.trace) - 1
+        said = (f"element {look.element + 1} is in {look.active}" for look in self.look(row))
+        return image(self.frame(row), f"t = {self.trace.t[row]:.6g} s: {', '.join(said)}")
 
     def paint(self, row: int) -> None:
         """Paint the tree `root` as a row; `frame` does this and writes the tree.

@@ -34,10 +34,9 @@ from gms_fsm.traces.verdicts import (
     InvariantVerdict,
     PassivityVerdict,
 )
-from plots._contents import chart_in_words
 from plots._html import listing, paragraph, table
 from plots.block_diagram import block_diagram
-from plots.drawings import fitted
+from plots.drawings import DrawnGraph, image
 from plots.live_chart import LiveChart
 from plots.render import available, drawn
 from plots.statechart import statechart
@@ -97,37 +96,30 @@ def svg_of(graph: graphviz.Digraph) -> str | None:
         picture = drawn(graph, "svg")
     except OutputError:
         return None
-    return None if picture is None else fitted(picture.decode())
+    return None if picture is None else picture.decode()
 
 
-def chart_svg(chart: Chart) -> str | None:
-    """Return a chart as SVG."""
-    return svg_of(statechart(chart))
+def graph_of(subject: Chart | Model | Contact | System) -> DrawnGraph:
+    """Return what is drawn of a chart, a model, a contact or a system."""
+    if isinstance(subject, System):
+        return block_diagram(subject)
+    if isinstance(subject, Chart):
+        return statechart(subject)
+    return statechart(subject.chart, subject.n if subject.n <= MOST_ELEMENTS else 1)
 
 
-def model_svg(model: Model | Contact) -> str | None:
-    """Return a model's or a contact's bank of elements as SVG."""
-    return svg_of(statechart(model.chart, model.n if model.n <= MOST_ELEMENTS else 1))
+def subject_svg(subject: Chart | Model | Contact | System) -> str | None:
+    """Return a chart, a model, a contact or a system as SVG, or None without Graphviz."""
+    return svg_of(graph_of(subject))
 
 
-def system_svg(system: System) -> str | None:
-    """Return a system's block diagram as SVG."""
-    return svg_of(block_diagram(system))
-
-
-def chart_html(chart: Chart) -> str | None:
-    """Return a chart as text, where it cannot be drawn."""
-    return None if available() else listing(chart_in_words(chart))
-
-
-def model_html(model: Model | Contact) -> str | None:
-    """Return a model or a contact as text, where it cannot be drawn."""
-    return None if available() else listing(f"{model.title}\n{chart_in_words(model.chart)}")
-
-
-def system_html(system: System) -> str | None:
-    """Return a system as text, where it cannot be drawn."""
-    return None if available() else listing(block_diagram(system).text)
+def subject_html(subject: Chart | Model | Contact | System) -> str:
+    """Return the same as an image in HTML, or as text where it cannot be drawn."""
+    graph = graph_of(subject)
+    picture = svg_of(graph)
+    title = f"{subject.title}\n" if hasattr(subject, "title") else ""
+    words = title + graph.text
+    return listing(words) if picture is None else image(picture, words)
 
 
 # --------------------------------------------------------------------------- runs
@@ -213,7 +205,7 @@ def session_html(session: Session) -> str:
             chart = LiveChart(trace, min(trace.n, MOST_ELEMENTS), values=True)
         except GMSError:
             return "".join(parts)
-        parts.append(f"<div>{fitted(chart.frame(branch.cursor))}</div>")
+        parts.append(image(chart.frame(branch.cursor), "the chart there"))
     return "".join(parts)
 
 
@@ -275,12 +267,8 @@ def _findings(*findings: Finding) -> Iterator[list[str]]:
 
 
 FORMS: Mapping[tuple[type, Form], Callable[[Any], Any]] = {
-    (Chart, "svg"): chart_svg,
-    (Chart, "html"): chart_html,
-    **{(model, "svg"): model_svg for model in (GMS, LuGre, ChartModel, Contact)},
-    **{(model, "html"): model_html for model in (GMS, LuGre, ChartModel, Contact)},
-    (System, "svg"): system_svg,
-    (System, "html"): system_html,
+    **{(kind, "svg"): subject_svg for kind in (Chart, GMS, LuGre, ChartModel, Contact, System)},
+    **{(kind, "html"): subject_html for kind in (Chart, GMS, LuGre, ChartModel, Contact, System)},
     (GMSParameters, "html"): parameters_html,
     (Trace, "png"): trace_png,
     (Trace, "html"): trace_html,

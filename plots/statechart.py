@@ -67,7 +67,7 @@ def statechart(
     marked: Iterable[str] = (),
     names: bool = False,
     note: str = "",
-) -> graphviz.Digraph:
+) -> DrawnGraph:
     """Draw a chart: one element, or a bank of elements as parallel states.
 
     Parameters
@@ -267,7 +267,7 @@ class Sheet:
 
     def graph(
         self, numbers: Sequence[int], *, bare: bool, values: Sequence[Row] = (), foot: str = ""
-    ) -> graphviz.Digraph:
+    ) -> DrawnGraph:
         """Draw elements.
 
         Parameters

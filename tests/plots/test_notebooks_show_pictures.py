@@ -15,6 +15,7 @@ import pytest
 import plots
 from gms_fsm import Chart, ChartModel, LuGre, Prescribed, State, Stribeck, simulate
 from gms_fsm.charts import GMS_ELEMENT
+from gms_fsm.errors import OutputError
 from plots import notebook
 from tests.helpers import ROOT, one_element, stick_slip
 from tests.plots.systems_to_draw import BLOCKS, SERVO, run
@@ -60,12 +61,19 @@ def test_a_trace_is_a_png() -> None:
 
 def test_without_graphviz_a_notebook_falls_back_to_text(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(notebook, "drawn", lambda graph, form: None)
-    monkeypatch.setattr(notebook, "available", lambda: False)
-    assert notebook.chart_svg(GMS_ELEMENT["signed"]) is None
-    assert notebook.model_svg(stick_slip("signed")) is None
     for shown in (GMS_ELEMENT["signed"], stick_slip("signed"), SERVO.contact("bearing")):
+        assert shown._repr_svg_() is None  # type: ignore[attr-defined]
         assert " -> " in html.unescape(shown._repr_html_())  # type: ignore[attr-defined]
     assert "J_m*dw_m/dt" in SERVO._repr_html_().replace(" ", "")  # type: ignore[attr-defined]
+
+
+def test_a_graph_that_graphviz_refuses_is_text(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(graph: object, form: str) -> bytes:
+        raise OutputError("Graphviz cannot draw this graph")
+
+    monkeypatch.setattr(notebook, "drawn", broken)
+    assert plots.block_diagram(2)._repr_mimebundle_().keys() == {"text/plain"}
+    assert stick_slip("signed")._repr_html_().startswith("<pre")  # type: ignore[attr-defined]
 
 
 @pytest.mark.slow
@@ -116,7 +124,7 @@ def test_a_log_is_a_record_array_for_everybody_else() -> None:
 def test_what_a_user_wrote_stays_text() -> None:
     state = State("a", flow={"z": "v"}, outputs={"F": "z"})
     chart = Chart("<script>", variables=("z",), states=(state,))
-    assert "<script>" not in notebook.listing(notebook.chart_in_words(chart))
+    assert "<script>" not in chart._repr_html_()
     assert "<script>" not in notebook.table(["<script>"], [["<script>"]], caption="<script>")
 
 
