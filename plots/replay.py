@@ -1,9 +1,10 @@
 """A run as a single web page to step, scrub and explain it, without a network.
 
-Everything the page shows is computed here and stored in it: values, active states, truth values and
-margins of clauses. The page restyles the chart and moves cursors; it evaluates no guards. The only
-text it parses is the condition that a user types into its `until` box. The plot library
-(uPlot) is read from the installed package and written into the page with its licence.
+Python stores the values of the run, its transitions, charts as pictures and guards as trees.
+The page computes truths, margins and regions from these trees, with one function for all of them;
+it has no switching rules of its own. The only text it parses is the condition that a user types
+into its `until` box. The plot library (uPlot) is read from the installed package and written into
+the page with its licence.
 """
 
 from __future__ import annotations

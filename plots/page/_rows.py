@@ -38,13 +38,13 @@ class PageRows:
         The run with these rows.
     number : ndarray of int, shape (rows,)
         Number of each row in the trace, or of the row before it.
-    between : ndarray of bool, shape (rows,)
-        Whether a row lies between two rows of the trace.
+    between : ndarray of int, shape (rows,)
+        0 for a row of the trace, 1 for one after that row, 2 for one before the first row.
     """
 
     trace: Trace
     number: NDArray[np.int64]
-    between: NDArray[np.bool_]
+    between: NDArray[np.int64]
 
     def at(self, chosen: NDArray[np.bool_]) -> PageRows:
         """Return some of the rows."""
@@ -133,7 +133,7 @@ def _with_microsteps(trace: Trace) -> PageRows:
     stops, rows = trace.stops, trace.rows
     number = np.arange(len(rows))
     if (trace.microstep > 0).any() or not (stops.microstep > 0).any():
-        return PageRows(trace, number, np.zeros(len(rows), dtype=bool))
+        return PageRows(trace, number, np.zeros(len(rows), dtype=np.int64))
     alone = ~np.isin(rows.t, stops.t)  # at a stop, its own rows show more
     pairs = zip(vars(stops).values(), vars(rows.at(alone)).values(), strict=True)
     table = Rows(*(np.concatenate(pair) for pair in pairs))
@@ -144,7 +144,7 @@ def _with_microsteps(trace: Trace) -> PageRows:
     last = np.append(np.diff(table.t) > 0, True)
     own = last & (found >= 0) & (rows.t[found] == table.t)
     run = replace(trace, rows=table, stops=table, stored={})
-    return PageRows(run, np.maximum(found, 0), ~own)
+    return PageRows(run, np.maximum(found, 0), np.where(found < 0, 2, ~own))
 
 
 def _refined(found: PageRows, wanted: int) -> PageRows:
@@ -164,4 +164,5 @@ def _refined(found: PageRows, wanted: int) -> PageRows:
             return found
     number, between = np.zeros((2, len(refined)), dtype=np.int64)
     number[~new], between[~new], between[new] = found.number, found.between, 1
-    return PageRows(refined, np.maximum.accumulate(number), between.astype(bool))
+    between[refined.t < run.t[found.between != 2].min()] = 2
+    return PageRows(refined, np.maximum.accumulate(number), between)

@@ -62,7 +62,6 @@ def stored_run(page: PageRows, charts: Sequence[int], reports: Sequence[Report])
     whole = trace.system is None or bool(trace.which)
     return {
         "rows": len(trace),
-        "last": int(page.number[-1]),
         "instants": packed(instants),
         "number": packed(page.number),
         "between": packed(page.between),
@@ -96,6 +95,7 @@ def _contact(trace: Trace, pool: Pool, picture: int, reports: Sequence[Report]) 
         "chart": picture,
         "n": n,
         "states": [state.name for state in chart.states],
+        "locked": [state.locked for state in chart.states],
         "edges": edges,
         "parameters": {
             name: float(value) if np.ndim(value) == 0 else np.asarray(value).tolist()

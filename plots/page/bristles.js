@@ -48,11 +48,7 @@ class BristlesPane {
 
   most(name) {
     const { contact, run } = this.view, column = contact.columns[name];
-    return (Array.isArray(column) ? column : [column]).reduce((largest, get) => {
-      let found = largest;
-      for (let row = 0; row < run.rows; row++) { const u = Math.abs(get(row)); if (u > found && Number.isFinite(u)) found = u; }
-      return found;
-    }, 0);
+    return largest(extent((Array.isArray(column) ? column : [column]).map((get) => ({ get, rows: run.rows }))));
   }
 
   note() {
@@ -129,23 +125,27 @@ class BristlesPane {
         each.contact.setAttribute("transform", `translate(${at.toFixed(2)} 0)`);
         each.link.setAttribute("transform", `translate(${from.toFixed(2)} ${each.y}) scale(${((this.wall - from) / 100).toFixed(5)} ${each.tall})`);
       }
-      if (each.value) write(each.value, `${this.z} ${eng(z, unit, 4)}`);
-      if (each.force) write(each.force, eng(contact.forces[i](row), "N", 4));
+      if (each.value) say(each.value, `${this.z} ${eng(z, unit, 4)}`);
+      if (each.force) say(each.force, eng(contact.forces[i](row), "N", 4));
     });
     this.reveal(fired?.contact === contact ? fired.element : view.element);
   }
 
+  // Whether a contact does not move on the ground. A bristle sticks in the default state; without one, as in an end stop or
+  // a block on a belt, only a state that locks the motion holds it.
+  held(mode) { return this.z ? mode === 0 : this.view.contact.locked[mode]; }
+
   restyle({ group, label, way }, i, mode, now, v) {
-    const { contact, element } = this.view, held = mode === 0;
+    const { contact, element } = this.view, held = this.held(mode);
     group.setAttribute("class", ["element", `mode${mode % STATES}`, held ? "held" : "open", now && "fired", i === element && "chosen",
       !contact.edges.length && "alone"].filter(Boolean).join(" "));
-    write(label, `E${i + 1} ${contact.states[mode]}`);
+    say(label, `E${i + 1} ${contact.states[mode]}`);
     way.setAttribute("visibility", held || v === 0 ? "hidden" : "inherit");
     way.setAttribute("transform", v < 0 ? "scale(-1 1)" : "");
   }
 
   arrow({ text, arrow }, words, u, largest) {
-    write(text, words);
+    say(text, words);
     const length = largest > 0 && Number.isFinite(u) && u !== 0 ? Math.max((BRISTLE.arrow * Math.abs(u)) / largest, 7) : 0;
     const d = length ? `M0 0H${(Math.sign(u) * length).toFixed(1)}m${-5 * Math.sign(u)} -4l${5 * Math.sign(u)} 4l${-5 * Math.sign(u)} 4` : "M0 -4V4";
     arrow.setAttribute("d", d);
@@ -160,5 +160,3 @@ class BristlesPane {
   }
 }
 PANES.push(BristlesPane);
-
-function write(node, text) { if (node.textContent !== text) node.textContent = text; }

@@ -84,21 +84,28 @@ class RunView {
     if (fired && following) this.choose(fired.contact, fired.element);
     const { contact } = this;
     const get = (name, unit) => eng(contact.value(name, 0, row), unit, 5);
-    const number = `row ${run.number[row]}`;
+    const ended = run.ended(frames.t[frame]) && `ended at ${eng(run.t(row), "s", 5)}`;
     $(".values", this.root).textContent = [
       `F = ${get("F", "N")}`, `v = ${eng(contact.value(contact.velocity, 0, row), "m/s", 5)}`, `x = ${get("x", "m")}`,
-      run.between[row] ? `after ${number}` : `${number} of ${run.of}`,
-      run.between[row] ? "" : `micro-step ${run.microstep[row]}`,
+      run.rowName(row) + (run.between[row] ? "" : ` of ${run.of}`),
+      ended || (run.between[row] ? "" : `micro-step ${run.microstep[row]}`),
     ].filter(Boolean).join("   ");
     this.showTokens();
     this.explain();
     for (const pane of Object.values(this.open)) pane.show();
   }
 
+  happened() {
+    const { row, run } = this;
+    if (run.t(row) !== frames.t[frame]) return []; // the other run is further on, and this one has no row there
+    return [run.fired.get(row), ...(run.late.get(row) ?? [])].filter(Boolean);
+  }
+
   // What happened at this row, and what the selected element waits for, if it did not just fire.
   verdict() {
-    const { contact, element, row, run } = this, fired = run.fired.get(row);
-    const happened = [fired, ...(run.late.get(row) ?? [])].filter(Boolean);
+    const { contact, element, run } = this;
+    if (run.ended(frames.t[frame])) return "ended";
+    const happened = this.happened();
     const own = happened.some((entry) => entry.contact === contact && entry.element === element);
     return [...happened.map((entry) => entry.contact.sentence(entry)), ...(own ? [] : [this.waits()])].join("; ");
   }
@@ -207,17 +214,23 @@ function reveal(node, box, lines = 1, covered = 0) {
   if (inner.left < outer.left || inner.right > outer.right) box.scrollLeft += inner.left - outer.left;
 }
 
-// The clause that holds back an edge: the false one that is furthest from its boundary, relative to its sides.
+// The clause that holds back an edge: the false one that is furthest from its boundary, relative to its sides. One without
+// a margin is named only if all others are true, as in the race of plots/panels/_race.py.
 function worstClause(clauses) {
-  return clauses.filter(({ truth }) => truth !== 1).sort((a, b) => relative(a) - relative(b))[0];
+  const place = (clause) => (Number.isNaN(clause.margin) ? Infinity : relative(clause));
+  return clauses.filter(({ truth }) => truth !== 1).reduce((worst, each) => (worst && place(worst) <= place(each) ? worst : each), null);
 }
-function relative({ left, right, margin }) {
-  const size = Math.max(Math.abs(left), Math.abs(right));
-  return Number.isNaN(margin) ? -Infinity : size === 0 ? 0 : margin / size;
+// From -1 to 1; a clause without a margin is further away than any other.
+function relative(clause) {
+  const { left, right, margin } = clause;
+  if (Number.isNaN(margin)) return -Infinity;
+  return isZero(clause) ? 0 : clamp(margin / Math.max(Math.abs(left), Math.abs(right)), -1, 1);
 }
 // A margin due to the clock and floats is zero, as in the debugger.
-function marginText({ left, right, margin, unit }) {
-  if (Math.abs(margin) <= data.rounding * Math.max(Math.abs(left), Math.abs(right))) return "0";
+function isZero({ left, right, margin }) { return Number.isFinite(margin) && Math.abs(margin) <= data.rounding * Math.max(Math.abs(left), Math.abs(right)); }
+function marginText(clause) {
+  const { margin, unit } = clause;
+  if (isZero(clause)) return "0";
   return `${margin > 0 ? "+" : ""}${eng(margin, unit)}`;
 }
 // In words, of the edge that is nearest to firing.

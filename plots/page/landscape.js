@@ -1,6 +1,6 @@
 "use strict";
 // The guards of the selected element as regions of a plane, with the flow and the path of the run. The dot is at the
-// row; moved away from it, it asks what would fire there. Everything that does not span the plane is as at the row.
+// row; where it is moved away, the page says what would fire there. Everything that does not span the plane is as at the row.
 const ARROW = 13; // px, the length of an arrow of the flow
 const PIXELS = 5, FAR = 30; // a step of the dot by an arrow key; with Shift
 const MOST = 80; // drawings that are kept
@@ -13,7 +13,7 @@ class LandscapePane {
 
   constructor(view, box) {
     Object.assign(this, { view, box, moved: null, at: -1, drawnAt: 0, layouts: new Map(), drawings: new Map() });
-    this.none = make("p", box, "This chart has no plane to draw: its guards read nothing besides the velocity and the time.", { class: "note" });
+    this.none = make("p", box, "This chart has no plane to draw: it has no variables, and its guards read nothing but the velocity.", { class: "note" });
     this.body = make("div", box, "", { class: "beside" });
     const left = make("div", this.body, "", { class: "ground-plan" });
     this.plane = new Plane(left, { role: "group" });
@@ -121,9 +121,9 @@ class LandscapePane {
   // Pins and places where guards turn are in view, except those far away from the run.
   axes() {
     const { contact, element } = this.view, { names: [v, z], threshold, pins } = contact.plane, { rows } = contact.run;
-    const speeds = extent([{ get: (row) => contact.value(v, element, row), rows }]), top = Math.max(Math.abs(speeds.low), Math.abs(speeds.high));
+    const speeds = extent([{ get: (row) => contact.value(v, element, row), rows }]), top = largest(speeds);
     const fastest = Math.max(3 * top, 100 * threshold, ...pins.map(({ at }) => 1.5 * Math.abs(at[0])).filter((speed) => speed <= 100 * top));
-    const seen = extent([{ get: (row) => contact.value(z, element, row), rows }]), widest = Math.max(Math.abs(seen.low), Math.abs(seen.high)) || 1;
+    const seen = extent([{ get: (row) => contact.value(z, element, row), rows }]), widest = largest(seen) || 1;
     const all = [seen.low, seen.high, ...pins.map(({ at }) => at[1]).filter((u) => Math.abs(u) <= 4 * widest)];
     const wide = { h: 1600, up: new Axis({ name: z, low: -4 * widest, high: 4 * widest }) };
     for (const state of contact.states.keys()) {
@@ -162,9 +162,9 @@ class LandscapePane {
     this.drawGuards();
     this.drawFlow();
     place(this.trail, { d: this.track.before(asked.row, RECENT * (whole.max - whole.min)) });
-    const [x, y] = this.placeOfDot(), here = [plane.x(points.v0), plane.y(points.z0)];
-    place(this.dot, { transform: `translate(${x.toFixed(2)} ${y.toFixed(2)})` });
-    place(this.origin, { cx: here[0], cy: here[1], opacity: this.moved ? 1 : 0 });
+    const at = this.placeOfDot(), here = [plane.x(points.v0), plane.y(points.z0)], known = (point) => point.every(Number.isFinite);
+    place(this.dot, { visibility: known(at) ? "inherit" : "hidden", ...(known(at) && { transform: `translate(${at.map((u) => u.toFixed(2)).join(" ")})` }) });
+    place(this.origin, { opacity: this.moved && known(here) ? 1 : 0, ...(known(here) && { cx: here[0], cy: here[1] }) });
     this.dot.classList.toggle("moved", this.moved !== null);
     this.tell();
   }
@@ -314,8 +314,6 @@ class LandscapePane {
 }
 PANES.push(LandscapePane);
 
-function say(node, text) { if (node.textContent !== text) node.textContent = text; }
-
 function arrowAt(x, y, cos, sin) {
   const at = (u, w) => `${(x + u * cos - w * sin).toFixed(1)} ${(y + u * sin + w * cos).toFixed(1)}`, end = ARROW / 2;
   return `M${at(-end, 0)}L${at(end, 0)}M${at(end - 4, 2.5)}L${at(end, 0)}L${at(end - 4, -2.5)}`;
@@ -364,7 +362,7 @@ class Race {
       say(word, k === told.edge ? told.word : fires ? "true, after the first" : "");
       lane.classList.toggle("fires", k === told.edge);
       clauses.forEach((clause, c) => {
-        const { row, mark, bar, margin } = rows[c], compared = !Number.isNaN(clause.margin), part = compared ? clamp(relative(clause), -1, 1) : 0;
+        const { row, mark, bar, margin } = rows[c], compared = !Number.isNaN(clause.margin), part = compared ? relative(clause) : 0;
         say(mark, `${MARKS[clause.truth]}`);
         say(margin, compared ? marginText(clause) : { 1: "true", 0: "false" }[clause.truth] ?? "not computable");
         row.className = `${clause.truth === 1 ? "true" : "false"}${clause === worst ? " worst" : ""}`;

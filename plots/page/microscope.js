@@ -266,7 +266,7 @@ class MicroscopePane {
 
   button(k, { row, contact, element, edge }) {
     const { strip, view: { run } } = this, at = contact.columns.F;
-    const node = make("button", this.foot, `${run.between[row] ? "after " : ""}${run.number[row]}\n${run.microstep[row]}`, {
+    const node = make("button", this.foot, `${BETWEEN[run.between[row]]}${run.number[row]}\n${run.microstep[row]}`, {
       tabindex: -1, "aria-label": `Row ${run.number[row]}, micro-step ${run.microstep[row]}: ${contact.sentence({ element, edge })}, `
         + `F ${eng(at(row - 1), "N", F_DIGITS)} before, ${eng(at(row), "N", F_DIGITS)} after`,
     });
@@ -277,28 +277,28 @@ class MicroscopePane {
 
   // The stairs of F and the times above them, for the columns in view. A text that would be cut off is left out.
   drawTop(left, first, last) {
-    const { strip, labels, view } = this, said = [];
-    const say = (text, middle, level, kind) => {
+    const { strip, labels, view } = this, told = [];
+    const tell = (text, middle, level, kind) => {
       const half = (kind === "time first" ? BOLD : 1) * textWidth(text) / 2;
-      if (middle - half >= left + 1 && middle + half <= left + this.across - 1) said.push([text, labels + middle - left, level, kind]);
+      if (middle - half >= left + 1 && middle + half <= left + this.across - 1) told.push([text, labels + middle - left, level, kind]);
     };
     for (let k = first; k <= last; k++) {
       const apart = strip.apart(k), { run } = view, t = run.t(strip.rows[k] ?? run.rows - 1);
-      if (apart) say(`+${eng(t - run.t(strip.rows[k - 1] ?? 0), "s", 3)}`, strip.gaps[k] + COLUMN.gap / 2, 13, "time");
-      if (k < strip.rows.length) say(apart ? eng(t, "s", 7) : "+0", strip.middle(k), 13, apart ? "time first" : "time");
+      if (apart) tell(`+${eng(t - run.t(strip.rows[k - 1] ?? 0), "s", 3)}`, strip.gaps[k] + COLUMN.gap / 2, 13, "time");
+      if (k < strip.rows.length) tell(apart ? eng(t, "s", 7) : "+0", strip.middle(k), 13, apart ? "time first" : "time");
     }
-    this.drawStairs(left, strip.levels(first, last), say);
+    this.drawStairs(left, strip.levels(first, last), tell);
     const here = strip.place(view.row) - left;
     place(this.mark, { d: this.line.hidden || here < 0 ? "" : `M${labels + here} ${COLUMN.head}V${this.top}` });
-    said.forEach(([text, x, y, kind], k) => {
+    told.forEach(([text, x, y, kind], k) => {
       const node = this.texts[k] ??= draw("text", this.svg, { "text-anchor": "middle" });
       place(node, { x, y, class: kind });
-      if (node.textContent !== text) node.textContent = text;
+      say(node, text);
     });
-    for (const node of this.texts.slice(said.length)) node.textContent = "";
+    for (const node of this.texts.slice(told.length)) node.textContent = "";
   }
 
-  drawStairs(left, levels, say) {
+  drawStairs(left, levels, tell) {
     const { contact } = this.view, F = contact.columns.F, title = `F ${contact.name}`;
     this.title.textContent = textWidth(title) * BOLD < this.labels ? title : "F";
     const values = levels.map(({ row }) => F(row));
@@ -315,7 +315,7 @@ class MicroscopePane {
       path += begins || !before ? `M${x(from)} ${level.toFixed(1)}H${x(to)}` : `V${level.toFixed(1)}H${x(to)}`;
       before = { to, level };
       const shown = [texts[k], eng(values[k], "N", F_DIGITS - 1)].find((text) => textWidth(text) <= to - from - 4);
-      if (shown) say(shown, (from + to) / 2, level - 4, "value");
+      if (shown) tell(shown, (from + to) / 2, level - 4, "value");
     });
     place(this.path, { d: path });
     place(this.through, { d: through });

@@ -20,9 +20,9 @@ function show(k, words = "") {
   const scrubber = $("#scrubber");
   scrubber.value = inTime ? t : frame;
   const verdicts = views.map((view) => (views.length > 1 ? `run ${view.place + 1}: ` : "") + view.verdict());
-  if (!play.on) scrubber.setAttribute("aria-valuetext", `${place}, row ${runs[0].number[frames.rows[0][frame]]}`);
+  if (!play.on) scrubber.setAttribute("aria-valuetext", `${place}, ${runs[0].rowName(frames.rows[0][frame])}`);
   $("#say").textContent = words && views.length > 1 ? words : [words, ...verdicts].filter(Boolean).join("; ");
-  $("#say").classList.toggle("fired", views.some(({ run, row }) => run.fired.has(row) || run.late.has(row)));
+  $("#say").classList.toggle("fired", views.some((view) => view.happened().length));
 }
 
 function pointAt(k) {

@@ -156,6 +156,9 @@ function extent(columns) {
   return low <= high ? { low, high } : { low: -1, high: 1 };
 }
 
+// The largest distance from 0 in a range.
+const largest = ({ low, high }) => Math.max(Math.abs(low), Math.abs(high));
+
 // The path of a run in a plane, in px, by row.
 class Track {
   constructor(plane, across, up, run) {
@@ -199,7 +202,7 @@ class Track {
     const { x, y } = this, seen = new Set(), found = [];
     for (let row = 1, way = every / 2; row < x.length && found.length < most; row++) {
       const dx = x[row] - x[row - 1], dy = y[row] - y[row - 1], length = Math.hypot(dx, dy);
-      if (!(length > 0)) continue;
+      if (!(length > 0 && length < Infinity)) continue;
       way += length;
       const cell = `${Math.round(x[row] / every)} ${Math.round(y[row] / every)} ${Math.round((2 * Math.atan2(dy, dx)) / Math.PI)}`;
       if (way < every || seen.has(cell)) continue;

@@ -2,6 +2,7 @@
 // The plots over time. All share one time axis, a cursor at the row shown and a crosshair under the mouse; the head of
 // each plot tells its value at the crosshair, or else at the cursor.
 const AXIS = 58, GAP = 10, TIME_AXIS = 20; // px to the left and to the right of the plots, and below them
+const LEAST = { 1: 46, 2: 34 }; // px, of a plot of one run or of two, so that the time axis stays in view
 const DASHES = [[], [7, 4], [2, 3], [8, 3, 2, 3], [12, 4], [4, 2, 1, 2, 1, 2]];
 const COLOURS = 7, STATES = 5; // of the style sheet: --e0 ..., --state0 ...
 const WIDE = matchMedia("(min-width: 1000px)"); // there the page fills the screen and does not scroll
@@ -45,12 +46,7 @@ class TimePlots {
 
   made({ title, note = "", unit = "", lines, at, digits = 5, step = false }, isLast) {
     const head = make("h3", this.body, ""), name = make("span", head), value = make("output", head);
-    const largest = lines.reduce((most, { get, run }) => {
-      let found = most;
-      for (let row = 0; row < run.rows; row++) { const u = Math.abs(get(row)); if (u > found && Number.isFinite(u)) found = u; }
-      return found;
-    }, 0);
-    const power = powerOf(largest, unit);
+    const power = powerOf(largest(extent(lines.map(({ get, run }) => ({ get, rows: run.rows })))), unit);
     name.textContent = unit ? `${title} [${PREFIXES[power]}${unit}]` : title;
     const ink = (stroke) => () => colour(stroke);
     const axis = { stroke: ink("--ink"), grid: { stroke: ink("--grid"), width: 1 }, ticks: { show: false }, font: "11px system-ui, sans-serif" };
@@ -65,6 +61,7 @@ class TimePlots {
       cursor: { y: false, x: false, points: { show: false } },
       hooks: { setScale: [(u, key) => key === "x" && zoomTo(u.scales.x.min, u.scales.x.max, u)] },
     }, [frames.t, ...lines.map(alongFrames)], make("div", this.body, "", { role: "img", "aria-label": `${title} over time`, class: "plot" }));
+    if (isLast) make("span", plot.root, `t [${PREFIXES[TIME_POWER]}s]`, { class: "time-unit" });
     let down = 0;
     plot.over.addEventListener("mousedown", (event) => { down = event.clientX; });
     plot.over.addEventListener("click", (event) => { // the end of a drag is also a click
@@ -92,7 +89,7 @@ class TimePlots {
     if (!width || !this.plots.length) return;
     const heads = this.plots.reduce((sum, { value }) => sum + value.parentNode.offsetHeight, 0);
     const left = this.box.clientHeight - heads - (this.ribbons?.offsetHeight ?? 0) - TIME_AXIS - 2;
-    const height = WIDE.matches ? Math.max(Math.floor(left / this.plots.length), 46) : 92;
+    const height = WIDE.matches ? Math.max(Math.floor(left / this.plots.length), LEAST[runs.length]) : 92;
     for (const each of this.plots) {
       const own = each === last ? height + TIME_AXIS : height;
       if (each.plot.width !== width || each.plot.height !== own) each.plot.setSize({ width, height: own });
@@ -117,7 +114,7 @@ class TimePlots {
     const row = pointed === null ? this.view.row : frames.rows[this.view.place][pointed];
     for (const { value, at, unit, digits } of this.plots) {
       const u = at(row), text = typeof u === "string" ? u : eng(u, unit, digits);
-      if (value.textContent !== text) value.textContent = text;
+      say(value, text);
     }
   }
 

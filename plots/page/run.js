@@ -15,6 +15,8 @@ function integers([kind, text]) {
   return found;
 }
 
+const BETWEEN = ["", "after ", "before "]; // where a row of the page lies, seen from a row of the trace
+
 class RunData {
   constructor(stored, place) {
     Object.assign(this, { place, title: stored.title, of: stored.of, rows: stored.rows, system: stored.system });
@@ -35,6 +37,11 @@ class RunData {
       else this.late.set(entry.row, [...(this.late.get(entry.row) ?? []), entry]);
     }
   }
+
+  rowName(row) { return `${BETWEEN[this.between[row]]}row ${this.number[row]}`; }
+
+  // Whether a time is after the last row; the page of a longer run goes on, with the last values of this one.
+  ended(t) { return t > this.t(this.rows - 1); }
 
   // A column by row: the number of a stored one, or that and a factor.
   column(each) {

@@ -1,5 +1,5 @@
 "use strict";
-// Further panes: the list of transitions.
+// The list of transitions.
 const MOST_OPTIONS = 2000;
 
 class LogPane {

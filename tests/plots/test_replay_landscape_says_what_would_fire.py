@@ -1,4 +1,7 @@
-"""A dot dragged away from the row says "... would fire" exactly where Python finds a guard true."""
+"""The landscape says what would fire at its dot, and what holds an edge back, as Python does.
+
+A dot dragged away from the row says "... would fire" exactly where Python finds a guard true.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gms_fsm.inspection.explain import explain
+from plots.panels._race import held_back_by
+from plots.replay import write_replay
 from tests.plots.browser import Open, browser, open_page, pages
 from tests.plots.landscape_cases import NAMES, first_to_fire, opened, run
+from tests.plots.systems_to_draw import BALL
+from tests.plots.systems_to_draw import run as run_of
 
 __all__ = ["browser", "open_page", "pages"]
 
@@ -58,3 +66,29 @@ def test_dragging_to_random_points(open_page: Open, tmp_path: Path, name: str) -
             assert text.startswith(("nothing would fire: ", "no edge leaves "))
         fired.append(edge)
     assert 10 < sum(map(bool, fired)) < len(fired) - 10
+
+
+WORST = """() => {
+    const { contact, row } = views[0], scope = contact.scope(0, row);
+    return contact.leaving(contact.modes[0][row])
+        .map((k) => worstClause(contact.clauses(k, scope))?.text ?? "");
+}"""
+
+
+@pytest.mark.parametrize("name", ["gms", "ball"])  # the guards of the ball have compound clauses
+def test_the_clause_that_holds_an_edge_back_is_that_of_the_printed_race(
+    open_page: Open, tmp_path: Path, name: str
+) -> None:
+    trace = run(name)[0] if name == "gms" else run_of(BALL)
+    page = open_page(write_replay(tmp_path / "page.html", trace))
+    numbers, between = page.evaluate("[[...runs[0].number], [...runs[0].between]]")
+    checked = 0
+    for k in [row for row, sample in enumerate(between) if not sample][::3]:
+        why = explain(trace.contact(trace.contacts[0]), numbers[k], 0)
+        if why.left:
+            continue
+        page.evaluate("(row) => show(row)", k)
+        wanted = [held_back_by(each) for each in why]
+        assert page.evaluate(WORST) == [each.text if each else "" for each in wanted]
+        checked += sum(each is not None for each in wanted)
+    assert checked > 15

@@ -1,6 +1,6 @@
 """The bristles of the replay page move with the row.
 
-Contacts are where z puts them, pegs show the default state, the ground moves with x.
+Contacts are where z puts them, pegs show where contacts do not move, the ground moves with x.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from gms_fsm.systems.models import demonstration
 from plots.replay import write_replay
 from tests.helpers import SINE, bank, wear
 from tests.plots.browser import Open, browser, events, mass, open_page, open_tab, pages
-from tests.plots.systems_to_draw import BLOCKS, run
+from tests.plots.systems_to_draw import BALL, BLOCKS, run
 from tests.systems_cases import puck
 
 __all__ = ["browser", "open_page", "pages"]
@@ -105,6 +105,23 @@ def test_a_peg_is_a_default_state(open_page: Open, tmp_path: Path, name: str) ->
             if element["arrow"]:
                 assert element["way"] == np.sign(v)
     assert min(counts.values()) > 10
+
+
+@pytest.mark.parametrize("name", ["end-stop", "stiction"])
+def test_without_bristles_a_peg_is_a_locked_state(
+    open_page: Open, tmp_path: Path, name: str
+) -> None:
+    trace = run(BALL if name == "end-stop" else BLOCKS)
+    trace = trace.contact(trace.contacts[0])
+    page = opened(open_page, tmp_path, trace)
+    locked = [state.name for state in trace.model.chart.states if state.locked]
+    seen = set()
+    for row, number in own_rows(page, 50):
+        page.evaluate(f"go({row})")
+        state = trace.states[number, 0]
+        assert page.evaluate(ELEMENTS)[0]["peg"] == (state in locked)
+        seen.add(str(state))
+    assert len(seen) > 1 or name == "end-stop"  # a ball that bounces is free
 
 
 def test_a_contact_that_sticks_moves_with_the_ground(open_page: Open, tmp_path: Path) -> None:

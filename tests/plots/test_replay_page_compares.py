@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gms_fsm import Prescribed, simulate
 from plots.replay import write_replay
+from tests.helpers import FIG4_SINE, stick_slip
 from tests.plots.browser import Open, browser, fig4, frame, open_page, pages, said
 
 __all__ = ["browser", "open_page", "pages"]
@@ -42,6 +44,37 @@ def test_two_runs_are_shown_at_the_same_time(open_page: Open) -> None:
     page.fill("#until", "F > 1.2")
     page.press("#until", "Enter")
     assert frame(page) > 0
+
+
+def test_a_shorter_run_is_said_to_have_ended(open_page: Open, tmp_path: Path) -> None:
+    short = simulate(stick_slip("signed"), Prescribed(FIG4_SINE), 30.0)
+    page = open_page(write_replay(tmp_path / "page.html", fig4("signed"), short))
+    values = page.locator(".values").nth(1)
+    for k, ended in (
+        (np.searchsorted(fig4("signed").t, 29.0), False),
+        (page.evaluate("last"), True),
+    ):
+        page.evaluate(f"go({k})")
+        assert ("ended at 30.000 s" in values.inner_text()) == ended
+        assert said(page).endswith("run 2: ended") == ended
+    assert "run 1: element 1 is in" in said(page)
+
+
+def test_margins_and_the_time_axis_of_both_runs_are_in_view(open_page: Open) -> None:
+    page = open_page("two", "laptop")
+    for place in (1, 2):
+        for inner, outer in (("thead th:nth-child(4)", ".why"), (".time-unit", ".pane.time")):
+            of = [
+                page.locator(f".run:nth-child({place}) {q}").bounding_box() for q in (inner, outer)
+            ]
+            assert of[0] is not None
+            assert of[1] is not None
+            right, bottom = (
+                [box[at] + box[size] for box in of]
+                for at, size in (("x", "width"), ("y", "height"))
+            )
+            assert right[0] <= right[1] + 1
+            assert bottom[0] <= bottom[1] + 1
 
 
 def test_lines_of_the_other_run_are_drawn_where_both_are_compared(open_page: Open) -> None:

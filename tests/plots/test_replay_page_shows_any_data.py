@@ -21,6 +21,19 @@ __all__ = ["browser", "open_page", "pages"]
 
 pytestmark = pytest.mark.slow
 
+LINEAR = ChartModel(
+    Chart(
+        "spring",
+        inputs=("v",),
+        variables=("z",),
+        parameters=("k",),
+        states=(State("only", flow={"z": "v"}),),
+        transitions=(),
+        outputs={"F": "k * z"},
+    ),
+    {"k": 1.0},
+)
+
 
 def test_a_hostile_name_is_shown_and_not_run(open_page: Open, tmp_path: Path) -> None:
     evil = "</script><script>document.title='owned'</script><img src=x onerror=alert(1)>"
@@ -63,6 +76,32 @@ def test_values_that_are_not_numbers_are_shown_as_words(open_page: Open, tmp_pat
     page.fill("#until", "F < 0")
     page.press("#until", "Enter")
     assert frame(page) > 2
+
+
+def test_views_leave_out_values_that_are_not_numbers(open_page: Open, tmp_path: Path) -> None:
+    trace = fig4("signed")
+    stored = {name: np.array(values) for name, values in trace.seen.items()}
+    stored["friction.F"][20:40] = math.inf
+    stored["friction.v"][50:60] = math.nan
+    page = open_page(write_replay(tmp_path / "gaps.html", replace(trace, stored=stored)))
+    for key in ("phase", "landscape", "microscope"):  # a drawing with NaN is a console message
+        page.evaluate(f"openPane('right', '{key}')")
+        for row in (30, 55, 70):
+            page.evaluate(f"go({row})")
+            if key == "landscape":
+                seen = page.locator(".probe").get_attribute("visibility") != "hidden"
+                assert seen == (row != 55)
+
+
+@pytest.mark.parametrize(("scale", "unit"), [(1.0, "s"), (1e-6, "µs"), (1e6, "Ms")])
+def test_the_time_axis_has_its_unit(
+    open_page: Open, tmp_path: Path, scale: float, unit: str
+) -> None:
+    rig = Prescribed(f"{1e-3 / scale!r} * sin(t / {scale!r})")
+    trace = simulate(LINEAR, rig, scale)
+    page = open_page(write_replay(tmp_path / "page.html", trace))
+    assert page.locator(".time-unit").inner_text() == f"t [{unit}]"
+    assert page.evaluate("10 ** TIME_POWER") == pytest.approx(scale)
 
 
 def test_the_sandboxed_frame_of_a_notebook_works(open_page: Open, tmp_path: Path) -> None:

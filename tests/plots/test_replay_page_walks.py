@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from gms_fsm import Prescribed, simulate
+from plots.replay import write_replay
+from tests.helpers import FIG4_SINE, stick_slip
 from tests.plots.browser import (
     Open,
     browser,
@@ -178,6 +182,8 @@ def test_numbers_of_rows_are_those_of_the_trace(open_page: Open) -> None:
     page.evaluate(f"show({sample})")
     before = int(np.searchsorted(trace.t, page.evaluate("frames.t[frame]"))) - 1
     assert f"after row {before} " in page.locator(".values").inner_text() + " "
+    heard = page.locator("#scrubber").get_attribute("aria-valuetext")
+    assert (heard or "").endswith(f" s, after row {before}")
 
 
 def test_a_pinned_element_stays_selected(open_page: Open) -> None:
@@ -191,3 +197,16 @@ def test_a_pinned_element_stays_selected(open_page: Open) -> None:
     page.click("#follow")
     fired = page.evaluate("runs[0].fired.get(views[0].row).element")
     assert page.evaluate("views[0].element") == fired
+
+
+def test_rows_before_the_first_requested_time_are_before_it(
+    open_page: Open, tmp_path: Path
+) -> None:
+    trace = simulate(stick_slip("signed"), Prescribed(FIG4_SINE), 60.0, t_eval=[50.0, 55.0])
+    page = open_page(write_replay(tmp_path / "late.html", trace))
+    for _ in range(4):
+        page.keyboard.press("Shift+ArrowRight")
+        assert page.evaluate("frames.t[frame]") < 50.0
+        assert "before row 0" in page.locator(".values").inner_text()
+    page.evaluate("show(frames.t.findIndex((t) => t > 50.0))")
+    assert "after row 0" in page.locator(".values").inner_text()
