@@ -9,7 +9,7 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.inspection._branch import Branch
 from gms_fsm.inspection._elements import chart_of
 from gms_fsm.inspection._here import why_at
-from gms_fsm.inspection.session import Session
+from gms_fsm.inspection.session import Fired, Session
 from gms_fsm.lowering.layout import BankPlaces
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "ContactView",
     "EdgeView",
     "ElementView",
+    "EventView",
     "Ribbons",
     "StateView",
     "ValueView",
@@ -25,6 +26,7 @@ __all__ = [
     "branches",
     "chart_states",
     "ending",
+    "events",
     "ribbons",
     "view",
 ]
@@ -214,6 +216,25 @@ class Ribbons:
     end: float
     modes: tuple[tuple[int, ...] | None, ...]
     now: int
+
+
+@dataclass(frozen=True)
+class EventView:
+    """One firing.
+
+    Parameters
+    ----------
+    row : int
+        The row it made.
+    t : float
+        Time, s.
+    fired : Fired
+        What fired.
+    """
+
+    row: int
+    t: float
+    fired: Fired
 
 
 @dataclass(frozen=True)
@@ -475,6 +496,34 @@ def ribbons(session: Session, parts: int) -> Ribbons:
         modes.append(branch.raw(row).mode if row >= 0 and reached else None)
     now = min(parts - 1, int(parts * (session.here.t - start) / (end - start)))
     return Ribbons(start, end, tuple(modes), now)
+
+
+def events(session: Session, *, ahead: bool = False) -> tuple[EventView, ...]:
+    """Return the firings of the current branch, in the order of their rows.
+
+    Parameters
+    ----------
+    session : Session
+        The session.
+    ahead : bool
+        Whether to include those computed after the cursor.
+
+    Returns
+    -------
+    tuple of EventView
+        All firings up to the cursor.
+    """
+    branch = session.branch
+    rows = branch.firing_rows(len(branch) if ahead else branch.cursor + 1)
+    log = branch.log()  # one record for each of these rows
+    return tuple(
+        EventView(
+            row,
+            record.t,
+            Fired(record.element, record.edge, record.source, record.target, record.contact),
+        )
+        for row, record in zip(rows, log, strict=False)
+    )
 
 
 def branches(session: Session) -> tuple[BranchView, ...]:
