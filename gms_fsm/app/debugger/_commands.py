@@ -119,6 +119,13 @@ class Commands:
             raise SessionError(f"unknown command {name!r}", advice=f"{hint}help lists all commands")
         yield from getattr(self, f"do_{name}")(arg)
 
+    @property
+    def prompt(self) -> str:
+        """What stands in front of a command."""
+        session = self.session
+        branch = f", branch {session.current}" if session.current else ""
+        return f"(t={session.here.t:.4f} s{branch}) "
+
     def complete(self, text: str, before: str = "") -> list[str]:
         """Return how a word can be completed.
 

@@ -82,7 +82,7 @@ class Debugger(cmd.Cmd):
         self.encoding = (getattr(self.stdout, "encoding", None) or "utf-8").lower()
         drawn = self.coloured and self.encoding.startswith("utf")
         self.commands = Commands(session, DRAWN if drawn else PLAIN)
-        self._new_prompt()
+        self.prompt = self.commands.prompt
 
     @property
     def session(self) -> Session:
@@ -118,13 +118,8 @@ class Debugger(cmd.Cmd):
 
     def postcmd(self, stop: bool, line: str) -> bool:  # noqa: ARG002 (signature of the base class)
         """Show the current position in the prompt."""
-        self._new_prompt()
+        self.prompt = self.commands.prompt
         return stop
-
-    def _new_prompt(self) -> None:
-        session = self.session
-        branch = f", branch {session.current}" if session.current else ""
-        self.prompt = f"(t={session.here.t:.4f} s{branch}) "
 
     def onecmd(self, line: str) -> bool:
         """Execute one command; an error is printed and never ends the session.

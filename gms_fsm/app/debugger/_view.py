@@ -25,6 +25,7 @@ __all__ = [
     "View",
     "branches",
     "chart_states",
+    "curves",
     "ending",
     "events",
     "ribbons",
@@ -471,8 +472,14 @@ def chart_states(session: Session, machine: int) -> tuple[StateView, ...]:
     )
 
 
-def ribbons(session: Session, parts: int) -> Ribbons:
-    """Return the states of all elements over the whole time span.
+def ribbons(
+    session: Session,
+    parts: int,
+    *,
+    branch: int | None = None,
+    span: tuple[float, float] | None = None,
+) -> Ribbons:
+    """Return the states of all elements over time.
 
     Parameters
     ----------
@@ -480,22 +487,64 @@ def ribbons(session: Session, parts: int) -> Ribbons:
         The session.
     parts : int
         Number of equal parts of the time span.
+    branch : int, optional
+        Number of the branch; the current one if omitted.
+    span : tuple of float, optional
+        Start and end time, s; those of the run if omitted.
 
     Returns
     -------
     Ribbons
         The states in the middle of each part.
     """
-    branch, start, end = session.branch, session.branch.raw(0).t, session.t_end
-    modes: list[tuple[int, ...] | None] = []
+    start, end = span or (session.branch.raw(0).t, session.t_end)
+    shown = session.branch if branch is None else session.branches[branch]
+    rows = _sampled(shown, start, end, parts)
+    modes = tuple(None if row is None else shown.raw(row).mode for row in rows)
+    now = min(parts - 1, int(parts * (session.here.t - start) / (end - start)))
+    return Ribbons(start, end, modes, now)
+
+
+def _sampled(branch: Branch, start: float, end: float, parts: int) -> list[int | None]:
+    """Return the row in the middle of each part of a time span; None where none is known."""
+    rows: list[int | None] = []
     for part in range(parts):
-        t = start + (end - start) * (part + 0.5) / parts
-        row = branch.row_at(t)
+        row = branch.row_at(start + (end - start) * (part + 0.5) / parts)
         # The states of the last row are known only up to its time.
         reached = row + 1 < len(branch) or branch.ended
-        modes.append(branch.raw(row).mode if row >= 0 and reached else None)
-    now = min(parts - 1, int(parts * (session.here.t - start) / (end - start)))
-    return Ribbons(start, end, tuple(modes), now)
+        rows.append(row if row >= 0 and reached else None)
+    return rows
+
+
+def curves(
+    session: Session, machine: int, parts: int, span: tuple[float, float]
+) -> dict[str, tuple[float | None, ...]]:
+    """Return velocity and force of a contact over time.
+
+    Parameters
+    ----------
+    session : Session
+        The session.
+    machine : int
+        An element of the contact, counted over all contacts from 0.
+    parts : int
+        Number of equal parts of the time span.
+    span : tuple of float
+        Start and end time, s.
+
+    Returns
+    -------
+    dict of str to tuple
+        ``v``, m/s, and ``F``, N: the last row before the middle of each part; None where the
+        branch has not been computed.
+    """
+    branch, contact = session.branch, session.start.program.layout.bank(machine).name
+    found: dict[str, list[float | None]] = {"v": [], "F": []}
+    for row in _sampled(branch, *span, parts):
+        scope = None if row is None else branch.scope(branch.raw(row), contact)
+        for name, values in found.items():
+            values.append(None if scope is None else getattr(scope, name))
+    return {name: tuple(values) for name, values in found.items()}
 
 
 def events(session: Session, *, ahead: bool = False) -> tuple[EventView, ...]:
