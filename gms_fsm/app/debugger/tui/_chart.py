@@ -134,7 +134,7 @@ def chart_art(states: Sequence[StateView], width: int, *, names: bool = True) ->
     for name in targets:
         came = any(edge.fired and edge.target == name for _, edge in leaving)
         weight, role = (HEAVY, "fired") if came else (LIGHT, "dim")
-        canvas.across(entries[name], BOX + inner + 5, lanes[name], weight, role)
+        canvas.across(entries[name], BOX + inner + 4, lanes[name], weight, role)
         canvas.write(entries[name], BOX + inner + 4, "◀", role)
     return canvas.lines()
 

@@ -6,7 +6,8 @@ Values are those of the view, in engineering units; sentences are those of the l
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from gms_fsm.app._quantities import quantity, sparkline
@@ -35,6 +36,7 @@ __all__ = [
     "fitted",
     "labels",
     "margin_bar",
+    "ranges",
     "ribbon_rows",
     "session_rows",
     "status_lines",
@@ -43,8 +45,10 @@ __all__ = [
 
 RIBBON = "─▓═┼▒┄"  # one mark per state, as at the line prompt
 DECADES = 6  # of a margin, relative to the larger side
+UNITS = {"v": "m/s", "F": "N"}
 BAR = 8  # characters for |z|/s = 1
-SIDES_FROM = 56  # columns; narrower tables of clauses leave out both sides
+VALUE = 13  # columns of a value in the table of clauses
+VALUES = VALUE + 4  # columns around text and bar
 
 
 class Row(NamedTuple):
@@ -165,7 +169,7 @@ def _table(contact: ContactView, chosen: int, width: int) -> list[Row]:
                 for name, value in zip(chart.variables, each.variables, strict=True)
             ),
             "" if each.s is None else quantity(each.s, "m"),
-            "" if each.ratio is None else f"{each.ratio:.3g}",
+            "" if each.ratio is None else _ratio(each.ratio),
             quantity(each.F, "N"),
         ]
         for i, each in enumerate(contact.elements, start=contact.first)
@@ -179,7 +183,7 @@ def _table(contact: ContactView, chosen: int, width: int) -> list[Row]:
     edges_at = used + (BAR + 2 if bar else 0)
     edges = all(edges_at + len(_edges(each)) <= width for each in contact.elements)
     text = "  ".join(_cell(heads[j], wide[j], j) for j in kept)
-    text += f"  {'|z|/s to 1':<{BAR}}"[: BAR + 2] if bar else ""
+    text += f"  {'0':<{BAR - 1}}1" if bar else ""
     rows = [Row(line((f"{text}  {'edges' if edges else ''}".rstrip(), "dim")))]
     for i, (each, row) in enumerate(zip(contact.elements, cells, strict=True), contact.first):
         spans = [
@@ -192,6 +196,10 @@ def _table(contact: ContactView, chosen: int, width: int) -> list[Row]:
             spans.append(Span(_edges(each)))
         rows.append(Row(spans, f"element {lead}{each.number}"))
     return rows
+
+
+def _ratio(ratio: float) -> str:
+    return f"{ratio:.3f}" if ratio < 1000.0 else f"{ratio:.2e}"
 
 
 def _element_role(column: int, names: Sequence[str], each: ElementView, chosen: bool) -> str:
@@ -268,12 +276,10 @@ def why_rows(why: Why, address: str, points: Sequence[Breakpoint], width: int) -
         Heading, edges with their clauses, and one sentence per edge.
     """
     rows = [Row(line((part, "head"))) for text in why.heading for part in wrapped(text, width)]
-    clauses = [clause for each in why for clause in each.clauses]
-    wide = max((len(clause.text) for clause in clauses), default=0)
-    sides = width >= SIDES_FROM + wide
-    half = max(3, min(12, (width - wide - (40 if sides else 16)) // 2))
-    if clauses:
-        rows.append(Row(line((_clause_head(wide, half, sides), "dim"))))
+    texts = [len(clause.text) for each in why for clause in each.clauses]
+    if texts:
+        table = Table.fitting(max(texts), width)
+        rows.append(Row(line((table.head, "dim"))))
     for each in why:
         edge = each.edge
         command = f"break valid {edge.name} element {address}"
@@ -284,35 +290,62 @@ def why_rows(why: Why, address: str, points: Sequence[Breakpoint], width: int) -
         text = f"{each.priority} {edge.name}: {edge.source} → {edge.target}{fired}{marks}"
         role = "fired" if each.fired else "head"
         rows += [Row(line((part, role)), command) for part in wrapped(text, width)]
-        rows += [
-            Row(_clause_line(clause, wide, half, width, sides=sides), command)
-            for clause in each.clauses
-        ]
+        rows += [Row(each, command) for clause in each.clauses for each in table.lines(clause)]
     for each in why:
         role = "fired" if each.fired else "true" if each.holds else ""
         rows += [Row(line((part, role))) for part in wrapped(each.verdict, width)]
     return rows
 
 
-def _clause_head(wide: int, half: int, sides: bool) -> str:
-    values = f"{'left':>11} {'right':>11} " if sides else ""
-    return f"  {'clause':<{wide}} {values}{'margin':>11}  {'false':>{half}}│{'true':<{half}}"
+class Table(NamedTuple):
+    """How clauses are laid out: widths of the text and of half a bar, and what there is room for.
 
+    Where a text leaves no room for its margin, the margin is on the next line.
+    """
 
-def _clause_line(clause: Clause, wide: int, half: int, width: int, *, sides: bool) -> Line:
-    mark = MARKS[clause.holds if clause.computable else None]
-    role = "true" if clause.holds else "false"
-    text = short(clause.text, max(8, min(wide, width - 2 * half - 18)))
-    spans = [Span(f"{mark} ", role), Span(f"{text:<{wide}} ")]
-    if not clause.computable:
-        return [*spans, Span("cannot be computed here", "dim")]
-    if math.isnan(clause.margin):  # compound: no two sides
-        return [*spans, Span("true" if clause.holds else "false", role)]
-    if sides:
-        left, right = (quantity(side, clause.unit) for side in (clause.left, clause.right))
-        spans.append(Span(f"{left:>11} {right:>11} "))
-    margin = "0, rounding" if clause.relative == 0.0 else quantity(clause.margin, clause.unit)
-    return [*spans, Span(f"{margin:>11}  "), Span(margin_bar(clause.relative, half), role)]
+    wide: int
+    half: int
+    sides: bool
+    apart: bool
+
+    @classmethod
+    def fitting(cls, wide: int, width: int) -> Table:
+        """Return the layout for texts and a panel of given widths."""
+        sides = width >= wide + VALUES + 2 * VALUE + 2 * 6
+        apart = width < wide + VALUES + 2 * 2
+        wide = min(wide, width - 2) if apart else wide
+        used = VALUES + 2 * VALUE * sides + (0 if apart else wide)
+        return cls(wide, max(2, min(12, (width - used) // 2)), sides, apart)
+
+    @property
+    def head(self) -> str:
+        """The headings of the columns."""
+        values = f"{'left':>{VALUE}}{'right':>{VALUE}}" if self.sides else ""
+        bar = f"{'false'[: self.half]:>{self.half}}│{'true'[: self.half]:<{self.half}}"
+        clause = "" if self.apart else f"{'clause':<{self.wide}}"
+        return f"  {clause}{values}{'margin':>{VALUE}} {bar}"
+
+    def lines(self, clause: Clause) -> list[Line]:
+        """Return the line of a clause, or two: truth, text, both sides, margin, bar."""
+        mark = MARKS[clause.holds if clause.computable else None]
+        role, value = "true" if clause.holds else "false", list[Span]()
+        if not clause.computable:
+            value = [Span("  cannot be computed here", "dim")]
+        elif math.isnan(clause.margin):  # compound: no two sides
+            value = [Span("  true" if clause.holds else "  false", role)]
+        else:
+            if self.sides:
+                both = (quantity(side, clause.unit) for side in (clause.left, clause.right))
+                value += [Span(f"{side:>{VALUE}}") for side in both]
+            margin = quantity(clause.margin, clause.unit) if clause.relative else "0, rounding"
+            bar = margin_bar(clause.relative, self.half)
+            value += [Span(f"{margin:>{VALUE}} "), Span(bar, role)]
+        if not self.apart:
+            return [[Span(f"{mark} ", role), Span(f"{clause.text:<{self.wide}}"), *value]]
+        texts = textwrap.wrap(clause.text, self.wide)
+        leads = [f"{mark} ", *["  "] * len(texts)]
+        found = [line((lead, role), text) for lead, text in zip(leads, texts, strict=False)]
+        return [*found, [Span("  "), *value]]
 
 
 # --------------------------------------------------------------------------- over time
@@ -406,8 +439,23 @@ def _joined(spans: Sequence[Span]) -> Line:
     return found
 
 
-def curve_rows(values: dict[str, tuple[float | None, ...]], lead: int, now: int) -> list[Row]:
-    """Return velocity and force over time as sparklines; the title says their ranges.
+def ranges(values: Mapping[str, Sequence[float | None]]) -> str:
+    """Return the ranges of velocity and force.
+
+    >>> ranges({"v": (0.0, None, 0.15), "F": (1.0, 2.0)})
+    'v 0 m/s to 150.0 mm/s  F 1.000 N to 2.000 N'
+    """
+    found = []
+    for name, each in values.items():
+        known = [value for value in each if value is not None and math.isfinite(value)]
+        if known:
+            low, high = (quantity(value, UNITS[name]) for value in (min(known), max(known)))
+            found.append(f"{name} {low} to {high}")
+    return "  ".join(found)
+
+
+def curve_rows(values: Mapping[str, Sequence[float | None]], lead: int, now: int) -> list[Row]:
+    """Return velocity and force over time as sparklines; `ranges` says what they span.
 
     Parameters
     ----------
@@ -452,24 +500,21 @@ def event_rows(events: Sequence[EventView], cursor: int, width: int) -> list[Row
     if not events:
         return [Row(line(("no transition so far", "dim")))]
     here = max((i for i, each in enumerate(events) if each.row <= cursor), default=-1)
-    return [
-        Row(
-            line(
-                (
-                    short(f"{'▶' if i == here else ' '}{each.t:>11.9g} s  {_fired(each)}", width),
-                    "head" if i == here else "dim" if each.row > cursor else "",
-                )
-            ),
-            _move(each.row - cursor),
-        )
-        for i, each in enumerate(events)
-    ]
+    rows = []
+    for i, each in enumerate(events):
+        text = f"{'▶' if i == here else ' '}{each.t:>11.9g} s  "
+        text += _fired(each.fired, width - len(text))
+        role = "head" if i == here else "dim" if each.row > cursor else ""
+        rows.append(Row(line((text, role)), _move(each.row - cursor)))
+    return rows
 
 
-def _fired(each: EventView) -> str:
-    fired: Fired = each.fired
+def _fired(fired: Fired, room: int) -> str:
+    """Return what fired, in the longest form that fits."""
     who = f"{fired.contact} {fired.element + 1}" if fired.contact else f"E{fired.element + 1}"
-    return f"{who} {fired.source} → {fired.target}  {fired.edge}"
+    change = f"{fired.source} → {fired.target}"
+    forms = (f"{who} {change}  {fired.edge}", f"{who} {fired.edge}", f"{who} {change}")
+    return next((form for form in forms if len(form) <= room), short(forms[-1], max(1, room)))
 
 
 def _move(rows: int) -> str:
