@@ -222,11 +222,26 @@ def schema_command() -> None:
     typer.echo(json.dumps(schema(), indent=2))
 
 
-def debug_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:
+def debug_command(
+    scenario: ScenarioFile,
+    overrides: Overrides = None,
+    tui: Annotated[
+        bool, typer.Option("--tui", help="Use the whole terminal: panels, keys and mouse.")
+    ] = False,
+    light: Annotated[
+        bool, typer.Option("--light", help="With --tui: dark text on a light ground.")
+    ] = False,
+) -> None:
     """Step through a scenario in the terminal: break, why, back, poke, compare."""
-    from gms_fsm.app.debugger import run_debugger, scenario_to_debug
+    from gms_fsm.app.debugger import run_debugger, scenario_to_debug, session_of
+    from gms_fsm.app.debugger.tui import run_tui
 
-    raise typer.Exit(run_debugger(scenario_to_debug(scenario, overrides or [])))
+    if light and not tui:
+        raise typer.BadParameter("it is an option of --tui", param_hint="--light")
+    loaded = scenario_to_debug(scenario, overrides or [])
+    if tui:
+        raise typer.Exit(run_tui(session_of(loaded), loaded.title, light=light))
+    raise typer.Exit(run_debugger(loaded))
 
 
 def lesson_command(

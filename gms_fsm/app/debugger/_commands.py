@@ -13,14 +13,8 @@ from pathlib import Path
 from gms_fsm.app.debugger import _text as text_of
 from gms_fsm.app.debugger._elements import Elements, completions, integer, read_edits, spelled
 from gms_fsm.app.debugger._help import ALIASES, COMMANDS, MOVES, help_of, overview
-from gms_fsm.app.debugger._view import (
-    branches,
-    chart_states,
-    ending,
-    events,
-    ribbons,
-    view,
-)
+from gms_fsm.app.debugger._over_time import events, ribbons
+from gms_fsm.app.debugger._view import branches, chart_states, ending, view
 from gms_fsm.errors import GMSError, SessionError
 from gms_fsm.inspection.explain import holds
 from gms_fsm.inspection.session import KINDS, Breakpoint, Session

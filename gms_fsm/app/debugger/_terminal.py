@@ -24,7 +24,7 @@ from gms_fsm.app.scenario import Loaded, load_scenario
 from gms_fsm.errors import GMSError, ScenarioError
 from gms_fsm.inspection.session import Session
 
-__all__ = ["Debugger", "run_debugger", "scenario_to_debug"]
+__all__ = ["Debugger", "run_debugger", "scenario_to_debug", "session_of"]
 
 NARROWEST = 40  # columns; a narrower terminal breaks the lines itself
 COLOURS = ("34", "33", "35", "36", "32")  # for states
@@ -244,14 +244,40 @@ def scenario_to_debug(path: str | Path, overrides: Sequence[str] = ()) -> Loaded
     return load_scenario(path, overrides)
 
 
-def run_debugger(loaded: Loaded, stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
-    """Open a scenario in the debugger.
+def session_of(loaded: Loaded) -> Session:
+    """Return a session of a scenario.
 
     Parameters
     ----------
     loaded : Loaded
         From `gms_fsm.app.scenario.load_scenario`. Requested times are ignored: a session has a row
         at every step.
+
+    Returns
+    -------
+    Session
+        At the start of the run.
+
+    Raises
+    ------
+    ScenarioError
+        If the run of the scenario cannot be set up.
+    """
+    not_here = ("t_end", "t_eval", "monitors")
+    options = {name: value for name, value in loaded.arguments.items() if name not in not_here}
+    try:
+        return Session(*loaded.subject, **options)
+    except GMSError as error:
+        raise ScenarioError.of(error).inside(loaded.path) from None
+
+
+def run_debugger(loaded: Loaded, stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
+    """Open a scenario in the debugger.
+
+    Parameters
+    ----------
+    loaded : Loaded
+        As for `session_of`.
     stdin, stdout : text files, optional
         The terminal by default.
 
@@ -265,10 +291,4 @@ def run_debugger(loaded: Loaded, stdin: TextIO | None = None, stdout: TextIO | N
     ScenarioError
         If the run of the scenario cannot be set up.
     """
-    not_here = ("t_end", "t_eval", "monitors")
-    options = {name: value for name, value in loaded.arguments.items() if name not in not_here}
-    try:
-        session = Session(*loaded.subject, **options)
-    except GMSError as error:
-        raise ScenarioError.of(error).inside(loaded.path) from None
-    return Debugger(session, loaded.title, stdin, stdout).run()
+    return Debugger(session_of(loaded), loaded.title, stdin, stdout).run()

@@ -6,7 +6,8 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from gms_fsm.app.debugger._view import BranchView, ContactView, Ribbons, StateView, View
+from gms_fsm.app.debugger._over_time import Ribbons
+from gms_fsm.app.debugger._view import BranchView, ContactView, StateView, View
 from gms_fsm.inspection.session import Breakpoint
 
 __all__ = [
@@ -211,9 +212,7 @@ def ending_lines(ending: str) -> Iterator[str]:
         yield "  go back and look, or poke a value to continue in a new branch"
 
 
-def chart_lines(
-    states: Sequence[StateView], marks: Marks, width: int = WIDTH
-) -> Iterator[str]:
+def chart_lines(states: Sequence[StateView], marks: Marks, width: int = WIDTH) -> Iterator[str]:
     """Yield a chart as boxes, the active one marked, with the edges below each.
 
     Parameters

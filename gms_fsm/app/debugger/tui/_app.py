@@ -21,20 +21,15 @@ from textual.widgets import Input, Static
 
 from gms_fsm.app.debugger._commands import Commands
 from gms_fsm.app.debugger._help import overview
+from gms_fsm.app.debugger._over_time import curves, ribbons
+from gms_fsm.app.debugger._over_time import events as events_of
 from gms_fsm.app.debugger._text import DRAWN
-from gms_fsm.app.debugger._view import (
-    View,
-    branches,
-    chart_states,
-    curves,
-    ribbons,
-    view,
-)
-from gms_fsm.app.debugger._view import events as events_of
+from gms_fsm.app.debugger._view import View, branches, chart_states, view
+from gms_fsm.app.debugger.tui import _guards, _time
 from gms_fsm.app.debugger.tui import _panels as drawn
 from gms_fsm.app.debugger.tui._chart import chart_art
 from gms_fsm.app.debugger.tui._keys import KEYS, help_rows, with_number
-from gms_fsm.app.debugger.tui._spans import DARK, LIGHT, line, painted
+from gms_fsm.app.debugger.tui._spans import DARK, LIGHT, Row, line, painted
 from gms_fsm.app.debugger.tui._widgets import Help, Keys, Panel, Prompt, Ribbon
 from gms_fsm.inspection.session import Session
 
@@ -162,7 +157,7 @@ class FullScreen(App[int]):
         self._draw_ribbons()
         self._draw_keys()
 
-    def _contents(self) -> dict[str, Callable[[int], Sequence[drawn.Row]]]:
+    def _contents(self) -> dict[str, Callable[[int], Sequence[Row]]]:
         """Return what each panel shows, as functions of its width."""
         commands, session, element = self.commands, self.commands.session, self.commands.element
         address = commands.elements.short(element)
@@ -170,7 +165,7 @@ class FullScreen(App[int]):
         return {
             "chart": self._chart,
             "elements": lambda width: drawn.element_rows(self.seen, element, width),
-            "why": lambda width: drawn.why_rows(
+            "why": lambda width: _guards.why_rows(
                 session.why(commands.elements.address(element)),
                 address,
                 session.breakpoints,
@@ -202,7 +197,7 @@ class FullScreen(App[int]):
         self.highest = max(self.highest, min(most, rest))
         top.styles.height = self.highest
 
-    def _show(self, name: str, rows: Callable[[int], Sequence[drawn.Row]]) -> None:
+    def _show(self, name: str, rows: Callable[[int], Sequence[Row]]) -> None:
         panel = self.panel(name)
         if not panel.display or not panel.size.width:
             return
@@ -210,7 +205,7 @@ class FullScreen(App[int]):
             panel.show(rows(panel.columns), self.palette)
         except Exception as error:  # a value that cannot be computed must not end the session
             text = f"cannot be shown here: {error}"
-            panel.show([drawn.Row(line((text, "error")))], self.palette)
+            panel.show([Row(line((text, "error")))], self.palette)
         if name == "answers":
             self._show_last_answer(panel)
         elif name != "chart":
@@ -225,7 +220,7 @@ class FullScreen(App[int]):
         top = min(before, max(0, len(panel.rows) - height))
         self.call_after_refresh(self.call_after_refresh, panel.scroll_to, y=top, animate=False)
 
-    def _answers(self, width: int) -> list[drawn.Row]:
+    def _answers(self, width: int) -> list[Row]:
         """Return the transcript; where there is room for two lines, the last answer."""
         panel, begin = self.panel("answers"), 0
         panel.border_title = "answers"
@@ -235,7 +230,7 @@ class FullScreen(App[int]):
                 panel.border_title, begin = self.said[begin], begin + 1
         return drawn.answer_rows(self.said[begin:], width)
 
-    def _chart(self, width: int) -> list[drawn.Row]:
+    def _chart(self, width: int) -> list[Row]:
         """Draw the chart of the chosen element, with the names of edges if they fit."""
         commands, panel = self.commands, self.panel("chart")
         states = chart_states(commands.session, commands.element)
@@ -249,7 +244,7 @@ class FullScreen(App[int]):
             art = chart_art(states, width, names=False)
         active = next((i for i, each in enumerate(art) if "ACTIVE" in str(each)), 0)
         self.call_after_refresh(panel.keep_visible, active + 1)
-        return [drawn.Row(each) for each in art]
+        return [Row(each) for each in art]
 
     def _draw_status(self) -> None:
         status = self.screen_stack[0].query_one("#status", Static)
@@ -267,30 +262,30 @@ class FullScreen(App[int]):
             return
         session, element = self.commands.session, self.commands.element
         states = max(len(each.state) for each in self.seen.elements)
-        names = max(map(len, drawn.labels(self.seen.contacts)))
+        names = max(map(len, _time.labels(self.seen.contacts)))
         lead = min(names, 14) + min(states, 9) + 3
         parts, span = max(10, panel.columns - lead), self.span
         shown, parent = ribbons(session, parts, span=span), session.branch.parent
         other = None if parent is None else ribbons(session, parts, branch=parent, span=span)
-        rows = drawn.ribbon_rows(shown, other, self.seen, element, lead)
+        rows = _time.ribbon_rows(shown, other, self.seen, element, lead)
         bank = self.commands.elements.bank(element)
         whose = f" ({bank.name})" if len(self.seen.contacts) > 1 else ""
         title = f"states over time{whose}: {'  '.join(self._key())}"
         if not self.small:
             values = curves(session, element, parts, span)
-            panel.border_subtitle = drawn.ranges(values)
-            rows = drawn.curve_rows(values, lead, shown.now) + rows
-        axis = " " * lead + drawn.axis(*span, parts)
+            panel.border_subtitle = _time.ranges(values)
+            rows = _time.curve_rows(values, lead, shown.now) + rows
+        axis = " " * lead + _time.axis(*span, parts)
         panel.lead, panel.span, panel.parts = lead, span, parts
         panel.border_title = title
-        panel.show([*rows, drawn.Row(line((axis, "dim")))], self.palette)
+        panel.show([*rows, Row(line((axis, "dim")))], self.palette)
         self.call_after_refresh(panel.keep_visible, 0)
 
     def _key(self) -> list[str]:
         """Return the marks of the states, of the chosen element's chart."""
         bank = self.commands.elements.bank(self.commands.element)
         chart = self.commands.session.system.contact(bank.name).chart
-        marks = drawn.RIBBON
+        marks = _time.RIBBON
         return [f"{marks[i % len(marks)]} {each.name}" for i, each in enumerate(chart.states)]
 
     @property

@@ -20,11 +20,7 @@ __all__ = ["MARKS", "chart_art"]
 MARKS = {True: "✓", False: "✗", None: "?"}
 LIGHT, HEAVY = 1, 2
 # The box-drawing character for weights 0, 1, 2 of the arms up, right, down and left: base 3.
-ARMS = (
-    " ╴╸╷┐┑╻┒┓╶─╾┌┬┭┎┰┱╺╼━┍┮┯┏┲┳"
-    "╵┘┙│┤┥╽┧┪└┴┵├┼┽┟╁╅┕┶┷┝┾┿┢╆╈"
-    "╹┚┛╿┦┩┃┨┫┖┸┹┞╀╃┠╂╉┗┺┻┡╄╇┣╊╋"
-)
+ARMS = " ╴╸╷┐┑╻┒┓╶─╾┌┬┭┎┰┱╺╼━┍┮┯┏┲┳╵┘┙│┤┥╽┧┪└┴┵├┼┽┟╁╅┕┶┷┝┾┿┢╆╈╹┚┛╿┦┩┃┨┫┖┸┹┞╀╃┠╂╉┗┺┻┡╄╇┣╊╋"
 ROUND = dict(zip("┌┐└┘", "╭╮╰╯", strict=True))
 UP, RIGHT, DOWN, LEFT = range(4)
 BOX, STUB, LABEL = 2, 4, 6  # columns of a box, of its edges' stem, and of their texts
@@ -139,9 +135,7 @@ def chart_art(states: Sequence[StateView], width: int, *, names: bool = True) ->
     return canvas.lines()
 
 
-def _wire(
-    canvas: Canvas, edge: EdgeView, begin: tuple[int, int], lane: int, entry: int
-) -> None:
+def _wire(canvas: Canvas, edge: EdgeView, begin: tuple[int, int], lane: int, entry: int) -> None:
     """Draw an edge from its text to the lane of its target, and along the lane."""
     weight, role = (HEAVY, "fired") if edge.fired else (LIGHT, "dim")
     row, column = begin

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from gms_fsm.app.debugger.tui._panels import Row
-from gms_fsm.app.debugger.tui._spans import line
+from gms_fsm.app.debugger.tui._spans import Row, line
 
 __all__ = ["KEYS", "Key", "help_rows", "with_number"]
 

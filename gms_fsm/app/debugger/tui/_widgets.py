@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import ClassVar
 
 from gms_fsm._extras import require
 
@@ -19,8 +20,7 @@ from textual.message import Message
 from textual.screen import ModalScreen
 from textual.widgets import Input, Static
 
-from gms_fsm.app.debugger.tui._panels import Row
-from gms_fsm.app.debugger.tui._spans import painted
+from gms_fsm.app.debugger.tui._spans import Row, painted
 
 __all__ = ["Help", "Keys", "Panel", "Prompt", "Ribbon"]
 
@@ -28,10 +28,10 @@ __all__ = ["Help", "Keys", "Panel", "Prompt", "Ribbon"]
 class Panel(ScrollableContainer, can_focus=True, inherit_bindings=False):
     """Lines in a frame; a click on a line gives its command."""
 
-    BINDINGS = (
+    BINDINGS: ClassVar = [
         Binding("pageup", "page_up", show=False),
         Binding("pagedown", "page_down", show=False),
-    )
+    ]
 
     class Chosen(Message):
         """A line was clicked, or a time in the ribbons."""
@@ -136,12 +136,12 @@ def _long(key: tuple[str, str, str]) -> int:
 class Prompt(Input):
     """The command line: history with the arrow keys, completion with Tab."""
 
-    BINDINGS = (
+    BINDINGS: ClassVar = [
         Binding("up", "earlier", show=False),
         Binding("down", "later", show=False),
         Binding("tab", "complete", show=False, priority=True),
         Binding("escape", "leave", show=False),
-    )
+    ]
 
     class Completing(Message):
         """Several words are possible."""
@@ -215,11 +215,11 @@ def _common(words: Sequence[str]) -> str:
 class Help(ModalScreen[None]):
     """The keys and the commands."""
 
-    BINDINGS = (
+    BINDINGS: ClassVar = [
         Binding("escape,q,question_mark,enter", "dismiss", "close"),
         Binding("up", "scroll(-1)", show=False),
         Binding("down", "scroll(1)", show=False),
-    )
+    ]
 
     def __init__(self, rows: Sequence[Row], palette: Mapping[str, str]) -> None:
         super().__init__()
