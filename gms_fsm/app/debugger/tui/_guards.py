@@ -1,4 +1,4 @@
-"""The guards of an element clause by clause: a table with margins as bars on a logarithmic scale."""
+"""The guards of an element clause by clause: a table, and margins as bars on a log scale."""
 
 from __future__ import annotations
 
