@@ -1,8 +1,9 @@
-"""``run --live --pace`` shows a run at the speed asked for, and computes the same run as without."""
+"""``run --live --pace`` shows a run at the speed asked for; the run is the same as without."""
 
 from __future__ import annotations
 
 import io
+import itertools
 import re
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from tests.helpers import FASTEST, FIG4_SINE, ROOT, open_loop, stick_slip
 from tests.scenario_files import CommandLine
 
 FIG_4 = str(ROOT / "scenarios" / "paper_fig4_stick_slip.toml")
-END = 30.0  # s
+END = 12.0  # s
 
 
 class Clock:
@@ -71,7 +72,7 @@ def run(engine: str, **options: Any) -> Trace:
 
 
 @pytest.mark.parametrize("engine", ["machines", FASTEST])
-@pytest.mark.parametrize("pace", [0.5, 4.0])
+@pytest.mark.parametrize("pace", [1.0, 4.0])
 def test_each_frame_shows_the_time_of_the_clock(engine: str, pace: float, clock: Clock) -> None:
     view, _, _ = played(pace, engine)
     begin = view.looks[0][0]
@@ -80,16 +81,17 @@ def test_each_frame_shows_the_time_of_the_clock(engine: str, pace: float, clock:
     for now, t, _ in view.looks:
         assert t == pytest.approx(pace * (now - begin), abs=pace * 0.01)
     times = [now for now, _, _ in view.looks]
-    assert max(b - a for a, b in zip(times, times[1:], strict=False)) < 1.01 * BETWEEN_FRAMES
+    assert max(b - a for a, b in itertools.pairwise(times)) < 1.01 * BETWEEN_FRAMES
 
 
 @pytest.mark.parametrize("engine", ["machines", FASTEST])
 def test_between_rows_values_are_interpolated(engine: str, clock: Clock) -> None:
     view, trace, _ = played(4.0, engine)
-    times = [t for _, t, _ in view.looks]
-    expected = trace.sample(times)
-    assert [values["F"] for _, _, values in view.looks] == pytest.approx(list(expected.F), abs=1e-6)
-    assert [values["v"] for _, _, values in view.looks] == pytest.approx(list(expected.v), abs=1e-9)
+    # At the time of a transition a row made by an earlier micro-step may be shown.
+    looks = [(t, values) for _, t, values in view.looks if t not in trace.transitions.t]
+    expected = trace.sample([t for t, _ in looks])
+    assert [values["F"] for _, values in looks] == pytest.approx(list(expected.F), abs=1e-6)
+    assert [values["v"] for _, values in looks] == pytest.approx(list(expected.v), abs=1e-9)
 
 
 def test_the_run_is_the_same(clock: Clock) -> None:

@@ -43,8 +43,10 @@ GROUNDS = {
         "gms-light", primary="#00558f", background="#fbfbf9", surface="#f1f1ec", dark=False
     ),
 }
+TITLES = {"events": "transitions", "why": "why (margins: log scale)"}
 LARGE = (120, 36)  # columns and rows from which all panels are shown at once
-PAGES, ANSWERS = 3, 2  # pages of a smaller terminal; the one with all answers
+PAGES, LISTS, ANSWERS = 3, 1, 2  # pages of a smaller terminal; those of lists and of answers
+ELEMENTS = 0.4  # the most of the height that elements take on their page
 RIBBONS, LOWER = 0.3, 8  # the most of the height that ribbons take; rows of the lower panels
 TRANSCRIPT = 2000  # lines
 SLOW = 0.2  # s, after which a command is reported as still working
@@ -89,6 +91,11 @@ class FullScreen(App[int]):
         self.waiting: deque[str] = deque()
         self.busy = self.stopping = False
         self.seen: View = view(session)
+        names = ("chart", "elements", "why", "events", "session", "answers")
+        self.panels = {name: Panel(TITLES.get(name, name), name) for name in names}
+        self.ribbon, self.top = Ribbon("states over time", "ribbons"), Horizontal(id="top")
+        self.status, self.lead = Static(id="status"), Static(id="lead")
+        self.prompt, self.keys, self.small = Prompt(self._complete), Keys(), False
         for theme in GROUNDS.values():
             self.register_theme(theme)
         self.theme = "gms-light" if light else "gms-dark"
@@ -96,22 +103,23 @@ class FullScreen(App[int]):
     # ------------------------------------------------------------------ layout
     def compose(self) -> ComposeResult:
         """Make the panels."""
-        yield Static(id="status")
+        panels = self.panels
+        yield self.status
         with Vertical(id="body"):
-            with Horizontal(id="top"):
-                yield Panel("chart", "chart")
+            with self.top:
+                yield panels["chart"]
                 with Vertical(id="right"):
-                    yield Panel("elements", "elements")
-                    yield Panel("why", "why")
-            yield Ribbon("states over time", "ribbons")
+                    yield panels["elements"]
+                    yield panels["why"]
+            yield self.ribbon
             with Horizontal(id="bottom"):
-                yield Panel("transitions", "events")
-                yield Panel("session", "session")
-                yield Panel("answers", "answers")
+                yield panels["events"]
+                yield panels["session"]
+                yield panels["answers"]
         with Horizontal(id="line"):
-            yield Static(id="lead")
-            yield Prompt(self._complete)
-        yield Keys()
+            yield self.lead
+            yield self.prompt
+        yield self.keys
 
     def on_mount(self) -> None:
         """Draw, with no panel in focus."""
@@ -124,25 +132,17 @@ class FullScreen(App[int]):
 
     def _arrange(self, width: int = 0, height: int = 0) -> None:
         width, height = width or self.size.width, height or self.size.height
-        small = width < LARGE[0] or height < LARGE[1]
-        self.screen.set_class(small, "small")
+        self.small = width < LARGE[0] or height < LARGE[1]
+        screen = self.screen_stack[0]
+        screen.set_class(self.small, "small")
         for page in range(PAGES):
-            self.screen.set_class(small and page == self.page, f"page{page}")
+            screen.set_class(self.small and page == self.page, f"page{page}")
         self.call_after_refresh(self.draw)
-
-    @property
-    def small(self) -> bool:
-        """Whether the terminal has no room for all panels at once."""
-        return self.screen_stack[0].has_class("small")
 
     @property
     def palette(self) -> Mapping[str, str]:
         """The colours of the roles."""
         return DARK if self.current_theme.dark else LIGHT
-
-    def panel(self, name: str) -> Panel:
-        """Return a panel by name."""
-        return self.screen_stack[0].query_one(f"#{name}", Panel)
 
     # ------------------------------------------------------------------ drawing
     def draw(self) -> None:
@@ -185,20 +185,21 @@ class FullScreen(App[int]):
 
         The height never shrinks, so that nothing jumps from step to step.
         """
-        top = self.screen_stack[0].query_one("#top")
         if self.small:
-            top.styles.height = None
+            rows = len(self.panels["elements"].rows) + 1
+            most = int(ELEMENTS * self.size.height)
+            self.top.styles.height = min(rows, most) if self.page == LISTS else None
             self.highest = 0
             return
-        size = {name: len(self.panel(name).rows) + 2 for name in ("chart", "elements", "why")}
+        size = {name: len(self.panels[name].rows) + 2 for name in ("chart", "elements", "why")}
         most = max(size["chart"], size["elements"] + size["why"])
         ribbons = min(len(self.seen.elements) + 6, int(RIBBONS * self.size.height))
         rest = self.size.height - ribbons - 3 - LOWER
         self.highest = max(self.highest, min(most, rest))
-        top.styles.height = self.highest
+        self.top.styles.height = self.highest
 
     def _show(self, name: str, rows: Callable[[int], Sequence[Row]]) -> None:
-        panel = self.panel(name)
+        panel = self.panels[name]
         if not panel.display or not panel.size.width:
             return
         try:
@@ -207,7 +208,7 @@ class FullScreen(App[int]):
             text = f"cannot be shown here: {error}"
             panel.show([Row(line((text, "error")))], self.palette)
         if name == "answers":
-            self._show_last_answer(panel)
+            self.call_after_refresh(self.call_after_refresh, self._show_last_answer, panel)
         elif name != "chart":
             marks = ("".join(span.text for span in row.line) for row in panel.rows)
             here = next((i for i, text in enumerate(marks) if text.startswith("▶")), 0)
@@ -215,49 +216,55 @@ class FullScreen(App[int]):
 
     def _show_last_answer(self, panel: Panel) -> None:
         """Scroll to the last answer, from its beginning if it is longer than the panel."""
-        begin, height = self.last, panel.scrollable_content_region.height
-        before = len(drawn.answer_rows(self.said[:begin], panel.columns))
-        top = min(before, max(0, len(panel.rows) - height))
-        self.call_after_refresh(self.call_after_refresh, panel.scroll_to, y=top, animate=False)
+        top = 0
+        if not self.only_last:
+            before = len(drawn.answer_rows(self.said[: self.last], panel.columns))
+            height = panel.scrollable_content_region.height
+            top = min(before, max(0, len(panel.rows) - height))
+        panel.scroll_to(y=top, animate=False)
+
+    @property
+    def only_last(self) -> bool:
+        """Whether there is room for two lines of answers only."""
+        return self.small and self.page != ANSWERS
 
     def _answers(self, width: int) -> list[Row]:
         """Return the transcript; where there is room for two lines, the last answer."""
-        panel, begin = self.panel("answers"), 0
+        panel, begin = self.panels["answers"], 0
         panel.border_title = "answers"
-        if self.small and self.page != ANSWERS:
+        if self.only_last:
             begin = self.last
             if self.said[begin].startswith("(t="):  # the title has the command
                 panel.border_title, begin = self.said[begin], begin + 1
         return drawn.answer_rows(self.said[begin:], width)
 
     def _chart(self, width: int) -> list[Row]:
-        """Draw the chart of the chosen element, with the names of edges if they fit."""
-        commands, panel = self.commands, self.panel("chart")
+        """Draw the chart of the chosen element, with the names of edges if they take no lines."""
+        commands, panel = self.commands, self.panels["chart"]
         states = chart_states(commands.session, commands.element)
         bank = commands.elements.bank(commands.element)
         chart = commands.session.system.contact(bank.name).chart
         name = commands.elements.name(commands.element)
         title = f"{name}: {chart.name}"
         panel.border_title = title if len(title) <= width - 2 else name
-        art = chart_art(states, width)
-        if len(art) > panel.scrollable_content_region.height:
-            art = chart_art(states, width, names=False)
+        art, shorter = (chart_art(states, width, names=names) for names in (True, False))
+        if len(art) > len(shorter):
+            art = shorter
         active = next((i for i, each in enumerate(art) if "ACTIVE" in str(each)), 0)
         self.call_after_refresh(panel.keep_visible, active + 1)
         return [Row(each) for each in art]
 
     def _draw_status(self) -> None:
-        status = self.screen_stack[0].query_one("#status", Static)
         lines = drawn.status_lines(self.seen, self.heading, self.size.width, busy=self.busy)
-        status.update(painted(lines, self.palette))
+        self.status.update(painted(lines, self.palette))
         lead = f"{self.number}" if self.number else self.commands.prompt
         if not self.busy:
-            self.screen_stack[0].query_one("#lead", Static).update(
+            self.lead.update(
                 painted([line((lead, "fired" if self.number else "command"))], self.palette)
             )
 
     def _draw_ribbons(self) -> None:
-        panel = self.screen_stack[0].query_one("#ribbons", Ribbon)
+        panel = self.ribbon
         if not panel.display or not panel.size.width:
             return
         session, element = self.commands.session, self.commands.element
@@ -299,12 +306,11 @@ class FullScreen(App[int]):
         return left, left + self.zoom
 
     def _draw_keys(self) -> None:
-        keys = self.screen_stack[0].query_one(Keys)
         if self.number:
-            keys.show(with_number(self.number), 0, self.palette)
+            self.keys.show(with_number(self.number), 0, self.palette)
             return
         shown = [(each.shown, each.label, each.action) for each in KEYS if each.label]
-        keys.show(shown, 2, self.palette)
+        self.keys.show(shown, 2, self.palette)
 
     # ------------------------------------------------------------------ commands
     def give(self, *lines: str) -> None:
@@ -359,7 +365,7 @@ class FullScreen(App[int]):
 
     @on(Input.Submitted)
     def _typed(self, message: Input.Submitted) -> None:
-        prompt = self.query_one(Prompt)
+        prompt = self.prompt
         text = message.value.strip() or self.commands.last_move
         prompt.remember(message.value.strip())
         prompt.value = ""
@@ -370,7 +376,7 @@ class FullScreen(App[int]):
     def _completing(self, message: Prompt.Completing) -> None:
         if message.words:
             keys = [("", word, "bell") for word in message.words]
-            self.query_one(Keys).show(keys, 0, self.palette)
+            self.keys.show(keys, 0, self.palette)
         else:
             self._draw_keys()
 
@@ -448,7 +454,7 @@ class FullScreen(App[int]):
         self.number = ""
         self._draw_status()
         self._draw_keys()
-        prompt = self.query_one(Prompt)
+        prompt = self.prompt
         prompt.write(text)
         prompt.focus()
 

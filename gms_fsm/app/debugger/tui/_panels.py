@@ -5,11 +5,12 @@ Values are those of the view, in engineering units; sentences are those of the l
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 
 from gms_fsm.app._quantities import quantity
 from gms_fsm.app.debugger._over_time import EventView
-from gms_fsm.app.debugger._text import breakpoint_text, progress, short, wrapped
+from gms_fsm.app.debugger._text import breakpoint_text, progress, wrapped
 from gms_fsm.app.debugger._view import BranchView, ContactView, ElementView, View
 from gms_fsm.app.debugger.tui._chart import MARKS
 from gms_fsm.app.debugger.tui._spans import Line, Row, Span, line, state_role
@@ -25,6 +26,7 @@ __all__ = [
 ]
 
 BAR = 8  # characters for |z|/s = 1
+TIME = " " * 16  # columns of the time of a transition
 
 
 def status_lines(view: View, title: str, width: int, *, busy: bool = False) -> list[Line]:
@@ -56,7 +58,7 @@ def status_lines(view: View, title: str, width: int, *, busy: bool = False) -> l
     for contact in view.contacts:
         lead = f"{contact.name}: " if contact.name else ""
         values = {"v": (contact.v, "m/s"), "F": (contact.F, "N")}
-        text = " ".join(f"{name} = {quantity(*value)}" for name, value in values.items())
+        text = ", ".join(f"{name} = {quantity(*value)}" for name, value in values.items())
         parts.append(Span(f"{lead}{text}"))
     if view.ending == "end":
         parts.append(Span("end of the run", "fired"))
@@ -214,21 +216,24 @@ def event_rows(events: Sequence[EventView], cursor: int, width: int) -> list[Row
     if not events:
         return [Row(line(("no transition so far", "dim")))]
     here = max((i for i, each in enumerate(events) if each.row <= cursor), default=-1)
-    rows = []
+    forms = [_forms(each.fired) for each in events]
+    room = width - len(TIME)
+    fitting = (i for i in range(len(forms[0])) if max(len(form[i]) for form in forms) <= room)
+    form, rows = next(fitting, len(forms[0]) - 1), list[Row]()
     for i, each in enumerate(events):
-        text = f"{'▶' if i == here else ' '}{each.t:>11.9g} s  "
-        text += _fired(each.fired, width - len(text))
         role = "head" if i == here else "dim" if each.row > cursor else ""
-        rows.append(Row(line((text, role)), _move(each.row - cursor)))
+        lead = f"{'▶' if i == here else ' '}{each.t:>11.9g} s  "
+        for part in textwrap.wrap(forms[i][form], max(8, room)):
+            rows.append(Row(line((lead + part, role)), _move(each.row - cursor)))
+            lead = TIME
     return rows
 
 
-def _fired(fired: Fired, room: int) -> str:
-    """Return what fired, in the longest form that fits."""
+def _forms(fired: Fired) -> tuple[str, ...]:
+    """Return what fired, from long to short."""
     who = f"{fired.contact} {fired.element + 1}" if fired.contact else f"E{fired.element + 1}"
     change = f"{fired.source} → {fired.target}"
-    forms = (f"{who} {change}  {fired.edge}", f"{who} {fired.edge}", f"{who} {change}")
-    return next((form for form in forms if len(form) <= room), short(forms[-1], max(1, room)))
+    return f"{who} {change}  {fired.edge}", f"{who} {fired.edge}"
 
 
 def _move(rows: int) -> str:

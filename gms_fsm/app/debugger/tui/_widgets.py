@@ -53,7 +53,7 @@ class Panel(ScrollableContainer, can_focus=True, inherit_bindings=False):
     @property
     def columns(self) -> int:
         """Columns for text, beside a scroll bar."""
-        return max(10, self.outer_size.width - self.gutter.width - 1)
+        return max(10, self.outer_size.width - self.styles.gutter.width - 1)
 
     def show(self, rows: Sequence[Row], palette: Mapping[str, str]) -> None:
         """Show lines instead of those shown."""
