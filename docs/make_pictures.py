@@ -90,7 +90,7 @@ def draw_held() -> None:
 
 
 def draw_figures(signed: Trace) -> None:
-    """Write the pictures of runs: ribbons, cascade, overview, Stribeck curve, schematic."""
+    """Write the pictures of runs: ribbons, cascade, overview, landscape, micro-steps, and so on."""
     figures.save(figures.ribbons_figure(signed), FOLDER / "figure_ribbons.png")
     figures.save(figures.cascade_figure(signed), FOLDER / "figure_cascade.png")
     sliding = (signed.states == "slip").sum(axis=1)
@@ -98,6 +98,11 @@ def draw_figures(signed: Trace) -> None:
     figures.save(schematic_figure(signed, row), FOLDER / "schematic.png")
     pulled = run("pulled_mass")
     figures.save(figures.overview(pulled, title="Pulled mass"), FOLDER / "figure_overview.png")
+    landscape = plots.landscape(pulled, 1, t=20.8, title="Pulled mass")
+    figures.save(landscape, FOLDER / "figure_landscape.png")
+    figures.save(plots.unfold(signed, 32.6, 32.7), FOLDER / "figure_unfold.png")
+    phase = plots.phase(pulled, window=(17.5, 25.5), title="Pulled mass")
+    figures.save(phase, FOLDER / "figure_phase.png")
     with rc_context(RC):
         figure = Figure(figsize=(5.4, 3.6), layout="constrained")
         ax = figure.subplots()

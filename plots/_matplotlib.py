@@ -21,25 +21,31 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Rectangle
 from matplotlib.path import Path as Curve
 from matplotlib.text import Text
-from matplotlib.ticker import LogLocator, MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
+from matplotlib.transforms import Bbox, IdentityTransform
 from PIL import Image
 
 __all__ = [
     "Artist",
     "Axes",
+    "Bbox",
     "BoundaryNorm",
     "Curve",
     "FancyArrowPatch",
     "Figure",
     "FigureCanvasAgg",
+    "IdentityTransform",
     "Image",
+    "Line2D",
     "LineCollection",
     "ListedColormap",
     "LogLocator",
     "MaxNLocator",
+    "NullLocator",
     "Rectangle",
     "RendererBase",
     "Text",

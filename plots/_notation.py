@@ -20,7 +20,7 @@ from gms_fsm.language import (
     spell,
 )
 
-__all__ = ["NOTATIONS", "Writer"]
+__all__ = ["NOTATIONS", "RAISED", "Writer"]
 
 NOTATIONS = ("stateflow", "math")
 
@@ -32,7 +32,7 @@ _TOKEN = re.compile(
     r"(?P<power>\^\d+(?![\w.]))|(?P<number>\d[\d.]*(?:e[+-]?\d+)?)|(?P<name>\w+)|>=|<=|[*!-]"
 )
 _SIGNS = {">=": "≥", "<=": "≤", "*": "·", "-": "−", "!": "¬", "sqrt": "√", "pi": "π"}
-_RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 _GREEK = {
     unicodedata.name(c).removeprefix("GREEK SMALL LETTER ").lower(): c
@@ -140,9 +140,9 @@ def _symbol(name: str) -> str:
 def _formula_token(match: re.Match[str]) -> str:
     token = match[0]
     if match["power"]:
-        return token[1:].translate(_RAISED)
+        return token[1:].translate(RAISED)
     if match["number"]:
         digits, _, exponent = token.partition("e")
-        power = f"10{str(int(exponent)).translate(_RAISED)}" if exponent else ""
+        power = f"10{str(int(exponent)).translate(RAISED)}" if exponent else ""
         return (power if digits == "1" else f"{digits}·{power}") if power else digits
     return _SIGNS.get(token, token)

@@ -1,9 +1,10 @@
 """A run as a single web page to step, scrub and explain it, without a network.
 
-Everything the page shows is computed here and stored in it: values, active states, truth values and
-margins of clauses. The page restyles the chart and moves cursors; it evaluates no guards. The only
-text it parses is the condition that a user types into its `until` box. The plot library
-(uPlot) is read from the installed package and written into the page with its licence.
+Python stores the values of the run, its transitions, charts as pictures and guards as trees.
+The page computes truths, margins and regions from these trees, with one function for all of them;
+it has no switching rules of its own. The only text it parses is the condition that a user types
+into its `until` box. The plot library (uPlot) is read from the installed package and written into
+the page with its licence.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ from typing import Any
 from gms_fsm._arguments import checked_kind, listed
 from gms_fsm._extras import missing
 from gms_fsm.errors import ParameterError
+from gms_fsm.inspection.explain import ROUNDING
+from gms_fsm.inspection.prove import Report
 from gms_fsm.language import (
     COMPARISONS,
     CONSTANTS,
@@ -32,22 +35,33 @@ from gms_fsm.language import (
     OPERATIONS,
     SEVERAL,
 )
-from gms_fsm.traces.trace import Trace, check_trace
+from gms_fsm.traces.trace import Trace
 from plots import formats
-from plots._replay_chart import chart_svg
-from plots._replay_run import common_frames, frames_of_run, page_rows, stored_run
-from plots.style import (
-    CHART_THEMES,
-    ELEMENT_COLOURS,
-    INK,
-    PANEL,
-    STATE_EDGES,
-    STATE_FILLS,
-    TEXT_ORANGE,
-)
+from plots._window import window_of
+from plots.page._chart import chart_svg
+from plots.page._rows import page_rows
+from plots.page._run import stored_run, views_of
+from plots.style import CHART_THEMES, ELEMENT_COLOURS, PAGE_THEMES
 
 __all__ = ["Replay", "replay", "replay_html", "write_replay"]
 
+# In this order: later ones use what earlier ones define.
+SCRIPTS = (
+    "base.js",
+    "trees.js",
+    "run.js",
+    "until.js",
+    "plane.js",
+    "chart.js",
+    "plots.js",
+    "views.js",
+    "phase.js",
+    "regions.js",
+    "landscape.js",
+    "microscope.js",
+    "bristles.js",
+    "page.js",
+)
 HATCH_ANGLES = (None, 45, 135, 0, 90)  # of the states' ribbons, degrees
 # uPlot's licence must accompany every copy, but the package's file only names it.
 MIT = """\
@@ -115,7 +129,13 @@ class Replay:
 
 
 def replay(
-    trace: Trace, other: Trace | None = None, *, title: str = "", names: Sequence[str] = ()
+    trace: Trace,
+    other: Trace | None = None,
+    *,
+    title: str = "",
+    names: Sequence[str] = (),
+    window: tuple[float, float] | None = None,
+    checks: Report | Sequence[Report] = (),
 ) -> Replay:
     """Make a replay page, for a notebook.
 
@@ -129,6 +149,12 @@ def replay(
         Title of the page; by default the names of the models.
     names : sequence of str, optional
         Names of the runs; the only distinction between two runs of one model on one rig.
+    window : (float, float), optional
+        Time interval to show, s; by default the whole run. A run with more transitions than a page
+        can hold needs one.
+    checks : Report or sequence of Report, optional
+        From `gms_fsm.inspection.prove.prove`; the counterexamples are pinned in the landscapes of
+        their charts.
 
     Returns
     -------
@@ -138,7 +164,8 @@ def replay(
     Raises
     ------
     ParameterError
-        If there are names, but not one per run.
+        If there are names, but not one per run, the window is not inside the run, or it contains
+        too many transitions.
     MissingExtraError
         If uPlot is not installed.
 
@@ -149,7 +176,8 @@ def replay(
     ...                  Prescribed("0.2"), 3.0)
     >>> replay(trace).save("page.html")  # doctest: +SKIP
     """
-    return Replay(replay_html(trace, other, title=title, names=names))
+    page = replay_html(trace, other, title=title, names=names, window=window, checks=checks)
+    return Replay(page)
 
 
 def write_replay(
@@ -159,6 +187,8 @@ def write_replay(
     *,
     title: str = "",
     names: Sequence[str] = (),
+    window: tuple[float, float] | None = None,
+    checks: Report | Sequence[Report] = (),
 ) -> Path:
     """Write a replay page: a single file that needs neither a network nor a server.
 
@@ -166,7 +196,7 @@ def write_replay(
     ----------
     path : str or Path
         The file; its folder must exist, and its ending selects the format, such as ``.html``.
-    trace, other, title, names
+    trace, other, title, names, window, checks
         See `replay`.
 
     Returns
@@ -184,17 +214,24 @@ def write_replay(
         If the folder cannot be written.
     """
     formats.chosen(path, "page")  # before any work
-    return replay(trace, other, title=title, names=names).save(path)
+    page = replay(trace, other, title=title, names=names, window=window, checks=checks)
+    return page.save(path)
 
 
 def replay_html(
-    trace: Trace, other: Trace | None = None, *, title: str = "", names: Sequence[str] = ()
+    trace: Trace,
+    other: Trace | None = None,
+    *,
+    title: str = "",
+    names: Sequence[str] = (),
+    window: tuple[float, float] | None = None,
+    checks: Report | Sequence[Report] = (),
 ) -> str:
     """Return a replay page as text.
 
     Parameters
     ----------
-    trace, other, title, names
+    trace, other, title, names, window, checks
         See `replay`.
 
     Returns
@@ -205,44 +242,47 @@ def replay_html(
     Raises
     ------
     ParameterError
-        If there are names, but not one per run.
+        See `replay`.
     MissingExtraError
         If uPlot is not installed.
     """
     traces = [trace] if other is None else [trace, other]
     for each in traces:
-        check_trace(each)
+        checked_kind("trace", each, Trace, "a Trace, from simulate(...) or Trace.load(path)")
+        window_of(each, window)
     checked_kind("title", title, str, "a text")
+    reports = [checks] if isinstance(checks, Report) else listed("checks", checks, "Reports")
+    known = [view.model.chart for each in traces for view in views_of(each)]
+    for report in reports:
+        checked_kind("checks", report, Report, "a Report, from prove(chart)")
+        if report.chart not in known:
+            raise ParameterError(
+                f"checks has a Report of another chart, {report.chart.name!r}",
+                advice=f"these runs have {', '.join(sorted({chart.name for chart in known}))}",
+            )
     names = [checked_kind("names", each, str, "texts") for each in listed("names", names, "texts")]
     plot_script, plot_style = _uplot()
     if len(names) not in (0, len(traces)):
         raise ParameterError(
             f"{len(traces)} run(s) but names = {list(names)!r}", advice="give one each"
         )
-    pictures = [chart_svg(each.model.chart, each.n) for each in traces]
-    charts = list(dict.fromkeys(pictures))
-    chosen = [page_rows(each) for each in traces]
-    frames = common_frames([run.t.tolist() for run, _ in chosen])
-    runs = [
-        {
-            "chart": charts.index(picture),
-            "title": ": ".join([*names[i : i + 1], f"{run.model.title}; {run.rig.title}"]),
-            **stored_run(run, between, frames_of_run(frames, i)),
-        }
-        for i, (picture, (run, between)) in enumerate(zip(pictures, chosen, strict=True))
-    ]
+    charts: list[str] = []
+    runs = []
+    for i, each in enumerate(traces):
+        page = page_rows(each, window)
+        pictures = [chart_svg(view.model.chart, view.n) for view in views_of(each)]
+        charts += [picture for picture in dict.fromkeys(pictures) if picture not in charts]
+        run = stored_run(page, [charts.index(picture) for picture in pictures], reports)
+        head = [*names[i : i + 1], each.title]
+        runs.append({"title": ": ".join(head), "of": len(each), **run})
     data = {
-        "title": title or " and ".join(dict.fromkeys(t.model.title for t in traces)),
+        "title": title or " and ".join(dict.fromkeys(_short(each) for each in traces)),
         "runs": runs,
-        "frames": frames,
         "language": _language(),
-        "events": sorted({entry["frame"] for run in runs for entry in run["log"]}),
-        # The ink of a page depends on its theme.
-        "colours": ["--ink" if colour == INK else colour for colour in ELEMENT_COLOURS],
-        "fills": list(zip(STATE_FILLS, STATE_EDGES, HATCH_ANGLES, strict=True)),
+        "rounding": ROUNDING,
     }
-    script = _part("replay_until.js") + _part("replay_page.js")
-    style = _theme() + plot_style + _part("replay_page.css")
+    script = "".join(map(_part, SCRIPTS))
+    style = _theme() + plot_style + _part("page.css")
     scripts = " ".join(map(_hash, (plot_script, script)))
     parts = {
         # Only the scripts written here may run; text from a trace cannot, even as markup.
@@ -258,7 +298,14 @@ def replay_html(
         "script": script,
     }
     # In one pass, so that placeholders inside the parts are left unchanged.
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], _part("replay_template.html"))
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], _part("template.html"))
+
+
+def _short(trace: Trace) -> str:
+    """Return the name of what runs."""
+    if trace.system is not None and not trace.which:
+        return trace.system.name
+    return trace.model.title
 
 
 def _language() -> dict[str, Any]:
@@ -293,7 +340,7 @@ def _text(path: Path | Traversable) -> str:
 
 
 def _part(name: str) -> str:
-    return _text(resources.files("plots").joinpath(name))
+    return _text(resources.files("plots.page").joinpath(name))
 
 
 def _hash(text: str) -> str:
@@ -307,17 +354,32 @@ def _copyright(script: str) -> str:
 
 
 def _theme() -> str:
-    """Return the colours of both themes as variables of the style sheet."""
-    more = {"light": (PANEL, "#E3E6EA", TEXT_ORANGE), "dark": ("#1D2127", "#2B3038", "#FF8A3D")}
+    """Return the colours of both themes as variables, and the looks of states."""
     texts = {}
     for name, theme in CHART_THEMES.items():
+        page = PAGE_THEMES[name]
         colours = {key.replace("_", "-"): value for key, value in vars(theme).items()}
-        colours |= dict(zip(("panel", "grid", "fired-text"), more[name], strict=True))
+        colours |= {"panel": page.panel, "grid": page.grid}
+        colours |= {"fired-text": page.fired_text, "fired-fill": page.fired_fill}
+        for key, values in (("e", page.elements), ("fill", page.fills), ("edge", page.edges)):
+            colours |= {f"{key}{k}": value for k, value in enumerate(values)}
         texts[name] = "".join(f"--{key}:{value};" for key, value in colours.items())
+    looks = "".join(
+        f".state{k}{{background:{_hatched(k, angle)}}}\n" for k, angle in enumerate(HATCH_ANGLES)
+    )
+    swatches = "".join(
+        f".e{k}{{border-color:var(--e{k})!important}}\n" for k in range(len(ELEMENT_COLOURS))
+    )
     return (
         f":root{{color-scheme:light dark;{texts['light']}}}\n"
-        f"@media(prefers-color-scheme:dark){{:root{{{texts['dark']}}}}}\n"
+        f"@media(prefers-color-scheme:dark){{:root{{{texts['dark']}}}}}\n{looks}{swatches}"
     )
+
+
+def _hatched(k: int, angle: int | None) -> str:
+    if angle is None:
+        return f"var(--fill{k})"
+    return f"repeating-linear-gradient({angle}deg,var(--edge{k}) 0 1px,var(--fill{k}) 1px 6px)"
 
 
 def _inert(data: object) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from gms_fsm.errors import ParameterError
 from gms_fsm.traces.trace import Trace, check_trace
 from plots._matplotlib import Artist, Axes, FancyArrowPatch, Figure, Rectangle, rc_context
-from plots.panels._shown import scaled
+from plots.panels._shown import checked_row, scaled
 from plots.style import (
     BLUE,
     ELEMENT_COLOURS,
@@ -85,16 +85,8 @@ def schematic(
     n = elements if trace is None else trace.n
     if not isinstance(n, (int, np.integer)) or isinstance(n, bool) or not 1 <= n <= MOST:
         raise ParameterError(f"a schematic shows 1 to {MOST} elements", place="elements", value=n)
-    if trace is not None and (
-        not isinstance(row, (int, np.integer))
-        or isinstance(row, bool)
-        or not -len(trace) <= row < len(trace)
-    ):
-        raise ParameterError(
-            f"it must be an integer from {-len(trace)} to {len(trace) - 1}",
-            place="row",
-            value=row,
-        )
+    if trace is not None:
+        row = checked_row(trace, row)
     drawn: list[Artist] = []
     shift = np.zeros(n)
     if trace is not None:

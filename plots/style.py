@@ -43,6 +43,9 @@ ELEMENT_DASHES: tuple[str | tuple[int, tuple[float, ...]], ...] = (
 STATE_FILLS = ("#CFE3F2", "#F7CDB0", "#CDEBE0", "#F1D9E7", "#FAE8C0")
 STATE_EDGES = (BLUE, VERMILION, "#009E73", "#CC79A7", "#E69F00")
 HATCHES = ("", "////", "....", "xxxx", "\\\\\\\\")
+# Edges that leave one state, by priority; the tints are light enough for lines on top of them.
+EDGE_COLOURS = (BLUE, VERMILION, "#00795A", "#A8487F", "#8A6100", INK, LINE_GREY)
+EDGE_HATCHES = ("////", "\\\\\\\\", "....", "||||", "----", "xxxx", "oooo")
 
 RC: Any = {  # matplotlib types each key separately
     "font.family": "sans-serif",
@@ -113,5 +116,44 @@ CHART_THEMES: Mapping[str, ChartTheme] = {
         "#FF8A3D",
         "#3FCB9A",
         "#9AA1AB",
+    ),
+}
+
+
+@dataclass(frozen=True)
+class PageTheme:
+    """Further colours of a replay page, next to those of its chart.
+
+    Parameters
+    ----------
+    panel, grid : str
+        Ground of the controls, and lines in plots.
+    fired_text, fired_fill : str
+        Text about a firing, and its ground.
+    elements, fills, edges : tuple of str
+        Lines of elements; grounds and hatches of states.
+    """
+
+    panel: str
+    grid: str
+    fired_text: str
+    fired_fill: str
+    elements: tuple[str, ...]
+    fills: tuple[str, ...]
+    edges: tuple[str, ...]
+
+
+PAGE_THEMES: Mapping[str, PageTheme] = {
+    "light": PageTheme(
+        PANEL, "#E3E6EA", TEXT_ORANGE, VERMILION_TINT, ELEMENT_COLOURS, STATE_FILLS, STATE_EDGES
+    ),
+    "dark": PageTheme(
+        "#1D2127",
+        "#2B3038",
+        "#FF9A57",
+        "#46270F",
+        ("#56B4E9", "#FF8A3D", "#3FCB9A", "#E29BC4", "#F0B93A", "#9AD1F2", "#E6E8EB"),
+        ("#173C57", "#5A3214", "#15463A", "#4A2C43", "#4A3B12"),
+        ("#56B4E9", "#FF8A3D", "#3FCB9A", "#E29BC4", "#F0B93A"),
     ),
 }

@@ -81,6 +81,20 @@ def one_element(
     return GMS(parameters, law=law)  # type: ignore[arg-type]
 
 
+def bank(n: int) -> GMS:
+    """Return a GMS model of n different elements."""
+    parameters = GMSParameters(
+        k=np.linspace(1.5, 0.5, n),
+        sigma=np.full(n, 0.3),
+        C=np.full(n, 0.02),
+        sigma_2=0.1,
+        stribeck=Stribeck(0.4, 1.5, 1e-3),
+        v_c=1e-6,
+        weights=np.linspace(0.15, 0.85, n),
+    )
+    return GMS(parameters, law="signed")
+
+
 def same_bits(a: Trace, b: Trace) -> None:
     """Assert that two traces are equal to the last bit."""
     for name in ("t", "microstep", "x", "v", "z", "F", "F_elements", "states"):

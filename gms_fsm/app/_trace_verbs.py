@@ -14,16 +14,14 @@ from gms_fsm.app._options import ContactName, End, Start, TraceFile
 from gms_fsm.errors import ParameterError, shown
 
 if TYPE_CHECKING:
-    from gms_fsm import Trace
+    from gms_fsm import Chart, Trace
 
 __all__ = ["animate_command", "plot_command", "replay_command"]
 
 
 def _of_contact(path: Path, contact: str) -> Trace:
     """Return a saved run as one contact sees it: the one chosen, or the only one."""
-    from gms_fsm import Trace
-
-    run = Trace.load(path)
+    run = _loaded(path)
     known = ", ".join(map(repr, run.contacts))
     if contact and contact not in run.contacts:
         raise ParameterError(
@@ -38,6 +36,22 @@ def _of_contact(path: Path, contact: str) -> Trace:
             advice=f"say which one to show: --contact {run.contacts[0]}",
         )
     return run.contact(contact or run.contacts[0])
+
+
+def _loaded(path: Path) -> Trace:
+    from gms_fsm import Trace
+
+    return Trace.load(path)
+
+
+def _window(run: Trace, start: float | None, end: float | None) -> tuple[float, float] | None:
+    """Return the part of a run to show; None for the whole run."""
+    if start is None and end is None:
+        return None
+    return (
+        float(run.t[0]) if start is None else start,
+        float(run.t[-1]) if end is None else end,
+    )
 
 
 def plot_command(
@@ -55,12 +69,7 @@ def plot_command(
     run = _of_contact(trace, contact)
     files = [formats.files(name, "figure") for name in ("overview", "ribbons")]
     folder = output_folder(output, chain(*files))
-    window = None
-    if start is not None or end is not None:
-        window = (
-            float(run.t[0]) if start is None else start,
-            float(run.t[-1]) if end is None else end,
-        )
+    window = _window(run, start, end)
     pictures = (figures.overview(run, window=window), figures.ribbons_figure(run, window=window))
     for figure, names in zip(pictures, files, strict=True):
         for name in names:
@@ -103,15 +112,27 @@ def replay_command(
         Path, typer.Option("--output", "-o", help="Output file, ending in {page}.")
     ] = Path("replay.html"),
     title: Annotated[str, typer.Option(help="Title of the page.")] = "",
+    start: Start = None,
+    end: End = None,
     contact: ContactName = "",
+    check: Annotated[
+        bool, typer.Option("--check", help="Pin the counterexamples of `gms-fsm check`.")
+    ] = False,
 ) -> None:
     """Write a run as a web page in which it can be stepped through and explained."""
+    from gms_fsm import prove
     from gms_fsm.traces.trace import files_of
     from plots import write_replay
 
-    refuse_input(output, *files_of(trace), *([] if other is None else files_of(other)))
-    first = _of_contact(trace, contact)
-    second = None if other is None else _of_contact(other, contact)
-    names = [] if other is None else [trace.stem, other.stem]
-    page = write_replay(output, first, second, title=title, names=names)
+    files = [trace] if other is None else [trace, other]
+    refuse_input(output, *chain(*map(files_of, files)))
+    runs = [_of_contact(each, contact) if contact else _loaded(each) for each in files]
+    names = [] if other is None else [each.stem for each in files]
+    charts: list[Chart] = []
+    for view in (run.contact(name) for run in runs for name in run.contacts):
+        if view.model.chart not in charts:
+            charts.append(view.model.chart)
+    reports = [prove(chart) for chart in charts] if check else []
+    window = _window(runs[0], start, end)
+    page = write_replay(output, *runs, title=title, names=names, window=window, checks=reports)
     typer.echo(str(page))

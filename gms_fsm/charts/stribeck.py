@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import STRIBECK, FloatArray, checked_values
-from gms_fsm.language import Value, parse_value
-from gms_fsm.language._vectors import values_of
+from gms_fsm.language import Value, parse_value, values_of
 
 __all__ = ["Stribeck", "stribeck_text"]
 

@@ -24,7 +24,16 @@ from gms_fsm.traces._views import steps_of
 from gms_fsm.traces.scope import Scope
 from gms_fsm.traces.trace import Trace
 
-__all__ = ["Clause", "Explanation", "Why", "explain", "explain_state", "holds", "values_at"]
+__all__ = [
+    "Clause",
+    "Explanation",
+    "Why",
+    "clause_unit",
+    "explain",
+    "explain_state",
+    "holds",
+    "values_at",
+]
 
 ROUNDING = 1e-8  # relative to both sides; a smaller margin is due to the clock and floats
 
@@ -61,6 +70,8 @@ class Clause:
     @property
     def relative(self) -> float:
         """Margin over the larger side; 0 if it is due to rounding, NaN where the margin is."""
+        if math.isinf(self.margin):
+            return math.copysign(1.0, self.margin)
         larger = max(abs(self.left), abs(self.right))
         if abs(self.margin) <= ROUNDING * larger:
             return 0.0
@@ -324,11 +335,26 @@ def _clause(chart: Chart, part: Condition, values: Mapping[str, float]) -> Claus
     except (ArithmeticError, ValueError):
         return Clause(text, False, math.nan, math.nan, math.nan, computable=False)
     margin = left - right if part.op in (">", ">=") else right - left
-    return Clause(text, truth, left, right, margin, unit=_unit(chart, part, text))
+    return Clause(text, truth, left, right, margin, unit=clause_unit(chart, part, text))
 
 
-def _unit(chart: Chart, part: Condition, text: str) -> str:
-    """Return the unit of both sides of a comparison: that of its names, if all agree."""
+def clause_unit(chart: Chart, part: Condition, text: str) -> str:
+    """Return the unit of both sides of a comparison: that of its names, if all agree.
+
+    Parameters
+    ----------
+    chart : Chart
+        The chart, which knows the units of names.
+    part : Condition
+        A clause of a guard.
+    text : str
+        The clause as shown.
+
+    Returns
+    -------
+    str
+        Empty if the names do not determine it.
+    """
     units = {chart.unit(name) for name in names_in(part)} - {""}
     plain = not set(text) & set("*/^()")
     return units.pop() if plain and len(units) == 1 else ""

@@ -58,6 +58,7 @@ from gms_fsm.language._tree import (
     names_in,
     states_in,
 )
+from gms_fsm.language._vectors import truths, values_of
 
 __all__ = [
     "COMPARISONS",
@@ -107,5 +108,7 @@ __all__ = [
     "split",
     "states_in",
     "substitute",
+    "truths",
     "turning_inside",
+    "values_of",
 ]

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import as_floats
-from gms_fsm.language import Value
-from gms_fsm.language._vectors import values_of
+from gms_fsm.language import Value, values_of
 
 __all__ = ["SAMPLES", "waking_times"]
 

@@ -120,10 +120,11 @@ class Trace:
     every: Any = field(default=None, repr=False)  # the log of all contacts, where one is chosen
 
     def __repr__(self) -> str:
-        return f"<Trace: {self._title}; {len(self.rows)} rows, {len(self.transitions)} transitions>"
+        return f"<Trace: {self.title}; {len(self.rows)} rows, {len(self.transitions)} transitions>"
 
     @property
-    def _title(self) -> str:
+    def title(self) -> str:
+        """What ran: model and rig, or a system and its contacts."""
         if self.system is None or self.which:
             return f"{self.model.title}; {self.rig.title}"
         return f"{self.system.name}; contacts {', '.join(self.contacts)}"

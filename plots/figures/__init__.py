@@ -5,6 +5,7 @@ Figures are made without pyplot, so there is no global state and no display.
 
 from __future__ import annotations
 
+from plots.figures._landscapes import landscape
 from plots.figures._paper import (
     FIG3_PHASES,
     compare_laws,
@@ -13,9 +14,11 @@ from plots.figures._paper import (
     held_residuals,
     residuals,
 )
+from plots.figures._phase import phase
 from plots.figures._phenomena import phenomena_matrix, phenomenon_figure
 from plots.figures._runs import Measured, cascade_figure, overview, ribbons_figure
 from plots.figures._saving import save
+from plots.figures._unfold import unfold
 from plots.panels._shown import SMOOTH
 
 __all__ = [
@@ -27,10 +30,13 @@ __all__ = [
     "figure_3",
     "figure_4",
     "held_residuals",
+    "landscape",
     "overview",
+    "phase",
     "phenomena_matrix",
     "phenomenon_figure",
     "residuals",
     "ribbons_figure",
     "save",
+    "unfold",
 ]

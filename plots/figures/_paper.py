@@ -11,9 +11,10 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots._matplotlib import Figure, rc_context
+from plots._window import Window
 from plots.figures._parts import element_legend
 from plots.panels._held import Lag
-from plots.panels._shown import Window, checked_window, scaled, shown
+from plots.panels._shown import checked_window, scaled, shown
 from plots.style import BLUE, INK, LINE_GREY, RC, TEXT_GREY
 
 __all__ = [

@@ -8,7 +8,7 @@ import numpy as np
 
 from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Axes, Figure
-from plots.panels._shown import Window
+from plots._window import Window
 
 
 def head(trace: Trace, title: str) -> str:

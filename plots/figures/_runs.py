@@ -12,6 +12,7 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.traces.trace import Trace, check_trace
 from plots import panels
 from plots._matplotlib import Axes, Figure, LineCollection, MaxNLocator, rc_context
+from plots._window import Window
 from plots.figures._parts import (
     element_legend,
     head,
@@ -22,7 +23,7 @@ from plots.figures._parts import (
 )
 from plots.panels._axes import VECTOR_ROWS
 from plots.panels._cascades import CASCADE
-from plots.panels._shown import Window, checked_window, scaled, shown
+from plots.panels._shown import checked_window, scaled, shown
 from plots.style import BLUE, PALE_GREY, RC, VERMILION
 
 __all__ = ["Measured", "cascade_figure", "overview", "ribbons_figure"]

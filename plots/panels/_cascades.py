@@ -11,9 +11,9 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.errors import shown as written
 from gms_fsm.traces.trace import Trace, check_trace
 from plots._matplotlib import Axes
+from plots._window import Window
 from plots.panels._axes import Artists, draw_curve, element_look, note, time_axis
 from plots.panels._shown import (
-    Window,
     checked_elements,
     checked_window,
     has_threshold,

@@ -11,8 +11,9 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.errors import shown as written
 from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Axes
+from plots._window import Window
 from plots.panels._axes import Artists, draw_curve, time_axis
-from plots.panels._shown import SMOOTH, Window, checked_window, is_number
+from plots.panels._shown import SMOOTH, checked_window, is_number
 from plots.style import INK
 
 __all__ = ["difference", "residual"]

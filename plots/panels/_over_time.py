@@ -8,6 +8,7 @@ import numpy as np
 
 from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Axes
+from plots._window import Window
 from plots.panels._axes import (
     Artists,
     draw_curve,
@@ -18,7 +19,6 @@ from plots.panels._axes import (
     time_axis,
 )
 from plots.panels._shown import (
-    Window,
     checked_elements,
     checked_window,
     has_threshold,

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Axes, BoundaryNorm, LineCollection, ListedColormap, colormaps
+from plots._window import Window
 from plots.panels._axes import VECTOR_ROWS, Artists, draw_curve, log_axis
-from plots.panels._shown import Window, checked_elements, scaled, shown
-from plots.style import BLUE, LINE_GREY, VERMILION
+from plots.panels._shown import checked_elements, scaled, shown
+from plots.style import BLUE, INK, LINE_GREY, VERMILION
 
-__all__ = ["hysteresis", "portrait", "slip_bar"]
+__all__ = ["arrows", "hysteresis", "portrait", "slip_bar"]
+
+MOST_ARROWS = 500  # looked at along one path
+OVERLAP, REPEATED = 0.22, 0.7  # inches between arrows, and between those of the same direction
+SHAFT = 0.05  # inches of the path whose direction an arrow has
 
 
 def _by_slipping(
@@ -178,3 +184,64 @@ def hysteresis(
         )
         begin = end
     return lines
+
+
+def arrows(ax: Axes, lines: LineCollection, *, apart: float = 1.1) -> Artists:
+    """Draw arrowheads along a portrait, in the direction of time.
+
+    Parameters
+    ----------
+    ax : Axes
+        Axes with the portrait, as large as they will be.
+    lines : LineCollection
+        From `portrait` or `hysteresis`; its pieces are in the order of time.
+    apart : float
+        Distance along the path, inches. Where a path repeats itself, only the first arrow of
+        several close ones is drawn.
+
+    Returns
+    -------
+    list of Artist
+        One annotation per arrow, from a point of the path to a later one.
+    """
+    pieces = [np.asarray(piece) for piece in lines.get_segments()]
+    path = np.concatenate([*pieces, np.empty((0, 2))])
+    path = path[np.isfinite(path).all(axis=1)]
+    if len(path) < 2:
+        return []
+    inches = ax.transData.transform(path) / ax.figure.dpi
+    steps = np.hypot(*np.diff(inches, axis=0).T)
+    moved = np.concatenate([[True], steps > 0])
+    path, length = path[moved], np.concatenate([[0.0], np.cumsum(steps[steps > 0])])
+    if not length[-1] > 0:
+        return []
+    apart = max(apart, length[-1] / MOST_ARROWS)
+    look: dict[str, Any] = {"arrowstyle": "-|>,head_length=0.5,head_width=0.25"}
+    look |= {"color": INK, "linewidth": 0.0, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 11}
+    drawn: Artists = []
+    known: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []  # tips, directions; inches
+    for end in np.arange(apart / 2, length[-1], apart).tolist():
+        # The arrow ends on the path, and begins where the path was just before.
+        tip, tail = (_at(path, length, at) for at in (end, end - SHAFT))
+        here, before = ax.transData.transform([tip, tail]) / ax.figure.dpi
+        size = float(np.hypot(*(here - before)))
+        if size < 0.5 * SHAFT:  # the path turns back here
+            continue
+        way = (here - before) / size
+        if any(_alike(here - other, float(way @ theirs)) for other, theirs in known):
+            continue
+        known.append((here, way))
+        drawn.append(ax.annotate("", tip, tail, arrowprops=look, zorder=5))
+    return drawn
+
+
+def _at(path: NDArray[np.float64], length: NDArray[np.float64], at: float) -> tuple[float, float]:
+    """Return the point of a path at a length along it."""
+    x, y = (float(np.interp(at, length, column)) for column in path.T)
+    return x, y
+
+
+def _alike(between: NDArray[np.float64], cosine: float) -> bool:
+    """Return whether two arrows are so close that one of them is enough."""
+    away = float(np.hypot(*between))
+    return away < OVERLAP or (away < REPEATED and cosine > 0.8)

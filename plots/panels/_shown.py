@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,9 @@ from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.errors import shown as written
 from gms_fsm.traces._views import picked
 from gms_fsm.traces.trace import Trace, check_trace
+from plots._window import Window, window_of
 
 __all__ = ["has_threshold", "shown"]
-
-Window = tuple[float, float]
 
 SCALES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
 SMOOTH = 2000  # points per curve
@@ -126,20 +126,7 @@ def checked_window(trace: Trace, window: Window | None) -> Window:
         If it is not two increasing times that overlap the run, or if there is no run.
     """
     check_trace(trace)
-    first, last = float(trace.t[0]), float(trace.t[-1])
-    if window is None:
-        return first, last
-    try:
-        begin, end = (float(t) for t in window)
-    except (TypeError, ValueError):
-        begin, end = last, first
-    if not (first <= begin < end <= last):
-        raise ParameterError(
-            f"window is {written(window)}",
-            advice=f"it must be two times (t0, t1) with t0 < t1 inside the run, {first:g} "
-            f"to {last:g} s",
-        )
-    return begin, end
+    return window_of(trace, window)
 
 
 def checked_elements(trace: Trace, elements: Iterable[int] | None) -> list[int]:
@@ -156,7 +143,7 @@ def checked_elements(trace: Trace, elements: Iterable[int] | None) -> list[int]:
         chosen = list(elements)
     except TypeError:
         chosen = []
-    whole = all(isinstance(i, (int, np.integer)) and not isinstance(i, bool) for i in chosen)
+    whole = all(map(is_whole, chosen))
     if (
         not chosen
         or not whole
@@ -169,6 +156,44 @@ def checked_elements(trace: Trace, elements: Iterable[int] | None) -> list[int]:
             "(labels count from 1)",
         )
     return [int(i) for i in chosen]
+
+
+def one_element(trace: Trace, element: Any) -> int:
+    """Return the number of an element; raise `ParameterError` if there is no such one."""
+    check_trace(trace)
+    if not is_whole(element) or not 0 <= element < trace.n:
+        raise ParameterError(
+            f"it must be an integer from 0 to {trace.n - 1} (labels count from 1)",
+            place="element",
+            value=element,
+        )
+    return int(element)
+
+
+def checked_row(trace: Trace, row: Any, t: Any = None) -> int:
+    """Return the number of a row, from 0; with a time, that of the last row at or before it.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such row.
+    """
+    if t is not None:
+        first, last = float(trace.t[0]), float(trace.t[-1])
+        if not is_number(t) or not first <= t <= last:
+            raise ParameterError(
+                f"it must be a time in the run, {first:g} to {last:g} s", place="t", value=t
+            )
+        return int(np.searchsorted(trace.t, t, side="right")) - 1
+    if not is_whole(row) or not -len(trace) <= row < len(trace):
+        raise ParameterError(
+            f"it must be an integer from {-len(trace)} to {len(trace) - 1}", place="row", value=row
+        )
+    return int(row) % len(trace)
+
+
+def is_whole(value: object) -> bool:
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
 
 
 def is_number(value: object) -> bool:

@@ -8,8 +8,9 @@ import numpy as np
 
 from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Axes, RendererBase, Text
+from plots._window import Window
 from plots.panels._axes import VECTOR_ROWS, Artists, time_axis
-from plots.panels._shown import Window, checked_elements, checked_window
+from plots.panels._shown import checked_elements, checked_window
 from plots.style import HATCHES, INK, STATE_EDGES, STATE_FILLS
 
 __all__ = ["ribbons"]

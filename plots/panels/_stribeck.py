@@ -11,8 +11,9 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.errors import shown as written
 from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Axes
+from plots._window import Window
 from plots.panels._axes import Artists, draw_curve
-from plots.panels._shown import Window, scaled, shown
+from plots.panels._shown import scaled, shown
 from plots.style import INK, STATE_FILLS, VERMILION
 
 __all__ = ["stribeck"]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import re
 from typing import Any
 
 import numpy as np
@@ -14,6 +12,7 @@ from gms_fsm.inspection.explain import explain
 from gms_fsm.systems.system import System
 from gms_fsm.traces.trace import Trace
 from plots import LiveChart, replay, statechart
+from tests.plots.stored import column, data_of, integers, log, same
 from tests.plots.systems_to_draw import BALL, BLOCKS, END_STOP, PULLED, STICTION, run
 
 pytest.importorskip("matplotlib", reason="figures need the extra 'plots'")
@@ -21,10 +20,13 @@ pytest.importorskip("matplotlib", reason="figures need the extra 'plots'")
 from plots import figures, panels, schematic  # after the skip
 from plots._matplotlib import Axes, Figure
 
-FIGURES = ("overview", "ribbons_figure", "cascade_figure")
+FIGURES = ("overview", "ribbons_figure", "cascade_figure", "phase")
 LAGS = {"lag_between_ticks", "lag_over_period", "lag_over_time"}
 OTHERS = {"cascade_window", "difference", "has_threshold", "residual", "shown", "slip_bar", *LAGS}
-PANELS = tuple(sorted({*panels.__all__} - OTHERS - {"stribeck"}))
+OF_AN_ELEMENT = {"landscape", "pins", "race"}
+UNFOLDED = {"Unfolded", "unfolded", "unfolded_force", "unfolded_states"}
+OTHERS |= {"arrows", "stribeck", *OF_AN_ELEMENT, *UNFOLDED}
+PANELS = tuple(sorted({*panels.__all__} - OTHERS))
 
 
 @pytest.fixture
@@ -36,12 +38,8 @@ def ax() -> Axes:
 def stored(trace: Trace) -> dict[str, Any]:
     """Return the data of the only run of a replay page."""
     pytest.importorskip("uplot", reason="a page needs the extra 'replay'")
-    found = re.search(
-        r'<script[^>]*type="application/json"[^>]*>(.*?)</script>', replay(trace).html, re.DOTALL
-    )
-    assert found is not None
-    (only,) = json.loads(found[1])["runs"]
-    return only  # type: ignore[no-any-return]
+    (only,) = data_of(replay(trace).html)["runs"]
+    return dict(only)
 
 
 @pytest.mark.slow
@@ -57,6 +55,19 @@ def test_every_figure_takes_a_contact(name: str, system: System, contact: str) -
 @pytest.mark.parametrize("name", PANELS)
 def test_every_panel_takes_a_contact(name: str, ax: Axes) -> None:
     assert getattr(panels, name)(ax, run(BLOCKS).contact("pad2"))
+
+
+@pytest.mark.parametrize(
+    ("system", "contact"), [(PULLED, "pad"), (BALL, "floor"), (BLOCKS, "pad2")]
+)
+def test_landscape_and_micro_steps_take_a_contact(system: System, contact: str) -> None:
+    trace = run(system).contact(contact)
+    t = trace.transitions.t
+    for figure in (
+        figures.landscape(trace, 0, row=len(trace) // 2),
+        figures.unfold(trace, float(t[0]), float(t[min(4, t.size - 1)])),
+    ):
+        assert figure.get_suptitle().startswith(f"{contact}: ")
 
 
 @pytest.mark.parametrize("name", ["deflections", "ratio"])
@@ -103,24 +114,23 @@ def test_a_firing_belongs_to_its_own_contact(contact: str) -> None:
     ]
     assert len(made) == len(trace.transitions) < (trace.microstep > 0).sum()
     assert [LiveChart(trace).look(row)[0].fired for row in made] == trace.transitions.edge.tolist()
-    logged = stored(trace)["log"]
-    assert all(entry["made"] for entry in logged)
-    assert [entry["t"] for entry in logged] == trace.transitions.t.tolist()
+    page = stored(trace)
+    rows, _, _, made_rows = log(page["contacts"][0])
+    assert made_rows.all()
+    assert column(page, page["t"])[rows].tolist() == trace.transitions.t.tolist()
 
 
 def test_a_page_of_a_chart_without_variables_has_no_plot_of_elements() -> None:
-    page = stored(run(PULLED))
-    assert page["inner"] == {"title": "", "bounds": [], "columns": []}
-    assert {edge["name"] for edge in page["edges"]} == {e.name for e in STICTION.transitions}
+    (contact,) = stored(run(PULLED))["contacts"]
+    assert contact["variables"] == []
+    assert {edge["name"] for edge in contact["edges"]} == {e.name for e in STICTION.transitions}
 
 
 @pytest.mark.slow
 def test_a_page_shows_the_force_that_guards_read() -> None:
-    """The left side of F > F_s is the force of the row, at every row."""
+    """F is stored bit for bit where guards read it."""
     trace = run(PULLED)
     page = stored(trace)
-    ((left, right, margin),) = page["sides"][0][0]
-    pool = page["pool"]
-    assert pool[left] == pool[page["names"]["F"]]
-    assert pool[right] == [1.5]
-    assert len(pool[margin]) > 1
+    own = integers(page["between"]) == 0
+    F = column(page, page["contacts"][0]["values"]["F"]["all"])[own]
+    assert same(F, trace.F[integers(page["number"])[own]])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from gms_fsm import simulate
@@ -10,7 +9,9 @@ from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.systems.system import Body, Contact, System
 from gms_fsm.traces.trace import Trace
 from plots import LiveChart, mermaid, statechart
-from plots._replay_run import stored_run
+from plots.page._rows import page_rows
+from plots.page._run import stored_run
+from tests.plots.stored import integers
 
 RESET = Chart(
     "reset",
@@ -63,6 +64,7 @@ def test_only_the_line_that_was_taken_is_counted(trace: Trace) -> None:
 
 
 def test_a_page_shows_the_edge_of_the_state_that_was_left(trace: Trace) -> None:
-    page = stored_run(trace, np.zeros(len(trace), dtype=bool), range(len(trace)))
-    names = [(edge["name"], page["states"][edge["source"]]) for edge in page["edges"]]
-    assert [names[entry["edge"]] for entry in page["log"]] == [("up", "low"), ("stop", "high")]
+    (contact,) = stored_run(page_rows(trace), [0], [])["contacts"]
+    names = [(edge["name"], contact["states"][edge["source"]]) for edge in contact["edges"]]
+    edges = integers(contact["log"][2])
+    assert [names[edge] for edge in edges] == [("up", "low"), ("stop", "high")]

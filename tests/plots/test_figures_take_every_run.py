@@ -58,6 +58,8 @@ FIGURES: dict[str, Callable[[Trace], Figure]] = {
     "overview": figures.overview,
     "ribbons": figures.ribbons_figure,
     "cascade": figures.cascade_figure,
+    "landscape": lambda run: figures.landscape(run, run.n - 1, row=len(run) // 2),
+    "phase": figures.phase,
     "schematic": schematic_figure,
     "Fig. 4": lambda run: figures.figure_4(run, run, run),
     "Fig. 3": lambda run: figures.figure_3(run, run, run, run.F, title="Fig. 3"),

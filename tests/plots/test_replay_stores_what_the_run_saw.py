@@ -1,18 +1,17 @@
-"""The data of a replay page are the values, truths and margins of the run, and they are only data.
+"""The data of a replay page are the rows, values, states and log of the run, and only data.
 
-No browser is needed here; `test_replay_page_in_a_browser.py` drives the page.
+No browser is needed here; what the page computes from them is the claim of
+`test_replay_page_explains.py`.
 """
 
 from __future__ import annotations
 
 import html
 import importlib.util
-import json
 import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,12 +21,13 @@ from gms_fsm.charts import GMS_ELEMENT
 from gms_fsm.charts.chart import Chart, State
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import MissingExtraError, OutputError, ParameterError, TraceFileError
-from gms_fsm.inspection.explain import explain
+from gms_fsm.inspection.prove import prove
 from gms_fsm.systems.models import ChartModel, LuGre
 from gms_fsm.traces.failures import SimulationError
-from plots import _replay_chart
+from plots.page import _chart, _rows
 from plots.replay import replay, replay_html, write_replay
-from tests.helpers import FIG4_SINE, pulled_mass, stick_slip
+from tests.helpers import FASTEST, FIG4_SINE, bank, pulled_mass, stick_slip
+from tests.plots.stored import column, data_of, integers, log, modes, same
 
 uplot = pytest.mark.skipif(
     importlib.util.find_spec("uplot") is None, reason="needs the package uplot-python"
@@ -39,87 +39,52 @@ def fig4(law: str) -> Trace:
     return simulate(stick_slip(law), Prescribed(FIG4_SINE), 100.0)
 
 
-def data_of(page: str) -> dict[str, Any]:
-    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.S)
-    assert found is not None
-    return dict(json.loads(found[1]))
-
-
-def column(run: dict[str, Any], number: int) -> np.ndarray:
-    """Return a column at all rows of the page."""
-    values = np.array([float(u) for u in run["pool"][number]])
-    return np.broadcast_to(values, len(run["microstep"])) if values.size == 1 else values
-
-
 @pytest.mark.slow
 @uplot
 @pytest.mark.parametrize("law", ["published", "signed"])
-def test_every_row_of_a_transition_is_there_and_explained_as_the_run_explains_it(law: str) -> None:
+def test_rows_have_the_numbers_the_bits_and_the_states_of_the_trace(law: str) -> None:
     trace = fig4(law)
     (run,) = data_of(replay_html(trace))["runs"]
-    times, steps = column(run, run["names"]["t"]), np.array(run["microstep"])
-    instants = np.flatnonzero(np.isin(trace.t, trace.t[trace.microstep > 0]))
-    assert instants.size > 80
-    for row in instants:
-        (here,) = np.flatnonzero((times == trace.t[row]) & (steps == trace.microstep[row]))[-1:]
-        for i in range(trace.n):
-            assert run["states"][run["mode"][i][here]] == trace.states[row, i]
-            who, edge = run["fired"].get(str(here), (-1, -1))
-            asked = here - 1 if who == i else here
-            told = {e.edge.name: e for e in explain(trace, int(row), i)}
-            assert {e for e, x in told.items() if x.fired} == (
-                {run["edges"][edge]["name"]} if who == i else set()
-            )
-            for k, entry in enumerate(run["edges"]):
-                leaves = run["mode"][i][asked] == entry["source"]
-                assert leaves == (entry["name"] in told)
-                if not leaves:
-                    continue
-                for c, clause in enumerate(told[entry["name"]].clauses):
-                    assert entry["clauses"][c] == clause.text
-                    assert run["truth"][i][k][c][asked] == "01"[clause.holds]
-                    for number, value in zip(
-                        run["sides"][i][k][c],
-                        (clause.left, clause.right, clause.margin),
-                        strict=True,
-                    ):
-                        stored = float(column(run, number)[asked])
-                        assert stored == pytest.approx(value, rel=1e-6, abs=0.0)
+    (contact,) = run["contacts"]
+    own = integers(run["between"]) == 0
+    number = integers(run["number"])[own]
+    assert set(np.flatnonzero(np.isin(trace.t, trace.transitions.t))) <= set(number)
+    assert (integers(run["microstep"])[own] == trace.microstep[number]).all()
+    values = contact["values"]
+    for name, wanted in (("t", trace.t), ("v", trace.v), ("x", trace.x)):
+        assert same(column(run, values[name]["all"])[own], wanted[number]), name
+    for i in range(trace.n):
+        assert same(column(run, values["z"]["by"][i])[own], trace.z[number, i])
+        assert same(column(run, values["s"]["by"][i])[own], trace.s[number, i])
+        forces = column(run, contact["forces"][i])[own]
+        assert forces == pytest.approx(trace.F_elements[number, i], rel=1e-6, abs=1e-12)
+    assert column(run, values["F"]["all"])[own] == pytest.approx(trace.F[number], rel=1e-6)
+    assert (modes(contact, run["rows"])[own] == trace.modes[number]).all()
 
 
 @pytest.mark.slow
 @uplot
 def test_the_log_is_complete_and_points_at_the_rows_that_firings_made() -> None:
     trace = fig4("signed")
-    page = data_of(replay_html(trace))
-    (run,) = page["runs"]
-    assert len(run["log"]) == len(trace.transitions) == 64
-    for entry, record in zip(run["log"], trace.transitions, strict=True):
-        assert entry["t"] == record.t == column(run, run["names"]["t"])[entry["row"]]
-        assert entry["text"].startswith(f"element {record.element + 1} {record.source} → ")
-        assert run["mode"][record.element][entry["row"]] == run["states"].index(record.target)
-        assert run["mode"][record.element][entry["row"] - 1] == run["states"].index(record.source)
-    assert page["events"] == sorted({entry["frame"] for entry in run["log"]})
-
-
-@pytest.mark.slow
-@uplot
-@pytest.mark.parametrize("law", ["published", "signed"])
-def test_a_breakpoint_stops_before_every_firing(law: str) -> None:
-    (run,) = data_of(replay_html(fig4(law)))["runs"]
-    for entry in run["log"]:
-        # The guard became true at the latest on the row where it was evaluated.
-        stops = run["stops"][entry["element"]][entry["edge"]]
-        mode = run["mode"][entry["element"]]
-        stop = max(row for row in stops if row < entry["row"])
-        assert set(mode[stop : entry["row"]]) == {run["edges"][entry["edge"]]["source"]}
+    (run,) = data_of(replay_html(trace))["runs"]
+    (contact,) = run["contacts"]
+    rows, elements, edges, made = log(contact)
+    assert len(rows) == len(trace.transitions) == 64
+    assert made.all()
+    states = modes(contact, run["rows"])
+    names = contact["states"]
+    for row, element, edge, record in zip(rows, elements, edges, trace.transitions, strict=True):
+        assert column(run, run["t"])[row] == record.t
+        assert (element, contact["edges"][edge]["name"]) == (record.element, record.edge)
+        assert names[states[row, element]] == record.target
+        assert names[states[row - 1, element]] == record.source
 
 
 @pytest.mark.slow
 @uplot
 def test_the_page_of_fig_4_is_small_and_complete() -> None:
     page = replay_html(fig4("published"), title="Fig. 4")
-    assert len(page.encode()) < 1_000_000
+    assert len(page.encode()) < 500_000
     assert "Permission is hereby granted" in page
     assert "Leon Sorokin" in page
     assert not re.search(r"""(src|href)\s*=\s*["']?(https?:)?//""", page)
@@ -128,13 +93,71 @@ def test_the_page_of_fig_4_is_small_and_complete() -> None:
 
 @pytest.mark.slow
 @uplot
-def test_long_runs_are_thinned_but_keep_all_transitions() -> None:
+def test_800_000_rows_with_30_000_transitions_fit_into_5_megabytes() -> None:
+    trace = simulate(*pulled_mass(), 22_300.0, engine=FASTEST)
+    assert len(trace) > 800_000
+    page = replay_html(trace)
+    assert len(page.encode()) < 5_000_000
+    (run,) = data_of(page)["runs"]
+    assert len(log(run["contacts"][0])[0]) == len(trace.transitions) > 30_000
+    number = integers(run["number"])
+    assert same(column(run, run["t"]), trace.t[number])
+    assert set(np.flatnonzero(np.isin(trace.t, trace.transitions.t))) <= set(number)
+    # Between the instants the page has what can be seen: in 100 intervals the extremes of the run.
+    v = column(run, run["contacts"][0]["values"]["v"]["all"])
+    for low in np.linspace(0.0, 22_000.0, 100):
+        inside, shown = ((t >= low) & (t < low + 220.0) for t in (trace.t, trace.t[number]))
+        assert v[shown].max() > 0.99 * trace.v[inside].max()
+        assert v[shown].min() <= 0.99 * trace.v[inside].min()
+
+
+@pytest.mark.slow
+@uplot
+def test_20_elements_with_400_instants_fit_into_2_megabytes() -> None:
+    trace = simulate(bank(20), Prescribed("0.15*sin(2*pi*t/5)"), 100.0)
+    assert np.unique(trace.transitions.t).size >= 320
+    assert len(replay_html(trace).encode()) < 2_000_000
+
+
+@pytest.mark.slow
+@uplot
+def test_a_window_shows_that_part_of_the_run() -> None:
+    trace = fig4("signed")
+    (run,) = data_of(replay_html(trace, window=(20.0, 40.0)))["runs"]
+    t = column(run, run["t"])
+    assert (t.min() >= 20.0) & (t.max() <= 40.0)
+    inside = trace.transitions[(trace.transitions.t >= 20.0) & (trace.transitions.t <= 40.0)]
+    assert len(log(run["contacts"][0])[0]) == len(inside) > 0
+    own = integers(run["between"]) == 0
+    assert same(t[own], trace.t[integers(run["number"])[own]])
+    for window in ((40.0, 20.0), (0.0, 101.0), (1.0,), "all"):
+        with pytest.raises(ParameterError, match="window is"):
+            replay_html(trace, window=window)  # type: ignore[arg-type]
+
+
+@pytest.mark.slow
+@uplot
+def test_more_transitions_than_a_page_holds_ask_for_a_window(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(_rows, "MOST_AT_TRANSITIONS", 50)
+    with pytest.raises(ParameterError, match="give a shorter window"):
+        replay_html(fig4("signed"))
+    assert replay_html(fig4("signed"), window=(0.0, 10.0))
+
+
+@pytest.mark.slow
+@uplot
+def test_long_runs_at_requested_times_keep_all_transitions() -> None:
     trace = simulate(*pulled_mass(), 60.0, t_eval=np.linspace(0.0, 60.0, 20_001))
     assert (trace.microstep == 0).all()
     (run,) = data_of(replay_html(trace))["runs"]
-    assert len(run["log"]) == len(trace.transitions) == 72
-    assert all(entry["made"] for entry in run["log"])
-    assert len(run["microstep"]) < 1600
+    rows, _, _, made = log(run["contacts"][0])
+    assert len(rows) == len(trace.transitions) == 72
+    assert made.all()
+    assert run["rows"] < 3000
+    own = integers(run["between"]) == 0
+    assert same(column(run, run["t"])[own], trace.t[integers(run["number"])[own]])
 
 
 @pytest.mark.slow
@@ -146,40 +169,35 @@ def test_requested_times_of_a_loaded_trace_are_not_duplicated(tmp_path: Path) ->
     loaded = data_of(replay_html(Trace.load(trace.save(tmp_path / "run.npz"))))
     for page in (fresh, loaded):
         (run,) = page["runs"]
-        assert all(entry["made"] for entry in run["log"])
-        keys = list(zip(page["frames"]["t"], run["microstep"], strict=True))
+        assert log(run["contacts"][0])[3].all()
+        steps = integers(run["microstep"])
+        keys = list(zip(column(run, run["t"]).tolist(), steps.tolist(), strict=True))
         assert keys == sorted(keys)
-        assert sum(run["microstep"]) == sum(fig4("signed").microstep)
+        assert sum(steps) == sum(fig4("signed").microstep)
 
 
 @uplot
 def test_a_signal_that_is_not_in_the_file_leaves_the_rows_as_they_are(tmp_path: Path) -> None:
     trace = simulate(stick_slip("signed"), Prescribed(lambda t: 0.2), 3.0)
     (run,) = data_of(replay_html(Trace.load(trace.save(tmp_path / "run.npz"))))["runs"]
-    assert len(run["microstep"]) == len(trace)
-    assert not any(run["between"])
+    assert run["rows"] == len(trace)
+    assert not integers(run["between"]).any()
 
 
-@pytest.mark.slow
 @uplot
-def test_two_runs_share_one_time_and_micro_steps_stand_side_by_side() -> None:
-    page = data_of(replay_html(fig4("published"), fig4("signed")))
-    first, second = page["runs"]
-    times = np.array(page["frames"]["t"])
-    assert (np.diff(times) >= 0).all()
-    for run, rows, own in zip(
-        (first, second), page["frames"]["rows"], page["frames"]["own"], strict=True
-    ):
-        shown = [row for row, mine in zip(rows, own, strict=True) if mine]
-        assert shown == list(range(len(run["microstep"])))
-        assert (column(run, run["names"]["t"])[rows] <= times).all()
-    (begin,) = {run["log"][0]["frame"] for run in (first, second)}
-    for step in range(4):  # the first break-aways are the same under both laws
-        rows = [page["frames"]["rows"][k][begin + step] for k in (0, 1)]
-        assert [run["microstep"][row] for run, row in zip((first, second), rows, strict=True)] == [
-            step + 1,
-            step + 1,
-        ]
+def test_counterexamples_are_pinned_where_they_have_a_place() -> None:
+    pytest.importorskip("z3")
+    report = prove(GMS_ELEMENT["published"])
+    (run,) = data_of(replay_html(fig4("published"), checks=report))["runs"]
+    pins = run["contacts"][0]["plane"]["pins"]
+    wanted = [f for f in report.findings if {"v", "z"} <= f.counterexample.keys()]
+    assert [pin["text"] for pin in pins] == [f.text for f in wanted]
+    assert [pin["at"] for pin in pins] == [
+        [f.counterexample["v"], f.counterexample["z"]] for f in wanted
+    ]
+    assert len(pins) > 0
+    with pytest.raises(ParameterError, match="checks has a Report of another chart"):
+        replay_html(fig4("signed"), checks=report)
 
 
 @uplot
@@ -204,15 +222,15 @@ def test_a_hostile_name_stays_a_text() -> None:
 
 @pytest.mark.slow
 @uplot
-def test_nan_and_infinities_are_distinguished() -> None:
+def test_nan_and_infinities_are_stored() -> None:
     trace = fig4("signed")
     stored = {name: np.array(values) for name, values in trace.seen.items()}
     stored["friction.F"][:3] = np.nan, np.inf, -np.inf
     stored["friction.v"][5] = np.nan
     (run,) = data_of(replay_html(replace(trace, stored=stored)))["runs"]
-    assert run["pool"][run["names"]["F"]][:3] == ["NaN", "Infinity", "-Infinity"]
-    assert [run["pool"][side][5] for side in run["sides"][0][0][1][::2]] == ["NaN", "NaN"]
-    assert run["truth"][0][0][1][5] == "0"  # a comparison with no number does not hold
+    values = run["contacts"][0]["values"]
+    assert same(column(run, values["F"]["all"])[:3], np.array([np.nan, np.inf, -np.inf]))
+    assert np.isnan(column(run, values["v"]["all"])[5])
 
 
 @pytest.mark.slow
@@ -221,7 +239,7 @@ def test_a_failed_run_has_a_page() -> None:
     with pytest.raises(SimulationError) as stopped:
         simulate(stick_slip("signed"), Prescribed("0.1*sqrt(2 - t)"), 5.0)
     (run,) = data_of(replay_html(stopped.value.trace))["runs"]
-    assert len(run["microstep"]) >= len(stopped.value.trace)
+    assert run["rows"] >= len(stopped.value.trace)
 
 
 def test_without_uplot_the_message_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -266,19 +284,21 @@ def test_a_chart_without_edges_and_a_model_of_many_elements_have_pages() -> None
     rig = Prescribed(FIG4_SINE)
     lugre = LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=0.4, stribeck=Stribeck(1, 1.5, 0.05))
     (run,) = data_of(replay_html(simulate(lugre, rig, 10.0)))["runs"]
-    assert run["edges"] == run["log"] == run["inner"]["bounds"] == []
+    (contact,) = run["contacts"]
+    assert contact["edges"] == []
+    assert len(log(contact)[0]) == 0
     chart = GMS_ELEMENT["signed"]
     values = {"k": 1.0, "sigma": 0.0, "C": 0.02, "v_c": 1e-6}
     bank = ChartModel(chart, values, n=9, stribeck=Stribeck(1, 1.5, 0.05))
     page = replay_html(simulate(bank, rig, 10.0))
     assert page.count('class="node state"') == 2  # one chart, which shows the chosen element
-    assert len(data_of(page)["runs"][0]["mode"]) == 9
+    assert data_of(page)["runs"][0]["contacts"][0]["n"] == 9
 
 
 @pytest.mark.slow
 @uplot
 def test_without_graphviz_the_page_has_a_note(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_replay_chart, "drawn", lambda graph, form: None)
+    monkeypatch.setattr(_chart, "drawn", lambda graph, form: None)
     assert "No chart: Graphviz" in replay_html(fig4("signed"))
 
 

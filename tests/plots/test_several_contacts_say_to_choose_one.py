@@ -8,7 +8,7 @@ from functools import partial
 import pytest
 
 from gms_fsm.errors import ParameterError
-from plots import LiveChart, animate, live_statechart, replay, statechart
+from plots import LiveChart, animate, live_statechart, statechart
 from tests.plots.systems_to_draw import BLOCKS, STICTION, run
 
 pytest.importorskip("matplotlib", reason="figures need the extra 'plots'")
@@ -22,11 +22,12 @@ ON_AXES = sorted(
     - {"difference", "residual", "slip_bar"}
     - {"lag_between_ticks", "lag_over_period", "lag_over_time"}
     - {"cascade_window", "has_threshold", "shown"}
+    - {"landscape", "pins", "race"}  # of one element
+    - {"Unfolded", "arrows", "unfolded", "unfolded_force", "unfolded_states"}
 )
 DRAWN: dict[str, Callable[..., object]] = {
     "LiveChart": LiveChart,
     "live_statechart": partial(live_statechart, row=0),
-    "replay": replay,
     "animate": partial(animate, path="run.gif"),
     "statechart": lambda trace: statechart(STICTION, counts=trace),
     "schematic": partial(schematic.schematic, AX),
@@ -34,6 +35,12 @@ DRAWN: dict[str, Callable[..., object]] = {
     "shown": panels.shown,
     **{name: partial(getattr(panels, name), AX) for name in ON_AXES},
     **{name: getattr(figures, name) for name in ("overview", "ribbons_figure", "cascade_figure")},
+    "landscape": partial(figures.landscape, element=0),
+    "landscape, panel": partial(panels.landscape, AX, element=0),
+    "race": partial(panels.race, AX, element=0),
+    "pins": partial(panels.pins, AX, element=0, checks=None),
+    "unfold": partial(figures.unfold, t0=0.0, t1=1.0),
+    "phase": figures.phase,
 }
 
 

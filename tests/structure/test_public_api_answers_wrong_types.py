@@ -82,6 +82,12 @@ def _trace() -> Trace:
     return simulate(MODEL, RIG, 1.0)
 
 
+@functools.cache
+def _switching() -> Trace:
+    model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    return simulate(model, Prescribed("0.2"), 3.0)
+
+
 def _entries(tmp: Path) -> Iterator[Entry]:
     """Yield every public entry with known valid arguments."""
     run = {"model": MODEL, "rig": RIG, "t_end": 1.0, "t_start": 0.0, "initial": None}
@@ -136,12 +142,16 @@ def _entries(tmp: Path) -> Iterator[Entry]:
         "animate": {"trace": _trace(), "path": tmp / "a.gif"},
         "block_diagram": {"elements": 1},
         "live_statechart": {"trace": _trace(), "row": 0} | view,
+        "landscape": {"trace": _trace(), "element": 0, "row": -1, "t": None, "window": None}
+        | {"checks": None, "title": ""},
         "mermaid": {"chart": CHART},
         "overview": {"trace": _trace(), "title": ""},
+        "phase": {"trace": _trace(), "row": None, "window": None, "elements": None, "title": ""},
         "render": {"graph": plots.block_diagram(1), "path": tmp / "a.dot"},
         "replay": {"trace": _trace(), "other": None, "title": "", "names": ()},
         "statechart": {"chart": CHART, "elements": 1, "notation": "stateflow", "direction": "TB"}
         | {"theme": "light", "counts": None, "marked": (), "names": False, "note": ""},
+        "unfold": {"trace": _switching(), "t0": 1.0, "t1": 3.0, "elements": None, "title": ""},
         "write_replay": {"path": tmp / "a.html", "trace": _trace(), "other": None, "title": ""}
         | {"names": ()},
     }

@@ -7,8 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm.language import MATLAB_LIKE, Condition, clauses, names_in, spell
-from gms_fsm.language._vectors import truths
+from gms_fsm.language import MATLAB_LIKE, Condition, clauses, names_in, spell, truths
 from gms_fsm.traces.scope import guard_columns
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.verdicts import ClauseSeen, CoverageVerdict

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ExpressionError, SignalError
-from gms_fsm.language import Condition, names_in, parse_condition, states_in
-from gms_fsm.language._vectors import truths
+from gms_fsm.language import Condition, names_in, parse_condition, states_in, truths
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import System
 from gms_fsm.traces._between import first_true, interpolated

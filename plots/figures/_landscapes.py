@@ -1,0 +1,175 @@
+"""The figure of one element's guards: landscape, race to fire, what is held, counterexamples."""
+
+from __future__ import annotations
+
+from textwrap import wrap
+
+from gms_fsm.errors import ParameterError
+from gms_fsm.inspection._findings import Report
+from gms_fsm.traces.trace import Trace, check_trace
+from plots import panels
+from plots._matplotlib import Figure, Line2D, rc_context
+from plots._plane import Plane
+from plots._window import Window
+from plots.figures._parts import head
+from plots.panels._landscapes import DASHED, acceleration, pinned, quantity
+from plots.panels._race import rows_of
+from plots.panels._shown import checked_row, one_element
+from plots.style import INK, LINE_GREY, RC
+
+__all__ = ["landscape"]
+
+WIDTH, PLOT, TOP, LINE = (
+    11.6,
+    5.2,
+    0.95,
+    0.165,
+)  # inches: figure, panels, above them, a line of text
+LANE = 0.56  # inches: a row of the race, if there is room
+LETTERS = 165  # of the caption, per line
+
+
+def landscape(
+    trace: Trace,
+    element: int,
+    *,
+    row: int = -1,
+    t: float | None = None,
+    window: Window | None = None,
+    checks: Report | None = None,
+    title: str = "",
+) -> Figure:
+    """Draw when an element would switch: its guards in the plane of v and z, and how far they are.
+
+    Left, the guards of the edges that leave the active state as regions, each clause as a line,
+    with the flow of the state and the path of the run. Right, the race to fire: the margin of each
+    clause. A chart without variables is drawn over v and the first other quantity that its guards
+    read.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run; of a system with several contacts, ``trace.contact(name)``.
+    element : int
+        Which element, counted from 0.
+    row : int
+        Row of the run; negative rows count from the end. On a row made by a firing of this element
+        the row before is shown, with the values that the guards saw.
+    t : float, optional
+        Instead of a row: the last row at or before this time, s.
+    window : (float, float), optional
+        Time interval in which the path is drawn, s; by default from the transition of this element
+        before the row to the one after it.
+    checks : Report, optional
+        From `gms_fsm.prove`, of the chart of the run: its counterexamples are drawn as pins.
+    title : str
+        Of the figure; the model and its law are added.
+
+    Returns
+    -------
+    Figure
+        The caption says what is held as at the row.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such element, row or time, the report is that of another chart, or the chart
+        has nothing to draw over v.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    >>> from plots.figures import landscape
+    >>> run = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.2"), 3.0)
+    >>> figure = landscape(run, 0, t=1.5)
+    >>> [ax.get_title(loc="left") for ax in figure.axes]
+    ['a) guards that leave stick', 'b) race to fire']
+    """
+    check_trace(trace)
+    element = one_element(trace, element)
+    if t is not None and row != -1:
+        raise ParameterError(f"row is {row} and t is {t}", advice="give one of them")
+    row = checked_row(trace, row, t)
+    plane = Plane.of(trace, row, element)
+    lines = _caption(trace, plane)
+    if checks is not None:
+        lines += _pins_listed(plane, checks)
+    lines = [part for line in lines for part in wrap(line, LETTERS, subsequent_indent="      ")]
+    below = 0.82 + LINE * len(lines)
+    height = TOP + PLOT + below
+    with rc_context(RC):
+        figure = Figure(figsize=(WIDTH, height))
+        bottom, tall = below / height, PLOT / height
+        left = figure.add_axes((0.72 / WIDTH, bottom, 6.7 / WIDTH, tall))
+        lanes = min(tall, LANE * rows_of(plane.why) / height)
+        right = figure.add_axes((7.85 / WIDTH, bottom + tall - lanes, 3.6 / WIDTH, lanes))
+        panels.landscape(left, trace, element, row=row, window=window)
+        if checks is not None:
+            panels.pins(left, trace, element, checks, row=row)
+        panels.race(right, trace, element, row=row)
+        shown = "guards that leave" if plane.edges else "flow of"
+        left.set_title(f"a) {shown} {plane.state}")
+        right.set_title("b) race to fire")
+        looks = [("path before", INK, "-"), ("after", INK, DASHED)]
+        handles = [Line2D([], [], color=c, linestyle=dash, label=n) for n, c, dash in looks]
+        if plane.threshold is not None:
+            handles.append(Line2D([], [], color=LINE_GREY, linewidth=5, alpha=0.45, label="±s(v)"))
+        left.legend(handles=handles, loc="lower right", bbox_to_anchor=(1, 1), ncols=3)
+        figure.suptitle(
+            _title(trace, plane, title), x=0.02, y=1 - 0.12 / height, ha="left", va="top"
+        )
+        for number, line in enumerate(lines):
+            place = (LINE * (len(lines) - number) + 0.06) / height
+            figure.text(0.02, place, line, fontsize=8, va="top", color=INK)
+    return figure
+
+
+def _title(trace: Trace, plane: Plane, title: str) -> str:
+    who = f"{plane.why.contact} E{plane.why.element + 1}".lstrip()
+    place = f"t = {trace.t[plane.row]:.9g} s, row {plane.row}"
+    return f"{head(trace, title)}\n{who} in {plane.state} at {place}"
+
+
+def _caption(trace: Trace, plane: Plane) -> list[str]:
+    """Return what is held, what the arrows are, and which row is shown, as lines."""
+    chart, lines = plane.chart, []
+    if plane.why.left:
+        edge = next(each.edge.name for each in plane.why if each.fired)
+        lines.append(
+            f"Row {plane.row + 1} was made by {edge}; shown is row {plane.row} before it, with the "
+            "values that the guards saw."
+        )
+    held = ", ".join(
+        f"{name} = {quantity(chart, name, value)}" for name, value in plane.held.items()
+    )
+    again = [f"{name}({plane.names[0]})" if name == "s" else name for name in plane.again]
+    lines.append(
+        f"Held as at the row: {held or 'nothing'}."
+        + (f" Computed at every point: {', '.join(again)}." if again else "")
+    )
+    dv = acceleration(trace, plane.row)
+    second = plane.names[1]
+    if (plane.state, second) not in chart.flows:
+        lines.append(f"No arrows: {second} is no variable of the chart.")
+    elif dv is None:
+        lines.append("No arrows: the arc of this row has no second time.")
+    else:
+        lines.append(
+            f"Arrows: direction of the flow; d{second}/dt is that of {plane.state}, "
+            f"d{plane.names[0]}/dt = {quantity(chart, 'a', dv)} as at this row everywhere."
+        )
+    return lines
+
+
+def _pins_listed(plane: Plane, checks: Report) -> list[str]:
+    """Return the findings with pins as numbered lines."""
+    found = pinned(plane, checks)
+    if not found:
+        return [f"No finding of the checks has a point with {' and '.join(plane.names)}."]
+    lines = [
+        "Pins: counterexamples, with numbers of their own; on the frame if they lie outside it."
+    ]
+    for number, each in enumerate(found, start=1):
+        where = ", ".join(each.where)
+        lines.append(f"{number}  {each.check} {each.status}, {where}: {each.text} ({each.example})")
+    return lines

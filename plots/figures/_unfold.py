@@ -1,0 +1,112 @@
+"""The figure of micro-steps: a cascade unfolded into columns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gms_fsm.traces.trace import Trace
+from plots import panels
+from plots._matplotlib import Figure, Rectangle, rc_context
+from plots.figures._parts import head
+from plots.panels._shown import scaled
+from plots.panels._unfolded import FEW, column_width, edge_texts
+from plots.style import HATCHES, RC, STATE_EDGES, STATE_FILLS
+
+__all__ = ["unfold"]
+
+COLUMN, NARROWEST, WIDEST, SIDES = 1.15, 6.4, 11.6, 1.0  # inches: a column, the figure, margins
+FORCE, ROW, FLATTEST = 2.3, 0.34, 0.22  # inches: the upper panel, a row of the lower one
+TOP, BELOW = 0.95, 1.25  # inches: above and below the panels
+
+
+def unfold(
+    trace: Trace,
+    t0: float,
+    t1: float,
+    *,
+    elements: Sequence[int] | None = None,
+    title: str = "",
+) -> Figure:
+    """Draw the micro-steps in a time interval in equal columns, however short they are.
+
+    Every instant with transitions takes one column before the first firing and one after each.
+    Above, F as stairs with the values before and after each firing; below, the state of every
+    element, with a frame around the one that fired and the name of the edge.
+
+    Parameters
+    ----------
+    trace : Trace
+        The run; of a system with several contacts, ``trace.contact(name)``.
+    t0, t1 : float
+        The interval, s; both ends belong to it.
+    elements : sequence of int, optional
+        Which elements, counted from 0; by default all.
+    title : str
+        Of the figure; the model and its law are added.
+
+    Returns
+    -------
+    Figure
+        Between instants, time is cut out; its length is written below.
+
+    Raises
+    ------
+    ParameterError
+        If nothing fires in the interval, or there are more than 24 columns; the message says which
+        interval to choose.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    >>> from plots.figures import unfold
+    >>> run = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.2"), 3.0)
+    >>> force, states = unfold(run, 1.9, 2.1).axes  # four break-aways at t = 2 s
+    >>> [label.get_text() for label in states.get_xticklabels()]
+    ['0', '1', '2', '3', '4']
+    """
+    part = panels.unfolded(trace, t0, t1, elements=elements)
+    count = len(part.elements)
+    wide = min(max(NARROWEST, SIDES + COLUMN * part.width), WIDEST)
+    _, _, head_room = edge_texts(part, column_width(wide - SIDES, part))
+    tall = count * (ROW if count <= FEW else FLATTEST)
+    between = 0.45 + head_room
+    height = TOP + FORCE + between + tall + BELOW
+    names = [state.name for state in trace.model.chart.states]
+    with rc_context(RC):
+        figure = Figure(figsize=(wide, height))
+        left, broad = (SIDES - 0.15) / wide, 1 - SIDES / wide
+        force = figure.add_axes((left, 1 - (TOP + FORCE) / height, broad, FORCE / height))
+        states = figure.add_axes((left, BELOW / height, broad, tall / height))
+        panels.unfolded_force(force, part)
+        panels.unfolded_states(states, part)
+        force.set_title("a) F before and after each firing")
+        place = left, (BELOW + tall + head_room + 0.14) / height
+        figure.text(*place, "b) who fires, and by which edge", fontsize=9.5)
+        shown = sorted({mode for each in part.columns for mode in each.modes})
+        handles = [_swatch(mode, names[mode]) for mode in shown]
+        figure.legend(handles=handles, loc="lower left", ncols=6)
+        title = f"{head(trace, title)}\n{_said(part)}"
+        figure.suptitle(title, x=0.2 / wide, y=1 - 0.12 / height, ha="left", va="top")
+    return figure
+
+
+def _swatch(mode: int, name: str) -> Rectangle:
+    look: Any = {
+        "facecolor": STATE_FILLS[mode % len(STATE_FILLS)],
+        "edgecolor": STATE_EDGES[mode % len(STATE_EDGES)],
+        "hatch": HATCHES[mode % len(HATCHES)],
+    }
+    return Rectangle((0, 0), 1, 1, label=name, linewidth=0.6, **look)
+
+
+def _said(part: panels.Unfolded) -> str:
+    """Return how many transitions there are, and in what time."""
+    count, took = part.log.size, float(part.times[-1] - part.times[0])
+    number = "one transition" if count == 1 else f"{count} transitions"
+    if took == 0.0:
+        return f"{number} at t = {part.times[0]:.9g} s"
+    factor, unit = scaled(np.array([took]), "s")
+    return f"{number} in {factor * took:.4g} {unit}"

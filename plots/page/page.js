@@ -1,0 +1,259 @@
+"use strict";
+// The page: rows of one run or both on a common time, playing, breakpoints, keys. A frame is a row of either run.
+const runs = data.runs.map((stored, place) => new RunData(stored, place));
+const frames = new Frames(runs), last = frames.t.length - 1;
+const whole = { min: frames.t[0], max: frames.t[last] }, span = { ...whole };
+const TIME_POWER = powerOf(Math.max(Math.abs(whole.min), Math.abs(whole.max)), "s");
+const events = [...new Set(runs.flatMap((run, k) => run.log.map(({ row }) => frames.of[k][row])))].sort((a, b) => a - b);
+const breakpoints = new Map();
+let frame = 0, following = true, zooming = false;
+const views = [];
+const keyOf = (view, contact, element, edge) => `${view.place}/${contact.name}/${element}/${edge}`;
+
+function show(k, words = "") {
+  frame = clamp(k, 0, last);
+  const t = frames.t[frame], half = (span.max - span.min) / 2;
+  if (t < span.min || t > span.max) zoomTo(t - half, t + half); // a zoomed window follows
+  for (const view of views) view.show(frames.rows[view.place][frame]);
+  const place = `t = ${written(t, 9)} s`;
+  $("#now").textContent = place;
+  const scrubber = $("#scrubber");
+  scrubber.value = inTime ? t : frame;
+  const verdicts = views.map((view) => (views.length > 1 ? `run ${view.place + 1}: ` : "") + view.verdict());
+  if (!play.on) scrubber.setAttribute("aria-valuetext", `${place}, ${runs[0].rowName(frames.rows[0][frame])}`);
+  $("#say").textContent = words && views.length > 1 ? words : [words, ...verdicts].filter(Boolean).join("; ");
+  $("#say").classList.toggle("fired", views.some((view) => view.happened().length));
+}
+
+function pointAt(k) {
+  if (pointed === k) return;
+  pointed = k;
+  for (const view of views) for (const pane of Object.values(view.open)) pane.point?.();
+}
+
+function eachPlots(act) {
+  for (const view of views) for (const pane of Object.values(view.open)) if (pane instanceof TimePlots) act(pane);
+}
+
+function chooseElement(element) {
+  for (const view of views) view.choose(view.contact, element);
+  show(frame);
+}
+
+function openPane(side, key) {
+  for (const view of views) view.openPane(side, key);
+}
+
+function nextPane(side) {
+  const tabs = $$(`.${side} [role=tab]`, views[0].root), at = tabs.findIndex((tab) => tab.getAttribute("aria-selected") === "true");
+  openPane(side, tabs[(at + 1) % tabs.length].dataset.key);
+}
+
+// ------------------------------------------------------------------ breakpoints and until
+function toggleBreak(view, element, edge) {
+  const { contact } = view, key = keyOf(view, contact, element, edge), had = breakpoints.delete(key);
+  const text = `${nameOf(contact, element)}, ${contact.edges[edge].name}`;
+  if (!had) {
+    const of = frames.of[view.place];
+    breakpoints.set(key, { text, frames: new Set([...contact.stops(element, edge)].map((row) => of[row])) });
+  }
+  view.explained = "";
+  show(frame, `breakpoint ${had ? "removed" : "set"}: ${text}`);
+}
+
+function stopsAt(k) {
+  const point = [...breakpoints.values()].find((each) => each.frames.has(k));
+  return point ? `stopped at a breakpoint: ${point.text}` : "";
+}
+
+function readUntil() {
+  const box = $("#until"), errors = [];
+  const conditions = box.value.trim() === "" ? [] : runs.map((run) => {
+    try { return condition(box.value, run); } catch (error) { errors.push(error.message); return () => false; }
+  });
+  const wrong = runs.length === errors.length; // two runs may have different names
+  box.setAttribute("aria-invalid", wrong);
+  if (wrong) $("#say").textContent = errors[0];
+  return wrong ? null : (k) => conditions.some((f, i) => f(frames.rows[i][k]));
+}
+
+function proceed() {
+  pause();
+  const holds = readUntil(), text = $("#until").value.trim();
+  if (!holds) return;
+  let before = holds(frame);
+  for (let k = frame + 1; k <= last; k++) {
+    const now = holds(k), stop = stopsAt(k) || (now && !before && `stopped: ${text} became true at this row of the page`);
+    before = now;
+    if (stop) { show(k, stop); return; }
+  }
+  show(last, breakpoints.size || text ? "end of the run: nothing stopped it" : "end of the run: no breakpoint or condition is set");
+}
+
+// ------------------------------------------------------------------ zoom
+function zoomTo(min, max, origin = null) {
+  if (zooming || !(max - min > 1e-12 * Math.max(Math.abs(min), Math.abs(max)))) return;
+  zooming = true; // the other plots also report their new scales
+  Object.assign(span, { min, max });
+  eachPlots((pane) => pane.zoom(origin));
+  zooming = false;
+}
+
+function zoom(factor) {
+  const t = frames.t[frame], half = (factor * (span.max - span.min)) / 2;
+  zoomTo(Math.max(t - half, whole.min), Math.min(t + half, whole.max));
+}
+
+// ------------------------------------------------------------------ playing
+// The clock of the run moves on by the time since the last picture. At a transition it stays for a moment at every
+// micro-step, so that each can be seen; in a run with many transitions for a shorter one, or not at all where that
+// would be less than a picture.
+const HOLD = 400, PICTURE = 1000 / 60; // ms
+const play = { on: false, t: 0, held: 0, at: 0 };
+
+function setPlaying(on) {
+  play.on = on;
+  const button = $("#play");
+  button.setAttribute("aria-pressed", on);
+  button.setAttribute("aria-label", on ? "Pause" : "Play");
+  button.textContent = on ? "❚❚ pause" : "▶ play";
+  $("#say").setAttribute("aria-live", on ? "off" : "polite"); // a screen reader would not keep up
+  if (!on) return;
+  Object.assign(play, { t: frames.t[frame], held: 0, at: performance.now() });
+  requestAnimationFrame(tick);
+}
+const pause = () => { if (play.on) { setPlaying(false); show(frame); } };
+
+function tick(now) {
+  if (!play.on) return;
+  const passed = clamp(now - play.at, 0, 100), speed = $("#speed").value;
+  play.at = now;
+  play.held -= passed;
+  if (play.held <= 0) move(passed, speed);
+  if (play.on) requestAnimationFrame(tick);
+}
+
+function move(passed, speed) {
+  const slowly = speed === "rows", duration = Number(speed) * 1000, hold = slowly ? 500 : Math.min(HOLD, duration / events.length);
+  const target = slowly ? Infinity : play.t + (passed * (whole.max - whole.min)) / duration;
+  const stays = (row) => slowly || (hold >= PICTURE && eventFrames.has(row));
+  let k = frame;
+  while (k < last && (slowly || frames.t[k + 1] <= target)) { // to the last row before the clock
+    k += 1;
+    if (stays(k)) play.held = hold;
+    if (stays(k) || stopsAt(k)) break;
+  }
+  play.t = slowly || play.held > 0 ? frames.t[k] : Math.min(target, frames.t[last]);
+  const stop = k !== frame && stopsAt(k), ended = k === last && !(play.held > 0);
+  if (stop || ended) setPlaying(false);
+  if (k !== frame || stop || ended) show(k, stop || (ended ? "end of the run" : ""));
+  else eachPlots((pane) => pane.placeCursor(play.t));
+}
+const eventFrames = new Set(events);
+
+function playOrPause() {
+  if (!play.on && frame === last) show(0);
+  setPlaying(!play.on);
+  if (!play.on) show(frame, "paused");
+}
+
+// ------------------------------------------------------------------ keys and buttons
+const go = (k) => { if (play.on) setPlaying(false); show(k); };
+const setFollowing = () => {
+  following = !following;
+  $("#follow").setAttribute("aria-pressed", following);
+  show(frame, following ? "the element that fires is selected" : "the selected element stays selected");
+};
+const actions = {
+  start: () => go(0), end: () => go(last), back: () => go(frame - 1), step: () => go(frame + 1),
+  "back-transition": () => go(events.findLast((k) => k < frame) ?? 0),
+  transition: () => go(events.find((k) => k > frame) ?? last),
+  play: playOrPause, continue: proceed, follow: setFollowing,
+  "zoom-in": () => zoom(0.5), "zoom-out": () => zoom(2), "zoom-all": () => zoomTo(whole.min, whole.max),
+  "next-element": () => chooseElement((views[0].element + 1) % views[0].contact.n),
+  "last-element": () => chooseElement((views[0].element + views[0].contact.n - 1) % views[0].contact.n),
+  right: () => nextPane("right"), left: () => nextPane("left"),
+  help: () => $("#keys").showModal(),
+  difference: firstDifference,
+  more: () => {
+    const on = document.body.classList.toggle("more");
+    $("#more").setAttribute("aria-expanded", on);
+  },
+};
+const KEYS = {
+  ArrowLeft: "back", ArrowRight: "step", "Shift ArrowLeft": "back-transition", "Shift ArrowRight": "transition",
+  " ": "play", c: "continue", f: "follow", Home: "start", End: "end", "+": "zoom-in", "=": "zoom-in", "-": "zoom-out", 0: "zoom-all",
+  "]": "next-element", "[": "last-element", v: "right", V: "left", "?": "help", d: "difference",
+};
+document.addEventListener("keydown", (event) => {
+  if (event.altKey || event.ctrlKey || event.metaKey || event.defaultPrevented || $("#keys").open) return;
+  if (event.target.closest("select, input[type=text]")) return;
+  if (event.key === " " && event.target.closest("button, summary, [role=button]")) return;
+  const action = KEYS[(event.shiftKey && event.key.startsWith("Arrow") ? "Shift " : "") + event.key];
+  if (/^[1-9]$/.test(event.key)) chooseElement(Number(event.key) - 1);
+  else if (action) actions[action]();
+  else return;
+  event.preventDefault();
+});
+for (const button of $$("#controls button")) button.addEventListener("click", actions[button.id]);
+
+// ------------------------------------------------------------------ the scrubber, in time or in rows
+let inTime = true;
+function setScale(scale) {
+  inTime = scale === "t";
+  const scrubber = $("#scrubber"), { min, max } = inTime ? whole : { min: 0, max: last };
+  Object.assign(scrubber, { min, max, step: inTime ? "any" : 1 });
+  const at = (k) => ((inTime ? frames.t[k] - min : k) / Math.max(max - min, Number.MIN_VALUE)) * 1000;
+  $("#ticks").setAttribute("viewBox", "0 0 1000 1");
+  const marks = [...new Set(events.map((k) => at(k).toFixed(1)))]; // as many as can be told apart
+  $("#ticks path").setAttribute("d", marks.map((x) => `M${x} 0V1`).join(""));
+  $("#ticks .pinned").setAttribute("d", pinned === null ? "" : `M${at(pinned)} 0V1`);
+  scrubber.value = inTime ? frames.t[frame] : frame;
+}
+$("#scrubber").addEventListener("input", ({ target }) => go(inTime ? Math.max(lastAt(frames.t, Number(target.value)), 0) : Number(target.value)));
+$("#scrubber").addEventListener("keydown", (event) => { // in time, too, an arrow is a row
+  const way = { ArrowUp: 1, ArrowDown: -1 }[event.key];
+  if (!way) return;
+  event.preventDefault();
+  go(frame + way);
+});
+$("#scale").addEventListener("change", ({ target }) => setScale(target.value));
+$("#until").addEventListener("keydown", (event) => {
+  if (event.key === "Enter") proceed();
+  if (event.key === "Escape") event.target.blur();
+});
+
+// ------------------------------------------------------------------ two runs: where they first differ
+// The first transition that only one run makes, or that the runs make in another order, stays pinned in the plots.
+function difference() {
+  const [a, b] = runs.map(({ log }) => log), text = (entry) => entry && entry.contact.sentence(entry);
+  let k = 0;
+  while (k < Math.min(a.length, b.length) && text(a[k]) === text(b[k])) k += 1;
+  if (k === Math.max(a.length, b.length)) return { frame: null, told: "both runs make the same transitions in the same order" };
+  const told = [a[k], b[k]].map((entry, i) => `run ${i + 1}: ${entry ? `${text(entry)} at ${written(entry.t, 7)} s` : "no further transition"}`);
+  const at = [a[k], b[k]].flatMap((entry, i) => (entry ? [frames.of[i][entry.row]] : []));
+  return { frame: Math.min(...at), told: `first difference, transition ${k + 1}: ${told.join("; ")}` };
+}
+const first = runs.length > 1 ? difference() : { frame: null, told: "there is one run only" };
+pinned = first.frame;
+
+function firstDifference() {
+  if (first.frame !== null) go(first.frame);
+  show(frame, first.told);
+}
+
+// ------------------------------------------------------------------ start
+document.title = $("#title").textContent = data.title;
+$("#runs").className = runs.length > 1 ? "two" : "one";
+$("#names").textContent = `${Object.keys(runs[0].names).join(", ")}, state(1) == ${runs[0].contacts[0].states.at(-1)}`;
+$("#facts").textContent = runs.map((run) => `${run.title}: ${run.of} rows, ${run.rows} on this page; ${run.log.length} transitions.`).join(" ");
+if (matchMedia("(prefers-reduced-motion: reduce)").matches) $("#speed").value = "rows";
+for (const run of runs) views.push(new RunView(run));
+for (const view of views) { view.choose(view.contact, 0); view.addTabs(); }
+$("#difference").hidden = runs.length < 2;
+setScale("t");
+openPane("left", "chart");
+openPane("right", "time");
+new ResizeObserver(() => { for (const view of views) view.fit(); }).observe($("#runs"));
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => eachPlots((pane) => pane.recolour()));
+show(0);

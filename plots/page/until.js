@@ -1,0 +1,95 @@
+"use strict";
+// The `until` box: a condition on stored values, in the expression language of gms-fsm. It is the only text that
+// Python has not seen. It becomes a tree like those that Python stores, so both are evaluated by the same function.
+// Precedence, functions and constants come from Python; nothing is ever passed to `eval`.
+function parse(text, { levels, negation, sign, functions, constants }, names, owners) {
+  const pattern = /\s*(?:(?<digits>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?!\w)|(?<name>[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)|\*\*|[<>=!]=|[-+*/()<>,])/y;
+  const fail = (at, reason) => { throw new SyntaxError(`until, column ${at + 1}: ${reason}`); };
+  const end = text.trimEnd().length, tokens = [];
+  while (pattern.lastIndex < end) {
+    const begin = pattern.lastIndex + text.slice(pattern.lastIndex).search(/\S/), found = pattern.exec(text);
+    if (!found) fail(begin, `cannot read ${JSON.stringify(text[begin])}`);
+    const word = found[0].trim();
+    tokens.push({ word, ...found.groups, at: pattern.lastIndex - word.length });
+  }
+  let next = 0;
+  const here = () => tokens[next] ?? { word: "", at: end };
+  const take = (words, wanted) => (words.includes(here().word) ? tokens[next++].word : wanted && fail(here().at, `expected ${wanted}`));
+  // A part is a truth value or a number; brackets may contain either, so it is checked where it is used.
+  const as = (truth, part) => (Boolean(part.truth) === truth ? part.tree
+    : fail(part.at, truth ? "a comparison is needed, for example v > 0" : "a number is needed"));
+
+  function expression(level) {
+    let left = prefix();
+    for (;;) {
+      const { word, at } = here(), own = levels[word];
+      if (word === "==" || word === "!=") fail(at, "only < <= > >= compare numbers; == is for state(1) == name");
+      if (!(own >= level)) return left;
+      next += 1;
+      const right = expression(word === "**" ? sign : own + 1), logic = own < negation, compares = own === levels["<"];
+      const chain = compares && left.last; // a < b < c is a < b and b < c
+      const b = as(logic, right), now = [word, chain ? left.last : as(logic, left), b];
+      left = { at: left.at, truth: logic || compares, tree: chain ? ["and", left.tree, now] : now, last: compares && b };
+    }
+  }
+
+  function prefix() {
+    const { word, digits, name, at } = here();
+    next += 1;
+    if (digits) return { at, tree: Number(digits) };
+    if (word === "-" || word === "+") {
+      const tree = as(false, expression(sign));
+      return { at, tree: word === "-" ? ["-", tree] : tree };
+    }
+    if (word === "not") return { at, truth: true, tree: ["not", as(true, expression(negation))] };
+    if (word === "(") {
+      const { truth, tree } = expression(1);
+      take([")"], "a closing bracket");
+      return { at, truth, tree };
+    }
+    if (Object.hasOwn(owners, word)) return inState(at, owners[word]);
+    if (Object.hasOwn(constants, word)) return { at, tree: constants[word] };
+    if (Object.hasOwn(functions, word)) return call(word, at);
+    if (name && Object.hasOwn(names, name)) return { at, tree: name };
+    return fail(at, word ? `unknown ${JSON.stringify(word)}; names are ${Object.keys(names).join(", ")}` : "the text ends too early");
+  }
+
+  function call(name, at) {
+    const parts = [];
+    take(["("], `${name}(...)`);
+    do parts.push(as(false, expression(1))); while (take([","]));
+    take([")"], "a closing bracket");
+    if ((functions[name] === "one") !== (parts.length === 1)) fail(at, `${name} got ${parts.length} arguments`);
+    return { at, tree: [name, ...parts] };
+  }
+
+  function inState(at, { place, n, states }) {
+    take(["("], "state(1) == name");
+    const numbers = Array.from({ length: n }, (_, i) => String(i + 1));
+    const element = take(numbers, `an element, 1 to ${n}`) - 1;
+    take([")"], "a closing bracket");
+    const equal = take(["==", "!="], "== or !=") === "==", state = take(states, `a state: ${states.join(", ")}`);
+    const tree = ["state", `${place}/${element}`, state];
+    return { at, truth: true, tree: equal ? tree : ["not", tree] };
+  }
+
+  const tree = as(true, expression(1));
+  return next < tokens.length ? fail(here().at, `cannot be read from ${JSON.stringify(here().word)}`) : tree;
+}
+
+// A condition typed by the user, as a function of the row of a run; throws a SyntaxError with a message.
+function condition(text, run) {
+  const owners = {};
+  run.contacts.forEach(({ name, n, states }, place) => {
+    owners[name ? `${name}.state` : "state"] = { place, n, states };
+    if (run.contacts.length === 1) owners.state = { place, n, states };
+  });
+  const f = compiled(parse(text, data.language, run.names, owners));
+  const scope = (row) => (name) => {
+    const state = /^state\((\d+)\/(\d+)\)$/.exec(name);
+    if (!state) return run.names[name](row);
+    const contact = run.contacts[state[1]];
+    return contact.states[contact.modes[state[2]][row]];
+  };
+  return (row) => truthOf(f, scope(row)) === 1;
+}

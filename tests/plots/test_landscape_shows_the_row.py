@@ -1,0 +1,254 @@
+"""A landscape draws regions, clauses, path and dot of the row, and the race its margins."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gms_fsm import Report, Trace, prove, simulate
+from gms_fsm.charts import CHARTS
+from gms_fsm.charts.broken import BROKEN
+from gms_fsm.errors import ParameterError
+from gms_fsm.inspection.explain import explain
+
+pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.contour import QuadContourSet
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.text import Annotation
+
+from plots import figures, panels
+from plots._plane import Plane, linear_threshold, plane_axes
+from plots.panels._line_names import LineNames, NamedLine
+from plots.panels._race import held_back_by
+from tests.helpers import FASTEST, one_element, pulled_mass, stick_slip, wear
+from tests.helpers import open_loop as sine
+from tests.zoo.zoo_cases import elasto_plastic, karnopp, modelica
+
+MM = 1e3
+
+
+@pytest.fixture(scope="module")
+def run() -> Trace:
+    return simulate(*pulled_mass(), 20.0, engine=FASTEST)
+
+
+def row_of(run: Trace, edge: str, element: int) -> int:
+    """Return the row made by the first firing of an edge by an element."""
+    log = run.transitions
+    record = log[(log.edge == edge) & (log.element == element)][0]
+    rows = np.flatnonzero((run.t == record.t) & (run.states[:, element] == record.target))
+    return int(rows[0])
+
+
+def regions(drawn: list[object]) -> dict[str, QuadContourSet]:
+    found = {a.get_label(): a for a in drawn if isinstance(a, QuadContourSet) and a.filled}
+    return {name: each for name, each in found.items() if not name.startswith("_")}
+
+
+def test_the_axes_are_the_velocity_and_the_first_quantity_that_guards_read() -> None:
+    names = ("gms-signed", "stiction", "backlash", "dog-clutch", "modelica", "planar-coulomb")
+    known = {name: CHARTS[name] for name in names if name in CHARTS}
+    found = {name: plane_axes(chart) for name, chart in known.items()}
+    expected = {
+        "stiction": ("v", "F"),
+        "backlash": ("v", "x"),
+        "dog-clutch": ("v", "t"),
+        "modelica": ("v", "N"),
+        "planar-coulomb": ("v", "h"),
+    }
+    assert found.items() >= expected.items()
+    assert plane_axes(stick_slip("signed").chart) == ("v", "z")
+    assert plane_axes(CHARTS["prandtl-tomlinson"]) is None
+
+
+@pytest.mark.parametrize(("v_c", "linear"), [(1e-6, 1e-7), (1e-3, 1e-4), (2e-6, 1e-7)])
+def test_the_axis_is_linear_a_decade_below_v_c(v_c: float, linear: float) -> None:
+    run = simulate(one_element("signed", v_c=v_c), sine(), 1.0)
+    for row in (0, -1):
+        plane = Plane.of(run, row, 0)
+        assert linear_threshold(plane, 0.2) == pytest.approx(linear)
+
+
+def test_without_a_turn_the_largest_speed_decides() -> None:
+    plane = Plane.of(elasto_plastic().run(), 10, 0)
+    assert linear_threshold(plane, 0.06) == pytest.approx(1e-5)
+
+
+def test_dot_and_ranges(run: Trace) -> None:
+    row = row_of(run, "break_away_forward", 2) - 40
+    ax = Figure().subplots()
+    drawn = panels.landscape(ax, run, 2, row=row)
+    (dot,) = (each for each in drawn if getattr(each, "get_marker", lambda: "")() == "o")
+    assert dot.get_xydata()[0] == pytest.approx([run.v[row], MM * run.z[row, 2]])  # type: ignore[attr-defined]
+    assert ax.get_ylabel() == "z [mm]"
+    low, high = ax.get_ylim()
+    assert low < -MM * run.s[:, 2].max() < MM * run.s[:, 2].max() < high
+    assert ax.get_xlim()[1] > np.abs(run.v).max()
+    path = next(each for each in drawn if getattr(each, "get_label", str)() == "before")
+    points = path.get_xydata()  # type: ignore[attr-defined]
+    assert points[~np.isnan(points[:, 0])][-1] == pytest.approx((run.v[row], MM * run.z[row, 2]))
+
+
+def test_regions_end_where_the_guard_turns(run: Trace) -> None:
+    """A little outside the clauses the region is left, a little inside it is not."""
+    row = row_of(run, "arrest", 0) - 3
+    ax = Figure().subplots()
+    found = regions(panels.landscape(ax, run, 0, row=row))
+    assert list(found) == ["arrest"]
+    s = MM * float(run.model.weights[0]) * 1.5
+    (path,) = found["arrest"].get_paths()
+    for v, z, inside in (
+        (0.0, 0.0, True),
+        (0.9e-6, 0.97 * s, True),
+        (-0.9e-6, -0.97 * s, True),
+        (1.2e-6, 0.0, False),
+        (0.0, 1.03 * s, False),
+    ):
+        assert path.contains_point((v, z)) == inside, (v, z)
+
+
+def test_a_row_made_by_a_firing_shows_the_row_before(run: Trace) -> None:
+    row = row_of(run, "break_away_forward", 1)
+    figure = figures.landscape(run, 1, row=row)
+    assert figure.axes[0].get_title(loc="left") == "a) guards that leave stick"
+    texts = [text.get_text() for text in figure.texts[1:]]
+    assert f"Row {row} was made by break_away_forward; shown is row {row - 1} before it" in texts[0]
+    lanes = [text.get_text() for text in figure.axes[1].texts]
+    assert "fired" in lanes
+    assert all(text[0] == "✓" for text in lanes if text.endswith(("z >= s", " v > v_c")))
+
+
+def test_a_time_is_the_last_row_at_or_before_it(run: Trace) -> None:
+    title = figures.landscape(run, 0, t=5.0).get_suptitle()
+    row = int(np.flatnonzero(run.t <= 5.0)[-1])
+    assert title.endswith(f"t = {run.t[row]:.9g} s, row {row}")
+
+
+@pytest.mark.parametrize("element", [0, 3])
+def test_bars_are_relative_margins(run: Trace, element: int) -> None:
+    row = row_of(run, "break_away_forward", element) - 30
+    drawn = panels.race(Figure().subplots(), run, element, row=row)
+    bars = [each for each in drawn if isinstance(each, Rectangle) and each.get_x() == 0.0]
+    told = [clause for each in explain(run, row, element) for clause in each.clauses]
+    assert len(bars) == len(told)
+    for bar, clause in zip(bars, told, strict=True):
+        size = max(abs(clause.left), abs(clause.right))
+        expected = float(np.clip(clause.margin / size, -1, 1))
+        assert bar.get_width() == pytest.approx(expected)
+        assert (bar.get_facecolor()[:3] != (1.0, 1.0, 1.0)) == clause.holds
+
+
+def test_what_holds_an_edge_back_is_bold(run: Trace) -> None:
+    row = row_of(run, "break_away_forward", 0) - 30
+    drawn = panels.race(Figure().subplots(), run, 0, row=row)
+    bold = [a.get_text() for a in drawn if getattr(a, "get_weight", str)() == "bold"]
+    assert "✗  z >= s" in bold
+    assert not [text for text in bold if text.startswith("✓")]
+
+
+def test_the_smallest_relative_margin_holds_back(run: Trace) -> None:
+    """In slip at speed, |v| <= v_c is far from true, and |z| < s false by little."""
+    rows = np.flatnonzero((run.states[:, 0] == "slip") & (run.v > 0))
+    row = next(k for k in rows.tolist() if not any(c.holds for c in explain(run, k, 0)[0].clauses))
+    told = explain(run, row, 0)[0]
+    for each in (told, replace(told, clauses=told.clauses[::-1])):
+        back = held_back_by(each)
+        assert back is not None
+        assert back.text == "|v| <= v_c"
+
+
+def test_compound_clauses_have_a_mark_only() -> None:
+    trace = simulate(wear(), sine(), 30.0)
+    row = int(np.flatnonzero(trace.states[:, 1] == "creep")[2])
+    drawn = panels.race(Figure().subplots(), trace, 1, row=row)
+    texts = [each.get_text() for each in drawn if hasattr(each, "get_text")]
+    compound = [text for text in texts if "||" in text or "!" in text]
+    assert len(compound) == 2
+    assert all(text[0] in "✓✗" for text in compound)
+    assert len([each for each in drawn if isinstance(each, Rectangle) and each.get_x() == 0]) == 1
+
+
+@pytest.mark.parametrize("row", [60, 170, 230, 290, -1])
+def test_names_of_clauses_do_not_overlap(run: Trace, row: int) -> None:
+    figure = figures.landscape(run, 0, row=row)
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    (names,) = (each for each in figure.axes[0].get_children() if isinstance(each, LineNames))
+    placed = names.placed(renderer)
+    boxes = [text.get_window_extent(renderer) for text in placed]
+    plane = Plane.of(run, row, 0)
+    assert len(boxes) >= 1 + len(plane.edges)
+    for i, box in enumerate(boxes):
+        assert not any(box.overlaps(other) for other in boxes[:i])
+        assert figure.axes[0].bbox.contains(*box.min)
+        assert figure.axes[0].bbox.contains(*box.max)
+
+
+def test_names_of_one_line_stand_side_by_side() -> None:
+    figure = Figure()
+    ax = figure.subplots()
+    names = LineNames(ax)
+    line = np.array([[0.0, 0.5], [1.0, 0.5]])
+    names.lines += [NamedLine(f"line {k}", "black", (line,)) for k in range(60)]
+    placed = names.placed(FigureCanvasAgg(figure).get_renderer())
+    boxes = [text.get_window_extent() for text in placed]
+    assert 4 <= len(placed) < 60  # the others have no place
+    assert not any(b.overlaps(a) for k, b in enumerate(boxes) for a in boxes[:k])
+
+
+def test_the_caption_says_what_is_held() -> None:
+    trace = modelica().run()
+    row = int(np.flatnonzero(trace.states[:, 0] == "stuck")[2])
+    said = figures.landscape(trace, 0, row=row).texts[1].get_text()
+    assert said == (
+        f"Held as at the row: F = {trace.F[row]:.4g} N. Computed at every point: load, F_0."
+    ).replace("-", "−")
+
+
+def test_arrows_follow_the_flow(run: Trace) -> None:
+    """While sticking dz/dt = v: arrows point up for v > 0, down for v < 0; all with dv/dt."""
+    row = row_of(run, "break_away_forward", 0) - 40
+    (flow,) = (
+        each
+        for each in panels.landscape(Figure().subplots(), run, 0, row=row)
+        if type(each).__name__ == "Quiver"
+    )
+    v = flow.X  # type: ignore[attr-defined]
+    assert (np.sign(flow.V) == np.sign(v)).all()  # type: ignore[attr-defined]
+    slope = (run.v[row + 1] - run.v[row - 1]) / (run.t[row + 1] - run.t[row - 1])
+    assert (np.sign(flow.U) == np.sign(slope)).all()  # type: ignore[attr-defined]
+
+
+def published() -> tuple[Trace, Report]:
+    model = stick_slip("published")
+    return simulate(model, sine(), 10.0), prove(model.chart)
+
+
+@pytest.mark.slow
+def test_counterexamples_are_pins() -> None:
+    pytest.importorskip("z3", reason="needs z3 (extra: proof)")
+    trace, report = published()
+    figure = figures.landscape(trace, 0, checks=report)
+    (finding,) = (each for each in report.findings if {"v", "z"} <= each.counterexample.keys())
+    (pin,) = (each for each in figure.axes[0].lines if each.get_marker() == "D")
+    assert pin.get_ydata() == [finding.counterexample["z"]]  # type: ignore[comparison-overlap]
+    numbers = [a.get_text() for a in figure.axes[0].texts if isinstance(a, Annotation)]
+    assert numbers == ["1"]
+    lines = [text.get_text() for text in figure.texts]
+    assert any(line.startswith("1  stability refuted, slip: ") for line in lines)
+    with pytest.raises(ParameterError, match="is the report of the chart"):
+        figures.landscape(trace, 0, checks=prove(BROKEN["overlap"].chart))
+
+
+def test_forces_are_drawn_where_there_are_no_variables() -> None:
+    trace = karnopp().run()
+    row = int(np.flatnonzero((trace.states[:, 0] == "stuck") & (np.abs(trace.F) > 0.7))[0])
+    ax = Figure().subplots()
+    found = regions(panels.landscape(ax, trace, 0, row=row))
+    assert ax.get_ylabel() == "F [N]"
+    lowest = {name: min(p.vertices[:, 1].min() for p in c.get_paths()) for name, c in found.items()}
+    assert lowest["release_forward"] == pytest.approx(1.5, abs=0.02)  # F_s

@@ -1,0 +1,207 @@
+"""Unfolded micro-steps have the order, the forces and the states of the transition log."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from gms_fsm import GMS, GMSParameters, Prescribed, Stribeck, Trace, simulate
+from gms_fsm.errors import ParameterError
+
+pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
+
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+from matplotlib.text import Annotation
+
+from plots import figures, panels
+from tests.helpers import FASTEST, FIG4_SINE, pulled_mass, stick_slip
+from tests.plots.systems_to_draw import BLOCKS
+from tests.plots.systems_to_draw import run as of_system
+
+
+def pulled() -> tuple[Trace, float, float]:
+    """The pulled mass: a set of arrests at one time, then arrests and break-aways one by one."""
+    return simulate(*pulled_mass(), 30.0, engine=FASTEST), 17.5, 21.5
+
+
+def milliseconds() -> tuple[Trace, float, float]:
+    """Four break-aways within 17 ms."""
+    return simulate(stick_slip("published"), Prescribed(FIG4_SINE), 25.0), 20.1, 20.2
+
+
+def one_time() -> tuple[Trace, float, float]:
+    """A set of four at one time."""
+    run = simulate(stick_slip("signed"), Prescribed("0.2"), 3.0)
+    t = float(run.transitions.t[0])
+    return run, t, t
+
+
+def twenty() -> tuple[Trace, float, float]:
+    """Twenty elements at one time."""
+    parameters = GMSParameters(
+        np.linspace(10, 40, 20),
+        [0.1] * 20,
+        [0.02] * 20,
+        sigma_2=0.4,
+        stribeck=Stribeck(1.0, 1.5, 0.05),
+        v_c=1e-6,
+        weights=[0.01] * 20,
+    )
+    return simulate(GMS(parameters, law="signed"), Prescribed("0.2"), 1.0), 0.0, 1.0
+
+
+def contact() -> tuple[Trace, float, float]:
+    """One of two contacts of a system."""
+    trace = of_system(BLOCKS).contact("pad2")
+    return trace, float(trace.t[0]), float(trace.t[-1])
+
+
+CASES = pytest.mark.parametrize(
+    ("make", "instants", "firings"),
+    [
+        (pulled, 7, 10),
+        (milliseconds, 4, 4),
+        (one_time, 1, 4),
+        (twenty, 1, 20),
+        (contact, None, None),
+    ],
+)
+Make = Callable[[], tuple[Trace, float, float]]
+
+
+@CASES
+def test_stairs_are_the_forces_of_the_log(
+    make: Make, instants: int | None, firings: int | None
+) -> None:
+    trace, t0, t1 = make()
+    log = trace.transitions[(trace.transitions.t >= t0) & (trace.transitions.t <= t1)]
+    part = panels.unfolded(trace, t0, t1)
+    if instants is not None:
+        assert (part.times.size, log.size) == (instants, firings)
+    ax = Figure(figsize=(10, 4)).subplots()
+    drawn = panels.unfolded_force(ax, part)
+    stairs = [each for each in drawn if isinstance(each, Line2D)][: part.times.size]
+    factor = {"F [N]": 1.0, "F [mN]": 1e3}[ax.get_ylabel()]
+    k = 0
+    for t, line in zip(np.unique(log.t), stairs, strict=True):
+        mine = log[log.t == t]
+        levels = np.asarray(line.get_ydata())[::2] / factor  # one per column
+        np.testing.assert_allclose(levels[0], mine.F_before[0], rtol=1e-15)
+        np.testing.assert_allclose(levels[1:], mine.F_after, rtol=1e-15)
+        np.testing.assert_allclose(levels[:-1], mine.F_before, rtol=1e-15)
+        k += mine.size
+    assert k == log.size
+
+
+@CASES
+def test_columns_are_in_the_order_of_the_log(
+    make: Make, instants: int | None, firings: int | None
+) -> None:
+    trace, t0, t1 = make()
+    log = trace.transitions[(trace.transitions.t >= t0) & (trace.transitions.t <= t1)]
+    part = panels.unfolded(trace, t0, t1)
+    fired = [each for each in part.columns if each.edge]
+    assert [(each.element, each.edge) for each in fired] == list(
+        zip(log.element.tolist(), log.edge.tolist(), strict=True)
+    )
+    assert [float(part.times[each.instant]) for each in fired] == log.t.tolist()
+    lefts = [each.left for each in part.columns]
+    assert (np.diff(lefts) > 0.999).all()
+    # The states are those of the rows of the run.
+    for each in part.columns:
+        rows = (trace.t == part.times[each.instant]) & (trace.microstep == each.step)
+        assert each.modes == tuple(trace.modes[np.flatnonzero(rows)[-1]].tolist())
+
+
+def test_frames_and_names_show_who_fired() -> None:
+    trace, t0, t1 = milliseconds()
+    figure = figures.unfold(trace, t0, t1)
+    ax = figure.axes[1]
+    frames = [each for each in ax.patches if isinstance(each, Rectangle) and each.get_zorder() == 5]
+    log = trace.transitions[(trace.transitions.t >= t0) & (trace.transitions.t <= t1)]
+    assert [int(each.get_y()) for each in frames] == log.element.tolist()
+    texts = [each.get_text() for each in ax.texts if isinstance(each, Annotation)]
+    edges = [text.replace("\n", "") for text in texts if text.startswith("break")]
+    assert edges == log.edge.tolist()
+    step = 1e3 * np.diff(log.t)
+    assert [text for text in texts if text[0] in "t+"] == [
+        f"t = {log.t[0]:.9g} s",
+        *(f"+{each:.4g} ms" for each in step),
+    ]
+    assert "17.16 ms" in figure.get_suptitle()
+
+
+@pytest.mark.parametrize("make", [pulled, milliseconds, one_time, twenty])
+def test_written_values_tell_before_from_after(make: Make) -> None:
+    part = panels.unfolded(*make())
+    drawn = panels.unfolded_force(Figure(figsize=(10, 4)).subplots(), part)
+    texts = [each.get_text() for each in drawn if isinstance(each, Annotation)]
+    assert len(texts) == len(part.columns)
+    for text, each in zip(texts, part.columns, strict=True):
+        assert float(text.replace("−", "-")) == pytest.approx(each.F, rel=6e-3)
+    for k in range(part.times.size):
+        own = [t for t, each in zip(texts, part.columns, strict=True) if each.instant == k]
+        assert len(set(own)) == len(own)
+
+
+def test_firings_of_others_are_one_column() -> None:
+    trace, t, _ = one_time()
+    part = panels.unfolded(trace, t, t, elements=[0, 2])
+    assert [(each.step, each.element) for each in part.columns] == [
+        (0, -1),
+        (1, 0),
+        (2, -1),
+        (3, 2),
+    ]
+    log = trace.transitions
+    assert [each.F for each in part.columns[2:]] == [log.F_before[2], log.F_after[2]]
+    figure = figures.unfold(trace, t, t, elements=[0, 2])
+    assert "others" in [each.get_text() for each in figure.axes[1].texts]
+
+
+def test_too_many_columns_name_a_window_that_works() -> None:
+    trace = simulate(stick_slip("signed"), Prescribed(FIG4_SINE), 60.0)
+    with pytest.raises(
+        ParameterError, match=r"there are \d+ columns from 0 to 60 s; at most 24"
+    ) as e:
+        figures.unfold(trace, 0.0, 60.0)
+    assert e.value.advice.startswith("choose the window (")
+    t0, t1 = ast.literal_eval(e.value.advice.removeprefix("choose the window "))
+    assert 20 <= len(panels.unfolded(trace, t0, t1).columns) <= 24
+
+
+def test_too_many_at_one_time_say_to_choose_elements() -> None:
+    parameters = GMSParameters(
+        [1.0] * 30, [0.0] * 30, [0.1] * 30, sigma_2=0, stribeck=Stribeck(1, 1.5, 0.1), v_c=1e-6
+    )
+    trace = simulate(GMS(parameters, law="signed"), Prescribed("1"), 2.0)
+    with pytest.raises(ParameterError, match="31 columns are at t = "):
+        figures.unfold(trace, 0.0, 2.0)
+    assert len(panels.unfolded(trace, 0.0, 2.0, elements=[0, 1, 2]).columns) == 4
+
+
+@pytest.mark.parametrize(
+    ("window", "said"),
+    [
+        ((0.1, 1.0), r"no transition from 0.1 to 1 s; the nearest one is at t = 2"),
+        ((2.0, 1.0), r"window is \(2.0, 1.0\); it must be two times"),
+        ((1.0, 9.0), r"inside the run, 0 to 3 s"),
+        (("a", 2.0), r"window is "),
+        ((9.0, 9.0), r"window is "),
+    ],
+)
+def test_wrong_windows(window: tuple[float, float], said: str) -> None:
+    trace, *_ = one_time()
+    with pytest.raises(ParameterError, match=said):
+        figures.unfold(trace, *window)
+
+
+def test_a_run_without_transitions() -> None:
+    trace = simulate(stick_slip("signed"), Prescribed("0"), 1.0)
+    with pytest.raises(ParameterError, match="the run has no transitions"):
+        figures.unfold(trace, 0.0, 1.0)
