@@ -38,9 +38,9 @@ def quantity(value: float, unit: str = "", digits: int = 4) -> str:
     >>> quantity(1e-6, "m/s"), quantity(0.99999, "m"), quantity(3e-7, "m^2"), quantity(1.51743)
     ('1.000 µm/s', '1.000 m', '3.000e-07 m^2', '1.517')
     """
-    if not math.isfinite(value) or value == 0.0:
+    rounded = float(f"{value:.{digits - 1}e}")  # of the largest numbers it is infinite
+    if not math.isfinite(rounded) or value == 0.0:
         return f"{value:g} {unit}".rstrip()
-    rounded = float(f"{value:.{digits - 1}e}")
     power = math.floor(math.log10(abs(rounded)) + 1e-12)
     step = 3 * (power // 3)
     if unit and TAKES_PREFIX.match(unit) and step in PREFIXES:

@@ -53,6 +53,7 @@ def test_any_number_is_shown_with_its_unit(value: float, unit: str) -> None:
         (1500.0, "kg", "1500 kg"),
         (2.0, "rad", "2.000 rad"),
         (math.nan, "m", "nan m"),
+        (1.7976e308, "m", "1.7976e+308 m"),
     ],
 )
 def test_edges(value: float, unit: str, text: str) -> None:

@@ -76,7 +76,7 @@ class FullScreen(App[int]):
         Binding("home", "command('goto {start}')", show=False),
         Binding("end", "command('goto {end}')", show=False),
         Binding("escape", "stop", show=False),
-        Binding("ctrl+c", "stop", show=False, priority=True),
+        Binding("ctrl+c", "interrupt", show=False, priority=True),
     ]
 
     def __init__(self, session: Session, title: str = "", *, light: bool = False) -> None:
@@ -488,6 +488,12 @@ class FullScreen(App[int]):
         self.number = ""
         self._draw_status()
         self._draw_keys()
+
+    def action_interrupt(self) -> None:
+        """Interrupt a long move, or say how to leave."""
+        if not self.busy:
+            self.notify("q quits")
+        self.action_stop()
 
     def action_leave(self) -> None:
         """Leave, also during a long move."""
