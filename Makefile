@@ -101,6 +101,7 @@ soak: $(VENV)/dev.stamp
 
 gallery: $(VENV)/all.stamp
 	$(RUN)/python docs/make_pictures.py
+	$(RUN)/python docs/make_screens.py
 	$(RUN)/python docs/make_zoo.py
 	$(RUN)/python docs/make_phenomena.py
 

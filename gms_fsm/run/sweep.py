@@ -21,7 +21,7 @@ from gms_fsm.errors import GMSError, ParameterError, cut
 from gms_fsm.lowering._compiled import check_numba
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
 from gms_fsm.run._compiled_run import CompiledRun
-from gms_fsm.run._recording import scope_of
+from gms_fsm.run._moment import scope_of
 from gms_fsm.run._swept import LOG, LONGEST, Sweep, row_name
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import Run
