@@ -109,6 +109,7 @@ foreign: $(VENV)/foreign.stamp
 
 gallery: $(VENV)/all.stamp
 	$(RUN)/python docs/make_pictures.py
+	$(RUN)/python docs/make_screens.py
 	$(RUN)/python docs/make_zoo.py
 	$(RUN)/python docs/make_phenomena.py
 

@@ -21,6 +21,10 @@ EXTRAS: Mapping[str, tuple[str, str]] = {
     "fast": ("engine 'compiled' needs", "engine='machines' gives the same result, slower"),
     "sweep": ("tables of a sweep need", "Sweep.save writes .npz files"),
     "replay": ("a replay page needs", "gms-fsm plot and gms-fsm debug show a run too"),
+    "tui": (
+        "the full-screen debugger needs",
+        "gms-fsm debug without --tui answers at a prompt, and gms-fsm replay makes a page",
+    ),
     "jupyter": ("the widget needs", "plots.replay shows a run in a notebook too"),
     "check": ("checking a chart needs", "a chart runs without its proofs"),
 }

@@ -1,8 +1,8 @@
 """Pictures: charts drawn by Graphviz, figures drawn by matplotlib.
 
 Importing this package needs neither a Graphviz program nor matplotlib; drawing does. Figures are in
-`plots.figures`, single panels in `plots.panels` (extra ``plots``). Once it is imported, charts,
-models, systems and traces display themselves in a notebook.
+`plots.figures`, single panels in `plots.panels` (extra ``plots``). What notebooks show of charts,
+models, systems and runs is made by `plots.notebook`; they need no import of this package.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from gms_fsm._extras import require
 from plots.block_diagram import block_diagram
 from plots.live_chart import LiveChart, live_statechart
 from plots.mermaid import mermaid
-from plots.notebook import register
 from plots.render import render
 from plots.replay import replay, write_replay
 from plots.statechart import statechart
@@ -46,8 +45,6 @@ __all__ = [
     "unfold",
     "write_replay",
 ]
-
-register()
 
 
 def animate(trace: Trace, path: str | Path, **options: Any) -> Path:

@@ -100,6 +100,9 @@ class Replay:
 
     html: str
 
+    def __repr__(self) -> str:
+        return f"<Replay: a page of {len(self.html)} characters; .save(path) writes it to a file>"
+
     def _repr_html_(self) -> str:
         # Without allow-same-origin: the page may run its scripts but not touch the notebook.
         return (

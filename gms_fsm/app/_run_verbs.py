@@ -5,6 +5,7 @@ from __future__ import annotations
 import collections
 import enum
 import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -72,8 +73,16 @@ def run_command(
     ] = None,
     overrides: Overrides = None,
     live: Annotated[
-        bool, typer.Option("--live", help="Show the state of every element during the run.")
+        bool,
+        typer.Option("--live", help="Show states, curves and transitions during the run."),
     ] = False,
+    pace: Annotated[
+        float | None,
+        typer.Option(
+            help="With --live: simulated seconds per second of the clock, such as 0.1.",
+            show_default=False,
+        ),
+    ] = None,
     checkpoint: Annotated[
         bool,
         typer.Option(
@@ -87,11 +96,15 @@ def run_command(
     from gms_fsm.app.report import monitor_lines, note_lines, run_scenario, velocity_note
     from gms_fsm.app.scenario import load_scenario
 
+    if pace is not None and not live:
+        raise typer.BadParameter("it is an option of --live", param_hint="--pace")
+    if pace is not None and not 0.0 < pace < math.inf:
+        raise typer.BadParameter(f"{pace:g} is not a positive number", param_hint="--pace")
     loaded = load_scenario(scenario, overrides or [])
     folder = Path("out") / scenario.stem if output is None else output
     start, end = loaded.arguments["t_start"], loaded.arguments["t_end"]
     try:
-        with LiveView(messages(), start, end, detail=live) as view:
+        with LiveView(messages(), start, end, detail=live, pace=pace) as view:
             trace, files = run_scenario(loaded, folder, view, checkpoint=checkpoint)
     except KeyboardInterrupt as error:
         note(str(error) or "interrupted")
@@ -222,11 +235,26 @@ def schema_command() -> None:
     typer.echo(json.dumps(schema(), indent=2))
 
 
-def debug_command(scenario: ScenarioFile, overrides: Overrides = None) -> None:
+def debug_command(
+    scenario: ScenarioFile,
+    overrides: Overrides = None,
+    tui: Annotated[
+        bool, typer.Option("--tui", help="Use the whole terminal: panels, keys and mouse.")
+    ] = False,
+    light: Annotated[
+        bool, typer.Option("--light", help="With --tui: dark text on a light ground.")
+    ] = False,
+) -> None:
     """Step through a scenario in the terminal: break, why, back, poke, compare."""
-    from gms_fsm.app.debugger import run_debugger, scenario_to_debug
+    from gms_fsm.app.debugger import run_debugger, scenario_to_debug, session_of
+    from gms_fsm.app.debugger.tui import run_tui
 
-    raise typer.Exit(run_debugger(scenario_to_debug(scenario, overrides or [])))
+    if light and not tui:
+        raise typer.BadParameter("it is an option of --tui", param_hint="--light")
+    loaded = scenario_to_debug(scenario, overrides or [])
+    if tui:
+        raise typer.Exit(run_tui(session_of(loaded), loaded.title, light=light))
+    raise typer.Exit(run_debugger(loaded))
 
 
 def lesson_command(
@@ -237,12 +265,21 @@ def lesson_command(
     output: Annotated[Path, typer.Option("--output", "-o", help="Output folder.")] = Path(
         "lessons"
     ),
+    notebook: Annotated[
+        bool, typer.Option("--notebook", help="Write it as a notebook instead, without running it.")
+    ] = False,
 ) -> None:
     """Run a lesson: a figure, a replay page, and five lines with the measured values."""
-    from gms_fsm.app.lessons import listed, numbered, teach
+    from gms_fsm.app.lessons import LESSONS, listed, numbered, teach
 
-    if not number:
+    if not number and not notebook:
         typer.echo(listed())
+        return
+    if notebook:
+        from gms_fsm.app.lessons.notebooks import write_notebook
+
+        for each in [numbered(number)] if number else LESSONS:
+            typer.echo(str(write_notebook(each, output)))
         return
     chosen = numbered(number)
     with messages().status(f"running lesson {chosen}"):

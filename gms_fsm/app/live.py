@@ -1,4 +1,4 @@
-"""Live view of a running simulation in the terminal: the active state of every element."""
+"""Live view of a running simulation: states, curves and transitions, also against the clock."""
 
 from __future__ import annotations
 
@@ -8,25 +8,32 @@ from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Any
 
-from rich.console import Console, Group
+from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
+from gms_fsm.app._quantities import quantity, sparkline
+from gms_fsm.lowering.log_columns import LogRecord
 from gms_fsm.run.simulate import Moment
 
 __all__ = ["LiveView"]
 
 BETWEEN_FRAMES = 0.1  # s; drawing more often would cost more than the simulation
+BETWEEN_LINES = 1.0  # s of the clock, without a terminal
+LATE = 1.0  # s of the clock by which a run may be behind before the clock waits for it
 BAR = 20  # characters for |z|/s = 1
+CURVE = 60  # characters of v and F over time; against the clock each is one frame
+EVENTS = 5  # transitions shown
 COLOURS = ("blue", "dark_orange3", "green", "magenta", "yellow")
 
 
 class LiveView:
-    """Shows states, |z|/s as bars, v and F during a simulation.
+    """Shows states, |z|/s as bars, v and F, and the last transitions during a simulation.
 
-    Use it as a context manager and pass it to ``simulate(progress=...)``.
+    Use it as a context manager and pass it to ``simulate(progress=...)``. Without a terminal it
+    prints lines.
 
     Parameters
     ----------
@@ -36,21 +43,34 @@ class LiveView:
         Start and end time for the progress bar, s.
     detail : bool
         If False, show only the progress bar.
+    pace : float, optional
+        Simulated seconds per second of the clock; as fast as possible if omitted.
     """
 
-    def __init__(self, console: Console, t_start: float, t_end: float, detail: bool) -> None:
-        self.detail = detail
+    def __init__(
+        self,
+        console: Console,
+        t_start: float,
+        t_end: float,
+        detail: bool,
+        pace: float | None = None,
+    ) -> None:
+        self.detail, self.pace = detail, pace
         self.names: list[str] = []
-        self.next_frame = 0.0
+        self.next_frame = self.next_line = 0.0
         self.latest: Moment | None = None
+        self.begin: float | None = None  # time of the clock at t_start, against the clock
+        self.behind = False  # whether computing takes longer than the pace allows
+        self.read = 0  # transitions read
+        self.last: list[LogRecord] = []  # the last of them
         self.bar = Progress(
-            TextColumn("t = {task.fields[t]:.2f} s"),
+            TextColumn("t = {task.fields[t]}"),
             BarColumn(),
             TimeElapsedColumn(),
             console=console,
         )
         self.t_start = t_start
-        self.task = self.bar.add_task("", total=t_end - t_start, t=t_start)
+        self.task = self.bar.add_task("", total=t_end - t_start, t=quantity(t_start, "s"))
         self.console = console
         self.live = Live(self.bar, console=console, auto_refresh=False)
 
@@ -68,14 +88,41 @@ class LiveView:
                 self.show(self.latest)  # the last state is always drawn
             self.live.stop()
         elif self.detail and self.latest is not None:
-            self.console.print(*self.tables(self.latest))  # a log gets only the last state
+            self._print_transitions(self.latest)
+            self.console.print(*self.tables(self.latest))
 
     def __call__(self, moment: Moment) -> None:
-        """Draw, if enough time has passed since the last frame."""
-        self.latest = moment
-        if not self.console.is_terminal:
+        """Draw, if enough time has passed since the last frame; against the clock, wait for it."""
+        if self.pace is None:
+            self._see(moment)
             return
+        if self.begin is None:
+            self.begin = time.monotonic()
+        late = time.monotonic() - self._due(moment.t)
+        if late > LATE:
+            self.begin, self.behind = self.begin + late, True
+        while (now := time.monotonic()) < self._due(moment.t):
+            self._see(moment.at(self.t_start + self.pace * (now - self.begin)))
+            left = self._due(moment.t) - time.monotonic()
+            if left > 0.0:
+                time.sleep(min(BETWEEN_FRAMES, left))
+        self._see(moment)
+
+    def _due(self, t: float) -> float:
+        """Return when the clock reaches a simulated time."""
+        assert self.begin is not None
+        assert self.pace is not None
+        return self.begin + (t - self.t_start) / self.pace
+
+    def _see(self, moment: Moment) -> None:
+        """Draw a moment, if enough time has passed since the last frame."""
+        self.latest = moment
         now = time.monotonic()
+        if not self.console.is_terminal:
+            if self.detail and now >= self.next_line:
+                self._print_lines(moment)
+                self.next_line = now + BETWEEN_LINES
+            return
         if now < self.next_frame:
             return
         self.show(moment)
@@ -83,10 +130,90 @@ class LiveView:
 
     def show(self, moment: Moment) -> None:
         """Draw now."""
-        self.bar.update(self.task, completed=moment.t - self.t_start, t=moment.t)
-        shown = Group(*self.tables(moment), self.bar) if self.detail else self.bar
+        self.bar.update(
+            self.task, completed=moment.t - self.t_start, t=quantity(moment.t, "s", digits=5)
+        )
+        shown = Group(*self.picture(moment), self.bar) if self.detail else self.bar
         self.live.start()
         self.live.update(shown, refresh=True)
+
+    # ------------------------------------------------------------------ lines
+    def _print_transitions(self, moment: Moment) -> None:
+        """Print the transitions since the last line, if against the clock."""
+        new = self._read(moment)
+        for record in new if self.pace is not None else ():
+            self._print(_event(record))
+
+    def _print_lines(self, moment: Moment) -> None:
+        """Print the transitions since the last line, and the values."""
+        self._print_transitions(moment)
+        count = "" if self.pace is not None else f", {self.read} transitions"
+        self._print(f"t = {quantity(moment.t, 's', digits=5)}{count}: {_summary(moment)}")
+
+    def _print(self, text: str) -> None:
+        self.console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    def _read(self, moment: Moment) -> list[LogRecord]:
+        """Return the transitions since the last reading."""
+        new = moment.transitions(self.read)
+        self.read += len(new)
+        self.last = [*self.last, *new][-EVENTS:]
+        return new
+
+    # ------------------------------------------------------------------ the picture
+    def picture(self, moment: Moment) -> list[RenderableType]:
+        """Return tables, curves and the last transitions.
+
+        Parameters
+        ----------
+        moment : Moment
+            What to show.
+
+        Returns
+        -------
+        list
+            For a `rich` console.
+        """
+        self._read(moment)
+        slow = "; computing is slower than that" * self.behind
+        pace = "" if self.pace is None else f"{self.pace:g} simulated seconds per second{slow}"
+        return [
+            *self.tables(moment),
+            *self.curves(moment),
+            Text(f"last transitions ({self.read} so far)" if self.last else "no transition so far"),
+            *(Text(f"  {_event(record)}", no_wrap=True) for record in self.last),
+            *([Text(pace)] if pace else []),
+        ]
+
+    def curves(self, moment: Moment) -> list[Text]:
+        """Return v and F of each contact over time: since the start, or the last frames.
+
+        Parameters
+        ----------
+        moment : Moment
+            The end of the curves.
+
+        Returns
+        -------
+        list of rich.text.Text
+            Two lines per contact, with their ranges.
+        """
+        start = self.t_start
+        if self.pace is not None:
+            start = max(start, moment.t - self.pace * CURVE * BETWEEN_FRAMES)
+        span = moment.t - start
+        if span <= 0.0:
+            return []
+        wide = max(10, min(CURVE, self.console.width - 44))
+        seen = [moment.at(start + span * (i + 1) / wide).values for i in range(wide)]
+        lines = []
+        for lead in _leads(seen[-1]):
+            for name, unit in (("v", "m/s"), ("F", "N")):
+                values = [float(each[lead + name]) for each in seen]
+                low, high = quantity(min(values), unit), quantity(max(values), unit)
+                text = f"{lead}{name} {sparkline(values)} {low} to {high}"
+                lines.append(Text(text, no_wrap=True))
+        return [*lines, Text(f"over the last {quantity(span, 's')}")]
 
     def tables(self, moment: Moment) -> list[Table]:
         """Return the table of each contact.
@@ -102,7 +229,7 @@ class LiveView:
             One, if there are not several contacts.
         """
         values, states, found = moment.values, moment.states, list[Table]()
-        for name in [key.removesuffix("F") for key in values if key.split(".")[-1] == "F"]:
+        for name in _leads(values):
             own = {each: values[name + each] for each in ("v", "F", "z", "s")}
             lead = f"{name.removesuffix('.')}   ".lstrip()
             here, states = states[: len(own["z"])], states[len(own["z"]) :]
@@ -130,12 +257,15 @@ class LiveView:
         rich.table.Table
             State, |z|/s and z of each element; v and F in the title.
         """
-        title = f"{lead}t = {t:10.4f} s   v = {values['v']:+.6f} m/s   F = {values['F']:+.5f} N"
+        title = (
+            f"{lead}t = {quantity(t, 's', digits=5):<9}   v = {quantity(values['v'], 'm/s'):>11}   "
+            f"F = {quantity(values['F'], 'N'):>9}"
+        )
         bare = all(map(math.isnan, values["s"]))  # no threshold without a Stribeck curve
         still = all(map(math.isnan, values["z"]))  # a chart without variables
         table = Table("element", "state", title=title, title_justify="left", min_width=len(title))
-        for head in (*(() if bare else ("|z|/s", "")), *(() if still else ("z [m]",))):
-            table.add_column(Text(head))  # [m] would be markup
+        for head in (*(() if bare else ("|z|/s", "")), *(() if still else ("z",))):
+            table.add_column(head)
         for i, (state, z, s) in enumerate(zip(states, values["z"], values["s"], strict=True)):
             if state not in self.names:
                 self.names.append(state)
@@ -150,5 +280,28 @@ class LiveView:
                 filled = min(BAR, round(BAR * ratio))
                 bar = Text("█" * filled + "░" * (BAR - filled), style=colour)
                 row += [Text(f"{ratio:.3f}"), bar]
-            table.add_row(*row, *([] if still else [f"{z:+.4e}"]))
+            table.add_row(*row, *([] if still else [f"{quantity(z, 'm'):>9}"]))
         return table
+
+
+def _leads(values: Mapping[str, Any]) -> list[str]:
+    """Return what stands before the names of each contact: nothing, or ``gear.``."""
+    return [key.removesuffix("F") for key in values if key.split(".")[-1] == "F"]
+
+
+def _event(record: LogRecord) -> str:
+    who = f"{record.contact} {record.element + 1}".lstrip() if record.contact else ""
+    who = who or f"element {record.element + 1}"
+    return f"t = {record.t:.9g} s  {who}: {record.source} -> {record.target} by {record.edge}"
+
+
+def _summary(moment: Moment) -> str:
+    """Return v, F and the states of each contact in one line."""
+    values, states, parts = moment.values, moment.states, []
+    for lead in _leads(values):
+        count = len(values[f"{lead}z"])
+        here, states = states[:count], states[count:]
+        v, F = quantity(values[f"{lead}v"], "m/s"), quantity(values[f"{lead}F"], "N")
+        counts = [f"{here.count(name)} {name}" for name in dict.fromkeys(here)]
+        parts.append(f"{lead}v = {v}, {lead}F = {F}, {', '.join(counts)}")
+    return "; ".join(parts)

@@ -79,7 +79,12 @@ class Branch:
         self.offset = fork + 1 + (begin is not None)
         self.stops: set[int] = set()  # rows at which the guards were evaluated
         self.firings: list[int] = []  # rows made by firings in this branch
+        self.on_row: Callable[[], object] = _nothing  # called at each row of a move; may interrupt
         self.pull()
+
+    def __repr__(self) -> str:
+        fork = "" if self.parent is None else f", from row {self.fork} of branch {self.parent}"
+        return f"<Branch: {len(self)} rows, cursor at row {self.cursor}{fork}>"
 
     # ------------------------------------------------------------------ rows
     def __len__(self) -> int:
@@ -87,6 +92,7 @@ class Branch:
 
     def pull(self) -> bool:
         """Compute at least one more row, and return whether there was one."""
+        self.on_row()
         before = len(self)
         with _unbroken():
             while not (self.ended or self.failure) and len(self) == before:
@@ -242,6 +248,10 @@ class Branch:
             ),
         )
         return start.trace(rows, rows, log_of(self.log()))
+
+
+def _nothing() -> None:
+    """Do nothing at a row."""
 
 
 @contextmanager

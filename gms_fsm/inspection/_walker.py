@@ -30,6 +30,7 @@ def forward(branch: Branch) -> Iterator[int]:
     """Move forward by rows to the end, and yield the number of each new row."""
     branch.between = None
     while branch.cursor + 1 < len(branch) or branch.pull():
+        branch.on_row()
         branch.cursor += 1
         yield branch.cursor
 
@@ -105,6 +106,7 @@ def reaches(branch: Branch, holds: Callable[[Row], bool]) -> bool:
     truth = holds(branch.here)
     begin = None if branch.between is None else branch.between.t  # a second `until` starts there
     while True:
+        branch.on_row()
         row = branch.cursor
         if row + 1 >= len(branch) and not branch.pull():
             branch.between = None

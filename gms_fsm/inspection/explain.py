@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+from gms_fsm._display import displayed, short_repr
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.language import (
     MATLAB_LIKE,
@@ -67,7 +68,19 @@ class Clause:
     computable: bool = True
     unit: str = ""
 
+    @property
+    def relative(self) -> float:
+        """Margin over the larger side; 0 if it is due to rounding, NaN where the margin is."""
+        if math.isinf(self.margin):
+            return math.copysign(1.0, self.margin)
+        larger = max(abs(self.left), abs(self.right))
+        if abs(self.margin) <= ROUNDING * larger:
+            return 0.0
+        return self.margin / larger
 
+
+@displayed("html")
+@short_repr
 @dataclass(frozen=True)
 class Explanation:
     """One edge that leaves the state of an element, or the state it has just left.
@@ -116,10 +129,17 @@ class Explanation:
         """Whether this edge was taken to reach the row."""
         return self.past and self.taken == self.edge.name
 
+    @property
+    def verdict(self) -> str:
+        """One sentence on why this edge fires or not."""
+        return _verdict(self)
+
     def __str__(self) -> str:
-        return f"{_verdict(self)}\n{_detail(self)}"
+        return f"{self.verdict}\n{_detail(self)}"
 
 
+@displayed("html")
+@short_repr
 @dataclass(frozen=True)
 class Why:
     """Why an element switches or does not: a sequence of `Explanation`, highest priority first.
@@ -162,7 +182,9 @@ class Why:
     def __getitem__(self, index: int) -> Explanation:
         return self.edges[index]
 
-    def __str__(self) -> str:
+    @property
+    def heading(self) -> tuple[str, ...]:
+        """Lines on the element: its state, what it has just left, what holds it, its next tick."""
         who = f"{self.contact or 'element'} {self.element + 1}"
         lines = [f"{who} is in {self.state} at t = {self.t:.9g} s"]
         if self.left:
@@ -173,7 +195,10 @@ class Why:
             lines.append(f"its guards are evaluated at ticks only, the next time {when}")
         if not self.edges:
             lines.append("no edge leaves this state")
-        return "\n".join([*lines, *map(_verdict, self.edges), *map(_detail, self.edges)])
+        return tuple(lines)
+
+    def __str__(self) -> str:
+        return "\n".join([*self.heading, *map(_verdict, self.edges), *map(_detail, self.edges)])
 
 
 def values_at(trace: Trace, row: int, element: int) -> dict[str, float]:
@@ -403,7 +428,7 @@ def _sides(clause: Clause) -> str:
 
 
 def _amount(clause: Clause, *, signed: bool) -> str:
-    if abs(clause.margin) <= ROUNDING * max(abs(clause.left), abs(clause.right)):
+    if clause.relative == 0.0:
         return "0 (rounding)"
     shown = f"{clause.margin:+.3g}" if signed else f"{abs(clause.margin):.3g}"
     return f"{shown} {clause.unit}".rstrip()

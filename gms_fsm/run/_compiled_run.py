@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.lowering import _compiled as compiled
-from gms_fsm.lowering.log_columns import LOG_NUMBERS, LOG_TEXTS
+from gms_fsm.lowering.log_columns import LOG_NUMBERS, LOG_TEXTS, LogRecord
 from gms_fsm.lowering.program import equations
+from gms_fsm.run._moment import Place, Recording
 from gms_fsm.run._recording import (
     PATIENCE,
-    Recording,
     check_end,
     check_pace,
     explained,
@@ -282,6 +282,27 @@ class Columns:
         b: Any = self.buffers
         modes = (*b.now.mode.tolist(), *b.sliding.flags.tolist())
         return float(b.now.clock[T]), b.now.y.tolist(), modes
+
+    def around(self, t: float) -> tuple[Place, Place | None]:
+        """Return the last row at or before a time, and the next one."""
+        out, log, start = self.buffers.out, self.log, self.start
+        rows: Any = out  # arrays
+        count = int(out.cursor[ROW])
+        row = int(np.searchsorted(rows.rows_t[:count], t, "right")) - 1
+        modes: Any = log.rows_mode
+        places = [
+            (float(rows.rows_t[i]), rows.rows_y[i].tolist(), tuple(modes[i].tolist()))
+            for i in (row, row + 1)
+            if 0 <= i < count
+        ]
+        if row < 0:
+            mode = start.program.layout.not_sliding(start.mode)
+            places.insert(0, (start.t_start, list(start.y), mode))
+        return places[0], (*places, None)[1]
+
+    def firings(self, after: int) -> list[LogRecord]:
+        """Return the records of the log from a number on."""
+        return [LogRecord(*each) for each in self.transitions()[after:].tolist()]
 
     def as_lists(self) -> hybrid.Buffers:
         """Return the buffers with time, state and modes as Python numbers, for messages."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from gms_fsm.language import rough_points
 from gms_fsm.lowering._observing import armed, rate
 from gms_fsm.lowering.layout import Layout
 from gms_fsm.lowering.log_columns import CONTACT, LogRecord
+from gms_fsm.run._moment import Place, Recording, scope_of
 from gms_fsm.run.machines import Interference
 from gms_fsm.run.start import Start
 from gms_fsm.traces._log import log_of
@@ -47,34 +49,16 @@ from integrators.steps import H
 
 __all__ = [
     "PATIENCE",
-    "Moment",
     "Recorder",
-    "Recording",
     "check_end",
     "check_pace",
     "explained",
     "interference_error",
-    "scope_of",
 ]
 
 POWERS = 12  # iterations of the power method
 STABLE = 1.5  # step times fastest rate; explicit methods are stable up to 2 or 3.3
 PATIENCE = 5_000  # steps between two pace checks
-
-
-class Recording(Protocol):
-    """What listeners may read from a run in progress."""
-
-    @property
-    def start(self) -> Start:
-        """The model, rig and settings of the run."""
-
-    @property
-    def latest(self) -> tuple[float, list[float], tuple[int, ...]]:
-        """Time, state and modes reached."""
-
-    def trace(self) -> Trace:
-        """Return the trace of all recorded data."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +128,21 @@ class Recorder:
                     self.stops.add(t, 0, y, mode)
                 self.latest = (t, y, mode)
 
+    def around(self, t: float) -> tuple[Place, Place | None]:
+        """Return the last row at or before a time, and the next one."""
+        rows, mode = self.rows, self.start.program.layout.not_sliding(self.start.mode)
+        row = bisect_right(rows.t, t) - 1
+        places = [
+            (rows.t[i], rows.y[i], rows.mode[i]) for i in (row, row + 1) if 0 <= i < len(rows.t)
+        ]
+        if row < 0:
+            places.insert(0, (self.start.t_start, list(self.start.y), mode))
+        return places[0], (*places, None)[1]
+
+    def firings(self, after: int) -> list[LogRecord]:
+        """Return the records of the log from a number on."""
+        return self.log[after:]
+
     def state(self) -> dict[str, Any]:
         """Return the contents as arrays, for a checkpoint."""
         layout = self.start.program.layout
@@ -200,51 +199,6 @@ class Recorder:
         rows = self.rows.rows(layout)
         stops = self.stops.rows(layout) if start.output == "t_eval" else rows
         return start.trace(rows, stops, log_of(self.log))
-
-
-@dataclass(frozen=True, eq=False)
-class Moment:
-    """The latest row of a running simulation, computed on demand."""
-
-    _recording: Recording
-
-    @property
-    def t(self) -> float:
-        """Time, s."""
-        return self._recording.latest[0]
-
-    @property
-    def states(self) -> list[str]:
-        """Active state of each element."""
-        start, (_, _, mode) = self._recording.start, self._recording.latest
-        return [
-            start.system.contact(bank.name).chart.states[each].name
-            for bank in start.program.layout.banks
-            for each in mode[bank.elements]
-        ]
-
-    @property
-    def values(self) -> dict[str, Any]:
-        """``x`` [m], ``v`` [m/s] and ``F`` [N]; ``z`` and ``s`` [m], one per element.
-
-        With several contacts they have the contact's name before them: ``gear.F``.
-        """
-        start, found = self._recording.start, {}
-        banks = start.program.layout.banks
-        for bank in banks:
-            here = scope_of(start, *self._recording.latest, bank.name)
-            lead = f"{bank.name}." if len(banks) > 1 else ""
-            for name in ("x", "v", "F", "z", "s"):
-                found[f"{lead}{name}"] = getattr(here, name)
-        return found
-
-
-def scope_of(
-    start: Start, t: float, y: list[float], mode: Sequence[int], contact: str = ""
-) -> Scope:
-    """Return the values of a contact at a state of a run; without a name of the only one."""
-    bank = start.program.layout.contact(contact)
-    return Scope.of(start.system.contact(bank.name), start.program, t, y, mode, bank.name)
 
 
 # --------------------------------------------------------------------------- wording of errors

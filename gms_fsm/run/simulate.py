@@ -12,10 +12,10 @@ from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.lowering.program import equations
 from gms_fsm.run._checkpoint import Checkpointer
 from gms_fsm.run._compiled_run import CompiledRun
+from gms_fsm.run._moment import Moment
 from gms_fsm.run._own_machines import engine_of, own_machines
 from gms_fsm.run._recording import (
     PATIENCE,
-    Moment,
     Recorder,
     check_end,
     check_pace,
@@ -82,7 +82,7 @@ def simulate(
         callbacks run and their states are correct at the end. In a system by contact:
         ``{"gear": ElementMachines(system.contact("gear"))}``.
     progress : callable, optional
-        Called at intervals with the `Moment` reached.
+        Called at intervals with the `Moment` reached, and at the end.
     checkpoint : str or Path, optional
         A file for the state of a long run, written at intervals. If it exists when the run starts,
         the run continues from it, bit for bit as if it had not been interrupted; at the end the
@@ -160,6 +160,8 @@ def simulate(
                 keeper.look()
             if progress is not None:
                 progress(Moment(run.recorder))
+        if progress is not None:
+            progress(Moment(run.recorder))
     except SimulationError as error:
         if watching:
             error.trace = watched(error.trace, watching, error)

@@ -21,7 +21,7 @@ from gms_fsm.errors import GMSError, ParameterError, cut
 from gms_fsm.lowering._compiled import check_numba
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
 from gms_fsm.run._compiled_run import CompiledRun
-from gms_fsm.run._recording import scope_of
+from gms_fsm.run._moment import scope_of
 from gms_fsm.run._swept import LOG, LONGEST, Sweep, row_name
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import Run
@@ -30,6 +30,7 @@ from gms_fsm.systems._varied import numbers_in, with_numbers_of
 from gms_fsm.systems.models import Model, parameter_names, with_values
 from gms_fsm.systems.rigs import Rig, with_numbers
 from gms_fsm.systems.system import Contact, System
+from gms_fsm.traces._log import Log
 from gms_fsm.traces.rows import Rows, column_name
 from gms_fsm.traces.trace import Trace
 
@@ -511,7 +512,7 @@ class _Collected:
             self.t,
             **self.end,
             states=np.concatenate(states, axis=1),
-            transitions=np.concatenate(self.logs).view(np.recarray),
+            transitions=np.concatenate(self.logs).view(Log),
             edges=tuple(edges),
             times=self.times,
             rows=self.rows,

@@ -1,4 +1,4 @@
-"""The output of the debugger is plain text of 80 columns, with colour only in a terminal."""
+"""The debugger's output is plain text, as wide as the terminal, with colour only there."""
 
 from __future__ import annotations
 
@@ -129,6 +129,27 @@ def test_a_terminal_gets_colour_without_extra_information(monkeypatch: pytest.Mo
     for drawn, mark in zip("✗✓░█─▓═│║┌┐└┘╔╗╚╝", "ny.#-#=||++++++++", strict=True):
         bare = bare.replace(drawn, mark)
     assert bare.replace("=", "-").replace("#", "-") == plain.replace("=", "-").replace("#", "-")
+
+
+@pytest.mark.parametrize("columns", [60, 100, 160])
+def test_a_terminal_gets_lines_of_its_width(columns: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = _on_a_terminal(monkeypatch, TERM="xterm", COLUMNS=str(columns))
+    lines = [line.rstrip() for line in re.sub(r"\x1b\[[0-9;]*m", "", text).splitlines()]
+    assert all(len(line) <= columns for line in lines)
+    assert max(map(len, lines)) > columns - 10
+    ribbon = next(line for line in lines if line.startswith(" E1 "))
+    assert len(lines[lines.index(ribbon) - 1]) == columns  # its axis
+    sentence = "help lists the commands, where shows everything, quit exits."
+    assert (sentence in lines) == (columns >= len(sentence))
+
+
+def test_a_long_answer_is_one_line_where_there_is_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    out = Terminal()
+    monkeypatch.setenv("COLUMNS", "150")
+    made = Debugger(_bank(4), "", io.StringIO("goto 1\nwhy 1\nquit\n"), out)
+    made.run()
+    (line,) = (each for each in out.getvalue().splitlines() if "break_away_backward does" in each)
+    assert len(re.sub(r"\x1b\[[0-9;]*m", "", line)) > 80
 
 
 @pytest.mark.parametrize("environment", [{"NO_COLOR": "1"}, {"TERM": "dumb"}])

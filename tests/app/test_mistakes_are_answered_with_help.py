@@ -208,7 +208,7 @@ def test_no_bar_of_a_run_that_does_not_begin() -> None:
     model, rig = pulled_mass()
     with LiveView(console, 0.0, 1.0, detail=False) as view:
         simulate(model, rig, 1.0, progress=view)
-    assert "t = 1.00 s" in screen.getvalue()
+    assert "t = 1.0000 s" in screen.getvalue()
 
 
 # --------------------------------------------------------------------------- values in messages

@@ -12,8 +12,9 @@ from pathlib import Path
 
 from gms_fsm.app.debugger import _text as text_of
 from gms_fsm.app.debugger._elements import Elements, completions, integer, read_edits, spelled
-from gms_fsm.app.debugger._help import ALIASES, COMMANDS, help_of, overview
-from gms_fsm.app.debugger._view import branches, chart_states, ending, ribbons, view
+from gms_fsm.app.debugger._help import ALIASES, COMMANDS, MOVES, help_of, overview
+from gms_fsm.app.debugger._over_time import events, ribbons
+from gms_fsm.app.debugger._view import branches, chart_states, ending, view
 from gms_fsm.errors import GMSError, SessionError
 from gms_fsm.inspection.explain import holds
 from gms_fsm.inspection.session import KINDS, Breakpoint, Session
@@ -31,6 +32,8 @@ class Commands:
         The session.
     marks : Marks
         Drawing characters.
+    width : int
+        Columns of tables and pictures.
 
     Examples
     --------
@@ -41,8 +44,48 @@ class Commands:
     ['0.4']
     """
 
-    def __init__(self, session: Session, marks: text_of.Marks = text_of.PLAIN) -> None:
-        self.session, self.marks, self.element = session, marks, 0
+    def __init__(
+        self,
+        session: Session,
+        marks: text_of.Marks = text_of.PLAIN,
+        width: int = text_of.WIDTH,
+    ) -> None:
+        self.session, self.marks, self.width, self.element = session, marks, width, 0
+        self.last_move = ""  # the line that moved last, which an empty line repeats
+        self.left = False  # whether the last line was `quit`
+
+    def reply(self, line: str) -> Iterator[str]:
+        """Execute a line as a person types it; a mistake is answered and changes nothing.
+
+        Parameters
+        ----------
+        line : str
+            A command or its short name, and its argument. Comments and empty lines do nothing.
+
+        Yields
+        ------
+        str
+            The lines of the answer; those of a mistake begin with ``error:``.
+        """
+        name, rest = ([*line.split(None, 1), "", ""])[:2]
+        name, self.left = ALIASES.get(name, name), False
+        if not name or name.startswith("#"):
+            return
+        if name in MOVES:
+            self.last_move = line
+        try:
+            yield from self.answer(name, rest.strip())
+        except KeyboardInterrupt:
+            yield "stopped"
+            yield from self.here()
+        except GMSError as error:
+            yield f"error: {error}"
+        except BrokenPipeError:
+            raise
+        except Exception as error:  # losing the session would be worse than an unclear message
+            yield f"error: {type(error).__name__}: {error}"
+        else:
+            self.left = name == "quit"
 
     def answer(self, name: str, arg: str) -> Iterator[str]:
         """Execute a command.
@@ -69,6 +112,32 @@ class Commands:
             hint = f"did you mean {near[0]}? " if near else ""
             raise SessionError(f"unknown command {name!r}", advice=f"{hint}help lists all commands")
         yield from getattr(self, f"do_{name}")(arg)
+
+    @property
+    def prompt(self) -> str:
+        """What stands in front of a command."""
+        session = self.session
+        branch = f", branch {session.current}" if session.current else ""
+        return f"(t={session.here.t:.4f} s{branch}) "
+
+    def complete(self, text: str, before: str = "") -> list[str]:
+        """Return how a word can be completed.
+
+        Parameters
+        ----------
+        text : str
+            Its beginning.
+        before : str
+            The line up to the word.
+
+        Returns
+        -------
+        list of str
+            Commands at the beginning of a line, else arguments of its command.
+        """
+        typed = before.split(None, 1)
+        words = self.words(ALIASES.get(typed[0], typed[0]), before) if typed else COMMANDS
+        return [word for word in words if word.startswith(text)]
 
     def words(self, name: str, before: str) -> Sequence[str]:
         """Return the possible arguments of a command: edges, states, names, numbers.
@@ -256,8 +325,8 @@ class Commands:
         """Show everything."""
         _nothing("where", arg)
         seen = view(self.session)
-        states = ribbons(self.session, text_of.ribbon_parts(seen))
-        yield from text_of.screen_lines(seen, states, self.element, self.marks)
+        states = ribbons(self.session, text_of.ribbon_parts(seen, self.width))
+        yield from text_of.screen_lines(seen, states, self.element, self.marks, self.width)
 
     def do_why(self, arg: str) -> Iterator[str]:
         """Explain the guards of an element."""
@@ -283,18 +352,18 @@ class Commands:
         chart = session.system.contact(bank.name).chart
         who = self.elements.name(self.element)
         yield f"{who} of {bank.n}: {chart.name}, t = {session.here.t:.9g} s"
-        yield from text_of.chart_lines(chart_states(session, self.element), self.marks)
+        states = chart_states(session, self.element)
+        yield from text_of.chart_lines(states, self.marks, self.width)
 
     def do_log(self, arg: str) -> Iterator[str]:
         """Show the last transitions."""
-        count, branch = _count("log", arg, 10), self.session.branch
-        rows = branch.firing_rows(self.session.here.row + 1)
-        if not rows:
+        count, found = _count("log", arg, 10), events(self.session)
+        if not found:
             yield "no transition so far"
-        for row in rows[-count:]:
-            yield f"  t = {branch.raw(row).t:<12.9g} s  row {row:<5} {branch.fired(row)}"
-        if len(rows) > count:
-            yield f"  ({len(rows) - count} earlier ones)"
+        for each in found[-count:]:
+            yield f"  t = {each.t:<12.9g} s  row {each.row:<5} {each.fired}"
+        if len(found) > count:
+            yield f"  ({len(found) - count} earlier ones)"
 
     def do_print(self, arg: str) -> Iterator[str]:
         """Show a value."""

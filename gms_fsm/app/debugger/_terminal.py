@@ -1,4 +1,6 @@
-"""The terminal interface of a session: one command per line, plain-text answers of 80 columns.
+"""The terminal interface of a session: one command per line, answered by lines of plain text.
+
+Lines are as wide as the terminal; in a pipe or a file they have 80 columns, whatever wrote them.
 
 Nothing is redrawn, so a transcript, a pipe and a screen reader all get the same text. Colour is
 added last and carries no additional information.
@@ -10,20 +12,21 @@ import cmd
 import io
 import os
 import re
+import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
 
 from gms_fsm.app.debugger._commands import Commands
-from gms_fsm.app.debugger._help import ALIASES, COMMANDS, MOVES
-from gms_fsm.app.debugger._text import DRAWN, PLAIN, wrapped
+from gms_fsm.app.debugger._text import DRAWN, PLAIN, WIDTH, wrapped
 from gms_fsm.app.scenario import Loaded, load_scenario
 from gms_fsm.errors import GMSError, ScenarioError
 from gms_fsm.inspection.session import Session
 
-__all__ = ["Debugger", "run_debugger", "scenario_to_debug"]
+__all__ = ["Debugger", "run_debugger", "scenario_to_debug", "session_of"]
 
+NARROWEST = 40  # columns; a narrower terminal breaks the lines itself
 COLOURS = ("34", "33", "35", "36", "32")  # for states
 WORDS = {"true": "32", "false": "31", "fired": "1", "FIRED": "1", "error:": "1;31", "ACTIVE": "1"}
 
@@ -79,8 +82,7 @@ class Debugger(cmd.Cmd):
         self.encoding = (getattr(self.stdout, "encoding", None) or "utf-8").lower()
         drawn = self.coloured and self.encoding.startswith("utf")
         self.commands = Commands(session, DRAWN if drawn else PLAIN)
-        self.last_move = ""
-        self._new_prompt()
+        self.prompt = self.commands.prompt
 
     @property
     def session(self) -> Session:
@@ -116,13 +118,8 @@ class Debugger(cmd.Cmd):
 
     def postcmd(self, stop: bool, line: str) -> bool:  # noqa: ARG002 (signature of the base class)
         """Show the current position in the prompt."""
-        self._new_prompt()
+        self.prompt = self.commands.prompt
         return stop
-
-    def _new_prompt(self) -> None:
-        session = self.session
-        branch = f", branch {session.current}" if session.current else ""
-        self.prompt = f"(t={session.here.t:.4f} s{branch}) "
 
     def onecmd(self, line: str) -> bool:
         """Execute one command; an error is printed and never ends the session.
@@ -137,34 +134,21 @@ class Debugger(cmd.Cmd):
         bool
             Whether to exit.
         """
-        name, rest = ([*line.split(None, 1), "", ""])[:2]
-        if not name:
-            if not self.typed or not self.last_move:
-                return False
-            return self.onecmd(self.last_move)
-        if name.startswith("#"):
-            return False
-        if name == "EOF":
+        if line == "EOF":
             return True
-        name = ALIASES.get(name, name)
-        if name in MOVES:
-            self.last_move = line
-        try:
-            for said in self.commands.answer(name, rest.strip()):
-                self.say(said)
-        except KeyboardInterrupt:
-            self.say("stopped")
-            for said in self.commands.here():
-                self.say(said)
-        except GMSError as error:
-            self.say(f"error: {error}")
-        except BrokenPipeError:
-            raise
-        except Exception as error:  # losing the session would be worse than an unclear message
-            self.say(f"error: {type(error).__name__}: {error}")
-        else:
-            return name == "quit"
-        return False
+        if self.typed and not line.strip():
+            line = self.commands.last_move
+        self.commands.width = self.width
+        for said in self.commands.reply(line):
+            self.say(said)
+        return self.commands.left
+
+    @property
+    def width(self) -> int:
+        """Columns: those of the terminal, else 80."""
+        if not self.stdout.isatty():
+            return WIDTH
+        return max(NARROWEST, shutil.get_terminal_size((WIDTH, 24)).columns)
 
     def reply(self, line: str) -> str:
         """Return the answer to a command, for scripts.
@@ -188,8 +172,9 @@ class Debugger(cmd.Cmd):
 
     def say(self, text: str) -> None:
         """Print lines, wrapped to the screen width."""
+        width = self.width
         for line in text.split("\n"):
-            for part in wrapped(line):
+            for part in wrapped(line, width):
                 part = part.encode(self.encoding, "replace").decode(self.encoding)
                 self.stdout.write(f"{self._painted(part)}\n")
 
@@ -206,14 +191,12 @@ class Debugger(cmd.Cmd):
     # ------------------------------------------------------------------ completion
     def completenames(self, text: str, *_: object) -> list[str]:
         """Complete a command."""
-        return [name for name in COMMANDS if name.startswith(text)]
+        return self.commands.complete(text)
 
     def completedefault(self, *arguments: object) -> list[str]:
         """Complete an argument: edges, states, names or numbers, depending on the command."""
         text, line, begin = str(arguments[0]), str(arguments[1]), int(str(arguments[2]))
-        name = line.split(None, 1)[0]
-        words = self.commands.words(ALIASES.get(name, name), line[:begin])
-        return [word for word in words if word.startswith(text)]
+        return self.commands.complete(text, line[:begin])
 
     complete_help = completedefault
 
@@ -261,14 +244,40 @@ def scenario_to_debug(path: str | Path, overrides: Sequence[str] = ()) -> Loaded
     return load_scenario(path, overrides)
 
 
-def run_debugger(loaded: Loaded, stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
-    """Open a scenario in the debugger.
+def session_of(loaded: Loaded) -> Session:
+    """Return a session of a scenario.
 
     Parameters
     ----------
     loaded : Loaded
         From `gms_fsm.app.scenario.load_scenario`. Requested times are ignored: a session has a row
         at every step.
+
+    Returns
+    -------
+    Session
+        At the start of the run.
+
+    Raises
+    ------
+    ScenarioError
+        If the run of the scenario cannot be set up.
+    """
+    not_here = ("t_end", "t_eval", "monitors")
+    options = {name: value for name, value in loaded.arguments.items() if name not in not_here}
+    try:
+        return Session(*loaded.subject, **options)
+    except GMSError as error:
+        raise ScenarioError.of(error).inside(loaded.path) from None
+
+
+def run_debugger(loaded: Loaded, stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
+    """Open a scenario in the debugger.
+
+    Parameters
+    ----------
+    loaded : Loaded
+        As for `session_of`.
     stdin, stdout : text files, optional
         The terminal by default.
 
@@ -282,10 +291,4 @@ def run_debugger(loaded: Loaded, stdin: TextIO | None = None, stdout: TextIO | N
     ScenarioError
         If the run of the scenario cannot be set up.
     """
-    not_here = ("t_end", "t_eval", "monitors")
-    options = {name: value for name, value in loaded.arguments.items() if name not in not_here}
-    try:
-        session = Session(*loaded.subject, **options)
-    except GMSError as error:
-        raise ScenarioError.of(error).inside(loaded.path) from None
-    return Debugger(session, loaded.title, stdin, stdout).run()
+    return Debugger(session_of(loaded), loaded.title, stdin, stdout).run()

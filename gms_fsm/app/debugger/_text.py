@@ -1,4 +1,4 @@
-"""The display of the debugger as lines of at most 80 columns."""
+"""The display of the debugger as lines of text, 80 columns wide unless the terminal is wider."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from gms_fsm.app.debugger._view import BranchView, ContactView, Ribbons, StateView, View
+from gms_fsm.app.debugger._over_time import Ribbons
+from gms_fsm.app.debugger._view import BranchView, ContactView, StateView, View
 from gms_fsm.inspection.session import Breakpoint
 
 __all__ = [
@@ -25,8 +26,8 @@ __all__ = [
     "wrapped",
 ]
 
-WIDTH = 80
-BAR = 8  # characters for |z|/s = 1
+WIDTH = 80  # columns, where there is no terminal
+BAR = 8  # characters for |z|/s = 1, and more in a wide terminal
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,9 @@ PLAIN = Marks("ny", ".#", "-#=+%o", "+-+|++", "+=+|++")
 DRAWN = Marks("✗✓", "░█", "─▓═┼▒┄", "┌─┐│└┘", "╔═╗║╚╝")
 
 
-def screen_lines(view: View, ribbons: Ribbons, chosen: int, marks: Marks) -> Iterator[str]:
+def screen_lines(
+    view: View, ribbons: Ribbons, chosen: int, marks: Marks, width: int = WIDTH
+) -> Iterator[str]:
     """Yield one screen: the position, each element with values and edges, the states over time.
 
     Parameters
@@ -55,6 +58,8 @@ def screen_lines(view: View, ribbons: Ribbons, chosen: int, marks: Marks) -> Ite
         The marked element, counted over all contacts from 0.
     marks : Marks
         Drawing characters.
+    width : int
+        Columns.
 
     Yields
     ------
@@ -65,7 +70,7 @@ def screen_lines(view: View, ribbons: Ribbons, chosen: int, marks: Marks) -> Ite
     yield f"t = {view.t:.9g} s, row {view.row}{step}, branch {view.branch}"
     yield from _body_lines(view)
     for contact in view.contacts:
-        yield from _contact_lines(contact, view, chosen, marks)
+        yield from _contact_lines(contact, view, chosen, marks, width)
     no, yes = tuple(marks.truth)
     yield f"edges by priority, one mark per clause: {yes} true, {no} false, * just taken; see why"
     yield from _ribbon_lines(ribbons, view.contacts, marks)
@@ -86,7 +91,9 @@ def _body_lines(view: View) -> Iterator[str]:
         yield from ending_lines(view.ending)
 
 
-def _contact_lines(contact: ContactView, view: View, chosen: int, marks: Marks) -> Iterator[str]:
+def _contact_lines(
+    contact: ContactView, view: View, chosen: int, marks: Marks, width: int
+) -> Iterator[str]:
     """Yield a contact: its force, and each element with its values and edges."""
     more = "".join(f", {name} = {value:.6g}" for name, value in contact.more.items())
     shared = "  (shared with other locks)" if contact.shared else ""
@@ -97,8 +104,9 @@ def _contact_lines(contact: ContactView, view: View, chosen: int, marks: Marks) 
         yield f"v = {contact.v:.6g} m/s, x = {contact.x:.6g} m, F = {contact.F:.6g} N"
         yield from ending_lines(view.ending)
     chart = contact.chart
-    wide = max(5, min(8, max(len(state.name) for state in chart.states)))
-    yield "  ".join(["  el", " ".join([f"{'state':<{wide}}", *_heads(contact)]), "edges"])
+    bar, most = BAR + max(0, width - WIDTH) // 4, 8 + max(0, width - WIDTH) // 4
+    wide = max(5, min(most, max(len(state.name) for state in chart.states)))
+    yield "  ".join(["  el", " ".join([f"{'state':<{wide}}", *_heads(contact, bar)]), "edges"])
     for i, each in enumerate(contact.elements, start=contact.first):
         lead = f"{'>' if i == chosen else ' '}{each.number:>3}  "
         cells = [f"{value:>10.4g}" for value in each.variables]
@@ -106,7 +114,7 @@ def _contact_lines(contact: ContactView, view: View, chosen: int, marks: Marks) 
             shown = f"{each.ratio:.3f}" if each.ratio < 100 else f"{each.ratio:.1e}"
             cells += [f"{each.s:>9.4g}", f"{shown:>7}"]
             if len(each.variables) == 1:  # further variables take the place of the bar
-                cells.append(_bar(each.ratio, marks))
+                cells.append(_bar(each.ratio, marks, bar))
         cells.append(f"{each.F:>10.4g}")
         line = lead + " ".join([f"{short(each.state, wide):<{wide}}", *cells])
         edges = " ".join(
@@ -115,14 +123,14 @@ def _contact_lines(contact: ContactView, view: View, chosen: int, marks: Marks) 
             + ("*" if edge.fired else "")
             for edge in each.edges
         )
-        if len(line) + 2 + len(edges) <= WIDTH:
+        if len(line) + 2 + len(edges) <= width:
             yield f"{line}  {edges}"
         else:
             yield line
             yield f"      {edges}"
 
 
-def _heads(contact: ContactView) -> list[str]:
+def _heads(contact: ContactView, bar: int) -> list[str]:
     """Return the headings of the values of an element, with the same widths."""
     chart = contact.chart
     units = {name: chart.unit(name) for name in chart.variables}
@@ -131,14 +139,14 @@ def _heads(contact: ContactView) -> list[str]:
     if contact.elements[0].ratio is not None:
         heads += [f"{'s [m]':>9}", f"{short(f'|{chart.variables[0]}|/s', 7):>7}"]
         if len(names) == 1:
-            heads.append(" " * (BAR + 2))
+            heads.append(" " * (bar + 2))
     return [*heads, f"{'F_i [N]':>10}"]
 
 
-def _bar(ratio: float, marks: Marks) -> str:
+def _bar(ratio: float, marks: Marks, wide: int) -> str:
     empty, full = tuple(marks.bar)
-    filled = min(BAR, round(BAR * min(ratio, 1.0)))
-    return f"[{full * filled}{empty * (BAR - filled)}{'>' if ratio > 1 else ']'}"
+    filled = min(wide, round(wide * min(ratio, 1.0)))
+    return f"[{full * filled}{empty * (wide - filled)}{'>' if ratio > 1 else ']'}"
 
 
 def _ribbon_lines(ribbons: Ribbons, contacts: Sequence[ContactView], marks: Marks) -> Iterator[str]:
@@ -161,9 +169,9 @@ def _ribbon_lines(ribbons: Ribbons, contacts: Sequence[ContactView], marks: Mark
         yield f"      {who}{key}{last}"
 
 
-def ribbon_parts(view: View) -> int:
+def ribbon_parts(view: View, width: int = WIDTH) -> int:
     """Return the number of characters for the states over time."""
-    return WIDTH - _lead(_labels(view.contacts))
+    return width - _lead(_labels(view.contacts))
 
 
 def _labels(contacts: Sequence[ContactView]) -> list[str]:
@@ -204,7 +212,7 @@ def ending_lines(ending: str) -> Iterator[str]:
         yield "  go back and look, or poke a value to continue in a new branch"
 
 
-def chart_lines(states: Sequence[StateView], marks: Marks) -> Iterator[str]:
+def chart_lines(states: Sequence[StateView], marks: Marks, width: int = WIDTH) -> Iterator[str]:
     """Yield a chart as boxes, the active one marked, with the edges below each.
 
     Parameters
@@ -213,6 +221,8 @@ def chart_lines(states: Sequence[StateView], marks: Marks) -> Iterator[str]:
         The states of the chart.
     marks : Marks
         Drawing characters.
+    width : int
+        Columns.
 
     Yields
     ------
@@ -225,7 +235,7 @@ def chart_lines(states: Sequence[StateView], marks: Marks) -> Iterator[str]:
         lines += [f"  {name} = {text}" for name, text in state.forces]
         lines += ["  locked: v = 0, F is what holds it"] * state.locked
         box, lead = (marks.active, "> ") if state.active else (marks.box, "  ")
-        yield from _boxed(lines, box, lead)
+        yield from _boxed(lines, box, lead, width)
         for edge in state.edges:
             fired = "  FIRED" if edge.fired else ""
             yield f"     {edge.priority} {edge.name} -> {edge.target}{fired}"
@@ -233,9 +243,9 @@ def chart_lines(states: Sequence[StateView], marks: Marks) -> Iterator[str]:
             yield f"         [{edge.guard}]{f'  {truths}' if truths else ''}"
 
 
-def _boxed(lines: Sequence[str], box: str, lead: str) -> Iterator[str]:
+def _boxed(lines: Sequence[str], box: str, lead: str, width: int) -> Iterator[str]:
     left, across, right, side, low_left, low_right = tuple(box)
-    lines = [short(line, WIDTH - 8) for line in lines]
+    lines = [short(line, width - 8) for line in lines]
     wide = max(30, *(len(line) for line in lines)) + 2
     yield f"  {left}{across * wide}{right}"
     for number, line in enumerate(lines):
@@ -312,14 +322,16 @@ def short(text: str, wide: int) -> str:
     return text if len(text) <= wide else text[: wide - 1] + "~"
 
 
-def wrapped(line: str) -> Iterator[str]:
+def wrapped(line: str, width: int = WIDTH) -> Iterator[str]:
     """Yield a line in parts that fit the screen.
 
     >>> [len(part) <= WIDTH for part in wrapped("word " * 40)]
     [True, True, True]
+    >>> [len(part) <= 120 for part in wrapped("word " * 40, 120)]
+    [True, True]
     """
-    if len(line) <= WIDTH:
+    if len(line) <= width:
         yield line.rstrip()
         return
     indent = " " * (len(line) - len(line.lstrip()) + 2)
-    yield from textwrap.wrap(line, WIDTH, subsequent_indent=indent[:40])
+    yield from textwrap.wrap(line, width, subsequent_indent=indent[: width // 2])

@@ -18,14 +18,12 @@ __all__ = [
     "ContactView",
     "EdgeView",
     "ElementView",
-    "Ribbons",
     "StateView",
     "ValueView",
     "View",
     "branches",
     "chart_states",
     "ending",
-    "ribbons",
     "view",
 ]
 
@@ -193,27 +191,6 @@ class View:
     def elements(self) -> tuple[ElementView, ...]:
         """All elements of all contacts."""
         return tuple(each for contact in self.contacts for each in contact.elements)
-
-
-@dataclass(frozen=True)
-class Ribbons:
-    """The states of all elements over time.
-
-    Parameters
-    ----------
-    start, end : float
-        Start and end time, s.
-    modes : tuple of (tuple of int or None)
-        State index of each element, for equal parts of that time; None where the branch has not
-        been computed.
-    now : int
-        The part that contains the cursor.
-    """
-
-    start: float
-    end: float
-    modes: tuple[tuple[int, ...] | None, ...]
-    now: int
 
 
 @dataclass(frozen=True)
@@ -448,33 +425,6 @@ def chart_states(session: Session, machine: int) -> tuple[StateView, ...]:
         )
         for state in chart.states
     )
-
-
-def ribbons(session: Session, parts: int) -> Ribbons:
-    """Return the states of all elements over the whole time span.
-
-    Parameters
-    ----------
-    session : Session
-        The session.
-    parts : int
-        Number of equal parts of the time span.
-
-    Returns
-    -------
-    Ribbons
-        The states in the middle of each part.
-    """
-    branch, start, end = session.branch, session.branch.raw(0).t, session.t_end
-    modes: list[tuple[int, ...] | None] = []
-    for part in range(parts):
-        t = start + (end - start) * (part + 0.5) / parts
-        row = branch.row_at(t)
-        # The states of the last row are known only up to its time.
-        reached = row + 1 < len(branch) or branch.ended
-        modes.append(branch.raw(row).mode if row >= 0 and reached else None)
-    now = min(parts - 1, int(parts * (session.here.t - start) / (end - start)))
-    return Ribbons(start, end, tuple(modes), now)
 
 
 def branches(session: Session) -> tuple[BranchView, ...]:

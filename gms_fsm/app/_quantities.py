@@ -1,0 +1,77 @@
+"""Values in engineering units for screens: ``-776.2 mm``, ``1.346 N``, ``25.00 kN/m``."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+
+__all__ = ["quantity", "sparkline"]
+
+PREFIXES = {3 * i - 18: prefix for i, prefix in enumerate(["a", *"fpnµm", "", *"kMGT"])}
+# A prefix belongs to the first unit of a product; of a power or of kg it would be wrong.
+TAKES_PREFIX = re.compile(r"(m|s|N|J|W|Pa|Hz|rad|V|A|Nm|Ns)(?=$|[/*·])")
+BLOCKS = "▁▂▃▄▅▆▇█"
+
+
+def quantity(value: float, unit: str = "", digits: int = 4) -> str:
+    """Return a value with its unit, and a prefix instead of an exponent.
+
+    Parameters
+    ----------
+    value : float
+        In SI units.
+    unit : str
+        SI unit; empty for a number without one.
+    digits : int
+        Significant digits.
+
+    Returns
+    -------
+    str
+        The text. A unit that takes no prefix, such as ``m^2``, follows a power of ten.
+
+    Examples
+    --------
+    >>> quantity(-0.77618, "m"), quantity(1.5, "N"), quantity(0, "m/s"), quantity(2.5e4, "N/m")
+    ('-776.2 mm', '1.500 N', '0 m/s', '25.00 kN/m')
+    >>> quantity(1e-6, "m/s"), quantity(0.99999, "m"), quantity(3e-7, "m^2"), quantity(1.51743)
+    ('1.000 µm/s', '1.000 m', '3.000e-07 m^2', '1.517')
+    """
+    rounded = float(f"{value:.{digits - 1}e}")  # of the largest numbers it is infinite
+    if not math.isfinite(rounded) or value == 0.0:
+        return f"{value:g} {unit}".rstrip()
+    power = math.floor(math.log10(abs(rounded)) + 1e-12)
+    step = 3 * (power // 3)
+    if unit and TAKES_PREFIX.match(unit) and step in PREFIXES:
+        return f"{rounded / 10.0**step:.{digits - 1 - power + step}f} {PREFIXES[step]}{unit}"
+    if -4 <= power < digits:
+        return f"{rounded:.{digits - 1 - power}f} {unit}".rstrip()
+    return f"{rounded:.{digits - 1}e} {unit}".rstrip()
+
+
+def sparkline(values: Sequence[float | None]) -> str:
+    """Return values as a line of blocks, the lowest and the highest at its edges.
+
+    Parameters
+    ----------
+    values : sequence of float or None
+        One per character; blank where there is none.
+
+    Returns
+    -------
+    str
+        As many characters.
+
+    Examples
+    --------
+    >>> sparkline([0.0, 0.5, 1.0, None, -1.0]), sparkline([2.0, 2.0])
+    ('▅▆█ ▁', '▁▁')
+    """
+    known = [value for value in values if value is not None and math.isfinite(value)]
+    low, high = min(known, default=0.0), max(known, default=0.0)
+    height = (len(BLOCKS) - 1) / (high - low) if high > low else 0.0
+    return "".join(
+        " " if value is None or not math.isfinite(value) else BLOCKS[round((value - low) * height)]
+        for value in values
+    )

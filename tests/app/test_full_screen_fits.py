@@ -1,0 +1,116 @@
+"""The full-screen debugger clips no text, on small and on large terminals."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import pytest
+
+pytest.importorskip("textual", reason="needs the extra tui")
+
+from gms_fsm import GMS, GMSParameters, Prescribed, Stribeck
+from gms_fsm.app.debugger.tui._app import PAGES, FullScreen
+from gms_fsm.app.debugger.tui._widgets import Panel
+from gms_fsm.inspection.session import Session
+from tests.app.full_screen import LARGE, SMALL, drive, press, screen_text, session, settle
+
+pytestmark = pytest.mark.slow
+SIZES = [SMALL, (100, 30), (120, 36), LARGE]
+
+
+def _check(app: FullScreen, size: tuple[int, int]) -> set[str]:
+    """Assert that each visible panel is on the screen and its lines fit; return their names."""
+    whole = app.screen.region
+    assert (whole.width, whole.height) == size
+    seen = set()
+    for panel in app.screen.query(Panel):
+        if not panel.display or not panel.region.height or not panel.region.width:
+            continue
+        seen.add(str(panel.id))
+        assert whole.contains_region(panel.region), panel.id
+        inside = panel.scrollable_content_region
+        assert inside.height >= 1, panel.id
+        assert inside.width >= 20, panel.id
+        for row in panel.rows:
+            text = "".join(span.text for span in row.line)
+            wide = panel.max_scroll_x + inside.width  # the chart can be scrolled sideways
+            assert len(text.rstrip()) <= wide, (panel.id, text)
+        assert panel.max_scroll_y + inside.height >= len(panel.rows), panel.id
+    for name in ("#status", "#line", "#keys"):
+        assert whole.contains_region(app.query_one(name).region), name
+    bar = app.keys
+    assert bar.places[-1][1] <= size[0]
+    assert [place[2] for place in bar.places[-2:]] == ["help", "leave"]
+    return seen
+
+
+def _twelve() -> Session:
+    k = [1.0 + 0.1 * i for i in range(12)]
+    parameters = GMSParameters(
+        k, [0.1] * 12, [0.1] * 12, sigma_2=0.1, stribeck=Stribeck(1.0, 1.5, 1e-3), v_c=1e-6
+    )
+    return Session(GMS(parameters, law="published"), Prescribed("0.15*sin(2*pi*t/25)"), 100.0)
+
+
+@pytest.mark.parametrize(
+    ("scenario", "size"),
+    [
+        *itertools.product(["brake_squeal", "twelve"], [SMALL, LARGE]),
+        ("ball_screw_table", (120, 36)),
+        ("drill_string", (100, 30)),
+        ("servo", (132, 43)),
+    ],
+)
+def test_every_panel_is_on_the_screen_and_its_lines_fit(
+    scenario: str, size: tuple[int, int]
+) -> None:
+    made = _twelve() if scenario == "twelve" else session(scenario)
+
+    async def action(app: FullScreen, pilot: Any) -> None:
+        app.give("next", "next")
+        app.action_break()
+        await settle(pilot)
+        seen = _check(app, size)
+        for _ in range(1, PAGES if app.small else 1):
+            await press(pilot, "v")
+            seen |= _check(app, size)
+        assert seen == {"chart", "why", "ribbons", "elements", "events", "session", "answers"}
+        await press(pilot, "question_mark")
+        assert app.screen.region.contains_region(app.screen.query_one(Panel).region)
+
+    drive(action, size, made)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_the_chart_of_an_element_is_whole(size: tuple[int, int]) -> None:
+    async def action(app: FullScreen, pilot: Any) -> None:
+        app.give("goto 25")
+        await settle(pilot)
+        text = screen_text(app)
+        for part in (
+            "stick",
+            "slip  ◉ ACTIVE",
+            "dz = sgn(v) * C * (1 - z / s)",
+            "[z >= s && v > v_c]",
+        ):
+            assert part in text
+        for i in range(1, 5):
+            assert f"E{i}" in text
+        chart = app.panels["chart"]
+        assert chart.max_scroll_y == 0
+        assert chart.max_scroll_x == 0
+
+    drive(action, size)
+
+
+def test_it_adapts_when_the_terminal_changes() -> None:
+    async def action(app: FullScreen, pilot: Any) -> None:
+        for size in (LARGE, (132, 43), SMALL):
+            await pilot.resize_terminal(*size)
+            app.give("step")
+            await settle(pilot)
+            seen = _check(app, size)
+            assert ("events" in seen) == (size != SMALL)
+
+    drive(action, SMALL)

@@ -1,0 +1,80 @@
+"""The full-screen debugger and the line prompt give the same answers and show the same values."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import pytest
+
+pytest.importorskip("textual", reason="needs the extra tui")
+
+from gms_fsm.app._quantities import quantity
+from gms_fsm.app.debugger import Debugger, view
+from gms_fsm.app.debugger._text import DRAWN
+from gms_fsm.app.debugger.tui._app import FullScreen
+from tests.app.full_screen import LARGE, drive, session, settle
+from tests.app.test_debugger_is_plain_text import EVERYTHING
+
+COMMANDS = [each for each in EVERYTHING if not each.startswith("load")]
+
+
+def _lines(text: str) -> str:
+    return " ".join(text.split())
+
+
+@pytest.mark.slow
+def test_every_command_has_the_same_answer() -> None:
+    async def action(app: FullScreen, pilot: Any) -> None:
+        app.give(*COMMANDS)
+        await settle(pilot)
+
+    app = drive(action, LARGE)
+    made = Debugger(session())
+    made.commands.marks = DRAWN
+    begins = [i for i, text in enumerate(app.said) if text.startswith("(t=")]
+    assert len(begins) == len(COMMANDS)
+    for begin, end, command in zip(begins, [*begins[1:], len(app.said)], COMMANDS, strict=True):
+        assert app.said[begin] == f"{made.prompt}{command}"
+        expected = made.reply(command)
+        made.prompt = made.commands.prompt
+        assert _lines("\n".join(app.said[begin + 1 : end])) == _lines(expected), command
+    assert made.session.here == app.commands.session.here
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", ["paper_fig4_stick_slip", "friction_damper"])
+def test_panels_show_the_values_of_the_view_with_units(scenario: str) -> None:
+    made = session(scenario)
+
+    async def action(app: FullScreen, pilot: Any) -> None:
+        app.give("next", "next", "next", "step 3")
+        await settle(pilot)
+
+    app = drive(action, LARGE, made)
+    seen = view(made)
+    shown = app.panels["elements"].shown
+    rows = re.findall(r"^[▶ ] E\d.*", shown, re.MULTILINE)
+    for row, each in zip(rows, seen.elements, strict=True):
+        assert row.split()[-2 - len(each.edges) :]
+        assert f" {each.state} " in row
+        assert f" {quantity(each.F, 'N')} " in row
+        if each.s is not None and each.ratio is not None:
+            assert f" {quantity(each.s, 'm')} " in row
+            assert f" {each.ratio:.3f} " in row
+            assert f" {quantity(each.variables[0], 'm')} " in row
+    why = made.why(app.commands.elements.address(0))
+    text = app.panels["why"].shown
+    for each in why:
+        assert each.verdict in _lines(text)
+        for clause in each.clauses:
+            margin = quantity(clause.margin, clause.unit) if clause.relative else "0, rounding"
+            pattern = (
+                rf"{'✓' if clause.holds else '✗'} {re.escape(clause.text)} .* {re.escape(margin)} "
+            )
+            assert re.search(pattern, text), (pattern, text)
+    log = [each for each in app.panels["events"].shown.splitlines() if each.strip()]
+    assert len(log) == len(made.branch.log())
+    for row, record in zip(log, made.branch.log(), strict=True):
+        assert f"{record.t:.9g} s" in row
+        assert record.edge in row
