@@ -114,3 +114,14 @@ def test_it_adapts_when_the_terminal_changes() -> None:
             assert ("events" in seen) == (size != SMALL)
 
     drive(action, SMALL)
+
+
+@pytest.mark.parametrize("size", [(40, 12), (10, 4)])
+def test_a_tiny_terminal_does_no_harm(size: tuple[int, int]) -> None:
+    async def action(app: FullScreen, pilot: Any) -> None:
+        app.give("next", "why 1")
+        await settle(pilot)
+        await press(pilot, "v", "v", "question_mark", "escape", "d")
+        assert app.commands.session.branch.cursor == 12
+
+    drive(action, size)
