@@ -256,9 +256,8 @@ class FullScreen(App[int]):
 
     def _draw_status(self) -> None:
         several = len(self.commands.session.branches) > 1
-        lines = drawn.status_lines(
-            self.seen, self.heading, self.size.width, several=several, busy=self.busy
-        )
+        width = self.status.outer_size.width - self.status.styles.gutter.width
+        lines = drawn.status_lines(self.seen, self.heading, width, several=several, busy=self.busy)
         self.status.update(painted(lines, self.palette))
         lead = f"{self.number}" if self.number else self.commands.prompt
         if not self.busy:
