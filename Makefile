@@ -10,6 +10,7 @@
 #   make bench   speed and error compared with C, SciPy, CVODE and PathSim
 #   make soak    stress tests: fuzzing, kills, a million transitions, 2,000 runs checked against a
 #                reference; SOAK_MINUTES=10 for each fuzzer
+#   make foreign the widget, driven in JupyterLab and marimo by their own user interfaces, in Chromium
 #   make gallery the pictures in docs/images, shown in docs/gallery.md, and the pages in docs/zoo
 #   make docs    the documentation -> folder site/, which can be opened from disk
 #   make wheel   a wheel -> folder dist/, installed and tested outside the checkout
@@ -21,7 +22,7 @@ RUN := $(VENV)/bin
 SOAK_MINUTES ?= 10
 PIP := $(RUN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: help paper test quick coverage lint core lowest bench soak gallery docs wheel clean
+.PHONY: help paper test quick coverage lint core lowest bench soak foreign gallery docs wheel clean
 .DEFAULT_GOAL := test
 
 $(VENV)/bin/python:
@@ -42,6 +43,10 @@ $(VENV)/docs.stamp: pyproject.toml | $(VENV)/bin/python
 
 $(VENV)/bench.stamp: pyproject.toml | $(VENV)/bin/python
 	$(PIP) install -e ".[dev,bench]"
+	@touch $@ $(VENV)/dev.stamp
+
+$(VENV)/foreign.stamp: pyproject.toml | $(VENV)/bin/python
+	$(PIP) install -e ".[dev,foreign]"
 	@touch $@ $(VENV)/dev.stamp
 
 help:
@@ -98,6 +103,9 @@ bench: $(VENV)/bench.stamp
 
 soak: $(VENV)/dev.stamp
 	$(RUN)/python -m tests.soak --minutes $(SOAK_MINUTES)
+
+foreign: $(VENV)/foreign.stamp
+	$(RUN)/python -m tests.foreign
 
 gallery: $(VENV)/all.stamp
 	$(RUN)/python docs/make_pictures.py

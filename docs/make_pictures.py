@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from contextlib import chdir, redirect_stdout
+from io import StringIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from textwrap import wrap
 from typing import Any
 
@@ -28,6 +31,7 @@ from gms_fsm import (
     sweep,
 )
 from gms_fsm._files import write_whole
+from gms_fsm.app.lessons.notebooks import cells_of
 from gms_fsm.app.paper import FIG4_END, FORCE, VELOCITY
 from gms_fsm.app.paper.experiments import experiments, run_one
 from gms_fsm.app.paper.writing import held_figure
@@ -277,6 +281,7 @@ def draw_howto() -> None:
     bilinear = tutorial_chart()
     plots.render(plots.statechart(bilinear), FOLDER / "howto_bilinear.png")
     figures.save(loops_figure(bilinear), FOLDER / "howto_bilinear_loop.png")
+    figures.save(desk_figure(), FOLDER / "howto_desk_experiment.png")
 
 
 def tutorial_chart() -> Chart:
@@ -287,6 +292,18 @@ def tutorial_chart() -> Chart:
     exec(file, names)
     chart: Chart = names["BILINEAR"]
     return chart
+
+
+def desk_figure() -> Figure:
+    """Return the figure of docs/howto/desk-experiment.md, whose code it runs."""
+    page = (Path(__file__).parent / "howto" / "desk-experiment.md").read_text(encoding="utf-8")
+    names: dict[str, Any] = {}
+    with TemporaryDirectory() as folder, chdir(folder), redirect_stdout(StringIO()):
+        for kind, text in cells_of(page):
+            if kind == "code":
+                exec(text, names)
+    figure: Figure = names["figure"]
+    return figure
 
 
 def loops_figure(bilinear: Chart) -> Figure:

@@ -12,6 +12,7 @@ The names below are imported lazily, on first access.
 ['break_away_forward', 'break_away_forward', 'break_away_forward', 'break_away_forward']
 """
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -99,6 +100,11 @@ _HOMES = {
 _HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
 
 __all__ = sorted(_HOME)
+
+if "IPython" in sys.modules:  # else this is no notebook
+    from gms_fsm._display import register_figures
+
+    register_figures()
 
 
 def __getattr__(name: str) -> Any:

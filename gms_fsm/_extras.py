@@ -25,6 +25,7 @@ EXTRAS: Mapping[str, tuple[str, str]] = {
         "the full-screen debugger needs",
         "gms-fsm debug without --tui answers at a prompt, and gms-fsm replay makes a page",
     ),
+    "jupyter": ("the widget needs", "plots.replay shows a run in a notebook too"),
     "check": ("checking a chart needs", "a chart runs without its proofs"),
 }
 

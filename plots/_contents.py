@@ -96,3 +96,41 @@ def _forces(chart: Chart, state: State) -> dict[str, Value]:
     """Return the forces that a state gives, by name; none if it is locked."""
     forces = {name: chart.forces[state.name, name] for name in chart.force_names}
     return {name: tree for name, tree in forces.items() if tree is not None}
+
+
+def chart_in_words(chart: Chart) -> str:
+    """Return a chart as text for people: shown where no picture can be drawn.
+
+    Parameters
+    ----------
+    chart : Chart
+        The chart.
+
+    Returns
+    -------
+    str
+        Name, states with their contents, and the edges that leave them, by priority.
+
+    Examples
+    --------
+    >>> from gms_fsm.charts import GMS_ELEMENT
+    >>> print(chart_in_words(GMS_ELEMENT["signed"]))
+    GMS element, signed law
+    stick (default)
+      during: dz = v;
+      1 -> slip [z >= s && v > v_c]
+      2 -> slip [z <= -s && v < -v_c]
+    slip
+      during: dz = C * (sgn(v) - z / s);
+      1 -> stick [|v| <= v_c && |z| < s]
+    """
+    write, lines = Writer(chart, "stateflow"), [chart.name]
+    for state in chart.states:
+        lines.append(f"{state.name}{' (default)' * (state == chart.default_state)}")
+        lines += [f"  {kind}: {text}" for kind, own in state_texts(write, state) for text in own]
+        for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
+            actions = write.actions(chart.assignments["action", edge.name])
+            line = f"  {priority} -> {edge.target} [{chart.guard_text(edge.name)}] {actions}"
+            lines.append(line.rstrip())
+    lines += [f"{kind}: {text}" for kind, own in chart_texts(write) for text in own]
+    return "\n".join(lines)

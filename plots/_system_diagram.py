@@ -30,6 +30,7 @@ from gms_fsm.language import (
 from gms_fsm.systems.signals import Corners, Formula, Signal
 from gms_fsm.systems.system import Body, Contact, System
 from plots._labels import escape, printable, wrapped
+from plots.drawings import DrawnGraph
 from plots.style import (
     BLUE,
     BLUE_TINT,
@@ -85,7 +86,7 @@ class Block:
         return f"{self.kind}-{self.name}"
 
 
-def system_diagram(system: System) -> graphviz.Digraph:
+def system_diagram(system: System) -> DrawnGraph:
     """Draw a system.
 
     Parameters
@@ -98,7 +99,7 @@ def system_diagram(system: System) -> graphviz.Digraph:
     graphviz.Digraph
         The picture as a Graphviz graph.
     """
-    graph = graphviz.Digraph(
+    graph = DrawnGraph(
         name=graphviz.escape(printable(system.name)),
         graph_attr={
             "rankdir": "LR",
@@ -122,11 +123,16 @@ def system_diagram(system: System) -> graphviz.Digraph:
         },
     )
     blocks = list(_blocks(system))
+    graph.text = "\n".join([system.name, *map(_in_words, blocks)])
     for block in blocks:
         graph.node(block.id, f"<{_box(block)}>", id=block.id, **{"class": block.kind})
     _draw_contacts(graph, system)
     _draw_values(graph, blocks, _owners(system))
     return graph
+
+
+def _in_words(block: Block) -> str:
+    return "\n    ".join([f"  {block.note} {block.name}", *block.texts])
 
 
 # --------------------------------------------------------------------------- what is drawn

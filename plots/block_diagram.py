@@ -24,6 +24,7 @@ import graphviz
 from gms_fsm.errors import ParameterError
 from gms_fsm.systems.system import System
 from plots._system_diagram import system_diagram
+from plots.drawings import DrawnGraph
 from plots.style import (
     BLUE,
     BLUE_TINT,
@@ -55,7 +56,7 @@ INTEGRATOR = (
 )
 
 
-def block_diagram(elements: int | System = 4) -> graphviz.Digraph:
+def block_diagram(elements: int | System = 4) -> DrawnGraph:
     """Draw the block diagram of a system, or of a GMS model.
 
     Parameters
@@ -97,8 +98,8 @@ def block_diagram(elements: int | System = 4) -> graphviz.Digraph:
     return _model_diagram(int(elements))
 
 
-def _model_diagram(elements: int) -> graphviz.Digraph:
-    graph = graphviz.Digraph(
+def _model_diagram(elements: int) -> DrawnGraph:
+    graph = DrawnGraph(
         name="block diagram",
         engine="neato",
         graph_attr={
@@ -118,6 +119,11 @@ def _model_diagram(elements: int) -> graphviz.Digraph:
             "margin": "0",
         },
         edge_attr={"color": INK, "arrowsize": "0.7", "penwidth": "1.1"},
+    )
+    graph.text = (
+        f"GMS model, {elements} element{'s' * (elements != 1)}: F is the sum of the forces of the "
+        "elements, and of sigma_2 v.\nEach element: v and s(v) -> chart (stick, slip) -> dz, "
+        "integrated to z; F_i = k_i z_i + sigma_i dz_i."
     )
     last = elements - 1
     x_sum = X_RIGHT_LANE + last * LANE + 100

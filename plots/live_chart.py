@@ -25,6 +25,7 @@ from gms_fsm.language import Condition, clauses, evaluate, names_in
 from gms_fsm.traces._views import steps_of
 from gms_fsm.traces.trace import Trace, check_trace
 from plots._labels import FALSE, TRUE, UNKNOWN, Piece, Row, edge_id, element_id, part_id
+from plots.drawings import Svg, image
 from plots.render import picture
 from plots.statechart import Sheet, chosen
 
@@ -33,6 +34,7 @@ __all__ = ["ElementLook", "LiveChart", "live_statechart"]
 SVG = "http://www.w3.org/2000/svg"
 THIN, THICK, BORDER = "1.1", "2.6", "3"
 VALUES_PER_LINE = 3
+SAID = 8  # elements in a repr
 TITLE = 2  # texts of a region before its values
 WIDEST = "-0.000e+000"  # a value is never longer than this
 
@@ -241,7 +243,7 @@ class LiveChart:
         Returns
         -------
         str
-            A whole SVG document, ready for a file or a page.
+            A whole SVG document, ready for a file or a page; a notebook shows the picture.
 
         Raises
         ------
@@ -249,7 +251,21 @@ class LiveChart:
             If there is no such row.
         """
         self.paint(row)
-        return ElementTree.tostring(self.root, encoding="unicode")
+        return Svg(ElementTree.tostring(self.root, encoding="unicode"))
+
+    def __repr__(self) -> str:
+        numbers = ", ".join(str(i + 1) for i in self.elements[:SAID])
+        more = ", ..." if len(self.elements) > SAID else ""
+        return f"<LiveChart: elements {numbers}{more}; {self.trace!r}>"
+
+    def _repr_svg_(self) -> str:
+        """Return the last row, for a notebook."""
+        return self.frame(-1)
+
+    def _repr_html_(self) -> str:
+        row = len(self.trace) - 1
+        said = (f"element {look.element + 1} is in {look.active}" for look in self.look(row))
+        return image(self.frame(row), f"t = {self.trace.t[row]:.6g} s: {', '.join(said)}")
 
     def paint(self, row: int) -> None:
         """Paint the tree `root` as a row; `frame` does this and writes the tree.
@@ -312,7 +328,7 @@ def live_statechart(
     Returns
     -------
     str
-        An SVG document.
+        An SVG document; a notebook shows the picture.
 
     Raises
     ------

@@ -15,6 +15,7 @@ from gms_fsm._arguments import checked_kind
 from gms_fsm.charts.chart import Chart
 from plots._contents import Texts, chart_texts, state_texts
 from plots._notation import Writer
+from plots.drawings import MermaidText
 
 __all__ = ["mermaid"]
 
@@ -69,7 +70,7 @@ def mermaid(chart: Chart) -> str:
         first = ids[chart.default_state.name]
         lines += [f"note right of {first}", *map(_escape, shared), "end note"]
     head = f"---\ntitle: {title}\n---\nstateDiagram-v2\n"
-    return head + "".join(f"    {line}\n" for line in lines)
+    return MermaidText(head + "".join(f"    {line}\n" for line in lines))
 
 
 def _lines(texts: Texts) -> Iterator[str]:

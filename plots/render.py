@@ -11,6 +11,7 @@ import re
 import shutil
 import subprocess
 import warnings
+from importlib.util import find_spec
 from pathlib import Path
 
 import graphviz
@@ -22,7 +23,7 @@ from gms_fsm.errors import MissingExtraError, OutputError, ParameterError
 from plots import formats
 from plots.statechart import ChartGraph
 
-__all__ = ["drawn", "picture", "render"]
+__all__ = ["available", "drawn", "picture", "render"]
 
 PNG_DPI = "144"  # twice a screen point: crisp on dense displays
 
@@ -136,6 +137,11 @@ def drawn(graph: graphviz.Digraph, form: str) -> bytes | None:
         # The same chart gives the same file: only the date would differ.
         picture = re.sub(rb"(/CreationDate \(D:)\d{14}", rb"\g<1>19700101000000", picture)
     return picture
+
+
+def available() -> bool:
+    """Return whether there is a Graphviz: the program dot, or the package pygraphviz."""
+    return shutil.which("dot") is not None or find_spec("pygraphviz") is not None
 
 
 def _by_program(graph: graphviz.Digraph, form: str) -> bytes | None:

@@ -15,7 +15,7 @@ import html
 import importlib.util
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from importlib.resources.abc import Traversable
@@ -24,6 +24,7 @@ from typing import Any
 
 from gms_fsm._arguments import checked_kind, listed
 from gms_fsm._extras import missing
+from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError
 from gms_fsm.inspection.explain import ROUNDING
 from gms_fsm.inspection.prove import Report
@@ -43,7 +44,7 @@ from plots.page._rows import page_rows
 from plots.page._run import stored_run, views_of
 from plots.style import CHART_THEMES, ELEMENT_COLOURS, PAGE_THEMES
 
-__all__ = ["Replay", "replay", "replay_html", "write_replay"]
+__all__ = ["Replay", "page_data", "page_html", "replay", "replay_html", "write_replay"]
 
 # In this order: later ones use what earlier ones define.
 SCRIPTS = (
@@ -60,6 +61,7 @@ SCRIPTS = (
     "landscape.js",
     "microscope.js",
     "bristles.js",
+    "host.js",
     "page.js",
 )
 HATCH_ANGLES = (None, 45, 135, 0, 90)  # of the states' ribbons, degrees
@@ -97,6 +99,9 @@ class Replay:
     """
 
     html: str
+
+    def __repr__(self) -> str:
+        return f"<Replay: a page of {len(self.html)} characters; .save(path) writes it to a file>"
 
     def _repr_html_(self) -> str:
         # Without allow-same-origin: the page may run its scripts but not touch the notebook.
@@ -247,6 +252,40 @@ def replay_html(
         If uPlot is not installed.
     """
     traces = [trace] if other is None else [trace, other]
+    stored = page_data(traces, title=title, names=names, window=window, checks=checks)
+    return page_html(*stored)
+
+
+def page_data(
+    traces: Sequence[Trace],
+    *,
+    title: str = "",
+    names: Sequence[str] = (),
+    window: tuple[float, float] | None = None,
+    checks: Report | Sequence[Report] = (),
+    draw: Callable[[Chart, int], str] = chart_svg,
+) -> tuple[dict[str, Any], list[str]]:
+    """Return what a page shows: the data of one or two runs, and pictures of their charts.
+
+    Parameters
+    ----------
+    traces : sequence of Trace
+        One run, or two.
+    title, names, window, checks
+        See `replay`.
+    draw : callable, optional
+        Draws the chart of a number of elements, as `plots.page._chart.chart_svg` does.
+
+    Returns
+    -------
+    (dict, list of str)
+        Data for JSON, and SVG texts, to which the data refer by number.
+
+    Raises
+    ------
+    ParameterError
+        See `replay`.
+    """
     for each in traces:
         checked_kind("trace", each, Trace, "a Trace, from simulate(...) or Trace.load(path)")
         window_of(each, window)
@@ -261,7 +300,6 @@ def replay_html(
                 advice=f"these runs have {', '.join(sorted({chart.name for chart in known}))}",
             )
     names = [checked_kind("names", each, str, "texts") for each in listed("names", names, "texts")]
-    plot_script, plot_style = _uplot()
     if len(names) not in (0, len(traces)):
         raise ParameterError(
             f"{len(traces)} run(s) but names = {list(names)!r}", advice="give one each"
@@ -270,7 +308,7 @@ def replay_html(
     runs = []
     for i, each in enumerate(traces):
         page = page_rows(each, window)
-        pictures = [chart_svg(view.model.chart, view.n) for view in views_of(each)]
+        pictures = [draw(view.model.chart, view.n) for view in views_of(each)]
         charts += [picture for picture in dict.fromkeys(pictures) if picture not in charts]
         run = stored_run(page, [charts.index(picture) for picture in pictures], reports)
         head = [*names[i : i + 1], each.title]
@@ -281,6 +319,30 @@ def replay_html(
         "language": _language(),
         "rounding": ROUNDING,
     }
+    return data, charts
+
+
+def page_html(data: Mapping[str, Any], charts: Sequence[str]) -> str:
+    """Return a page that shows data from `page_data`.
+
+    Parameters
+    ----------
+    data : mapping
+        The runs.
+    charts : sequence of str
+        The pictures of their charts.
+
+    Returns
+    -------
+    str
+        HTML.
+
+    Raises
+    ------
+    MissingExtraError
+        If uPlot is not installed.
+    """
+    plot_script, plot_style = _uplot()
     script = "".join(map(_part, SCRIPTS))
     style = _theme() + plot_style + _part("page.css")
     scripts = " ".join(map(_hash, (plot_script, script)))

@@ -21,7 +21,7 @@ from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ParameterError
 from gms_fsm.language import Both, Condition, Either, clauses
 from gms_fsm.traces.trace import Trace
-from plots._contents import Texts, chart_texts, state_texts
+from plots._contents import Texts, chart_in_words, chart_texts, state_texts
 from plots._labels import (
     DOT,
     LONGEST_LINE,
@@ -37,6 +37,7 @@ from plots._labels import (
     wrapped,
 )
 from plots._notation import NOTATIONS, Writer
+from plots.drawings import DrawnGraph
 from plots.style import CHART_THEMES, MONO, SANS, ChartTheme
 
 __all__ = ["ChartGraph", "statechart"]
@@ -49,7 +50,7 @@ ROOM_PER_EDGE = {"TB": 45, "LR": 16}
 MARKED = "2.6"  # points; width of highlighted lines
 
 
-class ChartGraph(graphviz.Digraph):  # type: ignore[misc]
+class ChartGraph(DrawnGraph):
     """A picture of a state chart that refers to it, so that other formats can be written."""
 
     chart: Chart
@@ -66,7 +67,7 @@ def statechart(
     marked: Iterable[str] = (),
     names: bool = False,
     note: str = "",
-) -> graphviz.Digraph:
+) -> DrawnGraph:
     """Draw a chart: one element, or a bank of elements as parallel states.
 
     Parameters
@@ -266,7 +267,7 @@ class Sheet:
 
     def graph(
         self, numbers: Sequence[int], *, bare: bool, values: Sequence[Row] = (), foot: str = ""
-    ) -> graphviz.Digraph:
+    ) -> DrawnGraph:
         """Draw elements.
 
         Parameters
@@ -300,7 +301,7 @@ class Sheet:
             node_attr={"fontname": SANS, "shape": "plain"},
             edge_attr={"color": ink, "arrowsize": "0.7", "penwidth": "1.1"},
         )
-        graph.chart = self.chart
+        graph.chart, graph.text = self.chart, chart_in_words(self.chart)
         below = self.definitions() + (list(values) if bare else [])
         below += [[Piece(line, "value")] for line in foot.splitlines()]
         if below:

@@ -265,12 +265,21 @@ def lesson_command(
     output: Annotated[Path, typer.Option("--output", "-o", help="Output folder.")] = Path(
         "lessons"
     ),
+    notebook: Annotated[
+        bool, typer.Option("--notebook", help="Write it as a notebook instead, without running it.")
+    ] = False,
 ) -> None:
     """Run a lesson: a figure, a replay page, and five lines with the measured values."""
-    from gms_fsm.app.lessons import listed, numbered, teach
+    from gms_fsm.app.lessons import LESSONS, listed, numbered, teach
 
-    if not number:
+    if not number and not notebook:
         typer.echo(listed())
+        return
+    if notebook:
+        from gms_fsm.app.lessons.notebooks import write_notebook
+
+        for each in [numbered(number)] if number else LESSONS:
+            typer.echo(str(write_notebook(each, output)))
         return
     chosen = numbered(number)
     with messages().status(f"running lesson {chosen}"):

@@ -14,10 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from gms_fsm._arguments import checked_kind, checked_path
+from gms_fsm._display import displayed
 from gms_fsm.charts._parts import State, Transition, texts_of
 from gms_fsm.charts._reader import Reader
 from gms_fsm.charts.parameters import QUANTITIES, Parameter
-from gms_fsm.errors import ChartError, shown
+from gms_fsm.errors import ChartError, cut, shown
 from gms_fsm.language import CONSTANTS, FUNCTIONS, MATLAB_LIKE, Condition, Value, spell
 
 __all__ = ["Chart", "State", "Transition"]
@@ -31,6 +32,7 @@ RESERVED = frozenset(
 )
 
 
+@displayed("svg", "html")
 @dataclass(frozen=True, init=False)
 class Chart:
     """The state chart of one friction element, checked at construction.
@@ -144,6 +146,13 @@ class Chart:
         expanded = tuple(each for edge in self.transitions for each in edge.each())
         for each, value in {**Reader(self).trees(), "transitions": expanded}.items():
             object.__setattr__(self, each, value)
+
+    def __repr__(self) -> str:
+        states, edges = len(self.states), len(self.transitions)
+        return (
+            f"<Chart {cut(self.name)!r}: {states} state{'s' * (states != 1)}, "
+            f"{edges} edge{'s' * (edges != 1)}>"
+        )
 
     # ------------------------------------------------------------------ checks
     def _check_names(self) -> None:

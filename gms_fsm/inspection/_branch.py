@@ -82,6 +82,10 @@ class Branch:
         self.on_row: Callable[[], object] = _nothing  # called at each row of a move; may interrupt
         self.pull()
 
+    def __repr__(self) -> str:
+        fork = "" if self.parent is None else f", from row {self.fork} of branch {self.parent}"
+        return f"<Branch: {len(self)} rows, cursor at row {self.cursor}{fork}>"
+
     # ------------------------------------------------------------------ rows
     def __len__(self) -> int:
         return self.offset + len(self.run.recorder.rows.t)

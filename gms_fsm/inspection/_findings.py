@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias, get_args
 
+from gms_fsm._display import displayed, short_repr
 from gms_fsm.charts.chart import Chart
 from gms_fsm.inspection._subject import subject_of
 
@@ -18,6 +19,8 @@ Status: TypeAlias = Literal["proved", "settled by order", "refuted", "undecided"
 CHECKS: tuple[Check, ...] = get_args(Check)
 
 
+@displayed("html")
+@short_repr
 @dataclass(frozen=True)
 class Finding:
     """The result of one statement about a chart.
@@ -60,6 +63,8 @@ class Finding:
         return listed(self.counterexample)
 
 
+@displayed("html")
+@short_repr
 @dataclass(frozen=True)
 class Report:
     """The statements about a chart that were proved, refuted or left undecided.

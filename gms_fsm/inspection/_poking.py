@@ -15,7 +15,7 @@ from gms_fsm.systems.models import parameter_names
 if TYPE_CHECKING:
     from gms_fsm.inspection._branch import Row
 
-__all__ = ["Edits", "initial_with", "pokeable"]
+__all__ = ["Edits", "initial_values", "initial_with", "pokeable"]
 
 AGE = "age"  # restarts in a state that was poked
 
@@ -205,14 +205,12 @@ def initial_with(edits: Edits, start: Start, here: Row) -> dict[str, Any]:
     dict
         In the form accepted by `gms_fsm.simulate`: the whole state, with the changes.
     """
+    initial = initial_values(start, here)
     layout = start.program.layout
-    initial: dict[str, Any] = layout.y.named(here.y)
-    modes = list(here.mode[layout.elements])
     poked = {machine_of(element, start): name for element, name in edits.state.items()}
     for bank in layout.banks:
-        names = [state.name for state in start.system.contact(bank.name).chart.states]
-        active = enumerate(modes[bank.elements], start=bank.first)
-        initial[f"{bank.name}.states"] = [poked.get(i, names[mode]) for i, mode in active]
+        states = enumerate(initial[f"{bank.name}.states"], start=bank.first)
+        initial[f"{bank.name}.states"] = [poked.get(i, name) for i, name in states]
         if AGE in bank.variables:
             ages = enumerate(initial[bank.of(AGE)], start=bank.first)
             initial[bank.of(AGE)] = [0.0 if i in poked else age for i, age in ages]
@@ -223,3 +221,27 @@ def initial_with(edits: Edits, start: Start, here: Row) -> dict[str, Any]:
         else:
             initial[name] = values
     return initial if edits.v is None else initial | {"v": edits.v}
+
+
+def initial_values(start: Start, here: Row) -> dict[str, Any]:
+    """Return the whole state at a point of a run as the ``initial`` of another.
+
+    Parameters
+    ----------
+    start : Start
+        Of the run.
+    here : Row
+        The point.
+
+    Returns
+    -------
+    dict
+        In the form accepted by `gms_fsm.simulate`.
+    """
+    layout = start.program.layout
+    initial: dict[str, Any] = layout.y.named(here.y)
+    modes = list(here.mode[layout.elements])
+    for bank in layout.banks:
+        names = [state.name for state in start.system.contact(bank.name).chart.states]
+        initial[f"{bank.name}.states"] = [names[mode] for mode in modes[bank.elements]]
+    return initial

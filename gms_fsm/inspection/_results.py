@@ -8,6 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from gms_fsm._display import displayed, short_repr
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import SessionError, shown
 from gms_fsm.traces.trace import Trace
@@ -58,6 +59,7 @@ class BodyHere:
     v: float
 
 
+@short_repr
 @dataclass(frozen=True)
 class ContactHere:
     """A contact at one row.
@@ -97,6 +99,8 @@ class ContactHere:
         return f"{text}, {', '.join(f'{count} {name}' for count, name in counts)}"
 
 
+@displayed("html")
+@short_repr
 @dataclass(frozen=True)
 class Here:
     """One row of a branch; printed, the text of the debugger after a move.
@@ -210,6 +214,8 @@ def _found(parts: Mapping[str, Part], name: str, kind: str) -> Part:
     return parts[name]
 
 
+@displayed("html")
+@short_repr
 @dataclass(frozen=True)
 class BranchComparison:
     """A comparison of two branches; printed, the text of the debugger.

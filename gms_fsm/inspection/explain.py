@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+from gms_fsm._display import displayed, short_repr
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.language import (
     MATLAB_LIKE,
@@ -78,6 +79,8 @@ class Clause:
         return self.margin / larger
 
 
+@displayed("html")
+@short_repr
 @dataclass(frozen=True)
 class Explanation:
     """One edge that leaves the state of an element, or the state it has just left.
@@ -135,6 +138,8 @@ class Explanation:
         return f"{self.verdict}\n{_detail(self)}"
 
 
+@displayed("html")
+@short_repr
 @dataclass(frozen=True)
 class Why:
     """Why an element switches or does not: a sequence of `Explanation`, highest priority first.

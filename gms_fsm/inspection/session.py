@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Unpack
 
 from gms_fsm._arguments import checked_path
+from gms_fsm._display import displayed
 from gms_fsm.errors import SessionError
 from gms_fsm.inspection import _breakpoints, _conditions, _session_file, _walker
 from gms_fsm.inspection._arguments import check_branch, check_row, checked_settings, chosen_pair
@@ -34,6 +35,7 @@ from gms_fsm.systems.system import System
 __all__ = ["KINDS", "Branch", "BranchComparison", "Breakpoint", "Fired", "Here", "Session"]
 
 
+@displayed("html")
 class Session:
     """A simulation to step through: ``Session(model, rig, t_end)``, or ``Session(system, t_end)``.
 

@@ -33,6 +33,7 @@ from typing import Any
 import numpy as np
 
 import integrators
+from gms_fsm._display import full_text
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.errors import SignalError
 from gms_fsm.language import Binary, Requirement, Value, spell
@@ -164,7 +165,7 @@ def _key(system: System) -> tuple[Any, ...]:
     contacts = [
         (
             contact.name,
-            repr(contact.chart),
+            full_text(contact.chart),
             contact.n,
             contact.v,
             tuple(contact.inputs.items()),

@@ -18,6 +18,7 @@ from gms_fsm.charts.parameters import QUANTITIES, FloatArray
 from gms_fsm.errors import OutputError, ParameterError, TraceFileError, cut, shown, why
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
 from gms_fsm.traces._archives import member
+from gms_fsm.traces._log import Log
 from gms_fsm.traces.rows import column_name
 
 if TYPE_CHECKING:
@@ -403,7 +404,7 @@ def _read(file: Any) -> Sweep:
         ends=groups["end_"],
         owners=found.get("owners", np.empty(0, dtype=np.str_)),
         edges=tuple(edges.tolist()),
-        transitions=log.view(np.recarray),
+        transitions=log.view(Log),
         **{name: found[name] for name in _SAVED},
     )
 

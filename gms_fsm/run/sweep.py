@@ -30,6 +30,7 @@ from gms_fsm.systems._varied import numbers_in, with_numbers_of
 from gms_fsm.systems.models import Model, parameter_names, with_values
 from gms_fsm.systems.rigs import Rig, with_numbers
 from gms_fsm.systems.system import Contact, System
+from gms_fsm.traces._log import Log
 from gms_fsm.traces.rows import Rows, column_name
 from gms_fsm.traces.trace import Trace
 
@@ -511,7 +512,7 @@ class _Collected:
             self.t,
             **self.end,
             states=np.concatenate(states, axis=1),
-            transitions=np.concatenate(self.logs).view(np.recarray),
+            transitions=np.concatenate(self.logs).view(Log),
             edges=tuple(edges),
             times=self.times,
             rows=self.rows,

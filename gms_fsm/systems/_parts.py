@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from gms_fsm._display import displayed
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.charts.stribeck import Stribeck
-from gms_fsm.errors import ParameterError, shown
+from gms_fsm.errors import ParameterError, cut, shown
 from gms_fsm.systems._given import (
     Text,
     check_name,
@@ -80,6 +81,7 @@ class Body:
         return self.velocity is not None
 
 
+@displayed("svg", "html")
 @dataclass(frozen=True, init=False, eq=False)
 class Contact:
     """Machines of one chart on one relative velocity.
@@ -173,6 +175,10 @@ class Contact:
             "model": model,
         }.items():
             object.__setattr__(self, each, value)
+
+    def __repr__(self) -> str:
+        count = f"{self.n} element{'s' * (self.n != 1)}"
+        return f"<Contact {cut(self.name)!r}: {cut(self.chart.name)}, {count}, v = {self.v[0]}>"
 
     # What a `Model` has, so that everything that reads models reads contacts too.
     @property

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gms_fsm._display import displayed, short_repr
 from gms_fsm.charts.gms import PARAMETERS, TABLE_I
 from gms_fsm.charts.parameters import (
     SIGMA_2,
@@ -25,6 +26,8 @@ __all__ = ["GMSParameters"]
 RULES = {each.name: each.rule for each in PARAMETERS}
 
 
+@displayed("html")
+@short_repr
 @dataclass(frozen=True, eq=False)
 class GMSParameters:
     """Parameters of a bank of n GMS elements.

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gms_fsm._display import displayed, short_repr
 from gms_fsm.charts.chart import SUPPLIED, Chart
 from gms_fsm.charts.gms import GMS_ELEMENT, Law, check_law
 from gms_fsm.charts.lugre import LUGRE
@@ -77,6 +78,8 @@ class Model(Protocol):
         """Viscous friction, Ns/m."""
 
 
+@displayed("svg", "html")
+@short_repr
 @dataclass(frozen=True, eq=False)
 class GMS:
     """A bank of Generalized Maxwell Slip elements in parallel.
@@ -163,6 +166,8 @@ class GMS:
         return self.parameters.sigma_2
 
 
+@displayed("svg", "html")
+@short_repr
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LuGre:
     """The LuGre model: one bristle, one state, no edges.
@@ -213,6 +218,8 @@ class LuGre:
         return np.ones(1)
 
 
+@displayed("svg", "html")
+@short_repr
 @dataclass(frozen=True, eq=False)
 class ChartModel:
     """Any chart run as a bank of n elements, for example with your own guards or states.

@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Protocol
 
 from numpy.typing import ArrayLike
 
+from gms_fsm._display import short_repr
 from gms_fsm.charts.parameters import Parameter, checked_scalar
 from gms_fsm.systems.signals import Signal, SignalLike, as_signal
 
@@ -40,6 +41,7 @@ class Rig(Protocol):
         """Text of dv/dt in t, x, v, F, the signals and the numbers; None if v is prescribed."""
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Prescribed:
     """Open loop: the velocity is prescribed.
@@ -71,6 +73,7 @@ class Prescribed:
         return {}
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Slider:
     """Closed loop: a mass pushed by a force, ``m dv/dt = F_a(t) - F``.
@@ -153,6 +156,7 @@ class PulledSlider:
         return {each.name: getattr(self, each.name) for each in self.parameters}
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class TextRig:
     """Any rig as its texts, numbers and signals: what a file keeps of a rig of your own.

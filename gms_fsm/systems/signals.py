@@ -15,6 +15,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gms_fsm._display import short_repr
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ExpressionError, SignalError, shown
 from gms_fsm.language import Value, parse_value
@@ -47,6 +48,7 @@ class Formula:
             raise error.at("signal") from None
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Corners:
     """Straight lines between corners; two corners at the same time make a jump.
@@ -124,6 +126,7 @@ class Corners:
         return found
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Function:
     """A Python callable of t [s] that returns a number.

@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from gms_fsm._arguments import checked_path
+from gms_fsm._display import displayed
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import checked_scalar
-from gms_fsm.errors import ExpressionError, ParameterError, Part, shown
+from gms_fsm.errors import ExpressionError, ParameterError, Part, cut, shown
 from gms_fsm.language import (
     Binary,
     Name,
@@ -51,6 +52,7 @@ __all__ = ["Body", "Contact", "Mounting", "Sampled", "Several", "System", "syste
 Key = tuple[str | int, ...]
 
 
+@displayed("svg", "html")
 @dataclass(frozen=True, eq=False)
 class System:
     """Bodies, the contacts between them, and what drives both.
@@ -125,6 +127,12 @@ class System:
         from gms_fsm.systems._assembly import assembled
 
         put(self, "assembly", assembled(self))
+
+    def __repr__(self) -> str:
+        bodies, contacts = (
+            cut(", ".join(each.name for each in parts)) for parts in (self.bodies, self.contacts)
+        )
+        return f"<System {cut(self.name)!r}: bodies {bodies}; contacts {contacts}>"
 
     def _signal(self, name: str, given: Any, here: str) -> Signal | str:
         """Return a signal; one whose text names numbers stays a text."""
@@ -341,8 +349,11 @@ class Several:
     def __init__(self, system: System) -> None:
         self._system = system
 
+    def __repr__(self) -> str:
+        return f"<{len(self._system.contacts)} contacts of {self._system!r}>"
+
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("__"):
+        if name.startswith("_"):
             raise AttributeError(name)
         known = ", ".join(repr(each.name) for each in self._system.contacts)
         raise ParameterError(

@@ -8,9 +8,33 @@ from typing import Any
 
 import numpy as np
 
+from gms_fsm._display import displayed
 from gms_fsm.lowering.log_columns import CONTACT, LOG_TEXTS, LogRecord
 
-__all__ = ["is_log", "log_from", "log_of"]
+__all__ = ["Log", "is_log", "log_from", "log_of"]
+
+
+@displayed("html")
+class Log(np.recarray[Any, Any]):
+    """A record array that notebooks show as a table of its first rows.
+
+    In every other respect it is a `numpy.recarray`.
+
+    Examples
+    --------
+    >>> records = np.array([(0.5, "slip"), (0.7, "stick")], dtype=[("t", "f8"), ("to", "U5")])
+    >>> log = records.view(Log)
+    >>> log
+    <2 records of t, to>
+    >>> log.to.tolist(), log[log.t > 0.6]
+    (['slip', 'stick'], <1 record of t, to>)
+    """
+
+    def __repr__(self) -> str:
+        names = self.dtype.names
+        if names is None or self.ndim != 1:
+            return repr(self.view(np.ndarray))
+        return f"<{len(self)} record{'s' * (len(self) != 1)} of {', '.join(names)}>"
 
 
 def log_of(records: Iterable[LogRecord]) -> Any:
@@ -29,7 +53,7 @@ def log_from(columns: Mapping[str, Any]) -> Any:
     log = np.empty(len(columns["t"]), dtype=_of_width(width, CONTACT in columns))
     for name in log.dtype.names:
         log[name] = columns[name]
-    return log.view(np.recarray)
+    return log.view(Log)
 
 
 def is_log(log: Any) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 from gms_fsm._files import write_whole
 from gms_fsm.traces._archives import member
 from gms_fsm.traces._header import Header
+from gms_fsm.traces._log import Log
 from gms_fsm.traces._parts import Parts, Ran
 from gms_fsm.traces.rows import Rows
 
@@ -43,5 +44,5 @@ def read(path: Path) -> Parts:
         stored = {
             place: member(file, f"observed_{name}", most) for name, place in ran.names.items()
         }
-        log = member(file, "transitions").view(np.recarray)
+        log = member(file, "transitions").view(Log)
     return Parts(header, ran, tables["rows"], tables["stops"], log, stored)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gms_fsm._display import short_repr
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import OutputError, TraceFileError, why
 from gms_fsm.lowering._observing import armed, rate, sigmas
@@ -16,6 +17,7 @@ from gms_fsm.lowering.program import Program
 from gms_fsm.systems.system import Body
 from gms_fsm.traces import _csv, _npz
 from gms_fsm.traces._header import Header
+from gms_fsm.traces._log import Log
 from gms_fsm.traces._parts import Parts, Ran, checked, held_period
 from gms_fsm.traces.rows import Rows, merged
 
@@ -35,6 +37,7 @@ __all__ = [
 ]
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class BodyTrace:
     """The motion of a body.
@@ -156,7 +159,7 @@ def sliding_of(trace: Trace) -> Any:
     table = merged(trace.rows, trace.stops)
     found: list[tuple[Any, ...]] = []
     if len(table) < 2:
-        return np.array(found, dtype=_SLIDING).view(np.recarray)
+        return np.array(found, dtype=_SLIDING).view(Log)
     for k, flags in enumerate(table.mode[:, trace.program.layout.slides].T):
         edges = np.flatnonzero(np.diff(np.concatenate([[0], flags, [0]])))
         for first, behind in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
@@ -170,7 +173,7 @@ def sliding_of(trace: Trace) -> Any:
             name = trace.program.surface_names[k]
             end = float(table.t[min(behind, len(table) - 1)])
             found.append((float(table.t[first]), end, name, begun, ended))
-    return np.array(found, dtype=_SLIDING).view(np.recarray)
+    return np.array(found, dtype=_SLIDING).view(Log)
 
 
 def sigma_at(program: Program, table: Rows, row: int, surface: int) -> float:

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gms_fsm._display import short_repr
 from gms_fsm.charts.parameters import FloatArray
 
 __all__ = ["Rows", "column_name", "merged"]
 
 
+@short_repr
 @dataclass(frozen=True, eq=False)
 class Rows:
     """Times, micro-steps, states y and modes, row by row.

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm._arguments import checked_integer, checked_path
+from gms_fsm._display import displayed
 from gms_fsm._extras import require
 from gms_fsm.charts.parameters import FloatArray, as_numbers
 from gms_fsm.errors import (
@@ -73,6 +74,7 @@ def check_trace(trace: object) -> None:
     _ = trace.model.chart  # a system with several contacts refuses, and says to choose one
 
 
+@displayed("png", "html")
 @dataclass(frozen=True, eq=False)
 class Trace:
     """The result of a simulation.

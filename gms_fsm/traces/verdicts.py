@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
+from gms_fsm._display import displayed, short_repr
+
 __all__ = [
     "ChatteringVerdict",
     "ClauseSeen",
@@ -48,6 +50,8 @@ class Episode:
     values: dict[str, float]
 
 
+@displayed("html")
+@short_repr
 @dataclass(frozen=True)
 class ChatteringVerdict:
     """Verdict of `gms_fsm.traces.monitors.Chattering`.
@@ -71,6 +75,8 @@ class ChatteringVerdict:
     kind: Literal["chattering"] = "chattering"
 
 
+@displayed("html")
+@short_repr
 @dataclass(frozen=True)
 class InvariantVerdict:
     """Verdict of `gms_fsm.traces.monitors.Invariant`.
@@ -110,6 +116,8 @@ class InvariantVerdict:
     kind: Literal["invariant"] = "invariant"
 
 
+@displayed("html")
+@short_repr
 @dataclass(frozen=True)
 class PassivityVerdict:
     """Verdict of `gms_fsm.traces.monitors.Passivity`.
@@ -171,6 +179,8 @@ class ClauseSeen:
     false: tuple[bool, ...]
 
 
+@displayed("html")
+@short_repr
 @dataclass(frozen=True)
 class CoverageVerdict:
     """Verdict of `gms_fsm.traces.monitors.Coverage`.

@@ -30,7 +30,8 @@ def chart_svg(chart: Chart, n: int) -> str:
         for title in node.findall(f"{{{SVG}}}title"):
             node.remove(title)  # browsers show titles as tooltips, and these are ids
         _give_role(node)
-    root.attrib = {"viewBox": root.attrib["viewBox"]}
+    # With its namespace, because a page that gets another picture later reads it as XML.
+    root.attrib = {"xmlns": SVG, "viewBox": root.attrib["viewBox"]}
     groups = {group.get("id", ""): group for group in root.iter("g")}
     groups["graph0"].remove(groups["graph0"][0])  # the background; the page has its own
     _name_texts(groups["graph0"], sheet.definitions())

@@ -1,6 +1,6 @@
 "use strict";
 // Shared by all parts of the page. All text from the data is inserted as textContent, never as HTML.
-const data = JSON.parse(document.getElementById("data").textContent);
+let data = JSON.parse(document.getElementById("data").textContent); // a host may send other data later
 const $ = (query, root = document) => root.querySelector(query);
 const $$ = (query, root = document) => [...root.querySelectorAll(query)];
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();

@@ -2,7 +2,7 @@
 // The view of one run: its head, the chart with marks, the tokens of the elements, the table of guards, the tabs.
 // A pane is what a tab shows. It is a class with: static side ("left" or "right"), static key and title,
 // constructor(view, box), show() for the row view.row and the element view.element, fit() after a change of size,
-// theme, contact or zoom. Only the pane in view is called. `static of(view)` is false where it has nothing to show.
+// theme, contact or zoom, close() before it is thrown away. Only the pane in view is called. `static of(view)` is false where it has nothing to show.
 const PANES = [];
 const MARKS = { 1: "✓", 0: "✗", "-1": "?" };
 
@@ -65,6 +65,8 @@ class RunView {
     for (const pane of Object.values(this.open)) pane.fit?.();
   }
 
+  close() { for (const { pane } of Object.values(this.panes)) pane?.close?.(); }
+
   // ---------------------------------------------------------------- the row
   choose(contact, element) {
     const other = contact !== this.contact;
@@ -95,6 +97,14 @@ class RunView {
     for (const pane of Object.values(this.open)) pane.show();
   }
 
+  // Whether an element of the contact shown is in another state than in the other run, at the row shown.
+  differs(element) {
+    const other = views.find((each) => each !== this), { contact } = this;
+    const same = other?.run.contacts.find(({ name, n }) => name === contact.name && n > element);
+    if (!same || views.some(({ run }) => run.ended(frames.t[frame]))) return false;
+    return same.states[same.modes[element][frames.rows[other.place][frame]]] !== contact.states[contact.modes[element][this.row]];
+  }
+
   happened() {
     const { row, run } = this;
     if (run.t(row) !== frames.t[frame]) return []; // the other run is further on, and this one has no row there
@@ -107,15 +117,7 @@ class RunView {
     if (run.ended(frames.t[frame])) return "ended";
     const happened = this.happened();
     const own = happened.some((entry) => entry.contact === contact && entry.element === element);
-    return [...happened.map((entry) => entry.contact.sentence(entry)), ...(own ? [] : [this.waits()])].join("; ");
-  }
-
-  waits() {
-    const { contact, element, row } = this, state = contact.modes[element][row], leaving = contact.leaving(state);
-    const who = `${nameOf(contact, element)} is in ${contact.states[state]}`;
-    if (!leaving.length) return contact.edges.length ? `${who}; no edge leaves it` : who;
-    const scope = contact.scope(element, row), next = contact.firesNext(state, scope);
-    return `${who}; ${next >= 0 ? `${contact.edges[next].name} fires next` : heldBack(contact, leaving, scope)}`;
+    return [...happened.map((entry) => entry.contact.sentence(entry)), ...(own ? [] : [waiting(contact, element, row)])].join("; ");
   }
 
   // ---------------------------------------------------------------- tokens: the active state of every element
@@ -138,11 +140,13 @@ class RunView {
     const { contact, row, run } = this, fired = run.fired.get(row);
     if (contact.n < 2) return;
     this.tokens.forEach((token, i) => {
-      const mode = contact.modes[i][row], now = fired && fired.contact === contact && fired.element === i;
-      const look = `${mode}/${Boolean(now)}/${i === this.element}`;
+      const mode = contact.modes[i][row], now = fired && fired.contact === contact && fired.element === i, differs = this.differs(i);
+      const look = `${mode}/${Boolean(now)}/${i === this.element}/${differs}`;
       if (token.dataset.look === look) return;
       token.dataset.look = look;
       token.classList.toggle("fired", Boolean(now));
+      token.classList.toggle("differs", differs);
+      token.title = differs ? "in another state than in the other run" : "";
       token.setAttribute("aria-pressed", i === this.element);
       [...token.children[1].children].forEach((cell, k) => { cell.className = k === mode ? `on state${k % STATES}` : ""; });
       token.lastChild.textContent = contact.states[mode];
@@ -205,6 +209,15 @@ class RunView {
     const lines = $$("tbody tr", this.root), first = lines.find((line) => line.matches(".fired")) ?? lines.find((line) => line.matches(".asked"));
     if (first) reveal(first, $(".why", this.root), first.querySelector("th")?.rowSpan ?? 1, $("caption", this.root).offsetHeight);
   }
+}
+
+// What an element waits for, in words.
+function waiting(contact, element, row) {
+  const state = contact.modes[element][row], leaving = contact.leaving(state);
+  const who = `${nameOf(contact, element)} is in ${contact.states[state]}`;
+  if (!leaving.length) return contact.edges.length ? `${who}; no edge leaves it` : who;
+  const scope = contact.scope(element, row), next = contact.firesNext(state, scope);
+  return `${who}; ${next >= 0 ? `${contact.edges[next].name} fires next` : heldBack(contact, leaving, scope)}`;
 }
 
 // Scrolls only the box, and only if needed: the page itself stays where it is.
@@ -284,13 +297,18 @@ class ChartPane {
     const active = contact.modes[element][view.row], asked = contact.modes[element][row], scope = contact.scope(element, row);
     const truths = contact.edges.map((edge) => edge.clauses.map(({ holds }) => truthOf(holds, scope)));
     const stops = contact.edges.map((_, k) => breakpoints.has(keyOf(view, contact, element, k)));
-    const look = [element, active, fired, truths, stops, view.element].join();
+    const differs = view.differs(element), look = [element, active, fired, truths, stops, view.element, differs].join();
     if (this.looks[slot] === look) return; // most elements look the same as on the previous row
     this.looks[slot] = look;
     for (const node of this.parts[slot]) {
       const { state, edge } = node.dataset, on = (name, yes) => node.classList.toggle(name, yes);
-      if (state) on("active", Number(state) === active);
-      else if (!edge) on("chosen", element === view.element);
+      if (state) {
+        on("active", Number(state) === active);
+        on("differs", Number(state) === active && differs);
+      } else if (!edge) {
+        on("chosen", element === view.element);
+        on("differs", differs);
+      }
       else {
         const k = Number(edge), leaving = contact.edges[k].source === asked;
         on("pale", !leaving);

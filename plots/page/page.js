@@ -1,10 +1,7 @@
 "use strict";
 // The page: rows of one run or both on a common time, playing, breakpoints, keys. A frame is a row of either run.
-const runs = data.runs.map((stored, place) => new RunData(stored, place));
-const frames = new Frames(runs), last = frames.t.length - 1;
-const whole = { min: frames.t[0], max: frames.t[last] }, span = { ...whole };
-const TIME_POWER = powerOf(Math.max(Math.abs(whole.min), Math.abs(whole.max)), "s");
-const events = [...new Set(runs.flatMap((run, k) => run.log.map(({ row }) => frames.of[k][row])))].sort((a, b) => a - b);
+let runs, frames, last, events, eventFrames, first, TIME_POWER; // of the data shown, see `load`
+const whole = {}, span = {};
 const breakpoints = new Map();
 let frame = 0, following = true, zooming = false;
 const views = [];
@@ -23,6 +20,7 @@ function show(k, words = "") {
   if (!play.on) scrubber.setAttribute("aria-valuetext", `${place}, ${runs[0].rowName(frames.rows[0][frame])}`);
   $("#say").textContent = words && views.length > 1 ? words : [words, ...verdicts].filter(Boolean).join("; ");
   $("#say").classList.toggle("fired", views.some((view) => view.happened().length));
+  tell();
 }
 
 function pointAt(k) {
@@ -53,13 +51,12 @@ function nextPane(side) {
 function toggleBreak(view, element, edge) {
   const { contact } = view, key = keyOf(view, contact, element, edge), had = breakpoints.delete(key);
   const text = `${nameOf(contact, element)}, ${contact.edges[edge].name}`;
-  if (!had) {
-    const of = frames.of[view.place];
-    breakpoints.set(key, { text, frames: new Set([...contact.stops(element, edge)].map((row) => of[row])) });
-  }
+  if (!had) breakpoints.set(key, { text, place: view.place, name: contact.name, element, edge, frames: framesOf(view.place, contact, element, edge) });
   view.explained = "";
   show(frame, `breakpoint ${had ? "removed" : "set"}: ${text}`);
 }
+
+const framesOf = (place, contact, element, edge) => new Set([...contact.stops(element, edge)].map((row) => frames.of[place][row]));
 
 function stopsAt(k) {
   const point = [...breakpoints.values()].find((each) => each.frames.has(k));
@@ -149,7 +146,6 @@ function move(passed, speed) {
   if (k !== frame || stop || ended) show(k, stop || (ended ? "end of the run" : ""));
   else eachPlots((pane) => pane.placeCursor(play.t));
 }
-const eventFrames = new Set(events);
 
 function playOrPause() {
   if (!play.on && frame === last) show(0);
@@ -230,12 +226,19 @@ function difference() {
   let k = 0;
   while (k < Math.min(a.length, b.length) && text(a[k]) === text(b[k])) k += 1;
   if (k === Math.max(a.length, b.length)) return { frame: null, told: "both runs make the same transitions in the same order" };
-  const told = [a[k], b[k]].map((entry, i) => `run ${i + 1}: ${entry ? `${text(entry)} at ${written(entry.t, 7)} s` : "no further transition"}`);
-  const at = [a[k], b[k]].flatMap((entry, i) => (entry ? [frames.of[i][entry.row]] : []));
-  return { frame: Math.min(...at), told: `first difference, transition ${k + 1}: ${told.join("; ")}` };
+  const entries = [a[k], b[k]], at = entries.map((entry, i) => (entry ? frames.of[i][entry.row] : Infinity)), least = Math.min(...at);
+  const told = entries.map((entry, i) => `run ${i + 1}: ${entry ? `${text(entry)} at ${written(entry.t, 7)} s` : "no further transition"}`);
+  // Why the later run did not do the same then; of two at one time, the one that was held back.
+  const words = entries.map((entry, i) => (frames.t[at[i]] === frames.t[least] ? heldInOther(entry, i, at[i]) : ""));
+  const why = words.find((each) => each && !each.endsWith("fires next")) ?? words.find(Boolean);
+  return { frame: least, told: `first difference, transition ${k + 1}: ${told.join("; ")}${why ? `; ${why}` : ""}` };
 }
-const first = runs.length > 1 ? difference() : { frame: null, told: "there is one run only" };
-pinned = first.frame;
+
+// What the element of a firing waits for in the other run, at the row where it fired.
+function heldInOther({ contact, element }, i, at) {
+  const same = runs[1 - i].contacts.find(({ name, n }) => name === contact.name && n > element);
+  return same && !runs[1 - i].ended(frames.t[at]) ? `in run ${2 - i} ${waiting(same, element, frames.rows[1 - i][at])}` : "";
+}
 
 function firstDifference() {
   if (first.frame !== null) go(first.frame);
@@ -243,17 +246,45 @@ function firstDifference() {
 }
 
 // ------------------------------------------------------------------ start
-document.title = $("#title").textContent = data.title;
-$("#runs").className = runs.length > 1 ? "two" : "one";
-$("#names").textContent = `${Object.keys(runs[0].names).join(", ")}, state(1) == ${runs[0].contacts[0].states.at(-1)}`;
-$("#facts").textContent = runs.map((run) => `${run.title}: ${run.of} rows, ${run.rows} on this page; ${run.log.length} transitions.`).join(" ");
+// Shows other data in the place of those shown, if any; time, zoom, selection, breakpoints and open tabs stay.
+function load(given) {
+  const t = frames?.t[frame] ?? -Infinity, zoomed = frames && (span.min !== whole.min || span.max !== whole.max) && { ...span };
+  const kept = views.map(({ contact, element, panes }) => ({ name: contact.name, element, panes }));
+  const tabs = Object.values(kept[0]?.panes ?? {}).filter(({ tab }) => tab.getAttribute("aria-selected") === "true").map(({ Pane }) => [Pane.side, Pane.key]);
+  for (const view of views.splice(0)) { view.close(); view.root.remove(); }
+  data = given;
+  runs = data.runs.map((stored, place) => new RunData(stored, place));
+  frames = new Frames(runs);
+  last = frames.t.length - 1;
+  Object.assign(whole, { min: frames.t[0], max: frames.t[last] });
+  Object.assign(span, zoomed && zoomed.min < whole.max && zoomed.max > whole.min ? zoomed : whole);
+  TIME_POWER = powerOf(Math.max(Math.abs(whole.min), Math.abs(whole.max)), "s");
+  events = [...new Set(runs.flatMap((run, k) => run.log.map(({ row }) => frames.of[k][row])))].sort((a, b) => a - b);
+  eventFrames = new Set(events);
+  first = runs.length > 1 ? difference() : { frame: null, told: "there is one run only" };
+  [pointed, pinned, frame] = [null, first.frame, clamp(lastAt(frames.t, t), 0, last)];
+  for (const [key, { place, name, element, edge, ...point }] of breakpoints) {
+    const contact = runs[place]?.contacts.find((each) => each.name === name);
+    if (!(contact?.n > element && contact.edges[edge])) breakpoints.delete(key);
+    else breakpoints.set(key, { ...point, place, name, element, edge, frames: framesOf(place, contact, element, edge) });
+  }
+  document.title = $("#title").textContent = data.title;
+  $("#runs").className = runs.length > 1 ? "two" : "one";
+  $("#names").textContent = `${Object.keys(runs[0].names).join(", ")}, state(1) == ${runs[0].contacts[0].states.at(-1)}`;
+  $("#facts").textContent = runs.map((run) => `${run.title}: ${run.of} rows, ${run.rows} on this page; ${run.log.length} transitions.`).join(" ");
+  for (const run of runs) views.push(new RunView(run));
+  views.forEach((view, place) => {
+    const { name, element } = kept[place] ?? kept[0] ?? { name: "", element: 0 };
+    view.choose(view.run.contacts.find((each) => each.name === name) ?? view.contact, element);
+    view.addTabs();
+  });
+  $("#difference").hidden = runs.length < 2;
+  setScale($("#scale").value);
+  for (const [side, key] of [["left", "chart"], ["right", "time"], ...tabs]) openPane(side, key);
+  show(frame);
+}
+
 if (matchMedia("(prefers-reduced-motion: reduce)").matches) $("#speed").value = "rows";
-for (const run of runs) views.push(new RunView(run));
-for (const view of views) { view.choose(view.contact, 0); view.addTabs(); }
-$("#difference").hidden = runs.length < 2;
-setScale("t");
-openPane("left", "chart");
-openPane("right", "time");
+load(data);
 new ResizeObserver(() => { for (const view of views) view.fit(); }).observe($("#runs"));
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => eachPlots((pane) => pane.recolour()));
-show(0);

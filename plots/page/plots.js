@@ -15,8 +15,8 @@ function decimals(step) {
   return 13;
 }
 
-// A stack of plots and ribbons over time. A plot is { title, unit, lines, at }: lines as { get, stroke, dash, run },
-// and at(row), its value for the head.
+// A stack of plots and ribbons over time. A plot is { title, unit, lines, at, band }: lines as { get, stroke, dash, run },
+// at(row), its value for the head, and whether the area between its two lines is filled.
 class TimePlots {
   constructor(view, box) {
     Object.assign(this, { view, box, plots: [], tracks: [], wanted: [] });
@@ -44,7 +44,7 @@ class TimePlots {
     this.wanted = [];
   }
 
-  made({ title, note = "", unit = "", lines, at, digits = 5, step = false }, isLast) {
+  made({ title, note = "", unit = "", lines, at, digits = 5, step = false, band = false }, isLast) {
     const head = make("h3", this.body, ""), name = make("span", head), value = make("output", head);
     const power = powerOf(largest(extent(lines.map(({ get, run }) => ({ get, rows: run.rows })))), unit);
     name.textContent = unit ? `${title} [${PREFIXES[power]}${unit}]` : title;
@@ -59,8 +59,9 @@ class TimePlots {
         stroke: ink(stroke), dash, width, points: { size: 4 }, ...(step && { paths: uPlot.paths.stepped({ align: 1 }) }),
       }))],
       cursor: { y: false, x: false, points: { show: false } },
-      hooks: { setScale: [(u, key) => key === "x" && zoomTo(u.scales.x.min, u.scales.x.max, u)] },
+      hooks: { ...(band && { drawAxes: [(u) => fillBetween(u, lines)] }), setScale: [(u, key) => key === "x" && zoomTo(u.scales.x.min, u.scales.x.max, u)] },
     }, [frames.t, ...lines.map(alongFrames)], make("div", this.body, "", { role: "img", "aria-label": `${title} over time`, class: "plot" }));
+    if (span.min !== whole.min || span.max !== whole.max) plot.setScale("x", { ...span }); // made while zoomed
     if (isLast) make("span", plot.root, `t [${PREFIXES[TIME_POWER]}s]`, { class: "time-unit" });
     let down = 0;
     plot.over.addEventListener("mousedown", (event) => { down = event.clientX; });
@@ -103,6 +104,8 @@ class TimePlots {
     this.drawRibbons();
     this.placeCursor();
   }
+
+  close() { for (const { plot } of this.plots) plot.destroy(); }
 
   recolour() { for (const { plot } of this.plots) plot.redraw(false, true); }
 
@@ -162,6 +165,31 @@ function alongFrames({ get, run }) {
   return found;
 }
 
+// The area between two lines, behind both: forward along one and back along the other.
+function fillBetween(plot, [one, two]) {
+  const { ctx, bbox } = plot, path = new Path2D();
+  const rowsOf = ({ run }) => Array.from({ length: run.rows }, (_, row) => row);
+  for (const [line, rows] of [[one, rowsOf(one)], [two, rowsOf(two).reverse()]]) {
+    for (const row of rows) {
+      const u = line.get(row);
+      if (Number.isFinite(u)) path.lineTo(plot.valToPos(line.run.t(row), "x", true), plot.valToPos(u, "y", true));
+    }
+  }
+  ctx.save();
+  ctx.beginPath();
+  ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+  ctx.clip();
+  ctx.fillStyle = colour("--fired-fill");
+  ctx.fill(path);
+  ctx.restore();
+}
+
+// The value of a line at a time, on a straight line between two rows.
+function valueAt({ get, run }, frame, t) {
+  const row = frames.rows[run.place][frame], next = Math.min(row + 1, run.rows - 1), from = run.t(row), to = run.t(next);
+  return to > from && t > from ? get(row) + ((get(next) - get(row)) * (t - from)) / (to - from) : get(row);
+}
+
 class TimePane extends TimePlots {
   static side = "right"; static key = "time"; static title = "Time";
 
@@ -175,11 +203,17 @@ class TimePane extends TimePlots {
       run: each.run, contact: each.run.contacts.find(({ name }) => name === contact.name) ?? each.run.contacts[0],
     }));
     const column = (of, name) => { const each = of.columns[name === "v" ? of.velocity : name]; return Array.isArray(each) ? each[0] : each; };
-    const one = (title, name, unit) => this.add({
-      title, note: others.length ? "dotted: the other run" : "", unit,
-      lines: [...others.map((each) => ({ get: column(each.contact, name), run: each.run, stroke: "--soft", dash: [2, 3] })), { get: column(contact, name), run, stroke: "--ink" }],
-      at: column(contact, name),
-    });
+    const one = (title, name, unit) => {
+      const own = { get: column(contact, name), run, stroke: "--ink" };
+      const lines = [...others.map((each) => ({ get: column(each.contact, name), run: each.run, stroke: "--soft", dash: [2, 3] })), own];
+      const band = others.length > 0 && name !== "v";
+      const at = (row) => { // of the second run also how far it is from the first
+        const k = pointed ?? frame, t = frames.t[k];
+        if (!band || view.place === 0 || runs.some((each) => each.ended(t))) return own.get(row);
+        return `${eng(own.get(row), unit, 5)}  Δ ${eng(valueAt(own, k, t) - valueAt(lines[0], k, t), unit, 3)}`;
+      };
+      this.add({ title, note: others.length ? "dotted: the other run" : "", unit, lines, at, band });
+    };
     one("F", "F", "N");
     const inner = this.addInner();
     one("v", "v", "m/s");

@@ -13,6 +13,7 @@ from gms_fsm.app.debugger import run_debugger, scenario_to_debug
 from gms_fsm.app.scenario import load_scenario, load_system
 from gms_fsm.lowering.program import lower
 from tests import own_files
+from tests.plots.stored import data_of
 from tests.scenario_files import CommandLine, one_message
 
 
@@ -146,7 +147,7 @@ def test_the_schema_knows_the_keys_of_systems(verb: CommandLine) -> None:
 
 # --------------------------------------------------------------------------- saved traces
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["plot", "replay", "animate"])
+@pytest.mark.parametrize("name", ["plot", "animate"])
 def test_a_picture_shows_one_contact(name: str, verb: CommandLine) -> None:
     load_scenario("pair.toml").simulate(engine="ifelse").save("run.npz")
     said = ("run.npz: it has the contacts 'pad1', 'pad2', 'gear'", "--contact pad1")
@@ -155,9 +156,14 @@ def test_a_picture_shows_one_contact(name: str, verb: CommandLine) -> None:
 
 
 @pytest.mark.slow
-def test_replay_shows_the_chosen_contact(verb: CommandLine) -> None:
-    pytest.importorskip("graphviz")
+def test_replay_shows_all_contacts_or_the_chosen_one(verb: CommandLine) -> None:
+    pytest.importorskip("uplot", reason="a page needs the extra 'replay'")
     load_scenario("pair.toml").simulate(engine="ifelse").save("run.npz")
+    done = verb("replay", "run.npz", "-o", "all.html")
+    assert done.code == 0, done.err
+    (run,) = data_of(Path("all.html").read_text(encoding="utf-8"))["runs"]
+    assert [each["name"] for each in run["contacts"]] == ["pad1", "pad2", "gear"]
+    one_message(verb("replay", "run.npz", "--contact", "pad"), "run.npz has no contact 'pad'")
     done = verb("replay", "run.npz", "--contact", "gear", "-o", "page.html")
     assert done.code == 0, done.err
     assert "gear: Backlash" in Path("page.html").read_text(encoding="utf-8")

@@ -21,7 +21,6 @@ pytestmark = pytest.mark.slow
 for module in (
     "furo",
     "ipykernel",
-    "jupytext",
     "latex2mathml",
     "myst_parser",
     "nbclient",

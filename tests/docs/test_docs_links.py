@@ -45,7 +45,7 @@ def test_links(path: Path) -> None:
         file, _, anchor = link.partition("#")
         target = (path.parent / file).resolve() if file else path
         if made := MADE.search(target.as_posix()):
-            target = target.with_name(f"{made[1]}.py")
+            target = target.with_name(f"{made[1]}.ipynb")
         assert target.is_file(), link
         assert target.stat().st_size > 0, link
         if anchor:
@@ -84,8 +84,8 @@ def test_every_page_is_in_the_contents() -> None:
         for path in [*docs.rglob("*.md"), *docs.rglob("*.rst")]
     }
     assert pages <= listed, pages - listed
-    scripts = {f"lessons/{path.stem}" for path in (docs / "lessons").glob("lesson_*.py")}
-    assert listed <= pages | scripts, listed - pages - scripts
+    notebooks = {f"lessons/{path.stem}" for path in (docs / "lessons").glob("lesson_*.ipynb")}
+    assert listed <= pages | notebooks, listed - pages - notebooks
 
 
 def test_the_citation_names_this_version() -> None:

@@ -1,19 +1,24 @@
-"""After `import plots` charts, models and traces show themselves in a notebook."""
+"""What notebooks show of charts, models, systems and runs, and what without Graphviz."""
 
 from __future__ import annotations
 
+import html
+import io
+import pickle
 import subprocess
 import sys
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 import plots
-from gms_fsm import ChartModel, LuGre, Prescribed, Stribeck, simulate
+from gms_fsm import Chart, ChartModel, LuGre, Prescribed, State, Stribeck, simulate
 from gms_fsm.charts import GMS_ELEMENT
+from gms_fsm.errors import OutputError
 from plots import notebook
 from tests.helpers import ROOT, one_element, stick_slip
-from tests.plots.systems_to_draw import SERVO
+from tests.plots.systems_to_draw import BLOCKS, SERVO, run
 
 CURVE = Stribeck(1.0, 1.5, 1e-3)
 
@@ -56,16 +61,96 @@ def test_a_trace_is_a_png() -> None:
 
 def test_without_graphviz_a_notebook_falls_back_to_text(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(notebook, "drawn", lambda graph, form: None)
-    assert notebook.chart_svg(GMS_ELEMENT["signed"]) is None
-    assert notebook.model_svg(stick_slip("signed")) is None
+    for shown in (GMS_ELEMENT["signed"], stick_slip("signed"), SERVO.contact("bearing")):
+        assert shown._repr_svg_() is None  # type: ignore[attr-defined]
+        assert " -> " in html.unescape(shown._repr_html_())  # type: ignore[attr-defined]
+    assert "J_m*dw_m/dt" in SERVO._repr_html_().replace(" ", "")  # type: ignore[attr-defined]
+
+
+def test_a_graph_that_graphviz_refuses_is_text(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(graph: object, form: str) -> bytes:
+        raise OutputError("Graphviz cannot draw this graph")
+
+    monkeypatch.setattr(notebook, "drawn", broken)
+    assert plots.block_diagram(2)._repr_mimebundle_().keys() == {"text/plain"}
+    assert stick_slip("signed")._repr_html_().startswith("<pre")  # type: ignore[attr-defined]
 
 
 @pytest.mark.slow
-def test_gms_fsm_alone_shows_no_pictures() -> None:
-    """The methods come with `plots`, not with `gms_fsm`."""
+def test_importing_gms_fsm_imports_no_pictures() -> None:
+    """Classes have the methods; `plots` is imported when a notebook calls one of them."""
     code = (
-        "import gms_fsm as g; assert not hasattr(g.Chart, '_repr_svg_'); "
-        "assert not hasattr(g.Trace, '_repr_png_'); import plots; "
-        "assert hasattr(g.Chart, '_repr_svg_') and hasattr(g.Trace, '_repr_png_')"
+        "import sys, gms_fsm as g; assert hasattr(g.Chart, '_repr_svg_'); g.Trace, g.Session; "
+        "assert not {'plots', 'matplotlib', 'IPython', 'graphviz'} & set(sys.modules); "
+        "from gms_fsm.charts import LUGRE; assert LUGRE._repr_html_() != ''; "
+        "assert 'plots' in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)
+
+
+@pytest.mark.slow
+def test_a_run_of_several_contacts_is_a_table() -> None:
+    shown = run(BLOCKS)._repr_html_()  # type: ignore[attr-defined]
+    assert shown.count("<tr>") == 3
+    assert "pad1: " in shown
+    assert "trace.contact(&#x27;pad1&#x27;)" in shown
+
+
+def test_a_log_shows_its_first_records_and_how_many_more() -> None:
+    trace = simulate(stick_slip("signed"), Prescribed("0.15*sin(2*pi*t/25)"), 100.0)
+    log = trace.transitions
+    shown = log._repr_html_()
+    assert shown.count("<tr>") == 11
+    assert f"and {len(log) - 10} more" in shown
+    assert "<p>3 records</p>" in log[:3]._repr_html_()
+
+
+def test_a_log_is_a_record_array_for_everybody_else() -> None:
+    log = simulate(stick_slip("signed"), Prescribed("0.2"), 3.0).transitions
+    assert isinstance(log, np.recarray)
+    assert type(log.t) is type(log["t"]) is np.ndarray
+    assert isinstance(log[0], np.record)
+    assert log[log.element == 1].edge.tolist() == ["break_away_forward"]
+    again = pickle.loads(pickle.dumps(log))
+    assert again.dtype == log.dtype
+    assert again.tobytes() == log.tobytes() == np.asarray(log).tobytes()
+    file = io.BytesIO()
+    np.save(file, log)
+    plain = io.BytesIO()
+    np.save(plain, log.view(np.recarray))
+    assert file.getvalue() == plain.getvalue()
+
+
+def test_what_a_user_wrote_stays_text() -> None:
+    state = State("a", flow={"z": "v"}, outputs={"F": "z"})
+    chart = Chart("<script>", variables=("z",), states=(state,))
+    assert "<script>" not in chart._repr_html_()
+    assert "<script>" not in notebook.table(["<script>"], [["<script>"]], caption="<script>")
+
+
+def test_a_figure_is_sharp_on_a_dense_screen() -> None:
+    figure = pytest.importorskip("matplotlib.figure", reason="needs the extra 'plots'")
+    made = figure.Figure(figsize=(3, 2))
+    made.subplots().plot([1, 2])
+    png, size = notebook.figure_png(made)
+    assert png.startswith(b"\x89PNG")
+    assert int.from_bytes(png[16:20]) // 2 == size["width"]
+
+
+def test_charts_of_one_name_and_size_are_not_mixed_up() -> None:
+    """The short repr of a chart does not identify it: the program is that of its texts."""
+    charts = [
+        Chart(
+            "one name",
+            variables=("z",),
+            states=(State("a", flow={"z": text}),),
+            outputs={"F": "z"},
+        )
+        for text in ("v", "2 * v")
+    ]
+    assert repr(charts[0]) == repr(charts[1])
+    ends = [
+        simulate(ChartModel(chart, {}), Prescribed("0.2"), 1.0).variable("z")[-1]
+        for chart in charts
+    ]
+    assert ends == pytest.approx([0.2, 0.4])

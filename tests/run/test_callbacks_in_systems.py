@@ -61,7 +61,7 @@ def test_machines_of_something_else_are_refused() -> None:
         ({"pad3": ElementMachines(pad)}, "no contact 'pad3'"),
         ({"pad2": ElementMachines(pad)}, r"machines\['pad2'\]: these .* different model"),
         ({"pad1": ElementMachines(foreign)}, r"system\.contact\('pad1'\)"),
-        ({"pad1": pad}, r"machines\['pad1'\] is Contact.*; it must be an ElementMachines"),
+        ({"pad1": pad}, r"machines\['pad1'\] is <Contact 'pad1'.*; it must be an ElementMachines"),
         (ElementMachines(pad), "give a mapping, for example {'pad1': "),
         (pad, "several contacts"),
     )

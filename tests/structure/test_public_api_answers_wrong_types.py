@@ -141,6 +141,7 @@ def _entries(tmp: Path) -> Iterator[Entry]:
         "LiveChart": {"trace": _trace()} | view,
         "animate": {"trace": _trace(), "path": tmp / "a.gif"},
         "block_diagram": {"elements": 1},
+        "explore": run | options | {"sliders": {"v_c": (1e-9, 2.0)}, "height": 500},
         "live_statechart": {"trace": _trace(), "row": 0} | view,
         "landscape": {"trace": _trace(), "element": 0, "row": -1, "t": None, "window": None}
         | {"checks": None, "title": ""},

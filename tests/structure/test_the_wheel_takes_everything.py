@@ -22,7 +22,15 @@ FILES = [
 def test_there_are_files_of_all_three() -> None:
     assert PACKAGES == ["gms_fsm", "integrators", "plots"]
     assert len(FILES) > 70
-    assert {path.suffix for path in FILES} == {".py", ".typed", ".css", ".tcss", ".html", ".js"}
+    assert {path.suffix for path in FILES} == {
+        ".py",
+        ".typed",
+        ".css",
+        ".tcss",
+        ".html",
+        ".js",
+        ".md",
+    }
 
 
 def test_each_folder_is_a_package() -> None:

@@ -1,0 +1,103 @@
+"""What the cells of a lesson's notebook call: predictions are compared, a parameter is varied."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+__all__ = ["reveal", "vary"]
+
+
+def reveal(predicted: float | str | None, measured: float | str, unit: str = "") -> None:
+    """Print what was predicted next to what was measured.
+
+    Parameters
+    ----------
+    predicted : float, str or None
+        The reader's answer; None if there is none.
+    measured : float or str
+        What the run gave.
+    unit : str, optional
+        Of both.
+
+    Examples
+    --------
+    >>> reveal(5.0, 6.25, "um")
+    You predicted 5 um. Measured: 6.25 um; your answer is 20 % too low.
+    >>> reveal("open", "closed")
+    You predicted open. Measured: closed.
+    >>> reveal(None, 6.25, "um")
+    You predicted nothing. Measured: 6.25 um.
+    """
+    answer = "nothing" if predicted is None else _said(predicted, unit)
+    print(f"You predicted {answer}. Measured: {_said(measured, unit)}{_off(predicted, measured)}.")
+
+
+def _said(value: float | str, unit: str) -> str:
+    return value if isinstance(value, str) else f"{value:.4g} {unit}".rstrip()
+
+
+def _off(predicted: float | str | None, measured: float | str) -> str:
+    if predicted is None or isinstance(predicted, str) or isinstance(measured, str) or not measured:
+        return ""
+    error = 100 * (predicted / measured - 1)
+    if abs(error) < 0.5:
+        return "; your answer is right"
+    if not math.isfinite(error) or predicted / measured < 0 or abs(error) > 900:
+        return "; your answer is far off"
+    return f"; your answer is {abs(error):.0f} % too {'high' if error > 0 else 'low'}"
+
+
+def vary(
+    draw: Callable[[Any], object],
+    initial: float,
+    least: float,
+    most: float,
+    step: float,
+    label: str,
+    *,
+    log: bool = False,
+) -> None:
+    """Show what a function draws, with a slider for its argument if ipywidgets is installed.
+
+    Parameters
+    ----------
+    draw : callable
+        ``draw(value)`` returns a figure. Its argument is an integer if the four numbers are.
+    initial, least, most, step : float
+        Of the slider. With `log` the last three are powers of 10.
+    label : str
+        Next to the slider.
+    log : bool
+        Whether the slider is logarithmic.
+    """
+    display: Any = import_module("IPython.display").display
+    if find_spec("ipywidgets") is None:
+        display(draw(initial))
+        print(
+            f"{label} = {initial:g}; for another value call {getattr(draw, '__name__', 'draw')}"
+            "(value). With ipywidgets (pip install ipywidgets) there is a slider here."
+        )
+        return
+    ipywidgets: Any = import_module("ipywidgets")
+    numbers = (initial, least, most, step)
+    whole = all(isinstance(each, int) for each in numbers)
+    kind = "FloatLogSlider" if log else "IntSlider" if whole else "FloatSlider"
+    slider = getattr(ipywidgets, kind)(
+        initial,
+        min=least,
+        max=most,
+        step=step,
+        description=label,
+        continuous_update=False,
+        **({} if whole else {"readout_format": ".4g"}),
+    )
+    ipywidgets.interact(draw, **{_argument(draw): slider})
+
+
+def _argument(draw: Callable[..., object]) -> str:
+    return next(iter(inspect.signature(draw).parameters))

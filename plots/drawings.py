@@ -1,0 +1,105 @@
+"""Drawings that show themselves: a graph with whatever Graphviz is installed, and SVG text."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from html import escape
+
+import graphviz
+
+__all__ = ["DrawnGraph", "MermaidText", "Svg", "image"]
+
+
+def image(svg: str, words: str) -> str:
+    """Return an SVG document as an image in HTML, no wider than the page.
+
+    JupyterLab cuts off the right side of a wide SVG document that is not in HTML.
+
+    Parameters
+    ----------
+    svg : str
+        The document.
+    words : str
+        What it shows, for readers who do not see it.
+
+    Returns
+    -------
+    str
+        An ``img`` element.
+
+    Examples
+    --------
+    >>> image("<svg></svg>", "nothing")
+    '<img style="max-width:100%" alt="nothing" src="data:image/svg+xml;base64,PHN2Zz48L3N2Zz4=">'
+    """
+    data = b64encode(svg.encode()).decode()
+    words = escape(words)
+    return f'<img style="max-width:100%" alt="{words}" src="data:image/svg+xml;base64,{data}">'
+
+
+class DrawnGraph(graphviz.Digraph):  # type: ignore[misc]
+    """A Graphviz graph that a notebook shows as a picture, or as text without Graphviz.
+
+    Examples
+    --------
+    >>> from plots import block_diagram
+    >>> block_diagram(2)
+    <DrawnGraph 'block diagram'; plots.render writes it to a file>
+    """
+
+    text = ""  # what is drawn, in words; shown without Graphviz
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name!r:.120}; plots.render writes it to a file>"
+
+    def _repr_mimebundle_(
+        self,
+        **_: object,  # include, exclude: the caller selects again
+    ) -> dict[str, str]:
+        # graphviz would run the program dot, and raise an error where there is none.
+        from plots import notebook
+
+        picture = notebook.svg_of(self)
+        if picture is None:
+            return {"text/plain": self.text or repr(self)}
+        html = image(picture, self.text)
+        return {"text/html": html, "image/svg+xml": picture, "text/plain": repr(self)}
+
+
+class Svg(str):
+    """An SVG document as text, which a notebook shows as a picture.
+
+    Examples
+    --------
+    >>> Svg("<svg></svg>")
+    <SVG document of 11 characters>
+    """
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return f"<SVG document of {len(self)} characters>"
+
+    def _repr_svg_(self) -> str:
+        return str(self)
+
+    def _repr_html_(self) -> str:
+        return image(self, "a picture")
+
+
+class MermaidText(str):
+    """Mermaid text, which a notebook shows as a diagram where it knows Mermaid.
+
+    Examples
+    --------
+    >>> MermaidText("stateDiagram-v2")
+    <Mermaid text of 15 characters>
+    """
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return f"<Mermaid text of {len(self)} characters>"
+
+    def _repr_markdown_(self) -> str:
+        return f"```mermaid\n{self}```"

@@ -1,0 +1,1 @@
+"""The widget that explores runs in a notebook (extra ``jupyter``): `plots.explore`."""
