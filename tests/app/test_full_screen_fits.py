@@ -10,6 +10,7 @@ import pytest
 pytest.importorskip("textual", reason="needs the extra tui")
 
 from gms_fsm import GMS, GMSParameters, Prescribed, Stribeck
+from gms_fsm.app._quantities import quantity
 from gms_fsm.app.debugger.tui._app import PAGES, FullScreen
 from gms_fsm.app.debugger.tui._widgets import Panel
 from gms_fsm.inspection.session import Session
@@ -39,6 +40,10 @@ def _check(app: FullScreen, size: tuple[int, int]) -> set[str]:
         assert panel.max_scroll_y + inside.height >= len(panel.rows), panel.id
     for name in ("#status", "#line", "#keys"):
         assert whole.contains_region(app.query_one(name).region), name
+    status = screen_text(app).splitlines()[: app.status.region.height]
+    assert f"t = {app.seen.t:.9g} s" in status[0]
+    for contact in app.seen.contacts:
+        assert any(f"F = {quantity(contact.F, 'N')}" in text for text in status)
     bar = app.keys
     assert bar.places[-1][1] <= size[0]
     assert [place[2] for place in bar.places[-2:]] == ["help", "leave"]
@@ -114,3 +119,14 @@ def test_it_adapts_when_the_terminal_changes() -> None:
             assert ("events" in seen) == (size != SMALL)
 
     drive(action, SMALL)
+
+
+@pytest.mark.parametrize("size", [(40, 12), (10, 4)])
+def test_a_tiny_terminal_does_no_harm(size: tuple[int, int]) -> None:
+    async def action(app: FullScreen, pilot: Any) -> None:
+        app.give("next", "why 1")
+        await settle(pilot)
+        await press(pilot, "v", "v", "question_mark", "escape", "d")
+        assert app.commands.session.branch.cursor == 12
+
+    drive(action, size)

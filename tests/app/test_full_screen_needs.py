@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import sys
 
 import pytest
 
-from tests.helpers import ROOT
+from gms_fsm import Prescribed
+from gms_fsm.app.debugger.tui import run_tui
+from gms_fsm.errors import SessionError
+from gms_fsm.inspection.session import Session
+from tests.helpers import ROOT, stick_slip
 from tests.scenario_files import CommandLine, one_message
 
 FIG_4 = ROOT / "scenarios" / "paper_fig4_stick_slip.toml"
@@ -29,6 +34,17 @@ def test_without_a_terminal_the_prompt_is_offered(gms_fsm: CommandLine) -> None:
     one_message(
         gms_fsm("debug", "--tui", FIG_4), "needs a terminal", "without --tui it reads commands"
     )
+
+
+def test_a_terminal_that_cannot_place_text_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("textual", reason="needs the extra tui")
+    for name in ("stdin", "stdout"):
+        file = io.StringIO()
+        monkeypatch.setattr(file, "isatty", lambda: True)
+        monkeypatch.setattr(sys, name, file)
+    monkeypatch.setenv("TERM", "dumb")
+    with pytest.raises(SessionError, match="needs a terminal"):
+        run_tui(Session(stick_slip("signed"), Prescribed("0.1"), 1.0))
 
 
 def test_a_mistake_in_the_scenario_is_one_message(gms_fsm: CommandLine) -> None:

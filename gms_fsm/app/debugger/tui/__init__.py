@@ -6,6 +6,7 @@ both interfaces give the same answers. The panels show the view model of the deb
 
 from __future__ import annotations
 
+import os
 import sys
 
 from gms_fsm._extras import require
@@ -37,10 +38,11 @@ def run_tui(session: Session, title: str = "", *, light: bool = False) -> int:
     MissingExtraError
         If Textual is not installed.
     SessionError
-        If there is no terminal.
+        If there is no terminal, or one that cannot place text.
     """
     require("textual", "tui")
-    if not (sys.stdin and sys.stdin.isatty() and sys.stdout and sys.stdout.isatty()):
+    terminal = all(file is not None and file.isatty() for file in (sys.stdin, sys.stdout))
+    if not terminal or os.environ.get("TERM") == "dumb":
         raise SessionError(
             "the full-screen debugger needs a terminal",
             advice="without --tui it reads commands from a pipe and answers in lines",

@@ -255,7 +255,9 @@ class FullScreen(App[int]):
         return [Row(each) for each in art]
 
     def _draw_status(self) -> None:
-        lines = drawn.status_lines(self.seen, self.heading, self.size.width, busy=self.busy)
+        several = len(self.commands.session.branches) > 1
+        width = self.status.outer_size.width - self.status.styles.gutter.width
+        lines = drawn.status_lines(self.seen, self.heading, width, several=several, busy=self.busy)
         self.status.update(painted(lines, self.palette))
         lead = f"{self.number}" if self.number else self.commands.prompt
         if not self.busy:

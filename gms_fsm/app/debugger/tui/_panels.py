@@ -29,7 +29,9 @@ BAR = 8  # characters for |z|/s = 1
 TIME = " " * 16  # columns of the time of a transition
 
 
-def status_lines(view: View, title: str, width: int, *, busy: bool = False) -> list[Line]:
+def status_lines(
+    view: View, title: str, width: int, *, several: bool = False, busy: bool = False
+) -> list[Line]:
     """Return time, place and the main values: what is shown above everything.
 
     Parameters
@@ -40,6 +42,8 @@ def status_lines(view: View, title: str, width: int, *, busy: bool = False) -> l
         What runs.
     width : int
         Columns.
+    several : bool
+        Whether there are several branches; else the branch is not shown.
     busy : bool
         Whether a command is being executed.
 
@@ -53,7 +57,7 @@ def status_lines(view: View, title: str, width: int, *, busy: bool = False) -> l
     parts = [
         Span(f"t = {view.t:.9g} s", "head"),
         Span(f"{place}{step}"),
-        Span(f"branch {view.branch}", "fired" if view.branch else ""),
+        *([Span(f"branch {view.branch}", "fired")] if several else []),
     ]
     for contact in view.contacts:
         lead = f"{contact.name}: " if contact.name else ""
