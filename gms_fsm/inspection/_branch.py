@@ -239,9 +239,14 @@ class Branch:
         """Return the branch so far as a trace."""
         raw = [self.raw(row) for row in range(len(self))]
         start = self.run.start
+        t = np.array([row.t for row in raw])
+        steps = np.array([row.microstep for row in raw], dtype=np.int64)
+        if self.shared is not None:  # they count the firings at one time, also those before the fork
+            own = np.arange(len(raw)) > self.fork
+            steps[own & (t == t[self.fork])] += steps[self.fork]
         rows = Rows(
-            np.array([row.t for row in raw]),
-            np.array([row.microstep for row in raw], dtype=np.int64),
+            t,
+            steps,
             np.array([row.y for row in raw]),
             np.array([row.mode for row in raw], dtype=np.int64).reshape(
                 len(raw), start.program.layout.modes
