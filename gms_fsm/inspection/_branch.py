@@ -241,7 +241,9 @@ class Branch:
         start = self.run.start
         t = np.array([row.t for row in raw])
         steps = np.array([row.microstep for row in raw], dtype=np.int64)
-        if self.shared is not None:  # they count the firings at one time, also those before the fork
+        if (
+            self.shared is not None
+        ):  # they count the firings at one time, also those before the fork
             own = np.arange(len(raw)) > self.fork
             steps[own & (t == t[self.fork])] += steps[self.fork]
         rows = Rows(
