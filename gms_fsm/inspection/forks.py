@@ -528,9 +528,8 @@ def _place(ran: _Ran, poke: Poke) -> tuple[int, Row]:
         )
     last = int(np.searchsorted(rows.t, poke.t, side="right")) - 1
     if rows.t[last] == poke.t:
-        first = int(np.searchsorted(rows.t, poke.t, side="left"))
-        same = np.flatnonzero(rows.microstep[first : last + 1] == poke.microstep)
-        at = first + int(same[-1]) if same.size else last
+        same = np.flatnonzero((rows.t == poke.t) & (rows.microstep == poke.microstep))
+        at = int(same[-1]) if same.size else last
         y, mode = rows.y[at].tolist(), tuple(rows.mode[at].tolist())
         return at, Row(poke.t, int(rows.microstep[at]), y, mode)
     mode = tuple(rows.mode[last].tolist())

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from gms_fsm.inspection.explain import explain
-from plots.panels._race import held_back_by
 from plots.replay import write_replay
 from tests.plots.browser import Open, browser, open_page, pages
 from tests.plots.landscape_cases import NAMES, first_to_fire, opened, run
@@ -79,6 +78,8 @@ WORST = """() => {
 def test_the_clause_that_holds_an_edge_back_is_that_of_the_printed_race(
     open_page: Open, tmp_path: Path, name: str
 ) -> None:
+    from plots.panels._race import held_back_by  # needs matplotlib
+
     trace = run(name)[0] if name == "gms" else run_of(BALL)
     page = open_page(write_replay(tmp_path / "page.html", trace))
     numbers, between = page.evaluate("[[...runs[0].number], [...runs[0].between]]")
