@@ -10,13 +10,13 @@ import re
 import sys
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from gms_fsm.errors import cut
 
 __all__ = ["Form", "displayed", "full_text", "register_figures", "short_repr"]
 
-Form = Literal["html", "png", "svg"]
+Form: TypeAlias = str  # as in the names of the methods that IPython asks: html, png or svg
 Shown = TypeVar("Shown", bound=type)
 
 MOST_NUMBERS = 8  # of an array in a short repr
