@@ -94,8 +94,10 @@ def race(ax: Axes, trace: Trace, element: int, *, row: int = -1) -> Artists:
     y = 0.0
     for number, each in enumerate(why):
         drawn += _lane(ax, each, number, y)
+        # The zero of the bars, not through the name of the edge.
+        ends = [y + 0.5, y + len(each.clauses) + 0.4]
+        ax.plot([0, 0], ends, color=LINE_GREY, linewidth=0.8, zorder=1)
         y += 1.0 + len(each.clauses) + GAP
-    ax.plot([0, 0], [0.4, y - 0.75], color=LINE_GREY, linewidth=0.8, zorder=1)
     ax.set(xlim=(-1.04, 1.04), ylim=(y - 0.75, -0.6), yticks=[])
     ax.set_xticks([-1, -0.5, 0, 0.5, 1], ["−1", "−0.5", "0", "0.5", "1"])
     ax.set_xlabel(
