@@ -70,8 +70,14 @@ def sparkline(values: Sequence[float | None]) -> str:
     """
     known = [value for value in values if value is not None and math.isfinite(value)]
     low, high = min(known, default=0.0), max(known, default=0.0)
-    height = (len(BLOCKS) - 1) / (high - low) if high > low else 0.0
-    return "".join(
-        " " if value is None or not math.isfinite(value) else BLOCKS[round((value - low) * height)]
-        for value in values
-    )
+    # By shares of the range, which neither overflows nor underflows; a reciprocal would.
+    scale = 1.0 if math.isfinite(high - low) else 0.5
+    span = scale * high - scale * low
+
+    def block(value: float | None) -> str:
+        if value is None or not math.isfinite(value):
+            return " "
+        share = (scale * value - scale * low) / span if span > 0.0 else 0.0
+        return BLOCKS[round(share * (len(BLOCKS) - 1))]
+
+    return "".join(map(block, values))
