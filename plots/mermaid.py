@@ -48,6 +48,7 @@ def mermaid(chart: Chart) -> str:
         [*] --> s1_bristle
         state "Bristle" as s1_bristle
         s1_bristle : during#58; dz = v - sigma_0 * |v| * z / s#59;
+        s1_bristle : force#58; F = sigma_0 * z + sigma_1 * dz#59;
     <BLANKLINE>
     """
     checked_kind("chart", chart, Chart, "a Chart, of a model its .chart")
