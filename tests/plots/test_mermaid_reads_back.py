@@ -184,5 +184,5 @@ def test_characters_that_mermaid_could_misread_are_escaped(chart: Chart) -> None
 
 def test_invalid_names(hostile: Chart) -> None:
     lines = mermaid(hostile).splitlines()
-    assert len(lines) == 8
+    assert len(lines) == 9
     assert not [line for line in lines[4:] if "evil:" in line or "%%" in line]

@@ -184,8 +184,9 @@ def of_class(drawn: dict[str, Drawn], name: str) -> set[str]:
 
 
 @pytest.mark.parametrize(("chart", "elements"), CASES)
-def test_every_state_shows_its_flow(chart: Chart, elements: int, draw: Draw) -> None:
+def test_every_state_shows_its_flow_and_its_force(chart: Chart, elements: int, draw: Draw) -> None:
     drawn = draw(chart, elements)
+    names, below = chart.force_names, len(chart.states) > 2
     expected = set()
     for element in range(1, elements + 1):
         for state in chart.states:
@@ -195,6 +196,7 @@ def test_every_state_shows_its_flow(chart: Chart, elements: int, draw: Draw) -> 
             for kind, trees in (
                 ("entry", chart.assignments["entry", state.name]),
                 ("during", flow),
+                ("force", {} if below else {f: chart.forces[state.name, f] for f in names}),
                 ("exit", chart.assignments["exit", state.name]),
             ):
                 lines += [f"{kind}:"] if trees else []
