@@ -254,7 +254,8 @@ def test_texts_stay_apart(draw: Draw) -> None:
             if found:
                 name = re.search(r" id=\"?([\w-]+)", line)
                 sizes = [re.search(rf"{side}=([\d.]+)", line) for side in ("width", "height")]
-                assert name is not None and all(sizes)
+                assert name is not None
+                assert all(sizes)
                 x, y = float(found[1]), float(found[2])
                 half = [36 * float(size[1]) for size in sizes if size]
                 rooms[name[1]] = (x - half[0], y - half[1], x + half[0], y + half[1])
@@ -272,7 +273,8 @@ def test_many_elements_take_no_more_room(tmp_path: Path, draw: Draw) -> None:
 
     four, twelve, twenty = size(4), size(12), size(20)
     assert twelve == twenty
-    assert twelve[0] <= four[0] and twelve[1] <= four[1]
+    assert twelve[0] <= four[0]
+    assert twelve[1] <= four[1]
 
 
 def test_a_vector_says_how_many_values_it_has(draw: Draw) -> None:
