@@ -44,7 +44,7 @@ from plots.style import (
     VERMILION_TINT,
 )
 
-__all__ = ["system_diagram"]
+__all__ = ["signal_text", "system_diagram"]
 
 # Outline, fill and border of each kind.
 LOOKS = {
@@ -140,7 +140,7 @@ def _blocks(system: System) -> Iterator[Block]:
     """Yield every part, from what drives to what is driven."""
     names = system.names
     for name, signal in system.signals.items():
-        yield Block("signal", name, "signal", (_signal(name, signal),), ())
+        yield Block("signal", name, "signal", (signal_text(name, signal),), ())
     for part in system.sampled:
         trees = {each: parse_value(t, [*names, "period"]) for each, t in part.updates.items()}
         note = f"every {_seconds(part.period)}"
@@ -222,7 +222,8 @@ def _less(total: Value, share: Value, force: str) -> Value:
     return Binary("+" if negative else "-", total, term)
 
 
-def _signal(name: str, signal: Signal | str) -> str:
+def signal_text(name: str, signal: Signal | str) -> str:
+    """Return what a signal is, in one line."""
     match signal:
         case str():
             return f"{name} = {signal}"
