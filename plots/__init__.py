@@ -17,6 +17,7 @@ from plots.live_chart import LiveChart, live_statechart
 from plots.mermaid import mermaid
 from plots.render import render
 from plots.replay import replay, write_replay
+from plots.schematic import schematic
 from plots.statechart import statechart
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ __all__ = [
     "phase",
     "render",
     "replay",
+    "schematic",
     "statechart",
     "unfold",
     "write_replay",

@@ -20,11 +20,12 @@ from plots._matplotlib import (
     Figure,
     FigureCanvasAgg,
     Rectangle,
+    RendererBase,
     rc_context,
 )
 from plots.style import INK, LINE_GREY, PANEL, PAPER, RC
 
-__all__ = ["UNIT", "Pen", "damper_points", "formula", "height", "spring_points", "width"]
+__all__ = ["UNIT", "Pen", "damper_points", "formula", "spring_points", "width"]
 
 Point = tuple[float, float]
 Points = npt.NDArray[np.float64]
@@ -103,24 +104,25 @@ def _symbol(name: str) -> str:
     return f"{shown}_{{{index}}}" if len(index) == 1 else rf"{shown}_{{\mathrm{{{index}}}}}"
 
 
+@lru_cache(maxsize=1)
+def _measuring() -> tuple[Figure, RendererBase]:
+    figure = Figure(dpi=72)
+    return figure, FigureCanvasAgg(figure).get_renderer()
+
+
 @lru_cache(maxsize=1024)
-def _extent(text: str, size: float, bold: bool) -> tuple[float, float]:
+def _width(text: str, size: float, bold: bool) -> float:
+    figure, renderer = _measuring()
     with rc_context(RC):
-        figure = Figure(dpi=72)
-        canvas = FigureCanvasAgg(figure)
         drawn = figure.text(0, 0, text, fontsize=size, fontweight="bold" if bold else "normal")
-        box = drawn.get_window_extent(canvas.get_renderer())
-    return box.width / 72 / UNIT, box.height / 72 / UNIT
+    box = drawn.get_window_extent(renderer)
+    drawn.remove()
+    return float(box.width) / 72 / UNIT
 
 
 def width(text: str, size: float = SMALL, *, bold: bool = False) -> float:
     """Return the width of a text in lengths of the axes."""
-    return _extent(text, size, bold)[0] if text else 0.0
-
-
-def height(text: str, size: float = SMALL) -> float:
-    """Return the height of a text in lengths of the axes."""
-    return _extent(text, size, False)[1] if text else 0.0
+    return _width(text, size, bold) if text else 0.0
 
 
 def spring_points(left: float, right: float, y: float) -> Points:
@@ -165,6 +167,7 @@ class Pen:
             *np.transpose(np.asarray(points, dtype=float)),
             color=INK,
             linewidth=lw,
+            linestyle="-",
             solid_capstyle="round",
             solid_joinstyle="round",
             zorder=3,
@@ -247,6 +250,7 @@ class Pen:
             mutation_scale=10,
             color=INK,
             linewidth=lw,
+            linestyle="-",
             shrinkA=0,
             shrinkB=0,
             zorder=5,
@@ -299,16 +303,19 @@ class Pen:
         )
 
     def clutch(self, left: float, right: float, y: float, gid: str) -> None:
-        """Draw two plates with teeth."""
+        """Draw two plates with teeth that fit into each other."""
         middle, gap = 0.5 * (left + right), (np.nan, np.nan)
         points: list[Point] = []
-        for end, plate, way in ((left, middle - 0.22, 1), (right, middle + 0.22, -1)):
-            points += [(end, y), (plate, y), gap, (plate, y - 0.32)]
-            for k in range(3):
-                low = y - 0.32 + 0.22 * k + (0.0 if way > 0 else 0.1)
+        for end, way in ((left, 1), (right, -1)):
+            plate = middle - 0.2 * way
+            # Teeth of one plate face the spaces of the other one.
+            teeth = (-0.24, 0.04) if way > 0 else (-0.1, 0.18)
+            points += [(end, y), (plate, y), gap, (plate, y - 0.28)]
+            for low in teeth:
                 tip = plate + 0.14 * way
-                points += [(plate, low), (tip, low), (tip, low + 0.1), (plate, low + 0.1)]
-            points += [(plate, y + 0.34), gap]
+                points += [(plate, y + low), (tip, y + low), (tip, y + low + 0.1)]
+                points += [(plate, y + low + 0.1)]
+            points += [(plate, y + 0.28), gap]
         self.line(points[:-1], gid=gid)
 
     def stop(self, face: float, post: float, y: float, gid: str) -> None:

@@ -189,11 +189,22 @@ def blocks_command(
         int | None,
         typer.Option(help="Number of elements of the paper's model; 4 by default."),
     ] = None,
+    schematic: Annotated[
+        bool,
+        typer.Option(
+            "--schematic",
+            help="Draw masses, springs, dampers and contacts instead, to a file ending in {figure}.",
+        ),
+    ] = False,
 ) -> None:
     """Draw the block diagram of a system, or of the paper's model (its Fig. 2a)."""
     import plots
 
     if not file:
+        if schematic:
+            raise ParameterError(
+                "no system is given", place="--schematic", advice="name a system or scenario file"
+            )
         picture = plots.block_diagram(4 if elements is None else elements)
         typer.echo(str(plots.render(picture, output)))
         return
@@ -210,6 +221,11 @@ def blocks_command(
         raise ParameterError(
             f"the number of elements is in {file}", place="--elements", advice="leave it out"
         )
+    if schematic:
+        from plots import figures
+
+        typer.echo(str(figures.save(plots.schematic(own.system), output)))
+        return
     typer.echo(str(plots.render(plots.block_diagram(own.system), output)))
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from functools import cache
 
-from gms_fsm import simulate
+import numpy as np
+
+from gms_fsm import GMS, GMSParameters, Stribeck, simulate
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.charts.parameters import Parameter
@@ -43,6 +45,19 @@ SHARED = Chart(
     contact_outputs={"F": "F + b * v"},
 )
 DRY = {"F_c": 1.0, "F_s": 1.5, "b": 0.0}
+
+GMS12 = GMS(  # more elements than are drawn one by one
+    GMSParameters(
+        np.linspace(0.5, 1.5, 12),
+        np.full(12, 0.1),
+        np.full(12, 1.0),
+        sigma_2=0.4,
+        stribeck=Stribeck(1.0, 1.5, 0.1),
+        v_c=1e-6,
+        weights=np.linspace(0.05, 0.2, 12),
+    ),
+    law="signed",
+)
 
 PULLED = System(
     "pulled mass",

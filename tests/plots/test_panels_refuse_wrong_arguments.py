@@ -16,7 +16,8 @@ pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
 
 from matplotlib.figure import Figure
 
-from plots import figures, panels, schematic
+from plots import _elements, figures, panels
+from plots.schematic import schematic_figure
 from tests.helpers import open_loop, stick_slip
 
 
@@ -110,10 +111,10 @@ def test_formats(run: Trace, tmp_path: Path) -> None:
 @pytest.mark.parametrize("row", [10_000, -10_000, 1.5, True, None], ids=str)
 def test_rows_of_a_schematic(run: Trace, row: object) -> None:
     with pytest.raises(ParameterError, match=r"row is .* integer from"):
-        schematic.schematic(Figure().subplots(), run, row)  # type: ignore[arg-type]
+        _elements.elements_at(Figure().subplots(), run, row)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("elements", [0, 13, 2.0, True], ids=str)
 def test_elements_of_a_schematic(elements: object) -> None:
     with pytest.raises(ParameterError, match=r"elements is .* 1 to 12 elements"):
-        schematic.schematic_figure(elements=elements)  # type: ignore[arg-type]
+        schematic_figure(elements=elements)  # type: ignore[arg-type]
