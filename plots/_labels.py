@@ -84,14 +84,14 @@ class Tally:
         return "taken once" if times == 1 else f"taken {times} times"
 
 
-def wrapped(text: str) -> list[str]:
+def wrapped(text: str, limit: int = LONGEST_LINE) -> list[str]:
     """Return a text as lines of limited length."""
-    if len(text) <= LONGEST_LINE:
+    if len(text) <= limit:
         return [text] if text else []
     # Continuation lines are indented; a word longer than a line is not broken.
     return textwrap.wrap(
         text,
-        LONGEST_LINE,
+        limit,
         subsequent_indent="  ",
         break_long_words=False,
         break_on_hyphens=False,

@@ -20,21 +20,18 @@ arXiv 2512.03049 (2025), Fig. 2a, eq. (2)-(4).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import graphviz
 
 from gms_fsm.errors import ParameterError
 from gms_fsm.systems.system import System
 from plots._system_diagram import system_diagram
+from plots._wires import PLACED, THICK, THIN, Point, caption, draw_wire, joint, position, sides
 from plots.drawings import DrawnGraph
 from plots.style import INK, PANEL, PAPER, SANS, TEXT_GREY
 
 __all__ = ["block_diagram"]
-
-Point = tuple[float, float]
 
 MOST_WIRES = 4  # elements; more are drawn as vectors
 
@@ -46,7 +43,6 @@ Y_FORCE, Y_RATE, Y_DEFLECTION = 85, 59, 21
 # From one element to the next: its two outputs, its z port, its feedback line.
 ELEMENT, PORT, LANE = 60, 30, 12
 SUM_WIDTH, MARGIN = 36, 22
-THIN, THICK = 1.1, 3.0  # lines of one value and of several
 
 # Where values enter and leave.
 TERMINAL = {"style": "rounded,filled", "fillcolor": PANEL}
@@ -131,14 +127,7 @@ def _model_diagram(elements: int) -> DrawnGraph:
     graph = DrawnGraph(
         name="block diagram",
         engine="neato",
-        graph_attr={
-            "layout": "neato",  # so that the DOT text is self-contained
-            "inputscale": "72",  # positions are points, not inches
-            "splines": "line",
-            "outputorder": "nodesfirst",
-            "bgcolor": PAPER,
-            "pad": "0.2",
-        },
+        graph_attr=PLACED | {"bgcolor": PAPER},
         node_attr={
             "fontname": SANS,
             "fontsize": "12",
@@ -182,10 +171,10 @@ def _chart(graph: graphviz.Digraph, n: int, y_bottom: float) -> None:
     )
     count = f' <FONT COLOR="{TEXT_GREY}">&#215; {n}</FONT>' if n > 1 else ""
     title = f"<B>GMS element chart</B>{count}"
-    _label(graph, "chart-title", (middle, Y_TITLE), title, width=150)
+    caption(graph, "chart-title", (middle, Y_TITLE), title, width=150)
     for name, text, y in (("v", "<I>v</I>", Y_VELOCITY), ("s", "<I>s</I>(<I>v</I>)", Y_STRIBECK)):
-        _joint(graph, f"chart-{name}", (X_CHART_LEFT, y))
-        _label(graph, f"chart-{name}-name", (X_CHART_LEFT + 20, y), text)
+        joint(graph, f"chart-{name}", (X_CHART_LEFT, y))
+        caption(graph, f"chart-{name}-name", (X_CHART_LEFT + 20, y), text)
 
 
 def _velocity(graph: graphviz.Digraph) -> None:
@@ -193,28 +182,28 @@ def _velocity(graph: graphviz.Digraph) -> None:
     _block(graph, "v", (X_INPUT, Y_VELOCITY), (44, 24), "<<I>v</I>>", **TERMINAL)
     _block(graph, "stribeck", (X_STRIBECK, Y_STRIBECK), (86, 40), "<<I>s</I>(<I>v</I>)>")
     note = f'<FONT POINT-SIZE="9" COLOR="{TEXT_GREY}">Stribeck, eq. (2)</FONT>'
-    _label(graph, "stribeck-note", (X_STRIBECK, Y_NOTE), note, width=86)
+    caption(graph, "stribeck-note", (X_STRIBECK, Y_NOTE), note, width=86)
     graph.node(
-        "branch", "", id="branch", pos=_pos((X_BRANCH, Y_VELOCITY)), shape="point", width="0.07"
+        "branch", "", id="branch", pos=position((X_BRANCH, Y_VELOCITY)), shape="point", width="0.07"
     )
-    _wire(graph, "velocity", "v", [], "branch", arrow="none")
-    _wire(graph, "velocity-chart", "branch", [], "chart-v")
-    _wire(graph, "velocity-stribeck", "branch", [(X_BRANCH, Y_STRIBECK)], "stribeck")
-    _wire(graph, "threshold", "stribeck", [], "chart-s")
+    draw_wire(graph, "velocity", "v", [], "branch", arrow="none")
+    draw_wire(graph, "velocity-chart", "branch", [], "chart-v")
+    draw_wire(graph, "velocity-stribeck", "branch", [(X_BRANCH, Y_STRIBECK)], "stribeck")
+    draw_wire(graph, "threshold", "stribeck", [], "chart-s")
 
 
 def _sum(graph: graphviz.Digraph, x: float, top: float, bottom: float) -> None:
     y = (top + bottom) / 2
     _block(graph, "sum", (x, y), (SUM_WIDTH, top - bottom), "")
     # The letter has no descender, so that its middle is above that of its line.
-    _label(graph, "sum-name", (x, y - 1.5), '<FONT POINT-SIZE="16">&#931;</FONT>', width=SUM_WIDTH)
+    caption(graph, "sum-name", (x, y - 1.5), '<FONT POINT-SIZE="16">&#931;</FONT>', width=SUM_WIDTH)
     _block(graph, "F", (x + 82, y), (44, 24), "<<I>F</I>>", **TERMINAL)
-    _wire(graph, "friction", "sum", [], "F")
+    draw_wire(graph, "friction", "sum", [], "F")
 
 
 def _summand(graph: graphviz.Digraph, name: str, x_sum: float, y: float) -> None:
-    _joint(graph, name, (x_sum - SUM_WIDTH / 2, y))
-    _label(graph, f"{name}-sign", (x_sum - SUM_WIDTH / 2 - 14, y + 8), "+", width=10)
+    joint(graph, name, (x_sum - SUM_WIDTH / 2, y))
+    caption(graph, f"{name}-sign", (x_sum - SUM_WIDTH / 2 - 14, y + 8), "+", width=10)
 
 
 def _viscous_path(graph: graphviz.Digraph, x_sum: float) -> None:
@@ -222,8 +211,8 @@ def _viscous_path(graph: graphviz.Digraph, x_sum: float) -> None:
     at = (X_INTEGRATOR, Y_VISCOUS)
     _block(graph, "sigma_2", at, (54, 54), label, shape="triangle", orientation="-90")
     _summand(graph, "sum-viscous", x_sum, Y_VISCOUS)
-    _wire(graph, "velocity-viscous", "branch", [(X_BRANCH, Y_VISCOUS)], "sigma_2")
-    _wire(graph, "viscous", "sigma_2", [], "sum-viscous")
+    draw_wire(graph, "velocity-viscous", "branch", [(X_BRANCH, Y_VISCOUS)], "sigma_2")
+    draw_wire(graph, "viscous", "sigma_2", [], "sum-viscous")
 
 
 def _element(
@@ -239,27 +228,27 @@ def _element(
         ("dz", (X_CHART_RIGHT, y_rate), -1),
     ):
         port = f"chart-{name}{lane.id}"
-        _joint(graph, port, at)
+        joint(graph, port, at)
         text = _indexed(f"<I>{name}</I>", lane.index)
-        _label(graph, f"{port}-name", (at[0] + side * inwards, at[1]), text, width=2 * inwards)
+        caption(graph, f"{port}-name", (at[0] + side * inwards, at[1]), text, width=2 * inwards)
 
     _summand(graph, f"sum-F{lane.id}", x_sum, y_force)
     force = f"force{lane.id}"
     tip = lane.tip((x_sum - SUM_WIDTH / 2, y_force))
-    _wire(graph, force, f"chart-F{lane.id}", tip, f"sum-F{lane.id}", width=lane.width)
+    draw_wire(graph, force, f"chart-F{lane.id}", tip, f"sum-F{lane.id}", width=lane.width)
 
     integrator = f"integrator{lane.id}"
     kind = {"class": "integrator"}
     _block(graph, integrator, (X_INTEGRATOR, y_rate), (40, 36), INTEGRATOR, **kind)
     rate = f"rate{lane.id}"
     tip = lane.tip((X_INTEGRATOR - 20, y_rate))
-    _wire(graph, rate, f"chart-dz{lane.id}", tip, integrator, width=lane.width)
+    draw_wire(graph, rate, f"chart-dz{lane.id}", tip, integrator, width=lane.width)
     # The first element's feedback is the outermost, so that the feedback lines never cross.
     right, left, below = X_RIGHT_LANE + inset, X_LEFT_LANE - inset, y_bottom - 16 - inset
     corners = [(right, y_rate), (right, below), (left, below), (left, y_deflection)]
     corners += lane.tip((X_CHART_LEFT, y_deflection))
     fed_back, port = f"deflection{lane.id}", f"chart-z{lane.id}"
-    _wire(graph, fed_back, integrator, corners, port, colour=TEXT_GREY, width=lane.width)
+    draw_wire(graph, fed_back, integrator, corners, port, colour=TEXT_GREY, width=lane.width)
     if lane.count > 1:
         _stroke(graph, force, (X_CHART_RIGHT + 30, y_force), lane.count)
         _stroke(graph, rate, (X_CHART_RIGHT + 30, y_rate), lane.count)
@@ -272,11 +261,7 @@ def _block(
     graph: graphviz.Digraph, name: str, at: Point, size: Point, label: str, **look: str
 ) -> None:
     plain = {"class": "block", "shape": "box", "style": "filled", "fillcolor": PAPER}
-    graph.node(name, label, id=name, pos=_pos(at), **_size(size), **(plain | look))
-
-
-def _label(graph: graphviz.Digraph, name: str, at: Point, text: str, width: float = 40) -> None:
-    graph.node(name, f"<{text}>", id=name, pos=_pos(at), shape="plaintext", **_size((width, 18)))
+    graph.node(name, label, id=name, pos=position(at), **sides(size), **(plain | look))
 
 
 def _indexed(symbol: str, index: str) -> str:
@@ -292,57 +277,11 @@ def _indexed(symbol: str, index: str) -> str:
     )
 
 
-def _joint(
-    graph: graphviz.Digraph, name: str, at: Point, colour: str = INK, width: float = THIN
-) -> None:
-    """Draw a square of a wire's width where wires end or turn, so that corners have no notch."""
-    graph.node(
-        name,
-        "",
-        id=name,
-        pos=_pos(at),
-        shape="box",
-        style="filled",
-        fillcolor=colour,
-        peripheries="0",  # an outline would make it wider than its wire
-        **_size((width, width)),
-    )
-
-
-def _wire(
-    graph: graphviz.Digraph,
-    name: str,
-    start: str,
-    corners: Sequence[Point],
-    end: str,
-    colour: str = INK,
-    arrow: str = "forward",
-    width: float = THIN,
-) -> None:
-    stops = [start, *(f"{name}-corner{k}" for k in range(1, len(corners) + 1)), end]
-    for stop, corner in zip(stops[1:], corners, strict=False):  # the last stop is not a corner
-        _joint(graph, stop, corner, colour, width)
-    for k, (here, there) in enumerate(pairwise(stops), start=1):
-        last = there == end
-        graph.edge(
-            here,
-            there,
-            id=f"{name}-{k}",
-            **{"class": "wire"},
-            color=colour,
-            penwidth=f"{THIN if last else width:g}",
-            # A line that ended at the side of a corner's square would leave a gap.
-            tailclip=str(here == start).lower(),
-            headclip=str(last).lower(),
-            dir=arrow if last else "none",
-        )
-
-
 def _stroke(graph: graphviz.Digraph, wire: str, at: Point, count: int, colour: str = INK) -> None:
     """Draw the oblique stroke of a vector through its wire, and the number of its values."""
     for end, way in (("low", -1), ("high", 1)):
         place = (at[0] + way * 3.5, at[1] + way * 6.5)
-        _joint(graph, f"{wire}-{end}", place, colour, width=0.1)
+        joint(graph, f"{wire}-{end}", place, colour, width=0.1)
     graph.edge(
         f"{wire}-low",
         f"{wire}-high",
@@ -354,12 +293,4 @@ def _stroke(graph: graphviz.Digraph, wire: str, at: Point, count: int, colour: s
         **{"class": "stroke"},
     )
     text = f'<FONT POINT-SIZE="10">{count}</FONT>'
-    _label(graph, f"{wire}-count", (at[0] + 13, at[1] + 9), text, width=20)
-
-
-def _pos(at: Point) -> str:
-    return f"{at[0]:g},{at[1]:g}!"
-
-
-def _size(size: Point) -> dict[str, str]:
-    return {"width": f"{size[0] / 72:.4f}", "height": f"{size[1] / 72:.4f}"}
+    caption(graph, f"{wire}-count", (at[0] + 13, at[1] + 9), text, width=20)

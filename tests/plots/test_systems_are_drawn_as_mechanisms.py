@@ -7,70 +7,18 @@ none stands at an arrow.
 from __future__ import annotations
 
 from collections import Counter
-from functools import cache
 from itertools import combinations
-from pathlib import Path
 
 import pytest
 
-from gms_fsm import Prescribed, PulledSlider, Slider
-from gms_fsm.app.scenario import load_scenario, load_system
-from gms_fsm.charts import CHARTS
+from gms_fsm import PulledSlider
 from gms_fsm.errors import ParameterError
 from gms_fsm.language import MATLAB_LIKE, spell
 from gms_fsm.systems.system import Body, Contact, System, system_of
 from plots._mechanics import Mechanism, mechanism, total
-from tests.plots.systems_to_draw import BALL, BLOCKS, DRY, GMS12, PLANAR, PULLED, SERVO, STICTION
+from tests.plots.systems_to_draw import BLOCKS, DRY, GMS12, PULLED, STICTION, systems
 
-SCENARIOS = Path(__file__).parents[2] / "scenarios"
 A4 = 8.27  # inches
-
-NUMBERS = dict.fromkeys(("m", "k", "k_c", "k_l", "P", "w", "d", "J", "r", "k_f"), 1.0)
-TRAIN = System(
-    "a train of four",
-    bodies=(
-        Body(
-            "one",
-            inertia="m",
-            force="-k * x_1 + k_c * (x_2 - x_1) + k_l * (x_4 - x_1) + P * sin(w * t)",
-            x="x_1",
-            v="v_1",
-        ),
-        Body("two", inertia="m", force="k_c*x_1 - k_c*x_2 + 0.5*d*(v_3 - v_2)", x="x_2", v="v_2"),
-        Body("three", inertia="m + J/r**2", force="0.5*d*(v_2 - v_3) - k*x_3", x="x_3", v="v_3"),
-        Body("four", inertia="m", force="k_l*(x_1 - x_4) - k_f*x_1", x="x_4", v="v_4"),
-    ),
-    contacts=(
-        Contact("slip", STICTION, DRY, v="v_2 - v_3"),
-        Contact("dog", CHARTS["dog-clutch"], {"t_on": 1.0, "t_off": 2.0}, v="v_3 - v_4"),
-        Contact("pads", STICTION, DRY, v="v_1"),
-        Contact("differential", STICTION, DRY, v="v_1 + v_2 - v_4"),
-    ),
-    numbers=NUMBERS,
-)
-PLANE = System(
-    "a puck",
-    bodies=(Body("east", inertia=1.0), Body("north", inertia=1.0, x="y", v="w")),
-    contacts=(Contact("floor", PLANAR, dict.fromkeys(PLANAR.parameter_names, 1.0), v=("v", "w")),),
-)
-RIGS = (Prescribed("0.1*sin(t)"), Slider(1.0, "0.3*t"), PulledSlider(1.0, 2.0, 0.1))
-
-
-@cache
-def systems() -> dict[str, System]:
-    """Return the scenarios without a measured record, the rigs, and the systems of the tests."""
-    found = {each.name: each for each in (PULLED, BALL, SERVO, TRAIN, PLANE)}
-    found |= {rig.title: system_of(GMS12, rig) for rig in RIGS}
-    for path in sorted(SCENARIOS.glob("*.toml")):
-        text = path.read_text(encoding="utf-8")
-        if "[record]" in text:
-            continue
-        if "[model]" in text and "[[body]]" not in text:
-            loaded = load_scenario(path)
-            found[path.stem] = system_of(loaded.model, loaded.rig)
-        else:
-            found[path.stem] = load_system(path)
-    return found
 
 
 def links(found: Mechanism) -> set[tuple[str, str, str, str]]:
@@ -241,7 +189,7 @@ def test_twelve_elements_are_one_contact() -> None:
     pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
     from plots import schematic
 
-    figure = schematic(system_of(GMS12, RIGS[2]))
+    figure = schematic(system_of(GMS12, PulledSlider(1.0, 2.0, 0.1)))
     below = " ".join(text.get_text() for text in figure.axes[0].texts)
     assert below.count("× 12") == 1
 
