@@ -35,7 +35,7 @@ from gms_fsm.app.lessons.notebooks import cells_of
 from gms_fsm.app.paper import FIG4_END, FORCE, VELOCITY
 from gms_fsm.app.paper.experiments import experiments, run_one
 from gms_fsm.app.paper.writing import held_figure
-from gms_fsm.app.scenario import load_scenario
+from gms_fsm.app.scenario import load_scenario, load_system
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.broken import BROKEN
 from plots import figures, panels
@@ -60,6 +60,7 @@ def main() -> None:
     figures.save(figures.compare_laws(runs), FOLDER / "fig4_laws.png")
     published, signed = runs.values()
     draw_charts(published, signed)
+    draw_systems()
     draw_figures(signed)
     draw_concepts(published)
     draw_howto()
@@ -84,6 +85,13 @@ def draw_charts(published: Trace, signed: Trace) -> None:
     live = plots.live_statechart(signed, row=row, elements=4, values=True)
     write_whole(FOLDER / "chart_live.svg", lambda file: file.write(live.encode()))
     plots.animate(signed, FOLDER / "film.gif", elements=[0], frames=50, t_end=50.0, fps=10)
+
+
+def draw_systems() -> None:
+    """Write the block diagram and the schematic of a servo."""
+    servo = load_system(SCENARIOS / "servo.toml")
+    plots.render(plots.block_diagram(servo), FOLDER / "system_blocks.png")
+    figures.save(plots.schematic(servo), FOLDER / "system_schematic.png")
 
 
 def draw_held() -> None:

@@ -345,10 +345,11 @@ def _ordered(row: list[str], items: Iterable[Item]) -> list[str]:
     if len(row) > MOST_ORDERED or not pairs:
         return row
 
-    def length(order: Sequence[str]) -> int:
-        return sum(abs(order.index(a) - order.index(b)) for a, b in pairs)
-
-    return list(min(permutations(row), key=length))
+    lengths = {
+        order: sum(abs(order.index(a) - order.index(b)) for a, b in pairs)
+        for order in permutations(row)
+    }
+    return list(min(lengths.items(), key=lambda each: each[1])[0])
 
 
 def _put(layout: Layout, item: Item) -> None:

@@ -107,7 +107,8 @@ def _symbol(name: str) -> str:
 @lru_cache(maxsize=1)
 def _measuring() -> tuple[Figure, RendererBase]:
     figure = Figure(dpi=72)
-    return figure, FigureCanvasAgg(figure).get_renderer()
+    renderer: RendererBase = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
+    return figure, renderer
 
 
 @lru_cache(maxsize=1024)

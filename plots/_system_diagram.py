@@ -224,9 +224,9 @@ def signal_text(name: str, signal: Signal | str) -> str:
     """Return what a signal is, in one line."""
     match signal:
         case str():
-            return f"{name} = {signal}"
+            return f"{name} = {signal.replace('**', '^')}"
         case Formula(text=text):
-            return f"{name} = {text}"
+            return f"{name} = {text.replace('**', '^')}"
         case Corners(times=times, held=held):
             return f"{name}: {times.size} {'corners' if held else 'samples'}"
     return f"{name}: a Python function"

@@ -21,6 +21,7 @@ GAP = 34.0  # between blocks of a column
 PORT = 20.0  # between wires at one side of a block: room for a text above each
 TRACK = 13.0  # between upright pieces
 LEAD = 16.0  # from the last track to the next column: room for an arrowhead
+NARROWEST = 46.0  # of a channel: room for two arrowheads and a line between them
 LANE = 18.0  # between wires above or below all blocks
 ROOM = 6.2  # width of a character of a wire's text
 STEP, NEAR = 5.0, 4.0  # by what a wire moves out of another one's way, and what is too close
@@ -291,7 +292,8 @@ def _across(boxes: Sequence[Box], wires: Sequence[_Wire]) -> None:
         for k, wire in enumerate(sorted(own, key=lambda each: _order(each, channel))):
             tracks[id(wire), channel] = x + room + TRACK * (k + 0.5)
         entered = any(wire.end == channel for wire in wires)
-        x += room + TRACK * len(own) + (LEAD if entered or own else 0.0)
+        wide = room + TRACK * len(own) + (LEAD if entered or own else 0.0)
+        x += max(wide, NARROWEST) if entered else wide
     for wire in wires:
         first = tracks.get((id(wire), wire.start), 0.0)
         wire.tracks = (first, tracks.get((id(wire), wire.end), first))

@@ -193,7 +193,7 @@ def blocks_command(
         bool,
         typer.Option(
             "--schematic",
-            help="Draw masses, springs, dampers and contacts instead, to a file ending in {figure}.",
+            help="Draw masses, springs, dampers, contacts instead, to a file ending in {figure}.",
         ),
     ] = False,
 ) -> None:
