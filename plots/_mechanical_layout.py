@@ -260,11 +260,16 @@ def label_of(touch: Touch) -> list[str]:
     contact = touch.contact
     count = f" × {contact.n}" if contact.n > 1 else ""
     lines = _wrapped(f"{printable(contact.chart.name)}{count}")
-    if len(touch.shares) > 2 or len(contact.v) > 1:
+    if _of_many(touch):
         lines += [formula(v) for v in contact.v]
     for name in SHOWN.get(touch.symbol, ()):
         lines.append(_number(contact.chart, name, contact.values[name]))
     return lines
+
+
+def _of_many(touch: Touch) -> bool:
+    """Return whether a contact has more velocities or bodies than a line has ends."""
+    return len(touch.shares) > 2 or len(touch.contact.v) > 1
 
 
 def _number(chart: Chart, name: str, value: object) -> str:
@@ -315,7 +320,7 @@ def _slots(found: Mechanism, belts: Sequence[str]) -> dict[str, list[Slot]]:
         above = [name for name in touch.shares if name not in belts]
         belt = next((name for name in touch.shares if name in belts), GROUND)
         single = len(above) == 1 and touch.symbol not in ("stop", "backlash")
-        if single or len(above) > 2:
+        if single or _of_many(touch):
             slots[above[0]].append(Slot(touch, belt))
     return slots
 
@@ -333,6 +338,8 @@ def _items(found: Mechanism, belts: Sequence[str]) -> Iterable[Item]:
         yield Item(*links[0].ends, links=tuple(sorted(links, key=lambda each: each.kind)[::-1]))
     for touch in found.touches:
         ends = [name for name in touch.shares if name not in belts]
+        if _of_many(touch):
+            continue
         if len(ends) == 2 == len(touch.shares):
             yield Item(ends[0], ends[1], touch=touch)
         elif touch.symbol in ("stop", "backlash"):

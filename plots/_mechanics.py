@@ -449,7 +449,7 @@ def _touch(system: System, contact: Contact) -> Touch:
             if share is not None and share != Number(0.0):
                 shares.setdefault(body.name, _as_term(share))
     symbol = _symbol(contact)
-    if len(shares) > 2 or (symbol != "friction" and len(contact.v) > 1):
+    if len(shares) > 2 or len(contact.v) > 1:
         symbol = "box"
     return Touch(contact, symbol, shares)
 

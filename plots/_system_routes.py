@@ -19,6 +19,7 @@ Point = tuple[float, float]
 
 GAP = 34.0  # between blocks of a column
 PORT = 20.0  # between wires at one side of a block: room for a text above each
+CORNER = 16.0  # from the end of a side to a wire: corners may be round
 TRACK = 13.0  # between upright pieces
 LEAD = 16.0  # from the last track to the next column: room for an arrowhead
 NARROWEST = 46.0  # of a channel: room for two arrowheads and a line between them
@@ -139,7 +140,7 @@ def routed(boxes: Sequence[Box], joins: Sequence[Join]) -> Sheet:
     ports = _ports(wires)
     for (name, _), found in ports.items():
         box = sheet.boxes[name]
-        box.height = max(box.height, PORT * len(found) + 8.0)
+        box.height = max(box.height, PORT * (len(found) - 1) + 2 * CORNER)
     _stack(boxes, joins)
     _heights(sheet.boxes, ports)
     _align(boxes, wires)
@@ -212,14 +213,14 @@ def _heights(boxes: Mapping[str, Box], ports: Ports) -> None:
         channel = box.column if side == "right" else box.column - 1
         aims = {id(wire): _aim(boxes, wire, name, side) for wire in found}
         order = sorted(found, key=lambda wire: aims[id(wire)], reverse=True)
-        low, high = box.y - 0.5 * box.height + 10.0, box.y + 0.5 * box.height - 10.0
+        low, high = box.y - 0.5 * box.height + CORNER, box.y + 0.5 * box.height - CORNER
         last = high + PORT
         for k, wire in enumerate(order):
             under = len(order) - 1 - k
             even = 0.5 * (low + high) + PORT * (under - 0.5 * (len(order) - 1))
             best = aims[id(wire)] if side == "left" and wire.way == "next" else even
             last = max(low + PORT * under, min(best, last - PORT))
-            y = _free(last, taken[channel], wire, low - 6.0, high + 6.0)
+            y = _free(last, taken[channel], wire, low - 3.0, high + 3.0)
             taken[channel].append((y, wire))
             if wire.join.source == name:
                 wire.out = y

@@ -137,6 +137,7 @@ def test_contacts_have_the_symbols_of_their_charts() -> None:
     }
     assert symbols("friction_damper") == {"joint": "backlash", "pad": "friction"}
     assert symbols("brake_squeal") == {"face": "box", "pad": "friction"}
+    assert symbols("a puck") == {"floor": "box"}
     assert symbols("servo") == {"bearing": "friction"}
     assert symbols("a train of four") == {
         "slip": "friction",
