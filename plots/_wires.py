@@ -30,7 +30,8 @@ def caption(
     graph: graphviz.Digraph, name: str, at: Point, text: str, width: float = 40, **look: str
 ) -> None:
     """Write a text, in the markup of Graphviz, around a place."""
-    plain = {"shape": "plaintext"} | sides((width, 18))
+    # With this, Graphviz does not warn of a text that it takes to be larger than its room.
+    plain = {"shape": "plaintext", "fixedsize": "shape"} | sides((width, 18))
     graph.node(name, f"<{text}>", id=name, pos=position(at), **(plain | look))
 
 
