@@ -48,15 +48,15 @@ class Frame:
         The value there, with its unit.
     said : str
         What the run did, measured; also the picture's text for those who do not see it.
-    picture : bytes or str
-        A PNG, or an SVG document.
+    pictures : tuple of bytes or str
+        PNGs, or SVG documents, shown side by side or, on a narrow screen, one below the other.
     at : float
         Where the cursor is in the picture beside it, as a share of its width.
     """
 
     value: str
     said: str
-    picture: bytes | str
+    pictures: tuple[bytes | str, ...]
     at: float = 0.0
 
 
@@ -108,13 +108,13 @@ def cycles(runs: dict[str, Trace]) -> Iterator[Frame]:
     for value, trace in runs.items():
         keep = settled(trace)
         with rc_context(RC):
-            figure = Figure(figsize=(7.2, 3.3), layout="constrained")
-            left, right = figure.subfigures(1, 2, width_ratios=(1.55, 1))
-            speed, states = left.subplots(2, 1, sharex=True, height_ratios=(1.2, 1))
+            over_time = Figure(figsize=(4.4, 3.3), layout="constrained")
+            speed, states = over_time.subplots(2, 1, sharex=True, height_ratios=(1.2, 1))
             panels.velocity(speed, trace, window=SETTLED)
             panels.ribbons(states, trace, window=SETTLED)
             speed.set(xlabel="", ylim=(-0.08 * fastest, 1.06 * fastest), ylabel="v [m/s]")
-            orbit = right.subplots()
+            cycle = Figure(figsize=(3.0, 3.3), layout="constrained")
+            orbit = cycle.subplots()
             orbit.plot(extension(trace)[keep], trace.v[keep], color=INK)
             limits(orbit, span, (0.0, fastest))
             orbit.axhline(0.1, color=LINE_GREY, linestyle=":", linewidth=0.9, zorder=0)
@@ -125,7 +125,7 @@ def cycles(runs: dict[str, Trace]) -> Iterator[Frame]:
             )
             speed.set_title("speed of the mass")
             states.set_title("active states")
-        yield Frame(value, motion(trace), png(figure))
+        yield Frame(value, motion(trace), (png(over_time), png(cycle)))
 
 
 def settled(trace: Trace) -> NDArray[np.bool_]:
@@ -181,7 +181,7 @@ def loops() -> Iterator[Frame]:
         first = trace.t <= 0.25
         error = float(np.abs(trace.F - smooth(trace.x))[first].max())
         with rc_context(RC):
-            figure = Figure(figsize=(7.2, 3.3), layout="constrained")
+            figure = Figure(figsize=(4.8, 3.3), layout="constrained")
             ax = figure.subplots()
             look = {"color": LINE_GREY, "linestyle": "--", "linewidth": 1.6, "zorder": 0}
             ax.plot(1e3 * way, smooth(way), label="infinitely many", **look)
@@ -193,7 +193,7 @@ def loops() -> Iterator[Frame]:
             ax.legend(loc="upper left")
         corners = "one break-away" if n == 1 else f"{n} break-away points"
         said = f"{corners}; at most {error:.3f} N from the smooth curve on the first way."
-        yield Frame(f"{n}", said[0].upper() + said[1:], png(figure))
+        yield Frame(f"{n}", said[0].upper() + said[1:], (png(figure),))
 
 
 # --------------------------------------------------------------------------- time
@@ -222,7 +222,7 @@ def moments() -> Slider:
         edge = f", {look.fired} fires" if row in at_edges else ""
         said = f"Element 1 is in {look.active}{edge}; F = {trace.F[row]:.3f} N."
         at = float(box.x0 + share * (box.x1 - box.x0))
-        frames.append(Frame(f"{trace.t[row]:.3f} s", said, chart.frame(row), at))
+        frames.append(Frame(f"{trace.t[row]:.3f} s", said, (chart.frame(row),), at))
     return Slider("t", rows.index(at_edges[0]), tuple(frames), beside)
 
 
@@ -237,6 +237,9 @@ def limits(ax: Axes, x: tuple[float, float], y: tuple[float, float]) -> None:
 def png(figure: Figure) -> bytes:
     """Draw a figure."""
     out = io.BytesIO()
+    layout = figure.get_layout_engine()
+    assert layout is not None
+    layout.set(rect=(0, 0, 0.98, 1))  # room for half the last label of an axis
     figure.savefig(out, format="png", dpi=DPI)
     return out.getvalue()
 
@@ -275,17 +278,22 @@ def both(data: bytes | str) -> Iterator[tuple[str, bytes]]:
 
 def write(folder: Path, name: str, slider: Slider) -> None:
     """Write the pictures of a slider, and what the page must know of them."""
-    pictures = {f"{name}_{k:02}": frame.picture for k, frame in enumerate(slider.frames)}
+    pictures = {
+        f"{name}_{k:02}{part}": data
+        for k, frame in enumerate(slider.frames)
+        for part, data in zip("ab", frame.pictures, strict=False)
+    }
     if slider.beside:
         pictures[f"{name}_beside"] = slider.beside
     for stem, data in pictures.items():
         for ending, content in both(data):
             (folder / f"{stem}{ending}").write_bytes(content)
-    svg = isinstance(slider.frames[0].picture, str)
+    first = slider.frames[0].pictures
     known = {
         "label": slider.label,
         "start": slider.start,
-        "ending": ".svg" if svg else ".webp",
+        "ending": ".svg" if isinstance(first[0], str) else ".webp",
+        "parts": "ab"[: len(first)],
         "frames": [[frame.value, frame.said, round(frame.at, 4)] for frame in slider.frames],
     }
     (folder / f"{name}.json").write_text(json.dumps(known), encoding="utf-8")

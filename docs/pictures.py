@@ -1,8 +1,8 @@
 """Pictures of the site: light and dark versions, cards of the gallery, sliders, the replay.
 
 Three directives: ``{cards}`` shows the entries of its own page with thumbnails, ``{frames} NAME`` a
-slider of `frames.SLIDERS`, and ``{replay}`` the run on the first page. Without JavaScript a slider is
-its first picture, and the replay a picture with a link.
+slider of `frames.SLIDERS`, and ``{replay}`` the run on the first page. Without JavaScript a slider
+is its first picture, and the replay a picture with a link.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import frames
-from dark import dark_picture, dark_svg, webp
+from dark import dark_picture, dark_svg, oklab, rgb, webp
 from docutils import nodes
 from docutils.parsers.rst import Directive
 from PIL import Image
@@ -24,6 +24,7 @@ from sphinx.application import Sphinx
 MADE = Path(__file__).parents[1] / ".docs-cache" / "frames"
 FOLDER = "_frames"  # in the site
 THUMB = (480, 320)  # pixels: twice the size of a card's picture
+GROUND = re.compile(r'<(?:rect|polygon) fill="(#[0-9a-fA-F]{6})"')  # the first area of an SVG
 SIZE = re.compile(r'<svg[^>]*?viewBox="[-\d.]+ [-\d.]+ ([\d.]+) ([\d.]+)"')
 
 
@@ -42,12 +43,23 @@ def size_of(path: Path) -> tuple[int, int]:
         return image.size
 
 
+def is_dark(path: Path) -> bool:
+    """Return whether a picture is drawn on a dark ground, such as that of a terminal."""
+    if path.suffix == ".svg":
+        ground = GROUND.search(path.read_text(encoding="utf-8"))
+        return ground is not None and oklab(rgb(ground[1]))[0] < 0.5
+    with Image.open(path) as image:
+        corner = image.convert("RGBA").getpixel((2, 2))
+    assert isinstance(corner, tuple)
+    return corner[3] > 0 and max(corner[:3]) < 100
+
+
 def dark_of(source: Path, folder: Path) -> Path | None:
     """Return the dark version of a picture in a folder, made if it is missing or old.
 
-    A film has none.
+    A film has none, and a picture that is dark itself needs none.
     """
-    if source.suffix == ".gif":
+    if source.suffix == ".gif" or is_dark(source):
         return None
     target = folder / f"{source.stem}_dark{'.svg' if source.suffix == '.svg' else '.webp'}"
     if not target.exists() or target.stat().st_mtime < source.stat().st_mtime:
@@ -64,14 +76,14 @@ def thumbs_of(source: Path, folder: Path) -> tuple[Path, Path | None]:
     if source.suffix == ".svg":
         return folder / source.name, dark_of(source, folder)
     light = folder / f"{source.stem}_thumb.webp"
-    dark = folder / f"{source.stem}_thumb_dark.webp"
     with Image.open(source) as image:
         small = image.convert("RGBA")
     small.thumbnail(THUMB, Image.Resampling.LANCZOS)
     white = Image.new("RGBA", small.size, "white")
     light.write_bytes(webp(Image.alpha_composite(white, small).convert("RGB"), sharp=False))
-    if source.suffix == ".gif":
+    if source.suffix == ".gif" or is_dark(source):
         return light, None
+    dark = folder / f"{source.stem}_thumb_dark.webp"
     dark.write_bytes(webp(dark_picture(small), sharp=False))
     return light, dark
 
@@ -86,9 +98,9 @@ def picture(address: str, alt: str, size: tuple[int, int], kind: str = "") -> st
 
 
 def pair(light: str, dark: str | None, alt: str, size: tuple[int, int]) -> str:
-    """Return a picture for both themes; without a dark version, the light one on white."""
+    """Return a picture for both themes; without a dark version, one for both."""
     if dark is None:
-        return picture(light, alt, size, "on-white")
+        return picture(light, alt, size, "as-drawn")
     return picture(light, alt, size, "only-light") + picture(dark, alt, size, "only-dark")
 
 
@@ -102,12 +114,13 @@ def pair_pictures(app: Sphinx, _: str, __: str, context: dict[str, Any], ___: An
     def replaced(match: re.Match[str]) -> str:
         address = match["address"]
         place, _, name = address.rpartition("/")
-        if name not in sources or not place.endswith("_images"):
+        paired = 'class="only-' in match["image"]  # a card's
+        if paired or name not in sources or not place.endswith("_images"):
             return match[0]
         folder.mkdir(exist_ok=True)
         dark = dark_of(sources[name], folder)
         alt = re.search(r'alt="([^"]*)"', match["image"])
-        tags = [("on-white", address)]
+        tags = [("as-drawn", address)]
         if dark:
             tags = [("only-light", address), ("only-dark", f"{place}/{dark.name}")]
         shown = ""
@@ -172,6 +185,12 @@ def with_subscript(name: str) -> str:
     return f"<i>{letter}</i><sub>{below}</sub>" if below else f"<i>{letter}</i>"
 
 
+def room(size: tuple[int, int], ending: str) -> str:
+    """Return the style of a picture's place: how wide it may be, and where it gets its own line."""
+    widest = size[0] / (16 if ending == ".svg" else 18)  # rem, at which letters have one size
+    return f'style="flex:{widest:.1f} 1 {0.62 * widest:.1f}rem;max-width:{widest:.1f}rem"'
+
+
 class Frames(Directive):
     """A slider whose pictures are made in advance."""
 
@@ -186,18 +205,19 @@ class Frames(Directive):
         known = json.loads((MADE / f"{name}.json").read_text(encoding="utf-8"))
         start, ending = known["start"], known["ending"]
         value, said, at = known["frames"][start]
-        first = f"{root}{name}_{start:02}"
-        size = size_of(MADE / f"{name}_{start:02}{ending}")
-        shown = (
-            f'<div class="frame">{pair(first + ending, f"{first}_dark{ending}", said, size)}</div>'
-        )
+        shown = ""
+        for part in known["parts"]:
+            stem = f"{name}_{start:02}{part}"
+            size = size_of(MADE / f"{stem}{ending}")
+            addresses = f"{root}{stem}{ending}", f"{root}{stem}_dark{ending}"
+            images = pair(*addresses, said if part == "a" else "", size)
+            shown += f'<div class="frame" data-part="{part}" {room(size, ending)}>{images}</div>'
         beside = MADE / f"{name}_beside.webp"
         if beside.exists():
-            curve = f"{root}{name}_beside"
-            curves = pair(f"{curve}.webp", f"{curve}_dark.webp", "", size_of(beside))
-            shown += (
-                f'<div class="beside">{curves}<i class="cursor" style="left:{100 * at}%"></i></div>'
-            )
+            curve, size = f"{root}{name}_beside", size_of(beside)
+            curves = pair(f"{curve}.webp", f"{curve}_dark.webp", "", size)
+            cursor = f'<i class="cursor" style="left:{100 * at}%"></i>'
+            shown += f'<div class="beside" {room(size, ".webp")}>{curves}{cursor}</div>'
         data = json.dumps({**known, "first": f"{root}{name}_"}).replace("<", "\\u003c")
         text = (
             f'<figure class="frames" id="frames-{name}"><div class="shown">{shown}</div>\n'

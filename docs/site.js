@@ -16,10 +16,15 @@ function onTheme(act) {
 
 // ------------------------------------------------------------------ sliders
 function slide(figure) {
-  const { frames, ending, first } = JSON.parse(figure.querySelector("script").textContent);
+  const { frames, ending, first, parts } = JSON.parse(figure.querySelector("script").textContent);
   const label = figure.querySelector("label"), input = label.querySelector("input"), output = label.querySelector("output");
-  const images = figure.querySelectorAll(".frame img"), cursor = figure.querySelector(".cursor"), caption = figure.querySelector("figcaption");
-  const address = (k, dark) => `${first}${String(k).padStart(2, "0")}${dark ? "_dark" : ""}${ending}`;
+  const places = [...figure.querySelectorAll(".frame")], cursor = figure.querySelector(".cursor"), caption = figure.querySelector("figcaption");
+  const address = (k, part, dark) => `${first}${String(k).padStart(2, "0")}${part}${dark ? "_dark" : ""}${ending}`;
+  const loaded = (k) => [...parts].map((part) => {
+    const image = new Image();
+    image.src = address(k, part, themeShown() === "dark");
+    return image;
+  });
 
   async function show() {
     const k = Number(input.value), [value, said, at] = frames[k];
@@ -27,20 +32,17 @@ function slide(figure) {
     caption.textContent = said;
     input.setAttribute("aria-valuetext", `${value}. ${said}`);
     if (cursor) cursor.style.left = `${100 * at}%`;
-    const next = new Image();
-    next.src = address(k, themeShown() === "dark");
-    await next.decode().catch(() => {}); // the old picture stays until the next one can be drawn
+    await Promise.allSettled(loaded(k).map((image) => image.decode())); // the old pictures stay until then
     if (Number(input.value) !== k) return;
-    for (const image of images) {
-      image.src = address(k, image.classList.contains("only-dark"));
-      image.alt = said;
+    for (const place of places) {
+      for (const image of place.querySelectorAll("img")) {
+        image.src = address(k, place.dataset.part, image.classList.contains("only-dark"));
+        if (image.alt) image.alt = said;
+      }
     }
   }
 
-  function prepare() { // as soon as somebody comes near
-    const dark = themeShown() === "dark";
-    frames.forEach((_, k) => { new Image().src = address(k, dark); });
-  }
+  const prepare = () => frames.forEach((_, k) => loaded(k)); // as soon as somebody comes near
 
   label.hidden = false;
   input.value = input.defaultValue; // some browsers keep it when the page is loaded again
