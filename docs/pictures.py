@@ -24,7 +24,7 @@ from sphinx.application import Sphinx
 MADE = Path(__file__).parents[1] / ".docs-cache" / "frames"
 FOLDER = "_frames"  # in the site
 THUMB = (480, 320)  # pixels: twice the size of a card's picture
-GROUND = re.compile(r'<(?:rect|polygon) fill="(#[0-9a-fA-F]{6})"')  # the first area of an SVG
+AREA = re.compile(r'<rect fill="(#\w{6})"[^>]*? width="([\d.]+)" height="([\d.]+)"')
 SIZE = re.compile(r'<svg[^>]*?viewBox="[-\d.]+ [-\d.]+ ([\d.]+) ([\d.]+)"')
 
 
@@ -46,8 +46,12 @@ def size_of(path: Path) -> tuple[int, int]:
 def is_dark(path: Path) -> bool:
     """Return whether a picture is drawn on a dark ground, such as that of a terminal."""
     if path.suffix == ".svg":
-        ground = GROUND.search(path.read_text(encoding="utf-8"))
-        return ground is not None and oklab(rgb(ground[1]))[0] < 0.5
+        areas = [
+            (oklab(rgb(colour))[0] > 0.5, float(width) * float(height))
+            for colour, width, height in AREA.findall(path.read_text(encoding="utf-8"))
+        ]  # of a terminal: the frame, then grounds on it; a chart has none
+        light = sum(area for is_light, area in areas if is_light)
+        return bool(areas) and light < areas[0][1] / 2
     with Image.open(path) as image:
         corner = image.convert("RGBA").getpixel((2, 2))
     assert isinstance(corner, tuple)

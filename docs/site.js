@@ -64,5 +64,8 @@ function embed(place) {
   onTheme(tell);
 }
 
+// The theme does not name its two regions beside the page.
+document.querySelector(".sidebar-drawer")?.setAttribute("aria-label", "Pages");
+document.querySelector(".toc-drawer")?.setAttribute("aria-label", "On this page");
 document.querySelectorAll("figure.frames").forEach(slide);
 document.querySelectorAll(".replay").forEach(embed);
