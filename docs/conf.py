@@ -20,6 +20,7 @@ import notebooks  # noqa: E402
 import pictures  # noqa: E402
 
 import gms_fsm  # noqa: E402
+from plots.style import CHART_THEMES  # noqa: E402
 
 project = "gms-fsm"
 author = "The gms-fsm founders"
@@ -64,11 +65,13 @@ html_theme_options = {
         "color-brand-primary": "#005F96",
         "color-brand-content": "#005F96",
         "color-brand-visited": "#7A3E8E",
+        "color-now": CHART_THEMES["light"].fired,
     },
     "dark_css_variables": {
         "color-brand-primary": "#6CB9EA",
         "color-brand-content": "#6CB9EA",
         "color-brand-visited": "#C9A0DC",
+        "color-now": CHART_THEMES["dark"].fired,
     },
 }
 
