@@ -439,9 +439,12 @@ def _theme() -> str:
     swatches = "".join(
         f".e{k}{{border-color:var(--e{k})!important}}\n" for k in range(ELEMENT_STEPS)
     )
+    dark = texts["dark"]
     return (
         f":root{{color-scheme:light dark;{texts['light']}}}\n"
-        f"@media(prefers-color-scheme:dark){{:root{{{texts['dark']}}}}}\n{looks}{swatches}"
+        f"@media(prefers-color-scheme:dark){{:root:not([data-theme=light]){{{dark}}}}}\n"
+        f":root[data-theme=light]{{color-scheme:light}}\n"
+        f":root[data-theme=dark]{{color-scheme:dark;{dark}}}\n{looks}{swatches}"
     )
 
 
