@@ -28,6 +28,7 @@ MARGIN = 12.0  # around what is in a region
 APART = 12.0  # between regions
 # Type of 10 points is at least 7 points high if this width is printed on 170 mm.
 PRINTED = 688.0
+WIDEST = 2 * 595.0 - 60.0  # two pages of A4, less the frame of a region
 MOST_ALIKE = 6  # regions; more that are all alike are drawn as one
 
 

@@ -30,8 +30,8 @@ CORNER = 10.0  # of a state, where no line ends
 STATES_APART, LABELS_APART, LINES_APART = 26.0, 12.0, 9.0
 LINE = 2.0  # room of a line in a row
 LONELY = 640.0  # width of a row of states without edges
-DEFAULT = 30.0  # from the dot to the default state
-LOOP_OUT, LOOP_UP = 18.0, 11.0  # from a state to the label of its loop; from the label to the line
+DEFAULT, DOT = 30.0, 4.0  # from the dot to the default state; radius of the dot
+LOOP_OUT, LOOP_UP = 28.0, 9.0  # from a state to the label of its loop; from the label to the line
 SWEEPS = 12
 
 
@@ -122,11 +122,12 @@ def _turned(point: Point) -> Point:
 
 @dataclass(frozen=True)
 class _Loop:
-    """The label of a self-loop: at which side of its state, and how far below its centre."""
+    """A self-loop: at which side of its state; its label and its ends, from the centre down."""
 
     link: int
     side: int
     below: float
+    port: float
 
 
 class _Layers:
@@ -138,6 +139,7 @@ class _Layers:
         self.layer = _layer_of(sizes, [links[k] for k in self.crossing])
         self.sizes = list(sizes)
         self.loops: list[list[_Loop]] = []
+        self.block: list[float] = []  # height of the loops of a state
         self.beside: list[list[float]] = []  # room for loops at the left and right of each state
         for state in range(len(sizes)):
             self._add_loops(state)
@@ -167,21 +169,24 @@ class _Layers:
         """Place the labels of loops: right of the state, or left if checked before other edges."""
         own = [k for k, each in enumerate(self.links) if each.source == state]
         others = [k for k in own if k in self.crossing]
-        loops, room = [], [0.0, 0.0]
+        loops, room, tallest = [], [0.0, 0.0], 0.0
         width, height = self.sizes[state]
         for side in (-1, 1):
             here = [
-                k for k in own if k not in others and (side < 0) == (k < max(others, default=-1))
+                k for k in own if k not in others and (side < 0) == (k < min(others, default=-1))
             ]
             levels = [self.links[k].size[1] + 2 * LOOP_UP + 6 for k in here]
             at = -sum(levels) / 2
-            for k, level in zip(here, levels, strict=True):
-                loops.append(_Loop(k, side, at + level / 2))
+            for place, (k, level) in enumerate(zip(here, levels, strict=True)):
+                port = (place - (len(here) - 1) / 2) * 2 * PORT
+                loops.append(_Loop(k, side, at + level / 2, port))
                 at += level
-            height = max(height, sum(levels) + 2 * CORNER)
+            height = max(height, 2 * PORT * len(here) + 2 * CORNER * bool(here))
+            tallest = max(tallest, sum(levels))
             if here:
                 room[side > 0] = LOOP_OUT + max(self.links[k].size[0] for k in here) + 4
         self.sizes[state] = width, height
+        self.block.append(tallest)
         self.loops.append(loops)
         self.beside.append(room)
 
@@ -226,16 +231,16 @@ class _Layers:
             near = self.above if down else self.below
             for row in rows if down else reversed(rows):
                 keys = {i: sum(x[j] for j in near[i]) / len(near[i]) for i in row if near[i]}
-                row.sort(key=lambda i: keys.get(i, x[i]))
+                if row[0] >= len(self.sizes) or sweep:  # states keep the chart's order at first
+                    row.sort(key=lambda i: keys.get(i, x[i]))
                 self._by_priority(row)
                 self._pack(row, x)
-            crossings = self._crossings(rows)
+            rank = self._agreed_order(x)
+            agreed = [sorted(row, key=rank.__getitem__) if r % 2 else list(row) for r, row in enumerate(rows)]
+            crossings = self._crossings(agreed)
             if fewest is None or crossings < fewest:
-                best, fewest = [list(row) for row in rows], crossings
-        for row in best:
-            self._pack(row, x)
-        rank = self._agreed_order(x)
-        return [row if r % 2 == 0 else sorted(row, key=rank.__getitem__) for r, row in enumerate(best)]
+                best, fewest = agreed, crossings
+        return best
 
     def _by_priority(self, row: list[int]) -> None:
         """Sort the labels of each state's edges into the places that they take in a row."""
@@ -329,10 +334,13 @@ class _Layers:
         heights = {self.label[k]: self.links[k].size[1] for k in self.crossing}
         heights |= {state: height for state, (_, height) in enumerate(self.sizes)}
         self.tall = heights
+        room = heights | {i: max(heights[i], block) for i, block in enumerate(self.block)}
         self.span: list[tuple[float, float]] = []
-        at = DEFAULT + 4.0
+        at = DEFAULT + DOT
         for r, row in enumerate(rows):
-            tall = max((heights.get(item, 0.0) for item in row), default=0.0)
+            tall = max((room.get(item, 0.0) for item in row), default=0.0)
+            if r == 0:  # above a default state that is lower than its row, the dot is in the row
+                at -= min((tall - heights[0]) / 2, DEFAULT)
             self.span.append((at, at + tall))
             across = [self._slant(*each) for each in self.segments if self.row[each[0]] == r]
             curve = 22.0 + min(max(0.12 * max(across, default=0.0), 4.0), 44.0)
@@ -405,11 +413,15 @@ class _Layers:
         width, height = self.links[loop.link].size
         edge = state[0] + loop.side * self.sizes[self.links[loop.link].source][0] / 2
         x, y = edge + loop.side * (LOOP_OUT + width / 2), state[1] + loop.below
-        up, down = y - height / 2 - LOOP_UP, y + height / 2 + LOOP_UP
-        near = x - loop.side * min(width / 2, 14.0)
-        out = _straight((edge, up), (near, up)) + [(x, up), (x, up), (x, y - height / 2)]
-        back = [(x, y + height / 2), (x, down), (x, down), (near, down)]
-        return (x, y), (out, back + _straight((near, down), (edge, down))[1:])
+        high, low = y - height / 2 - LOOP_UP, y + height / 2 + LOOP_UP
+        leaves, enters = state[1] + loop.port - PORT / 2, state[1] + loop.port + PORT / 2
+        corner, stub = edge + loop.side * LOOP_OUT, edge + loop.side * (ARROW + STUB)
+        bend = (stub + corner) / 2
+        out = [(edge, leaves), (bend, leaves), (bend, high), (corner, high)]
+        out += [(x, high), (x, high), (x, y - height / 2)]
+        back = [(x, y + height / 2), (x, low), (x, low), (corner, low)]
+        back += [(bend, low), (bend, enters), (stub, enters)]
+        return (x, y), (out, back + _straight((stub, enters), (edge, enters))[1:])
 
 
 def _straight(a: Point, b: Point) -> list[Point]:

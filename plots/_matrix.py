@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from plots._drawing import Drawing, Line, Node
+from plots._drawing import WIDEST, Drawing, Line, Node
 from plots._labels import DOT, Piece, edge_id, element_id, part_id
 from plots._layers import Point
 
@@ -52,14 +52,19 @@ def matrix_drawing(sheet: Sheet, number: int) -> Drawing:
         place: [(name, kind, cells.guard(rows, "marked" in kind)) for name, kind, rows in own]
         for place, own in entries.items()
     }
-    heads = [
-        cells.text([[Piece(str(k + 1), "title")], *([Piece(part, "note")] for part in _parts(name))])
-        for k, name in enumerate(states)
-    ]
-    wide = [max(box.width for box in boxes) + 2 * PAD]
-    for k, head in enumerate(heads):
-        own = [label.width for (_, b), found in labels.items() if b == k for *_, label in found]
-        wide.append(max([head.width, 26, *own]) + 2 * PAD)
+    names = [_parts(name) for name in states]
+    wide: list[float] = []
+    for above in (names, [[] for _ in names]):  # without names, if they are too wide
+        heads = [
+            cells.text([[Piece(str(k + 1), "title")], *([Piece(part, "note")] for part in parts)])
+            for k, parts in enumerate(above)
+        ]
+        wide = [max(box.width for box in boxes) + 2 * PAD]
+        for k, head in enumerate(heads):
+            own = [label.width for (_, b), found in labels.items() if b == k for *_, label in found]
+            wide.append(max([head.width, 26, *own]) + 2 * PAD)
+        if sum(wide) <= WIDEST:
+            break
     tall = [max(head.height for head in heads) + 2 * PAD]
     for k, box in enumerate(boxes):
         stacks = [
@@ -67,7 +72,8 @@ def matrix_drawing(sheet: Sheet, number: int) -> Drawing:
         ]
         tall.append(max([box.height, *stacks]) + 2 * PAD)
     xs, ys = _sums(wide), _sums(tall)
-    corner = cells.text([[Piece("from ↓   to →", "note")]])
+    words = "from ↓   to →", f"{DOT} default state"
+    corner = cells.text([[Piece(text, "note")] for text in words])
     nodes = [Node(f"{element}-corner", "head", (PAD + corner.width / 2, tall[0] / 2), corner)]
     for k, (head, box, name) in enumerate(zip(heads, boxes, states, strict=True)):
         nodes.append(

@@ -55,7 +55,7 @@ def places(
     for upper, lower in segments:
         shift = offset.get((upper, lower), 0.0)
         ends = upper < states, lower < states
-        weight = 1.0 if any(ends) else STRAIGHT
+        weight = (2.0 if not shift else 1.0) if any(ends) else STRAIGHT
         terms.append(({upper: 1.0, lower: -1.0}, shift if ends[0] else -shift, weight))
     for state, others in sides:
         mean = dict.fromkeys(others, -1.0 / len(others))

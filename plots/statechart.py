@@ -22,7 +22,7 @@ from gms_fsm.language import Both, Condition, Either, clauses
 from gms_fsm.traces.trace import Trace
 from plots._cells import Cells
 from plots._contents import Texts, chart_in_words, chart_texts, state_texts
-from plots._drawing import arrange, graph_drawing
+from plots._drawing import WIDEST, arrange, graph_drawing
 from plots._labels import (
     DOT,
     LONGEST_LINE,
@@ -53,7 +53,6 @@ MOST_EDGES = 20  # of a graph; a chart with more is drawn as a matrix
 MOST_LINES = 6  # of a guard on an edge; a longer one is written below the picture
 LONGEST_LABEL = 34  # characters of a line on an edge
 SMALLEST = 0.7  # smallest size of texts: 7 points instead of 10
-WIDEST = 2 * 595 - 60  # points: two pages of A4, less the frame of a region
 
 
 class ChartGraph(DrawnGraph):
@@ -317,9 +316,10 @@ class Sheet:
         """
         if self.scale < 1 or self.numbered:
             return self
-        if self.form == "matrix" or self.form == "auto" and not self.live and len(self._leaving) > MOST_EDGES:
-            return replace(self, form="matrix", numbered=self._numbers(all_of_them=True))
         long, every = (self._numbers(all_of_them=flag) for flag in (False, True))
+        many = self.form == "auto" and not self.live and len(self._leaving) > MOST_EDGES
+        if self.form == "matrix" or many:
+            return replace(self, form="matrix", numbered=every)
         for numbered, scale in ((long, 1.0), (every, 1.0), (every, SMALLEST)):
             sheet = replace(self, form="graph", numbered=numbered, scale=scale)
             if graph_drawing(sheet, 0).width <= WIDEST:
@@ -436,7 +436,8 @@ class Sheet:
         title = [Piece(state.name, "title")]
         if self.live:
             title.append(Piece(f" {DOT}", "dot"))
-        limit = LONGEST_LINE if self.direction == "TB" else LONGEST_LABEL
+        narrow = self.direction == "LR" or self.form == "matrix"
+        limit = LONGEST_LABEL if narrow else LONGEST_LINE
         texts = _rows(state_texts(self.write, state), limit)
         rows = [title, *(self._indexed(row) for row in texts)]
         if self.tally is not None:
