@@ -17,6 +17,7 @@ from plots.style import MONO, SANS, ChartTheme
 __all__ = ["Cells", "Label"]
 
 PLAIN = 10  # points, of formulas
+LEAST = 7  # points, of every text but an index
 SMALLER = 0.72  # a lowered index
 LINE, TITLE = 1.4, 1.5  # height of a line, in sizes of its font
 SIDE = 6  # left and right of the text of a state
@@ -163,8 +164,8 @@ class Cells:
         size = _size(wide, height)
         if piece.role == "pad":
             return f"<TD {size}></TD>"
-        points, face, bold, soft = _FACES.get(piece.role, _FORMULA)
-        points *= self.scale * (SMALLER if piece.lowered else 1)
+        _, face, bold, soft = _FACES.get(piece.role, _FORMULA)
+        points = self._points(piece)
         words = escape(piece.text)
         words = f"<B>{words}</B>" if bold else words
         colour = self.colours.soft if soft else self.colours.ink
@@ -180,9 +181,12 @@ class Cells:
     def _piece_width(self, piece: Piece) -> float:
         if piece.role == "pad":
             return SIDE - 1
-        size, face, *_ = _FACES.get(piece.role, _FORMULA)
-        points = size * self.scale * (SMALLER if piece.lowered else 1)
-        return width(printable(piece.text), points, mono=face == MONO)
+        face = _FACES.get(piece.role, _FORMULA)[1]
+        return width(printable(piece.text), self._points(piece), mono=face == MONO)
+
+    def _points(self, piece: Piece) -> float:
+        size = max(_FACES.get(piece.role, _FORMULA)[0] * self.scale, LEAST)
+        return size * (SMALLER if piece.lowered else 1)
 
     def _height(self, row: Row) -> int:
         sizes = [(_FACES.get(piece.role, _FORMULA)[0], piece.role) for piece in row] or [(0, "")]

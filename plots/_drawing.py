@@ -125,7 +125,7 @@ def graph_drawing(sheet: Sheet, number: int) -> Drawing:
     rows = [sheet.state_rows(state, number) for state in chart.states]
     plain = [cells.state(each) for each in rows]
     links = [
-        Link(*map(chart.state_index, (edge.source, edge.target)), (box.width, box.height))
+        Link(*map(chart.state_index, (edge.source, edge.target)), _roomy(box))
         for (edge, _), box in zip(edges, boxes, strict=True)
     ]
     laid = layered([(box.width, box.height) for box in plain], links, sheet.direction)
@@ -154,6 +154,11 @@ def graph_drawing(sheet: Sheet, number: int) -> Drawing:
         lines.append(Line(f"{name}-1", (names[link.source], guard), tuple(into), False, look))
         lines.append(Line(f"{name}-2", (guard, names[link.target]), tuple(out), True, look))
     return Drawing(laid.width, laid.height, tuple(nodes), tuple(lines))
+
+
+def _roomy(box: Label) -> tuple[float, float]:
+    """Return the size of a label with the gaps to its lines."""
+    return box.width + 6.0, box.height + 2.0
 
 
 def _default_line(

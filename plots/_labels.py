@@ -93,8 +93,9 @@ class Tally:
         return "taken once" if times == 1 else f"taken {times} times"
 
 
-# The index of a name; what stands before the first underscore is its symbol.
-_INDEX = re.compile(r"(?<![\w])([^\W_]+)_(\w*[^\W_])")
+# The index of a name; what stands before the first underscore is its symbol. Raised digits, which
+# are a power, belong to neither.
+_INDEX = re.compile(r"(?<!\w)([^\W_]+)_(\w*?[^\W_⁰¹²³⁴⁵⁶⁷⁸⁹])(?![^\W⁰¹²³⁴⁵⁶⁷⁸⁹])")
 
 
 def with_indices(row: Row) -> Row:
@@ -178,7 +179,7 @@ def _best_break(text: str, limit: int) -> int:
         before = (rank for rank, marks in enumerate(_BEFORE, 2) if words[i + 1] in marks)
         rank = min([*after, *before, len(_BEFORE) + 2])
         # A line that is nearly empty is worse than a break at a weaker operator.
-        short = at < limit / 3
+        short = at < limit / 4
         found.append((at > limit, short, depth, rank, at if at > limit else -at, at))
     return min(found)[-1] if found else -1
 

@@ -191,18 +191,11 @@ class _Layers:
         self.beside.append(room)
 
     def _add_chains(self) -> None:
-        load = [0.0] * (2 * max(self.layer) + 2)
-        spans = {}
         for k in self.crossing:
             ends = self.links[k].source, self.links[k].target
-            spans[k] = sorted(ends, key=lambda state: self.layer[state])
-        for k in sorted(spans, key=lambda k: self._span(*spans[k])):
-            upper, lower = spans[k]
-            gaps = range(2 * self.layer[upper] + 1, 2 * self.layer[lower], 2)
-            # Near the source, if there is room.
-            near = reversed(gaps) if self.links[k].source == lower else gaps
-            gap = min(near, key=lambda row: load[row])
-            load[gap] += self.links[k].size[0] + LABELS_APART
+            upper, lower = sorted(ends, key=lambda state: self.layer[state])
+            # In the row next to the source, so that the ends at the source are ordered as well.
+            gap = 2 * self.layer[ends[0]] + (1 if ends[0] == upper else -1)
             chain = [upper]
             for row in range(2 * self.layer[upper] + 1, 2 * self.layer[lower]):
                 chain.append(len(self.row))
@@ -212,10 +205,6 @@ class _Layers:
                 if row == gap:
                     self.label[k] = chain[-1]
             self.chain[k] = [*chain, lower]
-        self.chain = {k: self.chain[k] for k in self.crossing}
-
-    def _span(self, upper: int, lower: int) -> int:
-        return self.layer[lower] - self.layer[upper]
 
     def _ordered_rows(self) -> list[list[int]]:
         """Order the items of every row so that few lines cross."""
