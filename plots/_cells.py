@@ -110,7 +110,7 @@ class Cells:
         look = f'BGCOLOR="{self.colours.paper}" '
         tall = sum(heights) + 2
         if marked:
-            look += f'BORDER="1" COLOR="{self.colours.fired}" '
+            look += f'BORDER="1" COLOR="{self.colours.ink}" '
             body = body.replace(f'WIDTH="{wide}"', f'WIDTH="{wide - 2}"')
         return Label(f"<{_table(look, wide, tall, body)}>", wide, tall)
 
@@ -135,7 +135,7 @@ class Cells:
         wide = max(*map(self._width, rows), 36) + 2 * SIDE + 2
         tall = sum(heights) + 6
         wide, tall = max(wide, ceil(least[0])), max(tall, ceil(least[1]))
-        ink, border = (self.colours.fired, 3) if marked else (self.colours.ink, 1)
+        ink, border = self.colours.ink, 3 if marked else 1
         inner = wide - 2 * border
         title, *more = (
             self._row([Piece("", "pad"), *row], height, inner)

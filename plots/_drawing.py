@@ -149,7 +149,7 @@ def graph_drawing(sheet: Sheet, number: int) -> Drawing:
             look = {"style": "dashed"}
         marked = edge.name in sheet.marked
         if marked:
-            look |= {"class": "marked", "color": sheet.colours.fired, "penwidth": MARKED}
+            look |= {"class": "marked", "penwidth": MARKED}
         nodes.append(Node(guard, "guard marked" if marked else "guard", at, box))
         lines.append(Line(f"{name}-1", (names[link.source], guard), tuple(into), False, look))
         lines.append(Line(f"{name}-2", (guard, names[link.target]), tuple(out), True, look))

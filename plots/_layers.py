@@ -218,11 +218,13 @@ class _Layers:
         for sweep in range(SWEEPS):
             down = sweep % 2 == 0
             near = self.above if down else self.below
-            for row in rows if down else reversed(rows):
+            order = list(enumerate(rows))
+            for r, row in order if down else reversed(order):
                 keys = {i: sum(x[j] for j in near[i]) / len(near[i]) for i in row if near[i]}
-                if row[0] >= len(self.sizes) or sweep:  # states keep the chart's order at first
+                if r % 2 or sweep:  # states keep the chart's order at first
                     row.sort(key=lambda i: keys.get(i, x[i]))
-                self._by_priority(row)
+                if r % 2:
+                    self._by_priority(row)
                 self._pack(row, x)
             rank = self._agreed_order(x)
             agreed = [sorted(row, key=rank.__getitem__) if r % 2 else list(row) for r, row in enumerate(rows)]
@@ -235,7 +237,7 @@ class _Layers:
         """Sort the labels of each state's edges into the places that they take in a row."""
         own: dict[int, list[int]] = {}
         for k, item in sorted(self.label.items()):
-            if self.row[item] == self.row[row[0]]:
+            if item in row:
                 own.setdefault(self.links[k].source, []).append(item)
         for items in own.values():
             places = sorted(row.index(item) for item in items)
