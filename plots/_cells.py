@@ -114,7 +114,9 @@ class Cells:
             body = body.replace(f'WIDTH="{wide}"', f'WIDTH="{wide - 2}"')
         return Label(f"<{_table(look, wide, tall, body)}>", wide, tall)
 
-    def state(self, rows: Sequence[Row], marked: bool = False, least: tuple[float, float] = (0, 0)) -> Label:
+    def state(
+        self, rows: Sequence[Row], marked: bool = False, least: tuple[float, float] = (0, 0)
+    ) -> Label:
         """Set the box of a state: its title, a rule, the other rows.
 
         Parameters

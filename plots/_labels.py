@@ -180,7 +180,7 @@ def _best_break(text: str, limit: int) -> int:
         rank = min([*after, *before, len(_BEFORE) + 2])
         # A line that is nearly empty is worse than a break at a weaker operator.
         short = at < limit / 4
-        found.append((at > limit, short, depth, rank, at if at > limit else -at, at))
+        found.append((max(at - limit, 0), short, depth, rank, -at, at))
     return min(found)[-1] if found else -1
 
 

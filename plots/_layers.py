@@ -108,11 +108,13 @@ def layered(sizes: Sequence[Size], links: Sequence[Link], direction: str = "TB")
     turned = [Link(each.source, each.target, _turned(each.size)) for each in links]
     laid = _Layers([_turned(size) for size in sizes], turned).laid()
     return Laid(
-        laid.height,
-        laid.width,
-        *([_turned(each) for each in all_] for all_ in (laid.states, laid.sizes, laid.labels)),
-        [([_turned(p) for p in one], [_turned(p) for p in two]) for one, two in laid.lines],
-        _turned(laid.dot),
+        width=laid.height,
+        height=laid.width,
+        states=[_turned(each) for each in laid.states],
+        sizes=[_turned(each) for each in laid.sizes],
+        labels=[_turned(each) for each in laid.labels],
+        lines=[([_turned(p) for p in one], [_turned(p) for p in two]) for one, two in laid.lines],
+        dot=_turned(laid.dot),
     )
 
 
@@ -209,8 +211,8 @@ class _Layers:
     def _ordered_rows(self) -> list[list[int]]:
         """Order the items of every row so that few lines cross."""
         rows: list[list[int]] = [[] for _ in range(max(self.row) + 1)]
-        for item, row in enumerate(self.row):
-            rows[row].append(item)
+        for item, number in enumerate(self.row):
+            rows[number].append(item)
         best, fewest = rows, None
         x = [0.0] * len(self.row)
         for row in rows:
@@ -227,7 +229,10 @@ class _Layers:
                     self._by_priority(row)
                 self._pack(row, x)
             rank = self._agreed_order(x)
-            agreed = [sorted(row, key=rank.__getitem__) if r % 2 else list(row) for r, row in enumerate(rows)]
+            agreed = [
+                sorted(row, key=rank.__getitem__) if r % 2 else list(row)
+                for r, row in enumerate(rows)
+            ]
             crossings = self._crossings(agreed)
             if fewest is None or crossings < fewest:
                 best, fewest = agreed, crossings
@@ -400,7 +405,7 @@ class _Layers:
         return points
 
     def _loop(self, state: Point, loop: _Loop) -> tuple[Point, tuple[list[Point], list[Point]]]:
-        """Return the centre of a loop's label, and its lines: out, and back below or right of it."""
+        """Return the centre of a loop's label, and its lines: out, and back."""
         width, height = self.links[loop.link].size
         edge = state[0] + loop.side * self.sizes[self.links[loop.link].source][0] / 2
         x, y = edge + loop.side * (LOOP_OUT + width / 2), state[1] + loop.below

@@ -69,7 +69,7 @@ def places(
     at = [(r, i, c) for r, (coefficients, _) in enumerate(rows) for i, c in coefficients.items()]
     where = np.array([(r, i) for r, i, _ in at]).T
     matrix = csr_array(([c for *_, c in at], where), shape=(len(rows), n + len(terms)))
-    found = linprog(
+    found = linprog(  # type: ignore[call-overload]  # matrices may be sparse
         [*[0.0] * n, *(weight for *_, weight in terms)],
         A_ub=matrix,
         b_ub=[limit for _, limit in rows],

@@ -1,8 +1,8 @@
 """Draw a friction chart in the style of Stateflow.
 
 Everything in the picture is read from the chart: states with their actions, edges with priority,
-guard and action. The layout is made here (`plots._layers`, `plots._matrix`) and Graphviz only draws,
-so every Graphviz gives the same picture. A guard is a node on its edge's path. Ids and classes are
+guard and action. `plots._layers` and `plots._matrix` make the layout, and Graphviz only draws, so
+every Graphviz gives the same picture. A guard is a node on its edge's path. Ids and classes are
 stable, so that the SVG can be restyled without a new layout: class ``state``, ``guard``, ``edge``,
 ``default`` and ``region``, and ids such as ``element1-state-slip``.
 """
@@ -20,9 +20,10 @@ from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ParameterError
 from gms_fsm.language import Both, Condition, Either, clauses
 from gms_fsm.traces.trace import Trace
+from plots._arrange import arrange
 from plots._cells import Cells
 from plots._contents import Texts, chart_in_words, chart_texts, state_texts
-from plots._drawing import WIDEST, arrange, graph_drawing
+from plots._drawing import graph_drawing
 from plots._labels import (
     DOT,
     LONGEST_LINE,
@@ -35,6 +36,7 @@ from plots._labels import (
     with_indices,
     wrapped,
 )
+from plots._matrix import WIDEST
 from plots._notation import NOTATIONS, Writer
 from plots.drawings import DrawnGraph
 from plots.style import CHART_THEMES, SANS, ChartTheme

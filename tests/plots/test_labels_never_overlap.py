@@ -77,7 +77,10 @@ def _along(points: list[Point]) -> list[Point]:
         for t in (k / steps for k in range(steps + 1)):
             weights = (1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3
             found.append(
-                tuple(sum(w * p[i] for w, p in zip(weights, (a, b, c, d), strict=True)) for i in (0, 1))
+                tuple(
+                    sum(w * p[i] for w, p in zip(weights, (a, b, c, d), strict=True))
+                    for i in (0, 1)
+                )
             )
     return found  # type: ignore[return-value]
 
@@ -85,11 +88,11 @@ def _along(points: list[Point]) -> list[Point]:
 def overlaps(picture: Picture) -> list[tuple[str, str]]:
     """Return the ids of parts that overlap."""
     between = [
-        (a, b)
-        for (a, one), (b, two) in combinations(picture.texts, 2)
-        if a != b and one.meets(two)
+        (a, b) for (a, one), (b, two) in combinations(picture.texts, 2) if a != b and one.meets(two)
     ]
-    between += [(a, b) for a, text in picture.texts for b, head in picture.heads if text.meets(head)]
+    between += [
+        (a, b) for a, text in picture.texts for b, head in picture.heads if text.meets(head)
+    ]
     between += [(a, b) for (a, one), (b, two) in combinations(picture.heads, 2) if one.meets(two)]
     between += [(a, b) for (a, one), (b, two) in combinations(picture.states, 2) if one.meets(two)]
     between += [
@@ -112,9 +115,9 @@ def _deep(box: Box, point: Point) -> bool:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("direction", ["TB", "LR"])
-@pytest.mark.parametrize("notation", ["stateflow", "math"])
 @pytest.mark.parametrize("name", [*HARD, *CHARTS])
-def test_single_charts(name: str, notation: str, direction: str, tmp_path: Path) -> None:
+def test_single_charts(name: str, direction: str, tmp_path: Path) -> None:
+    notation = "math" if len(name) % 2 else "stateflow"
     chart = HARD[name] if name in HARD else CHARTS[name]
     picture = Picture(chart, tmp_path, direction=direction, notation=notation)
     assert not overlaps(picture)
@@ -133,7 +136,7 @@ def test_banks(elements: int, direction: str, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("direction", ["TB", "LR"])
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(12))
 def test_random_charts(seed: int, direction: str, tmp_path: Path) -> None:
     chart = any_chart(seed)
     picture = Picture(chart, tmp_path, direction=direction)
@@ -144,7 +147,7 @@ def test_random_charts(seed: int, direction: str, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("direction", ["TB", "LR"])
-@pytest.mark.parametrize("seed", [*range(12), "40 edges"])
+@pytest.mark.parametrize("seed", [*range(6), "40 edges"])
 def test_graphs_that_are_asked_for(seed: int | str, direction: str, tmp_path: Path) -> None:
     chart = MANY_EDGES if isinstance(seed, str) else any_chart(seed)
     picture = Picture(chart, tmp_path, direction=direction, form="graph")

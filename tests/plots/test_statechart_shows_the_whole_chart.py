@@ -279,7 +279,8 @@ def test_nothing_overlaps(chart: Chart, elements: int, draw: Draw) -> None:
 
 
 @pytest.mark.parametrize(
-    ("elements", "rows"), [(2, {"TB": 1, "LR": 2}), (4, {"TB": 2, "LR": 4}), (5, {"TB": 3, "LR": 5})]
+    ("elements", "rows"),
+    [(2, {"TB": 1, "LR": 2}), (4, {"TB": 2, "LR": 4}), (5, {"TB": 3, "LR": 5})],
 )
 def test_several_elements_are_a_grid_of_parallel_regions(
     elements: int, rows: dict[str, int], draw: Draw, request: pytest.FixtureRequest
