@@ -103,7 +103,7 @@ class Cells:
         """
         first = max(self._width(row[:1]) for row in rows) + 2
         heights = [self._height(row) for row in rows]
-        wide = first + max(self._width(row[1:]) for row in rows) + 2
+        wide = first + max(self._width(row[1:]) for row in rows) + (6 if marked else 2)
         body = "".join(
             self._row(row, height, wide, first) for row, height in zip(rows, heights, strict=True)
         )
@@ -135,9 +135,10 @@ class Cells:
         """
         heights = [self._height(row) for row in rows]
         wide = max(*map(self._width, rows), 36) + 2 * SIDE + 2
-        tall = sum(heights) + 6
-        wide, tall = max(wide, ceil(least[0])), max(tall, ceil(least[1]))
         ink, border = self.colours.ink, 3 if marked else 1
+        tall = sum(heights) + 4 + 2 * border
+        wide += 2 * border - 2
+        wide, tall = max(wide, ceil(least[0])), max(tall, ceil(least[1]))
         inner = wide - 2 * border
         title, *more = (
             self._row([Piece("", "pad"), *row], height, inner)

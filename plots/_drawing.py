@@ -112,7 +112,10 @@ def graph_drawing(sheet: Sheet, number: int) -> Drawing:
         for edge, priority in edges
     ]
     rows = [sheet.state_rows(state, number) for state in chart.states]
-    plain = [cells.state(each) for each in rows]
+    plain = [
+        cells.state(own, state.name in sheet.marked)
+        for own, state in zip(rows, chart.states, strict=True)
+    ]
     links = [
         Link(chart.state_index(edge.source), chart.state_index(edge.target), _roomy(box))
         for (edge, _), box in zip(edges, boxes, strict=True)
