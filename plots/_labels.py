@@ -149,7 +149,7 @@ def wrapped(text: str, limit: int = LONGEST_LINE) -> list[str]:
     Examples
     --------
     >>> wrapped("max(z - w, 0) >= s && v > v_c", 20)
-    ['max(z - w, 0) >=', '  s &&', '  v > v_c']
+    ['max(z - w, 0)', '  >= s && v > v_c']
     """
     lines, indent = [], ""
     while len(indent + text) > limit:
