@@ -1,21 +1,17 @@
 """An animation of a run: the live chart next to the friction force.
 
-Graphviz lays out the chart once and `plots.live_chart` paints it; here matplotlib draws the painted
-SVG, which contains only paths, polygons, circles and texts. A row therefore looks the same
-everywhere, no program is called per frame, and no SVG converter is needed. The chart is redrawn
-only when it changes; a cursor moves over the force in every frame.
+Graphviz lays out the chart once, `plots.live_chart` paints it, and matplotlib draws the painted SVG
+(`plots._svg_artists`): no program is called per frame. The chart is redrawn only when it changes; a
+cursor moves over the force in every frame.
 """
 
 from __future__ import annotations
 
-import itertools
-import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import Any, cast
-from xml.etree import ElementTree
 
 import numpy as np
 
@@ -23,16 +19,13 @@ from gms_fsm.errors import ParameterError, shown
 from gms_fsm.traces.trace import Trace, check_trace
 from plots import formats
 from plots._matplotlib import (
-    Artist,
-    Axes,
-    Curve,
     Figure,
     FigureCanvasAgg,
     Image,
-    patches,
     rc_context,
     to_rgb,
 )
+from plots._svg_artists import drawn
 from plots.live_chart import LiveChart
 from plots.statechart import Sheet
 from plots.style import CHART_THEMES, RC, ChartTheme
@@ -45,7 +38,6 @@ CURVE_WIDTH, CURVE_HEIGHT = 4.4, 3.4  # inches, of the force and its labels
 DPI = 100
 FASTEST = 50  # frames per second: GIF delays are in 10 ms, and readers reject a delay of 10 ms
 STEPS = 8  # shades of a colour along an edge; more could hardly be distinguished
-WIDE = 0.88  # matplotlib's sans serif is wider than the one used for the layout
 
 
 def animate(
@@ -214,7 +206,7 @@ class _Film:
         ax.set(xlim=(left, left + width), ylim=(top + height, top))
         ax.set_axis_off()
         chart.paint(0)
-        self.parts = list(_drawn(ax, chart.root))
+        self.parts = list(drawn(ax, chart.root, animated=True))
         self._draw_force(curve, width / POINTS / wide, wide, tall)
         self.canvas.draw()
         self.ground = self.canvas.copy_from_bbox(self.figure.bbox)
@@ -274,87 +266,3 @@ class _Film:
         table = np.unique(np.round(255 * np.array(shades)).astype(np.uint8), axis=0)
         image.putpalette(table.tobytes())  # at most 2 + 8 * 2 * 8 of the 256 that a GIF can have
         return image
-
-
-# --------------------------------------------------------------------------- SVG to matplotlib
-class _Part:
-    """One part of the SVG and its artist.
-
-    Parameters
-    ----------
-    node : Element
-        Of the painted tree.
-    artist : Artist
-        Drawn for it.
-    """
-
-    def __init__(self, node: ElementTree.Element, artist: Artist) -> None:
-        self.node, self.artist = node, artist
-
-    def update(self) -> None:
-        """Update the artist from the tree."""
-        get = self.node.get
-        if self.node.tag == "text":
-            shown = get("visibility") != "hidden"
-            self.artist.set(color=get("fill"), text=self.node.text or "", visible=shown)
-        else:
-            fill, stroke = (
-                "none" if get(name) in (None, "transparent") else get(name)
-                for name in ("fill", "stroke")
-            )
-            width = float(get("stroke-width") or 1.0)
-            self.artist.set(facecolor=fill, edgecolor=stroke, linewidth=width)
-
-    def draw(self, figure: Figure) -> None:
-        """Draw the artist on the figure."""
-        figure.draw_artist(self.artist)
-
-
-def _drawn(ax: Axes, root: ElementTree.Element) -> Iterator[_Part]:
-    """Make an artist for each part of the SVG, in its order."""
-    (graph,) = root.findall("g")
-    moved = re.search(r"translate\((\S+) (\S+)\)", graph.get("transform", ""))
-    dx, dy = (float(n) for n in moved.groups()) if moved else (0.0, 0.0)
-    for node in graph.iter():
-        artist = _artist(ax, node, dx, dy)
-        if artist is not None:
-            part = _Part(node, artist)
-            part.update()
-            yield part
-
-
-def _artist(ax: Axes, node: ElementTree.Element, dx: float, dy: float) -> Artist | None:
-    get = node.get
-    if node.tag == "text":
-        return ax.text(
-            float(get("x", "0")) + dx,
-            float(get("y", "0")) + dy,
-            "",
-            ha={"start": "left", "middle": "center"}[get("text-anchor", "start")],
-            va="baseline",
-            fontweight=get("font-weight", "normal"),
-            animated=True,
-            parse_math=False,
-            **_font(node),
-        )
-    if node.tag == "ellipse":
-        at = (float(get("cx", "0")) + dx, float(get("cy", "0")) + dy)
-        size = 2 * float(get("rx", "0")), 2 * float(get("ry", "0"))
-        return ax.add_patch(patches.Ellipse(at, *size, animated=True))
-    if node.tag not in ("path", "polygon", "polyline"):
-        return None
-    numbers = [float(n) for n in re.findall(r"-?\d+(?:\.\d+)?", get("d") or get("points") or "")]
-    points = np.array(numbers).reshape(-1, 2) + (dx, dy)
-    # Graphviz writes a path as M followed by cubic curves only.
-    kind = Curve.CURVE4 if node.tag == "path" else Curve.LINETO
-    codes = [Curve.MOVETO, *itertools.repeat(kind, len(points) - 1)]
-    dashes = {"linestyle": (0, (5, 2))} if get("stroke-dasharray") else {}
-    return ax.add_patch(patches.PathPatch(Curve(points, codes), animated=True, **dashes))
-
-
-def _font(node: ElementTree.Element) -> dict[str, Any]:
-    # The two families that matplotlib ships, so that it never searches for fonts.
-    size = float(node.get("font-size", "10"))
-    if "Mono" in node.get("font-family", ""):
-        return {"fontfamily": "DejaVu Sans Mono", "fontsize": size}
-    return {"fontfamily": "DejaVu Sans", "fontsize": WIDE * size}
