@@ -239,6 +239,8 @@ class Sheet:
         States and edges to highlight.
     names : bool
         Write each edge's name above its guard.
+    among : int
+        Leave room in each state for "3 of 4": how many of so many elements are in it.
     """
 
     chart: Chart
@@ -249,6 +251,7 @@ class Sheet:
     live: bool = False
     marked: frozenset[str] = frozenset()
     names: bool = False
+    among: int = 0
 
     def __post_init__(self) -> None:
         one_of("notation", self.notation, NOTATIONS)
@@ -431,6 +434,8 @@ class Sheet:
         title = [Piece(state.name[:1].upper() + state.name[1:], "title")]
         if self.live:
             title.append(Piece(f" {DOT}", "dot"))
+        if self.among:
+            title += [Piece("  ", "note"), Piece(f"{self.among} of {self.among}", "among")]
         rows = [title, *_rows(state_texts(self.write, state))]
         if self.tally is not None:
             rows.append([Piece(self.tally.of_state(number, state.name), "count")])
@@ -548,6 +553,7 @@ class Sheet:
             "dot": (12, SANS, False),
             "region": (13, SANS, True),
             "note": (10, SANS, False),
+            "among": (12, SANS, True),
             "count": (9, SANS, False),
             "never": (9, SANS, True),
             "priority": (10, MONO, True),
