@@ -25,8 +25,9 @@ def blend(ground: str, colour: str, share: float) -> str:
     >>> blend("#000000", "#ffffff", 0.2)
     '#333333'
     """
-    pairs = zip(to_rgb(ground), to_rgb(colour), strict=True)
-    return to_hex([a + share * (b - a) for a, b in pairs])
+    start, end = np.array(to_rgb(ground)), np.array(to_rgb(colour))
+    red, green, blue = start + share * (end - start)
+    return to_hex((red, green, blue))
 
 
 class FilmChart:
