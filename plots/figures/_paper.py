@@ -15,7 +15,7 @@ from plots._window import Window
 from plots.figures._parts import element_legend
 from plots.panels._held import Lag
 from plots.panels._shown import checked_window, scaled, shown
-from plots.style import BLUE, INK, LINE_GREY, RC, TEXT_GREY
+from plots.style import INK, LINE_GREY, RC, REPORTED, TEXT_GREY
 
 __all__ = [
     "FIG3_PHASES",
@@ -287,7 +287,7 @@ def held_residuals(
         between.set_title("c) friction; dots: at the ticks")
         period.set_title("d) largest at the ticks; lines: proportional to h")
         period.legend(loc="upper left", ncols=2)
-        (paper,) = force.plot([], [], color=BLUE, linestyle="--", linewidth=0.9)
+        (paper,) = force.plot([], [], **REPORTED)
         figure.legend(
             [*lines, paper],
             [*(str(line.get_label()) for line in lines), "the paper's residual"],

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from plots._matplotlib import Figure, Rectangle, rc_context
 from plots.figures._parts import head
 from plots.panels._shown import scaled
 from plots.panels._unfolded import FEW, column_width, edge_texts
-from plots.style import HATCHES, RC, STATE_EDGES, STATE_FILLS
+from plots.style import RC, state_look
 
 __all__ = ["unfold"]
 
@@ -94,12 +93,7 @@ def unfold(
 
 
 def _swatch(mode: int, name: str) -> Rectangle:
-    look: Any = {
-        "facecolor": STATE_FILLS[mode % len(STATE_FILLS)],
-        "edgecolor": STATE_EDGES[mode % len(STATE_EDGES)],
-        "hatch": HATCHES[mode % len(HATCHES)],
-    }
-    return Rectangle((0, 0), 1, 1, label=name, linewidth=0.6, **look)
+    return Rectangle((0, 0), 1, 1, label=name, **state_look(mode))
 
 
 def _said(part: panels.Unfolded) -> str:

@@ -14,7 +14,7 @@ from plots._matplotlib import Axes
 from plots._window import Window
 from plots.panels._axes import Artists, draw_curve
 from plots.panels._shown import scaled, shown
-from plots.style import INK, STATE_FILLS, VERMILION
+from plots.style import INK, PALE_GREY, PAPER
 
 __all__ = ["stribeck"]
 
@@ -76,7 +76,7 @@ def stribeck(
         np.abs(part.F[steady]),
         "s",
         markersize=5,
-        color=STATE_FILLS[0],
+        color=PALE_GREY,
         markeredgewidth=0,
         label="run, steady sliding",
         rasterized=True,
@@ -88,8 +88,8 @@ def stribeck(
             points[1],
             "o",
             markersize=4.5,
-            color=VERMILION,
-            markerfacecolor="white",
+            color=INK,
+            markerfacecolor=PAPER,
             label="measured",
             zorder=4,
         )
