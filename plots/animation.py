@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import cast
 
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.traces.trace import Trace, check_trace
@@ -19,7 +20,7 @@ from plots.film._pace import paced
 from plots.film._picture import FilmPicture
 from plots.panels._shown import shown as shown_rows
 from plots.statechart import Sheet, chosen
-from plots.style import RC
+from plots.style import RC, Theme
 
 __all__ = ["animate"]
 
@@ -121,7 +122,7 @@ def animate(
     pace = paced(trace, window, count, fps)
     chart = FilmChart(pace, elements, notation, theme)
     with rc_context(RC):
-        film = FilmPicture(pace, chart, shown_rows(trace, window), window, theme)
+        film = FilmPicture(pace, chart, shown_rows(trace, window), window, cast(Theme, theme))
         return formats.save(Movie(film, fps, progress), path, "animation")
 
 

@@ -15,20 +15,20 @@ import numpy as np
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Artist, Axes, Line2D, LineCollection, Rectangle, patches
-from plots.film._chart import blend
 from plots.film._pace import Frame
 from plots.panels._shown import has_threshold, scaled
-from plots.style import CHART_THEMES, HATCHES, PAGE_THEMES
+from plots.style import CHART_THEMES, HATCHES, PAGE_THEMES, Theme, ramp
 
-__all__ = ["Bristles", "row_height"]
+__all__ = ["Bristles", "panel_height"]
 
 HEAD, FOOT = 0.12, 0.08  # inches above and below the rows
+LEAST = 1.15  # inches, so that the numbers next to the slider have room
 TALLEST, LOWEST, ROOM = 0.46, 0.2, 3.6  # inches of a row; of all rows, if there are many
 SIZE = 8.0  # points of the texts
 WIDE = 0.068  # inches of a character
 LONGEST = 16  # characters of a state's name
 SLIDER, ARROW, NUMBERS = 0.24, 0.42, 1.2  # inches: slider, longest arrow, all to its right
-CONTACT = 0.2  # inches, of a contact
+CONTACT, TALL = 0.2, 0.55  # inches wide; share of the row's height
 SWING = 0.27  # share of the room that the largest deflection takes
 PERIOD, TICKS = 0.6, 6  # inches after which the ground looks the same, and its ticks
 TURNS = 7  # of a spring
@@ -41,6 +41,11 @@ def row_height(elements: int) -> float:
     [0.46, 0.46, 0.3, 0.2]
     """
     return min(TALLEST, max(LOWEST, ROOM / elements))
+
+
+def panel_height(elements: int) -> float:
+    """Return the height of all in inches."""
+    return max(LEAST, HEAD + FOOT + elements * row_height(elements))
 
 
 class Bristles:
@@ -73,10 +78,11 @@ class Bristles:
         trace: Trace,
         curve: Trace,
         elements: Sequence[int],
-        theme: str,
+        theme: Theme,
         size: tuple[float, float],
     ) -> None:
         self.ax, self.trace, self.elements = ax, trace, list(elements)
+        self.theme: Theme = theme
         self.colours, self.page = CHART_THEMES[theme], PAGE_THEMES[theme]
         ax.set(xlim=(0, size[0]), ylim=(size[1], 0))
         ax.set_axis_off()
@@ -99,68 +105,59 @@ class Bristles:
         self._draw()
 
     def _draw(self) -> None:
-        ax, colours = self.ax, self.colours
+        ax, colours, rows = self.ax, self.colours, range(len(self.elements))
         still: dict[str, Any] = {"color": colours.line, "linewidth": 0.8}
-        for k in range(len(self.elements)):
-            floor = self._floor(k)
+        text: dict[str, Any] = {"color": colours.ink, "fontsize": SIZE, "va": "center"}
+        for floor in map(self._floor, rows):
             ax.plot([self.left, self.wall], [floor, floor], **still)
             if self.z is not None:
-                ax.plot(2 * [self.rest], [floor - 0.55 * self.height, floor], ls=":", **still)
+                ax.plot(2 * [self.rest], [floor - TALL * self.height, floor], ls=":", **still)
         self.ground = LineCollection([], colors=colours.line, linewidths=0.7)
         self.limits = Line2D([], [], ls="", marker="v", markersize=4, color=colours.soft)
         self.springs = [
-            Line2D([], [], color=self._element_colour(i), linewidth=1.4, solid_joinstyle="round")
-            for i in self.elements
+            Line2D([], [], color=colour, linewidth=1.4, solid_joinstyle="round")
+            for colour in ramp("elements", len(rows), self.theme)
         ]
-        self.contacts = [Rectangle((0, 0), CONTACT, 0.62 * self.height) for _ in self.elements]
+        size = CONTACT, TALL * self.height
+        self.contacts = [Rectangle((0, 0), *size) for _ in rows]
+        self.lit = [Rectangle((0, 0), *size, linewidth=2.4, fill=False) for _ in rows]
         self.labels = [
-            ax.text(
-                0.02,
-                self._floor(k) - 0.22 * self.height,
-                "",
-                fontsize=SIZE,
-                va="center",
-                color=colours.ink,
-            )
-            for k in range(len(self.elements))
+            ax.text(0.02, self._floor(k) - TALL / 2 * self.height, "", **text) for k in rows
         ]
         lines: list[Any] = [self.ground, self.limits, *self.springs]
         for line in lines:
             ax.add_artist(line)
-        for contact in self.contacts:
-            ax.add_patch(contact)
-        top, bottom = HEAD, HEAD + self.height * len(self.elements)
-        look: dict[str, Any] = {"facecolor": self.page.panel, "edgecolor": colours.ink}
-        ax.add_patch(Rectangle((self.wall, top), SLIDER, bottom - top, linewidth=1.1, **look))
-        if bottom - top > 0.6:
-            ax.text(
-                self.wall + SLIDER / 2, (top + bottom) / 2, "slider", rotation=90, fontsize=SIZE,
-                ha="center", va="center", color=colours.ink,
-            )  # fmt: skip
-        if self.limited:
-            ax.text(
-                self.wall + SLIDER + 0.1, bottom, "▾ |z| = s", fontsize=SIZE - 0.5, va="bottom",
-                color=colours.soft,
-            )  # fmt: skip
-        self.arrows = []
-        middle = (top + bottom) / 2
-        for y in (middle - 0.16, middle + 0.16):
-            arrow = patches.Polygon([(0, 0)] * 3, closed=True, color=colours.ink)
-            ax.add_patch(arrow)
-            said = ax.text(
-                self.wall + SLIDER + 0.1, y, "", fontsize=SIZE, va="bottom", color=colours.ink
-            )
-            self.arrows.append((arrow, said, y))
-        moved = [each for arrow, said, _ in self.arrows for each in (arrow, said)]
-        self.moving = [*lines, *self.contacts, *self.labels, *moved]
+        for patch in (*self.contacts, *self.lit):
+            ax.add_patch(patch)
+        numbers = self._draw_slider(text)
+        self.moving = [*lines, *self.contacts, *self.lit, *self.labels, *numbers]
         for artist in self.moving:
             artist.set_animated(True)
 
+    def _draw_slider(self, text: dict[str, Any]) -> list[Artist]:
+        """Draw the slider; return the arrows and numbers of v and F next to it."""
+        ax, colours = self.ax, self.colours
+        tall = self.height * len(self.elements)
+        look: dict[str, Any] = {"facecolor": self.page.panel, "edgecolor": colours.ink}
+        ax.add_patch(Rectangle((self.wall, HEAD), SLIDER, tall, linewidth=1.1, **look))
+        middle = HEAD + tall / 2
+        if tall > 0.6:
+            ax.text(self.wall + SLIDER / 2, middle, "slider", rotation=90, ha="center", **text)
+        start = self.wall + SLIDER + 0.1
+        if self.limited:
+            end = max(HEAD + tall, LEAST - FOOT)
+            small = text | {"color": colours.soft, "va": "bottom"}
+            ax.text(start, end, "▾ |z| = s", **small)
+        middle = max(middle, HEAD + 0.3)
+        self.arrows = []
+        for y in (middle - 0.17, middle + 0.17):
+            arrow = patches.Polygon([(0, 0)] * 3, closed=True, color=colours.ink)
+            ax.add_patch(arrow)
+            self.arrows.append((arrow, ax.text(start, y, "", **(text | {"va": "bottom"})), y))
+        return [each for arrow, said, _ in self.arrows for each in (arrow, said)]
+
     def _floor(self, k: int) -> float:
         return HEAD + self.height * (k + 0.8)
-
-    def _element_colour(self, element: int) -> str:
-        return self.page.elements[element % len(self.page.elements)]
 
     # ------------------------------------------------------------------ the frame
     def show(self, frame: Frame) -> None:
@@ -173,11 +170,13 @@ class Bristles:
         for k, i in enumerate(self.elements):
             at, floor = self.rest - self.scale * float(z[i]), self._floor(k)
             self._paint_contact(k, int(modes[i]), at, lit.get(i, 0.0))
-            self.springs[k].set_data(*self._spring(at + CONTACT / 2, floor - 0.34 * self.height))
+            self.springs[k].set_data(
+                *self._spring(at + CONTACT / 2, floor - TALL / 2 * self.height)
+            )
             self.labels[k].set_text(f"E{i + 1} {self.names[int(modes[i])]}")
             if self.limited:
                 places = self.rest + self.scale * trace.s[row, i] * np.array([-1.0, 1.0])
-                limits += [(x, floor - 0.7 * self.height) for x in places]
+                limits += [(x, floor - 0.72 * self.height) for x in places]
         self.limits.set_data(np.array(limits).reshape(-1, 2).T)
         self.ground.set_segments(self._ground_at(float(trace.x[row])))
         v, force = float(trace.v[row]), float(trace.F[row])
@@ -186,15 +185,15 @@ class Bristles:
         self._point(1, "F", force, -force / self.most["F"] if self.most["F"] else 0.0)
 
     def _paint_contact(self, k: int, mode: int, at: float, lit: float) -> None:
-        contact = self.contacts[k]
-        contact.set_xy((at - CONTACT / 2, self._floor(k) - 0.62 * self.height))
-        edge = self.page.edges[mode % len(self.page.edges)]
+        contact, now = self.contacts[k], self.lit[k]
+        for patch in (contact, now):
+            patch.set_xy((at - CONTACT / 2, self._floor(k) - TALL * self.height))
         contact.set(
             facecolor=self.page.fills[mode % len(self.page.fills)],
-            edgecolor=blend(edge, self.colours.fired, lit),
+            edgecolor=self.page.hatches[mode % len(self.page.hatches)],
             hatch=2 * HATCHES[mode % len(HATCHES)],
-            linewidth=1.0 + 1.4 * lit,
         )
+        now.set(edgecolor=self.colours.fired, alpha=lit, visible=lit > 0)
 
     def _spring(self, start: float, y: float) -> tuple[FloatArray, FloatArray]:
         """Return the line from a contact to the slider."""
@@ -215,7 +214,9 @@ class Bristles:
         for k in range(len(self.elements)):
             floor = self._floor(k)
             for at, n in inside:
-                deep = 0.11 if n == 0 else 0.05  # one in six tells how far it has moved
+                deep = (
+                    0.24 if n == 0 else 0.11
+                ) * self.height  # one in six tells how far it has moved
                 marks.append([(at, floor), (at - 0.05, floor + deep)])
         return marks
 
@@ -230,10 +231,8 @@ class Bristles:
         back = tip + (-2 if share > 0 else 2) * min(head, length / 2)
         thin = 0.25 * head
         y += 0.05
-        outline = [
-            (tail, y - thin), (back, y - thin), (back, y - head), (tip, y),
-            (back, y + head), (back, y + thin), (tail, y + thin),
-        ]  # fmt: skip
+        half = [(tail, thin), (back, thin), (back, head), (tip, 0.0)]
+        outline = [(x, y - up) for x, up in half] + [(x, y + up) for x, up in half[2::-1]]
         arrow.set_xy(outline)
         arrow.set_visible(length > 0.04)
 

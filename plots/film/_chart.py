@@ -20,11 +20,7 @@ __all__ = ["FilmChart", "blend"]
 
 
 def blend(ground: str, colour: str, share: float) -> str:
-    """Return a mixture of two colours.
-
-    >>> blend("#000000", "#ffffff", 0.2)
-    '#333333'
-    """
+    """Return a mixture of two colours; a share of 0 is the ground."""
     start, end = np.array(to_rgb(ground)), np.array(to_rgb(colour))
     red, green, blue = start + share * (end - start)
     return to_hex((red, green, blue))

@@ -43,7 +43,8 @@ class Movie:
     @property
     def colours(self) -> list[str]:
         """The colours of the theme that every frame needs."""
-        return sorted(set(vars(self.film.colours).values()))
+        page = self.film.page
+        return sorted({*vars(self.film.colours).values(), *page.fills, *page.hatches, page.panel})
 
     def held(self) -> list[int]:
         """Return the first frame of each micro-step at which time stands still."""

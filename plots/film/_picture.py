@@ -16,11 +16,11 @@ from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Artist, Axes, Figure, FigureCanvasAgg, Image
 from plots._svg_artists import drawn
 from plots._window import Window
-from plots.film._bristles import FOOT, HEAD, Bristles, row_height
+from plots.film._bristles import Bristles, panel_height
 from plots.film._chart import FilmChart
 from plots.film._pace import Frame, Pace
 from plots.panels._states import spans
-from plots.style import CHART_THEMES, HATCHES, PAGE_THEMES
+from plots.style import CHART_THEMES, HATCHES, PAGE_THEMES, Theme
 
 __all__ = ["FilmPicture"]
 
@@ -58,7 +58,7 @@ class FilmPicture:
     """
 
     def __init__(
-        self, pace: Pace, chart: FilmChart, curve: Trace, window: Window, theme: str
+        self, pace: Pace, chart: FilmChart, curve: Trace, window: Window, theme: Theme
     ) -> None:
         self.pace, self.chart, self.trace = pace, chart, pace.trace
         self.colours, self.page = CHART_THEMES[theme], PAGE_THEMES[theme]
@@ -67,7 +67,7 @@ class FilmPicture:
         scale = min(1.0, WIDEST * POINTS / width, TALLEST * POINTS / height)
         drawing = scale * width / POINTS, scale * height / POINTS
         self.left = max(drawing[0], LEAST_LEFT)
-        bristles = HEAD + FOOT + len(elements) * row_height(len(elements))
+        bristles = panel_height(len(elements))
         lanes = len(elements) * min(LANE, max(LOWEST_LANE, LANES / len(elements)))
         self.tall = max(
             drawing[1] + bristles + 2 * MARGIN, SAID + FORCE + 0.12 + lanes + LABELS + MARGIN
@@ -99,9 +99,9 @@ class FilmPicture:
 
     def _axes(self, left: float, top: float, width: float, height: float) -> Axes:
         """Add axes; all lengths in inches, from the left and the top edge."""
-        box = (
-            left / self.wide, 1 - (top + height) / self.tall, width / self.wide, height / self.tall
-        )  # fmt: skip
+        bottom = self.tall - top - height
+        across, up = np.array([left, width]) / self.wide, np.array([bottom, height]) / self.tall
+        box = (across[0], up[0], across[1], up[1])
         return self.figure.add_axes(box, facecolor=self.colours.paper)
 
     def _draw_force(self, curve: Trace, window: Window, height: float) -> None:
@@ -129,7 +129,7 @@ class FilmPicture:
                     [(a, b - a) for name, a, b in found if name == state],
                     (lane + 0.6, 0.8),
                     facecolor=self.page.fills[number % len(self.page.fills)],
-                    edgecolor=self.page.edges[number % len(self.page.edges)],
+                    edgecolor=self.page.hatches[number % len(self.page.hatches)],
                     hatch=HATCHES[number % len(HATCHES)],
                     linewidth=0.5,
                 )
