@@ -83,7 +83,9 @@ def draw_charts(published: Trace, signed: Trace) -> None:
     row = int((signed.t == signed.transitions.t[first_alone]).nonzero()[0][-1])
     live = plots.live_statechart(signed, row=row, elements=4, values=True)
     write_whole(FOLDER / "chart_live.svg", lambda file: file.write(live.encode()))
-    plots.animate(signed, FOLDER / "film.gif", elements=[0], frames=50, t_end=50.0, fps=10)
+    # Four elements stick and load, break away one after another, slide, and are caught at once.
+    pulled = run("pulled_mass")
+    plots.animate(pulled, FOLDER / "film.gif", seconds=9.5, t_start=12.0, t_end=18.6)
 
 
 def draw_held() -> None:

@@ -120,12 +120,9 @@ def paced(trace: Trace, window: Window, frames: int, fps: float) -> Pace:
 
 def _held(micro_steps: int, frames: int, fps: float) -> int:
     """Return the number of frames for which each micro-step is shown."""
-    if not micro_steps:
+    if not micro_steps or micro_steps > min(SQUEEZED * frames, frames - 2):
         return 0
-    wanted = max(round(HOLD * fps), 1)
-    return min(wanted, int(HELD * frames / micro_steps)) or int(
-        micro_steps <= SQUEEZED * frames and micro_steps <= frames - 2
-    )
+    return max(1, min(round(HOLD * fps), int(HELD * frames / micro_steps)))
 
 
 def _running(

@@ -33,6 +33,7 @@ FORCE = 1.7  # inches of the force axis, at least
 LANE, LOWEST_LANE, LANES = 0.3, 0.16, 2.4  # inches of a ribbon; of all ribbons, if there are many
 MOST = 24  # elements with ribbon and bristle
 SIZE = 8.5  # points
+CURSOR = 1.44  # points: two pixels
 
 
 class FilmPicture:
@@ -144,7 +145,7 @@ class FilmPicture:
         ax.tick_params(axis="y", length=0)
         self.cursors.append(ax.axvline(window[0]))
         for cursor in self.cursors:
-            cursor.set(color=self.colours.fired, linewidth=1.3, animated=True)
+            cursor.set(color=self.colours.fired, linewidth=CURSOR, clip_on=False, animated=True)
         self.moving = [*self.cursors, *self.moving]
 
     def _paint_axes(self, ax: Axes) -> None:
