@@ -24,7 +24,7 @@ from tests.plots.films import count, frames_of, with_movie
 pytestmark = pytest.mark.slow
 VIDEOS = [ending for ending in endings("animation") if ending != ".gif"]
 FRAMES, FPS = 30, 10.0
-WINDOW = {"t_start": 4.0, "t_end": 6.0, "frames": FRAMES, "fps": FPS}  # four micro-steps at 4.9 s
+WINDOW = {"t_start": 3.3, "t_end": 5.0, "frames": FRAMES, "fps": FPS}  # four micro-steps at 3.8 s
 
 
 @pytest.fixture(autouse=True)
