@@ -86,13 +86,11 @@ class Bristles:
         self.colours, self.page = CHART_THEMES[theme], PAGE_THEMES[theme]
         ax.set(xlim=(0, size[0]), ylim=(size[1], 0))
         ax.set_axis_off()
-        names = [state.name[:LONGEST] for state in trace.model.chart.states]
-        self.names = [name[:1].upper() + name[1:] for name in names]
-        self.left = 0.1 + WIDE * (len(f"E{trace.n} ") + max(map(len, names)))
+        self.names = [state.name[:LONGEST] for state in trace.model.chart.states]
+        self.left = 0.1 + WIDE * (len(f"E{trace.n} ") + max(map(len, self.names)))
         self.wall = size[0] - NUMBERS - SLIDER
         self.height = row_height(len(self.elements))
         self.z = _deflection(curve)
-        self.limited = self.z is not None and has_threshold(trace)
         self.most = {"v": _largest(curve.v), "F": _largest(curve.F)}
         longest = 0.0 if self.z is None else _largest(curve.variable(self.z)[:, self.elements])
         space = self.wall - self.left
@@ -100,6 +98,9 @@ class Bristles:
         # Inches per metre; without springs the whole run is 20 periods of the ground.
         travel = float(np.ptp(curve.x)) or 1.0
         self.scale = SWING * space / longest if longest else 20 * PERIOD / travel
+        # In some charts s is a force and not the threshold of z.
+        limit = np.nanmin(curve.s) if self.z is not None and has_threshold(trace) else np.inf
+        self.limited = bool(self.scale * limit < space)
         self.units = scaled(curve.v, "m/s"), scaled(curve.F, "N")
         self.moving: list[Artist] = []
         self._draw()
@@ -176,7 +177,8 @@ class Bristles:
             self.labels[k].set_text(f"E{i + 1} {self.names[int(modes[i])]}")
             if self.limited:
                 places = self.rest + self.scale * trace.s[row, i] * np.array([-1.0, 1.0])
-                limits += [(x, floor - 0.72 * self.height) for x in places]
+                inside = places[(places > self.left) & (places < self.wall)]
+                limits += [(x, floor - 0.72 * self.height) for x in inside]
         self.limits.set_data(np.array(limits).reshape(-1, 2).T)
         self.ground.set_segments(self._ground_at(float(trace.x[row])))
         v, force = float(trace.v[row]), float(trace.F[row])

@@ -161,7 +161,7 @@ def test_texts_have_room(n: int, tmp_path: Path) -> None:
         for number in (0, held[0], held[-1], movie.frames - 1):
             picture = movie.picture(number)
             found = boxes(movie)
-            assert sum(text.startswith("E") and " S" in text for text, _, _ in found) == n
+            assert sum(text.startswith("E") and " s" in text for text, _, _ in found) == n
             for text, size, box in found:
                 assert size >= 7, text
                 assert box.x0 >= 0, text
