@@ -59,9 +59,9 @@ def animate(
     trace : Trace
         The run.
     path : str or Path
-        Its ending must be that of an animation format in `plots.formats.FORMATS`: ``.gif``, or
-        ``.mp4`` and ``.webm`` with the extra ``film``. The folder must exist; an existing file is
-        replaced atomically.
+        Its ending must be that of an animation format in `plots.formats.FORMATS`, such as ``.gif``.
+        Videos need the extra ``film``. The folder must exist; an existing file is replaced
+        atomically.
     elements : int or sequence of int, optional
         How many elements the chart shows, or which ones, counted from 0; by default all.
     frames : int, optional

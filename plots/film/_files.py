@@ -25,8 +25,8 @@ LONGEST = 65_535  # hundredths of a second that a frame of a GIF can last
 BT709 = 1  # the colours of a video, in ffmpeg's numbers
 # Quality so high that texts show no artefacts.
 CODECS = {
-    "mp4": ("libx264", {"crf": "18", "preset": "medium", "tune": "animation"}),
-    "webm": ("libvpx-vp9", {"crf": "24", "b": "0", "deadline": "good", "cpu-used": "4"}),
+    "libx264": {"crf": "18", "preset": "medium", "tune": "animation"},
+    "libvpx-vp9": {"crf": "24", "b": "0", "deadline": "good", "cpu-used": "4"},
 }
 Palette = NDArray[np.uint8]
 
@@ -139,15 +139,17 @@ class _Nearest:
 
 
 # --------------------------------------------------------------------------- video
-def video(movie: Movie, form: str) -> bytes:
+def video(movie: Movie, form: str, codec: str) -> bytes:
     """Return a film as a video that browsers play.
 
     Parameters
     ----------
     movie : Movie
         What; its size is even.
-    form : {"mp4", "webm"}
-        MP4 has H.264 and its index at the beginning, WebM has VP9; both have 4:2:0 colours.
+    form : str
+        Container, by ffmpeg's name. The index of an MP4 is at its beginning.
+    codec : {"libx264", "libvpx-vp9"}
+        What compresses the frames, with 4:2:0 colours.
 
     Returns
     -------
@@ -160,13 +162,12 @@ def video(movie: Movie, form: str) -> bytes:
         If PyAV is not installed.
     """
     av = require("av", "film")
-    codec, options = CODECS[form]
     with TemporaryDirectory() as folder:
         path = Path(folder, f"film.{form}")  # its index is moved to the front, which needs a file
-        flags = {"movflags": "faststart"} if form == "mp4" else {}
+        flags = {"movflags": "faststart"} if codec == "libx264" else {}
         with av.open(str(path), "w", format=form, options=flags) as file:
             rate = Fraction(movie.fps).limit_denominator(1000)
-            stream = file.add_stream(codec, rate=rate, options=options)
+            stream = file.add_stream(codec, rate=rate, options=CODECS[codec])
             stream.width, stream.height = movie.size
             stream.pix_fmt = "yuv420p"
             context = stream.codec_context
