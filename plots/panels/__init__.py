@@ -18,6 +18,7 @@ from plots.panels import (
     _differences,
     _held,
     _landscapes,
+    _many,
     _over_time,
     _portraits,
     _race,
@@ -30,6 +31,7 @@ from plots.panels._cascades import *  # noqa: F403
 from plots.panels._differences import *  # noqa: F403
 from plots.panels._held import *  # noqa: F403
 from plots.panels._landscapes import *  # noqa: F403
+from plots.panels._many import *  # noqa: F403
 from plots.panels._over_time import *  # noqa: F403
 from plots.panels._portraits import *  # noqa: F403
 from plots.panels._race import *  # noqa: F403
@@ -43,6 +45,7 @@ __all__ += _cascades.__all__
 __all__ += _differences.__all__
 __all__ += _held.__all__
 __all__ += _landscapes.__all__
+__all__ += _many.__all__
 __all__ += _over_time.__all__
 __all__ += _portraits.__all__
 __all__ += _race.__all__
