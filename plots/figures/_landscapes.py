@@ -11,7 +11,7 @@ from plots import panels
 from plots._matplotlib import Figure, Line2D, rc_context
 from plots._plane import Plane
 from plots._window import Window
-from plots.figures._parts import head, lettered
+from plots.figures._parts import head
 from plots.panels._landscapes import DASHED, acceleration, pinned, quantity
 from plots.panels._race import rows_of
 from plots.panels._shown import checked_row, one_element
@@ -108,8 +108,8 @@ def landscape(
             panels.pins(left, trace, element, checks, row=row)
         panels.race(right, trace, element, row=row)
         shown = "guards that leave" if plane.edges else "flow of"
-        lettered(left, "a", f"{shown} {plane.state}")
-        lettered(right, "b", "race to fire")
+        panels.lettered(left, "a", f"{shown} {plane.state}")
+        panels.lettered(right, "b", "race to fire")
         looks = [("path before", INK, "-"), ("after", INK, DASHED)]
         handles = [Line2D([], [], color=c, linestyle=dash, label=n) for n, c, dash in looks]
         if plane.threshold is not None:

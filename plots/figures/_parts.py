@@ -9,13 +9,12 @@ import numpy as np
 
 from gms_fsm.traces.trace import Trace
 from plots import panels
-from plots._matplotlib import Annotation, Axes, Figure, ScaledTranslation
+from plots._matplotlib import Annotation, Axes, Figure
 from plots._window import Window
 from plots.panels._axes import MANY
 from plots.panels._shown import checked_elements
 
 LANE = 0.15  # inches: a row of one element, with its label
-AFTER_LETTER = 13.0  # points: from the letter of a panel to its name
 ENTRY = 0.92  # inches: an entry of a legend
 
 
@@ -29,18 +28,7 @@ def letter_panels(axes: Sequence[Axes], names: Sequence[str]) -> None:
     for letter, ax, name in zip(ascii_lowercase, axes, names, strict=False):
         # Above the labels of the marks, if there are any.
         marked = any(isinstance(text, Annotation) and text.xy[1] >= 1.0 for text in ax.texts)
-        lettered(ax, letter, name, pad=16 if marked else 6)
-
-
-def lettered(ax: Axes, letter: str, name: str, *, pad: float = 6.0) -> None:
-    """Give a panel a title: a bold letter, and a name.
-
-    The letter is the middle one of the three titles that axes have, moved to the left.
-    """
-    ax.set_title(letter, loc="center", fontweight="bold", ha="left", x=0.0, pad=pad)
-    right = ScaledTranslation(AFTER_LETTER / 72, 0.0, ax.figure.dpi_scale_trans)
-    text = ax.set_title(name, loc="left", pad=pad)
-    text.set_transform(text.get_transform() + right)
+        panels.lettered(ax, letter, name, pad=16 if marked else 6)
 
 
 def over_threshold(

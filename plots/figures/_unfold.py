@@ -9,7 +9,7 @@ import numpy as np
 from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots._matplotlib import Figure, Rectangle, rc_context
-from plots.figures._parts import head, lettered
+from plots.figures._parts import head
 from plots.panels._shown import scaled
 from plots.panels._unfolded import FEW, column_width, edge_texts
 from plots.style import RC, state_look
@@ -81,9 +81,9 @@ def unfold(
         states = figure.add_axes((left, BELOW / height, broad, tall / height))
         panels.unfolded_force(force, part)
         panels.unfolded_states(states, part)
-        lettered(force, "a", "F before and after each firing")
+        panels.lettered(force, "a", "F before and after each firing")
         above = 72 * (head_room + 0.12)  # points
-        lettered(states, "b", "who fires, and by which edge", pad=above)
+        panels.lettered(states, "b", "who fires, and by which edge", pad=above)
         shown = sorted({mode for each in part.columns for mode in each.modes})
         handles = [_swatch(mode, names[mode]) for mode in shown]
         figure.legend(handles=handles, loc="lower left", ncols=6)

@@ -25,6 +25,7 @@ from plots.panels import (
     _shown,
     _states,
     _stribeck,
+    _titles,
     _unfolded,
 )
 from plots.panels._cascades import *  # noqa: F403
@@ -38,6 +39,7 @@ from plots.panels._race import *  # noqa: F403
 from plots.panels._shown import *  # noqa: F403
 from plots.panels._states import *  # noqa: F403
 from plots.panels._stribeck import *  # noqa: F403
+from plots.panels._titles import *  # noqa: F403
 from plots.panels._unfolded import *  # noqa: F403
 
 __all__: list[str] = []
@@ -52,4 +54,5 @@ __all__ += _race.__all__
 __all__ += _shown.__all__
 __all__ += _states.__all__
 __all__ += _stribeck.__all__
+__all__ += _titles.__all__
 __all__ += _unfolded.__all__
