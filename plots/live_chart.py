@@ -135,7 +135,7 @@ class LiveChart:
         self.elements = chosen(trace.n if elements is None else elements, trace.n)
         self.values = values
         chart = trace.model.chart
-        self._sheet = Sheet(chart, notation, direction, theme, live=True)
+        self._sheet = Sheet(chart, notation, direction, theme, live=True).fitted()
         read = frozenset[str]().union(*map(names_in, chart.guards.values()))
         late = [name for name in (*chart.force_names, *chart.rate_names) if name in read]
         names = dict.fromkeys([*chart.variables, *chart.inputs, *chart.velocities, *late])

@@ -63,6 +63,7 @@ class FilmChart:
             self.root, self.parts = self.live.root, self.live.parts[self.elements[0]]
             return
         sheet = Sheet(self.chart, notation, "TB", theme, live=True, among=len(self.elements))
+        sheet = sheet.fitted()
         self.root = plain_tree(rendered(sheet.graph([0], bare=True), "svg"))
         self.root.set("style", f"background:{self.colours.paper}")
         groups = {group.get("id", ""): group for group in self.root.iter("g")}
