@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from plots._matplotlib import Image
+from plots.film._chart import blend
+from plots.film._pace import FADE
 from plots.film._picture import FilmPicture
 
 __all__ = ["Movie"]
@@ -42,9 +44,10 @@ class Movie:
 
     @property
     def colours(self) -> list[str]:
-        """The colours of the theme that every frame needs."""
-        page = self.film.page
-        return sorted({*vars(self.film.colours).values(), *page.fills, *page.hatches, page.panel})
+        """The colours of the theme that every frame needs, and those of fading edges."""
+        page, own = self.film.page, self.film.colours
+        fading = [blend(own.ink, own.fired, k / (FADE + 1)) for k in range(1, FADE + 1)]
+        return sorted({*vars(own).values(), *page.fills, *page.hatches, page.panel, *fading})
 
     def held(self) -> list[int]:
         """Return the first frame of each micro-step at which time stands still."""

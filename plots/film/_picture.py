@@ -28,6 +28,7 @@ POINTS = 72.0  # per inch
 DPI = 100
 RIGHT, LEAST_LEFT = 4.9, 4.9  # inches, of the columns
 WIDEST, TALLEST = 9.0, 6.0  # inches of a chart; a larger one is drawn smaller
+SMALLEST = 0.8  # but not smaller than this: its texts have at least 7 points
 SAID, LABELS, MARGIN = 0.78, 0.5, 0.12  # inches: texts above the force; below an axis; around
 FORCE = 1.7  # inches of the force axis, at least
 LANE, LOWEST_LANE, LANES = 0.3, 0.16, 2.4  # inches of a ribbon; of all ribbons, if there are many
@@ -65,7 +66,7 @@ class FilmPicture:
         self.colours, self.page = CHART_THEMES[theme], PAGE_THEMES[theme]
         elements = range(min(self.trace.n, MOST))
         x, y, width, height = (float(n) for n in chart.root.get("viewBox", "").split())
-        scale = min(1.0, WIDEST * POINTS / width, TALLEST * POINTS / height)
+        scale = max(SMALLEST, min(1.0, WIDEST * POINTS / width, TALLEST * POINTS / height))
         drawing = scale * width / POINTS, scale * height / POINTS
         self.left = max(drawing[0], LEAST_LEFT)
         bristles = panel_height(len(elements))
