@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 import plots
@@ -40,7 +41,7 @@ from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.broken import BROKEN
 from plots import figures, panels
 from plots.schematic import schematic_figure
-from plots.style import INK, LINE_GREY, PAPER, RC, TEXT_GREY
+from plots.style import INK, LINE_GREY, PAPER, RC, TEXT_GREY, ramp
 
 FOLDER = Path(__file__).parent / "images"
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -84,7 +85,9 @@ def draw_charts(published: Trace, signed: Trace) -> None:
     row = int((signed.t == signed.transitions.t[first_alone]).nonzero()[0][-1])
     live = plots.live_statechart(signed, row=row, elements=4, values=True)
     write_whole(FOLDER / "chart_live.svg", lambda file: file.write(live.encode()))
-    plots.animate(signed, FOLDER / "film.gif", elements=[0], frames=50, t_end=50.0, fps=10)
+    # Four elements stick and load, break away one after another, slide, and are caught at once.
+    pulled = run("pulled_mass")
+    plots.animate(pulled, FOLDER / "film.gif", seconds=9.5, t_start=12.0, t_end=18.6)
 
 
 def draw_systems() -> None:
@@ -150,13 +153,14 @@ def element_figure() -> Figure:
         panels.ratio(ratio, trace)
         panels.force(force, trace)
         panels.ribbons(states, trace)
-        for ax, title in (
-            (velocity, "a) the slider moves back and forth"),
-            (ratio, "b) deflection over threshold"),
-            (force, "c) force"),
-            (states, "d) state"),
-        ):
-            ax.set_title(title)
+        named = (
+            (velocity, "the slider moves back and forth"),
+            (ratio, "deflection over threshold"),
+            (force, "force"),
+            (states, "state"),
+        )
+        for letter, (ax, title) in zip("abcd", named, strict=True):
+            panels.lettered(ax, letter, title)
             if ax is not states:
                 ax.set_xlabel("")
                 ax.tick_params(labelbottom=False)
@@ -172,8 +176,8 @@ def microstep_figure(trace: Trace) -> Figure:
         over_time, by_step = figure.subplots(1, 2, width_ratios=(1, 1.5))
         t = float(log.t[0])
         panels.force(over_time, trace, window=(t - 1.5, t + 1.5))
-        over_time.set_title("a) over time: one jump of F")
-        by_step.set_title(f"b) at t = {t:.4f} s: four firings, five rows")
+        panels.lettered(over_time, "a", "over time: one jump of F")
+        panels.lettered(by_step, "b", f"at t = {t:.4f} s: four firings, five rows")
         by_step.plot(trace.microstep[rows], trace.F[rows], "o--", color=INK, markersize=6)
         for record, number in zip(log, range(1, 5), strict=True):
             by_step.annotate(
@@ -352,7 +356,9 @@ def sweep_figure() -> Figure:
     with rc_context(RC):
         figure = Figure(figsize=(6.0, 3.8), layout="constrained")
         ax = figure.subplots()
-        image = ax.pcolormesh(speed, v_s, counts, cmap="cividis", rasterized=True)
+        image = ax.pcolormesh(
+            speed, v_s, counts, cmap=ListedColormap(ramp("heat", 256)), rasterized=True
+        )
         ax.set(yscale="log", xlabel="pulling speed [m/s]", ylabel="v_s [m/s]")
         ax.set_title(f"arrests in 60 s, {len(result):,} runs; signed law")
         figure.colorbar(image, label="arrests")

@@ -50,7 +50,7 @@ __all__ = [
 
 
 def animate(trace: Trace, path: str | Path, **options: Any) -> Path:
-    """Make an animation of the live chart next to the force; see `plots.animation.animate`.
+    """Make a film of a run, slowed at transitions; see `plots.animation.animate`.
 
     Parameters
     ----------

@@ -25,6 +25,7 @@ SIDE = 6  # left and right of the text of a state
 # Of a role: size, face, bold, secondary.
 _FACES = {
     "title": (12, SANS, True, False),
+    "among": (12, SANS, True, False),
     "dot": (12, SANS, False, False),
     "region": (13, SANS, True, False),
     "note": (10, SANS, False, True),

@@ -13,23 +13,24 @@ from gms_fsm._extras import require
 require("matplotlib", "plots")
 require("PIL", "plots")  # comes with matplotlib
 
-from matplotlib import colormaps, patches, rc_context
+from matplotlib import patches, rc_context
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
-from matplotlib.colors import BoundaryNorm, ListedColormap, to_rgb
+from matplotlib.colors import BoundaryNorm, ListedColormap, to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Rectangle
 from matplotlib.path import Path as Curve
-from matplotlib.text import Text
+from matplotlib.text import Annotation, Text
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
-from matplotlib.transforms import Bbox, IdentityTransform
+from matplotlib.transforms import Bbox, IdentityTransform, ScaledTranslation
 from PIL import Image
 
 __all__ = [
+    "Annotation",
     "Artist",
     "Axes",
     "Bbox",
@@ -48,9 +49,10 @@ __all__ = [
     "NullLocator",
     "Rectangle",
     "RendererBase",
+    "ScaledTranslation",
     "Text",
-    "colormaps",
     "patches",
     "rc_context",
+    "to_hex",
     "to_rgb",
 ]

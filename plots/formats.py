@@ -116,9 +116,18 @@ def _matplotlib(form: str, **metadata: None) -> Callable[[Any], bytes]:
 
 
 def _gif(movie: Any) -> bytes:
-    from plots.animation import gif
+    from plots.film._files import gif
 
     return gif(movie)
+
+
+def _video(form: str, codec: str) -> Callable[[Any], bytes]:
+    def write(movie: Any) -> bytes:
+        from plots.film._files import video
+
+        return video(movie, form, codec)
+
+    return write
 
 
 def _html(page: Any) -> bytes:
@@ -140,6 +149,8 @@ FORMATS: list[Format] = [
     Format(".svg", "figure", "a figure", "matplotlib", _svg, "plots", usual=True),
     Format(".pdf", "figure", "a figure", "matplotlib", _pdf, "plots"),
     Format(".gif", "animation", "an animation", "Pillow", _gif, "plots"),
+    Format(".mp4", "animation", "an animation", "PyAV", _video("mp4", "libx264"), "film"),
+    Format(".webm", "animation", "an animation", "PyAV", _video("webm", "libvpx-vp9"), "film"),
     Format(".html", "page", "a replay page", "gms-fsm", _html, "replay", usual=True),
 ]
 INSTEAD = ".dot"  # written for a graph if there is no Graphviz

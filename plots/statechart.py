@@ -271,6 +271,8 @@ class Sheet:
         Edges whose guards are written below the picture, with their numbers.
     scale : float
         Size of the texts, 1 for the usual one.
+    among : int
+        Leave room in each state for "3 of 4": how many of so many elements are in it.
     """
 
     chart: Chart
@@ -284,6 +286,7 @@ class Sheet:
     names: bool = False
     numbered: Mapping[str, int] = field(default_factory=dict)
     scale: float = 1.0
+    among: int = 0
 
     def __post_init__(self) -> None:
         one_of("notation", self.notation, NOTATIONS)
@@ -438,6 +441,8 @@ class Sheet:
         title = [Piece(state.name, "title")]
         if self.live:
             title.append(Piece(f" {DOT}", "dot"))
+        if self.among:
+            title += [Piece("  ", "note"), Piece(f"{self.among} of {self.among}", "among")]
         narrow = self.direction == "LR" or self.form == "matrix"
         limit = LONGEST_LABEL if narrow else LONGEST_LINE
         texts = _rows(state_texts(self.write, state), limit)

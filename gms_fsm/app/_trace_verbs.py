@@ -81,12 +81,16 @@ def animate_command(
     output: Annotated[
         Path, typer.Option("--output", "-o", help="Output file, ending in {animation}.")
     ] = Path("film.gif"),
-    frames: Annotated[int, typer.Option(help="Number of frames.")] = 200,
+    frames: Annotated[int | None, typer.Option(help="Number of frames; usually 200.")] = None,
+    seconds: Annotated[
+        float | None, typer.Option(help="Length of the film, instead of --frames.")
+    ] = None,
+    fps: Annotated[float, typer.Option(help="Frames per second, at most 50.")] = 20.0,
     start: Start = None,
     end: End = None,
     contact: ContactName = "",
 ) -> None:
-    """Make an animation of the chart next to the force."""
+    """Make a film of a run: chart, bristles, force and states, slowed at transitions."""
     from gms_fsm.traces.trace import files_of
     from plots.animation import animate
 
@@ -95,11 +99,20 @@ def animate_command(
     with progress_bars() as bar:
         task = bar.add_task("frames", total=frames)
 
-        def show(done: int, _: int) -> None:
+        def show(done: int, count: int) -> None:
             bar.start()
-            bar.update(task, completed=done)
+            bar.update(task, completed=done, total=count)
 
-        film = animate(run, output, frames=frames, t_start=start, t_end=end, progress=show)
+        film = animate(
+            run,
+            output,
+            frames=frames,
+            seconds=seconds,
+            fps=fps,
+            t_start=start,
+            t_end=end,
+            progress=show,
+        )
     typer.echo(str(film))
 
 

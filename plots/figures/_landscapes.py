@@ -83,7 +83,7 @@ def landscape(
     >>> run = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.2"), 3.0)
     >>> figure = landscape(run, 0, t=1.5)
     >>> [ax.get_title(loc="left") for ax in figure.axes]
-    ['a) guards that leave stick', 'b) race to fire']
+    ['guards that leave stick', 'race to fire']
     """
     check_trace(trace)
     element = one_element(trace, element)
@@ -108,8 +108,8 @@ def landscape(
             panels.pins(left, trace, element, checks, row=row)
         panels.race(right, trace, element, row=row)
         shown = "guards that leave" if plane.edges else "flow of"
-        left.set_title(f"a) {shown} {plane.state}")
-        right.set_title("b) race to fire")
+        panels.lettered(left, "a", f"{shown} {plane.state}")
+        panels.lettered(right, "b", "race to fire")
         looks = [("path before", INK, "-"), ("after", INK, DASHED)]
         handles = [Line2D([], [], color=c, linestyle=dash, label=n) for n, c, dash in looks]
         if plane.threshold is not None:

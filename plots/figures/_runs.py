@@ -16,14 +16,16 @@ from plots._window import Window
 from plots.figures._parts import (
     element_legend,
     head,
+    lanes_height,
     last_cycles,
     legend_above,
     letter_panels,
     one_time_axis,
+    over_threshold,
 )
-from plots.panels._axes import VECTOR_ROWS
+from plots.panels._axes import MANY, VECTOR_ROWS
 from plots.panels._cascades import CASCADE
-from plots.panels._shown import checked_window, scaled, shown
+from plots.panels._shown import checked_elements, checked_window, scaled, shown
 from plots.style import LINE_GREY, PALE_GREY, RC
 
 __all__ = ["Measured", "cascade_figure", "overview", "ribbons_figure"]
@@ -95,28 +97,31 @@ def overview(
     whole = window is None and begin == trace.t[0]
     part = shown(trace, window)
     left_part = part if whole or window is not None else shown(trace, (begin, end))
+    count = len(checked_elements(trace, elements))
+    tall = [1.6, 1.6, *([1.0] if count > MANY else []), lanes_height(count, 1.6)]  # inches
     with rc_context(RC):
-        figure = Figure(figsize=(11.0, 6.6), layout="constrained")
+        figure = Figure(figsize=(11.0, sum(tall) + 1.8), layout="constrained")
         grid = figure.add_gridspec(1, 2, width_ratios=(1.5, 1))
         left, right = (figure.add_subfigure(grid[0, column]) for column in (0, 1))
-        time = left.subplots(3, 1, sharex=True)
+        time = list(left.subplots(len(tall), 1, sharex=True, height_ratios=tall))
         loop, portrait = right.subplots(2, 1)
         panels.velocity(time[0], left_part, window=(begin, end))
         panels.force(time[1], left_part, window=(begin, end))
-        panels.ribbons(time[2], left_part, window=(begin, end), elements=elements)
+        if count > MANY:
+            panels.slipping(time[2], left_part, window=(begin, end), elements=elements)
+        panels.ribbons(time[-1], left_part, window=(begin, end), elements=elements)
         panels.hysteresis(loop, trace, window=window)
         panels.portrait(portrait, part, elements=elements)
         if measured is not None:
             _add_measured(time[1], loop, measured, trace, (begin, end))
         if trace.model.chart.transitions:
-            legend_above(time[2])
-        for ax in time[:2]:
+            legend_above(time[-1])
+        for ax in time[:-1]:
             ax.set_xlabel("")
         note = "" if whole or window is not None else f", last {end - begin:.3g} s"
-        for ax, name in zip(time, ("velocity", "friction", "active states"), strict=True):
-            ax.set_title(name + note)
-        loop.set_title("hysteresis")
-        portrait.set_title("friction against velocity")
+        names = ["velocity", "friction", *(["how many slip"] if count > MANY else [])]
+        names = [name + note for name in (*names, "active states")]
+        letter_panels([*time, loop, portrait], [*names, "hysteresis", "friction against velocity"])
         for ax in (loop, portrait):  # narrow, and labels such as -0.35 are wide
             ax.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
         figure.suptitle(head(trace, title), x=0.01, ha="left")
@@ -191,7 +196,9 @@ def ribbons_figure(
     if zoom is None and window is None:
         zoom = panels.cascade_window(trace, around, within=within)
     with rc_context(RC):
-        figure = Figure(figsize=(13.2 if zoom else 9.6, 9.2), layout="constrained")
+        tall = _heights(len(checked_elements(trace, elements)))
+        size = 13.2 if zoom else 9.6, sum(tall) + 2.2
+        figure = Figure(figsize=size, layout="constrained")
         halves = figure.add_gridspec(1, 2, width_ratios=(2.1, 1) if zoom else (1.3, 1))
         parts = [figure.add_subfigure(halves[0, column]) for column in (0, 1)]
         grid = parts[0].subplots(
@@ -199,30 +206,25 @@ def ribbons_figure(
             2 if zoom else 1,
             squeeze=False,
             width_ratios=(1.45, 1) if zoom else None,
-            height_ratios=(1, 1.2, 1.2, 1),
+            height_ratios=tall,
         )
         left, right = list(grid[:, 0]), list(parts[1].subplots(2, 1))
         panels.velocity(left[0], part, window=limits)
-        panels.ratio(left[1], part, window=limits, elements=elements)
+        second = over_threshold(left[1], part, window=limits, elements=elements)
         panels.force(left[2], part, window=limits)
         panels.ribbons(left[3], part, window=limits, elements=elements)
         one_time_axis(left)
         axes = left + right
-        second = "first variable" if trace.model.chart.variables else "deflection"
-        if "s" in trace.model.chart.inputs:
-            second = (
-                "deflection / threshold" if panels.has_threshold(trace) else "deflection / s(v)"
-            )
         names = ["velocity", second, "friction", "active states"]
         if limits[0] > trace.t[0] and crowded:
             names = [f"{name}, last {limits[1] - limits[0]:.3g} s" for name in names]
         if zoom:
             middle = list(grid[:, 1])
-            _cascade_column(middle, trace, zoom, elements)
+            margin = _cascade_column(middle, trace, zoom, elements)
             for ax in left:
                 ax.axvspan(*zoom, color=PALE_GREY, linewidth=1.0, alpha=0.6, zorder=0)
             axes = left + middle + right
-            names += _zoom_names(zoom)
+            names += _zoom_names(zoom, margin)
         (lines,) = panels.portrait(right[0], trace, window=window, elements=elements, bar=False)
         panels.hysteresis(right[1], trace, window=window, elements=elements, slipping=True)
         assert isinstance(lines, LineCollection)
@@ -266,11 +268,12 @@ def cascade_figure(
     zoom = window or panels.cascade_window(trace, around, within=within)
     limits = checked_window(trace, zoom)
     with rc_context(RC):
-        figure = Figure(figsize=(6.4, 9.2), layout="constrained")
-        axes = list(figure.subplots(4, 1, height_ratios=(1, 1.2, 1.2, 1)))
-        _cascade_column(axes, trace, limits, elements)
-        names = _zoom_names(limits)
-        letter_panels(axes, names if zoom else ["velocity", "margin", "friction", "active states"])
+        tall = _heights(len(checked_elements(trace, elements)))
+        figure = Figure(figsize=(6.4, sum(tall) + 2.2), layout="constrained")
+        axes = list(figure.subplots(4, 1, height_ratios=tall))
+        margin = _cascade_column(axes, trace, limits, elements)
+        names = _zoom_names(limits, margin)
+        letter_panels(axes, names if zoom else ["velocity", margin, "friction", "active states"])
         figure.suptitle(head(trace, title), x=0.01, ha="left")
         element_legend(figure, axes[1], axes[3])
     return figure
@@ -278,21 +281,32 @@ def cascade_figure(
 
 def _cascade_column(
     axes: Sequence[Axes], trace: Trace, zoom: Window, elements: Sequence[int] | None
-) -> None:
+) -> str:
+    """Draw the panels of a cascade; return the name of the second one."""
     part = shown(trace, zoom)
     panels.velocity(axes[0], part, window=zoom)
-    panels.margins(axes[1], part, window=zoom, elements=elements)
+    name = "margin to the threshold"
+    if len(checked_elements(trace, elements)) > MANY:
+        name = over_threshold(axes[1], part, window=zoom, elements=elements)
+    else:
+        panels.margins(axes[1], part, window=zoom, elements=elements)
     panels.cascade(axes[2], part, window=zoom, elements=elements)
     panels.ribbons(axes[3], part, window=zoom, elements=elements)
     one_time_axis(axes)
+    return name
 
 
-def _zoom_names(zoom: Window) -> list[str]:
+def _heights(count: int) -> tuple[float, ...]:
+    """Return the heights of velocity, deflections, friction and states, inches."""
+    return 1.6, lanes_height(count, 1.9), 1.9, lanes_height(count, 1.6)
+
+
+def _zoom_names(zoom: Window, margin: str) -> list[str]:
     middle, width = (zoom[0] + zoom[1]) / 2, zoom[1] - zoom[0]
     factor, unit = scaled(np.array([width]), "s")
     return [
         f"velocity, {factor * width:.3g} {unit} at t = {middle:.5g} s",
-        "margin to the threshold",
+        margin,
         "jumps of F (open: before, filled: after)",
         "order of slipping",
     ]

@@ -81,9 +81,9 @@ def unfold(
         states = figure.add_axes((left, BELOW / height, broad, tall / height))
         panels.unfolded_force(force, part)
         panels.unfolded_states(states, part)
-        force.set_title("a) F before and after each firing")
-        place = left, (BELOW + tall + head_room + 0.14) / height
-        figure.text(*place, "b) who fires, and by which edge", fontsize=9.5)
+        panels.lettered(force, "a", "F before and after each firing")
+        above = 72 * (head_room + 0.12)  # points
+        panels.lettered(states, "b", "who fires, and by which edge", pad=above)
         shown = sorted({mode for each in part.columns for mode in each.modes})
         handles = [_swatch(mode, names[mode]) for mode in shown]
         figure.legend(handles=handles, loc="lower left", ncols=6)

@@ -92,7 +92,7 @@ def test_plot_animate_and_replay(draw: CommandLine, files: Path) -> None:
         (["blocks", str(SERVO), "--schematic", "-o", "s.dot"], ".png, .svg or .pdf"),
         (["plot", "bad.npz"], "damaged or incomplete"),
         (["plot", "none.npz"], "no such file"),
-        (["animate", "t.npz", "-o", "film.mp4"], ".gif"),
+        (["animate", "t.npz", "-o", "film.avi"], ".gif, .mp4 or .webm"),
         (["animate", "bad.npz"], "damaged or incomplete"),
         (["replay", "bad.npz"], "damaged or incomplete"),
         (["replay", "t.npz", "bad.npz"], "damaged or incomplete"),
