@@ -15,6 +15,7 @@ from gms_fsm._extras import require
 from plots.block_diagram import block_diagram
 from plots.live_chart import LiveChart, live_statechart
 from plots.mermaid import mermaid
+from plots.presets import preset
 from plots.render import render
 from plots.replay import replay, write_replay
 from plots.statechart import statechart
@@ -39,6 +40,7 @@ __all__ = [
     "mermaid",
     "overview",
     "phase",
+    "preset",
     "render",
     "replay",
     "statechart",

@@ -16,11 +16,13 @@ require("PIL", "plots")  # comes with matplotlib
 from matplotlib import colormaps, patches, rc_context
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Rectangle
 from matplotlib.path import Path as Curve
@@ -32,6 +34,7 @@ from PIL import Image
 __all__ = [
     "Artist",
     "Axes",
+    "Axis",
     "Bbox",
     "BoundaryNorm",
     "Curve",
@@ -40,6 +43,7 @@ __all__ = [
     "FigureCanvasAgg",
     "IdentityTransform",
     "Image",
+    "Legend",
     "Line2D",
     "LineCollection",
     "ListedColormap",

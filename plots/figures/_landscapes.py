@@ -11,11 +11,13 @@ from plots import panels
 from plots._matplotlib import Figure, Line2D, rc_context
 from plots._plane import Plane
 from plots._window import Window
+from plots.figures._layout import fitted, sheet
 from plots.figures._parts import head
 from plots.panels._landscapes import DASHED, acceleration, pinned, quantity
 from plots.panels._race import rows_of
 from plots.panels._shown import checked_row, one_element
-from plots.style import INK, LINE_GREY, RC
+from plots.presets import font, pt, settings
+from plots.style import INK, LINE_GREY
 
 __all__ = ["landscape"]
 
@@ -97,8 +99,8 @@ def landscape(
     lines = [part for line in lines for part in wrap(line, LETTERS, subsequent_indent="      ")]
     below = 0.82 + LINE * len(lines)
     height = TOP + PLOT + below
-    with rc_context(RC):
-        figure = Figure(figsize=(WIDTH, height))
+    with rc_context(settings()):
+        figure = sheet(WIDTH, height, layout=None)
         bottom, tall = below / height, PLOT / height
         left = figure.add_axes((0.72 / WIDTH, bottom, 6.7 / WIDTH, tall))
         lanes = min(tall, LANE * rows_of(plane.why) / height)
@@ -113,15 +115,17 @@ def landscape(
         looks = [("path before", INK, "-"), ("after", INK, DASHED)]
         handles = [Line2D([], [], color=c, linestyle=dash, label=n) for n, c, dash in looks]
         if plane.threshold is not None:
-            handles.append(Line2D([], [], color=LINE_GREY, linewidth=5, alpha=0.45, label="±s(v)"))
+            handles.append(
+                Line2D([], [], color=LINE_GREY, linewidth=pt(5), alpha=0.45, label="±s(v)")
+            )
         left.legend(handles=handles, loc="lower right", bbox_to_anchor=(1, 1), ncols=3)
         figure.suptitle(
             _title(trace, plane, title), x=0.02, y=1 - 0.12 / height, ha="left", va="top"
         )
         for number, line in enumerate(lines):
             place = (LINE * (len(lines) - number) + 0.06) / height
-            figure.text(0.02, place, line, fontsize=8, va="top", color=INK)
-    return figure
+            figure.text(0.02, place, line, fontsize=font(8), va="top", color=INK)
+    return fitted(figure)
 
 
 def _title(trace: Trace, plane: Plane, title: str) -> str:

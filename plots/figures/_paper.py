@@ -12,10 +12,12 @@ from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots._matplotlib import Figure, rc_context
 from plots._window import Window
+from plots.figures._layout import fitted, legend_below, narrow, sheet
 from plots.figures._parts import element_legend
 from plots.panels._held import Lag
 from plots.panels._shown import checked_window, scaled, shown
-from plots.style import BLUE, INK, LINE_GREY, RC, TEXT_GREY
+from plots.presets import font, pt, settings
+from plots.style import BLUE, INK, LINE_GREY, TEXT_GREY
 
 __all__ = [
     "FIG3_PHASES",
@@ -72,10 +74,10 @@ def figure_3(
             f"force has shape {np.shape(force)}",
             advice=f"it must have one value per row of the chart run, shape {chart.t.shape}",
         )
-    with rc_context(RC):
-        figure = Figure(figsize=(9.0, 6.2), layout="constrained")
-        axes = figure.subplots(2, 2).ravel()
-        axes[0].plot(chart.t, force, color=INK, linewidth=0.9)
+    with rc_context(settings()):
+        figure = sheet(4.2, 8.8) if narrow() else sheet(9.0, 6.2)
+        axes = figure.subplots(*(4, 1) if narrow() else (2, 2)).ravel()
+        axes[0].plot(chart.t, force, color=INK, linewidth=pt(0.9))
         axes[0].set_xlim(*checked_window(chart, window))
         axes[0].set(xlabel="t [s]", ylabel=r"$F_a$ [N]", title="a) applied force (chosen by us)")
         for ax, trace, name in zip(
@@ -98,12 +100,12 @@ def figure_3(
                     ha="right",
                     va="top",
                     color=TEXT_GREY,
-                    fontsize=8,
+                    fontsize=font(8),
                 )
         if len(phases) > 1:
             axes[1].legend(loc="upper left")
         figure.suptitle(title, x=0.01, ha="left")
-    return figure
+    return fitted(figure)
 
 
 def figure_4(
@@ -131,9 +133,9 @@ def figure_4(
         Panels a to f.
     """
     chart, ifelse, lugre = (shown(trace, window) for trace in (chart, ifelse, lugre))
-    with rc_context(RC):
-        figure = Figure(figsize=(10.5, 6.2), layout="constrained")
-        axes = figure.subplots(2, 3, sharex=True).ravel()
+    with rc_context(settings()):
+        figure = sheet(4.2, 10.0) if narrow() else sheet(10.5, 6.2)
+        axes = figure.subplots(*(6, 1) if narrow() else (2, 3), sharex=True).ravel()
         panels.velocity(axes[0], chart)
         axes[0].set_title("a) velocity (chosen by us)")
         panels.deflections(axes[1], chart, elements=elements)
@@ -149,10 +151,10 @@ def figure_4(
         ):
             panels.force(ax, trace)
             ax.set_title(title)
-        for ax in axes[:3]:
+        for ax in axes[: 5 if narrow() else 3]:
             ax.set_xlabel("")
         figure.suptitle(f"Fig. 4, stick-slip: {chart.model.title}", x=0.01, ha="left")
-    return figure
+    return fitted(figure)
 
 
 def compare_laws(
@@ -177,8 +179,8 @@ def compare_laws(
     Figure
         Three rows.
     """
-    with rc_context(RC):
-        figure = Figure(figsize=(5.2 * len(runs), 7.2), layout="constrained")
+    with rc_context(settings()):
+        figure = sheet(5.2 * len(runs), 7.2)
         grid = figure.subplots(
             3, len(runs), sharex=True, sharey="row", squeeze=False, height_ratios=(1.2, 1.2, 0.8)
         )
@@ -188,7 +190,9 @@ def compare_laws(
             panels.force(column[1], trace)
             panels.ribbons(column[2], trace, elements=elements)
             for sign in (1, -1) if panels.has_threshold(trace) else ():
-                column[0].axhline(sign * trace.s.min(), color=LINE_GREY, linewidth=0.7, zorder=0)
+                column[0].axhline(
+                    sign * trace.s.min(), color=LINE_GREY, linewidth=pt(0.7), zorder=0
+                )
             column[0].set_title(title)
             for ax in column[:2]:
                 ax.set_xlabel("")
@@ -198,7 +202,7 @@ def compare_laws(
                 (0.02, 0.04),
                 xycoords="axes fraction",
                 color=TEXT_GREY,
-                fontsize=8,
+                fontsize=font(8),
             )
         handles, labels = (
             a + b
@@ -208,8 +212,8 @@ def compare_laws(
                 strict=True,
             )
         )
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
-    return figure
+        legend_below(figure, handles, labels)
+    return fitted(figure)
 
 
 def residuals(
@@ -234,14 +238,14 @@ def residuals(
     Figure
         One panel per run.
     """
-    with rc_context(RC):
-        figure = Figure(figsize=(9.0, 2.4 * len(runs) + 0.4), layout="constrained")
+    with rc_context(settings()):
+        figure = sheet(9.0, 2.4 * len(runs) + 0.4)
         axes = figure.subplots(len(runs), 1, squeeze=False)[:, 0]
         for ax, (name, (times, difference)) in zip(axes, runs.items(), strict=True):
             panels.difference(ax, times, difference, log=log)
             ax.set_title(name)
         figure.suptitle(title, x=0.01, ha="left")
-    return figure
+    return fitted(figure)
 
 
 def held_residuals(
@@ -275,9 +279,9 @@ def held_residuals(
     Figure
         Panels a to d.
     """
-    with rc_context(RC):
-        figure = Figure(figsize=(9.0, 6.2), layout="constrained")
-        force, place, between, period = figure.subplots(2, 2).ravel()
+    with rc_context(settings()):
+        figure = sheet(4.2, 9.2) if narrow() else sheet(9.0, 6.2)
+        force, place, between, period = figure.subplots(*(4, 1) if narrow() else (2, 2)).ravel()
         lines = panels.lag_over_time(force, lags, papers[0], window=(0.0, until))
         panels.lag_over_time(place, lags, papers[1], window=(0.0, until), place=True)
         panels.lag_between_ticks(between, lags, window=(zoom, zoom + 2 * lags[0].period))
@@ -287,12 +291,8 @@ def held_residuals(
         between.set_title("c) friction; dots: at the ticks")
         period.set_title("d) largest at the ticks; lines: proportional to h")
         period.legend(loc="upper left", ncols=2)
-        (paper,) = force.plot([], [], color=BLUE, linestyle="--", linewidth=0.9)
-        figure.legend(
-            [*lines, paper],
-            [*(str(line.get_label()) for line in lines), "the paper's residual"],
-            loc="outside lower left",
-            ncols=4,
-        )
+        (paper,) = force.plot([], [], color=BLUE, linestyle="--", linewidth=pt(0.9))
+        names = [*(str(line.get_label()) for line in lines), "the paper's residual"]
+        legend_below(figure, [*lines, paper], names)
         figure.suptitle(title, x=0.01, ha="left")
-    return figure
+    return fitted(figure)

@@ -9,6 +9,8 @@ import numpy as np
 from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Axes, Figure
 from plots._window import Window
+from plots.figures._layout import legend_below
+from plots.presets import pt
 
 
 def head(trace: Trace, title: str) -> str:
@@ -20,7 +22,7 @@ def letter_panels(axes: Sequence[Axes], names: Sequence[str]) -> None:
     """Name the panels of a figure: a), b), ..."""
     for number, (ax, name) in enumerate(zip(axes, names, strict=True)):
         # Above the labels of the marks, if there are any.
-        ax.set_title(f"{chr(ord('a') + number)}) {name}", pad=16 if ax.texts else 6)
+        ax.set_title(f"{chr(ord('a') + number)}) {name}", pad=pt(16 if ax.texts else 6))
 
 
 def legend_above(ax: Axes) -> None:
@@ -40,13 +42,7 @@ def element_legend(figure: Figure, *axes: Axes) -> None:
     """Add one legend of elements and states below the figure."""
     found = [ax.get_legend_handles_labels() for ax in axes]
     entries = {name: handle for pair in found for handle, name in zip(*pair, strict=True)}
-    figure.legend(
-        list(entries.values()),
-        list(entries),
-        loc="outside lower left",
-        ncols=min(10, len(entries)),
-        handlelength=2.6,
-    )
+    legend_below(figure, list(entries.values()), list(entries))
 
 
 def one_time_axis(column: Sequence[Axes]) -> None:

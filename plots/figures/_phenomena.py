@@ -9,6 +9,8 @@ import numpy as np
 
 from gms_fsm.phenomena.results import MARKS, VERDICTS, Measured, PhenomenaTable, Phenomenon
 from plots._matplotlib import Axes, Figure, Rectangle, rc_context
+from plots.figures._layout import fitted, sheet
+from plots.presets import font, pt, settings
 from plots.style import (
     BLUE,
     BLUE_TINT,
@@ -18,7 +20,6 @@ from plots.style import (
     LINE_GREY,
     PALE_GREY,
     PAPER,
-    RC,
     TEXT_GREY,
     TEXT_ORANGE,
     VERMILION,
@@ -62,22 +63,22 @@ def phenomenon_figure(table: PhenomenaTable, name: str) -> Figure | None:
         return None
     columns = min(COLUMNS, len(shown))
     rows = -(-len(shown) // columns)
-    with rc_context(RC):
+    with rc_context(settings()):
         size = (max(columns * PANEL[0], 5.4) + 0.3, rows * PANEL[1] + 0.95)
-        sheet = Figure(figsize=size, layout="constrained")
+        sheet = sheet(*size)
         grid = sheet.subplots(rows, columns, squeeze=False)
         limits = [_common(shown, axis, phenomenon) for axis in ("x", "y")]
         for ax, (model, found) in zip(grid.flat, shown, strict=False):
             _panel(ax, model, found, phenomenon, limits)
         for ax in grid.flat[len(shown) :]:
             ax.set_axis_off()
-        sheet.supxlabel(phenomenon.axes[0], fontsize=9.5)
-        sheet.supylabel(phenomenon.axes[1], fontsize=9.5)
-        sheet.suptitle(phenomenon.title, x=0.01, ha="left", fontsize=12)
+        sheet.supxlabel(phenomenon.axes[0], fontsize=font(9.5))
+        sheet.supylabel(phenomenon.axes[1], fontsize=font(9.5))
+        sheet.suptitle(phenomenon.title, x=0.01, ha="left", fontsize=font(12))
         handles, labels = grid.flat[0].get_legend_handles_labels()
         if labels:
             sheet.legend(handles, labels, loc="outside upper right", ncols=len(labels))
-    return sheet
+    return fitted(sheet)
 
 
 def _panel(
@@ -96,8 +97,8 @@ def _panel(
             color=colour,
             linestyle=dash,
             marker=marker,
-            markersize=3,
-            linewidth=1.1,
+            markersize=pt(3),
+            linewidth=pt(1.1),
             label=curve.label,
         )
     if phenomenon.log:
@@ -112,8 +113,8 @@ def _panel(
     if not phenomenon.log:
         ax.locator_params(axis="x", nbins=4)
     ax.locator_params(axis="y", nbins=4)
-    ax.tick_params(labelsize=7.5, length=2.5)
-    ax.set_title(model, fontsize=9, fontweight="bold", pad=15)
+    ax.tick_params(labelsize=font(7.5), length=2.5)
+    ax.set_title(model, fontsize=font(9), fontweight="bold", pad=15)
     brief = f"{MARKS[found.verdict]} {found.numbers[0]}" + (", own scale" if own else "")
     ax.annotate(
         brief,
@@ -121,7 +122,7 @@ def _panel(
         (0, 4),
         xycoords="axes fraction",
         textcoords="offset points",
-        fontsize=8,
+        fontsize=font(8),
         color=COLOURS[found.verdict],
         family="DejaVu Sans",
     )
@@ -176,59 +177,63 @@ def phenomena_matrix(
     above = 0.25 + 0.14 * max(head.count("\n") + 1 for head in heads)
     above += 0.3 if title else 0.0
     size = (left + wide * len(heads) + 0.2, above + 0.7 + high * max(1, len(models)))
-    with rc_context(RC):
+    with rc_context(settings()):
         total = size[1] + below
-        sheet = Figure(figsize=(size[0], total))
+        sheet = sheet(size[0], total, layout=None)
         ax = sheet.add_axes((0.0, below / total, 1.0, size[1] / total))
         ax.set(xlim=(0.0, size[0]), ylim=(0.0, size[1]))
         ax.set_axis_off()
         if title:
-            ax.text(0.1, size[1] - 0.08, title, ha="left", va="top", fontsize=12)
+            ax.text(0.1, size[1] - 0.08, title, ha="left", va="top", fontsize=font(12))
         top = size[1] - above
         for column, head in enumerate(heads):
             x = left + (column + 0.5) * wide
-            ax.text(x, top + 0.1, head, ha="center", va="bottom", fontsize=8)
+            ax.text(x, top + 0.1, head, ha="center", va="bottom", fontsize=font(8))
         for row, model in enumerate(models):
             y = top - (row + 0.5) * high
-            ax.text(left - 0.1, y, model, ha="right", va="center", fontsize=9)
+            ax.text(left - 0.1, y, model, ha="right", va="center", fontsize=font(9))
             for column, phenomenon in enumerate(table.phenomena):
                 found = table.cell(model, phenomenon.name)
                 corner = (left + column * wide, y - 0.5 * high)
                 tint: Any = TINTS.get(found.verdict, PAPER)
                 ax.add_patch(
-                    Rectangle(corner, wide, high, facecolor=tint, edgecolor=PALE_GREY, lw=0.6)
+                    Rectangle(corner, wide, high, facecolor=tint, edgecolor=PALE_GREY, lw=pt(0.6))
                 )
                 _symbol(ax, corner[0] + 0.2, y, found.verdict)
                 if found.numbers:
-                    ax.text(corner[0] + 0.36, y, str(found.numbers[0]), va="center", fontsize=8.5)
+                    ax.text(
+                        corner[0] + 0.36, y, str(found.numbers[0]), va="center", fontsize=font(8.5)
+                    )
         for column, note in enumerate(notes):
             x, side = (
                 (left - 0.1, "right") if column == 0 else (left + (column - 0.5) * wide, "center")
             )
-            ax.text(x, 0.56, note, ha=side, va="center", fontsize=7.5, color=TEXT_GREY)
+            ax.text(x, 0.56, note, ha=side, va="center", fontsize=font(7.5), color=TEXT_GREY)
         x = left + 0.2
         found_any = {
             table.cell(model, one.name).verdict for model in models for one in table.phenomena
         }
         for verdict in (each for each in VERDICTS if each in found_any):
             _symbol(ax, x, 0.3, verdict)
-            ax.text(x + 0.16, 0.3, verdict, va="center", fontsize=8.5)
+            ax.text(x + 0.16, 0.3, verdict, va="center", fontsize=font(8.5))
             x += 0.45 + 0.075 * len(verdict)
-    return sheet
+    return fitted(sheet)
 
 
 def _symbol(ax: Axes, x: float, y: float, verdict: str) -> None:
     colour = COLOURS[verdict]
     if verdict == "shows":
-        ax.plot([x], [y], "o", color=colour, markersize=8)
+        ax.plot([x], [y], "o", color=colour, markersize=pt(8))
     elif verdict == "does not show":
-        ax.plot([x], [y], "o", color=colour, markersize=7.5, markerfacecolor="none", mew=1.4)
+        ax.plot(
+            [x], [y], "o", color=colour, markersize=pt(7.5), markerfacecolor="none", mew=pt(1.4)
+        )
     elif verdict == "shows wrongly":
-        ax.plot([x], [y], "X", color=VERMILION, markersize=8.5)
+        ax.plot([x], [y], "X", color=VERMILION, markersize=pt(8.5))
     elif verdict == "does not apply":
-        ax.plot([x - 0.06, x + 0.06], [y, y], color=LINE_GREY, linewidth=1.4)
+        ax.plot([x - 0.06, x + 0.06], [y, y], color=LINE_GREY, linewidth=pt(1.4))
     else:
-        ax.text(x, y, "?", ha="center", va="center", color=colour, fontsize=10)
+        ax.text(x, y, "?", ha="center", va="center", color=colour, fontsize=font(10))
 
 
 def _folded(text: str) -> str:

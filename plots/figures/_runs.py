@@ -13,6 +13,7 @@ from gms_fsm.traces.trace import Trace, check_trace
 from plots import panels
 from plots._matplotlib import Axes, Figure, LineCollection, MaxNLocator, rc_context
 from plots._window import Window
+from plots.figures._layout import fitted, low, narrow, sheet
 from plots.figures._parts import (
     element_legend,
     head,
@@ -24,7 +25,8 @@ from plots.figures._parts import (
 from plots.panels._axes import VECTOR_ROWS
 from plots.panels._cascades import CASCADE
 from plots.panels._shown import checked_window, scaled, shown
-from plots.style import BLUE, PALE_GREY, RC, VERMILION
+from plots.presets import pt, settings
+from plots.style import BLUE, PALE_GREY, VERMILION
 
 __all__ = ["Measured", "cascade_figure", "overview", "ribbons_figure"]
 
@@ -95,12 +97,8 @@ def overview(
     whole = window is None and begin == trace.t[0]
     part = shown(trace, window)
     left_part = part if whole or window is not None else shown(trace, (begin, end))
-    with rc_context(RC):
-        figure = Figure(figsize=(11.0, 6.6), layout="constrained")
-        grid = figure.add_gridspec(1, 2, width_ratios=(1.5, 1))
-        left, right = (figure.add_subfigure(grid[0, column]) for column in (0, 1))
-        time = left.subplots(3, 1, sharex=True)
-        loop, portrait = right.subplots(2, 1)
+    with rc_context(settings()):
+        figure, time, (loop, portrait) = _overview_axes()
         panels.velocity(time[0], left_part, window=(begin, end))
         panels.force(time[1], left_part, window=(begin, end))
         panels.ribbons(time[2], left_part, window=(begin, end), elements=elements)
@@ -120,7 +118,23 @@ def overview(
         for ax in (loop, portrait):  # narrow, and labels such as -0.35 are wide
             ax.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
         figure.suptitle(head(trace, title), x=0.01, ha="left")
-    return figure
+    return fitted(figure)
+
+
+def _overview_axes() -> tuple[Figure, Sequence[Axes], Sequence[Axes]]:
+    """Return an empty figure, its panels over time, and the others: next to or below them."""
+    if narrow():
+        figure = sheet(4.2, 8.6)
+        axes = figure.subplots(5, 1, height_ratios=(1, 1, 1, 1.3, 1.3))
+        for ax in axes[1:3]:
+            ax.sharex(axes[0])
+        for ax in axes[:2]:
+            ax.tick_params(labelbottom=False)
+        return figure, axes[:3], axes[3:]
+    figure = sheet(11.0, 6.6)
+    grid = figure.add_gridspec(1, 2, width_ratios=(1.5, 1))
+    left, right = (figure.add_subfigure(grid[0, column]) for column in (0, 1))
+    return figure, left.subplots(3, 1, sharex=True), right.subplots(2, 1)
 
 
 def _add_measured(ax: Axes, loop: Axes, measured: Measured, trace: Trace, window: Window) -> None:
@@ -131,18 +145,18 @@ def _add_measured(ax: Axes, loop: Axes, measured: Measured, trace: Trace, window
         measured.t[inside],
         measured.F[inside],
         color=VERMILION,
-        linewidth=1.0,
+        linewidth=pt(1.0),
         label="measured",
         rasterized=bool(inside.sum() > VECTOR_ROWS),
     )
     legend_above(ax)
     factor, _ = scaled(trace.x - trace.x[0], "m")
-    loop.lines[0].set(linewidth=0.9, zorder=3, rasterized=True)
+    loop.lines[0].set(linewidth=pt(0.9), zorder=3, rasterized=True)
     loop.plot(
         factor * (measured.x - trace.x[0]),
         measured.F,
         color=VERMILION,
-        linewidth=0.5,
+        linewidth=pt(0.5),
         alpha=0.7,
         rasterized=True,
     )
@@ -190,8 +204,8 @@ def ribbons_figure(
     zoom = panels.cascade_window(part if around is None else trace, around, within=within)
     if zoom is None and window is None:
         zoom = panels.cascade_window(trace, around, within=within)
-    with rc_context(RC):
-        figure = Figure(figsize=(13.2 if zoom else 9.6, 9.2), layout="constrained")
+    with rc_context(settings()):
+        figure = sheet(13.2 if zoom else 9.6, 9.2)
         halves = figure.add_gridspec(1, 2, width_ratios=(2.1, 1) if zoom else (1.3, 1))
         parts = [figure.add_subfigure(halves[0, column]) for column in (0, 1)]
         grid = parts[0].subplots(
@@ -220,7 +234,7 @@ def ribbons_figure(
             middle = list(grid[:, 1])
             _cascade_column(middle, trace, zoom, elements)
             for ax in left:
-                ax.axvspan(*zoom, color=PALE_GREY, linewidth=1.0, alpha=0.6, zorder=0)
+                ax.axvspan(*zoom, color=PALE_GREY, linewidth=pt(1.0), alpha=0.6, zorder=0)
             axes = left + middle + right
             names += _zoom_names(zoom)
         (lines,) = panels.portrait(right[0], trace, window=window, elements=elements, bar=False)
@@ -231,7 +245,7 @@ def ribbons_figure(
         parts[0].align_ylabels(left)
         figure.suptitle(head(trace, title), x=0.01, ha="left")
         element_legend(figure, left[1], left[3])
-    return figure
+    return fitted(figure)
 
 
 def cascade_figure(
@@ -265,15 +279,18 @@ def cascade_figure(
     """
     zoom = window or panels.cascade_window(trace, around, within=within)
     limits = checked_window(trace, zoom)
-    with rc_context(RC):
-        figure = Figure(figsize=(6.4, 9.2), layout="constrained")
-        axes = list(figure.subplots(4, 1, height_ratios=(1, 1.2, 1.2, 1)))
+    with rc_context(settings()):
+        figure = sheet(6.4, 9.2)
+        if low():  # two columns
+            axes = list(figure.subplots(2, 2, height_ratios=(1.2, 1)).T.ravel())
+        else:
+            axes = list(figure.subplots(4, 1, height_ratios=(1, 1.2, 1.2, 1)))
         _cascade_column(axes, trace, limits, elements)
         names = _zoom_names(limits)
         letter_panels(axes, names if zoom else ["velocity", "margin", "friction", "active states"])
         figure.suptitle(head(trace, title), x=0.01, ha="left")
         element_legend(figure, axes[1], axes[3])
-    return figure
+    return fitted(figure)
 
 
 def _cascade_column(

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from plots import formats
 from plots._matplotlib import Figure, rc_context
-from plots.style import RC
+from plots.presets import settings
 
 __all__ = ["picture", "save"]
 
@@ -57,7 +57,7 @@ def picture(figure: Figure, form: str, metadata: Mapping[str, None]) -> bytes:
         Identical for identical traces.
     """
     buffer = BytesIO()
-    with rc_context(RC):
+    with rc_context(settings()):
         figure.savefig(buffer, format=form, metadata=metadata)
     return _named_clips(buffer.getvalue()) if form == "svg" else buffer.getvalue()
 

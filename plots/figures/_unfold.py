@@ -10,10 +10,12 @@ import numpy as np
 from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots._matplotlib import Figure, Rectangle, rc_context
+from plots.figures._layout import fitted, sheet
 from plots.figures._parts import head
 from plots.panels._shown import scaled
 from plots.panels._unfolded import FEW, column_width, edge_texts
-from plots.style import HATCHES, RC, STATE_EDGES, STATE_FILLS
+from plots.presets import font, pt, settings
+from plots.style import HATCHES, STATE_EDGES, STATE_FILLS
 
 __all__ = ["unfold"]
 
@@ -75,8 +77,8 @@ def unfold(
     between = 0.45 + head_room
     height = TOP + FORCE + between + tall + BELOW
     names = [state.name for state in trace.model.chart.states]
-    with rc_context(RC):
-        figure = Figure(figsize=(wide, height))
+    with rc_context(settings()):
+        figure = sheet(wide, height, layout=None)
         left, broad = (SIDES - 0.15) / wide, 1 - SIDES / wide
         force = figure.add_axes((left, 1 - (TOP + FORCE) / height, broad, FORCE / height))
         states = figure.add_axes((left, BELOW / height, broad, tall / height))
@@ -84,13 +86,13 @@ def unfold(
         panels.unfolded_states(states, part)
         force.set_title("a) F before and after each firing")
         place = left, (BELOW + tall + head_room + 0.14) / height
-        figure.text(*place, "b) who fires, and by which edge", fontsize=9.5)
+        figure.text(*place, "b) who fires, and by which edge", fontsize=font(9.5))
         shown = sorted({mode for each in part.columns for mode in each.modes})
         handles = [_swatch(mode, names[mode]) for mode in shown]
         figure.legend(handles=handles, loc="lower left", ncols=6)
         title = f"{head(trace, title)}\n{_said(part)}"
         figure.suptitle(title, x=0.2 / wide, y=1 - 0.12 / height, ha="left", va="top")
-    return figure
+    return fitted(figure)
 
 
 def _swatch(mode: int, name: str) -> Rectangle:
@@ -99,7 +101,7 @@ def _swatch(mode: int, name: str) -> Rectangle:
         "edgecolor": STATE_EDGES[mode % len(STATE_EDGES)],
         "hatch": HATCHES[mode % len(HATCHES)],
     }
-    return Rectangle((0, 0), 1, 1, label=name, linewidth=0.6, **look)
+    return Rectangle((0, 0), 1, 1, label=name, linewidth=pt(0.6), **look)
 
 
 def _said(part: panels.Unfolded) -> str:

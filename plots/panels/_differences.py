@@ -14,6 +14,7 @@ from plots._matplotlib import Axes
 from plots._window import Window
 from plots.panels._axes import Artists, draw_curve, time_axis
 from plots.panels._shown import SMOOTH, checked_window, is_number
+from plots.presets import pt
 from plots.style import INK
 
 __all__ = ["difference", "residual"]
@@ -71,7 +72,7 @@ def difference(
         values = np.maximum(np.abs(values), floor)
     ax.set_ylabel("|difference of F| [N]" if log else "difference of F [N]")
     time_axis(ax, float(times[0]), float(times[-1]))
-    return draw_curve(ax, times, values, color=INK, linewidth=0.8)
+    return draw_curve(ax, times, values, color=INK, linewidth=pt(0.8))
 
 
 def residual(

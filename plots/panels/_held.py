@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from plots._matplotlib import Axes, LogLocator
 from plots.panels._axes import Artists, draw_curve, time_axis
+from plots.presets import pt
 from plots.style import BLUE, INK, LINE_GREY, TEXT_GREY, VERMILION
 
 __all__ = ["lag_between_ticks", "lag_over_period", "lag_over_time"]
@@ -71,9 +72,9 @@ def lag_over_time(
         shown = (lag.t >= window[0]) & (lag.t <= window[1])
         values = factor * (lag.place if place else lag.force)[shown]
         name = f"h = {MILLI * lag.period:g} ms"
-        lines += draw_curve(ax, lag.t[shown], values, color=colour, linewidth=1.0, label=name)
+        lines += draw_curve(ax, lag.t[shown], values, color=colour, linewidth=pt(1.0), label=name)
     for sign in (1, -1):
-        ax.axhline(sign * factor * paper, color=BLUE, linestyle="--", linewidth=0.9)
+        ax.axhline(sign * factor * paper, color=BLUE, linestyle="--", linewidth=pt(0.9))
     time_axis(ax, *window)
     ax.set_ylabel("difference of x [µm]" if place else "difference of F [mN]")
     return lines
@@ -103,7 +104,7 @@ def lag_between_ticks(ax: Axes, lags: Sequence[Lag], *, window: tuple[float, flo
         t = np.column_stack([begin, begin + lag.period]).ravel()
         both = np.column_stack([lag.force[shown], lag.before[shown]]).ravel()
         lines += ax.plot(MILLI * (t - window[0]), MILLI * both, color=colour)
-        ax.plot(MILLI * (begin - window[0]), MILLI * lag.force[shown], "o", color=colour, ms=4)
+        ax.plot(MILLI * (begin - window[0]), MILLI * lag.force[shown], "o", color=colour, ms=pt(4))
     ax.set(
         xlabel=f"t − {window[0]:g} s [ms]",
         ylabel="difference of F [mN]",
@@ -149,17 +150,17 @@ def lag_over_period(
                 sizes.append(float(np.abs(values[inside]).max()) / papers[quantity])
             found += [size for size in sizes if size > 0]
             line = sizes[0] * periods / periods[0]  # a slope of exactly one
-            ax.plot(periods, line, color=LINE_GREY, linewidth=0.9, zorder=1)
+            ax.plot(periods, line, color=LINE_GREY, linewidth=pt(0.9), zorder=1)
             marks += ax.plot(
                 periods,
                 sizes,
                 marker,
                 color=(INK, TEXT_GREY)[quantity],
                 fillstyle=fill,
-                markersize=6,
+                markersize=pt(6),
                 label=f"{'Fx'[quantity]}, {name}",
             )
-    ax.axhline(1.0, color=BLUE, linestyle="--", linewidth=0.9)
+    ax.axhline(1.0, color=BLUE, linestyle="--", linewidth=pt(0.9))
     ax.set(
         xscale="log", yscale="log", xlabel="sample time h [ms]", ylabel="largest / the paper's [1]"
     )

@@ -31,6 +31,7 @@ from plots._window import Window
 from plots.panels._axes import Artists
 from plots.panels._line_names import LineNames, NamedLine
 from plots.panels._shown import checked_row, checked_window, one_element, scaled, shown
+from plots.presets import font, pt
 from plots.style import EDGE_COLOURS, EDGE_HATCHES, INK, LINE_GREY, PALE_GREY, TEXT_GREY
 
 __all__ = ["landscape", "pins"]
@@ -204,7 +205,7 @@ def landscape(
     around = path_window(trace, plane.row, element) if window is None else window
     drawn += _path(ax, trace, plane, element, checked_window(trace, around), view, names)
     here = plane.here[0], view.factor * plane.here[1]
-    (dot,) = ax.plot(*here, "o", color=INK, markersize=8, markeredgecolor="white", zorder=8)
+    (dot,) = ax.plot(*here, "o", color=INK, markersize=pt(8), markeredgecolor="white", zorder=8)
     names.avoid.append(here)
     return [*drawn, dot, names]
 
@@ -306,7 +307,13 @@ def _threshold(ax: Axes, plane: Plane, v: Floats, factor: float, names: LineName
     drawn: Artists = []
     for sign, name in ((1.0, "s(v)"), (-1.0, "−s(v)")):
         drawn += ax.plot(
-            v[0], sign * factor * s, color=LINE_GREY, linewidth=5, alpha=0.45, zorder=3, label=name
+            v[0],
+            sign * factor * s,
+            color=LINE_GREY,
+            linewidth=pt(5),
+            alpha=0.45,
+            zorder=3,
+            label=name,
         )
         curve = np.column_stack([v[0], sign * factor * s])
         names.lines.append(NamedLine(name, TEXT_GREY, (curve,)))
@@ -334,7 +341,7 @@ def _path(
     gaps = np.isnan(times)
     for keep, dash, name in ((times <= now, "-", "before"), (times >= now, DASHED, "after")):
         x, y = points[keep | gaps].T
-        drawn += ax.plot(x, y, color=INK, linestyle=dash, linewidth=1.2, zorder=6, label=name)
+        drawn += ax.plot(x, y, color=INK, linestyle=dash, linewidth=pt(1.2), zorder=6, label=name)
         names.curves.append(points[keep])
     return drawn
 
@@ -442,7 +449,7 @@ def pins(ax: Axes, trace: Trace, element: int, checks: Report, *, row: int = -1)
                 (v, z),
                 (7, 7),
                 textcoords="offset points",
-                fontsize=8,
+                fontsize=font(8),
                 fontweight="bold",
                 bbox={"boxstyle": "circle,pad=0.25", "facecolor": "white", "edgecolor": INK},
                 zorder=11,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plots._matplotlib import Artist, Axes, Bbox, IdentityTransform, RendererBase, Text
+from plots.presets import font
 
 __all__ = ["LineNames", "NamedLine"]
 
@@ -134,7 +135,7 @@ class LineNames(Artist):
         text = Text(
             text=line.name,
             color=line.colour,
-            fontsize=8,
+            fontsize=font(8),
             ha="center",
             va="center",
             bbox=box,

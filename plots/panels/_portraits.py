@@ -14,6 +14,7 @@ from plots._matplotlib import Axes, BoundaryNorm, LineCollection, ListedColormap
 from plots._window import Window
 from plots.panels._axes import VECTOR_ROWS, Artists, draw_curve, log_axis
 from plots.panels._shown import checked_elements, scaled, shown
+from plots.presets import pt
 from plots.style import BLUE, INK, LINE_GREY, VERMILION
 
 __all__ = ["arrows", "hysteresis", "portrait", "slip_bar"]
@@ -217,7 +218,7 @@ def arrows(ax: Axes, lines: LineCollection, *, apart: float = 1.1) -> Artists:
         return []
     apart = max(apart, length[-1] / MOST_ARROWS)
     look: dict[str, Any] = {"arrowstyle": "-|>,head_length=0.5,head_width=0.25"}
-    look |= {"color": INK, "linewidth": 0.0, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 11}
+    look |= {"color": INK, "linewidth": pt(0.0), "shrinkA": 0, "shrinkB": 0, "mutation_scale": 11}
     drawn: Artists = []
     known: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []  # tips, directions; inches
     for end in np.arange(apart / 2, length[-1], apart).tolist():

@@ -11,6 +11,7 @@ from plots._matplotlib import Axes, RendererBase, Text
 from plots._window import Window
 from plots.panels._axes import VECTOR_ROWS, Artists, time_axis
 from plots.panels._shown import checked_elements, checked_window
+from plots.presets import font, pt
 from plots.style import HATCHES, INK, STATE_EDGES, STATE_FILLS
 
 __all__ = ["ribbons"]
@@ -29,7 +30,7 @@ class _SpanName(Text):
             name,
             ha="center",
             va="center",
-            fontsize=7.5,
+            fontsize=font(7.5),
             color=INK,
             bbox={
                 "boxstyle": "round,pad=0.12",
@@ -122,7 +123,7 @@ def ribbons(
                     facecolor=STATE_FILLS[number % len(STATE_FILLS)],
                     edgecolor=STATE_EDGES[number % len(STATE_EDGES)],
                     hatch=HATCHES[number % len(HATCHES)],
-                    linewidth=0.6,
+                    linewidth=pt(0.6),
                     label=state if row == 0 else None,
                     rasterized=len(mine) > VECTOR_ROWS // 20,
                 )
@@ -155,7 +156,7 @@ def _held_bands(ax: Axes, trace: Trace, window: Window) -> Artists:
                     facecolor="none",
                     edgecolor="black",
                     hatch="xxx",
-                    linewidth=0.8,
+                    linewidth=pt(0.8),
                     zorder=3,
                     label=text,
                 )

@@ -19,6 +19,7 @@ from plots._matplotlib import Axes, Rectangle
 from plots._window import Window
 from plots.panels._axes import Artists
 from plots.panels._shown import checked_elements, checked_window, is_number, scaled
+from plots.presets import font, pt
 from plots.style import HATCHES, INK, LINE_GREY, STATE_EDGES, STATE_FILLS, TEXT_GREY
 
 __all__ = ["Unfolded", "unfolded", "unfolded_force", "unfolded_states"]
@@ -232,7 +233,7 @@ def unfolded_force(ax: Axes, part: Unfolded) -> Artists:
         own = part.of(instant)
         x = np.repeat([own[0].left, *(each.left + 1.0 for each in own)], 2)[1:-1]
         y = np.repeat([factor * each.F for each in own], 2)
-        drawn += ax.plot(x, y, color=INK, linewidth=1.8, solid_joinstyle="miter", zorder=3)
+        drawn += ax.plot(x, y, color=INK, linewidth=pt(1.8), solid_joinstyle="miter", zorder=3)
     for instant in range(1, part.times.size):
         before, after = part.of(instant - 1)[-1], part.of(instant)[0]
         drawn += ax.plot(
@@ -254,7 +255,7 @@ def unfolded_force(ax: Axes, part: Unfolded) -> Artists:
                 ha="center",
                 va="bottom",
                 rotation=90 if upright else 0,
-                fontsize=8,
+                fontsize=font(8),
                 color=INK,
             )
         )
@@ -312,13 +313,13 @@ def unfolded_states(ax: Axes, part: Unfolded) -> Artists:
                 plain = {"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85}
                 place = (each.left + 0.5, row + 1.0)
                 drawn.append(
-                    ax.text(*place, name, ha="center", va="center", fontsize=7.5, bbox=plain)
+                    ax.text(*place, name, ha="center", va="center", fontsize=font(7.5), bbox=plain)
                 )
     for each in part.columns:
         if each.element >= 0:
             row = part.elements.index(each.element)
             frame = Rectangle((each.left + 0.03, row + 0.55), 0.94, 0.9, fill=False, edgecolor=INK)
-            frame.set(linewidth=2.4, zorder=5)
+            frame.set(linewidth=pt(2.4), zorder=5)
             drawn.append(ax.add_patch(frame))
     drawn += _edge_names(ax, part, wide)
     ax.set(
@@ -345,7 +346,7 @@ def _cell(left: float, row: int, mode: int) -> Rectangle:
         facecolor=STATE_FILLS[mode % len(STATE_FILLS)],
         edgecolor=STATE_EDGES[mode % len(STATE_EDGES)],
         hatch=HATCHES[mode % len(HATCHES)],
-        linewidth=0.6,
+        linewidth=pt(0.6),
     )
 
 
@@ -396,7 +397,7 @@ def _edge_names(ax: Axes, part: Unfolded, wide: float) -> Artists:
             ha="center",
             va="bottom",
             rotation=90 if upright else 0,
-            fontsize=8,
+            fontsize=font(8),
             linespacing=1.15,
             color=INK if each.edge else TEXT_GREY,
             annotation_clip=False,
@@ -416,7 +417,7 @@ def _times(ax: Axes, part: Unfolded) -> Artists:
         "xycoords": ax.get_xaxis_transform(),
         "textcoords": "offset points",
         "va": "top",
-        "fontsize": 8.5,
+        "fontsize": font(8.5),
         "fontweight": "bold",
         "annotation_clip": False,
     }
@@ -439,7 +440,7 @@ def _breaks(ax: Axes, part: Unfolded) -> Artists:
             heights,
             transform=ax.get_xaxis_transform(),
             color=LINE_GREY,
-            linewidth=0.8,
+            linewidth=pt(0.8),
             zorder=1,
         )
     return drawn
