@@ -40,7 +40,7 @@ from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.broken import BROKEN
 from plots import figures, panels
 from plots.schematic import schematic_figure
-from plots.style import BLUE, INK, LINE_GREY, RC, TEXT_ORANGE, VERMILION
+from plots.style import INK, LINE_GREY, PAPER, RC, TEXT_GREY
 
 FOLDER = Path(__file__).parent / "images"
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -175,7 +175,7 @@ def microstep_figure(trace: Trace) -> Figure:
                 textcoords="offset points",
                 ha="left",
                 fontsize=8,
-                color=TEXT_ORANGE,
+                color=TEXT_GREY,
             )
         by_step.annotate(
             "before",
@@ -204,8 +204,8 @@ def crossing_figure() -> Figure:
         figure = Figure(figsize=(7.2, 3.6), layout="constrained")
         ax = figure.subplots()
         looks = (
-            (once, VERMILION, "s--", "guards checked once per step"),
-            (located, BLUE, "o-", "located"),
+            (once, TEXT_GREY, "s--", "guards checked once per step"),
+            (located, INK, "o-", "located"),
         )
         for trace, colour, look, name in looks:
             keep = (trace.t > true - 1.9 * step) & (trace.t < true + 2.9 * step)
@@ -216,21 +216,21 @@ def crossing_figure() -> Figure:
                 color=colour,
                 label=name,
                 markersize=7,
-                markerfacecolor="white" if colour == VERMILION else colour,
+                markerfacecolor=PAPER if trace is once else colour,
             )
         ax.axhline(0, color=LINE_GREY, linewidth=0.9, zorder=0)
         for time, text, colour, height in (
-            (true, "z >= s becomes true", BLUE, 0.97),
-            (found, "detected", TEXT_ORANGE, 0.62),
+            (true, "z >= s becomes true", INK, 0.97),
+            (found, "detected", TEXT_GREY, 0.62),
         ):
             ax.axvline(time, color=LINE_GREY, linestyle=":", linewidth=0.9, zorder=0)
             ax.annotate(
                 f"{text}\nt = {time:.2f} s",
                 (time, height),
-                (-6 if colour == BLUE else 6, 0),
+                (-6 if time == true else 6, 0),
                 xycoords=("data", "axes fraction"),
                 textcoords="offset points",
-                ha="right" if colour == BLUE else "left",
+                ha="right" if time == true else "left",
                 va="top",
                 color=colour,
             )
@@ -312,7 +312,7 @@ def loops_figure(bilinear: Chart) -> Figure:
     with rc_context(RC):
         figure = Figure(figsize=(5.4, 3.6), layout="constrained")
         ax = figure.subplots()
-        for H, colour, look in ((1e4, BLUE, "-"), (0.0, VERMILION, "--")):
+        for H, colour, look in ((1e4, INK, "-"), (0.0, TEXT_GREY, "--")):
             model = ChartModel(bilinear, {"k": 1e5, "H": H, "F_y": 1.0})
             trace = simulate(model, rig, 1.75)
             ax.plot(1e6 * trace.x, trace.F, look, color=colour, label=f"H = {H:g} N/m")

@@ -16,8 +16,7 @@ from plots.figures._layout import fitted, legend_below, narrow, sheet
 from plots.figures._parts import element_legend
 from plots.panels._held import Lag
 from plots.panels._shown import checked_window, scaled, shown
-from plots.presets import font, pt, settings
-from plots.style import BLUE, INK, LINE_GREY, TEXT_GREY
+from plots.style import INK, LINE_GREY, RC, REPORTED, TEXT_GREY
 
 __all__ = [
     "FIG3_PHASES",
@@ -291,8 +290,12 @@ def held_residuals(
         between.set_title("c) friction; dots: at the ticks")
         period.set_title("d) largest at the ticks; lines: proportional to h")
         period.legend(loc="upper left", ncols=2)
-        (paper,) = force.plot([], [], color=BLUE, linestyle="--", linewidth=pt(0.9))
-        names = [*(str(line.get_label()) for line in lines), "the paper's residual"]
-        legend_below(figure, [*lines, paper], names)
+        (paper,) = force.plot([], [], **REPORTED)
+        figure.legend(
+            [*lines, paper],
+            [*(str(line.get_label()) for line in lines), "the paper's residual"],
+            loc="outside lower left",
+            ncols=4,
+        )
         figure.suptitle(title, x=0.01, ha="left")
     return fitted(figure)

@@ -12,33 +12,21 @@ from plots._matplotlib import Axes, Figure, Rectangle, rc_context
 from plots.figures._layout import fitted, sheet
 from plots.presets import font, pt, settings
 from plots.style import (
-    BLUE,
-    BLUE_TINT,
-    ELEMENT_COLOURS,
-    ELEMENT_DASHES,
     INK,
     LINE_GREY,
     PALE_GREY,
-    PAPER,
+    RC,
     TEXT_GREY,
-    TEXT_ORANGE,
-    VERMILION,
-    VERMILION_TINT,
+    colour,
+    compared_look,
 )
 
 __all__ = ["phenomena_matrix", "phenomenon_figure"]
 
 COLUMNS, PANEL = 4, (2.7, 2.15)  # in
 TOO_LARGE = 4.0  # times the median range: such a panel has its own axis
-# Colour, and with it a shape, so that neither is needed alone.
-COLOURS = {
-    "shows": BLUE,
-    "does not show": TEXT_GREY,
-    "shows wrongly": TEXT_ORANGE,
-    "does not apply": PALE_GREY,
-    "failed": INK,
-}
-TINTS = {"shows": BLUE_TINT, "shows wrongly": VERMILION_TINT}
+# Verdicts differ by shape; the grounds only help to find them.
+TINTS = {"shows": "chosen", "shows wrongly": "pale"}
 
 
 def phenomenon_figure(table: PhenomenaTable, name: str) -> Figure | None:
@@ -88,18 +76,15 @@ def _panel(
     phenomenon: Phenomenon,
     limits: Sequence[tuple[float, float] | None],
 ) -> None:
-    looks = zip(ELEMENT_COLOURS, ELEMENT_DASHES, strict=True)
-    for curve, (colour, dash) in zip(found.curves, looks, strict=False):
+    for number, curve in enumerate(found.curves):
         marker = "o" if curve.x.size < 20 else ""
         ax.plot(
             curve.x,
             curve.y,
-            color=colour,
-            linestyle=dash,
             marker=marker,
-            markersize=pt(3),
-            linewidth=pt(1.1),
+            markersize=3,
             label=curve.label,
+            **compared_look(number),
         )
     if phenomenon.log:
         ax.set_xscale("log")
@@ -122,8 +107,8 @@ def _panel(
         (0, 4),
         xycoords="axes fraction",
         textcoords="offset points",
-        fontsize=font(8),
-        color=COLOURS[found.verdict],
+        fontsize=8,
+        color=INK,
         family="DejaVu Sans",
     )
 
@@ -195,7 +180,7 @@ def phenomena_matrix(
             for column, phenomenon in enumerate(table.phenomena):
                 found = table.cell(model, phenomenon.name)
                 corner = (left + column * wide, y - 0.5 * high)
-                tint: Any = TINTS.get(found.verdict, PAPER)
+                tint: Any = colour(TINTS.get(found.verdict, "paper"))
                 ax.add_patch(
                     Rectangle(corner, wide, high, facecolor=tint, edgecolor=PALE_GREY, lw=pt(0.6))
                 )
@@ -221,19 +206,16 @@ def phenomena_matrix(
 
 
 def _symbol(ax: Axes, x: float, y: float, verdict: str) -> None:
-    colour = COLOURS[verdict]
     if verdict == "shows":
-        ax.plot([x], [y], "o", color=colour, markersize=pt(8))
+        ax.plot([x], [y], "o", color=INK, markersize=8)
     elif verdict == "does not show":
-        ax.plot(
-            [x], [y], "o", color=colour, markersize=pt(7.5), markerfacecolor="none", mew=pt(1.4)
-        )
+        ax.plot([x], [y], "o", color=TEXT_GREY, markersize=7.5, markerfacecolor="none", mew=1.4)
     elif verdict == "shows wrongly":
-        ax.plot([x], [y], "X", color=VERMILION, markersize=pt(8.5))
+        ax.plot([x], [y], "X", color=INK, markersize=8.5)
     elif verdict == "does not apply":
         ax.plot([x - 0.06, x + 0.06], [y, y], color=LINE_GREY, linewidth=pt(1.4))
     else:
-        ax.text(x, y, "?", ha="center", va="center", color=colour, fontsize=font(10))
+        ax.text(x, y, "?", ha="center", va="center", color=INK, fontsize=10)
 
 
 def _folded(text: str) -> str:

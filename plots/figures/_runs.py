@@ -25,8 +25,7 @@ from plots.figures._parts import (
 from plots.panels._axes import VECTOR_ROWS
 from plots.panels._cascades import CASCADE
 from plots.panels._shown import checked_window, scaled, shown
-from plots.presets import pt, settings
-from plots.style import BLUE, PALE_GREY, VERMILION
+from plots.style import LINE_GREY, PALE_GREY, RC
 
 __all__ = ["Measured", "cascade_figure", "overview", "ribbons_figure"]
 
@@ -140,12 +139,12 @@ def _overview_axes() -> tuple[Figure, Sequence[Axes], Sequence[Axes]]:
 def _add_measured(ax: Axes, loop: Axes, measured: Measured, trace: Trace, window: Window) -> None:
     """Draw the measured friction over time and over x."""
     inside = (measured.t >= window[0]) & (measured.t <= window[1])
-    ax.lines[0].set(color=BLUE, label="model", zorder=3)
+    ax.lines[0].set(label="model", zorder=3)
     ax.plot(
         measured.t[inside],
         measured.F[inside],
-        color=VERMILION,
-        linewidth=pt(1.0),
+        color=LINE_GREY,
+        linewidth=2.4,
         label="measured",
         rasterized=bool(inside.sum() > VECTOR_ROWS),
     )
@@ -155,8 +154,8 @@ def _add_measured(ax: Axes, loop: Axes, measured: Measured, trace: Trace, window
     loop.plot(
         factor * (measured.x - trace.x[0]),
         measured.F,
-        color=VERMILION,
-        linewidth=pt(0.5),
+        color=LINE_GREY,
+        linewidth=0.5,
         alpha=0.7,
         rasterized=True,
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -14,8 +13,7 @@ from plots.figures._layout import fitted, sheet
 from plots.figures._parts import head
 from plots.panels._shown import scaled
 from plots.panels._unfolded import FEW, column_width, edge_texts
-from plots.presets import font, pt, settings
-from plots.style import HATCHES, STATE_EDGES, STATE_FILLS
+from plots.style import RC, state_look
 
 __all__ = ["unfold"]
 
@@ -96,12 +94,7 @@ def unfold(
 
 
 def _swatch(mode: int, name: str) -> Rectangle:
-    look: Any = {
-        "facecolor": STATE_FILLS[mode % len(STATE_FILLS)],
-        "edgecolor": STATE_EDGES[mode % len(STATE_EDGES)],
-        "hatch": HATCHES[mode % len(HATCHES)],
-    }
-    return Rectangle((0, 0), 1, 1, label=name, linewidth=pt(0.6), **look)
+    return Rectangle((0, 0), 1, 1, label=name, **state_look(mode))
 
 
 def _said(part: panels.Unfolded) -> str:

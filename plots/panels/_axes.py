@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Artist, Axes, MaxNLocator
 from plots.panels._shown import scaled
-from plots.style import ELEMENT_COLOURS, ELEMENT_DASHES, TEXT_GREY
+from plots.style import ELEMENT_DASHES, TEXT_GREY, element_colour
 
 Artists = list[Artist]
 
@@ -27,10 +27,10 @@ def first_variable(trace: Trace, values: NDArray[np.float64]) -> tuple[float, st
     return factor, f"{name} [{unit}]"
 
 
-def element_look(i: int) -> dict[str, Any]:
-    """Return colour and dash of element i."""
+def element_look(i: int, n: int) -> dict[str, Any]:
+    """Return colour and dash of element i of n."""
     return {
-        "color": ELEMENT_COLOURS[i % len(ELEMENT_COLOURS)],
+        "color": element_colour(i, n),
         "linestyle": ELEMENT_DASHES[i % len(ELEMENT_DASHES)],
     }
 

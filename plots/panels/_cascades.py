@@ -20,8 +20,7 @@ from plots.panels._shown import (
     is_number,
     shown,
 )
-from plots.presets import font, pt
-from plots.style import INK, LINE_GREY
+from plots.style import INK, LINE_GREY, PAPER
 
 __all__ = ["cascade", "cascade_window", "margins", "marks"]
 
@@ -122,7 +121,7 @@ def marks(
     begin, end = checked_window(trace, window)
     log = _in_window(trace, (begin, end), checked_elements(trace, elements))
     drawn: Artists = [
-        ax.axvline(t, linewidth=pt(0.9), zorder=1, **element_look(int(i)))
+        ax.axvline(t, linewidth=0.9, zorder=1, **element_look(int(i), trace.n))
         for t, i in zip(log.t.tolist(), log.element.tolist(), strict=True)
     ]
     if not labels or not end > begin:
@@ -205,15 +204,17 @@ def margins(
     lines: Artists = []
     dots: Artists = []
     for i in chosen:
-        lines += draw_curve(ax, part.t, factor * values[:, i], label=f"E{i + 1}", **element_look(i))
+        lines += draw_curve(
+            ax, part.t, factor * values[:, i], label=f"E{i + 1}", **element_look(i, trace.n)
+        )
         mine = log[log.element == i]
         if mine.size:
             dots += ax.plot(
                 mine.t,
                 factor * (1 - np.abs(mine.z / mine.s)),
                 "o",
-                color=element_look(i)["color"],
-                markersize=pt(4),
+                color=element_look(i, trace.n)["color"],
+                markersize=4,
                 clip_on=False,
                 zorder=4,
             )
@@ -266,7 +267,7 @@ def cascade(
             "o",
             markersize=pt(4.5),
             color=INK,
-            markerfacecolor="white",
+            markerfacecolor=PAPER,
             label="F before",
             zorder=3,
         ),

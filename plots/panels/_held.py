@@ -10,12 +10,10 @@ from numpy.typing import NDArray
 
 from plots._matplotlib import Axes, LogLocator
 from plots.panels._axes import Artists, draw_curve, time_axis
-from plots.presets import pt
-from plots.style import BLUE, INK, LINE_GREY, TEXT_GREY, VERMILION
+from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY, compared_look
 
 __all__ = ["lag_between_ticks", "lag_over_period", "lag_over_time"]
 
-COLOURS = (VERMILION, INK, "#009E73")  # of the sample times; blue is the paper
 MILLI, MICRO = 1e3, 1e6
 
 
@@ -68,13 +66,13 @@ def lag_over_time(
     """
     factor = MICRO if place else MILLI
     lines: Artists = []
-    for lag, colour in zip(lags, COLOURS, strict=False):
+    for number, lag in enumerate(lags):
         shown = (lag.t >= window[0]) & (lag.t <= window[1])
         values = factor * (lag.place if place else lag.force)[shown]
         name = f"h = {MILLI * lag.period:g} ms"
-        lines += draw_curve(ax, lag.t[shown], values, color=colour, linewidth=pt(1.0), label=name)
+        lines += draw_curve(ax, lag.t[shown], values, label=name, **compared_look(number))
     for sign in (1, -1):
-        ax.axhline(sign * factor * paper, color=BLUE, linestyle="--", linewidth=pt(0.9))
+        ax.axhline(sign * factor * paper, **REPORTED)
     time_axis(ax, *window)
     ax.set_ylabel("difference of x [µm]" if place else "difference of F [mN]")
     return lines
@@ -98,13 +96,14 @@ def lag_between_ticks(ax: Axes, lags: Sequence[Lag], *, window: tuple[float, flo
         One line per sample time.
     """
     lines: Artists = []
-    for lag, colour in zip(lags, COLOURS, strict=False):
+    for number, lag in enumerate(lags):
         shown = (lag.t > window[0] - lag.period) & (lag.t < window[1])
         begin = lag.t[shown]
         t = np.column_stack([begin, begin + lag.period]).ravel()
         both = np.column_stack([lag.force[shown], lag.before[shown]]).ravel()
-        lines += ax.plot(MILLI * (t - window[0]), MILLI * both, color=colour)
-        ax.plot(MILLI * (begin - window[0]), MILLI * lag.force[shown], "o", color=colour, ms=pt(4))
+        lines += ax.plot(MILLI * (t - window[0]), MILLI * both, **compared_look(number))
+        ink = compared_look(number)["color"]
+        ax.plot(MILLI * (begin - window[0]), MILLI * lag.force[shown], "o", color=ink, ms=4)
     ax.set(
         xlabel=f"t − {window[0]:g} s [ms]",
         ylabel="difference of F [mN]",
@@ -160,7 +159,7 @@ def lag_over_period(
                 markersize=pt(6),
                 label=f"{'Fx'[quantity]}, {name}",
             )
-    ax.axhline(1.0, color=BLUE, linestyle="--", linewidth=pt(0.9))
+    ax.axhline(1.0, **REPORTED)
     ax.set(
         xscale="log", yscale="log", xlabel="sample time h [ms]", ylabel="largest / the paper's [1]"
     )

@@ -31,8 +31,16 @@ from plots._window import Window
 from plots.panels._axes import Artists
 from plots.panels._line_names import LineNames, NamedLine
 from plots.panels._shown import checked_row, checked_window, one_element, scaled, shown
-from plots.presets import font, pt
-from plots.style import EDGE_COLOURS, EDGE_HATCHES, INK, LINE_GREY, PALE_GREY, TEXT_GREY
+from plots.style import (
+    EDGE_COLOURS,
+    EDGE_HATCHES,
+    INK,
+    LINE_GREY,
+    PALE_GREY,
+    PAPER,
+    TEXT_GREY,
+    VERMILION,
+)
 
 __all__ = ["landscape", "pins"]
 
@@ -205,7 +213,7 @@ def landscape(
     around = path_window(trace, plane.row, element) if window is None else window
     drawn += _path(ax, trace, plane, element, checked_window(trace, around), view, names)
     here = plane.here[0], view.factor * plane.here[1]
-    (dot,) = ax.plot(*here, "o", color=INK, markersize=pt(8), markeredgecolor="white", zorder=8)
+    (dot,) = ax.plot(*here, "o", color=VERMILION, markersize=8, markeredgecolor=PAPER, zorder=8)
     names.avoid.append(here)
     return [*drawn, dot, names]
 
@@ -442,7 +450,7 @@ def pins(ax: Axes, trace: Trace, element: int, checks: Report, *, row: int = -1)
         point = float(np.clip(v, *ax.get_xlim())), float(np.clip(factor * z, *ax.get_ylim()))
         places.setdefault(point, []).append(str(number))
     for (v, z), numbers in places.items():
-        drawn += ax.plot(v, z, "D", color="white", markeredgecolor=INK, clip_on=False, zorder=10)
+        drawn += ax.plot(v, z, "D", color=PAPER, markeredgecolor=INK, clip_on=False, zorder=10)
         drawn.append(
             ax.annotate(
                 ", ".join(numbers),
@@ -451,7 +459,7 @@ def pins(ax: Axes, trace: Trace, element: int, checks: Report, *, row: int = -1)
                 textcoords="offset points",
                 fontsize=font(8),
                 fontweight="bold",
-                bbox={"boxstyle": "circle,pad=0.25", "facecolor": "white", "edgecolor": INK},
+                bbox={"boxstyle": "circle,pad=0.25", "facecolor": PAPER, "edgecolor": INK},
                 zorder=11,
             )
         )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plots._matplotlib import Artist, Axes, Bbox, IdentityTransform, RendererBase, Text
-from plots.presets import font
+from plots.style import PAPER
 
 __all__ = ["LineNames", "NamedLine"]
 
@@ -131,7 +131,7 @@ class LineNames(Artist):
         return self.axes
 
     def _text(self, line: NamedLine) -> Text:
-        box = {"boxstyle": f"square,pad={PAD / 10}", "facecolor": "white", "edgecolor": "none"}
+        box = {"boxstyle": f"square,pad={PAD / 10}", "facecolor": PAPER, "edgecolor": "none"}
         text = Text(
             text=line.name,
             color=line.colour,

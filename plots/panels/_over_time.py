@@ -93,7 +93,7 @@ def force(
     lines = draw_curve(ax, part.t, part.F, color=INK, label="F")
     for i in chosen:
         lines += draw_curve(
-            ax, part.t, part.F_elements[:, i], label=f"$F_{{{i + 1}}}$", **element_look(i)
+            ax, part.t, part.F_elements[:, i], label=f"$F_{{{i + 1}}}$", **element_look(i, trace.n)
         )
     ax.set_ylabel("F [N]")
     time_axis(ax, *checked_window(trace, window))
@@ -135,7 +135,9 @@ def deflections(
     lines: Artists = []
     for i in chosen:
         label = f"$z_{{{i + 1}}}$" if name == "z" else f"{name}{i + 1}"
-        lines += draw_curve(ax, part.t, factor * part.z[:, i], label=label, **element_look(i))
+        lines += draw_curve(
+            ax, part.t, factor * part.z[:, i], label=label, **element_look(i, trace.n)
+        )
     ax.set_ylabel(title)
     time_axis(ax, *checked_window(trace, window))
     return lines
@@ -183,7 +185,9 @@ def ratio(
         factor, title = first_variable(trace, values)
     lines: Artists = []
     for i in chosen:
-        lines += draw_curve(ax, part.t, factor * values[:, i], label=f"E{i + 1}", **element_look(i))
+        lines += draw_curve(
+            ax, part.t, factor * values[:, i], label=f"E{i + 1}", **element_look(i, trace.n)
+        )
     if threshold:
         lines += [
             ax.axhline(level, color=LINE_GREY, linewidth=pt(0.8), zorder=1) for level in (1.0, -1.0)

@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.traces.trace import Trace
-from plots._matplotlib import Axes, BoundaryNorm, LineCollection, ListedColormap, colormaps
+from plots._matplotlib import Axes, BoundaryNorm, LineCollection, ListedColormap
 from plots._window import Window
 from plots.panels._axes import VECTOR_ROWS, Artists, draw_curve, log_axis
 from plots.panels._shown import checked_elements, scaled, shown
-from plots.presets import pt
-from plots.style import BLUE, INK, LINE_GREY, VERMILION
+from plots.style import INK, compared_look, ramp
 
 __all__ = ["arrows", "hysteresis", "portrait", "slip_bar"]
 
@@ -35,8 +34,8 @@ def _by_slipping(
     cuts = np.concatenate([[0], np.flatnonzero(np.diff(away)) + 1, [len(points)]])
     pieces = [points[a : b + 1] for a, b in pairwise(cuts)]
     count = len(chosen)
-    # From light green to dark violet: the more elements slip, the darker, also in grey.
-    shades = ListedColormap(colormaps["viridis_r"](np.linspace(0.18, 1.0, count + 1)))
+    # The more elements slip, the darker, also in grey.
+    shades = ListedColormap(ramp("slipping", count + 1))
     lines = LineCollection(
         pieces,
         cmap=shades,
@@ -48,7 +47,7 @@ def _by_slipping(
     )
     if not trace.model.chart.transitions:  # one state: nothing to count
         lines.set_array(None)
-        lines.set_color(BLUE)
+        lines.set_color(INK)
     ax.add_collection(lines)
     ax.autoscale_view()
     return lines
@@ -167,21 +166,17 @@ def hysteresis(
     ax.set(xlabel=f"x [{unit}]", ylabel="F [N]")
     if slipping:
         return [_by_slipping(ax, factor * x, part, chosen)]
-    looks = ((BLUE, "-"), (VERMILION, "-"), (LINE_GREY, "-"))
     begin = -np.inf
     lines: Artists = []
     for number, (name, end) in enumerate(phases or [("", np.inf)]):
         now = (part.t >= begin) & (part.t <= end)
-        colour, dash = looks[number % len(looks)]
         lines += draw_curve(
             ax,
             factor * x[now],
             part.F[now],
-            color=colour,
-            linestyle=dash,
             label=name,
             zorder=3 - number % 3,
-            linewidth=1.6 if number < 2 else 0.9,
+            **compared_look(number),
         )
         begin = end
     return lines

@@ -11,8 +11,7 @@ from plots._matplotlib import Axes, RendererBase, Text
 from plots._window import Window
 from plots.panels._axes import VECTOR_ROWS, Artists, time_axis
 from plots.panels._shown import checked_elements, checked_window
-from plots.presets import font, pt
-from plots.style import HATCHES, INK, STATE_EDGES, STATE_FILLS
+from plots.style import INK, PAPER, state_look
 
 __all__ = ["ribbons"]
 
@@ -34,7 +33,7 @@ class _SpanName(Text):
             color=INK,
             bbox={
                 "boxstyle": "round,pad=0.12",
-                "facecolor": "white",
+                "facecolor": PAPER,
                 "edgecolor": "none",
                 "alpha": 0.85,
             },
@@ -120,12 +119,9 @@ def ribbons(
                 ax.broken_barh(
                     mine,
                     (row + 0.6, 0.8),
-                    facecolor=STATE_FILLS[number % len(STATE_FILLS)],
-                    edgecolor=STATE_EDGES[number % len(STATE_EDGES)],
-                    hatch=HATCHES[number % len(HATCHES)],
-                    linewidth=pt(0.6),
                     label=state if row == 0 else None,
                     rasterized=len(mine) > VECTOR_ROWS // 20,
+                    **state_look(number),
                 )
             )
         # A name never fits into less than one hundredth of the axis.
@@ -154,7 +150,7 @@ def _held_bands(ax: Axes, trace: Trace, window: Window) -> Artists:
                     begin,
                     end,
                     facecolor="none",
-                    edgecolor="black",
+                    edgecolor=INK,
                     hatch="xxx",
                     linewidth=pt(0.8),
                     zorder=3,

@@ -19,8 +19,7 @@ from plots._matplotlib import Axes, Rectangle
 from plots._window import Window
 from plots.panels._axes import Artists
 from plots.panels._shown import checked_elements, checked_window, is_number, scaled
-from plots.presets import font, pt
-from plots.style import HATCHES, INK, LINE_GREY, STATE_EDGES, STATE_FILLS, TEXT_GREY
+from plots.style import INK, LINE_GREY, PAPER, TEXT_GREY, state_look
 
 __all__ = ["Unfolded", "unfolded", "unfolded_force", "unfolded_states"]
 
@@ -310,7 +309,7 @@ def unfolded_states(ax: Axes, part: Unfolded) -> Artists:
             cells.append(ax.add_patch(_cell(each.left, row, mode)))
             told = count <= FEW or each in firsts or part.elements[row] == each.element
             if told and LETTER * len(name) + 0.05 < wide and tall > 0.16:
-                plain = {"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85}
+                plain = {"facecolor": PAPER, "edgecolor": "none", "pad": 0.8, "alpha": 0.85}
                 place = (each.left + 0.5, row + 1.0)
                 drawn.append(
                     ax.text(*place, name, ha="center", va="center", fontsize=font(7.5), bbox=plain)
@@ -339,15 +338,7 @@ def unfolded_states(ax: Axes, part: Unfolded) -> Artists:
 
 
 def _cell(left: float, row: int, mode: int) -> Rectangle:
-    return Rectangle(
-        (left, row + 0.58),
-        1.0,
-        0.84,
-        facecolor=STATE_FILLS[mode % len(STATE_FILLS)],
-        edgecolor=STATE_EDGES[mode % len(STATE_EDGES)],
-        hatch=HATCHES[mode % len(HATCHES)],
-        linewidth=pt(0.6),
-    )
+    return Rectangle((left, row + 0.58), 1.0, 0.84, **state_look(mode))
 
 
 def column_width(wide: float, part: Unfolded) -> float:

@@ -262,7 +262,7 @@ def figure(result: Result) -> Figure:
     from matplotlib.figure import Figure
 
     from plots import panels
-    from plots.style import INK, LINE_GREY, RC, TEXT_GREY, VERMILION
+    from plots.style import INK, LINE_GREY, PAPER, RC, TEXT_GREY
 
     gms, lugre = result.gms, result.lugre
     end = float(result.turn_times[-1])
@@ -277,9 +277,9 @@ def figure(result: Result) -> Figure:
             1e6 * x,
             masing(t, x, result.turn_times),
             "o",
-            color=VERMILION,
+            color=TEXT_GREY,
             markersize=4.5,
-            markerfacecolor="white",
+            markerfacecolor=PAPER,
             zorder=4,
         )
         axes["a"].set_title(f"a) {gms.model.title}: loops close")
@@ -331,11 +331,11 @@ def figure(result: Result) -> Figure:
 def _loops(ax: Axes, trace: Trace, result: Result) -> None:
     """Draw F over x, label the reversals, and mark where the last stroke returns to them."""
     from plots import panels
-    from plots.style import BLUE, INK, VERMILION
+    from plots.style import INK, LINE_GREY
 
     phases = [("", float(result.turn_times[0])), ("", float(result.turn_times[3])), ("", np.inf)]
     lines = panels.hysteresis(ax, trace, phases)
-    looks = ((INK, "--", 1.4), (BLUE, "-", 1.4), (VERMILION, "-", 1.8))
+    looks = ((INK, "--", 1.4), (LINE_GREY, "-", 2.4), (INK, "-", 1.4))
     for line, (colour, dash, width) in zip(lines, looks, strict=True):
         line.set(color=colour, linestyle=dash, linewidth=width)
     corners = trace.sample(result.turn_times)

@@ -166,18 +166,18 @@ def figure(result: Result) -> Figure:
     from matplotlib.figure import Figure
 
     from plots import panels
-    from plots.style import BLUE, INK, RC, TEXT_GREEN, TEXT_GREY, TEXT_ORANGE, VERMILION
+    from plots.style import INK, RC, TEXT_GREY
 
     runs = (
-        ("c", result.lugre, "LuGre", "creeps with every stroke", VERMILION, TEXT_ORANGE),
-        ("d", result.springs, "GMS, Table I", "published law, no element can slip", BLUE, BLUE),
+        ("c", result.lugre, "LuGre", "creeps with every stroke", INK, TEXT_GREY),
+        ("d", result.springs, "GMS, Table I", "published law, no element can slip", INK, TEXT_GREY),
         (
             "e",
             result.slipping,
             "GMS, weights 0.25/k",
             "signed law, element 1 slips",
-            TEXT_GREEN,
-            TEXT_GREEN,
+            INK,
+            TEXT_GREY,
         ),
     )
     grid = np.linspace(0.0, END, 6001)

@@ -209,7 +209,7 @@ def figure(result: Result) -> Figure:
     from matplotlib.figure import Figure
 
     from plots import panels
-    from plots.style import BLUE, INK, RC, STATE_FILLS, TEXT_GREY, TEXT_ORANGE, VERMILION
+    from plots.style import INK, LINE_GREY, PALE_GREY, RC, TEXT_GREY
 
     found = {"located": result.located, "once per step": result.once}
     with rc_context(RC):
@@ -224,9 +224,9 @@ def figure(result: Result) -> Figure:
         t = t[np.abs(t - turn) < 2e-3]
         line = turn + np.array([-2e-3, 2e-3])
         up = np.sign(_velocity(line)[1])
-        near.axhspan(-1e6 * V_C, 1e6 * V_C, color=VERMILION, linewidth=0.8, zorder=1)
+        near.axhspan(-1e6 * V_C, 1e6 * V_C, color=LINE_GREY, linewidth=0.8, zorder=1)
         near.plot(1e3 * (line - turn), 1e6 * _velocity(line), color=INK, zorder=2)
-        near.plot(1e3 * (t - turn), 1e6 * _velocity(t), "o", color=BLUE, markersize=7, zorder=3)
+        near.plot(1e3 * (t - turn), 1e6 * _velocity(t), "o", color=INK, markersize=7, zorder=3)
         near.set(xlabel=f"t − {turn:g} s [ms]", ylabel="v [µm/s]", xlim=(-2, 2))
         near.set_title(f"a) samples of {1e3 * STEP:g} ms at a reversal")
         near.annotate(
@@ -236,11 +236,11 @@ def figure(result: Result) -> Figure:
             textcoords="offset points",
             ha="right",
             va="top" if up > 0 else "bottom",
-            color=TEXT_ORANGE,
+            color=TEXT_GREY,
         )
 
         places = np.arange(len(STEPS))
-        counts.bar(places, result.counts, width=0.62, facecolor=STATE_FILLS[0], edgecolor=BLUE)
+        counts.bar(places, result.counts, width=0.62, facecolor=PALE_GREY, edgecolor=INK)
         for place, count, met in zip(places, result.counts, result.met, strict=True):
             counts.annotate(
                 f"{met} of {REVERSALS.size}",
@@ -264,7 +264,7 @@ def figure(result: Result) -> Figure:
             fontsize=8,
         )
 
-        looks = ((INK, "-"), (VERMILION, "--"))
+        looks = ((INK, "-"), (TEXT_GREY, "--"))
         for (name, trace), (colour, dash) in zip(found.items(), looks, strict=True):
             lines = panels.force(force, trace)
             lines[0].set(color=colour, linestyle=dash, label=name, linewidth=1.4)

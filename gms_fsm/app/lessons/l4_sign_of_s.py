@@ -247,12 +247,12 @@ def figure(result: Result) -> Figure:
 
 
 def _balance(ax: Axes, balance: Energy) -> None:
-    from plots.style import BLUE, INK, VERMILION, VERMILION_TINT
+    from plots.style import INK, LINE_GREY, PALE_GREY, TEXT_GREY
 
     for values, colour, dash, name in (
         (balance.work, INK, "-", "work of the motion"),
-        (balance.stored, BLUE, "--", "stored in the springs"),
-        (balance.heat, VERMILION, "-", "heat: work minus stored"),
+        (balance.stored, TEXT_GREY, "--", "stored in the springs"),
+        (balance.heat, LINE_GREY, "-", "heat: work minus stored"),
     ):
         ax.plot(balance.t, values, color=colour, linestyle=dash, linewidth=1.5, label=name)
     # Where more than 0.05 W turns back.
@@ -263,8 +263,8 @@ def _balance(ax: Axes, balance: Energy) -> None:
         1,
         where=falls,
         transform=ax.get_xaxis_transform(),
-        facecolor=VERMILION_TINT,
-        edgecolor=VERMILION,
+        facecolor=PALE_GREY,
+        edgecolor=LINE_GREY,
         linewidth=0.0,
         hatch="////",
         alpha=0.6,

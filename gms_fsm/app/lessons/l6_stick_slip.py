@@ -235,7 +235,7 @@ def figure(result: Result) -> Figure:
     from matplotlib.figure import Figure
 
     from plots import panels
-    from plots.style import BLUE, INK, LINE_GREY, RC, TEXT_GREY, TEXT_ORANGE, VERMILION
+    from plots.style import INK, LINE_GREY, RC, TEXT_GREY
 
     trace = result.portrait
     window = (30.0, 60.0)
@@ -281,8 +281,8 @@ def figure(result: Result) -> Figure:
         )
         curves = (
             ("period", result.waits + result.slips, "D-", INK, INK),
-            ("wait", result.waits, "o-", BLUE, BLUE),
-            ("slip", result.slips, "s--", VERMILION, TEXT_ORANGE),
+            ("wait", result.waits, "o-", TEXT_GREY, TEXT_GREY),
+            ("slip", result.slips, "s--", LINE_GREY, TEXT_GREY),
         )
         for name, times, look, colour, ink in curves:
             parts.loglog(V, times, look, color=colour, markersize=5)

@@ -162,17 +162,18 @@ def figure(result: Result) -> Figure:
     from matplotlib.figure import Figure
 
     from plots.style import (
-        ELEMENT_COLOURS,
         ELEMENT_DASHES,
         INK,
         LINE_GREY,
         PALE_GREY,
         RC,
         TEXT_GREY,
+        ramp,
     )
 
-    looks = list(zip(SHOWN, ELEMENT_COLOURS, ELEMENT_DASHES, strict=False))
-    colours = dict(zip(SHOWN, ELEMENT_COLOURS, strict=False))
+    shades = ramp("compared", len(SHOWN))
+    looks = list(zip(SHOWN, shades, ELEMENT_DASHES, strict=False))
+    colours = dict(zip(SHOWN, shades, strict=True))
     with rc_context(RC):
         sheet = Figure(figsize=(8.2, 4.8), layout="constrained")
         loops, widths = sheet.subplots(1, 2, width_ratios=(1.5, 1))
