@@ -19,6 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pgf import RendererPgf
 from matplotlib.collections import LineCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap, to_rgb
 from matplotlib.figure import Figure
@@ -27,12 +28,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Rectangle
 from matplotlib.path import Path as Curve
 from matplotlib.text import Text
-from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
+from matplotlib.ticker import AutoLocator, FixedLocator, LogLocator, MaxNLocator, NullLocator
 from matplotlib.transforms import Bbox, IdentityTransform
 from PIL import Image
 
 __all__ = [
     "Artist",
+    "AutoLocator",
     "Axes",
     "Axis",
     "Bbox",
@@ -41,6 +43,7 @@ __all__ = [
     "FancyArrowPatch",
     "Figure",
     "FigureCanvasAgg",
+    "FixedLocator",
     "IdentityTransform",
     "Image",
     "Legend",
@@ -52,6 +55,7 @@ __all__ = [
     "NullLocator",
     "Rectangle",
     "RendererBase",
+    "RendererPgf",
     "Text",
     "colormaps",
     "patches",

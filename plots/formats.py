@@ -115,6 +115,12 @@ def _matplotlib(form: str, **metadata: None) -> Callable[[Any], bytes]:
     return write
 
 
+def _pgf(figure: Any) -> bytes:
+    from plots.figures._pgf import pgf
+
+    return pgf(figure)
+
+
 def _gif(movie: Any) -> bytes:
     from plots.animation import gif
 
@@ -139,6 +145,7 @@ FORMATS: list[Format] = [
     Format(".png", "figure", "a figure", "matplotlib", _matplotlib("png"), "plots", usual=True),
     Format(".svg", "figure", "a figure", "matplotlib", _svg, "plots", usual=True),
     Format(".pdf", "figure", "a figure", "matplotlib", _pdf, "plots"),
+    Format(".pgf", "figure", "a figure", "LaTeX", _pgf, "plots"),
     Format(".gif", "animation", "an animation", "Pillow", _gif, "plots"),
     Format(".html", "page", "a replay page", "gms-fsm", _html, "replay", usual=True),
 ]
@@ -196,7 +203,7 @@ def endings(*subjects: Subject, usual: bool = False) -> list[str]:
     Examples
     --------
     >>> endings("figure")
-    ['.png', '.svg', '.pdf']
+    ['.png', '.svg', '.pdf', '.pgf']
     """
     return [each.ending for each in of(*subjects) if each.usual or not usual]
 
@@ -241,7 +248,7 @@ def listed(*subjects: Subject) -> str:
     Examples
     --------
     >>> listed("figure")
-    '.png, .svg or .pdf'
+    '.png, .svg, .pdf or .pgf'
     >>> listed("graph", "chart")
     '.svg, .png, .pdf for a picture or .dot, .gv for DOT text or .mmd for Mermaid text'
     """
@@ -288,7 +295,7 @@ def chosen(path: str | Path, *subjects: Subject) -> Format:
     'matplotlib'
     >>> chosen("a.bmp", "figure")
     Traceback (most recent call last):
-    gms_fsm.errors.ParameterError: path is 'a.bmp'; it must end in .png, .svg or .pdf
+    gms_fsm.errors.ParameterError: path is 'a.bmp'; it must end in .png, .svg, .pdf or .pgf
     """
     path = checked_path("path", path)
     for each in of(*subjects):

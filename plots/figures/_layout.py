@@ -3,28 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
+from itertools import pairwise
 from typing import Any, cast
+
+import numpy as np
 
 from plots._matplotlib import (
     Artist,
+    AutoLocator,
     Axes,
     Axis,
     Bbox,
     Figure,
     FigureCanvasAgg,
+    FixedLocator,
     Legend,
     MaxNLocator,
     RendererBase,
     Text,
     rc_context,
 )
-from plots.presets import SCREEN, current, font, inches, pt, room, settings
+from plots.presets import SCREEN, current, inches, pt, room, settings
 
 __all__ = ["fitted", "legend_below", "low", "narrow", "sheet"]
 
 NARROW = 6.0  # inches of the screen: a narrower figure has one column of panels
-TRIES = 4  # of a layout: folded titles move the panels
+TRIES = 7  # of a layout: folded titles move the panels
 
 
 def narrow() -> bool:
@@ -37,7 +41,9 @@ def low() -> bool:
     return current().height is not None
 
 
-def sheet(wide: float, tall: float, *, layout: str | None = "constrained") -> Figure:
+def sheet(
+    wide: float, tall: float, *, layout: str | None = "constrained", grows: bool = False
+) -> Figure:
     """Return an empty figure.
 
     Parameters
@@ -46,6 +52,8 @@ def sheet(wide: float, tall: float, *, layout: str | None = "constrained") -> Fi
         Inches on the screen. The preset decides the width, and may decide the height.
     layout : str, optional
         Layout engine of matplotlib.
+    grows : bool
+        Whether the figure may be higher than the preset, because it shows a list.
 
     Returns
     -------
@@ -53,7 +61,10 @@ def sheet(wide: float, tall: float, *, layout: str | None = "constrained") -> Fi
         The figure.
     """
     used = current()
-    size = (used.width or inches(wide), used.height or inches(tall))
+    high = inches(tall)
+    if used.height is not None:
+        high = max(used.height, high) if grows else used.height
+    size = (used.width or inches(wide), high)
     return Figure(figsize=size, layout=cast(Any, layout), dpi=used.dpi)
 
 
@@ -77,16 +88,27 @@ def fitted(figure: Figure) -> Figure:
 
 
 def _fit(figure: Figure) -> None:
-    renderer = FigureCanvasAgg(figure).get_renderer()
+    renderer = _renderer(figure)
+    figure.draw_without_rendering()
+    for ax in figure.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            _pinned(axis)
     for _ in range(TRIES):
         figure.draw_without_rendering()
         changed = _head_folded(figure, renderer)
         changed |= _titles_folded(figure, renderer)
         for ax in figure.axes:
-            changed |= any([_thinned(axis, renderer) for axis in (ax.xaxis, ax.yaxis)])
+            changed |= _thinned(ax.xaxis, renderer) | _thinned(ax.yaxis, renderer)
             changed |= _above_legend(ax, renderer)
+            changed |= _label_folded(ax, renderer)
         if not changed:
             break
+
+
+def _renderer(figure: Figure) -> RendererBase:
+    canvas: Any = FigureCanvasAgg(figure)  # half of its methods are untyped
+    found: RendererBase = canvas.get_renderer()
+    return found
 
 
 def _head_folded(figure: Figure, renderer: RendererBase) -> bool:
@@ -137,20 +159,45 @@ def _folded(text: Text, wide: float, renderer: RendererBase) -> bool:
     return True
 
 
+def _pinned(axis: Axis) -> None:
+    """Keep the numbers of an axis: matplotlib chooses them anew whenever it draws.
+
+    By then the preset may no longer be in use.
+    """
+    if isinstance(axis.get_major_locator(), AutoLocator):
+        room_for = int(np.clip(axis.get_tick_space(), 1, 9))
+        axis.set_major_locator(MaxNLocator(room_for, steps=[1, 2, 2.5, 5, 10]))
+
+
 def _thinned(axis: Axis, renderer: RendererBase) -> bool:
     """Show fewer numbers on an axis if they meet."""
     locator = axis.get_major_locator()
     labels = [tick.label1 for tick in axis._update_ticks() if tick.label1.get_visible()]  # type: ignore[attr-defined]
     boxes = [each.get_window_extent(renderer) for each in labels if each.get_text()]
     space = pt(3.0) / 72 * axis.figure.dpi * (axis.axis_name == "x")  # type: ignore[attr-defined]
-    if not any(_meet(a, b, space) for a, b in zip(boxes, boxes[1:], strict=False)):
+    if not any(_meet(a, b, space) for a, b in pairwise(boxes)):
         return False
-    if not isinstance(locator, MaxNLocator) or len(boxes) < 3:
+    if len(boxes) < 3:
         return False
-    axis.set_major_locator(
-        MaxNLocator(max(1, len(boxes) - 2), steps=[1, 2, 2.5, 5, 10], min_n_ticks=2)
-    )
+    if isinstance(locator, FixedLocator):
+        places = np.asarray(axis.get_majorticklocs())
+        texts = [each.get_text() for each in axis.get_majorticklabels()]
+        begin = int(np.argmin(np.abs(places))) % 2  # zero stays
+        axis.set_ticks(places[begin::2], texts[begin::2])
+        return True
+    if not isinstance(locator, MaxNLocator):
+        return False
+    fewer = max(1, min(len(boxes) - 2, round(0.7 * len(boxes))))
+    axis.set_major_locator(MaxNLocator(fewer, steps=[1, 2, 2.5, 5, 10], min_n_ticks=2))
     return True
+
+
+def _label_folded(ax: Axes, renderer: RendererBase) -> bool:
+    """Fold the label of the x axis if it would leave the figure."""
+    box, whole = ax.xaxis.label.get_window_extent(renderer), ax.figure.bbox
+    if whole.x0 <= box.x0 and box.x1 <= whole.x1:
+        return False
+    return _folded(ax.xaxis.label, ax.get_window_extent(renderer).width, renderer)
 
 
 def _meet(a: Bbox, b: Bbox, space: float = 0.0) -> bool:
@@ -193,7 +240,7 @@ def legend_below(
     Legend
         The legend.
     """
-    renderer = FigureCanvasAgg(figure).get_renderer()
+    renderer = _renderer(figure)
     wide = figure.bbox.width - inches(0.1) * figure.dpi
     for columns in range(min(most, len(labels)), 0, -1):
         legend = figure.legend(

@@ -16,7 +16,8 @@ from plots.figures._layout import fitted, legend_below, narrow, sheet
 from plots.figures._parts import element_legend
 from plots.panels._held import Lag
 from plots.panels._shown import checked_window, scaled, shown
-from plots.style import INK, LINE_GREY, RC, REPORTED, TEXT_GREY
+from plots.presets import font, pt, settings
+from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY
 
 __all__ = [
     "FIG3_PHASES",

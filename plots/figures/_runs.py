@@ -25,10 +25,12 @@ from plots.figures._parts import (
 from plots.panels._axes import VECTOR_ROWS
 from plots.panels._cascades import CASCADE
 from plots.panels._shown import checked_window, scaled, shown
-from plots.style import LINE_GREY, PALE_GREY, RC
+from plots.presets import pt, settings
+from plots.style import LINE_GREY, PALE_GREY
 
 __all__ = ["Measured", "cascade_figure", "overview", "ribbons_figure"]
 
+LOW = 2  # panels below each other, on a slide
 MOST_SPANS = 30  # per element: more states are not readable side by side
 
 
@@ -144,7 +146,7 @@ def _add_measured(ax: Axes, loop: Axes, measured: Measured, trace: Trace, window
         measured.t[inside],
         measured.F[inside],
         color=LINE_GREY,
-        linewidth=2.4,
+        linewidth=pt(2.4),
         label="measured",
         rasterized=bool(inside.sum() > VECTOR_ROWS),
     )
@@ -155,7 +157,7 @@ def _add_measured(ax: Axes, loop: Axes, measured: Measured, trace: Trace, window
         factor * (measured.x - trace.x[0]),
         measured.F,
         color=LINE_GREY,
-        linewidth=0.5,
+        linewidth=pt(0.5),
         alpha=0.7,
         rasterized=True,
     )
@@ -192,7 +194,8 @@ def ribbons_figure(
     -------
     Figure
         Left: v, z / s, F and states over time. Middle: the zoom (omitted if nothing ever breaks
-        away and `around` is not given). Right: F against v and x.
+        away and `around` is not given). Right: F against v and x. On a slide there is room for four
+        panels: v and z / s are left out, and with a zoom also what is on the right.
     """
     limits = checked_window(trace, window)
     crowded = window is None and len(trace.transitions) > MOST_SPANS * trace.n
@@ -204,23 +207,13 @@ def ribbons_figure(
     if zoom is None and window is None:
         zoom = panels.cascade_window(trace, around, within=within)
     with rc_context(settings()):
-        figure = sheet(13.2 if zoom else 9.6, 9.2)
-        halves = figure.add_gridspec(1, 2, width_ratios=(2.1, 1) if zoom else (1.3, 1))
-        parts = [figure.add_subfigure(halves[0, column]) for column in (0, 1)]
-        grid = parts[0].subplots(
-            4,
-            2 if zoom else 1,
-            squeeze=False,
-            width_ratios=(1.45, 1) if zoom else None,
-            height_ratios=(1, 1.2, 1.2, 1),
-        )
-        left, right = list(grid[:, 0]), list(parts[1].subplots(2, 1))
-        panels.velocity(left[0], part, window=limits)
-        panels.ratio(left[1], part, window=limits, elements=elements)
-        panels.force(left[2], part, window=limits)
-        panels.ribbons(left[3], part, window=limits, elements=elements)
+        figure, left, middle, right = _ribbon_axes(zoom is not None)
+        if len(left) > LOW:
+            panels.velocity(left[0], part, window=limits)
+            panels.ratio(left[1], part, window=limits, elements=elements)
+        panels.force(left[-2], part, window=limits)
+        panels.ribbons(left[-1], part, window=limits, elements=elements)
         one_time_axis(left)
-        axes = left + right
         second = "first variable" if trace.model.chart.variables else "deflection"
         if "s" in trace.model.chart.inputs:
             second = (
@@ -229,22 +222,53 @@ def ribbons_figure(
         names = ["velocity", second, "friction", "active states"]
         if limits[0] > trace.t[0] and crowded:
             names = [f"{name}, last {limits[1] - limits[0]:.3g} s" for name in names]
+        names = names[-len(left) :]
         if zoom:
-            middle = list(grid[:, 1])
             _cascade_column(middle, trace, zoom, elements)
             for ax in left:
                 ax.axvspan(*zoom, color=PALE_GREY, linewidth=pt(1.0), alpha=0.6, zorder=0)
-            axes = left + middle + right
-            names += _zoom_names(zoom)
-        (lines,) = panels.portrait(right[0], trace, window=window, elements=elements, bar=False)
-        panels.hysteresis(right[1], trace, window=window, elements=elements, slipping=True)
-        assert isinstance(lines, LineCollection)
-        panels.slip_bar(lines, trace, right)
-        letter_panels(axes, [*names, "friction against velocity", "hysteresis"])
-        parts[0].align_ylabels(left)
+            names += _zoom_names(zoom)[-len(middle) :]
+        if right:
+            (lines,) = panels.portrait(right[0], trace, window=window, elements=elements, bar=False)
+            panels.hysteresis(right[1], trace, window=window, elements=elements, slipping=True)
+            assert isinstance(lines, LineCollection)
+            panels.slip_bar(lines, trace, right)
+            names += ["friction against velocity", "hysteresis"]
+        letter_panels([*left, *middle, *right], names)
+        figure.align_ylabels(left)
         figure.suptitle(head(trace, title), x=0.01, ha="left")
-        element_legend(figure, left[1], left[3])
+        element_legend(figure, *left[1:4:2])
     return fitted(figure)
+
+
+def _ribbon_axes(zoom: bool) -> tuple[Figure, list[Axes], list[Axes], list[Axes]]:
+    """Return an empty figure and its panels: over time, of the zoom, and F against v and x.
+
+    On a slide there is room for four panels.
+    """
+    rows = LOW if low() else 4
+    heights = (1, 1.2, 1.2, 1)[:rows]
+    if narrow() and not low():
+        figure = sheet(4.2, 11.3 if zoom else 7.4)
+        count = 2 * rows if zoom else rows
+        halves = figure.add_gridspec(2, 1, height_ratios=(count, 1.8))
+        column = list(figure.add_subfigure(halves[0, 0]).subplots(count, 1))
+        pair = list(figure.add_subfigure(halves[1, 0]).subplots(1, 2))
+        return figure, column[:rows], column[rows:], pair
+    figure = sheet(13.2 if zoom else 9.6, 9.2)
+    beside = not (zoom and low())
+    halves = figure.add_gridspec(
+        1, 1 + beside, width_ratios=(2.1 if zoom else 1.3, 1)[: 1 + beside]
+    )
+    grid = figure.add_subfigure(halves[0, 0]).subplots(
+        rows,
+        2 if zoom else 1,
+        squeeze=False,
+        width_ratios=(1.45, 1) if zoom else None,
+        height_ratios=heights,
+    )
+    right = list(figure.add_subfigure(halves[0, 1]).subplots(2, 1)) if beside else []
+    return figure, list(grid[:, 0]), list(grid[:, 1]) if zoom else [], right
 
 
 def cascade_figure(
@@ -280,11 +304,14 @@ def cascade_figure(
     limits = checked_window(trace, zoom)
     with rc_context(settings()):
         figure = sheet(6.4, 9.2)
-        if low():  # two columns
+        if low():  # two columns, with a time axis each
             axes = list(figure.subplots(2, 2, height_ratios=(1.2, 1)).T.ravel())
+            _cascade_column(axes, trace, limits, elements)
+            axes[1].set_xlabel(axes[3].get_xlabel())
+            axes[1].tick_params(labelbottom=True)
         else:
             axes = list(figure.subplots(4, 1, height_ratios=(1, 1.2, 1.2, 1)))
-        _cascade_column(axes, trace, limits, elements)
+            _cascade_column(axes, trace, limits, elements)
         names = _zoom_names(limits)
         letter_panels(axes, names if zoom else ["velocity", "margin", "friction", "active states"])
         figure.suptitle(head(trace, title), x=0.01, ha="left")
@@ -296,10 +323,11 @@ def _cascade_column(
     axes: Sequence[Axes], trace: Trace, zoom: Window, elements: Sequence[int] | None
 ) -> None:
     part = shown(trace, zoom)
-    panels.velocity(axes[0], part, window=zoom)
-    panels.margins(axes[1], part, window=zoom, elements=elements)
-    panels.cascade(axes[2], part, window=zoom, elements=elements)
-    panels.ribbons(axes[3], part, window=zoom, elements=elements)
+    if len(axes) > LOW:
+        panels.velocity(axes[0], part, window=zoom)
+        panels.margins(axes[1], part, window=zoom, elements=elements)
+    panels.cascade(axes[-2], part, window=zoom, elements=elements)
+    panels.ribbons(axes[-1], part, window=zoom, elements=elements)
     one_time_axis(axes)
 
 

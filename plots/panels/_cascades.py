@@ -20,6 +20,7 @@ from plots.panels._shown import (
     is_number,
     shown,
 )
+from plots.presets import font, pt
 from plots.style import INK, LINE_GREY, PAPER
 
 __all__ = ["cascade", "cascade_window", "margins", "marks"]
@@ -121,7 +122,7 @@ def marks(
     begin, end = checked_window(trace, window)
     log = _in_window(trace, (begin, end), checked_elements(trace, elements))
     drawn: Artists = [
-        ax.axvline(t, linewidth=0.9, zorder=1, **element_look(int(i), trace.n))
+        ax.axvline(t, linewidth=pt(0.9), zorder=1, **element_look(int(i), trace.n))
         for t, i in zip(log.t.tolist(), log.element.tolist(), strict=True)
     ]
     if not labels or not end > begin:
@@ -214,7 +215,7 @@ def margins(
                 factor * (1 - np.abs(mine.z / mine.s)),
                 "o",
                 color=element_look(i, trace.n)["color"],
-                markersize=4,
+                markersize=pt(4),
                 clip_on=False,
                 zorder=4,
             )

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from plots._matplotlib import Axes, LogLocator
 from plots.panels._axes import Artists, draw_curve, time_axis
+from plots.presets import pt
 from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY, compared_look
 
 __all__ = ["lag_between_ticks", "lag_over_period", "lag_over_time"]
@@ -103,7 +104,7 @@ def lag_between_ticks(ax: Axes, lags: Sequence[Lag], *, window: tuple[float, flo
         both = np.column_stack([lag.force[shown], lag.before[shown]]).ravel()
         lines += ax.plot(MILLI * (t - window[0]), MILLI * both, **compared_look(number))
         ink = compared_look(number)["color"]
-        ax.plot(MILLI * (begin - window[0]), MILLI * lag.force[shown], "o", color=ink, ms=4)
+        ax.plot(MILLI * (begin - window[0]), MILLI * lag.force[shown], "o", color=ink, ms=pt(4))
     ax.set(
         xlabel=f"t − {window[0]:g} s [ms]",
         ylabel="difference of F [mN]",

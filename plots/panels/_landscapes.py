@@ -31,6 +31,7 @@ from plots._window import Window
 from plots.panels._axes import Artists
 from plots.panels._line_names import LineNames, NamedLine
 from plots.panels._shown import checked_row, checked_window, one_element, scaled, shown
+from plots.presets import font, pt
 from plots.style import (
     EDGE_COLOURS,
     EDGE_HATCHES,
@@ -213,7 +214,7 @@ def landscape(
     around = path_window(trace, plane.row, element) if window is None else window
     drawn += _path(ax, trace, plane, element, checked_window(trace, around), view, names)
     here = plane.here[0], view.factor * plane.here[1]
-    (dot,) = ax.plot(*here, "o", color=VERMILION, markersize=8, markeredgecolor=PAPER, zorder=8)
+    (dot,) = ax.plot(*here, "o", color=VERMILION, markersize=pt(8), markeredgecolor=PAPER, zorder=8)
     names.avoid.append(here)
     return [*drawn, dot, names]
 

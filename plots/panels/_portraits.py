@@ -14,6 +14,7 @@ from plots._matplotlib import Axes, BoundaryNorm, LineCollection, ListedColormap
 from plots._window import Window
 from plots.panels._axes import VECTOR_ROWS, Artists, draw_curve, log_axis
 from plots.panels._shown import checked_elements, scaled, shown
+from plots.presets import pt
 from plots.style import INK, compared_look, ramp
 
 __all__ = ["arrows", "hysteresis", "portrait", "slip_bar"]

@@ -122,7 +122,7 @@ def _lane(ax: Axes, each: Explanation, number: int, y: float) -> Artists:
     name = f"{each.priority}  {each.edge.name} → {each.edge.target}"
     verdict = _verdict(each)
     size = 9.0 if len(name) + len(verdict) < LONGEST else 9.0 * LONGEST / (len(name) + len(verdict))
-    look: Any = {"va": "center", "fontsize": size}
+    look: Any = {"va": "center", "fontsize": font(size)}
     drawn.append(ax.text(-0.82, y, name, color=INK, **look))
     drawn.append(ax.text(1.03, y, verdict, ha="right", color=colour, **look))
     back = held_back_by(each)

@@ -11,6 +11,7 @@ from plots._matplotlib import Axes, RendererBase, Text
 from plots._window import Window
 from plots.panels._axes import VECTOR_ROWS, Artists, time_axis
 from plots.panels._shown import checked_elements, checked_window
+from plots.presets import font, pt
 from plots.style import INK, PAPER, state_look
 
 __all__ = ["ribbons"]

@@ -19,6 +19,7 @@ from plots._matplotlib import Axes, Rectangle
 from plots._window import Window
 from plots.panels._axes import Artists
 from plots.panels._shown import checked_elements, checked_window, is_number, scaled
+from plots.presets import font, inches, pt
 from plots.style import INK, LINE_GREY, PAPER, TEXT_GREY, state_look
 
 __all__ = ["Unfolded", "unfolded", "unfolded_force", "unfolded_states"]
@@ -249,7 +250,7 @@ def unfolded_force(ax: Axes, part: Unfolded) -> Artists:
             ax.annotate(
                 text,
                 (each.left + 0.5, factor * each.F),
-                (0, 4),
+                (0, pt(4)),
                 textcoords="offset points",
                 ha="center",
                 va="bottom",
@@ -299,7 +300,7 @@ def unfolded_states(ax: Axes, part: Unfolded) -> Artists:
     """
     chart, count = part.trace.model.chart, len(part.elements)
     wide = column_width(ax.get_window_extent().width / ax.figure.dpi, part)
-    tall = ax.get_window_extent().height / ax.figure.dpi / count
+    tall = ax.get_window_extent().height / inches(ax.figure.dpi) / count
     cells: Artists = []
     drawn: Artists = []
     firsts = [part.of(instant)[0] for instant in range(part.times.size)]
@@ -332,7 +333,7 @@ def unfolded_states(ax: Axes, part: Unfolded) -> Artists:
     ax.spines[:].set_visible(False)
     ax.set_xlabel(
         "micro-step at each instant (0: before the first firing); time",
-        labelpad=20 if part.times.size == 1 else 33,
+        labelpad=inches(20 if part.times.size == 1 else 33),
     )
     return [*cells, *drawn, *_times(ax, part), *_breaks(ax, part)]
 
@@ -342,8 +343,8 @@ def _cell(left: float, row: int, mode: int) -> Rectangle:
 
 
 def column_width(wide: float, part: Unfolded) -> float:
-    """Return the width of a column in axes of a width."""
-    return wide / (part.width + 0.2)
+    """Return the width of a column in axes of a width, in inches of the screen."""
+    return wide / inches(part.width + 0.2)
 
 
 def edge_texts(part: Unfolded, wide: float) -> tuple[dict[str, str], bool, float]:
@@ -354,7 +355,7 @@ def edge_texts(part: Unfolded, wide: float) -> tuple[dict[str, str], bool, float
     part : Unfolded
         From `unfolded`.
     wide : float
-        Width of a column, inches.
+        Width of a column, inches of the screen.
 
     Returns
     -------
@@ -382,7 +383,7 @@ def _edge_names(ax: Axes, part: Unfolded, wide: float) -> Artists:
         ax.annotate(
             texts.get(each.edge, "others"),
             (each.left + 0.5, 1.0),
-            (0, 3),
+            (0, pt(3)),
             xycoords=ax.get_xaxis_transform(),
             textcoords="offset points",
             ha="center",
@@ -414,9 +415,14 @@ def _times(ax: Axes, part: Unfolded) -> Artists:
     }
     # The first time is too long to stand between the others.
     low = -31 if texts else -18
-    first = ax.annotate(f"t = {part.times[0]:.9g} s", (0.0, 0.0), (0, low), ha="left", **look)
+    first = ax.annotate(
+        f"t = {part.times[0]:.9g} s", (0.0, 0.0), (0, inches(low)), ha="left", **look
+    )
     between = zip(places, texts, strict=True)
-    return [first, *(ax.annotate(u, (x, 0.0), (0, -18), ha="center", **look) for x, u in between)]
+    return [
+        first,
+        *(ax.annotate(u, (x, 0.0), (0, inches(-18)), ha="center", **look) for x, u in between),
+    ]
 
 
 def _breaks(ax: Axes, part: Unfolded) -> Artists:
