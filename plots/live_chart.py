@@ -143,7 +143,7 @@ class LiveChart:
             values=self._value_rows(None),
             foot=f"t = {WIDEST} s" if values else "",
         )
-        self.root = _plain_tree(picture(graph, "svg"))
+        self.root = plain_tree(picture(graph, "svg"))
         self.root.set("style", f"background:{self._sheet.colours.paper}")
         groups = {group.get("id", ""): group for group in self.root.iter("g")}
         self._parts = {i: _ElementParts(self._sheet, i, groups) for i in self.elements}
@@ -379,7 +379,7 @@ def _truth(part: Condition, values: Mapping[str, float]) -> bool | None:
 
 
 # --------------------------------------------------------------------------- reading the SVG
-def _plain_tree(picture: bytes) -> ElementTree.Element:
+def plain_tree(picture: bytes) -> ElementTree.Element:
     """Read an SVG; its namespace becomes an attribute, so that tags stay short."""
     root = ElementTree.fromstring(picture)
     for node in root.iter():
