@@ -63,30 +63,37 @@ def excited(model: Model, velocity: str | None, t_end: float | None) -> Excited:
     if velocity is not None and t_end is not None:
         return Excited(simulate(model, Prescribed(velocity), t_end), f"v(t) = {velocity} m/s")
     pulled = model.chart.locks or model.chart.sets_velocity
-    before, best = 0.0, 0.0
+    found, before = [], 0.0
     for step in range(TRIES):
         amplitude = SMALLEST * FACTOR**step
-        trace = _run(model, amplitude, CYCLES / 2, pulled=pulled)
+        trace = _run(model, amplitude, 1.0, pulled=pulled)
         if trace is None:
             break
+        found.append(amplitude)
         if pulled:
-            enough = bool(np.ptp(trace.x) > 2 * MOVES * amplitude)
+            acts = float(np.nanmax(np.abs(trace.F))) > 0
+            enough = acts and bool(np.ptp(trace.x) > 2 * MOVES * amplitude)
+        elif model.chart.transitions:
+            enough = np.unique(trace.transitions.element).size == model.n
         else:
-            force = float(np.nanmax(np.abs(trace.F)))
-            enough = 0 < force < SATURATED * before
-            before = force
-        best = amplitude if before > 0 or pulled else 0.0
+            force = _at_rest(trace)
+            enough, before = 0 < force < SATURATED * before, force
         if enough:
             break
-    for amplitude in (2 * best, best, best / FACTOR):
-        trace = _run(model, amplitude, CYCLES, pulled=pulled) if amplitude else None
-        if trace is not None:
+    for amplitude in reversed(found[-2:]):
+        trace = _run(model, amplitude, CYCLES, pulled=pulled)
+        if trace is not None and np.nanmax(np.abs(trace.F)) > 0:
             return Excited(trace, _about(amplitude, pulled=pulled))
+    largest = SMALLEST * FACTOR ** (TRIES - 1)
     raise ParameterError(
-        f"no sine between {SMALLEST:g} and {SMALLEST * FACTOR ** (TRIES - 1):.2g} m gives a loop of "
-        f"{model.title}",
+        f"no sine between {SMALLEST:g} and {largest:.2g} m gives a loop of {model.title}",
         advice="give velocity, for example '0.1*cos(t)', and t_end",
     )
+
+
+def _at_rest(trace: Trace) -> float:
+    """Return the force at the second turning point, where v is 0 and nothing viscous acts."""
+    return float(abs(np.interp(0.75 * PERIOD, trace.t, trace.F)))
 
 
 def _run(model: Model, amplitude: float, cycles: float, *, pulled: bool) -> Trace | None:

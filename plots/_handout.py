@@ -26,7 +26,7 @@ from plots import formats, panels, presets
 from plots._excitation import Excited, excited
 from plots._mathtext import Formulas, formula
 from plots._matplotlib import Axes, Figure, FigureCanvasAgg, rc_context
-from plots._svg_artists import WIDE, drawn
+from plots._svg_artists import drawn, smallest
 from plots.live_chart import plain_tree
 from plots.render import picture
 from plots.statechart import statechart
@@ -40,8 +40,9 @@ INNER = PAGE[0] - 2 * MARGIN
 SMALLEST, TEXT, HEAD, TITLE = 7.0, 8.0, 9.5, 16.0
 LEAD = 1.35  # height of a line, in sizes of its text
 LETTER = 0.56  # width of a letter, in sizes of its text; of most letters, so that lines fit
-LOOP = (196.0, 178.0)  # the loop with its labels
-CHART_TEXT = 10.0  # of the charts that Graphviz draws
+LOOP, HIGHEST = (236.0, 178.0), 250.0  # the loop with its labels; it fills what is left
+SHORT = 26  # letters: a table with longer values has the whole width
+LARGEST = 1.2  # the largest scale of a chart
 SIZES = presets.Preset("handout", None, None, TEXT, SMALLEST, 1.0, 150.0)
 
 
@@ -107,29 +108,28 @@ def handout_figure(
         foot = _foot(page, model)
         equations = _equations(model)
         rows = _rows(model)
-        beside = size[0] <= INNER - LOOP[0] - GAP
         high = _equations_height(page, equations)
-        wide = INNER if beside else INNER - LOOP[0] - GAP
+        beside = max(len(row[1]) for row in [*rows, HEADS]) <= SHORT
+        wide = INNER - LOOP[0] - GAP if beside else INNER
         table = _table_height(rows, wide)
-        lower = table if beside else max(table, LOOP[1])
-        tall = top - foot - high - lower - 3 * GAP
-        scale = min(1.0, (INNER - (LOOP[0] + GAP) * beside) / size[0], tall / size[1])
-        if scale * WIDE * CHART_TEXT < SMALLEST:
+        lower = max(table, LOOP[1]) if beside else table + GAP + LOOP[1]
+        scale = min(LARGEST, INNER / size[0], (top - foot - high - lower - 3 * GAP) / size[1])
+        letters = scale * smallest(root)
+        if letters < SMALLEST:
             raise ParameterError(
                 f"{model.title} does not fit on one A4 page: its chart would have letters of "
-                f"{scale * WIDE * CHART_TEXT:.1f} pt",
+                f"{max(0.0, letters):.1f} pt",
                 advice="write the chart with plots.render, and the loop with plots.phase",
             )
-        used = max(scale * size[1], LOOP[1] if beside else 0.0)
-        left = MARGIN if beside else MARGIN + (INNER - scale * size[0]) / 2
-        _draw_chart(page, root, (left, top - scale * size[1]), size, scale)
-        if beside:
-            _loop(page, run, (PAGE[0] - MARGIN - LOOP[0], top - LOOP[1]))
+        used = scale * size[1]
+        _draw_chart(page, root, (PAGE[0] / 2 - scale * size[0] / 2, top - used), size, scale)
         _write_equations(page, equations, top - used - GAP)
         top -= used + high + 2 * GAP
         _table(page, rows, top, wide)
         if not beside:
-            _loop(page, run, (PAGE[0] - MARGIN - LOOP[0], top - LOOP[1]))
+            top -= table + GAP
+        tall = min(HIGHEST, top - foot - GAP)
+        _loop(page, run, (PAGE[0] - MARGIN - LOOP[0] if beside else MARGIN, top - tall), tall)
     return figure
 
 
@@ -306,9 +306,9 @@ def _rows(model: Model) -> list[tuple[str, str, str, str]]:
         shared = {**asdict(model.stribeck), "weights": model.weights}
     if "sigma_2" not in names:
         shared["sigma_2"] = model.sigma_2
-    given += [
-        (each, shared[each.name]) for each in (WEIGHTS, *STRIBECK, SIGMA_2) if each.name in shared
-    ]
+    for each in (WEIGHTS, *STRIBECK, SIGMA_2):
+        if each.name in shared:
+            given.append((each, shared[each.name]))
     rows = [(each.name, _written(value), each.unit or "–", each.meaning) for each, value in given]
     inputs: Mapping[str, Any] = getattr(model, "inputs", {})
     return rows + [(name, str(text), "–", "input") for name, text in inputs.items()]
@@ -365,10 +365,9 @@ def _table(page: _Page, rows: Sequence[tuple[str, str, str, str]], top: float, w
 
 
 # --------------------------------------------------------------------------- the loop
-def _loop(page: _Page, run: Excited, at: tuple[float, float]) -> None:
+def _loop(page: _Page, run: Excited, at: tuple[float, float], tall: float) -> None:
     """Draw F over x, and say what moves the contact."""
-    x, y = at
-    wide, tall = LOOP
+    (x, y), wide = at, LOOP[0]
     page.text(x, y + tall, "Hysteresis", HEAD, fontweight="bold")
     lines = [part for line in run.about.split("\n") for part in _lines(line, SMALLEST, wide)]
     top = tall - HEAD * LEAD - 2
