@@ -18,6 +18,7 @@ __all__ = ["Excited", "excited"]
 PERIOD, CYCLES = 10.0, 2.25  # s; the first quarter leaves the origin
 SMALLEST, FACTOR, TRIES = 1e-7, 4.0, 14  # m: amplitudes that are tried, up to 6.7 m
 SATURATED = 1.6  # growth of F by FACTOR times the amplitude; an elastic contact has FACTOR
+PEAK = 1e3  # of the 90 % quantile of F
 MOVES = 0.3  # of the amplitude of the spring's end: a body that slips
 MASS, STIFFNESS = 1.0, 2.0  # kg, N/m
 
@@ -80,15 +81,23 @@ def excited(model: Model, velocity: str | None, t_end: float | None) -> Excited:
             enough, before = 0 < force < SATURATED * before, force
         if enough:
             break
-    for amplitude in reversed(found[-2:]):
+    smaller = ""
+    for amplitude in reversed(found):
         trace = _run(model, amplitude, CYCLES, pulled=pulled)
-        if trace is not None and np.nanmax(np.abs(trace.F)) > 0:
-            return Excited(trace, _about(amplitude, pulled=pulled))
+        if trace is not None and _bounded(trace):
+            return Excited(trace, _about(amplitude, pulled=pulled) + smaller)
+        smaller = "; F grows without limit if A is four times as large"
     largest = SMALLEST * FACTOR ** (TRIES - 1)
     raise ParameterError(
         f"no sine between {SMALLEST:g} and {largest:.2g} m gives a loop of {model.title}",
         advice="give velocity, for example '0.1*cos(t)', and t_end",
     )
+
+
+def _bounded(trace: Trace) -> bool:
+    """Return whether there is a force, and it does not run away, as the published law may do."""
+    forces = np.abs(trace.F[np.isfinite(trace.F)])
+    return 0 < float(forces.max()) < PEAK * float(np.quantile(forces, 0.9))
 
 
 def _at_rest(trace: Trace) -> float:

@@ -374,7 +374,7 @@ def _loop(page: _Page, run: Excited, at: tuple[float, float], tall: float) -> No
     for line in lines:
         page.text(x, y + top, line, SMALLEST, color=TEXT_GREY)
         top -= SMALLEST * LEAD
-    ax = page.axes(x + 38, y + 28, wide - 44, top - 28 - 6)
+    ax = page.axes(x + 38, y + 28, wide - 44, top - 28 - 14)
     panels.hysteresis(ax, run.trace)
     ax.tick_params(labelsize=SMALLEST)
     ax.locator_params(axis="x", nbins=4)
