@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 import plots
@@ -40,7 +41,7 @@ from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.broken import BROKEN
 from plots import figures, panels
 from plots.schematic import schematic_figure
-from plots.style import INK, LINE_GREY, PAPER, RC, TEXT_GREY
+from plots.style import INK, LINE_GREY, PAPER, RC, TEXT_GREY, ramp
 
 FOLDER = Path(__file__).parent / "images"
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -142,13 +143,14 @@ def element_figure() -> Figure:
         panels.ratio(ratio, trace)
         panels.force(force, trace)
         panels.ribbons(states, trace)
-        for ax, title in (
-            (velocity, "a) the slider moves back and forth"),
-            (ratio, "b) deflection over threshold"),
-            (force, "c) force"),
-            (states, "d) state"),
-        ):
-            ax.set_title(title)
+        named = (
+            (velocity, "the slider moves back and forth"),
+            (ratio, "deflection over threshold"),
+            (force, "force"),
+            (states, "state"),
+        )
+        for letter, (ax, title) in zip("abcd", named, strict=True):
+            panels.lettered(ax, letter, title)
             if ax is not states:
                 ax.set_xlabel("")
                 ax.tick_params(labelbottom=False)
@@ -164,8 +166,8 @@ def microstep_figure(trace: Trace) -> Figure:
         over_time, by_step = figure.subplots(1, 2, width_ratios=(1, 1.5))
         t = float(log.t[0])
         panels.force(over_time, trace, window=(t - 1.5, t + 1.5))
-        over_time.set_title("a) over time: one jump of F")
-        by_step.set_title(f"b) at t = {t:.4f} s: four firings, five rows")
+        panels.lettered(over_time, "a", "over time: one jump of F")
+        panels.lettered(by_step, "b", f"at t = {t:.4f} s: four firings, five rows")
         by_step.plot(trace.microstep[rows], trace.F[rows], "o--", color=INK, markersize=6)
         for record, number in zip(log, range(1, 5), strict=True):
             by_step.annotate(
@@ -344,7 +346,9 @@ def sweep_figure() -> Figure:
     with rc_context(RC):
         figure = Figure(figsize=(6.0, 3.8), layout="constrained")
         ax = figure.subplots()
-        image = ax.pcolormesh(speed, v_s, counts, cmap="cividis", rasterized=True)
+        image = ax.pcolormesh(
+            speed, v_s, counts, cmap=ListedColormap(ramp("heat", 256)), rasterized=True
+        )
         ax.set(yscale="log", xlabel="pulling speed [m/s]", ylabel="v_s [m/s]")
         ax.set_title(f"arrests in 60 s, {len(result):,} runs; signed law")
         figure.colorbar(image, label="arrests")

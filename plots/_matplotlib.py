@@ -13,7 +13,7 @@ from gms_fsm._extras import require
 require("matplotlib", "plots")
 require("PIL", "plots")  # comes with matplotlib
 
-from matplotlib import colormaps, patches, rc_context
+from matplotlib import patches, rc_context
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -27,12 +27,13 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Rectangle
 from matplotlib.path import Path as Curve
-from matplotlib.text import Text
-from matplotlib.ticker import AutoLocator, FixedLocator, LogLocator, MaxNLocator, NullLocator
-from matplotlib.transforms import Bbox, IdentityTransform
+from matplotlib.text import Annotation, Text
+from matplotlib.ticker import AutoLocator, LogLocator, MaxNLocator, NullLocator
+from matplotlib.transforms import Bbox, IdentityTransform, ScaledTranslation
 from PIL import Image
 
 __all__ = [
+    "Annotation",
     "Artist",
     "AutoLocator",
     "Axes",
@@ -43,7 +44,6 @@ __all__ = [
     "FancyArrowPatch",
     "Figure",
     "FigureCanvasAgg",
-    "FixedLocator",
     "IdentityTransform",
     "Image",
     "Legend",
@@ -56,8 +56,8 @@ __all__ = [
     "Rectangle",
     "RendererBase",
     "RendererPgf",
+    "ScaledTranslation",
     "Text",
-    "colormaps",
     "patches",
     "rc_context",
     "to_rgb",

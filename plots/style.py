@@ -288,8 +288,7 @@ RC: Any = {  # matplotlib types each key separately
     "axes.spines.right": False,
     "axes.formatter.useoffset": False,  # "-0.1934" is easier to read than an offset of "-1.9e-1"
     "hatch.linewidth": 0.6,
-    "axes.prop_cycle": f"cycler('color', {[ink for ink, *_ in COMPARED]})"
-    f" + cycler('linestyle', {[dash for _, dash, _ in COMPARED]})",
+    "axes.prop_cycle": f"cycler('color', {[ink for ink, *_ in COMPARED]})",
     "text.color": INK,
     "lines.linewidth": 1.2,
     "legend.frameon": False,

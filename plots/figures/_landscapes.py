@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from textwrap import wrap
+from typing import Any
 
 from gms_fsm.errors import ParameterError
 from gms_fsm.inspection._findings import Report
@@ -84,7 +85,7 @@ def landscape(
     >>> run = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.2"), 3.0)
     >>> figure = landscape(run, 0, t=1.5)
     >>> [ax.get_title(loc="left") for ax in figure.axes]
-    ['a) guards that leave stick', 'b) race to fire']
+    ['guards that leave stick', 'race to fire']
     """
     check_trace(trace)
     element = one_element(trace, element)
@@ -107,15 +108,18 @@ def landscape(
             panels.pins(left, trace, element, checks, row=row)
         panels.race(right, trace, element, row=row)
         shown = "guards that leave" if plane.edges else "flow of"
-        left.set_title(f"a) {shown} {plane.state}")
-        right.set_title("b) race to fire")
+        panels.lettered(left, "a", f"{shown} {plane.state}")
+        panels.lettered(right, "b", "race to fire")
         looks = [("path before", INK, "-"), ("after", INK, DASHED)]
         handles = [Line2D([], [], color=c, linestyle=dash, label=n) for n, c, dash in looks]
         if plane.threshold is not None:
             handles.append(
                 Line2D([], [], color=LINE_GREY, linewidth=pt(5), alpha=0.45, label="±s(v)")
             )
-        legend = left.legend(handles=handles, loc="lower right", bbox_to_anchor=(1, 1), ncols=3)
+        close: Any = {"handlelength": 1.4, "columnspacing": 1.0} if low() else {}
+        legend = left.legend(
+            handles=handles, loc="lower right", bbox_to_anchor=(1, 1), ncols=3, **close
+        )
         if room(WIDTH) < WIDTH:  # it may be wider than the panel
             legend.set_loc("lower left")
             legend.set_bbox_to_anchor((0, 1), left.transAxes)

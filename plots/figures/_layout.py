@@ -16,13 +16,13 @@ from plots._matplotlib import (
     Bbox,
     Figure,
     FigureCanvasAgg,
-    FixedLocator,
     Legend,
     MaxNLocator,
     RendererBase,
     Text,
     rc_context,
 )
+from plots.panels._titles import lettered
 from plots.presets import SCREEN, current, inches, pt, room, settings
 
 __all__ = ["fitted", "legend_below", "low", "narrow", "sheet"]
@@ -125,7 +125,8 @@ def _titles_folded(figure: Figure, renderer: RendererBase) -> bool:
     changed = False
     boxes = {ax: ax.get_tightbbox(renderer) for ax in figure.axes}
     for ax in figure.axes:
-        title = ax.title if ax.title.get_text() else ax._left_title  # type: ignore[attr-defined]
+        title = ax._left_title  # type: ignore[attr-defined]
+        title = title if title.get_text() else ax.title
         if not title.get_text():
             continue
         mine = ax.get_window_extent(renderer)
@@ -164,7 +165,8 @@ def _pinned(axis: Axis) -> None:
 
     By then the preset may no longer be in use.
     """
-    if isinstance(axis.get_major_locator(), AutoLocator):
+    locator: Any = axis.get_major_locator()
+    if isinstance(locator, AutoLocator) and getattr(locator, "_nbins", 0) == "auto":
         room_for = int(np.clip(axis.get_tick_space(), 1, 9))
         axis.set_major_locator(MaxNLocator(room_for, steps=[1, 2, 2.5, 5, 10]))
 
@@ -172,21 +174,20 @@ def _pinned(axis: Axis) -> None:
 def _thinned(axis: Axis, renderer: RendererBase) -> bool:
     """Show fewer numbers on an axis if they meet."""
     locator = axis.get_major_locator()
-    labels = [tick.label1 for tick in axis._update_ticks() if tick.label1.get_visible()]  # type: ignore[attr-defined]
-    boxes = [each.get_window_extent(renderer) for each in labels if each.get_text()]
+    ticks = [each for each in axis._update_ticks() if each.label1.get_visible()]  # type: ignore[attr-defined]
+    ticks = [each for each in ticks if each.label1.get_text()]
+    boxes = [each.label1.get_window_extent(renderer) for each in ticks]
     space = pt(3.0) / 72 * axis.figure.dpi * (axis.axis_name == "x")  # type: ignore[attr-defined]
     if not any(_meet(a, b, space) for a, b in pairwise(boxes)):
         return False
     if len(boxes) < 3:
         return False
-    if isinstance(locator, FixedLocator):
-        places = np.asarray(axis.get_majorticklocs())
-        texts = [each.get_text() for each in axis.get_majorticklabels()]
+    if not isinstance(locator, MaxNLocator):
+        places = np.array([each.get_loc() for each in ticks])
+        texts = [each.label1.get_text() for each in ticks]
         begin = int(np.argmin(np.abs(places))) % 2  # zero stays
         axis.set_ticks(places[begin::2], texts[begin::2])
         return True
-    if not isinstance(locator, MaxNLocator):
-        return False
     fewer = max(1, min(len(boxes) - 2, round(0.7 * len(boxes))))
     axis.set_major_locator(MaxNLocator(fewer, steps=[1, 2, 2.5, 5, 10], min_n_ticks=2))
     return True
@@ -215,7 +216,10 @@ def _above_legend(ax: Axes, renderer: RendererBase) -> bool:
     if box.y0 < ax.get_window_extent(renderer).y1 - 1 or not _meet(box, own):
         return False
     pad = (box.y1 - ax.get_window_extent(renderer).y1) / ax.figure.dpi * 72 + pt(2.0)
-    ax.set_title(title.get_text(), pad=pad)
+    if ax.title.get_text():
+        lettered(ax, ax.title.get_text(), title.get_text(), pad=pad)
+    else:
+        ax.set_title(title.get_text(), pad=pad)
     return True
 
 

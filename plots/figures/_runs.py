@@ -17,14 +17,16 @@ from plots.figures._layout import fitted, low, narrow, sheet
 from plots.figures._parts import (
     element_legend,
     head,
+    lanes_height,
     last_cycles,
     legend_above,
     letter_panels,
     one_time_axis,
+    over_threshold,
 )
-from plots.panels._axes import VECTOR_ROWS
+from plots.panels._axes import MANY, VECTOR_ROWS
 from plots.panels._cascades import CASCADE
-from plots.panels._shown import checked_window, scaled, shown
+from plots.panels._shown import checked_elements, checked_window, scaled, shown
 from plots.presets import pt, settings
 from plots.style import LINE_GREY, PALE_GREY
 
@@ -98,44 +100,49 @@ def overview(
     whole = window is None and begin == trace.t[0]
     part = shown(trace, window)
     left_part = part if whole or window is not None else shown(trace, (begin, end))
+    count = len(checked_elements(trace, elements))
+    tall = [1.6, 1.6, *([1.0] if count > MANY else []), lanes_height(count, 1.6)]  # inches
     with rc_context(settings()):
-        figure, time, (loop, portrait) = _overview_axes()
+        figure, time, (loop, portrait) = _overview_axes(tall)
         panels.velocity(time[0], left_part, window=(begin, end))
         panels.force(time[1], left_part, window=(begin, end))
-        panels.ribbons(time[2], left_part, window=(begin, end), elements=elements)
+        if count > MANY:
+            panels.slipping(time[2], left_part, window=(begin, end), elements=elements)
+        panels.ribbons(time[-1], left_part, window=(begin, end), elements=elements)
         panels.hysteresis(loop, trace, window=window)
         panels.portrait(portrait, part, elements=elements)
         if measured is not None:
             _add_measured(time[1], loop, measured, trace, (begin, end))
         if trace.model.chart.transitions:
-            legend_above(time[2])
-        for ax in time[:2]:
+            legend_above(time[-1])
+        for ax in time[:-1]:
             ax.set_xlabel("")
         note = "" if whole or window is not None else f", last {end - begin:.3g} s"
-        for ax, name in zip(time, ("velocity", "friction", "active states"), strict=True):
-            ax.set_title(name + note)
-        loop.set_title("hysteresis")
-        portrait.set_title("friction against velocity")
+        names = ["velocity", "friction", *(["how many slip"] if count > MANY else [])]
+        names = [name + note for name in (*names, "active states")]
+        letter_panels([*time, loop, portrait], [*names, "hysteresis", "friction against velocity"])
         for ax in (loop, portrait):  # narrow, and labels such as -0.35 are wide
             ax.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
         figure.suptitle(head(trace, title), x=0.01, ha="left")
     return fitted(figure)
 
 
-def _overview_axes() -> tuple[Figure, Sequence[Axes], Sequence[Axes]]:
+def _overview_axes(tall: Sequence[float]) -> tuple[Figure, Sequence[Axes], Sequence[Axes]]:
     """Return an empty figure, its panels over time, and the others: next to or below them."""
     if narrow():
-        figure = sheet(4.2, 8.6)
-        axes = figure.subplots(5, 1, height_ratios=(1, 1, 1, 1.3, 1.3))
-        for ax in axes[1:3]:
-            ax.sharex(axes[0])
-        for ax in axes[:2]:
+        figure = sheet(4.2, sum(tall) + 3.8)
+        axes = figure.subplots(len(tall) + 2, 1, height_ratios=(*tall, 2.0, 2.0))
+        time = axes[:-2]
+        for ax in time[1:]:
+            ax.sharex(time[0])
+        for ax in time[:-1]:
             ax.tick_params(labelbottom=False)
-        return figure, axes[:3], axes[3:]
-    figure = sheet(11.0, 6.6)
+        return figure, time, axes[-2:]
+    figure = sheet(11.0, sum(tall) + 1.8)
     grid = figure.add_gridspec(1, 2, width_ratios=(1.5, 1))
     left, right = (figure.add_subfigure(grid[0, column]) for column in (0, 1))
-    return figure, left.subplots(3, 1, sharex=True), right.subplots(2, 1)
+    over_time = left.subplots(len(tall), 1, sharex=True, height_ratios=tall)
+    return figure, over_time, right.subplots(2, 1)
 
 
 def _add_measured(ax: Axes, loop: Axes, measured: Measured, trace: Trace, window: Window) -> None:
@@ -207,27 +214,24 @@ def ribbons_figure(
     if zoom is None and window is None:
         zoom = panels.cascade_window(trace, around, within=within)
     with rc_context(settings()):
-        figure, left, middle, right = _ribbon_axes(zoom is not None)
+        tall = _heights(len(checked_elements(trace, elements)))
+        figure, left, middle, right = _ribbon_axes(tall, zoom=zoom is not None)
+        second = ""
         if len(left) > LOW:
             panels.velocity(left[0], part, window=limits)
-            panels.ratio(left[1], part, window=limits, elements=elements)
+            second = over_threshold(left[1], part, window=limits, elements=elements)
         panels.force(left[-2], part, window=limits)
         panels.ribbons(left[-1], part, window=limits, elements=elements)
         one_time_axis(left)
-        second = "first variable" if trace.model.chart.variables else "deflection"
-        if "s" in trace.model.chart.inputs:
-            second = (
-                "deflection / threshold" if panels.has_threshold(trace) else "deflection / s(v)"
-            )
         names = ["velocity", second, "friction", "active states"]
         if limits[0] > trace.t[0] and crowded:
             names = [f"{name}, last {limits[1] - limits[0]:.3g} s" for name in names]
         names = names[-len(left) :]
         if zoom:
-            _cascade_column(middle, trace, zoom, elements)
+            margin = _cascade_column(middle, trace, zoom, elements)
             for ax in left:
                 ax.axvspan(*zoom, color=PALE_GREY, linewidth=pt(1.0), alpha=0.6, zorder=0)
-            names += _zoom_names(zoom)[-len(middle) :]
+            names += _zoom_names(zoom, margin)[-len(middle) :]
         if right:
             (lines,) = panels.portrait(right[0], trace, window=window, elements=elements, bar=False)
             panels.hysteresis(right[1], trace, window=window, elements=elements, slipping=True)
@@ -241,25 +245,28 @@ def ribbons_figure(
     return fitted(figure)
 
 
-def _ribbon_axes(zoom: bool) -> tuple[Figure, list[Axes], list[Axes], list[Axes]]:
+def _ribbon_axes(
+    tall: Sequence[float], *, zoom: bool
+) -> tuple[Figure, list[Axes], list[Axes], list[Axes]]:
     """Return an empty figure and its panels: over time, of the zoom, and F against v and x.
 
     On a slide there is room for four panels.
     """
-    rows = LOW if low() else 4
-    heights = (1, 1.2, 1.2, 1)[:rows]
-    if narrow() and not low():
-        figure = sheet(4.2, 11.3 if zoom else 7.4)
-        count = 2 * rows if zoom else rows
-        halves = figure.add_gridspec(2, 1, height_ratios=(count, 1.8))
-        column = list(figure.add_subfigure(halves[0, 0]).subplots(count, 1))
+    rows = LOW if low() else len(tall)
+    heights = list(tall[-rows:])
+    if narrow():
+        column = [0.75 * each for each in heights] * (2 if zoom else 1)
+        figure = sheet(4.2, sum(column) + 2.1 + 0.3 * len(column))
+        halves = figure.add_gridspec(2, 1, height_ratios=(len(column), 1.8))
+        axes = list(
+            figure.add_subfigure(halves[0, 0]).subplots(len(column), 1, height_ratios=column)
+        )
         pair = list(figure.add_subfigure(halves[1, 0]).subplots(1, 2))
-        return figure, column[:rows], column[rows:], pair
-    figure = sheet(13.2 if zoom else 9.6, 9.2)
+        return figure, axes[:rows], axes[rows:], pair
+    figure = sheet(13.2 if zoom else 9.6, sum(tall) + 2.2)
     beside = not (zoom and low())
-    halves = figure.add_gridspec(
-        1, 1 + beside, width_ratios=(2.1 if zoom else 1.3, 1)[: 1 + beside]
-    )
+    widths = (2.1 if zoom else 1.3, 1)[: 1 + beside]
+    halves = figure.add_gridspec(1, len(widths), width_ratios=widths)
     grid = figure.add_subfigure(halves[0, 0]).subplots(
         rows,
         2 if zoom else 1,
@@ -303,17 +310,18 @@ def cascade_figure(
     zoom = window or panels.cascade_window(trace, around, within=within)
     limits = checked_window(trace, zoom)
     with rc_context(settings()):
-        figure = sheet(6.4, 9.2)
+        tall = _heights(len(checked_elements(trace, elements)))
+        figure = sheet(6.4, sum(tall) + 2.2)
         if low():  # two columns, with a time axis each
             axes = list(figure.subplots(2, 2, height_ratios=(1.2, 1)).T.ravel())
-            _cascade_column(axes, trace, limits, elements)
+            margin = _cascade_column(axes, trace, limits, elements)
             axes[1].set_xlabel(axes[3].get_xlabel())
             axes[1].tick_params(labelbottom=True)
         else:
-            axes = list(figure.subplots(4, 1, height_ratios=(1, 1.2, 1.2, 1)))
-            _cascade_column(axes, trace, limits, elements)
-        names = _zoom_names(limits)
-        letter_panels(axes, names if zoom else ["velocity", "margin", "friction", "active states"])
+            axes = list(figure.subplots(4, 1, height_ratios=tall))
+            margin = _cascade_column(axes, trace, limits, elements)
+        names = _zoom_names(limits, margin)
+        letter_panels(axes, names if zoom else ["velocity", margin, "friction", "active states"])
         figure.suptitle(head(trace, title), x=0.01, ha="left")
         element_legend(figure, axes[1], axes[3])
     return fitted(figure)
@@ -321,22 +329,33 @@ def cascade_figure(
 
 def _cascade_column(
     axes: Sequence[Axes], trace: Trace, zoom: Window, elements: Sequence[int] | None
-) -> None:
+) -> str:
+    """Draw the panels of a cascade; return the name of the second one."""
     part = shown(trace, zoom)
+    name = "margin to the threshold"
     if len(axes) > LOW:
         panels.velocity(axes[0], part, window=zoom)
-        panels.margins(axes[1], part, window=zoom, elements=elements)
+        if len(checked_elements(trace, elements)) > MANY:
+            name = over_threshold(axes[1], part, window=zoom, elements=elements)
+        else:
+            panels.margins(axes[1], part, window=zoom, elements=elements)
     panels.cascade(axes[-2], part, window=zoom, elements=elements)
     panels.ribbons(axes[-1], part, window=zoom, elements=elements)
     one_time_axis(axes)
+    return name
 
 
-def _zoom_names(zoom: Window) -> list[str]:
+def _heights(count: int) -> tuple[float, ...]:
+    """Return the heights of velocity, deflections, friction and states, inches."""
+    return 1.6, lanes_height(count, 1.9), 1.9, lanes_height(count, 1.6)
+
+
+def _zoom_names(zoom: Window, margin: str) -> list[str]:
     middle, width = (zoom[0] + zoom[1]) / 2, zoom[1] - zoom[0]
     factor, unit = scaled(np.array([width]), "s")
     return [
         f"velocity, {factor * width:.3g} {unit} at t = {middle:.5g} s",
-        "margin to the threshold",
+        margin,
         "jumps of F (open: before, filled: after)",
         "order of slipping",
     ]

@@ -13,7 +13,7 @@ from plots.figures._layout import fitted, low, sheet
 from plots.figures._parts import head
 from plots.panels._shown import scaled
 from plots.panels._unfolded import FEW, column_width, edge_texts
-from plots.presets import font, inches, room, settings
+from plots.presets import inches, room, settings
 from plots.style import state_look
 
 __all__ = ["unfold"]
@@ -66,7 +66,7 @@ def unfold(
     >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
     >>> from plots.figures import unfold
     >>> run = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.2"), 3.0)
-    >>> states, force = unfold(run, 1.9, 2.1).axes  # four break-aways at t = 2 s
+    >>> force, states = unfold(run, 1.9, 2.1).axes  # four break-aways at t = 2 s
     >>> [label.get_text() for label in states.get_xticklabels()]
     ['0', '1', '2', '3', '4']
     """
@@ -83,16 +83,15 @@ def unfold(
         height = figure.get_figheight() / inches(1)
         tall = height - above - BELOW
         left, broad = (SIDES - 0.15) / wide, 1 - SIDES / wide
-        states = figure.add_axes((left, BELOW / height, broad, tall / height))
-        panels.unfolded_states(states, part)
-        letter = ""
+        letters = iter("ab")
         if not low():
             force = figure.add_axes((left, 1 - (TOP + FORCE) / height, broad, FORCE / height))
             panels.unfolded_force(force, part)
-            force.set_title("a) F before and after each firing")
-            letter = "b) "
-        place = left, (BELOW + tall + head_room + 0.14) / height
-        figure.text(*place, f"{letter}who fires, and by which edge", fontsize=font(9.5))
+            panels.lettered(force, next(letters), "F before and after each firing")
+        states = figure.add_axes((left, BELOW / height, broad, tall / height))
+        panels.unfolded_states(states, part)
+        up = inches(72 * (head_room + 0.12))  # points
+        panels.lettered(states, next(letters), "who fires, and by which edge", pad=up)
         shown = sorted({mode for each in part.columns for mode in each.modes})
         handles = [_swatch(mode, names[mode]) for mode in shown]
         figure.legend(handles=handles, loc="lower left", ncols=6)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,12 @@ from numpy.typing import NDArray
 from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Artist, Axes, MaxNLocator
 from plots.panels._shown import scaled
+from plots.presets import font
 from plots.style import ELEMENT_DASHES, TEXT_GREY, element_colour
 
 Artists = list[Artist]
 
+MANY = 6  # more elements are drawn as rows and counted, not as curves
 VECTOR_ROWS = 6_000  # longer curves are rasterized in an SVG or PDF, which keeps the file small
 
 
@@ -66,6 +69,16 @@ def log_axis(ax: Axes, values: NDArray[np.float64], axis: str) -> None:
     low = max(float(positive.min()) if positive.size else 0.1, 1e-6 * top)
     limits = (0.8 * low, 1.25 * top)
     ax.set(**{f"{axis}scale": "log", f"{axis}lim": limits})
+
+
+def lanes(ax: Axes, elements: Sequence[int]) -> None:
+    """Label the rows of a panel with one row per element, the first one on top."""
+    ax.set(
+        ylim=(len(elements) + 0.5, 0.5),
+        yticks=range(1, len(elements) + 1),
+        yticklabels=[f"E{i + 1}" for i in elements],
+    )
+    ax.tick_params(axis="y", length=0, labelsize=font(9 if len(elements) <= MANY else 8))
 
 
 def note(ax: Axes, text: str) -> Artist:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError, SignalError
@@ -207,7 +208,7 @@ def landscape(
     _speed_ticks(ax, view)
     v, z = grid_of(ax, view, GRID)
     names = LineNames(ax)
-    drawn: Artists = _regions(ax, plane, v, z, view.factor)
+    drawn: Artists = _regions(ax, plane, v, z, view.factor, names)
     drawn += _flow(ax, trace, plane, view)
     drawn += _clauses(ax, plane, v, z, view.factor, names)
     drawn += _threshold(ax, plane, v, view.factor, names)
@@ -244,8 +245,10 @@ def _speed_ticks(ax: Axes, view: View) -> None:
     ax.xaxis.set_minor_locator(NullLocator())
 
 
-def _regions(ax: Axes, plane: Plane, v: Floats, z: Floats, factor: float) -> Artists:
-    """Draw where each guard is true."""
+def _regions(
+    ax: Axes, plane: Plane, v: Floats, z: Floats, factor: float, names: LineNames
+) -> Artists:
+    """Draw where each guard is true, with the number of its edge as in the race to fire."""
     drawn: Artists = []
     for number, edge in enumerate(plane.edges):
         inside = plane.truths(plane.chart.guards[edge.name], v, z)
@@ -262,7 +265,18 @@ def _regions(ax: Axes, plane: Plane, v: Floats, z: Floats, factor: float) -> Art
         lines.set(facecolor="none", edgecolor=to_rgb(colour) + (0.5,), linewidth=0.0)
         lines.set_label(edge.name)
         drawn.append(lines)
+        row, column = np.unravel_index(_depth(inside).argmax(), inside.shape)
+        place = float(v[0, column]), factor * float(z[row, 0])
+        box = {"boxstyle": "circle,pad=0.25", "facecolor": PAPER, "edgecolor": colour}
+        look = {"ha": "center", "va": "center", "fontsize": font(8), "fontweight": "bold"}
+        drawn.append(ax.text(*place, str(number + 1), color=INK, bbox=box, zorder=7, **look))
+        names.avoid.append(place)
     return drawn
+
+
+def _depth(inside: NDArray[np.bool_]) -> Floats:
+    """Return how far each point is inside a region, in points of the grid."""
+    return np.asarray(distance_transform_edt(np.pad(inside, 1)))[1:-1, 1:-1]
 
 
 def _clauses(

@@ -106,6 +106,7 @@ def deflections(
     *,
     window: Window | None = None,
     elements: Sequence[int] | None = None,
+    scale: tuple[float, str] | None = None,
 ) -> Artists:
     """Draw z_i(t) of every element, or the chart's first variable if it has another name.
 
@@ -119,6 +120,9 @@ def deflections(
         Time interval to show, s.
     elements : sequence of int, optional
         Which elements, counted from 0; by default all.
+    scale : (float, str), optional
+        Factor and title of the axis, for panels that are compared; by default those that suit the
+        run.
 
     Returns
     -------
@@ -130,7 +134,7 @@ def deflections(
         time_axis(ax, *checked_window(trace, window))
         return [note(ax, NO_VARIABLE)]
     part = shown(trace, window)
-    factor, title = first_variable(trace, part.z[:, chosen])
+    factor, title = first_variable(trace, part.z[:, chosen]) if scale is None else scale
     name = trace.model.chart.variables[0]
     lines: Artists = []
     for i in chosen:

@@ -13,12 +13,19 @@ from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Axes, BoundaryNorm, LineCollection, ListedColormap
 from plots._window import Window
 from plots.panels._axes import VECTOR_ROWS, Artists, draw_curve, log_axis
+from plots.panels._many import place_of
 from plots.panels._shown import checked_elements, scaled, shown
 from plots.presets import pt
-from plots.style import INK, compared_look, ramp
+from plots.style import INK, LINE_GREY, TEXT_GREY, ramp
 
 __all__ = ["arrows", "hysteresis", "portrait", "slip_bar"]
 
+# Phases; the third one may cover itself many times.
+PHASES: tuple[dict[str, Any], ...] = (
+    {"color": INK, "linestyle": "-", "linewidth": pt(1.6)},
+    {"color": TEXT_GREY, "linestyle": "--", "linewidth": pt(1.6)},
+    {"color": LINE_GREY, "linestyle": "-", "linewidth": pt(0.9)},
+)
 MOST_ARROWS = 500  # looked at along one path
 OVERLAP, REPEATED = 0.22, 0.7  # inches between arrows, and between those of the same direction
 SHAFT = 0.05  # inches of the path whose direction an arrow has
@@ -73,12 +80,10 @@ def slip_bar(lines: LineCollection, trace: Trace, axes: Axes | Sequence[Axes]) -
     norm = lines.norm
     assert isinstance(norm, BoundaryNorm)
     most = norm.N - 2
-    ticks = range(0, most + 1, 1 + most // 10)
+    step = 1 + most // 10
+    ticks = [*range(0, most - step // 2, step), most]
     bar = first.figure.colorbar(lines, ax=axes, ticks=ticks, aspect=30, fraction=0.05)
-    default = chart.default_state.name
-    others = [state.name for state in chart.states if state.name != default]
-    place = f"in {others[0]}" if len(others) == 1 else f"not in {default}"
-    bar.set_label(f"elements {place}")
+    bar.set_label(f"elements {place_of(trace)}")
     bar.ax.tick_params(length=0)
     bar.ax.minorticks_off()
 
@@ -137,6 +142,7 @@ def hysteresis(
     window: Window | None = None,
     elements: Sequence[int] | None = None,
     slipping: bool = False,
+    scale: tuple[float, str] | None = None,
 ) -> Artists:
     """Draw F against x, in one colour, in phases, or by the number of elements slipping.
 
@@ -154,6 +160,8 @@ def hysteresis(
         Elements that are counted with `slipping`; by default all.
     slipping : bool
         Colour as in `portrait`, instead of phases.
+    scale : (float, str), optional
+        Factor and unit of x, for panels that are compared; by default those that suit the run.
 
     Returns
     -------
@@ -163,7 +171,7 @@ def hysteresis(
     chosen = checked_elements(trace, elements)
     part = shown(trace, window)
     x = part.x - trace.x[0]
-    factor, unit = scaled(x, "m")
+    factor, unit = scaled(x, "m") if scale is None else scale
     ax.set(xlabel=f"x [{unit}]", ylabel="F [N]")
     if slipping:
         return [_by_slipping(ax, factor * x, part, chosen)]
@@ -177,7 +185,7 @@ def hysteresis(
             part.F[now],
             label=name,
             zorder=3 - number % 3,
-            **compared_look(number),
+            **PHASES[number % len(PHASES)],
         )
         begin = end
     return lines

@@ -1,4 +1,4 @@
-"""A colour has one meaning: all are roles of `plots.style`, listed in the docs, readable in grey."""
+"""A colour has one meaning: all are roles of `plots.style`, in the docs, readable in grey."""
 
 from __future__ import annotations
 

@@ -236,6 +236,7 @@ def _thresholds(result: Result) -> list[str]:
 
 
 def _draw_drift(ax: Axes, result: Result) -> None:
+    from plots import panels
     from plots.style import INK, LINE_GREY, TEXT_GREY
 
     grey = TEXT_GREY
@@ -248,10 +249,11 @@ def _draw_drift(ax: Axes, result: Result) -> None:
         ax.plot(curve.x, curve.y, look, color=colour, linewidth=0.9)
         ax.annotate(text, place, color=tint, fontsize=8)
     ax.set(xlabel="t [s]", ylabel="x [µm]", xlim=(0, 24), ylim=(-10, 95))
-    ax.set_title("a) bias and ripple: LuGre drifts")
+    panels.lettered(ax, "a", "bias and ripple: LuGre drifts")
 
 
 def _draw_memory(ax: Axes, result: Result) -> None:
+    from plots import panels
     from plots.style import INK, TEXT_GREY
 
     for model, look, colour in (("lugre", "--", TEXT_GREY), ("gms-signed", "-", INK)):
@@ -263,10 +265,11 @@ def _draw_memory(ax: Axes, result: Result) -> None:
     ax.annotate(f"LuGre: gap {gap:.1f} µm", (end, 1.68), color=TEXT_GREY, fontsize=8, ha="right")
     ax.annotate(NAMES["gms-signed"], (17.0, -1.38), color=INK, fontsize=8)
     ax.set(xlabel="x [µm]", ylabel="applied force [N]", xlim=(-15, 66), ylim=(-1.5, 1.95))
-    ax.set_title("b) reversals: GMS remembers")
+    panels.lettered(ax, "b", "reversals: GMS remembers")
 
 
 def _draw_energy(ax: Axes, result: Result) -> None:
+    from plots import panels
     from plots.style import INK, LINE_GREY, TEXT_GREY
 
     for model, look, colour, tint, place in (
@@ -278,4 +281,4 @@ def _draw_energy(ax: Axes, result: Result) -> None:
         ax.annotate(NAMES[model], place, color=tint, fontsize=8)
     ax.axhline(0, color=LINE_GREY, linewidth=0.8, zorder=0)
     ax.set(xlabel="t [ms]", ylabel="energy taken [mJ]", xlim=(0, 450), ylim=(-4.2, 1.3))
-    ax.set_title("c) energy in three cycles")
+    panels.lettered(ax, "c", "energy in three cycles")

@@ -282,7 +282,7 @@ def figure(result: Result) -> Figure:
             markerfacecolor=PAPER,
             zorder=4,
         )
-        axes["a"].set_title(f"a) {gms.model.title}: loops close")
+        panels.lettered(axes["a"], "a", f"{gms.model.title}: loops close")
         notes = {
             "a": "circles: doubled first loading\n(Masing's rule)",
             "b": "dashed: first loading\norange: last stroke, D to E\nsquares: back at C and A",
@@ -291,12 +291,13 @@ def figure(result: Result) -> Figure:
             axes[name].annotate(
                 note, (0.98, 0.04), xycoords="axes fraction", ha="right", color=TEXT_GREY
             )
-        axes["b"].set_title("b) LuGre, same initial stiffness: open loops")
+        panels.lettered(axes["b"], "b", "LuGre, same initial stiffness: open loops")
         axes["b"].sharey(axes["a"])
 
         motion = axes["c"]
         motion.plot(gms.t, 1e6 * gms.x, color=INK)
-        motion.set(xlim=(0, end), ylabel="x [µm]", title="c) motion (chosen by us)")
+        motion.set(xlim=(0, end), ylabel="x [µm]")
+        panels.lettered(motion, "c", "motion (chosen by us)")
         motion.tick_params(labelbottom=False)
         motion.margins(y=0.25)
         for name, time, place in zip(NAMES, result.turn_times, TURNS, strict=True):
@@ -321,7 +322,7 @@ def figure(result: Result) -> Figure:
                 va="bottom" if left else "top",
             )
         panels.ribbons(axes["d"], gms)
-        axes["d"].set_title("d) states of the elements")
+        panels.lettered(axes["d"], "d", "states of the elements")
         for time in result.turn_times[:-1]:
             axes["d"].axvline(time, color=LINE_GREY, linewidth=0.7, zorder=0)
         sheet.suptitle(f"Lesson 1: {QUESTION}", x=0.01, ha="left", fontsize=12)

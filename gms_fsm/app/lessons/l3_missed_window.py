@@ -228,7 +228,7 @@ def figure(result: Result) -> Figure:
         near.plot(1e3 * (line - turn), 1e6 * _velocity(line), color=INK, zorder=2)
         near.plot(1e3 * (t - turn), 1e6 * _velocity(t), "o", color=INK, markersize=7, zorder=3)
         near.set(xlabel=f"t − {turn:g} s [ms]", ylabel="v [µm/s]", xlim=(-2, 2))
-        near.set_title(f"a) samples of {1e3 * STEP:g} ms at a reversal")
+        panels.lettered(near, "a", f"samples of {1e3 * STEP:g} ms at a reversal")
         near.annotate(
             f"|v| ≤ $v_c$, {1e6 * window_width():.0f} µs long",
             (1.95, 0),
@@ -252,7 +252,7 @@ def figure(result: Result) -> Figure:
             )
         counts.set_xticks(places, [f"{1e3 * h:g}" for h in STEPS], fontsize=8)
         counts.set(xlabel="step [ms]", ylabel="switches found once per step", ylim=(0, 62))
-        counts.set_title("b) luck (above: reversals hit by a sample)")
+        panels.lettered(counts, "b", "luck (above: reversals hit by a sample)")
         counts.axhline(len(result.located.transitions), color=INK, linestyle="--", linewidth=0.9)
         counts.annotate(
             f"located, {1e3 * STEP:g} ms: {len(result.located.transitions)}",
@@ -268,11 +268,13 @@ def figure(result: Result) -> Figure:
         for (name, trace), (colour, dash) in zip(found.items(), looks, strict=True):
             lines = panels.force(force, trace)
             lines[0].set(color=colour, linestyle=dash, label=name, linewidth=1.4)
-        force.set_title(f"c) friction, {MODEL.title}")
+        panels.lettered(force, "c", f"friction, {MODEL.title}")
         force.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2)
         for letter, (name, trace) in zip("de", found.items(), strict=True):
             panels.ribbons(axes[letter], trace)
-            axes[letter].set_title(f"{letter}) states, {name}: {len(trace.transitions)} switches")
+            panels.lettered(
+                axes[letter], letter, f"states, {name}: {len(trace.transitions)} switches"
+            )
         for letter in "cd":
             axes[letter].set_xlabel("")
             axes[letter].tick_params(labelbottom=False)

@@ -220,10 +220,12 @@ def figure(result: Result) -> Figure:
                 ax.set_xlabel("")
         for ax in axes[:, 1]:
             ax.set_ylabel("")
-        axes[0, 0].set_title("a) " + columns[0][0])
-        axes[0, 1].set_title("b) " + columns[1][0])
-        axes[1, 0].set_title("c) energy (hatched: heat turns back)")
-        axes[1, 1].set_title(f"d) energy ({1e3 * result.vanished[1]:.1f} mJ turn back: invisible)")
+        panels.lettered(axes[0, 0], "a", columns[0][0])
+        panels.lettered(axes[0, 1], "b", columns[1][0])
+        panels.lettered(axes[1, 0], "c", "energy (hatched: heat turns back)")
+        panels.lettered(
+            axes[1, 1], "d", f"energy ({1e3 * result.vanished[1]:.1f} mJ turn back: invisible)"
+        )
         axes[0, 1].annotate(
             "all four $z_i$ together\ngrey: ± s(v) away from reversals",
             (0.97, 0.04),

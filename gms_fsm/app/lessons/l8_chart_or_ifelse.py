@@ -260,14 +260,14 @@ def figure(result: Result) -> Figure:
         for trace, name, colour, dash in looks:
             (line,) = panels.force(force, trace)
             line.set(color=colour, linestyle=dash, label=name, linewidth=1.4)
-        force.set_title(f"a) friction, {MODEL.title}")
+        panels.lettered(force, "a", f"friction, {MODEL.title}")
         force.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2)
         force.set_xlabel("")
         force.tick_params(labelbottom=False)
 
         panels.difference(residual, result.t, result.residual)
         residual.set(ylim=(1e-7, 30), xlim=(0, END))
-        residual.set_title("b) their difference")
+        panels.lettered(residual, "b", "their difference")
         residual.axhline(PAPERS, **REPORTED)
         for text, place, align in (
             ("the paper's $10^{-3}$ N", (0.3, 1.5 * PAPERS), "left"),
@@ -290,7 +290,7 @@ def figure(result: Result) -> Figure:
         near = (rows.t > window[0]) & (rows.t < window[1]) & (rows.microstep == 0)
         zoom.plot(1e3 * (rows.t[near] - first), rows.F[near], "o", color=TEXT_GREY, markersize=5)
         zoom.set(xlabel=f"t − {first:.4f} s [ms]", ylabel="F [N]", xlim=(-0.8, 1.2))
-        zoom.set_title("c) the break-away: late if once per step")
+        panels.lettered(zoom, "c", "the break-away: late if once per step")
         zoom.annotate(
             "dots: ends of steps",
             (0.97, 0.94),
@@ -309,6 +309,7 @@ def figure(result: Result) -> Figure:
 
 def _draw_lateness(ax: Axes, result: Result) -> None:
     """Draw the residual of a switch over its delay."""
+    from plots import panels
     from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY
 
     times = np.geomspace(0.5 * result.late.min(), 2 * result.late.max(), 20)
@@ -332,7 +333,7 @@ def _draw_lateness(ax: Axes, result: Result) -> None:
         fontsize=8,
     )
     ax.set(xlabel="delay of the switch [ms]", ylabel=f"difference at {LOOK:g} s [N]")
-    ax.set_title("d) residual of a late switch")
+    panels.lettered(ax, "d", "residual of a late switch")
 
 
 def _draw_held(over_time: Axes, over_period: Axes, result: Result) -> None:
@@ -352,7 +353,7 @@ def _draw_held(over_time: Axes, over_period: Axes, result: Result) -> None:
         color=TEXT_GREY,
         fontsize=8,
     )
-    over_time.set_title("e) outputs held for h, in Fig. 3")
+    panels.lettered(over_time, "e", "outputs held for h, in Fig. 3")
     panels.lag_over_period(
         over_period,
         result.pushed,
@@ -360,4 +361,4 @@ def _draw_held(over_time: Axes, over_period: Axes, result: Result) -> None:
         phases={"ramp": RAMP, "oscillation": OSCILLATION},
     )
     over_period.legend(loc="upper left", ncols=2)
-    over_period.set_title("f) the same at its largest, over h")
+    panels.lettered(over_period, "f", "the same at its largest, over h")

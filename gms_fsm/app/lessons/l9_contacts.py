@@ -341,17 +341,19 @@ def figure(result: Result) -> Figure:
         )
         _draw_pulled(axes["a"], axes["c"], result)
         panels.ribbons(axes["b"], result.stiction)
-        axes["b"].set(yticklabels=["pad"], title="b) states with stiction")
+        axes["b"].set(yticklabels=["pad"])
+        panels.lettered(axes["b"], "b", "states with stiction")
         _draw_gear(axes["d"], result)
         _draw_pair(axes["e"], result.impact, MASSES, "v [m/s]", "centre of mass")
-        axes["e"].set_title("e) impact at a stop")
+        panels.lettered(axes["e"], "e", "impact at a stop")
         _draw_pair(axes["f"], result.clutch, INERTIAS, "speed [rad/s]", "mean by inertia")
-        axes["f"].set_title("f) a dog clutch closes")
+        panels.lettered(axes["f"], "f", "a dog clutch closes")
         sheet.suptitle(f"Lesson 9: {QUESTION}", x=0.01, ha="left", fontsize=12)
     return sheet
 
 
 def _draw_pulled(moving: Axes, before: Axes, result: Result) -> None:
+    from plots import panels
     from plots.style import INK, TEXT_GREY
 
     for trace, look, colour in ((result.stiction, "-", INK), (result.bristles, "--", TEXT_GREY)):
@@ -361,17 +363,18 @@ def _draw_pulled(moving: Axes, before: Axes, result: Result) -> None:
         before.plot(fine.t[shown], 1e3 * fine.x[shown], look, color=colour)
     moving.set(ylabel="v [m/s]", xlim=(0, result.stiction.t[-1]))
     moving.tick_params(labelbottom=False)
-    moving.set_title(f"a) pulled mass; dashed: {bank().title}")
+    panels.lettered(moving, "a", f"pulled mass; dashed: {bank().title}")
     for text, height, colour in (
         ("bank: the bristles yield", 0.6 * 1e3 * result.crept[1], TEXT_GREY),
         ("stiction: x = 0", 1.0, INK),
     ):
         before.annotate(text, (3.0, height), color=colour, fontsize=8)
     before.set(xlabel="t [s]", ylabel="x [mm]", xlim=(0, 8))
-    before.set_title("c) before stiction lets go")
+    panels.lettered(before, "c", "before stiction lets go")
 
 
 def _draw_gear(ax: Axes, result: Result) -> None:
+    from plots import panels
     from plots.style import INK, LINE_GREY, TEXT_GREY
 
     for begin, end in result.dead:
@@ -391,7 +394,7 @@ def _draw_gear(ax: Axes, result: Result) -> None:
     )
     ax.legend(loc="upper right")
     ax.set(xlabel="t [s]", ylabel="angle [rad]", xlim=(0, 2 * PERIOD))
-    ax.set_title("d) gear with backlash; shaded: no contact")
+    panels.lettered(ax, "d", "gear with backlash; shaded: no contact")
 
 
 def _draw_pair(
