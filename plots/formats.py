@@ -145,7 +145,7 @@ FORMATS: list[Format] = [
     Format(".png", "figure", "a figure", "matplotlib", _matplotlib("png"), "plots", usual=True),
     Format(".svg", "figure", "a figure", "matplotlib", _svg, "plots", usual=True),
     Format(".pdf", "figure", "a figure", "matplotlib", _pdf, "plots"),
-    Format(".pgf", "figure", "a figure", "LaTeX", _pgf, "plots"),
+    Format(".pgf", "figure", "a figure", "matplotlib", _pgf, "plots"),
     Format(".gif", "animation", "an animation", "Pillow", _gif, "plots"),
     Format(".html", "page", "a replay page", "gms-fsm", _html, "replay", usual=True),
 ]

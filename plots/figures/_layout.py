@@ -137,7 +137,7 @@ def _titles_folded(figure: Figure, renderer: RendererBase) -> bool:
                 whole = boxes[other]
                 rights.append(theirs.x0 if whole is None else min(theirs.x0, whole.x0))
         wide = min(rights) - title.get_window_extent(renderer).x0 - inches(0.05) * figure.dpi
-        changed |= _folded(title, max(wide, mine.width), renderer)
+        changed |= _folded(title, max(wide, 0.6 * mine.width), renderer)
     return changed
 
 
