@@ -38,7 +38,7 @@ PresetName = Annotated[
     str,
     typer.Option(
         "--preset",
-        help="Sizes of figures: screen, ieee1 (one column, 3.5 in), ieee2 (7.16 in), slide or poster.",
+        help="Sizes of figures: screen, ieee1 (one column), ieee2 (two), slide or poster.",
     ),
 ]
 Start = Annotated[float | None, typer.Option(help="Start time in s.")]
