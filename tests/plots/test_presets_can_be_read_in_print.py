@@ -13,10 +13,17 @@ import pytest
 pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
 
 import plots
-from gms_fsm import ChartModel, Prescribed, PulledSlider, Trace, prove, simulate
+from gms_fsm import (
+    ChartModel,
+    Prescribed,
+    PulledSlider,
+    Trace,
+    measure_phenomena,
+    prove,
+    simulate,
+)
 from gms_fsm.charts.registry import entry
 from gms_fsm.errors import ParameterError
-from gms_fsm.phenomena import measure_phenomena
 from gms_fsm.systems.models import demonstration
 from plots import figures, presets
 from plots.presets import PRESETS, Preset
