@@ -58,7 +58,7 @@ def time_axis(ax: Axes, begin: float, end: float) -> None:
     low, high = factor * (begin - origin), factor * (end - origin)
     ticks = np.asarray(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high))
     ticks = ticks[(ticks >= low) & (ticks <= high)]
-    ax.set_xticks(origin + ticks / factor, [f"{tick:g}" for tick in ticks])
+    ax.set_xticks(origin + ticks / factor, [f"{tick:g}".replace("-", "−") for tick in ticks])
     ax.set_xlabel(f"t − {origin:.12g} s [{unit}]")
 
 

@@ -285,7 +285,7 @@ def figure(result: Result) -> Figure:
         panels.lettered(axes["a"], "a", f"{gms.model.title}: loops close")
         notes = {
             "a": "circles: doubled first loading\n(Masing's rule)",
-            "b": "dashed: first loading\norange: last stroke, D to E\nsquares: back at C and A",
+            "b": "dashed: first loading\nblack: last stroke, D to E\nsquares: back at C and A",
         }
         for name, note in notes.items():
             axes[name].annotate(
