@@ -145,8 +145,8 @@ def latex(text: str, *, math: bool) -> str:
 
     Examples
     --------
-    >>> latex("v_c = 10⁻³ m/s, $F_{1}$", math=True)
-    'v\\\\_c = 10\\\\ensuremath{^{-3}} m/s, $F_{1}$'
+    >>> print(latex("v_c = 10⁻³ m/s, $F_{1}$", math=True))
+    v\_c = 10\ensuremath{^{-3}} m/s, $F_{1}$
     """
     if not math:
         return _words(text)
