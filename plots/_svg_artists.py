@@ -17,9 +17,10 @@ import numpy as np
 
 from plots._matplotlib import Artist, Axes, Curve, Figure, patches
 
-__all__ = ["Part", "drawn"]
+__all__ = ["Part", "drawn", "smallest"]
 
-WIDE = 0.88  # matplotlib's sans serif is wider than the one used for the layout
+# matplotlib's fonts are wider than those used for the layout.
+WIDE, MONO = 0.88, 0.975
 
 
 class Part:
@@ -90,6 +91,11 @@ def drawn(
             yield part
 
 
+def smallest(root: ElementTree.Element) -> float:
+    """Return the size of the smallest text of an SVG, points."""
+    return min(float(_font(node, 1.0)["fontsize"]) for node in root.iter("text"))
+
+
 def _artist(
     ax: Axes, node: ElementTree.Element, dx: float, dy: float, scale: float
 ) -> Artist | None:
@@ -124,5 +130,5 @@ def _font(node: ElementTree.Element, scale: float) -> dict[str, Any]:
     # The two families that matplotlib ships, so that it never searches for fonts.
     size = scale * float(node.get("font-size", "10"))
     if "Mono" in node.get("font-family", ""):
-        return {"fontfamily": "DejaVu Sans Mono", "fontsize": size}
+        return {"fontfamily": "DejaVu Sans Mono", "fontsize": MONO * size}
     return {"fontfamily": "DejaVu Sans", "fontsize": WIDE * size}

@@ -15,9 +15,15 @@ from gms_fsm.app.paper import FORCE, VELOCITY
 from gms_fsm.errors import ParameterError
 
 if TYPE_CHECKING:
-    from gms_fsm import Report, Rig
+    from gms_fsm import Model, Report, Rig
 
-__all__ = ["blocks_command", "chart_command", "check_command", "code_command"]
+__all__ = [
+    "blocks_command",
+    "chart_command",
+    "check_command",
+    "code_command",
+    "handout_command",
+]
 
 
 class RigName(enum.StrEnum):
@@ -90,6 +96,36 @@ def chart_command(
         names=names,
     )
     typer.echo(str(plots.render(graph, output)))
+
+
+def handout_command(
+    name: ChartName,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Output file, ending in {figure}.")
+    ] = Path("handout.pdf"),
+    law: Law = "",
+) -> None:
+    """Print a model on one A4 page: chart, equations, parameters, a hysteresis loop.
+
+    An included chart has the numbers of its demonstration; a scenario file
+    has its own.
+    """
+    import plots
+    from gms_fsm.app._catalogue import chosen
+    from gms_fsm.app._own_files import own_file
+    from gms_fsm.app.scenario import load_scenario
+    from gms_fsm.systems.models import demonstration
+
+    own = own_file(name, law)
+    if own is None:
+        model: Model = demonstration(chosen("handout", name, law)[0], law)
+    elif own.chart is not None:
+        raise ParameterError(
+            "it is a chart file, which has no numbers", place=name, advice="give a scenario file"
+        )
+    else:
+        model = load_scenario(own.path).model
+    typer.echo(str(plots.handout(model, output)))
 
 
 def check_command(

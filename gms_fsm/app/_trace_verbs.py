@@ -10,7 +10,7 @@ import typer
 
 from gms_fsm._files import output_folder, refuse_input
 from gms_fsm.app._console import progress_bars
-from gms_fsm.app._options import ContactName, End, Start, TraceFile
+from gms_fsm.app._options import ContactName, End, PresetName, Start, TraceFile
 from gms_fsm.errors import ParameterError, shown
 
 if TYPE_CHECKING:
@@ -62,15 +62,19 @@ def plot_command(
     start: Start = None,
     end: End = None,
     contact: ContactName = "",
+    preset: PresetName = "screen",
 ) -> None:
     """Draw a run: an overview, and its break-aways in detail."""
+    import plots
     from plots import figures, formats
 
     run = _of_contact(trace, contact)
     files = [formats.files(name, "figure") for name in ("overview", "ribbons")]
     folder = output_folder(output, chain(*files))
     window = _window(run, start, end)
-    pictures = (figures.overview(run, window=window), figures.ribbons_figure(run, window=window))
+    with plots.preset(preset):
+        overview = figures.overview(run, window=window)
+        pictures = (overview, figures.ribbons_figure(run, window=window))
     for figure, names in zip(pictures, files, strict=True):
         for name in names:
             typer.echo(str(figures.save(figure, folder / name)))

@@ -13,11 +13,13 @@ from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots._matplotlib import Axes, Figure, rc_context
 from plots._window import Window
-from plots.figures._parts import ENTRY, element_legend, lanes_height, letter_panels
+from plots.figures._layout import fitted, legend_below, low, narrow, sheet
+from plots.figures._parts import element_legend, lanes_height, letter_panels
 from plots.panels._axes import MANY, first_variable
 from plots.panels._held import Lag
 from plots.panels._shown import checked_elements, checked_window, scaled, shown
-from plots.style import INK, LINE_GREY, RC, REPORTED, TEXT_GREY
+from plots.presets import font, pt, settings
+from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY
 
 __all__ = [
     "FIG3_PHASES",
@@ -77,10 +79,10 @@ def figure_3(
             f"force has shape {np.shape(force)}",
             advice=f"it must have one value per row of the chart run, shape {chart.t.shape}",
         )
-    with rc_context(RC):
-        figure = Figure(figsize=(9.0, 6.2), layout="constrained")
-        axes = figure.subplots(2, 2).ravel()
-        axes[0].plot(chart.t, force, color=INK, linewidth=0.9)
+    with rc_context(settings()):
+        figure = sheet(4.2, 8.8) if narrow() else sheet(9.0, 6.2)
+        axes = figure.subplots(*(4, 1) if narrow() else (2, 2)).ravel()
+        axes[0].plot(chart.t, force, color=INK, linewidth=pt(0.9))
         axes[0].set_xlim(*checked_window(chart, window))
         axes[0].set(xlabel="t [s]", ylabel=r"$F_a$ [N]")
         runs = chart, ifelse, lugre
@@ -101,14 +103,14 @@ def figure_3(
                     ha="right",
                     va="top",
                     color=TEXT_GREY,
-                    fontsize=8,
+                    fontsize=font(8),
                 )
         names = ["applied force (chosen by us)", f"{chart.model.title}; chart"]
         letter_panels(axes, [*names, "the same; if-else", "LuGre"])
         if len(phases) > 1:
             axes[1].legend(loc="lower right")
         figure.suptitle(title, x=0.01, ha="left")
-    return figure
+    return fitted(figure)
 
 
 def figure_4(
@@ -134,12 +136,12 @@ def figure_4(
     -------
     Figure
         Panels a to f; b and c have the same axis. Insets show the first peak of F, and of z of
-        LuGre.
+        LuGre, except on a slide.
     """
     chart, ifelse, lugre = (shown(trace, window) for trace in (chart, ifelse, lugre))
-    with rc_context(RC):
-        figure = Figure(figsize=(10.5, 6.2), layout="constrained")
-        axes = figure.subplots(2, 3, sharex=True).ravel()
+    with rc_context(settings()):
+        figure = sheet(4.2, 10.0) if narrow() else sheet(10.5, 6.2)
+        axes = figure.subplots(*(6, 1) if narrow() else (2, 3), sharex=True).ravel()
         panels.velocity(axes[0], chart)
         scale = _common_scale(chart, lugre)
         panels.deflections(axes[1], chart, elements=elements, scale=scale)
@@ -156,10 +158,10 @@ def figure_4(
         names = ["velocity (chosen by us)", "deflections, GMS", "deflection, LuGre"]
         kinds = ("chart", "if-else", "LuGre")
         letter_panels(axes, [*names, *(f"friction, {kind}" for kind in kinds)])
-        for ax in axes[:3]:
+        for ax in axes[: 5 if narrow() else 3]:
             ax.set_xlabel("")
         figure.suptitle(f"Fig. 4, stick-slip: {chart.model.title}", x=0.01, ha="left")
-    return figure
+    return fitted(figure)
 
 
 def _common_scale(*runs: Trace) -> tuple[float, str] | None:
@@ -179,25 +181,27 @@ def _first_peak(trace: Trace, values: Floats) -> int:
 
 def _zoom(ax: Axes, trace: Trace, values: Floats, unit: str, place: tuple[float, float]) -> None:
     """Show the first peak of the line of a panel in an inset, in the panel's unit."""
+    if low():
+        return
     peak = _first_peak(trace, values)
     half = ZOOM * float(trace.t[-1] - trace.t[0])
     t0, t1 = max(trace.t[0], trace.t[peak] - half), min(trace.t[-1], trace.t[peak] + half)
     near = values[(trace.t >= t0) & (trace.t <= t1)]
     high = float(near.max())
     # A fall that is much larger than the rise to the peak leaves the inset.
-    low = max(float(near.min()), high - 3 * float(high - near[0]))
-    edge = 0.1 * (high - low) or 1.0
+    bottom = max(float(near.min()), high - 3 * float(high - near[0]))
+    edge = 0.1 * (high - bottom) or 1.0
     size = int(np.floor(np.log10(abs(high)))) if high else 0
     power = size if size < -2 else 0
     inset = ax.inset_axes((*place, 0.46, 0.28))
-    inset.plot(trace.t, values / 10.0**power, color=ax.lines[0].get_color(), linewidth=1.0)
-    inset.set(xlim=(t0, t1), ylim=((low - edge) / 10.0**power, (high + edge) / 10.0**power))
-    inset.tick_params(labelsize=7, length=2)
-    inset.locator_params(nbins=3)
+    inset.plot(trace.t, values / 10.0**power, color=ax.lines[0].get_color(), linewidth=pt(1.0))
+    inset.set(xlim=(t0, t1), ylim=((bottom - edge) / 10.0**power, (high + edge) / 10.0**power))
+    inset.tick_params(labelsize=font(7), length=2)
+    inset.locator_params(nbins=3, prune="both")
     inset.spines[:].set(visible=True, color=LINE_GREY)
     scale = rf"$10^{{{power}}}$ " if power else ""
-    inset.set_title(f"first peak [{scale}{unit}]".replace("-", "−"), fontsize=7, pad=2)
-    bounds = (t0, low - edge, t1 - t0, high - low + 2 * edge)
+    inset.set_title(f"first peak [{scale}{unit}]".replace("-", "−"), fontsize=font(7), pad=2)
+    bounds = (t0, bottom - edge, t1 - t0, high - bottom + 2 * edge)
     frame = ax.indicate_inset(bounds, inset, edgecolor=LINE_GREY, alpha=1.0)
     for line in frame.connectors or ():
         line.set_visible(False)
@@ -231,11 +235,10 @@ def compare_laws(
     Figure
         Three rows.
     """
-    with rc_context(RC):
+    with rc_context(settings()):
         count = max(len(checked_elements(run, elements)) for run in runs.values())
         tall = lanes_height(count, 2.1) if count > MANY else 2.1, 2.1, lanes_height(count, 1.4)
-        size = 5.2 * len(runs), sum(tall) + 1.6
-        figure = Figure(figsize=size, layout="constrained")
+        figure = sheet(5.2 * len(runs), sum(tall) + 1.6)
         grid = figure.subplots(
             3, len(runs), sharex=True, sharey="row", squeeze=False, height_ratios=tall
         )
@@ -251,7 +254,9 @@ def compare_laws(
             panels.ribbons(column[2], trace, elements=elements)
             for sign in (1, -1) if panels.has_threshold(trace) and not many else ():
                 level = sign * float(np.nanmin(trace.s)) * (scale[0] if scale else 1.0)
-                column[0].axhline(level, color=LINE_GREY, linewidth=0.9, zorder=0, label=REACHED)
+                column[0].axhline(
+                    level, color=LINE_GREY, linewidth=pt(0.9), zorder=0, label=REACHED
+                )
             for ax in column[:2]:
                 ax.set_xlabel("")
         letter_panels(grid[0], list(runs))
@@ -259,11 +264,8 @@ def compare_laws(
         for ax in (grid[0, 0], grid[2, 0]):
             handles, labels = ax.get_legend_handles_labels()
             entries |= dict(zip(labels, handles, strict=True))
-        ncols = min(len(entries), int(size[0] / ENTRY) - 2)
-        figure.legend(
-            list(entries.values()), list(entries), loc="outside lower center", ncols=ncols
-        )
-    return figure
+        legend_below(figure, list(entries.values()), list(entries))
+    return fitted(figure)
 
 
 def residuals(
@@ -288,14 +290,14 @@ def residuals(
     Figure
         One panel per run.
     """
-    with rc_context(RC):
-        figure = Figure(figsize=(9.0, 2.4 * len(runs) + 0.4), layout="constrained")
+    with rc_context(settings()):
+        figure = sheet(9.0, 2.4 * len(runs) + 0.4)
         axes = figure.subplots(len(runs), 1, squeeze=False)[:, 0]
         for ax, (times, difference) in zip(axes, runs.values(), strict=True):
             panels.difference(ax, times, difference, log=log)
         letter_panels(list(axes), list(runs))
         figure.suptitle(title, x=0.01, ha="left")
-    return figure
+    return fitted(figure)
 
 
 def held_residuals(
@@ -329,9 +331,9 @@ def held_residuals(
     Figure
         Panels a to d.
     """
-    with rc_context(RC):
-        figure = Figure(figsize=(9.0, 6.2), layout="constrained")
-        force, place, between, period = figure.subplots(2, 2).ravel()
+    with rc_context(settings()):
+        figure = sheet(4.2, 9.2) if narrow() else sheet(9.0, 6.2)
+        force, place, between, period = figure.subplots(*(4, 1) if narrow() else (2, 2)).ravel()
         lines = panels.lag_over_time(force, lags, papers[0], window=(0.0, until))
         panels.lag_over_time(place, lags, papers[1], window=(0.0, until), place=True)
         panels.lag_between_ticks(between, lags, window=(zoom, zoom + 2 * lags[0].period))
@@ -347,11 +349,7 @@ def held_residuals(
         )
         period.legend(loc="upper left", ncols=2)
         (paper,) = force.plot([], [], **REPORTED)
-        figure.legend(
-            [*lines, paper],
-            [*(str(line.get_label()) for line in lines), "the paper's residual"],
-            loc="outside lower left",
-            ncols=4,
-        )
+        entries = [*(str(line.get_label()) for line in lines), "the paper's residual"]
+        legend_below(figure, [*lines, paper], entries)
         figure.suptitle(title, x=0.01, ha="left")
-    return figure
+    return fitted(figure)

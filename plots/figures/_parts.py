@@ -11,11 +11,12 @@ from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots._matplotlib import Annotation, Axes, Figure
 from plots._window import Window
+from plots.figures._layout import legend_below
 from plots.panels._axes import MANY
 from plots.panels._shown import checked_elements
+from plots.presets import pt
 
 LANE = 0.15  # inches: a row of one element, with its label
-ENTRY = 0.92  # inches: an entry of a legend
 
 
 def head(trace: Trace, title: str) -> str:
@@ -28,7 +29,7 @@ def letter_panels(axes: Sequence[Axes], names: Sequence[str]) -> None:
     for letter, ax, name in zip(ascii_lowercase, axes, names, strict=False):
         # Above the labels of the marks, if there are any.
         marked = any(isinstance(text, Annotation) and text.xy[1] >= 1.0 for text in ax.texts)
-        panels.lettered(ax, letter, name, pad=16 if marked else 6)
+        panels.lettered(ax, letter, name, pad=pt(16 if marked else 6))
 
 
 def over_threshold(
@@ -66,13 +67,7 @@ def element_legend(figure: Figure, *axes: Axes) -> None:
     """Add one legend of elements and states below the figure."""
     found = [ax.get_legend_handles_labels() for ax in axes]
     entries = {name: handle for pair in found for handle, name in zip(*pair, strict=True)}
-    figure.legend(
-        list(entries.values()),
-        list(entries),
-        loc="outside lower left",
-        ncols=min(int(figure.get_figwidth() / ENTRY), len(entries)) or 1,
-        handlelength=2.6,
-    )
+    legend_below(figure, list(entries.values()), list(entries))
 
 
 def one_time_axis(column: Sequence[Axes]) -> None:

@@ -9,16 +9,19 @@ import numpy as np
 from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots._matplotlib import Figure, Rectangle, rc_context
+from plots.figures._layout import fitted, low, sheet
 from plots.figures._parts import head
 from plots.panels._shown import scaled
 from plots.panels._unfolded import FEW, column_width, edge_texts
-from plots.style import RC, state_look
+from plots.presets import inches, room, settings
+from plots.style import state_look
 
 __all__ = ["unfold"]
 
 COLUMN, NARROWEST, WIDEST, SIDES = 1.15, 6.4, 11.6, 1.0  # inches: a column, the figure, margins
 FORCE, ROW, FLATTEST = 2.3, 0.34, 0.22  # inches: the upper panel, a row of the lower one
 TOP, BELOW = 0.95, 1.25  # inches: above and below the panels
+HEAD = 0.55  # inches: the title alone
 
 
 def unfold(
@@ -49,7 +52,8 @@ def unfold(
     Returns
     -------
     Figure
-        Between instants, time is cut out; its length is written below.
+        Between instants, time is cut out; its length is written below. On a slide there is no room
+        for F.
 
     Raises
     ------
@@ -68,28 +72,32 @@ def unfold(
     """
     part = panels.unfolded(trace, t0, t1, elements=elements)
     count = len(part.elements)
-    wide = min(max(NARROWEST, SIDES + COLUMN * part.width), WIDEST)
-    _, _, head_room = edge_texts(part, column_width(wide - SIDES, part))
-    tall = count * (ROW if count <= FEW else FLATTEST)
-    between = 0.45 + head_room
-    height = TOP + FORCE + between + tall + BELOW
+    wide = room(min(max(NARROWEST, SIDES + COLUMN * part.width), WIDEST))
+    _, _, head_room = edge_texts(part, column_width(inches(wide - SIDES), part))
+    tall = count * (ROW if count <= FEW and not low() else FLATTEST)
+    above = (HEAD if low() else TOP + FORCE) + 0.45 + head_room
+    height = above + tall + BELOW
     names = [state.name for state in trace.model.chart.states]
-    with rc_context(RC):
-        figure = Figure(figsize=(wide, height))
+    with rc_context(settings()):
+        figure = sheet(wide, height, layout=None, grows=True)
+        height = figure.get_figheight() / inches(1)
+        tall = height - above - BELOW
         left, broad = (SIDES - 0.15) / wide, 1 - SIDES / wide
-        force = figure.add_axes((left, 1 - (TOP + FORCE) / height, broad, FORCE / height))
+        letters = iter("ab")
+        if not low():
+            force = figure.add_axes((left, 1 - (TOP + FORCE) / height, broad, FORCE / height))
+            panels.unfolded_force(force, part)
+            panels.lettered(force, next(letters), "F before and after each firing")
         states = figure.add_axes((left, BELOW / height, broad, tall / height))
-        panels.unfolded_force(force, part)
         panels.unfolded_states(states, part)
-        panels.lettered(force, "a", "F before and after each firing")
-        above = 72 * (head_room + 0.12)  # points
-        panels.lettered(states, "b", "who fires, and by which edge", pad=above)
+        up = inches(72 * (head_room + 0.12))  # points
+        panels.lettered(states, next(letters), "who fires, and by which edge", pad=up)
         shown = sorted({mode for each in part.columns for mode in each.modes})
         handles = [_swatch(mode, names[mode]) for mode in shown]
         figure.legend(handles=handles, loc="lower left", ncols=6)
         title = f"{head(trace, title)}\n{_said(part)}"
         figure.suptitle(title, x=0.2 / wide, y=1 - 0.12 / height, ha="left", va="top")
-    return figure
+    return fitted(figure)
 
 
 def _swatch(mode: int, name: str) -> Rectangle:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Artist, Axes, MaxNLocator
 from plots.panels._shown import scaled
+from plots.presets import font
 from plots.style import ELEMENT_DASHES, TEXT_GREY, element_colour
 
 Artists = list[Artist]
@@ -77,7 +78,7 @@ def lanes(ax: Axes, elements: Sequence[int]) -> None:
         yticks=range(1, len(elements) + 1),
         yticklabels=[f"E{i + 1}" for i in elements],
     )
-    ax.tick_params(axis="y", length=0, labelsize=9 if len(elements) <= MANY else 8)
+    ax.tick_params(axis="y", length=0, labelsize=font(9 if len(elements) <= MANY else 8))
 
 
 def note(ax: Axes, text: str) -> Artist:

@@ -14,6 +14,7 @@ from plots._matplotlib import Axes
 from plots._window import Window
 from plots.panels._axes import Artists, draw_curve, time_axis
 from plots.panels._shown import SMOOTH, checked_window, is_number
+from plots.presets import pt
 from plots.style import INK, PALE_GREY
 
 __all__ = ["difference", "residual"]
@@ -75,7 +76,7 @@ def difference(
         values = np.maximum(np.abs(values), floor)
     ax.set_ylabel("|difference of F| [N]" if log else "difference of F [N]")
     time_axis(ax, float(times[0]), float(times[-1]))
-    look: dict[str, Any] = {"color": INK, "linewidth": 0.8}
+    look: dict[str, Any] = {"color": INK, "linewidth": pt(0.8)}
     if len(times) <= 2 * COLUMNS:
         return draw_curve(ax, times, values, **look)
     middles, low, high = _envelope(times, values)

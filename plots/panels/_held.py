@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from plots._matplotlib import Axes, LogLocator
 from plots.panels._axes import Artists, draw_curve, time_axis
+from plots.presets import pt
 from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY, compared_look
 
 __all__ = ["lag_between_ticks", "lag_over_period", "lag_over_time"]
@@ -103,7 +104,7 @@ def lag_between_ticks(ax: Axes, lags: Sequence[Lag], *, window: tuple[float, flo
         both = np.column_stack([lag.force[shown], lag.before[shown]]).ravel()
         lines += ax.plot(MILLI * (t - window[0]), MILLI * both, **compared_look(number))
         ink = compared_look(number)["color"]
-        ax.plot(MILLI * (begin - window[0]), MILLI * lag.force[shown], "o", color=ink, ms=4)
+        ax.plot(MILLI * (begin - window[0]), MILLI * lag.force[shown], "o", color=ink, ms=pt(4))
     ax.set(
         xlabel=f"t − {window[0]:g} s [ms]",
         ylabel="difference of F [mN]",
@@ -149,14 +150,14 @@ def lag_over_period(
                 sizes.append(float(np.abs(values[inside]).max()) / papers[quantity])
             found += [size for size in sizes if size > 0]
             line = sizes[0] * periods / periods[0]  # a slope of exactly one
-            ax.plot(periods, line, color=LINE_GREY, linewidth=0.9, zorder=1)
+            ax.plot(periods, line, color=LINE_GREY, linewidth=pt(0.9), zorder=1)
             marks += ax.plot(
                 periods,
                 sizes,
                 marker,
                 color=(INK, TEXT_GREY)[quantity],
                 fillstyle=fill,
-                markersize=6,
+                markersize=pt(6),
                 label=f"{'Fx'[quantity]}, {name}",
             )
     ax.axhline(1.0, **REPORTED)

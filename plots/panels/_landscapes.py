@@ -32,6 +32,7 @@ from plots._window import Window
 from plots.panels._axes import Artists
 from plots.panels._line_names import LineNames, NamedLine
 from plots.panels._shown import checked_row, checked_window, one_element, scaled, shown
+from plots.presets import font, pt
 from plots.style import (
     EDGE_COLOURS,
     EDGE_HATCHES,
@@ -214,7 +215,7 @@ def landscape(
     around = path_window(trace, plane.row, element) if window is None else window
     drawn += _path(ax, trace, plane, element, checked_window(trace, around), view, names)
     here = plane.here[0], view.factor * plane.here[1]
-    (dot,) = ax.plot(*here, "o", color=VERMILION, markersize=8, markeredgecolor=PAPER, zorder=8)
+    (dot,) = ax.plot(*here, "o", color=VERMILION, markersize=pt(8), markeredgecolor=PAPER, zorder=8)
     names.avoid.append(here)
     return [*drawn, dot, names]
 
@@ -267,7 +268,7 @@ def _regions(
         row, column = np.unravel_index(_depth(inside).argmax(), inside.shape)
         place = float(v[0, column]), factor * float(z[row, 0])
         box = {"boxstyle": "circle,pad=0.25", "facecolor": PAPER, "edgecolor": colour}
-        look = {"ha": "center", "va": "center", "fontsize": 8, "fontweight": "bold"}
+        look = {"ha": "center", "va": "center", "fontsize": font(8), "fontweight": "bold"}
         drawn.append(ax.text(*place, str(number + 1), color=INK, bbox=box, zorder=7, **look))
         names.avoid.append(place)
     return drawn
@@ -329,7 +330,13 @@ def _threshold(ax: Axes, plane: Plane, v: Floats, factor: float, names: LineName
     drawn: Artists = []
     for sign, name in ((1.0, "s(v)"), (-1.0, "−s(v)")):
         drawn += ax.plot(
-            v[0], sign * factor * s, color=LINE_GREY, linewidth=5, alpha=0.45, zorder=3, label=name
+            v[0],
+            sign * factor * s,
+            color=LINE_GREY,
+            linewidth=pt(5),
+            alpha=0.45,
+            zorder=3,
+            label=name,
         )
         curve = np.column_stack([v[0], sign * factor * s])
         names.lines.append(NamedLine(name, TEXT_GREY, (curve,)))
@@ -357,7 +364,7 @@ def _path(
     gaps = np.isnan(times)
     for keep, dash, name in ((times <= now, "-", "before"), (times >= now, DASHED, "after")):
         x, y = points[keep | gaps].T
-        drawn += ax.plot(x, y, color=INK, linestyle=dash, linewidth=1.2, zorder=6, label=name)
+        drawn += ax.plot(x, y, color=INK, linestyle=dash, linewidth=pt(1.2), zorder=6, label=name)
         names.curves.append(points[keep])
     return drawn
 
@@ -465,7 +472,7 @@ def pins(ax: Axes, trace: Trace, element: int, checks: Report, *, row: int = -1)
                 (v, z),
                 (7, 7),
                 textcoords="offset points",
-                fontsize=8,
+                fontsize=font(8),
                 fontweight="bold",
                 bbox={"boxstyle": "circle,pad=0.25", "facecolor": PAPER, "edgecolor": INK},
                 zorder=11,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plots._matplotlib import Artist, Axes, Bbox, IdentityTransform, RendererBase, Text
+from plots.presets import font
 from plots.style import PAPER
 
 __all__ = ["LineNames", "NamedLine"]
@@ -79,6 +80,7 @@ class LineNames(Artist):
         self.lines: list[NamedLine] = []
         self.avoid: list[tuple[float, float]] = []
         self.curves: list[Floats] = []
+        self.size = font(8)  # when the names are drawn, another preset may be in use
         self.set_zorder(9)
         self.set_in_layout(False)
         ax.add_artist(self)
@@ -135,7 +137,7 @@ class LineNames(Artist):
         text = Text(
             text=line.name,
             color=line.colour,
-            fontsize=8,
+            fontsize=self.size,
             ha="center",
             va="center",
             bbox=box,

@@ -11,6 +11,7 @@ from plots._matplotlib import Axes, ListedColormap
 from plots._window import Window
 from plots.panels._axes import Artists, lanes, note, time_axis
 from plots.panels._shown import checked_elements, checked_window, has_threshold, shown
+from plots.presets import font, pt
 from plots.style import INK, PAPER, ramp
 
 __all__ = ["heat", "slipping"]
@@ -85,8 +86,8 @@ def heat(
             times = times[:0]
         ends = row + 0.58, row + 1.42
         # White below ink, visible on every grey.
-        ax.vlines(times, *ends, color=PAPER, linewidth=2.4)
-        drawn.append(ax.vlines(times, *ends, color=INK, linewidth=0.9))
+        ax.vlines(times, *ends, color=PAPER, linewidth=pt(2.4))
+        drawn.append(ax.vlines(times, *ends, color=INK, linewidth=pt(0.9)))
     lanes(ax, chosen)
     time_axis(ax, begin, end)
     if bar:
@@ -146,12 +147,12 @@ def slipping(
         now = numbers == number
         pieces = np.column_stack([starts, ends - starts])[now & (ends > starts)]
         drawn.append(ax.broken_barh(pieces.tolist(), (0, number), facecolor=shades[number]))
-    drawn += ax.step(part.t, away, where="post", color=INK, linewidth=0.9)
+    drawn += ax.step(part.t, away, where="post", color=INK, linewidth=pt(0.9))
     ax.set(ylim=(0, 1.05 * count), ylabel=place_of(trace))
     ax.set_yticks([0, count // 2, count] if count > 1 else [0, 1])
     time_axis(ax, begin, end)
     said = f"at the end {away[-1]} of {count} {place_of(trace)}"
-    return [*drawn, ax.set_title(said, loc="right", fontsize=8)]
+    return [*drawn, ax.set_title(said, loc="right", fontsize=font(8))]
 
 
 def place_of(trace: Trace) -> str:

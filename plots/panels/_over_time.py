@@ -25,6 +25,7 @@ from plots.panels._shown import (
     scaled,
     shown,
 )
+from plots.presets import pt
 from plots.style import INK, LINE_GREY
 
 NO_VARIABLE = "no deflection:\nthis chart has no variables"
@@ -193,7 +194,7 @@ def ratio(
         )
     if threshold:
         lines += [
-            ax.axhline(level, color=LINE_GREY, linewidth=0.8, zorder=1) for level in (1.0, -1.0)
+            ax.axhline(level, color=LINE_GREY, linewidth=pt(0.8), zorder=1) for level in (1.0, -1.0)
         ]
     ax.set_ylabel(title)
     time_axis(ax, *checked_window(trace, window))

@@ -15,15 +15,16 @@ from plots._window import Window
 from plots.panels._axes import VECTOR_ROWS, Artists, draw_curve, log_axis
 from plots.panels._many import place_of
 from plots.panels._shown import checked_elements, scaled, shown
+from plots.presets import pt
 from plots.style import INK, LINE_GREY, TEXT_GREY, ramp
 
 __all__ = ["arrows", "hysteresis", "portrait", "slip_bar"]
 
 # Phases; the third one may cover itself many times.
 PHASES: tuple[dict[str, Any], ...] = (
-    {"color": INK, "linestyle": "-", "linewidth": 1.6},
-    {"color": TEXT_GREY, "linestyle": "--", "linewidth": 1.6},
-    {"color": LINE_GREY, "linestyle": "-", "linewidth": 0.9},
+    {"color": INK, "linestyle": "-", "linewidth": pt(1.6)},
+    {"color": TEXT_GREY, "linestyle": "--", "linewidth": pt(1.6)},
+    {"color": LINE_GREY, "linestyle": "-", "linewidth": pt(0.9)},
 )
 MOST_ARROWS = 500  # looked at along one path
 OVERLAP, REPEATED = 0.22, 0.7  # inches between arrows, and between those of the same direction
@@ -221,7 +222,7 @@ def arrows(ax: Axes, lines: LineCollection, *, apart: float = 1.1) -> Artists:
         return []
     apart = max(apart, length[-1] / MOST_ARROWS)
     look: dict[str, Any] = {"arrowstyle": "-|>,head_length=0.5,head_width=0.25"}
-    look |= {"color": INK, "linewidth": 0.0, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 11}
+    look |= {"color": INK, "linewidth": pt(0.0), "shrinkA": 0, "shrinkB": 0, "mutation_scale": 11}
     drawn: Artists = []
     known: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []  # tips, directions; inches
     for end in np.arange(apart / 2, length[-1], apart).tolist():

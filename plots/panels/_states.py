@@ -11,6 +11,7 @@ from plots._matplotlib import Axes, RendererBase, Text
 from plots._window import Window
 from plots.panels._axes import MANY, VECTOR_ROWS, Artists, lanes, time_axis
 from plots.panels._shown import checked_elements, checked_window
+from plots.presets import font, pt
 from plots.style import INK, PAPER, state_look
 
 __all__ = ["ribbons"]
@@ -31,7 +32,7 @@ class _SpanName(Text):
             name,
             ha="center",
             va="center",
-            fontsize=7.5,
+            fontsize=font(7.5),
             color=INK,
             bbox={
                 "boxstyle": "round,pad=0.12",
@@ -157,7 +158,7 @@ def _held_bands(ax: Axes, trace: Trace, window: Window) -> Artists:
                     facecolor="none",
                     edgecolor=INK,
                     hatch="xxx",
-                    linewidth=0.8,
+                    linewidth=pt(0.8),
                     zorder=3,
                     label=text,
                 )

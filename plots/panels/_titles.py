@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from plots._matplotlib import Axes, ScaledTranslation
+from plots.presets import inches
 
 __all__ = ["lettered"]
 
@@ -35,6 +36,6 @@ def lettered(ax: Axes, letter: str, name: str, *, pad: float = 6.0) -> None:
     ('a', 'velocity')
     """
     ax.set_title(letter, loc="center", fontweight="bold", ha="left", x=0.0, pad=pad)
-    right = ScaledTranslation(AFTER_LETTER / 72, 0.0, ax.figure.dpi_scale_trans)
+    right = ScaledTranslation(inches(AFTER_LETTER) / 72, 0.0, ax.figure.dpi_scale_trans)
     text = ax.set_title(name, loc="left", pad=pad)
     text.set_transform(text.get_transform() + right)

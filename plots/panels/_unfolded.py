@@ -19,6 +19,7 @@ from plots._matplotlib import Axes, Rectangle
 from plots._window import Window
 from plots.panels._axes import Artists
 from plots.panels._shown import checked_elements, checked_window, is_number, scaled
+from plots.presets import font, inches, pt
 from plots.style import INK, LINE_GREY, PAPER, TEXT_GREY, state_look
 
 __all__ = ["Unfolded", "unfolded", "unfolded_force", "unfolded_states"]
@@ -232,7 +233,7 @@ def unfolded_force(ax: Axes, part: Unfolded) -> Artists:
         own = part.of(instant)
         x = np.repeat([own[0].left, *(each.left + 1.0 for each in own)], 2)[1:-1]
         y = np.repeat([factor * each.F for each in own], 2)
-        drawn += ax.plot(x, y, color=INK, linewidth=1.8, solid_joinstyle="miter", zorder=3)
+        drawn += ax.plot(x, y, color=INK, linewidth=pt(1.8), solid_joinstyle="miter", zorder=3)
     for instant in range(1, part.times.size):
         before, after = part.of(instant - 1)[-1], part.of(instant)[0]
         drawn += ax.plot(
@@ -249,12 +250,12 @@ def unfolded_force(ax: Axes, part: Unfolded) -> Artists:
             ax.annotate(
                 text,
                 (each.left + 0.5, factor * each.F),
-                (0, 4),
+                (0, pt(4)),
                 textcoords="offset points",
                 ha="center",
                 va="bottom",
                 rotation=90 if upright else 0,
-                fontsize=8,
+                fontsize=font(8),
                 color=INK,
             )
         )
@@ -299,7 +300,7 @@ def unfolded_states(ax: Axes, part: Unfolded) -> Artists:
     """
     chart, count = part.trace.model.chart, len(part.elements)
     wide = column_width(ax.get_window_extent().width / ax.figure.dpi, part)
-    tall = ax.get_window_extent().height / ax.figure.dpi / count
+    tall = ax.get_window_extent().height / inches(ax.figure.dpi) / count
     cells: Artists = []
     drawn: Artists = []
     firsts = [part.of(instant)[0] for instant in range(part.times.size)]
@@ -312,13 +313,13 @@ def unfolded_states(ax: Axes, part: Unfolded) -> Artists:
                 plain = {"facecolor": PAPER, "edgecolor": "none", "pad": 0.8, "alpha": 0.85}
                 place = (each.left + 0.5, row + 1.0)
                 drawn.append(
-                    ax.text(*place, name, ha="center", va="center", fontsize=7.5, bbox=plain)
+                    ax.text(*place, name, ha="center", va="center", fontsize=font(7.5), bbox=plain)
                 )
     for each in part.columns:
         if each.element >= 0:
             row = part.elements.index(each.element)
             frame = Rectangle((each.left + 0.03, row + 0.55), 0.94, 0.9, fill=False, edgecolor=INK)
-            frame.set(linewidth=2.4, zorder=5)
+            frame.set(linewidth=pt(2.4), zorder=5)
             drawn.append(ax.add_patch(frame))
     drawn += _edge_names(ax, part, wide)
     ax.set(
@@ -332,7 +333,7 @@ def unfolded_states(ax: Axes, part: Unfolded) -> Artists:
     ax.spines[:].set_visible(False)
     ax.set_xlabel(
         "micro-step at each instant (0: before the first firing); time",
-        labelpad=20 if part.times.size == 1 else 33,
+        labelpad=inches(20 if part.times.size == 1 else 33),
     )
     return [*cells, *drawn, *_times(ax, part), *_breaks(ax, part)]
 
@@ -342,8 +343,8 @@ def _cell(left: float, row: int, mode: int) -> Rectangle:
 
 
 def column_width(wide: float, part: Unfolded) -> float:
-    """Return the width of a column in axes of a width."""
-    return wide / (part.width + 0.2)
+    """Return the width of a column in axes of a width, in inches of the screen."""
+    return wide / inches(part.width + 0.2)
 
 
 def edge_texts(part: Unfolded, wide: float) -> tuple[dict[str, str], bool, float]:
@@ -354,7 +355,7 @@ def edge_texts(part: Unfolded, wide: float) -> tuple[dict[str, str], bool, float
     part : Unfolded
         From `unfolded`.
     wide : float
-        Width of a column, inches.
+        Width of a column, inches of the screen.
 
     Returns
     -------
@@ -382,13 +383,13 @@ def _edge_names(ax: Axes, part: Unfolded, wide: float) -> Artists:
         ax.annotate(
             texts.get(each.edge, "others"),
             (each.left + 0.5, 1.0),
-            (0, 3),
+            (0, pt(3)),
             xycoords=ax.get_xaxis_transform(),
             textcoords="offset points",
             ha="center",
             va="bottom",
             rotation=90 if upright else 0,
-            fontsize=8,
+            fontsize=font(8),
             linespacing=1.15,
             color=INK if each.edge else TEXT_GREY,
             annotation_clip=False,
@@ -408,15 +409,20 @@ def _times(ax: Axes, part: Unfolded) -> Artists:
         "xycoords": ax.get_xaxis_transform(),
         "textcoords": "offset points",
         "va": "top",
-        "fontsize": 8.5,
+        "fontsize": font(8.5),
         "fontweight": "bold",
         "annotation_clip": False,
     }
     # The first time is too long to stand between the others.
     low = -31 if texts else -18
-    first = ax.annotate(f"t = {part.times[0]:.9g} s", (0.0, 0.0), (0, low), ha="left", **look)
+    first = ax.annotate(
+        f"t = {part.times[0]:.9g} s", (0.0, 0.0), (0, inches(low)), ha="left", **look
+    )
     between = zip(places, texts, strict=True)
-    return [first, *(ax.annotate(u, (x, 0.0), (0, -18), ha="center", **look) for x, u in between)]
+    return [
+        first,
+        *(ax.annotate(u, (x, 0.0), (0, inches(-18)), ha="center", **look) for x, u in between),
+    ]
 
 
 def _breaks(ax: Axes, part: Unfolded) -> Artists:
@@ -431,7 +437,7 @@ def _breaks(ax: Axes, part: Unfolded) -> Artists:
             heights,
             transform=ax.get_xaxis_transform(),
             color=LINE_GREY,
-            linewidth=0.8,
+            linewidth=pt(0.8),
             zorder=1,
         )
     return drawn
