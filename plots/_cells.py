@@ -175,7 +175,7 @@ class Cells:
         colour = self.colours.soft if soft else self.colours.ink
         place = ' VALIGN="BOTTOM"' if piece.lowered else ""
         return (
-            f'<TD ALIGN="LEFT"{place} {size}><FONT FACE="{face}" POINT-SIZE="{points:.4g}" '
+            f'<TD ALIGN="LEFT"{place} {size}><FONT FACE="{face}" POINT-SIZE="{points}" '
             f'COLOR="{colour}">{words}</FONT><BR ALIGN="LEFT"/></TD>'
         )
 
@@ -188,9 +188,10 @@ class Cells:
         face = _FACES.get(piece.role, _FORMULA)[1]
         return width(printable(piece.text), self._points(piece), mono=face == MONO)
 
-    def _points(self, piece: Piece) -> float:
+    def _points(self, piece: Piece) -> int:
+        """Return the size of a text; Graphviz takes whole points only."""
         size = max(_FACES.get(piece.role, _FORMULA)[0] * self.scale, LEAST)
-        return size * (SMALLER if piece.lowered else 1)
+        return int(size * (SMALLER if piece.lowered else 1))
 
     def _height(self, row: Row) -> int:
         sizes = [(_FACES.get(piece.role, _FORMULA)[0], piece.role) for piece in row] or [(0, "")]

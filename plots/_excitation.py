@@ -17,6 +17,7 @@ __all__ = ["Excited", "excited"]
 
 PERIOD, CYCLES = 10.0, 2.25  # s; the first quarter leaves the origin
 SMALLEST, FACTOR, TRIES = 1e-7, 4.0, 14  # m: amplitudes that are tried, up to 6.7 m
+UNSCALED = 0.1  # m: of a model that does the same at every amplitude
 SATURATED = 1.6  # growth of F by FACTOR times the amplitude; an elastic contact has FACTOR
 PEAK = 1e3  # of the median of F
 MOVES = 0.3  # of the amplitude of the spring's end: a body that slips
@@ -80,6 +81,8 @@ def excited(model: Model, velocity: str | None, t_end: float | None) -> Excited:
             force = _at_rest(trace)
             enough, before = 0 < force < SATURATED * before, force
         if enough:
+            if step == 0 and _any_size(model, pulled=pulled):
+                found.append(UNSCALED)
             break
     smaller = ""
     for amplitude in reversed(found):
@@ -92,6 +95,12 @@ def excited(model: Model, velocity: str | None, t_end: float | None) -> Excited:
         f"no sine between {SMALLEST:g} and {largest:.2g} m gives a loop of {model.title}",
         advice="give velocity, for example '0.1*cos(t)', and t_end",
     )
+
+
+def _any_size(model: Model, *, pulled: bool) -> bool:
+    """Return whether a model that acts at the smallest amplitude also does at a usual one."""
+    trace = _run(model, UNSCALED, CYCLES, pulled=pulled)
+    return trace is not None and _bounded(trace)
 
 
 def _bounded(trace: Trace) -> bool:

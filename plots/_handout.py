@@ -26,7 +26,7 @@ from plots import formats, panels, presets
 from plots._excitation import Excited, excited
 from plots._mathtext import Formulas, formula
 from plots._matplotlib import Axes, Figure, FigureCanvasAgg, rc_context
-from plots._svg_artists import drawn, smallest
+from plots._svg_artists import EXACT, drawn, smallest
 from plots.live_chart import plain_tree
 from plots.render import picture
 from plots.statechart import statechart
@@ -38,9 +38,11 @@ PAGE = (595.276, 841.89)  # A4
 MARGIN, GAP = 40.0, 14.0
 INNER = PAGE[0] - 2 * MARGIN
 SMALLEST, TEXT, HEAD, TITLE = 7.0, 8.0, 9.5, 16.0
+EQUATION = 10.0  # points; a fraction in it has 7
 LEAD = 1.35  # height of a line, in sizes of its text
 LETTER = 0.56  # width of a letter, in sizes of its text; of most letters, so that lines fit
-LOOP, HIGHEST = (236.0, 178.0), 250.0  # the loop with its labels; it fills what is left
+LOOP = (236.0, 178.0)  # the loop with its labels; it fills what is left
+LOWEST, HIGHEST = 124.0, 250.0  # of its heights, the first for a chart that needs the room
 SHORT = 26  # letters: a table with longer values has the whole width
 LARGEST = 1.2  # the largest scale of a chart
 SIZES = presets.Preset("handout", None, None, TEXT, SMALLEST, 1.0, 150.0)
@@ -88,7 +90,9 @@ def handout(
     'gms.pdf'
     """
     formats.chosen(path, "figure")
-    return formats.save(handout_figure(model, velocity=velocity, t_end=t_end), path, "figure")
+    figure = handout_figure(model, velocity=velocity, t_end=t_end)
+    with rc_context(EXACT):
+        return formats.save(figure, path, "figure")
 
 
 def handout_figure(
@@ -99,7 +103,7 @@ def handout_figure(
         raise ParameterError(
             "velocity and t_end belong together", advice="give both of them, or neither"
         )
-    root, size = _chart(model.chart)
+    charts = _charts(model.chart)
     run = excited(model, velocity, t_end)
     with presets.preset(SIZES), rc_context(presets.settings()):
         figure = Figure(figsize=(PAGE[0] / 72, PAGE[1] / 72), dpi=SIZES.dpi)
@@ -112,13 +116,16 @@ def handout_figure(
         beside = max(len(row[1]) for row in [*rows, HEADS]) <= SHORT
         wide = INNER - LOOP[0] - GAP if beside else INNER
         table = _table_height(rows, wide)
-        lower = max(table, LOOP[1]) if beside else table + GAP + LOOP[1]
-        scale = min(LARGEST, INNER / size[0], (top - foot - high - lower - 3 * GAP) / size[1])
-        letters = scale * smallest(root)
-        if letters < SMALLEST:
+        for loop in (LOOP[1], LOWEST):
+            lower = max(table, loop) if beside else table + GAP + loop
+            root, size, scale = _chart(charts, top - foot - high - lower - 3 * GAP)
+            letters = scale * smallest(root)
+            if letters >= SMALLEST:
+                break
+        else:
             raise ParameterError(
                 f"{model.title} does not fit on one A4 page: its chart would have letters of "
-                f"{max(0.0, letters):.1f} pt",
+                f"{max(0.0, letters):.2g} pt, less than {SMALLEST:g} pt",
                 advice="write the chart with plots.render, and the loop with plots.phase",
             )
         used = scale * size[1]
@@ -194,16 +201,36 @@ def _foot(page: _Page, model: Model) -> float:
 
 
 # --------------------------------------------------------------------------- the chart
-def _chart(chart: Chart) -> tuple[ElementTree.Element, tuple[float, float]]:
-    """Return the chart as SVG, in the direction that fits better, and its size."""
+Drawn = tuple[ElementTree.Element, tuple[float, float]]
+
+
+def _charts(chart: Chart) -> list[Drawn]:
+    """Return the chart as SVG, with its size: in both directions, and as a matrix."""
     found = []
-    for direction in ("TB", "LR"):
-        graph = statechart(chart, notation="math", direction=direction)
+    for direction, form in (("TB", "auto"), ("LR", "auto"), ("TB", "matrix")):
+        graph = statechart(chart, notation="math", direction=direction, form=form)
         root = plain_tree(picture(graph, "svg"))
         wide, tall = (float(n) for n in root.get("viewBox", "").split()[2:])
         found.append((root, (wide, tall)))
+    return found
+
+
+def _chart(
+    charts: Sequence[Drawn], room: float
+) -> tuple[ElementTree.Element, tuple[float, float], float]:
+    """Return the chart that fits best into the width of the page and a height, and its scale."""
+
+    def scale(each: Drawn) -> float:
+        return min(LARGEST, INNER / each[1][0], room / each[1][1])
+
+    def letters(each: Drawn) -> float:
+        return scale(each) * smallest(each[0])
+
     # A page is narrow: width counts first, then height.
-    return min(found, key=lambda each: (max(1.0, each[1][0] / INNER), each[1][1]))
+    best = min(charts[:2], key=lambda each: (max(1.0, each[1][0] / INNER), each[1][1]))
+    if letters(best) < SMALLEST:
+        best = max(charts, key=letters)
+    return (*best, scale(best))
 
 
 def _draw_chart(
@@ -262,12 +289,12 @@ def _total(chart: Chart, force: str, total: str) -> str:
 
 def _columns(page: _Page, equations: Sequence[tuple[str, str]]) -> tuple[int, list[float]]:
     """Return in how many columns equations are written, and how high each one is."""
-    sizes = [page.size(f"${each}$", HEAD) for _, each in equations]
+    sizes = [page.size(f"${each}$", EQUATION) for _, each in equations]
     labels = max((page.size(label, SMALLEST)[0] for label, _ in equations if label), default=0.0)
     widest = labels + 12 + max(wide for wide, _ in sizes)
     if widest > INNER:
         raise ParameterError("an equation is wider than an A4 page", advice="name parts of it: let")
-    heights = [max(tall, HEAD) + 5.0 for _, tall in sizes]
+    heights = [max(tall, EQUATION) + 4.5 for _, tall in sizes]
     return (2 if 2 * widest + GAP < INNER and len(equations) > 3 else 1), heights
 
 
@@ -290,7 +317,7 @@ def _write_equations(page: _Page, equations: Sequence[tuple[str, str]], top: flo
             look: Any = {"va": "center"}
             if label:
                 page.text(x, y - tall / 2, label, SMALLEST, color=TEXT_GREY, **look)
-            page.text(x + inset, y - tall / 2, f"${each}$", HEAD, **look)
+            page.text(x + inset, y - tall / 2, f"${each}$", EQUATION, **look)
             y -= tall
 
 

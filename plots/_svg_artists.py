@@ -17,10 +17,13 @@ import numpy as np
 
 from plots._matplotlib import Artist, Axes, Curve, Figure, patches
 
-__all__ = ["Part", "drawn", "smallest"]
+__all__ = ["EXACT", "Part", "drawn", "smallest"]
 
 # matplotlib's fonts are wider than those used for the layout.
 WIDE, MONO = 0.88, 0.975
+# Letters are not moved to whole pixels, so that a line has the width of its cell.
+EXACT: Any = {"text.hinting": "none"}
+INDEX = 0.75  # an index is smaller than that, relative to the text before it
 
 
 class Part:
@@ -92,8 +95,16 @@ def drawn(
 
 
 def smallest(root: ElementTree.Element) -> float:
-    """Return the size of the smallest text of an SVG, points."""
-    return min(float(_font(node, 1.0)["fontsize"]) for node in root.iter("text"))
+    """Return the size of the smallest text of an SVG but an index, points."""
+    sizes = []
+    for group in root.iter():
+        before = 0.0
+        for node in group.findall("text"):
+            size = float(_font(node, 1.0)["fontsize"])
+            if size > INDEX * before:
+                before = size
+                sizes.append(size)
+    return min(sizes)
 
 
 def _artist(

@@ -14,6 +14,7 @@ from gms_fsm.errors import ParameterError, shown
 from gms_fsm.traces.trace import Trace, check_trace
 from plots import formats
 from plots._matplotlib import rc_context
+from plots._svg_artists import EXACT
 from plots.film._chart import FilmChart
 from plots.film._movie import Movie
 from plots.film._pace import paced
@@ -121,7 +122,7 @@ def animate(
     window = (float(begin), float(end))
     pace = paced(trace, window, count, fps)
     chart = FilmChart(pace, elements, notation, theme)
-    with rc_context(RC):
+    with rc_context(RC | EXACT):
         film = FilmPicture(pace, chart, shown_rows(trace, window), window, cast(Theme, theme))
         return formats.save(Movie(film, fps, progress), path, "animation")
 

@@ -29,6 +29,7 @@ __all__ = [
     "pt",
     "room",
     "settings",
+    "to_scale",
 ]
 
 TEXT, LINE = 9.0, 1.2  # points: text and lines of figures for the screen
@@ -180,6 +181,19 @@ def font(size: float) -> float:
 def pt(size: float) -> float:
     """Return the width of a line, the size of a marker or a distance, from that on the screen."""
     return size * current().line / LINE
+
+
+def to_scale(look: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a look of lines or patches whose width is that on the screen, with its width here.
+
+    Examples
+    --------
+    >>> from plots.presets import preset, to_scale
+    >>> with preset("ieee1"):
+    ...     to_scale({"color": "k", "linewidth": 1.6})
+    {'color': 'k', 'linewidth': 1.2}
+    """
+    return {**look, "linewidth": round(pt(look["linewidth"]), 3)}
 
 
 def inches(size: float) -> float:

@@ -54,7 +54,7 @@ FORMS = {
 MOST_EDGES = 20  # of a graph; a chart with more is drawn as a matrix
 MOST_LINES = 6  # of a guard on an edge; a longer one is written below the picture
 LONGEST_LABEL = 34  # characters of a line on an edge
-SMALLEST = 0.75  # smallest size of texts: 7.5 points instead of 10
+SMALLEST = 0.7  # smallest size of texts: 7 points instead of 10
 
 
 class ChartGraph(DrawnGraph):

@@ -104,6 +104,7 @@ def handout_command(
         Path, typer.Option("--output", "-o", help="Output file, ending in {figure}.")
     ] = Path("handout.pdf"),
     law: Law = "",
+    contact: ContactName = "",
 ) -> None:
     """Print a model on one A4 page: chart, equations, parameters, a hysteresis loop.
 
@@ -113,18 +114,14 @@ def handout_command(
     import plots
     from gms_fsm.app._catalogue import chosen
     from gms_fsm.app._own_files import own_file
-    from gms_fsm.app.scenario import load_scenario
     from gms_fsm.systems.models import demonstration
 
     own = own_file(name, law)
+    _no_contact(contact, own)
     if own is None:
         model: Model = demonstration(chosen("handout", name, law)[0], law)
-    elif own.chart is not None:
-        raise ParameterError(
-            "it is a chart file, which has no numbers", place=name, advice="give a scenario file"
-        )
     else:
-        model = load_scenario(own.path).model
+        model = own.only_model(contact)
     typer.echo(str(plots.handout(model, output)))
 
 

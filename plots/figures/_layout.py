@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any, cast
 
@@ -25,7 +25,7 @@ from plots._matplotlib import (
 from plots.panels._titles import lettered
 from plots.presets import SCREEN, current, inches, pt, room, settings
 
-__all__ = ["fitted", "legend_below", "low", "narrow", "sheet"]
+__all__ = ["fitted", "legend_above", "legend_below", "low", "narrow", "sheet"]
 
 NARROW = 6.0  # inches of the screen: a narrower figure has one column of panels
 TRIES = 7  # of a layout: folded titles move the panels
@@ -74,17 +74,27 @@ def fitted(figure: Figure) -> Figure:
     Parameters
     ----------
     figure : Figure
-        Complete; on the screen it stays as it is.
+        Complete; on the screen only titles beside a legend of several rows are moved.
 
     Returns
     -------
     Figure
         The same one.
     """
-    if current() is not SCREEN:
-        with rc_context(settings()):
+    with rc_context(settings()):
+        if current() is not SCREEN:
             _fit(figure)
+        elif any(_rows(ax) > 1 for ax in figure.axes):
+            figure.draw_without_rendering()
+            for ax in figure.axes:
+                _above_legend(ax, _renderer(figure))
     return figure
+
+
+def _rows(ax: Axes) -> int:
+    """Return how many rows the legend of a panel has."""
+    legend: Any = ax.get_legend()
+    return 0 if legend is None else -(-len(legend.get_texts()) // legend._ncols)
 
 
 def _fit(figure: Figure) -> None:
@@ -136,8 +146,12 @@ def _titles_folded(figure: Figure, renderer: RendererBase) -> bool:
             if theirs.x0 >= mine.x1 and theirs.y0 < mine.y1 + 1 and mine.y0 < theirs.y1 + 1:
                 whole = boxes[other]
                 rights.append(theirs.x0 if whole is None else min(theirs.x0, whole.x0))
-        wide = min(rights) - title.get_window_extent(renderer).x0 - inches(0.05) * figure.dpi
-        changed |= _folded(title, max(wide, 0.6 * mine.width), renderer)
+        begin, space = title.get_window_extent(renderer).x0, inches(0.05) * figure.dpi
+        wide = max(min(rights) - begin - space, 0.6 * mine.width)
+        beside = ax._right_title  # type: ignore[attr-defined]
+        if beside.get_text():
+            wide = min(wide, beside.get_window_extent(renderer).x0 - begin - space)
+        changed |= _folded(title, wide, renderer)
     return changed
 
 
@@ -244,10 +258,10 @@ def legend_below(
     Legend
         The legend.
     """
-    renderer = _renderer(figure)
     wide = figure.bbox.width - inches(0.1) * figure.dpi
-    for columns in range(min(most, len(labels)), 0, -1):
-        legend = figure.legend(
+
+    def legend(columns: int) -> Legend:
+        return figure.legend(
             list(handles),
             list(labels),
             loc="outside lower left",
@@ -255,7 +269,39 @@ def legend_below(
             handlelength=2.6,
             columnspacing=1.2,
         )
-        if columns == 1 or legend.get_window_extent(renderer).width <= wide:
-            break
-        legend.remove()
-    return legend
+
+    return _with_columns(legend, min(most, len(labels)), wide, _renderer(figure))
+
+
+def legend_above(ax: Axes) -> None:
+    """Put the legend of a panel next to its title, where there are no curves.
+
+    It has as many columns as there is room for.
+    """
+    figure: Any = ax.figure
+    renderer = _renderer(figure.figure if figure.figure is not figure else figure)
+
+    def legend(columns: int) -> Legend:
+        return ax.legend(
+            loc="lower right",
+            bbox_to_anchor=(1, 1),
+            ncols=columns,
+            borderaxespad=0.1,
+            columnspacing=1.2,
+            handlelength=2.2,
+            handletextpad=0.5,
+        )
+
+    _with_columns(legend, 6, ax.get_window_extent(renderer).width, renderer)
+
+
+def _with_columns(
+    legend: Callable[[int], Legend], most: int, wide: float, renderer: RendererBase
+) -> Legend:
+    """Return a legend with as many columns as fit into so many pixels."""
+    for columns in range(most, 1, -1):
+        made = legend(columns)
+        if made.get_window_extent(renderer).width <= wide:
+            return made
+        made.remove()
+    return legend(1)

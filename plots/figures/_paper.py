@@ -18,7 +18,7 @@ from plots.figures._parts import element_legend, lanes_height, letter_panels
 from plots.panels._axes import MANY, first_variable
 from plots.panels._held import Lag
 from plots.panels._shown import checked_elements, checked_window, scaled, shown
-from plots.presets import font, pt, settings
+from plots.presets import font, pt, settings, to_scale
 from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY
 
 __all__ = [
@@ -348,7 +348,7 @@ def held_residuals(
             ],
         )
         period.legend(loc="upper left", ncols=2)
-        (paper,) = force.plot([], [], **REPORTED)
+        (paper,) = force.plot([], [], **to_scale(REPORTED))
         entries = [*(str(line.get_label()) for line in lines), "the paper's residual"]
         legend_below(figure, [*lines, paper], entries)
         figure.suptitle(title, x=0.01, ha="left")

@@ -50,19 +50,6 @@ def lanes_height(count: int, least: float, lane: float = LANE) -> float:
     return max(least, lane * count)
 
 
-def legend_above(ax: Axes) -> None:
-    """Put the legend next to the title, where there are no curves."""
-    ax.legend(
-        loc="lower right",
-        bbox_to_anchor=(1, 1),
-        ncols=6,
-        borderaxespad=0.1,
-        columnspacing=1.2,
-        handlelength=2.2,
-        handletextpad=0.5,
-    )
-
-
 def element_legend(figure: Figure, *axes: Axes) -> None:
     """Add one legend of elements and states below the figure."""
     found = [ax.get_legend_handles_labels() for ax in axes]

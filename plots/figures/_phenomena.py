@@ -10,7 +10,7 @@ import numpy as np
 from gms_fsm.phenomena.results import MARKS, VERDICTS, Measured, PhenomenaTable, Phenomenon
 from plots._matplotlib import Axes, Figure, Rectangle, rc_context
 from plots.figures._layout import fitted, sheet
-from plots.presets import font, inches, pt, room, settings
+from plots.presets import font, inches, pt, room, settings, to_scale
 from plots.style import (
     INK,
     LINE_GREY,
@@ -84,7 +84,7 @@ def _panel(
             marker=marker,
             markersize=pt(3),
             label=curve.label,
-            **compared_look(number),
+            **to_scale(compared_look(number)),
         )
     if phenomenon.log:
         ax.set_xscale("log")

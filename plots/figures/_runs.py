@@ -13,13 +13,12 @@ from gms_fsm.traces.trace import Trace, check_trace
 from plots import panels
 from plots._matplotlib import Axes, Figure, LineCollection, MaxNLocator, rc_context
 from plots._window import Window
-from plots.figures._layout import fitted, low, narrow, sheet
+from plots.figures._layout import fitted, legend_above, low, narrow, sheet
 from plots.figures._parts import (
     element_legend,
     head,
     lanes_height,
     last_cycles,
-    legend_above,
     letter_panels,
     one_time_axis,
     over_threshold,
@@ -118,8 +117,9 @@ def overview(
         for ax in time[:-1]:
             ax.set_xlabel("")
         note = "" if whole or window is not None else f", last {end - begin:.3g} s"
-        names = ["velocity", "friction", *(["how many slip"] if count > MANY else [])]
-        names = [name + note for name in (*names, "active states")]
+        # Beside the third name there is the number at the end; the time axis is the same.
+        names = [f"velocity{note}", f"friction{note}", f"active states{note}"]
+        names[2:2] = ["how many slip"] if count > MANY else []
         letter_panels([*time, loop, portrait], [*names, "hysteresis", "friction against velocity"])
         for ax in (loop, portrait):  # narrow, and labels such as -0.35 are wide
             ax.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from plots._matplotlib import Axes, LogLocator
 from plots.panels._axes import Artists, draw_curve, time_axis
-from plots.presets import pt
+from plots.presets import pt, to_scale
 from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY, compared_look
 
 __all__ = ["lag_between_ticks", "lag_over_period", "lag_over_time"]
@@ -71,9 +71,9 @@ def lag_over_time(
         shown = (lag.t >= window[0]) & (lag.t <= window[1])
         values = factor * (lag.place if place else lag.force)[shown]
         name = f"h = {MILLI * lag.period:g} ms"
-        lines += draw_curve(ax, lag.t[shown], values, label=name, **compared_look(number))
+        lines += draw_curve(ax, lag.t[shown], values, label=name, **to_scale(compared_look(number)))
     for sign in (1, -1):
-        ax.axhline(sign * factor * paper, **REPORTED)
+        ax.axhline(sign * factor * paper, **to_scale(REPORTED))
     time_axis(ax, *window)
     ax.set_ylabel("difference of x [µm]" if place else "difference of F [mN]")
     return lines
@@ -102,7 +102,7 @@ def lag_between_ticks(ax: Axes, lags: Sequence[Lag], *, window: tuple[float, flo
         begin = lag.t[shown]
         t = np.column_stack([begin, begin + lag.period]).ravel()
         both = np.column_stack([lag.force[shown], lag.before[shown]]).ravel()
-        lines += ax.plot(MILLI * (t - window[0]), MILLI * both, **compared_look(number))
+        lines += ax.plot(MILLI * (t - window[0]), MILLI * both, **to_scale(compared_look(number)))
         ink = compared_look(number)["color"]
         ax.plot(MILLI * (begin - window[0]), MILLI * lag.force[shown], "o", color=ink, ms=pt(4))
     ax.set(
@@ -160,7 +160,7 @@ def lag_over_period(
                 markersize=pt(6),
                 label=f"{'Fx'[quantity]}, {name}",
             )
-    ax.axhline(1.0, **REPORTED)
+    ax.axhline(1.0, **to_scale(REPORTED))
     ax.set(
         xscale="log", yscale="log", xlabel="sample time h [ms]", ylabel="largest / the paper's [1]"
     )

@@ -307,7 +307,7 @@ def _clauses(
             levels=[0.0],
             colors=[colour],
             linestyles=[dash],
-            linewidths=1.5,
+            linewidths=pt(1.5),
             zorder=4,
         )
         drawn.append(lines)

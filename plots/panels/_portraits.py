@@ -15,16 +15,16 @@ from plots._window import Window
 from plots.panels._axes import VECTOR_ROWS, Artists, draw_curve, log_axis
 from plots.panels._many import place_of
 from plots.panels._shown import checked_elements, scaled, shown
-from plots.presets import pt
+from plots.presets import pt, to_scale
 from plots.style import INK, LINE_GREY, TEXT_GREY, ramp
 
 __all__ = ["arrows", "hysteresis", "portrait", "slip_bar"]
 
 # Phases; the third one may cover itself many times.
 PHASES: tuple[dict[str, Any], ...] = (
-    {"color": INK, "linestyle": "-", "linewidth": pt(1.6)},
-    {"color": TEXT_GREY, "linestyle": "--", "linewidth": pt(1.6)},
-    {"color": LINE_GREY, "linestyle": "-", "linewidth": pt(0.9)},
+    {"color": INK, "linestyle": "-", "linewidth": 1.6},
+    {"color": TEXT_GREY, "linestyle": "--", "linewidth": 1.6},
+    {"color": LINE_GREY, "linestyle": "-", "linewidth": 0.9},
 )
 MOST_ARROWS = 500  # looked at along one path
 OVERLAP, REPEATED = 0.22, 0.7  # inches between arrows, and between those of the same direction
@@ -49,7 +49,7 @@ def _by_slipping(
         cmap=shades,
         norm=BoundaryNorm(np.arange(-0.5, count + 1.0), count + 1),
         array=away[cuts[:-1]],
-        linewidths=1.6,
+        linewidths=pt(1.6),
         capstyle="round",
         rasterized=len(points) > VECTOR_ROWS,
     )
@@ -185,7 +185,7 @@ def hysteresis(
             part.F[now],
             label=name,
             zorder=3 - number % 3,
-            **PHASES[number % len(PHASES)],
+            **to_scale(PHASES[number % len(PHASES)]),
         )
         begin = end
     return lines

@@ -162,7 +162,7 @@ def _clause(ax: Axes, clause: Clause, colour: str, y: float, *, bold: bool) -> A
         0.3,
         facecolor=colour if clause.holds else PAPER,
         edgecolor=colour,
-        linewidth=1.8 if bold else 1.0,
+        linewidth=pt(1.8 if bold else 1.0),
         zorder=2,
     )
     drawn.append(ax.add_patch(bar))

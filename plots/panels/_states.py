@@ -11,7 +11,7 @@ from plots._matplotlib import Axes, RendererBase, Text
 from plots._window import Window
 from plots.panels._axes import MANY, VECTOR_ROWS, Artists, lanes, time_axis
 from plots.panels._shown import checked_elements, checked_window
-from plots.presets import font, pt
+from plots.presets import font, pt, to_scale
 from plots.style import INK, PAPER, state_look
 
 __all__ = ["ribbons"]
@@ -118,6 +118,9 @@ def ribbons(
     chosen = checked_elements(trace, elements)
     begin, end = checked_window(trace, window)
     states = [state.name for state in trace.model.chart.states]
+    # Between many narrow rows there is no room for thicker outlines.
+    look = to_scale if len(chosen) <= MANY else dict
+    looks = [look(state_look(number)) for number in range(len(states))]
     drawn: Artists = []
     names: Artists = []
     for row, i in enumerate(chosen):
@@ -130,7 +133,7 @@ def ribbons(
                     (row + 1.0 - LANE / 2, LANE),
                     label=state if row == 0 else None,
                     rasterized=len(mine) > VECTOR_ROWS // 20,
-                    **state_look(number),
+                    **looks[number],
                 )
             )
         # A name never fits into less than one hundredth of the axis. In many narrow rows names

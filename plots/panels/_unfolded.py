@@ -19,7 +19,7 @@ from plots._matplotlib import Axes, Rectangle
 from plots._window import Window
 from plots.panels._axes import Artists
 from plots.panels._shown import checked_elements, checked_window, is_number, scaled
-from plots.presets import font, inches, pt
+from plots.presets import font, inches, pt, to_scale
 from plots.style import INK, LINE_GREY, PAPER, TEXT_GREY, state_look
 
 __all__ = ["Unfolded", "unfolded", "unfolded_force", "unfolded_states"]
@@ -30,6 +30,7 @@ TURNS = 10  # of a zigzag, per inch
 FEW = 8  # elements; of more, only new states are named
 LETTER = 0.075  # inches: width of a letter of 8 points
 LINE = 0.15  # inches: height of a line of 8 points
+BOLD = 1.1  # width of a bold letter of 8.5 points, of that of 8 points
 
 
 @dataclass(frozen=True)
@@ -331,15 +332,17 @@ def unfolded_states(ax: Axes, part: Unfolded) -> Artists:
     ax.set_xticks([each.left + 0.5 for each in part.columns], [str(c.step) for c in part.columns])
     ax.tick_params(length=0)
     ax.spines[:].set_visible(False)
+    texts, upright, high = time_texts(part, wide)
+    lower = 72 * high - 13 if upright else 0  # points: the times need more than a line
     ax.set_xlabel(
         "micro-step at each instant (0: before the first firing); time",
-        labelpad=inches(20 if part.times.size == 1 else 33),
+        labelpad=inches(33 + lower if texts else 20),
     )
-    return [*cells, *drawn, *_times(ax, part), *_breaks(ax, part)]
+    return [*cells, *drawn, *_times(ax, part, texts, upright, lower), *_breaks(ax, part)]
 
 
 def _cell(left: float, row: int, mode: int) -> Rectangle:
-    return Rectangle((left, row + 0.58), 1.0, 0.84, **state_look(mode))
+    return Rectangle((left, row + 0.58), 1.0, 0.84, **to_scale(state_look(mode)))
 
 
 def column_width(wide: float, part: Unfolded) -> float:
@@ -399,12 +402,36 @@ def _edge_names(ax: Axes, part: Unfolded, wide: float) -> Artists:
     ]
 
 
-def _times(ax: Axes, part: Unfolded) -> Artists:
-    """Write the time of the first instant, and the time between instants."""
-    places, texts = list(part.gaps), []
+def time_texts(part: Unfolded, wide: float) -> tuple[list[str], bool, float]:
+    """Return how the times between instants are written below columns of a width.
+
+    Parameters
+    ----------
+    part : Unfolded
+        From `unfolded`.
+    wide : float
+        Width of a column, inches of the screen.
+
+    Returns
+    -------
+    texts : list of str
+        One for each gap.
+    upright : bool
+        Whether they are rotated, because they would meet.
+    tall : float
+        Height of the highest one, inches.
+    """
+    texts = []
     for step in np.diff(part.times).tolist():
         factor, unit = scaled(np.array([step]), "s") if step >= 1e-10 else (1.0, "s")
         texts.append(f"+{factor * step:.4g} {unit}")
+    longest = BOLD * LETTER * max(map(len, texts), default=0)
+    upright = len(texts) > 1 and longest + 0.06 > wide * float(np.diff(part.gaps).min())
+    return texts, upright, longest if upright else LINE
+
+
+def _times(ax: Axes, part: Unfolded, texts: Sequence[str], upright: bool, lower: float) -> Artists:
+    """Write the time of the first instant, and the time between instants."""
     look: dict[str, Any] = {
         "xycoords": ax.get_xaxis_transform(),
         "textcoords": "offset points",
@@ -414,14 +441,15 @@ def _times(ax: Axes, part: Unfolded) -> Artists:
         "annotation_clip": False,
     }
     # The first time is too long to stand between the others.
-    low = -31 if texts else -18
+    low = -31 - lower if texts else -18
     first = ax.annotate(
         f"t = {part.times[0]:.9g} s", (0.0, 0.0), (0, inches(low)), ha="left", **look
     )
-    between = zip(places, texts, strict=True)
+    look |= {"ha": "center", "rotation": 90 if upright else 0}
+    between = zip(part.gaps, texts, strict=True)
     return [
         first,
-        *(ax.annotate(u, (x, 0.0), (0, inches(-18)), ha="center", **look) for x, u in between),
+        *(ax.annotate(text, (x, 0.0), (0, inches(-18)), **look) for x, text in between),
     ]
 
 

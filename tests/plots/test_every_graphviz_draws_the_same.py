@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 from xml.etree import ElementTree
@@ -12,7 +13,7 @@ from gms_fsm.charts import CHARTS, GMS_ELEMENT
 from plots.render import render
 from plots.statechart import statechart
 from tests.plots.charts_to_draw import LONG_GUARDS, MANY_EDGES, THREE_LOOPS
-from tests.plots.test_statechart_shows_the_whole_chart import SVG
+from tests.plots.test_statechart_shows_the_whole_chart import FIVE_STATES, SVG
 
 CASES = {
     **{name: (chart, 1, "math") for name, chart in CHARTS.items() if len(chart.transitions) > 1},
@@ -53,3 +54,13 @@ def test_program_and_package(
     for (_, x, y), (_, other_x, other_y) in zip(texts, other_texts, strict=True):
         assert other_x == pytest.approx(x, abs=1.0)
         assert other_y == pytest.approx(y, abs=2.5)
+
+
+@pytest.mark.parametrize("direction", ["TB", "LR"])
+def test_sizes_of_texts_are_whole_points(direction: str) -> None:
+    """Graphviz cuts off the rest, and the text would be narrower than its cell."""
+    for chart in (MANY_EDGES, THREE_LOOPS, FIVE_STATES):
+        graph = statechart(chart, direction=direction, notation="math", form="graph")
+        sizes = set(re.findall(r'POINT-SIZE="([^"]*)"', graph.source))
+        assert sizes
+        assert all(size.isdigit() for size in sizes)

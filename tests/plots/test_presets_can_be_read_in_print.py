@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -14,10 +15,13 @@ pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
 
 import plots
 from gms_fsm import (
+    Chart,
     ChartModel,
     Prescribed,
     PulledSlider,
+    State,
     Trace,
+    Transition,
     measure_phenomena,
     prove,
     simulate,
@@ -71,9 +75,48 @@ def difference() -> tuple[Any, Any]:
     return t, 1e-3 * np.sin(t)
 
 
+@functools.cache
+def sixteen() -> Trace:
+    """Breaks away one by one within milliseconds, late in a long run."""
+    return simulate(bank(16), PulledSlider(mass=1.0, stiffness=2.0, speed=0.1), 60.0)
+
+
+@functools.cache
+def cycles() -> Trace:
+    """Only its last cycles are shown, and the titles say so."""
+    return simulate(bank(12), Prescribed("0.9*sin(2*pi*t/4)"), 30.0)
+
+
+@functools.cache
+def five() -> Trace:
+    """States with long names."""
+    names = ["adhere", "creep_slowly", "slide_forward", "slide_backward", "lift_off_the_surface"]
+    chart = Chart(
+        "Five states",
+        inputs=("v",),
+        variables=("z",),
+        states=tuple(State(name, flow={"z": "1"}) for name in names),
+        transitions=tuple(
+            Transition(f"enter_{target}", source, target, guard="z > 1", actions={"z": "0"})
+            for source, target in itertools.pairwise([*names, names[0]])
+        ),
+        outputs={"F": "v"},
+    )
+    return simulate(ChartModel(chart, {}, n=2), LOOP, 7.5)
+
+
+def columns() -> tuple[float, float]:
+    """Return a window with ten instants."""
+    times = np.unique(sixteen().transitions.t)
+    return float(times[0]), float(times[9])
+
+
 FIGURES: dict[str, Callable[[], Any]] = {
     "overview": lambda: figures.overview(run("signed"), title="Pulled mass"),
     "overview of 12": lambda: figures.overview(many()),
+    "overview of the last cycles of 12": lambda: figures.overview(cycles()),
+    "overview of five states": lambda: figures.overview(five()),
+    "unfold of five states": lambda: figures.unfold(five(), 0.0, 6.5),
     "overview of lugre": lambda: figures.overview(lugre()),
     "ribbons": lambda: figures.ribbons_figure(run("signed")),
     "ribbons of 12": lambda: figures.ribbons_figure(many()),
@@ -120,6 +163,26 @@ def test_texts_can_be_read(name: str, preset: str) -> None:
         figure = FIGURES[name]()
     assert figure.get_figwidth() == sizes.width
     assert problems(figure, sizes.smallest) == []
+
+
+def test_times_between_many_instants_stay_apart() -> None:
+    for preset in ("ieee1", "ieee2", "slide"):
+        with plots.preset(preset) as sizes:
+            figure = figures.unfold(sixteen(), *columns())
+        assert problems(figure, sizes.smallest) == []
+
+
+def test_lines_have_the_width_of_the_preset() -> None:
+    """Also those whose look is a constant, whenever the package was imported."""
+
+    def widths(preset: str) -> list[float]:
+        with plots.preset(preset):
+            loop, portrait = figures.overview(run("signed")).axes[3:5]
+        return [loop.lines[0].get_linewidth(), portrait.collections[0].get_linewidth()[0]]
+
+    assert widths("screen") == pytest.approx([1.6, 1.6])
+    assert widths("ieee1") == pytest.approx([1.2, 1.2])
+    assert widths("poster") == pytest.approx([4.267, 4.267], abs=1e-3)
 
 
 def test_every_figure_builder_is_tried() -> None:
