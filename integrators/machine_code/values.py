@@ -1,0 +1,152 @@
+"""What names stand for while a function is translated: numbers, arrays, records, Python objects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from integrators.machine_code.tree import (
+    SIZES,
+    Address,
+    AddressOf,
+    Const,
+    Expr,
+    Load,
+    Local,
+    Op,
+)
+
+__all__ = ["Array", "Fixed", "Number", "Record", "Value", "leaves", "plus", "substituted", "times"]
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number."""
+
+    expr: Expr
+
+
+@dataclass(frozen=True)
+class Array:
+    """A view of memory, row by row.
+
+    Parameters
+    ----------
+    kind : str
+        Of its entries.
+    dims : tuple of Expr
+        Its lengths; None where it is not known.
+    base : Expr
+        An address.
+    offset : int
+        Bytes from there.
+    index : Expr, optional
+        Further entries from there.
+    """
+
+    kind: str
+    dims: tuple[Expr | None, ...]
+    base: Expr
+    offset: int = 0
+    index: Expr | None = None
+
+    @property
+    def address(self) -> Address:
+        """Where it begins."""
+        return Address(self.base, self.offset, self.index, SIZES[self.kind])
+
+    def at(self, place: Expr) -> Array | Number:
+        """Return an entry, or a row of a table."""
+        stride: Expr | None = Const("i", 1)
+        for length in self.dims[1:]:
+            stride = None if stride is None or length is None else times(stride, length)
+        if stride is None:
+            raise ValueError("the length of its rows is not known")
+        step = times(place, stride)
+        offset, index = self.offset, self.index
+        if isinstance(step, Const):
+            offset += SIZES[self.kind] * step.value
+        else:
+            index = step if index is None else plus(index, step)
+        row = replace(self, dims=self.dims[1:], offset=offset, index=index)
+        return row if row.dims else Number(Load(self.kind, row.address))
+
+
+@dataclass(frozen=True)
+class Record:
+    """A named tuple, or a tuple whose names are its places."""
+
+    cls: Any  # the class of a named tuple, or tuple
+    fields: Mapping[str, Value]
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """A Python object known while translating: a function, a class, a module."""
+
+    value: Any
+
+
+Value = Number | Array | Record | Fixed
+
+
+def plus(a: Expr, b: Expr) -> Expr:
+    """Return a sum of integers."""
+    if isinstance(a, Const) and isinstance(b, Const):
+        return Const("i", a.value + b.value)
+    if isinstance(a, Const) and a.value == 0:
+        return b
+    if isinstance(b, Const) and b.value == 0:
+        return a
+    return Op("i", "+", (a, b))
+
+
+def times(a: Expr, b: Expr) -> Expr:
+    """Return a product of integers."""
+    if isinstance(a, Const) and isinstance(b, Const):
+        return Const("i", a.value * b.value)
+    if isinstance(a, Const) and a.value == 1:
+        return b
+    if isinstance(b, Const) and b.value == 1:
+        return a
+    return Op("i", "*", (a, b))
+
+
+def leaves(value: Value) -> Iterator[Number | Array | Fixed]:
+    """Yield the numbers, arrays and objects that a value is made of, in order."""
+    if isinstance(value, Record):
+        for part in value.fields.values():
+            yield from leaves(part)
+    else:
+        yield value
+
+
+def substituted(expr: Any, given: Mapping[Local, Expr]) -> Any:
+    """Return an expression or a value with locals replaced."""
+    if not given:
+        return expr
+    match expr:
+        case Local():
+            return given.get(expr, expr)
+        case Op(operands=parts):
+            return replace(expr, operands=tuple(substituted(part, given) for part in parts))
+        case Load(address=address) | AddressOf(address=address):
+            return replace(expr, address=substituted(address, given))
+        case Address(base=base, index=index):
+            index = None if index is None else substituted(index, given)
+            return replace(expr, base=substituted(base, given), index=index)
+        case Number(expr=inner):
+            return Number(substituted(inner, given))
+        case Array(dims=dims, base=base, index=index):
+            return replace(
+                expr,
+                dims=tuple(None if each is None else substituted(each, given) for each in dims),
+                base=substituted(base, given),
+                index=None if index is None else substituted(index, given),
+            )
+        case Record(fields=fields):
+            return replace(
+                expr, fields={name: substituted(part, given) for name, part in fields.items()}
+            )
+    return expr
