@@ -79,6 +79,7 @@ def llvm_text(module: Module) -> str:
         *(f'!{k} = !{{!"{name}", !0}}' for k, name in enumerate(("f", "i", "b", "p"), 1)),
         *(f"!{k + 4} = !{{!{k}, !{k}, i64 0}}" for k in range(1, 5)),
     ]
+    kinds += ['!9 = distinct !{!9, !10}', '!10 = !{!"llvm.loop.unroll.full"}']
     return "\n".join([*lines, *functions, *kinds, ""])
 
 
@@ -95,6 +96,18 @@ def _table(table: Table) -> str:
 def _float(value: float) -> str:
     bits = struct.unpack("<Q", struct.pack("<d", value))[0]
     return f"0x{bits:016X}"
+
+
+UNROLL = True
+
+
+def _calls(body: Sequence[Statement]) -> bool:
+    for each in body:
+        if isinstance(each, Do):
+            return True
+        if isinstance(each, If) and (_calls(each.body) or _calls(each.orelse)):
+            return True
+    return False
 
 
 class _Writer:
@@ -272,6 +285,10 @@ class _Writer:
             f"  store i64 {self.new(f'add nsw i64 {now}, {statement.step}')}, ptr {place}"
         )
         self.jump(head)
+        if UNROLL and isinstance(statement.stop, Const) and isinstance(statement.start, Const):
+            turns = statement.stop.value - statement.start.value
+            if turns <= 8 and _calls(statement.body):
+                self.lines[-1] += ", !llvm.loop !9"
         self.place(end)
 
     def test(self, expr: Expr, yes: str, no: str) -> None:

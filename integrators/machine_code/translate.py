@@ -604,6 +604,9 @@ class _Body:
     def bind(self, name: str, value: Value) -> None:
         """Assign a value to a name."""
         match value:
+            case Number(expr=Const() as expr) if self.assigned.get(name, 0) == 1:
+                self.scope[name] = value
+                return
             case Number(expr=expr):
                 local = self.variable(name, expr.kind)
                 self.out.append(Set(local, self.as_kind(expr, local.kind)))
