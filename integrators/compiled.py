@@ -160,13 +160,13 @@ class Engine:
         integers = [ctypes.c_int64] * self.extra
         kind = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, *integers)
         self._function = kind(self.library.address("entry"))
-        if self.calls:
+        table = self.library.variable("callbacks") if self.calls else 0
+        if table:
             thunk = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
             self._thunks = [thunk(self._guarded(call)) for call in self.calls]
-            place = ctypes.c_void_p * len(self.calls)
-            table = place.from_address(self.library.variable("callbacks"))
+            places = (ctypes.c_void_p * len(self.calls)).from_address(table)
             for k, each in enumerate(self._thunks):
-                table[k] = ctypes.cast(each, ctypes.c_void_p).value
+                places[k] = ctypes.cast(each, ctypes.c_void_p).value
 
     def _guarded(self, call: Callable[[float], float]) -> Callable[[float], float]:
         """Return a function that never raises: machine code could not pass it on."""
@@ -227,7 +227,8 @@ def _made(
     """Return an engine from the store, or compile it."""
     inside = _longest(arguments) <= LONGEST_INSIDE
     layout = Layout(arguments, _is_known, inside=inside)
-    fixed = [part for part in _parts(arguments) if isinstance(part, Coefficients)]
+    # Which of the functions in the text are called, and the coefficients.
+    fixed = [getattr(part, "__name__", part) for part in _parts(arguments) if _is_known(part)]
     what = edition(), function.__name__, text, layout.key(), fixed, target_name()
     name = f"{function.__name__}-{hashlib.sha256(repr(what).encode()).hexdigest()[:24]}"
     content = None if store is None else store.get(name)

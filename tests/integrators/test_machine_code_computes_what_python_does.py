@@ -1,0 +1,353 @@
+"""Translated functions compute what Python computes, to the last bit, through LLVM and through C99.
+
+Each function below uses a part of the subset. Random arguments come from a seed that is printed
+when a comparison fails.
+"""
+
+import ctypes
+import math
+import shutil
+import struct
+import subprocess
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+pytest.importorskip("llvmlite")
+
+from integrators.machine_code import objects
+from integrators.machine_code.c99 import c99_text
+from integrators.machine_code.layout import Block, Column, Layout
+from integrators.machine_code.llvm import llvm_text
+from integrators.machine_code.translate import HostFunction, TranslationError, Translator
+
+SIZE = 5
+INFINITY = float("inf")
+WEIGHTS = (0.25, -1.5, 3.0, 0.125, 7.0)
+ROWS = ((1.0,), (2.0, 3.0), (4.0, 5.0, 6.0))
+
+
+class Pair(NamedTuple):
+    first: list[float]
+    second: list[float]
+
+
+class Given(NamedTuple):
+    x: list[float]
+    y: list[float]
+    i: list[int]
+    flags: list[bool]
+    table: list[list[float]]
+    out: list[float]
+    whole: list[int]
+    scale: float
+    count: int
+
+
+class Window(NamedTuple):
+    part: list[float]
+    factor: float
+    count: int
+
+
+def arithmetic(g):
+    for j in range(len(g.out)):
+        a, b = g.x[j], g.y[j]
+        g.out[j] = (a + b) * 3 - a / b + -a * g.scale
+    return 0
+
+
+def conversions(g):
+    for j in range(len(g.out)):
+        g.out[j] = int(g.x[j] * 10.0) / 3 + g.i[j] * 2 + abs(g.i[j]) - abs(g.x[j])
+        g.whole[j] = g.i[j] // 3 + g.i[j] % 4 + (g.i[j] & 6 | 1) + (g.i[j] ^ 5) + (g.count << 2)
+    return g.whole[0]
+
+
+def choices(g):
+    for j in range(len(g.out)):
+        a, b = g.x[j], g.y[j]
+        low = min(a, b, 0.5)
+        high = max(a, float(g.i[j]))
+        g.out[j] = low if a < b else high
+        if 0.0 < a <= 1.0:
+            g.out[j] += 1.0
+        elif not (g.flags[j] or a == b) and g.i[j] in (1, 2, 3):
+            g.out[j] -= 1.0
+        else:
+            g.out[j] = -g.out[j]
+    return 0
+
+
+def undefined(g):
+    for j in range(len(g.out)):
+        zero = g.x[j] - g.x[j]
+        nan = zero / zero
+        g.out[j] = min(nan, 1.0) if nan != nan else 2.0
+        g.whole[j] = 1 if nan < 1.0 or not nan >= 1.0 else 0
+        g.out[j] += 1.0 / zero if g.x[j] > 0.0 else -INFINITY
+    return 0
+
+
+def functions(g):
+    for j in range(len(g.out)):
+        u = abs(g.x[j]) + 0.1
+        a = math.exp(-u) + math.log(u) + math.sin(g.x[j]) + math.cos(g.y[j]) + math.tanh(g.x[j])
+        g.out[j] = a + math.atan(u) + math.asinh(u) + math.sqrt(u) + u**0.5 + math.pow(u, 2.0)
+    return 0
+
+
+def loops(g):
+    total, steps = 0.0, 0
+    while True:
+        steps += 1
+        if steps % 3 == 0:
+            continue
+        if steps > 20:
+            break
+        for j in range(1, len(g.x), 2):
+            total += g.x[j] * steps
+            if total > 50.0:
+                break
+    for u in g.y[: g.count]:
+        total -= u
+    while total > g.scale and steps < 100:
+        total *= 0.5
+        steps += 1
+    g.out[0] = total
+    return steps
+
+
+def both_of(a, b):
+    if a < b:
+        return a, b
+    return b, a
+
+
+def turned(pair, scale):
+    return Pair(pair.second, pair.first)
+
+
+def window(g, count):
+    factor = 2.0 * g.scale
+    return Window(g.x[:count], factor, count)
+
+
+def longer(g):
+    count = 0
+    for j in range(len(g.flags)):
+        if g.flags[j]:
+            count += 1
+    return window(g, count)
+
+
+def records(g):
+    pair = turned(Pair(g.x, g.y), g.scale)
+    first, second = pair
+    low, high = both_of(first[0], second[1])
+    g.out[0] = low - 2.0 * high
+    w = longer(g)
+    if g.flags[0]:
+        w = window(g, 1)
+    for u in w.part:
+        g.out[1] += u * w.factor
+    for j in (0, 2):
+        g.out[j] += second[j]
+    g.out[3], g.out[4] = g.out[4], g.out[3]
+    return len(w.part) + w.count
+
+
+def tables(g):
+    for r in range(len(g.table)):
+        row = g.table[r]
+        for c in range(len(row)):
+            row[c] = row[c] * WEIGHTS[c] + ROWS[r][0]
+        g.out[r] = row[-1]
+        picked = ROWS[r] if r < 2 else WEIGHTS
+        g.out[r] += picked[0]
+    g.whole[-1] |= 12
+    g.whole[0] = g.whole[1] = 7
+    return 0
+
+
+def applied(f, x, out):
+    for j in range(len(x)):
+        out[j] = f(x[j], j)
+
+
+def scaled(u, j):
+    return u * j
+
+
+def passed(g):
+    applied(scaled, g.x, g.out)
+    return 0
+
+
+CASES = [arithmetic, conversions, choices, undefined, functions, loops, records, tables, passed]
+
+
+def given(seed: int) -> Given:
+    """Return random arguments as lists."""
+    rng = np.random.default_rng(seed)
+    return Given(
+        x=rng.normal(0.0, 2.0, SIZE).tolist(),
+        y=rng.normal(0.0, 2.0, SIZE).tolist(),
+        i=rng.integers(-9, 9, SIZE).tolist(),
+        flags=rng.integers(0, 2, SIZE).astype(bool).tolist(),
+        table=rng.normal(0.0, 2.0, (3, SIZE)).tolist(),
+        out=rng.normal(0.0, 2.0, SIZE).tolist(),
+        whole=rng.integers(-9, 9, SIZE).tolist(),
+        scale=float(rng.normal()),
+        count=int(rng.integers(0, SIZE)),
+    )
+
+
+def plainly(function, arguments: Given) -> int:
+    """Call a function as Python, with numbers that do not raise."""
+    with np.errstate(all="ignore"):
+        wide = Given(*([np.float64(u) for u in part] if name in ("x", "y") else part
+                       for name, part in zip(Given._fields, arguments, strict=True)))  # fmt: skip
+        result = function(wide)
+    for name in ("x", "y"):
+        getattr(arguments, name)[:] = [float(u) for u in getattr(wide, name)]
+    return int(result)
+
+
+def bits(arguments: Given) -> list[bytes]:
+    """Return all arrays bit for bit."""
+    parts = [arguments.out, *arguments.table, arguments.whole]
+    return [struct.pack(f"<{len(p)}d", *map(float, p)) for p in parts]
+
+
+def module_of(function, inside: bool):
+    layout = Layout(given(0), callable, inside=inside)
+    translator = Translator()
+    translator.entry("entry", function, [layout.value])
+    return layout, translator.module
+
+
+def in_llvm(module):
+    library = objects.Library(objects.compiled(llvm_text(module)))
+    return library, library.address("entry")
+
+
+def in_c(module, folder):
+    (folder / "text.c").write_text(c99_text(module))
+    command = ["cc", "-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wno-unused", "-Werror",
+               "-fPIC", "-shared", "text.c", "-o", "text.so", "-lm"]  # fmt: skip
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    library = ctypes.CDLL(str(folder / "text.so"))
+    return library, ctypes.cast(library.entry, ctypes.c_void_p).value
+
+
+@pytest.mark.parametrize("inside", [True, False], ids=["inside", "outside"])
+@pytest.mark.parametrize("printer", ["llvm", "c99"])
+@pytest.mark.parametrize("function", CASES, ids=lambda each: each.__name__)
+def test_same_bits(function, printer, inside, tmp_path):
+    if printer == "c99" and shutil.which("cc") is None:
+        pytest.skip("there is no C compiler")
+    layout, module = module_of(function, inside)
+    library, address = in_llvm(module) if printer == "llvm" else in_c(module, tmp_path)
+    call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(address)
+    for seed in range(40):
+        expected = given(seed)
+        result = plainly(function, expected)
+        block = Block(layout, given(seed))
+        block.update(block.contents)
+        assert call(block.address) == result, f"given({seed})"
+        assert bits(block.contents) == bits(expected), f"given({seed})"
+    assert library
+
+
+def asks(g):
+    for j in range(len(g.out)):
+        g.out[j] = signal(g.x[j]) + 1.0
+    return 0
+
+
+signal = HostFunction(0)
+
+
+def test_a_host_function_is_called():
+    layout, module = module_of(asks, True)
+    library, address = in_llvm(module)
+    thunk = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(lambda t: 3.0 * t)
+    place = ctypes.c_void_p.from_address(library.variable("callbacks"))
+    place.value = ctypes.cast(thunk, ctypes.c_void_p).value
+    block = Block(layout, given(1))
+    block.update(block.contents)
+    ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(address)(block.address)
+    assert block.contents.out.tolist() == [3.0 * u + 1.0 for u in given(1).x]
+
+
+def columns_of(column, factor):
+    total = 0.0
+    for j in range(len(column)):
+        total += column[j] * factor
+    column[0] = total
+    return len(column)
+
+
+def test_a_column_may_change_between_calls():
+    example = (Column(), 2.0)
+    layout = Layout(example, callable)
+    translator = Translator()
+    translator.entry("entry", columns_of, list(layout.value.fields.values()))
+    library = objects.Library(objects.compiled(llvm_text(translator.module)))
+    call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(library.address("entry"))
+    block = Block(layout, example)
+    for length in (3, 10):
+        column = np.arange(1.0, length + 1.0)
+        total = 2.0 * column.sum()
+        block.update((column, 2.0))
+        assert call(block.address) == length
+        assert column[0] == total
+
+
+# --------------------------------------------------------------------------- what is refused
+def unknown_statement(g):
+    assert g.count > 0
+    return 0
+
+
+def unknown_call(g):
+    g.out[0] = round(g.x[0])
+    return 0
+
+
+def unknown_name(g):
+    g.out[0] = nowhere  # noqa: F821
+    return 0
+
+
+def wrong_kind(g):
+    g.whole[0] = g.x[0]
+    return 0
+
+
+def own_variable(g):
+    for j in range(3):
+        j = j + 1  # noqa: PLW2901
+    return 0
+
+
+@pytest.mark.parametrize(
+    ("function", "line"),
+    [
+        (unknown_statement, "assert g.count > 0"),
+        (unknown_call, "g.out[0] = round(g.x[0])"),
+        (unknown_name, "g.out[0] = nowhere  # noqa: F821"),
+        (wrong_kind, "g.whole[0] = g.x[0]"),
+        (own_variable, "for j in range(3):"),
+    ],
+    ids=lambda each: getattr(each, "__name__", None),
+)
+def test_an_error_names_the_line(function, line):
+    with pytest.raises(TranslationError) as caught:
+        module_of(function, True)
+    assert caught.value.line == line
+    number = function.__code__.co_firstlineno
+    assert f"line {number}" in caught.value.place or f"line {number + 1}" in caught.value.place
