@@ -23,7 +23,19 @@ import numpy as np
 from integrators import advance, columns, crossings, loop, sliding, step_size, steps
 from integrators.columns import Log, Recorded
 from integrators.loop import Buffers, Machines
-from integrators.machine_code import llvm, objects, translate, tree, values
+from integrators.machine_code import (
+    bindings,
+    expressions,
+    llvm,
+    objects,
+    passing,
+    sources,
+    statements,
+    translate,
+    tree,
+    values,
+    work,
+)
 from integrators.machine_code import layout as layouts
 from integrators.machine_code.layout import Block, Column, Layout
 from integrators.machine_code.llvm import llvm_text
@@ -117,7 +129,8 @@ def edition() -> str:
     16
     """
     loops = (steps, step_size, crossings, advance, sliding, loop, columns)
-    tools = (translate, values, tree, layouts, llvm, objects)
+    front = (sources, work, bindings, passing, expressions, statements, translate)
+    tools = (*front, values, tree, layouts, llvm, objects)
     functions: list[Callable[..., Any]] = []
     constants = []
     for module in (*loops, *tools):
@@ -260,7 +273,9 @@ def _longest(arguments: Any) -> int:
         if isinstance(part, np.ndarray):
             lengths += part.shape
         elif isinstance(part, list):
-            lengths.append(max(len(part), len(part[0]) if part and isinstance(part[0], list) else 0))
+            lengths.append(
+                max(len(part), len(part[0]) if part and isinstance(part[0], list) else 0)
+            )
     return max(lengths)
 
 
@@ -318,9 +333,7 @@ def example(functions: Functions, machines: Machines, b: Buffers, observed: int,
     """
     size = len(b.now.y)
     column: Any = Column
-    plan = b.plan._replace(
-        jumps=column(), before_jumps=column(), ticks=column("i"), knots=column()
-    )
+    plan = b.plan._replace(jumps=column(), before_jumps=column(), ticks=column("i"), knots=column())
     out = b.out._replace(times=column(), rows_t=column(), rows_y=column("f", size))
     log = Log(
         counts=[0, 0],
@@ -404,4 +417,3 @@ def observer(
         table=Column("f", seen),
     )
     return _made(text, each_row, rows, (), calls, store, notify), rows
-

@@ -13,7 +13,15 @@ from typing import NamedTuple
 
 from integrators.steps import T_STOP, Motion, Now, Scratch, T, Vector
 
-__all__ = ["Control", "error_norm", "memory_of", "next_factor", "retry_factor", "root_of", "starting_step"]
+__all__ = [
+    "Control",
+    "error_norm",
+    "memory_of",
+    "next_factor",
+    "retry_factor",
+    "root_of",
+    "starting_step",
+]
 
 SAFETY = 0.9
 LEAST, MOST = 0.2, 10.0  # limits of the change from one step to the next

@@ -23,7 +23,7 @@ from gms_fsm.lowering.program import Arguments, Program
 from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
 
 if TYPE_CHECKING:
-    from integrators.compiled import Engine
+    from integrators.compiled import Engine, Run
 
 __all__ = ["check_llvmlite", "engine", "functions", "notify", "observe_rows", "packed", "store"]
 
@@ -74,14 +74,14 @@ def _table(rows: list[list[float]]) -> FloatArray:
     return np.array(padded, dtype=np.float64).reshape(len(rows), length)
 
 
-def engine(program: Program, run: tuple[Any, ...]) -> Engine:
+def engine(program: Program, run: Run) -> Engine:
     """Return the loop of a program as machine code.
 
     Parameters
     ----------
     program : Program
         From `gms_fsm.lowering.program.lower`.
-    run : tuple
+    run : Run
         From `integrators.compiled.example`, with the functions from `functions`.
 
     Returns

@@ -163,7 +163,12 @@ def _names_of_locks(read: Assembly) -> set[str]:
     return names | {f"L_{r}_{s}" for r in rows for s in rows} | {"hit"}
 
 
-_SHORT = {"curve S": "S", "curve v dip": "v_dip", "curve v flat": "v_flat", "threshold weight": "weight"}
+_SHORT = {
+    "curve S": "S",
+    "curve v dip": "v_dip",
+    "curve v flat": "v_flat",
+    "threshold weight": "weight",
+}
 
 
 def _short(name: str) -> str:

@@ -7,7 +7,7 @@ code, if the mathematical functions come from the same library.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from integrators.machine_code.tree import (
     Address,
@@ -52,8 +52,15 @@ static inline double max_f(double a, double b) { return b > a ? b : a; }
 static inline int64_t min_i(int64_t a, int64_t b) { return b < a ? b : a; }
 static inline int64_t max_i(int64_t a, int64_t b) { return b > a ? b : a; }
 static inline int64_t abs_i(int64_t a) { return a < 0 ? -a : a; }
-static inline int64_t mod_i(int64_t a, int64_t b) { int64_t r = a % b; return r && (r ^ b) < 0 ? r + b : r; }
-static inline int64_t div_i(int64_t a, int64_t b) { int64_t q = a / b, r = a % b; return r && (r ^ b) < 0 ? q - 1 : q; }
+static inline int64_t mod_i(int64_t a, int64_t b)
+{
+    int64_t r = a % b;
+    return r && (r ^ b) < 0 ? r + b : r;
+}
+static inline int64_t div_i(int64_t a, int64_t b)
+{
+    return a / b - (a % b && (a ^ b) < 0);
+}
 """
 # How tightly operators bind in C, for as few brackets as compilers accept without a warning.
 _BINDS = {
@@ -74,13 +81,34 @@ def c99_text(module: Module) -> str:
     -------
     str
         The text; entries are not static.
+
+    Examples
+    --------
+    >>> from integrators.machine_code.translate import Translator
+    >>> from integrators.machine_code.values import Number
+    >>> from integrators.step_size import memory_of
+    >>> translator = Translator()
+    >>> _ = translator.entry("entry", memory_of, [Number(Local("f", "root"))])
+    >>> print(c99_text(translator.module).partition("static double ")[2].strip())
+    memory_of(double root_0)
+    {
+        return sqrt(max_f(root_0, 0.3));
+    }
+    <BLANKLINE>
+    double entry(double root)
+    {
+        return memory_of(root);
+    }
     """
     kinds = sorted({f.results for f in module.functions if len(f.results) > 1})
     parts = [HEAD, *map(_structure, kinds), *map(_table, module.tables)]
     if module.callbacks:
         parts.append(f"double (*callbacks[{module.callbacks}])(double);")
     results = {f.name: f.results for f in module.functions}
-    parts += [_Writer(function, results).text() for function in module.functions]
+    taken = {*RESERVED.split(), *(table.name for table in module.tables)}
+    functions = _Names(taken - {f.name for f in module.functions if f.entry})
+    taken |= {functions(f.name) for f in module.functions}
+    parts += [_Writer(f, results, functions, _Names(taken)).text() for f in module.functions]
     return "\n".join(parts)
 
 
@@ -108,35 +136,57 @@ def _result(kinds: str) -> str:
     return _TYPES[kinds] if kinds else "void"
 
 
-def _name(name: str) -> str:
-    words = re.sub(r"\W", "_", name)
-    words = f"p{words}" if words[0].isdigit() else words
-    return f"{words}_" if words in _RESERVED else words
+class _Names:
+    """Names of C, each for one name of the module."""
+
+    def __init__(self, taken: Iterable[str]) -> None:
+        self._taken = {*taken}
+        self._found: dict[str, str] = {}
+
+    def __call__(self, name: str) -> str:
+        """Return the name of a variable or a function."""
+        if name not in self._found:
+            words = re.sub(r"\W+", "_", name).strip("_")
+            free = words = f"u{words}" if words[:1].isdigit() else words
+            number = 1
+            while free in self._taken:
+                number += 1
+                free = f"{words}_{number}"
+            self._taken.add(free)
+            self._found[name] = free
+        return self._found[name]
 
 
-_RESERVED = frozenset(
-    "auto break case char const continue default do double else enum extern float for goto if "
-    "inline int long register restrict return short signed sizeof static struct switch typedef "
-    "union unsigned void volatile while bool true false y0 y1 yn j0 j1 jn gamma log exp sin cos".split()
-)
+RESERVED = """
+    auto bool break callbacks case char const continue default do double else enum extern false
+    float for goto if inline int long register restrict return short signed sizeof static struct
+    switch true typedef union unsigned void volatile while
+    acos asin asinh atan atan2 cos cosh exp fabs gamma j0 j1 jn log main pow sin sinh sqrt tan tanh
+    y0 y1 yn abs_i div_i max_f max_i min_f min_i mod_i
+"""
 
 
 class _Writer:
     """Writes one function."""
 
-    def __init__(self, function: Function, results: dict[str, str]) -> None:
+    def __init__(
+        self, function: Function, results: dict[str, str], functions: _Names, locals_: _Names
+    ) -> None:
         self.function, self.results = function, results
-        self.counter = 0
+        self.functions, self.name = functions, locals_
+        self.counter = 0  # of results with several parts
 
     def text(self) -> str:
         """Return its text."""
         function = self.function
-        names = ", ".join(f"{_TYPES[p.kind]} {_name(p.name)}" for p in function.parameters)
+        names = ", ".join(f"{_TYPES[p.kind]} {self.name(p.name)}" for p in function.parameters)
         head = "" if function.entry else "static "
-        opening = f"{head}{_result(function.results)} {_name(function.name)}({names or 'void'})"
+        opening = (
+            f"{head}{_result(function.results)} {self.functions(function.name)}({names or 'void'})"
+        )
         lines = [opening, "{"]
         for kind in "fibp":
-            own = [_name(v.name) for v in function.variables if v.kind == kind]
+            own = [self.name(v.name) for v in function.variables if v.kind == kind]
             if own:
                 star = ", *" if kind == "p" else ", "
                 lines.append(f"    {_TYPES[kind]} {star.join(own)};".replace("* ", "*"))
@@ -155,13 +205,14 @@ class _Writer:
         space = "    " * depth
         match statement:
             case Set(target=target, value=value):
-                return [f"{space}{_name(target.name)} = {self.value(value)};"]
+                return [f"{space}{self.name(target.name)} = {self.value(value)};"]
             case SetMany(targets=targets, call=call):
                 self.counter += 1
-                whole = f"many{self.counter}"
+                whole = self.name(f"many.{self.counter}")
                 made = f"{space}const many_{self.results[call.name]} {whole} = {self.value(call)};"
                 parts = [
-                    f"{space}{_name(each.name)} = {whole}.v{k};" for k, each in enumerate(targets)
+                    f"{space}{self.name(each.name)} = {whole}.v{k};"
+                    for k, each in enumerate(targets)
                 ]
                 return [made, *parts]
             case Put(kind=kind, address=address, value=value):
@@ -177,7 +228,7 @@ class _Writer:
                 head = f"{space}while ({self.value(test)}) {{"
                 return [head, *self.block(body, depth + 1), f"{space}}}"]
             case For(target=target, start=start, stop=stop, step=step, body=body):
-                name = _name(target.name)
+                name = self.name(target.name)
                 more = f"{name}++" if step == 1 else f"{name} += {step}"
                 head = f"{name} = {self.value(start)}; {name} < {self.value(stop, 7)}; {more}"
                 return [f"{space}for ({head}) {{", *self.block(body, depth + 1), f"{space}}}"]
@@ -211,7 +262,7 @@ class _Writer:
             case Const(value=value):
                 return str(value), _UNARY if value < 0 else _WHOLE
             case Local(name=name):
-                return _name(name), _WHOLE
+                return self.name(name), _WHOLE
             case Global(name=name):
                 return f"(char *){name}", _UNARY
             case Load(kind=kind, address=address):
@@ -232,7 +283,7 @@ class _Writer:
             case Op():
                 return self.operation(expr)
             case Invoke(name=name, arguments=arguments):
-                return f"{_name(name)}({', '.join(map(self.value, arguments))})", _WHOLE
+                return f"{self.functions(name)}({', '.join(map(self.value, arguments))})", _WHOLE
             case Foreign(name=name, arguments=arguments):
                 return f"{name}({', '.join(map(self.value, arguments))})", _WHOLE
             case Callback(number=number, arguments=arguments):
@@ -253,7 +304,8 @@ class _Writer:
         if op in ("neg", "not"):
             return f"{'-' if op == 'neg' else '!'}{self.value(expr.operands[0], _WHOLE)}", _UNARY
         if op in ("float", "int"):
-            return f"({_TYPES['f' if op == 'float' else 'i']}){self.value(expr.operands[0], 10)}", 10
+            type_ = _TYPES["f" if op == "float" else "i"]
+            return f"({type_}){self.value(expr.operands[0], _UNARY)}", _UNARY
         names = {"abs": "fabs" if kind == "f" else "abs_i", "sqrt": "sqrt", "%": "mod_i"}
         names |= {"//": "div_i", "min": f"min_{kind}", "max": f"max_{kind}"}
         return f"{names[op]}({', '.join(map(self.value, expr.operands))})", _WHOLE

@@ -85,7 +85,8 @@ class Layout:
 
     def _value(self, example: Any, way: tuple[int, ...], block: Expr) -> Record:
         names = getattr(example, "_fields", None) or tuple(map(str, range(len(example))))
-        hints = _kinds(type(example)) if hasattr(example, "_fields") else {}
+        record: Any = type(example)
+        hints = _kinds(record) if hasattr(example, "_fields") else {}
         fields: dict[str, Value] = {}
         for k, (name, part) in enumerate(zip(names, example, strict=True)):
             here = (*way, k)
@@ -103,7 +104,7 @@ class Layout:
                 fields[name] = Number(Load(kind, place))
                 self.numbers.append(_Place(here, self.words, kind, None))
                 self.words += 1
-        return Record(type(example), fields)
+        return Record(record, fields)
 
     def _array(self, part: Any, way: tuple[int, ...], block: Expr, kind: str | None) -> Array:
         if isinstance(part, np.ndarray):
@@ -152,6 +153,16 @@ class Block:
     ----------
     contents : named tuple or tuple
         Like the example, with arrays that are places in the block.
+    address : int
+        Of its first byte.
+
+    Examples
+    --------
+    >>> from integrators.step_size import Control
+    >>> control = Control(0.0, 0.0, 1e-6, [0.0, 0.5], 1.0, 0.0)
+    >>> block = Block(Layout(control, lambda part: False), control)
+    >>> block.contents.atol
+    array([0. , 0.5])
     """
 
     layout: Layout
@@ -219,7 +230,8 @@ class Block:
             for k in place.way:
                 array = array[k]
             if before.get(place.way) is not array:
-                assert array.dtype == _DTYPES[place.kind] and array.flags.c_contiguous
+                assert array.dtype == _DTYPES[place.kind]
+                assert array.flags.c_contiguous
                 before[place.way] = array
                 words[place.offset] = array.ctypes.data
                 for k in range(place.lengths):
@@ -247,5 +259,3 @@ def _shape(part: list[Any]) -> tuple[int, ...]:
     if part and isinstance(part[0], list):
         return len(part), len(part[0])
     return (len(part),)
-
-

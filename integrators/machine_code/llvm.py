@@ -1,8 +1,8 @@
 """The printer of LLVM's language, in the plainest form; LLVM itself makes it fast.
 
 Locals are places on the stack, which LLVM turns into registers. Functions of the C library are
-called as they are (``nobuiltin``): LLVM would otherwise turn pow(z, 0.5) into sqrt, which differs in
-the last bits. Nothing is contracted or reassociated.
+called as they are (``nobuiltin``): LLVM would otherwise turn pow(z, 0.5) into sqrt, which differs
+in the last bits. Nothing is contracted or reassociated.
 """
 
 from __future__ import annotations
@@ -63,6 +63,16 @@ def llvm_text(module: Module) -> str:
     -------
     str
         The text.
+
+    Examples
+    --------
+    >>> from integrators.machine_code.translate import Translator
+    >>> from integrators.machine_code.values import Number
+    >>> from integrators.step_size import memory_of
+    >>> translator = Translator()
+    >>> _ = translator.entry("entry", memory_of, [Number(Local("f", "root"))])
+    >>> "define internal double @memory_of(" in llvm_text(translator.module)
+    True
     """
     foreign: dict[str, int] = {}
     functions = [_Writer(function, module, foreign).text() for function in module.functions]
@@ -79,7 +89,7 @@ def llvm_text(module: Module) -> str:
         *(f'!{k} = !{{!"{name}", !0}}' for k, name in enumerate(("f", "i", "b", "p"), 1)),
         *(f"!{k + 4} = !{{!{k}, !{k}, i64 0}}" for k in range(1, 5)),
     ]
-    kinds += ['!9 = distinct !{!9, !10}', '!10 = !{!"llvm.loop.unroll.full"}']
+    kinds += ["!9 = distinct !{!9, !10}", '!10 = !{!"llvm.loop.unroll.full"}']
     return "\n".join([*lines, *functions, *kinds, ""])
 
 
@@ -98,10 +108,11 @@ def _float(value: float) -> str:
     return f"0x{bits:016X}"
 
 
-UNROLL = True
+MOST_TURNS = 8  # of loops that call functions and are written out
 
 
 def _calls(body: Sequence[Statement]) -> bool:
+    """Return whether statements call functions for what they do."""
     for each in body:
         if isinstance(each, Do):
             return True
@@ -186,9 +197,7 @@ class _Writer:
         match statement:
             case Set(target=target, value=value):
                 kind = _TYPES[target.kind]
-                self.lines.append(
-                    f"  store {kind} {self.value(value)}, ptr %{_name(target.name)}"
-                )
+                self.lines.append(f"  store {kind} {self.value(value)}, ptr %{_name(target.name)}")
             case SetMany(targets=targets, call=call):
                 made = self.call(call)
                 kinds = self.result(self.results[call.name])
@@ -285,9 +294,9 @@ class _Writer:
             f"  store i64 {self.new(f'add nsw i64 {now}, {statement.step}')}, ptr {place}"
         )
         self.jump(head)
-        if UNROLL and isinstance(statement.stop, Const) and isinstance(statement.start, Const):
+        if isinstance(statement.stop, Const) and isinstance(statement.start, Const):
             turns = statement.stop.value - statement.start.value
-            if turns <= 8 and _calls(statement.body):
+            if turns <= MOST_TURNS and _calls(statement.body):
                 self.lines[-1] += ", !llvm.loop !9"
         self.place(end)
 

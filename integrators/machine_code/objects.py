@@ -1,13 +1,13 @@
 """From LLVM's language to functions in memory, by llvmlite.
 
 Compiling takes a second; the object that it gives can be stored and is loaded in milliseconds.
+llvmlite is imported when one of these functions is called first.
 """
 
 from __future__ import annotations
 
 import functools
 import threading
-from collections.abc import Sequence
 from typing import Any
 
 __all__ = ["Library", "compiled", "target_name"]
@@ -36,7 +36,13 @@ def _machine() -> Any:
 
 
 def target_name() -> str:
-    """Return what an object depends on besides its text: LLVM and the processor."""
+    """Return what an object depends on besides its text: LLVM and the processor.
+
+    Returns
+    -------
+    str
+        Objects can be loaded where this text is the same.
+    """
     llvm = _binding()
     version = ".".join(map(str, llvm.llvm_version_info))
     features = llvm.get_host_cpu_features().flatten()
@@ -55,6 +61,14 @@ def compiled(text: str) -> bytes:
     -------
     bytes
         The object, for this processor.
+
+    Examples
+    --------
+    >>> text = "define double @half(double %x) { %y = fmul double %x, 0.5 ret double %y }"
+    >>> import ctypes
+    >>> library = Library(compiled(text))
+    >>> ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(library.address("half"))(3.0)
+    1.5
     """
     llvm = _binding()
     with _lock:
@@ -76,7 +90,7 @@ class Library:
     Parameters
     ----------
     content : bytes
-        From `compiled`.
+        From `compiled`. Damaged bytes may end the process: whoever stores them compares a hash.
     """
 
     def __init__(self, content: bytes) -> None:
@@ -95,7 +109,3 @@ class Library:
         """Return the address of a global variable."""
         found: int = self._engine.get_global_value_address(name)
         return found
-
-    def addresses(self, names: Sequence[str]) -> list[int]:
-        """Return the addresses of several entries."""
-        return [self.address(name) for name in names]

@@ -40,18 +40,29 @@ __all__ = [
     "Table",
     "While",
     "locals_in",
+    "parts_of",
 ]
 
 SIZES = {"f": 8, "i": 8, "b": 1, "p": 8}  # bytes in memory
 
 
 # --------------------------------------------------------------------------- expressions
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Const:
-    """A number."""
+    """A number; equal to others with the same bits."""
 
     kind: str
     value: Any
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Const) and self._bits == other._bits
+
+    def __hash__(self) -> int:
+        return hash(self._bits)
+
+    @property
+    def _bits(self) -> tuple[str, str]:
+        return self.kind, repr(self.value)  # 0.0 is not -0.0, and NaN is NaN
 
 
 @dataclass(frozen=True)
@@ -157,48 +168,64 @@ class Callback:
     kind: str = "f"
 
 
-Expr = (
-    Const
-    | Local
-    | Global
-    | Op
-    | Logic
-    | Choose
-    | Load
-    | AddressOf
-    | Invoke
-    | Foreign
-    | Callback
-)
+Expr = Const | Local | Global | Op | Logic | Choose | Load | AddressOf | Invoke | Foreign | Callback
+
+
+def parts_of(expr: Expr) -> Iterator[Expr]:
+    """Yield an expression and all its parts, from left to right.
+
+    Parameters
+    ----------
+    expr : Expr
+        Any expression.
+
+    Yields
+    ------
+    Expr
+        The expression itself first.
+
+    Examples
+    --------
+    >>> total = Op("f", "+", (Local("f", "a"), Const("f", 1.0)))
+    >>> [type(each).__name__ for each in parts_of(total)]
+    ['Op', 'Local', 'Const']
+    """
+    yield expr
+    below: tuple[Expr, ...] = ()
+    match expr:
+        case Op(operands=parts) | Invoke(arguments=parts):
+            below = parts
+        case Foreign(arguments=parts) | Callback(arguments=parts):
+            below = parts
+        case Logic(left=left, right=right):
+            below = left, right
+        case Choose(test=test, yes=yes, no=no):
+            below = test, yes, no
+        case Load(address=address) | AddressOf(address=address):
+            below = (address.base,) if address.index is None else (address.base, address.index)
+    for part in below:
+        yield from parts_of(part)
 
 
 def locals_in(expr: Expr) -> Iterator[Local]:
     """Yield the locals that an expression reads.
+
+    Parameters
+    ----------
+    expr : Expr
+        Any expression.
+
+    Yields
+    ------
+    Local
+        From left to right.
 
     Examples
     --------
     >>> [each.name for each in locals_in(Op("f", "+", (Local("f", "a"), Local("f", "b"))))]
     ['a', 'b']
     """
-    match expr:
-        case Local():
-            yield expr
-        case Op(operands=parts) | Invoke(arguments=parts):
-            for part in parts:
-                yield from locals_in(part)
-        case Foreign(arguments=parts) | Callback(arguments=parts):
-            for part in parts:
-                yield from locals_in(part)
-        case Logic(left=left, right=right):
-            yield from locals_in(left)
-            yield from locals_in(right)
-        case Choose(test=test, yes=yes, no=no):
-            for part in (test, yes, no):
-                yield from locals_in(part)
-        case Load(address=address) | AddressOf(address=address):
-            yield from locals_in(address.base)
-            if address.index is not None:
-                yield from locals_in(address.index)
+    return (part for part in parts_of(expr) if isinstance(part, Local))
 
 
 # --------------------------------------------------------------------------- statements

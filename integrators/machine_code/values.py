@@ -12,6 +12,7 @@ from integrators.machine_code.tree import (
     AddressOf,
     Const,
     Expr,
+    Global,
     Load,
     Local,
     Op,
@@ -36,7 +37,7 @@ class Array:
     kind : str
         Of its entries.
     dims : tuple of Expr
-        Its lengths; None where it is not known.
+        Its lengths.
     base : Expr
         An address.
     offset : int
@@ -46,7 +47,7 @@ class Array:
     """
 
     kind: str
-    dims: tuple[Expr | None, ...]
+    dims: tuple[Expr, ...]
     base: Expr
     offset: int = 0
     index: Expr | None = None
@@ -58,12 +59,9 @@ class Array:
 
     def at(self, place: Expr) -> Array | Number:
         """Return an entry, or a row of a table."""
-        stride: Expr | None = Const("i", 1)
+        step = place
         for length in self.dims[1:]:
-            stride = None if stride is None or length is None else times(stride, length)
-        if stride is None:
-            raise ValueError("the length of its rows is not known")
-        step = times(place, stride)
+            step = times(step, length)
         offset, index = self.offset, self.index
         if isinstance(step, Const):
             offset += SIZES[self.kind] * step.value
@@ -122,31 +120,29 @@ def leaves(value: Value) -> Iterator[Number | Array | Fixed]:
         yield value
 
 
-def substituted(expr: Any, given: Mapping[Local, Expr]) -> Any:
-    """Return an expression or a value with locals replaced."""
+def substituted(part: Any, given: Mapping[Local, Expr]) -> Any:
+    """Return a value, or an expression in one, with locals replaced."""
     if not given:
-        return expr
-    match expr:
+        return part
+    match part:
         case Local():
-            return given.get(expr, expr)
+            return given.get(part, part)
         case Op(operands=parts):
-            return replace(expr, operands=tuple(substituted(part, given) for part in parts))
+            return replace(part, operands=tuple(substituted(each, given) for each in parts))
         case Load(address=address) | AddressOf(address=address):
-            return replace(expr, address=substituted(address, given))
-        case Address(base=base, index=index):
+            return replace(part, address=substituted(address, given))
+        case Address(base=base, index=index) | Array(base=base, index=index):
             index = None if index is None else substituted(index, given)
-            return replace(expr, base=substituted(base, given), index=index)
+            moved = replace(part, base=substituted(base, given), index=index)
+            if isinstance(moved, Array):
+                dims = tuple(substituted(each, given) for each in moved.dims)
+                return replace(moved, dims=dims)
+            return moved
         case Number(expr=inner):
             return Number(substituted(inner, given))
-        case Array(dims=dims, base=base, index=index):
-            return replace(
-                expr,
-                dims=tuple(None if each is None else substituted(each, given) for each in dims),
-                base=substituted(base, given),
-                index=None if index is None else substituted(index, given),
-            )
         case Record(fields=fields):
-            return replace(
-                expr, fields={name: substituted(part, given) for name, part in fields.items()}
-            )
-    return expr
+            changed = {name: substituted(each, given) for name, each in fields.items()}
+            return replace(part, fields=changed)
+        case Const() | Global() | Fixed():
+            return part
+    raise AssertionError(part)  # anything else would have been assigned to a local before

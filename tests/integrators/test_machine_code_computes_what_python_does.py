@@ -185,7 +185,104 @@ def passed(g):
     return 0
 
 
-CASES = [arithmetic, conversions, choices, undefined, functions, loops, records, tables, passed]
+def lengths(g):
+    """A variable has its present length where it is read, also before its last assignment."""
+    part, total = g.x, 0
+    for j in range(4):
+        total = 10 * total + len(part)
+        part = g.x[:j]
+        if j == 1:
+            part = g.y
+    w = Window(g.x, 1.0, 2)
+    for j in range(3):
+        g.out[j] += w.factor * w.part[0] + len(w.part)
+        w = Window(g.y[: j + 1], -0.0, j)
+        if j > 0:
+            w = Window(g.x, g.scale, 5)
+    return total + w.count
+
+
+def signs_of(zero, out, j):
+    out[j] = 1.0 / (zero if zero < 0.0 else math.atan2(zero, -1.0))
+
+
+def zeros(g):
+    """The two zeros are two constants."""
+    signs_of(0.0, g.out, 0)
+    signs_of(-0.0, g.out, 1)
+    w = Window(g.x, 0.0, 0)
+    if g.flags[0]:
+        w = Window(g.x, -0.0, 0)
+    g.out[2] = math.atan2(w.factor, -1.0)
+    return 0
+
+
+def longer_of(g, j):
+    if j > 1:
+        return g.x, 1.5
+    if j > 0:
+        return g.y, 2
+    return g.x[:j], 0.0
+
+
+def returns(g):
+    """What is returned may be one or the other."""
+    total = 0
+    for j in range(3):
+        part, factor = longer_of(g, j)
+        both = longer_of(g, 2 - j)
+        total = 10 * total + len(part) + len(both[0])
+        for u in part:
+            g.out[j] += u * factor - both[1]
+    return total
+
+
+def now_and_later(g):
+    """What was read stays as it was."""
+    g.whole[0], g.whole[1] = 1, 0
+    row = g.table[g.whole[0]]
+    w = (g.whole[0], row[0])
+    g.whole[0] = 2
+    g.out[0] = row[1] + w[0] + w[1]
+    head = first_of(g.x, g.whole[0])
+    g.whole[0] = 4
+    last = 0
+    for j in (1, 2, 3):
+        if g.i[j] > 0:
+            last = j
+            found = 2 * j
+            g.out[1] += found
+    a, b = g.x, g.y
+    for j in range(3):
+        a, b = b, a
+        g.out[2] += a[j] - 2.0 * b[j]
+    return 100 * len(head) + last
+
+
+def first_of(x, count):
+    return x[:count]
+
+
+def raised(g):
+    g.whole[2] += 1
+    return g.whole[2]
+
+
+def once(g):
+    """Calls happen once, in their order."""
+    g.whole[2] = 0
+    inside = 0 <= raised(g) < 2 and g.i[0] < 3
+    g.x[raised(g)] = g.y[g.whole[2] - 2]
+    g.whole[raised(g) - 3] = raised(g) - g.whole[2]
+    if raised(g) in (1, 5, 6):
+        g.out[0] = 1.0
+    return g.whole[2] + inside
+
+
+CASES = [
+    arithmetic, conversions, choices, undefined, functions, loops, records, tables, passed,
+    lengths, zeros, returns, now_and_later, once,
+]  # fmt: skip
 
 
 def given(seed: int) -> Given:
@@ -309,8 +406,7 @@ def test_a_column_may_change_between_calls():
 
 # --------------------------------------------------------------------------- what is refused
 def unknown_statement(g):
-    assert g.count > 0
-    return 0
+    raise ValueError(g.count)
 
 
 def unknown_call(g):
@@ -330,18 +426,39 @@ def wrong_kind(g):
 
 def own_variable(g):
     for j in range(3):
-        j = j + 1  # noqa: PLW2901
+        j = j + 1
     return 0
+
+
+def no_value(g):  # noqa: RET503
+    if g.count > 3:
+        return 0
+    g.out[0] = 1.0
+
+
+def two_kinds(g):
+    w = Pair(g.x, g.y)
+    w = Window(g.x, 1.0, 2)
+    return w.count
+
+
+def two_results(g):
+    if g.count > 3:
+        return g.x
+    return g.count
 
 
 @pytest.mark.parametrize(
     ("function", "line"),
     [
-        (unknown_statement, "assert g.count > 0"),
+        (unknown_statement, "raise ValueError(g.count)"),
         (unknown_call, "g.out[0] = round(g.x[0])"),
         (unknown_name, "g.out[0] = nowhere  # noqa: F821"),
         (wrong_kind, "g.whole[0] = g.x[0]"),
         (own_variable, "for j in range(3):"),
+        (no_value, "def no_value(g):  # noqa: RET503"),
+        (two_kinds, "w = Window(g.x, 1.0, 2)"),
+        (two_results, "return g.count"),
     ],
     ids=lambda each: getattr(each, "__name__", None),
 )
@@ -350,4 +467,5 @@ def test_an_error_names_the_line(function, line):
         module_of(function, True)
     assert caught.value.line == line
     number = function.__code__.co_firstlineno
-    assert f"line {number}" in caught.value.place or f"line {number + 1}" in caught.value.place
+    lines = [f"line {number + k}, in {function.__name__}" for k in range(4)]
+    assert any(caught.value.place.endswith(each) for each in lines)
