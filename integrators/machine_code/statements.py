@@ -31,6 +31,7 @@ from integrators.machine_code.tree import (
     Local,
     Put,
     Return,
+    Set,
     Statement,
     While,
 )
@@ -178,7 +179,27 @@ def _over_range(work: Work, name: str, over: ast.Call, inside: Sequence[ast.stmt
     if work.scope[name] != bound or target.kind != "i":
         raise work.error(f"{name} would be of two kinds")
     stop = work.kept(stop)
-    work.out.append(For(target, start, stop, step.value, _block(work, inside)))
+    if _read_after(work, name):  # then it is the last one that the body had, not the limit
+        place = work.new("i")
+        made: tuple[Statement, ...] = (Set(target, place), *_block(work, inside))
+    else:
+        place, made = target, _block(work, inside)
+    work.out.append(For(place, start, stop, step.value, made))
+
+
+def _read_after(work: Work, name: str) -> bool:
+    """Return whether the variable of a loop is read outside the loops over it."""
+    waiting: list[ast.AST] = [work.source.definition]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.Name) and node.id == name and isinstance(node.ctx, ast.Load):
+            return True
+        match node:
+            case ast.For(target=ast.Name(id=other), iter=over) if other == name:
+                waiting.append(over)
+            case _:
+                waiting += ast.iter_child_nodes(node)
+    return False
 
 
 def _over_array(work: Work, name: str, array: Array, inside: Sequence[ast.stmt]) -> None:

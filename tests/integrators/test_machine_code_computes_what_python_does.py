@@ -279,9 +279,30 @@ def once(g):
     return g.whole[2] + inside
 
 
+def last_turn(g, i):
+    for j in range(g.count):
+        g.out[j] += 1.0
+    for i in range(3):
+        g.out[i] += 1.0
+    for i in range(2, 2):
+        g.out[i] += 1.0
+    for k in range(0, 5, 2):
+        if g.flags[k]:
+            break
+    g.out[i] = 7.0
+    g.out[k] -= 8.0
+    return i
+
+
+def after_loops(g):
+    """A loop's variable keeps its last value."""
+    return last_turn(g, g.count) + 10 * last_turn(g, 0)
+
+
 CASES = [
     arithmetic, conversions, choices, undefined, functions, loops, records, tables, passed,
     lengths, zeros, returns, now_and_later, once,
+    after_loops,
 ]  # fmt: skip
 
 
