@@ -206,6 +206,8 @@ def advance(
                 # Except if its length is almost zero: rounding might then undo the crossing, and a
                 # run would creep forward tick by tick.
                 theta = first_change(path, w, max(ROUGH * h, tick))
+                if theta <= ROUGH:  # perhaps almost zero
+                    theta = first_change(path, w, tick)
                 if theta < REDO and theta * h > AT_ONCE * tick:
                     clock[H] = theta * h
                     redone = True

@@ -331,9 +331,15 @@ class Writer:
         (bank,) = [each for each in self.read.banks if of(each.name, "") == contact]
         v, F_c, flat = bank.velocities[0], f"{contact}curve F_c", f"{contact}curve v flat"
         *calls, line = self.computed(self.local(name), value, signs, "  # (2)")
-        target, _, text = line.text.partition(" = ")
-        test = f"{self.local(F_c)} if abs({self.local(v)}) > {self.local(flat)} else"
-        return [*calls, Line(f"{target} = {test} {text}", line.reads | {v, F_c, flat})]
+        test = f"if abs({self.local(v)}) > {self.local(flat)}:"
+        constant = Line(f"{self.local(name)} = {self.local(F_c)}", frozenset({F_c}))
+        return [
+            *calls,
+            Line(test, frozenset({v, flat})),
+            *indented([constant]),
+            Line("else:"),
+            *indented([line]),
+        ]
 
     def table(self, name: str) -> str:
         """Spell the corners of a signal: their times and values."""
