@@ -147,6 +147,15 @@ def edition() -> str:
 
 # --------------------------------------------------------------------------- engines
 @dataclass(eq=False)
+class _Call:
+    """A call of machine code, and the first error in a function that it calls."""
+
+    block: Block
+    error: BaseException | None = None
+    copy: list[Any] = field(default_factory=list)  # the block's contents then
+
+
+@dataclass(eq=False)
 class Engine:
     """Machine code with the layout of its arguments.
 
@@ -167,7 +176,7 @@ class Engine:
     calls: Sequence[Callable[[float], float]]
     extra: int
     _function: Any = field(init=False)
-    _errors: threading.local = field(default_factory=threading.local)
+    _now: threading.local = field(default_factory=threading.local)  # `call`: of each thread
 
     def __post_init__(self) -> None:
         integers = [ctypes.c_int64] * self.extra
@@ -183,16 +192,15 @@ class Engine:
 
     def _guarded(self, call: Callable[[float], float]) -> Callable[[float], float]:
         """Return a function that never raises: machine code could not pass it on."""
-        errors = self._errors
+        now = self._now
 
         def value(t: float) -> float:
-            if getattr(errors, "first", None) is not None:
-                return math.nan
             try:
-                return float(call(t))
+                if now.call.error is None:
+                    return float(call(t))
             except BaseException as error:
-                errors.first = error
-                return math.nan
+                now.call.error, now.call.copy = error, now.call.block.copy()
+            return math.nan
 
         return value
 
@@ -214,13 +222,17 @@ class Engine:
         Raises
         ------
         Exception
-            What a function of the host program raised.
+            What a function of the host program raised; the block is as it was then.
         """
-        result: int = self._function(block.address, *integers)
-        if self.calls:
-            error, self._errors.first = getattr(self._errors, "first", None), None
-            if error is not None:
-                raise error
+        now = self._now
+        outer, now.call = getattr(now, "call", None), _Call(block)
+        try:
+            result: int = self._function(block.address, *integers)
+            if now.call.error is not None:
+                block.restore(now.call.copy)
+                raise now.call.error
+        finally:
+            now.call = outer
         return result
 
 

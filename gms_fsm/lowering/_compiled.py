@@ -8,7 +8,7 @@ import math
 import os
 import sys
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,7 @@ from gms_fsm._extras import missing
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.lowering._generated import load
 from gms_fsm.lowering._store import Store
-from gms_fsm.lowering.program import Arguments, Program
+from gms_fsm.lowering.program import Arguments, Program, guarded
 from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
 
 if TYPE_CHECKING:
@@ -92,8 +92,12 @@ def engine(program: Program, run: Run) -> Engine:
     from integrators import compiled
 
     with _lock:
-        calls = tuple(program.callables.values())
-        return compiled.engine(program.source, run, calls, store(), notify)
+        return compiled.engine(program.source, run, _calls(program), store(), notify)
+
+
+def _calls(program: Program) -> list[Callable[[float], float]]:
+    """Return the signals that are Python functions, by number."""
+    return [guarded(name, call) for name, call in program.callables.items()]
 
 
 def functions(program: Program) -> Mapping[str, Any]:
@@ -207,7 +211,7 @@ def _observer(program: Program) -> tuple[Any, Any]:
             program.live,
             packed(program.p),
             (layout.y.size, layout.modes, layout.observed.size),
-            tuple(program.callables.values()),
+            _calls(program),
             store(),
             notify,
         )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gms_fsm.errors import SignalError
 from gms_fsm.lowering import _compiled as compiled
 from gms_fsm.lowering.log_columns import LOG_NUMBERS, LOG_TEXTS, LogRecord
 from gms_fsm.lowering.program import equations
@@ -109,16 +110,14 @@ class CompiledRun:
         b, start, before = columns.buffers, columns.start, columns.latest
         try:
             event = columns.run(STEPS_AT_ONCE, pause=self.engine is not None)
-        except Exception as error:
-            if not start.program.callables:
-                raise
+        except SignalError as error:
             columns.interrupted(before)
-            names = " or ".join(map(repr, start.program.callables))
             raise SimulationError(
-                f"the function raised {type(error).__name__}: {error}",
-                columns.trace(),
-                place=f"signal {names}",
-            ) from error
+                error.reason, columns.trace(), place=error.place, advice=error.advice
+            ) from None
+        except KeyboardInterrupt:  # in a Python function
+            columns.interrupted(before)
+            raise
         if event == loop.DONE:
             check_end(columns)
             return False
@@ -390,11 +389,12 @@ def _engine(start: Start, p: compiled.Packed) -> tuple[Engine, Run, Plan]:
         layout.modes,
     )
     key = id(program.functions), flow, start.options.method
-    if key not in _engines:
+    found = _engines.get(key)
+    if found is None:
         if len(_engines) >= MOST_ENGINES:
             _engines.clear()
-        _engines[key] = compiled.engine(program, run), program.functions
-    return _engines[key][0], run, b.plan
+        found = _engines[key] = compiled.engine(program, run), program.functions
+    return found[0], run, b.plan
 
 
 def _integers(numbers: Any) -> Any:

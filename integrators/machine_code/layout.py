@@ -22,7 +22,10 @@ from integrators.machine_code.values import Array, Fixed, Number, Record, Value
 __all__ = ["Block", "Column", "Layout"]
 
 _KINDS = {float: "f", int: "i", bool: "b"}
-_LISTS: dict[Any, str] = {list[int]: "i", list[list[int]]: "i", list[bool]: "b"}
+# Of fields of named tuples; truth values that are not in lists take a word, as integers do.
+_FIELDS: dict[Any, str] = {
+    float: "f", int: "i", bool: "i", list[int]: "i", list[list[int]]: "i", list[bool]: "b",
+}  # fmt: skip
 _DTYPES = {"f": np.dtype(np.float64), "i": np.dtype(np.int64), "b": np.dtype(np.bool_)}
 
 
@@ -99,7 +102,7 @@ class Layout:
             elif isinstance(part, Column):
                 fields[name] = self._column(part, here, block)
             else:
-                kind = "f" if isinstance(part, float) else "i"
+                kind = hints.get(name) or ("f" if isinstance(part, float) else "i")
                 place = Address(block, 8 * self.words)
                 fields[name] = Number(Load(kind, place))
                 self.numbers.append(_Place(here, self.words, kind, None))
@@ -175,6 +178,7 @@ class Block:
         self._floats = self._words.view(np.float64)
         self._bytes = self._words.view(np.uint8)
         self._columns: dict[tuple[int, ...], Any] = {}
+        self._outside: list[Any] = []  # arrays of the example that are not inside the block
         self.address = self._words.ctypes.data
         self.contents = self._filled(self.example, ())
 
@@ -203,7 +207,8 @@ class Block:
     def _place(self, place: _Place) -> Any:
         dtype, shape = _DTYPES[place.kind], place.shape or ()
         if place.offset < 0:
-            return np.zeros(shape, dtype)
+            self._outside.append(np.zeros(shape, dtype))
+            return self._outside[-1]
         start = 8 * place.offset
         size = dtype.itemsize * int(np.prod(shape))
         return self._bytes[start : start + size].view(dtype).reshape(shape)
@@ -237,6 +242,27 @@ class Block:
                 for k in range(place.lengths):
                     words[place.offset + 1 + k] = array.shape[k]
 
+    def copy(self) -> list[Any]:
+        """Return the numbers and the arrays of the example, but no columns.
+
+        Returns
+        -------
+        list of ndarray
+            For `restore`.
+        """
+        return [array.copy() for array in (self._words, *self._outside)]
+
+    def restore(self, copy: list[Any]) -> None:
+        """Return to what `copy` returned.
+
+        Parameters
+        ----------
+        copy : list of ndarray
+            Of this block.
+        """
+        for array, before in zip((self._words, *self._outside), copy, strict=True):
+            array[...] = before
+
 
 def _constant(part: Any) -> Value:
     if hasattr(part, "_fields"):
@@ -249,9 +275,9 @@ def _constant(part: Any) -> Value:
 
 @functools.cache
 def _kinds(record: Any) -> dict[str, str]:
-    """Return the kinds of the lists of a named tuple."""
+    """Return the kinds of the fields of a named tuple, where its hints say them."""
     hints = typing.get_type_hints(record)
-    return {name: _LISTS[hint] for name, hint in hints.items() if hint in _LISTS}
+    return {name: _FIELDS[hint] for name, hint in hints.items() if hint in _FIELDS}
 
 
 def _shape(part: list[Any]) -> tuple[int, ...]:
