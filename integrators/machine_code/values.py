@@ -90,7 +90,13 @@ Value = Number | Array | Record | Fixed
 
 
 def plus(a: Expr, b: Expr) -> Expr:
-    """Return a sum of integers."""
+    """Return a sum of integers.
+
+    Examples
+    --------
+    >>> plus(Const("i", 2), Const("i", 3)).value
+    5
+    """
     if isinstance(a, Const) and isinstance(b, Const):
         return Const("i", a.value + b.value)
     if isinstance(a, Const) and a.value == 0:
@@ -101,7 +107,13 @@ def plus(a: Expr, b: Expr) -> Expr:
 
 
 def times(a: Expr, b: Expr) -> Expr:
-    """Return a product of integers."""
+    """Return a product of integers.
+
+    Examples
+    --------
+    >>> times(Const("i", 1), Local("i", "n")).name
+    'n'
+    """
     if isinstance(a, Const) and isinstance(b, Const):
         return Const("i", a.value * b.value)
     if isinstance(a, Const) and a.value == 1:
@@ -112,7 +124,24 @@ def times(a: Expr, b: Expr) -> Expr:
 
 
 def leaves(value: Value) -> Iterator[Number | Array | Fixed]:
-    """Yield the numbers, arrays and objects that a value is made of, in order."""
+    """Yield the numbers, arrays and objects that a value is made of, in order.
+
+    Parameters
+    ----------
+    value : Value
+        A record is taken apart.
+
+    Yields
+    ------
+    Number, Array or Fixed
+        At least one, unless it is an empty record.
+
+    Examples
+    --------
+    >>> one, two = (Number(Const("i", each)) for each in (1, 2))
+    >>> [each.expr.value for each in leaves(Record(tuple, {"0": one, "1": two}))]
+    [1, 2]
+    """
     if isinstance(value, Record):
         for part in value.fields.values():
             yield from leaves(part)
@@ -121,7 +150,25 @@ def leaves(value: Value) -> Iterator[Number | Array | Fixed]:
 
 
 def substituted(part: Any, given: Mapping[Local, Expr]) -> Any:
-    """Return a value, or an expression in one, with locals replaced."""
+    """Return a value, or an expression in one, with locals replaced.
+
+    Parameters
+    ----------
+    part : Value or Expr
+        Expressions that would have been assigned to a local are not expected.
+    given : mapping of Local to Expr
+        What takes their places.
+
+    Returns
+    -------
+    Value or Expr
+        Of the same class.
+
+    Examples
+    --------
+    >>> substituted(Number(Local("i", "n")), {Local("i", "n"): Const("i", 5)}).expr.value
+    5
+    """
     if not given:
         return part
     match part:
