@@ -303,7 +303,7 @@ def engine(
     Parameters
     ----------
     text : str
-        The text of the system's functions.
+        Changes with the system's functions.
     arguments : Run
         From `example`, with those functions.
     calls : sequence of callable

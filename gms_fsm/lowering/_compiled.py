@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from gms_fsm._extras import missing
 from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.language._functions import sgn
 from gms_fsm.lowering._generated import load
 from gms_fsm.lowering._store import Store
 from gms_fsm.lowering.program import Arguments, Program, guarded
@@ -92,7 +93,14 @@ def engine(program: Program, run: Run) -> Engine:
     from integrators import compiled
 
     with _lock:
-        return compiled.engine(program.source, run, _calls(program), store(), notify)
+        return compiled.engine(_text(program), run, _calls(program), store(), notify)
+
+
+def _text(program: Program) -> str:
+    """Return what the machine code of a program depends on: its text, and what the text calls."""
+    from integrators.compiled import digest
+
+    return digest(sgn, piecewise_linear, piecewise_slope, text=program.source)
 
 
 def _calls(program: Program) -> list[Callable[[float], float]]:
@@ -206,7 +214,7 @@ def _observer(program: Program) -> tuple[Any, Any]:
     layout = program.layout
     with _lock:
         return compiled.observer(
-            program.source,
+            _text(program),
             functions(program)["observe"],
             program.live,
             packed(program.p),

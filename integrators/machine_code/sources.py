@@ -95,10 +95,20 @@ def source_of(function: Callable[..., Any]) -> Source:
     found = _file(code, function.__globals__)
     key = code.co_name, code.co_firstlineno
     node, loaded = found.definitions.get(key), found.codes.get(key)
-    if node is None or loaded is None or loaded.co_code != code.co_code:
+    if node is None or loaded is None or _meaning(loaded) != _meaning(code):
         reason = "its text is not there, or has changed since it was loaded"
         raise TranslationError(reason, code.co_filename, code.co_name)
     return Source(function, found.lines, node)
+
+
+def _meaning(code: types.CodeType) -> list[Any]:
+    """Return what a function does, without its place in a file and the functions inside it."""
+    constants = [
+        (type(each), each if isinstance(each, frozenset) else repr(each))
+        for each in code.co_consts
+        if not isinstance(each, types.CodeType)
+    ]
+    return [code.co_code, code.co_names, code.co_varnames, constants]
 
 
 def _file(code: types.CodeType, names: dict[str, Any]) -> _File:

@@ -5,6 +5,7 @@ when a comparison fails.
 """
 
 import ctypes
+import linecache
 import math
 import shutil
 import struct
@@ -21,6 +22,8 @@ from integrators.machine_code.c99 import c99_text
 from integrators.machine_code.layout import Block, Column, Layout
 from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.translate import HostFunction, TranslationError, Translator
+from integrators.machine_code.tree import Local
+from integrators.machine_code.values import Number
 
 SIZE = 5
 INFINITY = float("inf")
@@ -399,6 +402,20 @@ def test_a_host_function_is_called():
     block.update(block.contents)
     ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(address)(block.address)
     assert block.contents.out.tolist() == [3.0 * u + 1.0 for u in given(1).x]
+
+
+@pytest.mark.parametrize("new", ["u - 1.0", "u + 2.0", "abs(u)"])
+def test_a_text_that_has_changed_since_it_was_loaded_is_refused(new, tmp_path, monkeypatch):
+    path = tmp_path / "changed.py"
+    path.write_text("def function(u):\n    return u + 1.0\n")
+    names = {}
+    exec(compile(path.read_text(), str(path), "exec"), names)
+    assert Translator().translated(names["function"], [Number(Local("f", "u"))]).slots
+    path.write_text(f"def function(u):\n    return {new}\n")
+    linecache.checkcache()
+    linecache.cache.pop(str(path), None)
+    with pytest.raises(TranslationError, match="has changed since it was loaded"):
+        Translator().translated(names["function"], [Number(Local("f", "u"))])
 
 
 def columns_of(column, factor):

@@ -347,6 +347,9 @@ def test_the_name_depends_on_all_that_the_code_depends_on(monkeypatch: pytest.Mo
         with monkeypatch.context() as patch:
             patch.setattr(place, attribute, lambda: "another")
             names[attribute] = _name()
+    with monkeypatch.context() as patch:
+        patch.setattr(compiled, "piecewise_linear", _other_loop)
+        names["a function that the text may call"] = _name()
     assert len(set(names.values())) == len(names), names
     assert _name() == names["usual"]
 
