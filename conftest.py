@@ -1,12 +1,13 @@
-"""Leave out the doctests of modules that cannot be imported without their extra."""
+"""Leave out the doctests of modules that need an extra that is not installed."""
 
 from __future__ import annotations
 
 import importlib.util
 
+collect_ignore = []
 # The classes of the full-screen debugger derive from those of Textual (extra: tui).
-collect_ignore = (
-    []
-    if importlib.util.find_spec("textual")
-    else [f"gms_fsm/app/debugger/tui/{name}.py" for name in ("_app", "_widgets")]
-)
+if not importlib.util.find_spec("textual"):
+    collect_ignore += [f"gms_fsm/app/debugger/tui/{name}.py" for name in ("_app", "_widgets")]
+# The examples compile (extra: fast).
+if not importlib.util.find_spec("llvmlite"):
+    collect_ignore += ["integrators/machine_code/objects.py"]

@@ -410,15 +410,13 @@ def first(_: int) -> Table:
     with tempfile.TemporaryDirectory() as folder:
         steps = (("cold cache", "signed"), ("known chart", "signed"), ("new chart", "published"))
         table = [
-            (name, f"{child(task, NUMBA_CACHE_DIR=folder)['seconds']:.2f} s")
-            for name, task in steps
+            (name, f"{child(task, GMS_FSM_CACHE=folder)['seconds']:.2f} s") for name, task in steps
         ]
     return Table(
         "First compiled run of a process",
         ("", "time"),
         table,
-        "Includes importing numba. Cold: nothing is cached. New chart: the engine is cached, this "
-        "chart on this rig is not.",
+        "Includes importing llvmlite. Cold: nothing is cached. New chart: others are.",
     )
 
 
@@ -441,7 +439,7 @@ def machine() -> str:
         names = [line for line in info.read_text().splitlines() if line.startswith("model name")]
         cpu = names[0].split(":")[1].strip() if names else cpu
     packages = [f"{name} {version(name)}" for name in ("numpy", "scipy")]
-    for name in ("numba", "scikit-sundae", "pathsim"):
+    for name in ("llvmlite", "scikit-sundae", "pathsim"):
         try:
             packages.append(f"{name} {version(name)}")
         except ModuleNotFoundError:

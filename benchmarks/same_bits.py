@@ -206,7 +206,7 @@ def table_at(commit: str | None, quick: bool) -> Table:
             archive = f"{root}.zip"
             subprocess.run(["git", "archive", "-o", archive, commit], cwd=ROOT, check=True)
             shutil.unpack_archive(archive, root)
-        own = os.environ | {"PYTHONPATH": str(root), "NUMBA_CACHE_DIR": str(Path(folder) / "code")}
+        own = os.environ | {"PYTHONPATH": str(root), "GMS_FSM_CACHE": str(Path(folder) / "code")}
         command = [sys.executable, __file__, "--child", str(output), *["--quick"] * quick]
         subprocess.run(command, cwd=root, env=own, check=True)
         return dict(json.loads(output.read_text(encoding="utf-8")))

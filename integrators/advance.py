@@ -18,7 +18,15 @@ from integrators.crossings import (
     is_quiet_step,
     longest_next,
 )
-from integrators.step_size import INFINITY, Control, error_norm, next_factor, retry_factor
+from integrators.step_size import (
+    INFINITY,
+    Control,
+    error_norm,
+    memory_of,
+    next_factor,
+    retry_factor,
+    root_of,
+)
 from integrators.steps import (
     ERROR_BEFORE,
     T_STOP,
@@ -43,6 +51,7 @@ REACHED, CROSSED, FULL, TOO_SMALL, NOT_FINITE = 0, 1, 2, 3, 4
 # Outcomes of a step, besides TOO_SMALL and NOT_FINITE.
 ACCEPTED, REJECTED = 5, 6
 REDO = 0.9  # a crossing before this fraction of an adaptive step causes the step to be repeated
+ROUGH = 0.01  # of a step: width of the bracket that decides whether it is repeated
 SMALLEST = 1e-280  # of an absolute tolerance: smaller numbers lose precision
 AT_ONCE = 1e3  # ticks; a crossing closer than this is taken immediately
 # Significant difference of two times: four units in the last place, whatever the run's length.
@@ -191,14 +200,20 @@ def advance(
             fit_dense(plan.method, h, y, scratch)
         if near:
             path = Path(motion, now.mode, interpolate, scratch.dense, t, t_new, y_new)
-            theta = first_change(path, w, tick)
-        if theta < REDO and theta * h > AT_ONCE * tick and adaptive and not redone:
-            # The stages lay beyond the crossing and may have missed events before it: the step up
-            # to the crossing is repeated on its own. Except if its length is almost zero: rounding
-            # might then undo the crossing, and a run would creep forward tick by tick.
-            clock[H] = theta * h
-            redone = True
-            continue
+            if adaptive and not redone:
+                # If the stages lay far beyond the crossing they may have missed events before it:
+                # the step up to the crossing is repeated on its own, and a rough place is enough.
+                # Except if its length is almost zero: rounding might then undo the crossing, and a
+                # run would creep forward tick by tick.
+                theta = first_change(path, w, max(ROUGH * h, tick))
+                if theta <= ROUGH:  # perhaps almost zero
+                    theta = first_change(path, w, tick)
+                if theta < REDO and theta * h > AT_ONCE * tick:
+                    clock[H] = theta * h
+                    redone = True
+                    continue
+            if theta != NO_CHANGE or not adaptive or redone:
+                theta = first_change(path, w, tick)
         redone = False
         if theta < 1.0:
             t_new = t + theta * h
@@ -258,13 +273,14 @@ def _assess_step(
         if clock[H] > tick:
             return REJECTED
         return TOO_SMALL if error < INFINITY else NOT_FINITE
-    factor = next_factor(error, clock[ERROR_BEFORE], order)
+    root = root_of(error, order)
+    factor = next_factor(root, clock[ERROR_BEFORE])
     if rejected:
         factor = min(factor, 1.0)
     # A step cut short by a stop says little about the step after it.
     cut_short = h < clock[H] and not rejected
     clock[H] = max(clock[H], h * factor) if cut_short else h * factor
-    clock[ERROR_BEFORE] = max(error, 1e-4)
+    clock[ERROR_BEFORE] = memory_of(root)
     return ACCEPTED
 
 

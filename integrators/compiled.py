@@ -1,197 +1,81 @@
-"""`integrators.columns.record` as machine code: the very same functions, compiled by numba.
+"""`integrators.columns.record` as machine code: the very same functions, translated and compiled.
 
-The system's functions are passed as addresses of functions with fixed signatures, so that the loop
-is compiled once per machine and cached, whatever it integrates.
+Each system gets machine code of its own: its functions are known while translating, and so are the
+lengths of all arrays, unless they are long. An object is compiled once and stored.
 """
 
 from __future__ import annotations
 
+import ctypes
 import functools
-import gc
 import hashlib
-import pickle
+import math
 import sys
 import threading
 import time
-import typing
-from collections.abc import Callable, Mapping
-from types import CodeType
-from typing import Any, Protocol
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from types import CodeType, FunctionType
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from integrators import advance, columns, crossings, loop, sliding, step_size, steps
-from integrators.loop import Machines
+from integrators.columns import Log, Recorded
+from integrators.loop import Buffers, Machines
+from integrators.machine_code import (
+    bindings,
+    expressions,
+    llvm,
+    objects,
+    passing,
+    sources,
+    statements,
+    translate,
+    tree,
+    values,
+    work,
+)
+from integrators.machine_code import layout as layouts
+from integrators.machine_code.layout import Block, Column, Layout
+from integrators.machine_code.llvm import llvm_text
+from integrators.machine_code.objects import Library, target_name
+from integrators.machine_code.translate import Translator
+from integrators.machine_code.tree import Local
+from integrators.machine_code.values import Number
 from integrators.sliding import Functions
+from integrators.steps import Coefficients
 
-__all__ = [
-    "SIGNATURES",
-    "Store",
-    "arrays",
-    "compiled",
-    "digest",
-    "edition",
-    "for_each_row",
-    "record",
-    "usable_inside",
-]
+__all__ = ["Engine", "Run", "Store", "digest", "edition", "engine", "example", "observer"]
 
-# Every function that `record` reaches. Those within a step are inlined: a call passes ten arrays,
-# which takes as long as their work does.
-_OF_A_STEP: tuple[Callable[..., Any], ...] = (
-    advance._next_end,
-    advance._assess_step,
-    advance._put_wanted,
-    advance.limit_after,
-    advance.next_on_grid,
-    advance.put_row,
-    advance.raise_floor,
-    advance.tick_at,
-    crossings._bracket,
-    crossings._is_quiet,
-    crossings._probe,
-    crossings._search,
-    crossings.any_changed,
-    crossings.copy_margins,
-    crossings.first_change,
-    crossings.is_quiet_step,
-    sliding.flow_on,
-    sliding.margins_on,
-    step_size.error_norm,
-    step_size.next_factor,
-    step_size.retry_factor,
-    steps.fit_dense,
-    steps.interpolate,
-    steps.take_step,
-    steps.weighted_sum,
-)
-# The phases of the loop are inlined too, and the writing of events: each is called from one place.
-_OF_AN_EVENT: tuple[Callable[..., Any], ...] = (
-    loop._begin_arc,
-    loop._choose_stop,
-    loop._end_arc,
-    loop._finish,
-    loop._fired,
-    loop._flowed,
-    columns._is_full,
-    loop._held,
-    loop._jump,
-    loop._make_due,
-    loop._only_due,
-    loop._pick,
-    columns._put_firing,
-    columns._put_stop,
-    loop._start,
-    loop._steps_ahead,
-)
-_OF_AN_ARC: tuple[Callable[..., Any], ...] = (
-    advance.advance,
-    crossings.listed,
-    crossings.longest_next,  # of few arcs; inlined, it slows every step down by a third
-    loop._reset_counts,
-    loop._list,
-    loop._reset_if_advanced,
-    loop._no_progress,
-    loop._often_changed,
-    columns._put_modes,
-    loop._rearm,
-    loop._undefined,
-    loop.run_to_event,
-    sliding._sign,
-    sliding._solve,
-    sliding.look,
-    sliding.seize,
-    sliding.slope_on,
-    step_size.scaled_size,
-    step_size.starting_step,
-)
-_INLINED = (*_OF_A_STEP, *_OF_AN_EVENT)
-_ARRAYS: Mapping[Any, tuple[type[Any], int]] = {
-    list[float]: (np.float64, 1),
-    tuple[float, ...]: (np.float64, 1),
-    list[int]: (np.int64, 1),
-    list[bool]: (np.bool_, 1),
-    list[list[float]]: (np.float64, 2),
-    tuple[tuple[float, ...], ...]: (np.float64, 2),
-    list[list[int]]: (np.int64, 2),
-}
-# The functions that make up a system: letters for float, Vector, list[int], int and p.
-SIGNATURES: Mapping[str, str] = {
-    "flow": "fVIVPV",
-    "flow_live": "fVIVPV",
-    "arm": "fVIPVI",
-    "margins": "fVIPIV",
-    "normal": "ifVIPV",
-    "switch": "fVIPI",
-    "act": "iifVIP",
-    "tick": "ifVIP",
-    "observe": "fVIVPV",
-}
-# IEEE arithmetic: x / 0 is inf or NaN, as in our Python (together with the caller's numbers that do
-# not raise). No reference counting either, which is atomic and took half of the time: nothing is
-# allocated here, and all arrays belong to the caller.
-_OPTIONS: Mapping[str, Any] = {"error_model": "numpy", "_nrt": False}
+# Arrays longer than this are not inside the block, and their lengths are variables.
+LONGEST_INSIDE = 64 + 8
 
 
-def arrays(record: Any) -> Any:
-    """Return a named tuple of lists as the same named tuple of arrays.
+class Run(NamedTuple):
+    """The arguments of `integrators.columns.record`, without the last two."""
 
-    Parameters
-    ----------
-    record : NamedTuple
-        Contains lists, numbers and named tuples.
-
-    Returns
-    -------
-    NamedTuple
-        Lists of lists are padded with zeros to form a table.
-
-    Examples
-    --------
-    >>> from integrators.steps import coefficients
-    >>> from integrators.tableaux import HEUN
-    >>> arrays(coefficients(HEUN)).A.tolist()
-    [[0.0], [1.0]]
-    """
-    return _constant(record) if isinstance(record, steps.Coefficients) else _converted(record)
+    functions: Functions
+    machines: Machines
+    buffers: Buffers
+    log: Log
+    recorded: Recorded
 
 
-def _converted(record: Any) -> Any:
-    kind: Any = type(record)
-    kinds = _kinds(kind)
-    return kind._make(_array(u, array) for u, array in zip(record, kinds, strict=True))
+class Rows(NamedTuple):
+    """The arguments of `each_row`."""
+
+    observe: Callable[..., Any]
+    t: Any
+    y: Any
+    mode: Any
+    live: Any
+    p: Any
+    table: Any
 
 
-@functools.cache
-def _kinds(record: Any) -> tuple[tuple[type[Any], int] | None, ...]:
-    """Return what array each field of a named tuple becomes; None if it is no list."""
-    hints = typing.get_type_hints(record)
-    return tuple(_ARRAYS.get(hints[name]) for name in record._fields)
-
-
-@functools.lru_cache(maxsize=32)
-def _constant(method: steps.Coefficients) -> Any:
-    """Return the arrays of a method, which no run writes to."""
-    return _converted(method)
-
-
-def _array(value: Any, kind: tuple[type[Any], int] | None) -> Any:
-    if kind is None:
-        return arrays(value) if hasattr(value, "_fields") else value
-    dtype, dimensions = kind
-    if dimensions == 1:
-        return np.array(value, dtype=dtype)
-    table = np.zeros((len(value), max(map(len, value), default=0)), dtype=dtype)
-    for row, numbers in zip(table, value, strict=True):
-        row[: len(numbers)] = numbers
-    return table
-
-
-# --------------------------------------------------------------------------- caching
 class Store(Protocol):
     """A cache for machine code. It must return exactly what was stored: wrong bits crash."""
-
-    def __hash__(self) -> int: ...
 
     def get(self, name: str) -> bytes | None:
         """Return the content stored under a name, or None."""
@@ -200,6 +84,7 @@ class Store(Protocol):
         """Store content under a name, if possible."""
 
 
+# --------------------------------------------------------------------------- what it depends on
 def digest(*functions: Callable[..., Any], text: str = "") -> str:
     """Return a hash of what some functions do.
 
@@ -228,305 +113,319 @@ def digest(*functions: Callable[..., Any], text: str = "") -> str:
     return stamp.hexdigest()[:16]
 
 
+@functools.cache
 def edition() -> str:
     """Return a hash of what the loop computes, whatever system it runs.
 
     Returns
     -------
     str
-        It changes with the loop's source and with the version of Python.
+        It changes with the loop's source, with how it is translated, and with the version of
+        Python.
 
     Examples
     --------
     >>> len(edition())
     16
     """
-    functions: list[Callable[..., Any]] = [columns.record, *_INLINED, *_OF_AN_ARC]
-    modules = (steps, step_size, crossings, advance, sliding, loop, columns)
-    constants = [
-        (name, value if isinstance(value, int | float) else getattr(value, "_fields", None))
-        for module in modules
-        for name, value in vars(module).items()
-    ]
+    loops = (steps, step_size, crossings, advance, sliding, loop, columns)
+    front = (sources, work, bindings, passing, expressions, statements, translate)
+    tools = (*front, values, tree, layouts, llvm, objects)
+    functions: list[Callable[..., Any]] = []
+    constants = []
+    for module in (*loops, *tools):
+        for name, value in vars(module).items():
+            if isinstance(value, FunctionType) and value.__module__ == module.__name__:
+                functions.append(value)
+            elif isinstance(value, type) and value.__module__ == module.__name__:
+                members = vars(value).values()
+                functions += [each for each in members if isinstance(each, FunctionType)]
+            shown = value if isinstance(value, int | float) else getattr(value, "_fields", None)
+            constants.append((name, shown))
     return digest(*functions, text=repr((sys.version, constants)))
 
 
-_lock = threading.RLock()  # for numba's settings, and to compile nothing twice
+# --------------------------------------------------------------------------- engines
+@dataclass(eq=False)
+class _Call:
+    """A call of machine code, and the first error in a function that it calls."""
+
+    block: Block
+    error: BaseException | None = None
+    copy: list[Any] = field(default_factory=list)  # the block's contents then
 
 
-class _VerifiedCache:
-    """Replaces numba's own cache, which loads files without verifying them."""
-
-    cache_path = None
-
-    def __init__(
-        self, function: Callable[..., Any], store: Store | None, on_miss: Callable[[], None]
-    ) -> None:
-        self.function, self.store, self.on_miss = function, store, on_miss
-        self.missed = False
-
-    def load_overload(self, signature: Any, target: Any) -> Any:
-        """Return a cached result, or None to have it compiled."""
-        from numba.core.compiler import CompileResult
-
-        target.refresh()
-        kept = None if self.store is None else self.store.get(self._name(signature, target))
-        if kept is not None:
-            try:
-                return CompileResult._rebuild(target, *pickle.loads(kept))
-            except Exception:  # stored by a numba that differs in more than its version number
-                pass
-        self.missed = True
-        self.on_miss()
-        return None
-
-    def save_overload(self, signature: Any, result: Any) -> None:
-        """Store a result."""
-        from numba.core.serialize import dumps
-
-        if self.store is not None:
-            name = self._name(signature, result.target_context)
-            self.store.put(name, dumps(result._reduce()))
-
-    def _name(self, signature: Any, target: Any) -> str:
-        import numba
-
-        # Includes the processor: a folder may be shared between machines.
-        what = signature, target.codegen().magic_tuple(), numba.__version__, _OPTIONS
-        function = self.function
-        text = repr((what, edition(), function.__module__, function.__qualname__))
-        return f"{function.__qualname__}-{digest(function, text=text)}"
-
-
-def _silent() -> None:
-    """Do nothing."""
-
-
-def _machine_code(
-    signature: Any,
-    function: Callable[..., Any],
-    store: Store | None,
-    on_miss: Callable[[], None] = _silent,
-) -> Any:
-    """Compile a function, or load its cached code from a store."""
-    import numba
-
-    config = numba.config
-    with _lock:
-        before = config.LOOP_VECTORIZE
-        # Vectorized loops cost a fifth at n = 4, and pay off only if n is in the hundreds.
-        config.LOOP_VECTORIZE = 0
-        collecting = gc.isenabled()
-        gc.disable()  # compiling creates millions of objects and hardly any cyclic garbage
-        try:
-            dispatcher = numba.njit(nogil=True, **_OPTIONS)(function)
-            dispatcher._cache = _VerifiedCache(function, store, on_miss)
-            dispatcher.compile(signature)
-            dispatcher.disable_compile()
-            return dispatcher
-        finally:
-            config.LOOP_VECTORIZE = before
-            if collecting:
-                gc.enable()
-
-
-# --------------------------------------------------------------------------- compiling
-def usable_inside(function: Callable[..., Any], *, inlined: bool = False) -> None:
-    """Make a Python function callable by name from compiled code.
+@dataclass(eq=False)
+class Engine:
+    """Machine code with the layout of its arguments.
 
     Parameters
     ----------
-    function : callable
-        Contains plain loops over numbers and arrays.
-    inlined : bool
-        Whether its code is copied into that of its callers.
+    layout : Layout
+        Of the block.
+    library : Library
+        Contains `entry`.
+    calls : sequence of callable
+        The functions of the host program that it calls.
+    extra : int
+        Number of integers that are passed besides the block.
     """
-    from numba.extending import register_jitable
 
-    register_jitable(**_OPTIONS, forceinline=inlined)(function)
+    layout: Layout
+    library: Library
+    calls: Sequence[Callable[[float], float]]
+    extra: int
+    _function: Any = field(init=False)
+    _now: threading.local = field(default_factory=threading.local)  # `call`: of each thread
+
+    def __post_init__(self) -> None:
+        integers = [ctypes.c_int64] * self.extra
+        kind = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, *integers)
+        self._function = kind(self.library.address("entry"))
+        table = self.library.variable("callbacks") if self.calls else 0
+        if table:
+            thunk = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
+            self._thunks = [thunk(self._guarded(call)) for call in self.calls]
+            places = (ctypes.c_void_p * len(self.calls)).from_address(table)
+            for k, each in enumerate(self._thunks):
+                places[k] = ctypes.cast(each, ctypes.c_void_p).value
+
+    def _guarded(self, call: Callable[[float], float]) -> Callable[[float], float]:
+        """Return a function that never raises: machine code could not pass it on."""
+        now = self._now
+
+        def value(t: float) -> float:
+            try:
+                if now.call.error is None:
+                    return float(call(t))
+            except BaseException as error:
+                now.call.error, now.call.copy = error, now.call.block.copy()
+            return math.nan
+
+        return value
+
+    def __call__(self, block: Block, *integers: int) -> int:
+        """Call the machine code; this releases the GIL.
+
+        Parameters
+        ----------
+        block : Block
+            Up to date.
+        *integers : int
+            Further arguments.
+
+        Returns
+        -------
+        int
+            Its result.
+
+        Raises
+        ------
+        Exception
+            What a function of the host program raised; the block is as it was then.
+        """
+        now = self._now
+        outer, now.call = getattr(now, "call", None), _Call(block)
+        try:
+            result: int = self._function(block.address, *integers)
+            if now.call.error is not None:
+                block.restore(now.call.copy)
+                raise now.call.error
+        finally:
+            now.call = outer
+        return result
 
 
-@functools.cache
-def _types() -> Mapping[str, Any]:
-    from numba import types
-
-    vector, ints, table = types.float64[::1], types.int64[::1], types.float64[:, ::1]
-    return {
-        "f": types.float64,
-        "i": types.int64,
-        "V": vector,
-        "I": ints,
-        "P": types.Tuple((vector, table, table)),
-    }
+def _is_known(part: Any) -> bool:
+    return callable(part) or isinstance(part, Coefficients)
 
 
-def _signature(letters: str) -> Any:
-    from numba import types
+def _made(
+    text: str,
+    function: Callable[..., Any],
+    arguments: Any,
+    extra: Sequence[str],
+    calls: Sequence[Callable[[float], float]],
+    store: Store | None,
+    notify: Callable[[str], None],
+) -> Engine:
+    """Return an engine from the store, or compile it."""
+    inside = _longest(arguments) <= LONGEST_INSIDE
+    layout = Layout(arguments, _is_known, inside=inside)
+    # Which of the functions in the text are called, and the coefficients.
+    fixed = [getattr(part, "__name__", part) for part in _parts(arguments) if _is_known(part)]
+    what = edition(), function.__name__, text, layout.key(), fixed, target_name()
+    name = f"{function.__name__}-{hashlib.sha256(repr(what).encode()).hexdigest()[:24]}"
+    content = None if store is None else store.get(name)
+    if content is None:
+        started = time.perf_counter()
+        notify("compiling, once for each chart and method ...")
+        fields = layout.value.fields.values()
+        translator = Translator()
+        numbers = [Number(Local("i", each)) for each in extra]
+        translator.entry("entry", function, [*fields, *numbers])
+        content = objects.compiled(llvm_text(translator.module))
+        if store is not None:
+            store.put(name, content)
+        notify(f"compiled in {time.perf_counter() - started:.1f} s")
+    return Engine(layout, Library(content), calls, len(extra))
 
-    return types.void(*(_types()[letter] for letter in letters))
+
+def _parts(record: Any) -> list[Any]:
+    """Return the parts of named tuples that are no named tuples, except known ones."""
+    if isinstance(record, tuple) and not _is_known(record):
+        return [part for each in record for part in _parts(each)]
+    return [record]
 
 
-def compiled(name: str, function: Callable[..., None], store: Store | None) -> Any:
-    """Return a system's function compiled to machine code.
+def _longest(arguments: Any) -> int:
+    """Return the largest length of a list."""
+    lengths = [0]
+    for part in _parts(arguments):
+        if isinstance(part, np.ndarray):
+            lengths += part.shape
+        elif isinstance(part, list):
+            lengths.append(
+                max(len(part), len(part[0]) if part and isinstance(part[0], list) else 0)
+            )
+    return max(lengths)
+
+
+def engine(
+    text: str,
+    arguments: Run,
+    calls: Sequence[Callable[[float], float]],
+    store: Store | None,
+    notify: Callable[[str], None],
+) -> Engine:
+    """Return `integrators.columns.record` as machine code for one system.
 
     Parameters
     ----------
-    name : str
-        A key of `SIGNATURES`.
-    function : callable
-        Its qualified name must be unique: the linker identifies it by nothing else.
+    text : str
+        Changes with the system's functions.
+    arguments : Run
+        From `example`, with those functions.
+    calls : sequence of callable
+        The functions that `integrators.machine_code.translate.HostFunction` stands for.
     store : Store, optional
-        The cache for its machine code.
+        The cache for machine code.
+    notify : callable
+        Called with a text before the system is compiled, which takes a while, and afterwards.
 
     Returns
     -------
-    callable
-        A function with the fixed signature.
+    Engine
+        To be called with a block, the largest number of steps, and whether to pause.
     """
-    return _machine_code(_signature(SIGNATURES[name]), function, store)
+    return _made(text, columns.record, arguments, ("steps", "pause"), calls, store, notify)
 
 
-def record(arguments: tuple[Any, ...], store: Store | None, notify: Callable[[str], None]) -> int:
-    """Call `integrators.columns.record` as machine code; this releases the GIL.
+def example(functions: Functions, machines: Machines, b: Buffers, observed: int, recorded: Recorded,
+            modes: int) -> Run:  # fmt: skip
+    """Return the arguments of `integrators.columns.record`, with columns that may grow.
 
     Parameters
     ----------
-    arguments : tuple
-        The function's arguments: named tuples of compiled functions, of arrays and numbers.
-    store : Store, optional
-        The cache for the machine code.
-    notify : callable
-        Called with a text before the loop is compiled, which takes a while, and afterwards.
+    functions, machines
+        Python functions, with arrays as parameters.
+    b : Buffers
+        From `integrators.hybrid.buffers`.
+    observed : int
+        Number of observed values.
+    recorded : Recorded
+        Where the numbers are that the log stores.
+    modes : int
+        Number of modes that are stored with a row.
+
+    Returns
+    -------
+    Run
+        An example for `integrators.machine_code.layout.Layout`.
+    """
+    size = len(b.now.y)
+    column: Any = Column
+    plan = b.plan._replace(jumps=column(), before_jumps=column(), ticks=column("i"), knots=column())
+    out = b.out._replace(times=column(), rows_t=column(), rows_y=column("f", size))
+    log = Log(
+        counts=[0, 0],
+        t=column(),
+        machine=column("i"),
+        edge=column("i"),
+        numbers=column("f", 5),
+        seen=[0.0] * observed,
+        rows_microstep=column("i"),
+        rows_mode=column("i", modes),
+        stops_t=column(),
+        stops_microstep=column("i"),
+        stops_y=column("f", size),
+        stops_mode=column("i", modes),
+    )
+    p: Any = functions.p
+    shared, own, _ = p
+    functions = functions._replace(p=(shared, own, Column(table=True)))
+    return Run(functions, machines, b._replace(plan=plan, out=out), log, recorded)
+
+
+def each_row(observe: Any, t: Any, y: Any, mode: Any, live: Any, p: Any, table: Any) -> int:
+    """Observe many rows.
+
+    Parameters
+    ----------
+    observe, t, y, mode, live, p, table
+        See `observer`; the table is filled.
 
     Returns
     -------
     int
-        The result of `integrators.columns.record`.
+        Their number.
     """
-    functions, machines, *others = arguments
-    addresses: list[Any] = [_address(function) for function in (*functions[:4], *machines)]
-    flow, arm, margins, normal, *switch = addresses
-    at = Functions(flow, arm, margins, normal, functions.p), Machines(*switch)
-    machine_code: Callable[..., int] = _record((*at, *others), store, notify)
-    return machine_code(*at, *others)
-
-
-@functools.lru_cache(maxsize=1024)
-def _address(function: Any) -> int:
-    """Return the address of a compiled function's machine code."""
-    (code,) = function.overloads.values()
-    address: int = code.library.get_pointer_to_function(code.fndesc.llvm_func_name)
-    return address
-
-
-def _function_at(signature: Any) -> Any:
-    """Return an intrinsic that turns an address into a function, in machine code.
-
-    If functions were passed directly, numba would unpickle their types at every call: 27 us each.
-    """
-    from numba import types
-    from numba.core import cgutils
-    from numba.extending import intrinsic
-
-    kind = types.FunctionType(signature)
-
-    def make(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        function = cgutils.create_struct_proxy(kind)(context, builder)
-        function.jit_addr = builder.inttoptr(arguments[0], function.jit_addr.type)
-        return function._getvalue()
-
-    def function_at(_typing: Any, _address: Any) -> Any:
-        return kind(types.int64), make
-
-    return intrinsic(function_at)
-
-
-_compiled_record: list[Any] = []
-
-
-def _record(arguments: tuple[Any, ...], store: Store | None, notify: Callable[[str], None]) -> Any:
-    if _compiled_record:
-        return _compiled_record[0]
-    with _lock:
-        if not _compiled_record:
-            _compiled_record.append(_compile_record(arguments, store, notify))
-        return _compiled_record[0]
-
-
-def _compile_record(
-    arguments: tuple[Any, ...], store: Store | None, notify: Callable[[str], None]
-) -> Any:
-    import numba
-
-    for helper in (*_INLINED, *_OF_AN_ARC):
-        usable_inside(helper, inlined=helper in _INLINED)
-    names = ("flow", "arm", "margins", "normal", "switch", "act", "tick", "observe")
-    at_flow, at_arm, at_margins, at_normal, at_switch, at_act, at_tick, at_observe = (
-        _function_at(_signature(SIGNATURES[name])) for name in names
-    )
-    run = numba.njit(inline="always", **_OPTIONS)(columns.record)  # otherwise it is compiled twice
-
-    def record(
-        at: Any, machines: Any, b: Any, log: Any, recorded: Any, most_steps: Any, pause: Any
-    ) -> Any:
-        functions = Functions(
-            at_flow(at.flow), at_arm(at.arm), at_margins(at.margins), at_normal(at.normal), at.p
-        )
-        switch = Machines(
-            at_switch(machines.ask),
-            at_act(machines.act),
-            at_tick(machines.tick),
-            at_observe(machines.observe),
-        )
-        return run(functions, switch, b, log, recorded, most_steps, pause)
-
-    record.__qualname__ = "record"  # the name in the cache
-    start = time.perf_counter()
-    result = _machine_code(
-        numba.types.int64(*map(numba.typeof, arguments)),
-        record,
-        store,
-        lambda: notify("compiling the engine, once on this machine ..."),
-    )
-    if result._cache.missed:
-        notify(f"compiled in {time.perf_counter() - start:.1f} s")
-    return result
-
-
-def _each_row(observe: Any, t: Any, y: Any, mode: Any, live: Any, p: Any, table: Any) -> None:
     for row in range(len(t)):
         observe(t[row], y[row], mode[row], live, p, table[row])
+    return len(t)
 
 
-@functools.cache
-def _compiled_each_row(store: Store | None) -> Any:
-    import numba
-
-    kind = _types()
-    observe = numba.types.FunctionType(_signature(SIGNATURES["observe"]))
-    table, modes = numba.types.float64[:, ::1], numba.types.int64[:, ::1]
-    signature = numba.types.void(observe, kind["V"], table, modes, kind["V"], kind["P"], table)
-    return _machine_code(signature, _each_row, store)
-
-
-def for_each_row(
-    observe: Any, rows: tuple[Any, Any, Any], live: Any, p: Any, table: Any, store: Store | None
-) -> None:
-    """Call a compiled ``observe`` for many rows.
+def observer(
+    text: str,
+    observe: Callable[..., Any],
+    live: list[float],
+    p: Any,
+    widths: tuple[int, int, int],
+    calls: Sequence[Callable[[float], float]],
+    store: Store | None,
+    notify: Callable[[str], None],
+) -> tuple[Engine, Rows]:
+    """Return machine code that observes many rows.
 
     Parameters
     ----------
+    text, calls, store, notify
+        As in `engine`.
     observe : callable
-        From `compiled`.
-    rows : tuple of ndarray, shapes (rows,), (rows, m), (rows, n)
-        Times, states and modes.
-    live : ndarray, shape (signs,)
-        `integrators.sliding.LIVE` for each sign.
+        ``observe(t, y, mode, signs, p, out)``.
+    live : list of float
+        The signs.
     p : tuple of ndarray
         Parameters.
-    table : ndarray, shape (rows, width)
-        Filled with the results.
-    store : Store, optional
-        The cache for the machine code.
+    widths : (int, int, int)
+        Number of states, of modes and of observed values.
+
+    Returns
+    -------
+    Engine
+        To be called with a block.
+    Rows
+        The example that its block begins with.
     """
-    _compiled_each_row(store)(observe, *rows, live, p, table)
+    shared, own, _ = p
+    size, modes, seen = widths
+    rows = Rows(
+        observe=observe,
+        t=Column(),
+        y=Column("f", size),
+        mode=Column("i", modes),
+        live=live,
+        p=(shared, own, Column(table=True)),
+        table=Column("f", seen),
+    )
+    return _made(text, each_row, rows, (), calls, store, notify), rows

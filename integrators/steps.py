@@ -26,7 +26,7 @@ __all__ = [
 Vector = list[float]
 Flow = Callable[..., Any]  # flow(t, y, mode, held, p, dy) -> None, fills dy
 Margins = Callable[..., Any]  # margins(t, y, mode, p, watch, out) -> None, fills watched entries
-# Indices into Now.clock: the time, the next step, the controller's error, the next stop; the time
+# Indices into Now.clock: the time, the next step, the controller's memory, the next stop; the time
 # since which switches are counted, and the time of the last one.
 T, H, ERROR_BEFORE, T_STOP, ANCHOR, SWITCHED = range(6)
 

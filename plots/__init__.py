@@ -106,7 +106,7 @@ def explore(
         Of the replay page, in pixels.
     **options
         ``t_start``, ``initial``, ``settings`` and the fields of `gms_fsm.Settings` by name. The
-        engine is ``"compiled"`` if numba is installed (extra ``fast``).
+        engine is ``"compiled"`` if llvmlite is installed (extra ``fast``).
 
     Returns
     -------

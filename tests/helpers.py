@@ -24,7 +24,7 @@ from gms_fsm.systems.signals import as_signal
 
 ROOT = Path(__file__).resolve().parents[1]  # of the repository
 # For long runs in tests that claim nothing of engines, which all give the same bits.
-FASTEST = "compiled" if importlib.util.find_spec("numba") else "ifelse"
+FASTEST = "compiled" if importlib.util.find_spec("llvmlite") else "ifelse"
 SINE = "0.2*sin(2*pi*t/20)"
 FIG4_SINE = "0.15*sin(2*pi*t/25)"
 FIG3_FORCE = "min(0.25*t, max(0.25, 0.75 - 0.125*t)) + 0.1*sin(2*pi*2*(max(t, 4) - 4))"

@@ -116,7 +116,7 @@ def fuzzing(name: str, seed: int, minutes: float) -> bool:
             *("--child", str(60 * minutes), "--watch", str(watch)),
         ]
         # Machine code of hostile charts should not be cached.
-        surroundings = {**os.environ, "NUMBA_CACHE_DIR": folder}
+        surroundings = {**os.environ, "GMS_FSM_CACHE": folder}
         limit = 60 * minutes + 2 * SLOWEST + 60
         try:
             done = subprocess.run(
@@ -197,7 +197,7 @@ def random_runs(seed: int, examples: int) -> bool:
     """Draw new random runs; hypothesis prints the one that fails, shrunk."""
     began = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:  # for machine code that is not needed again
-        surroundings = {"GMS_FSM_EXAMPLES": str(examples), "NUMBA_CACHE_DIR": folder}
+        surroundings = {"GMS_FSM_EXAMPLES": str(examples), "GMS_FSM_CACHE": folder}
         done = subprocess.run(
             [
                 sys.executable,

@@ -13,6 +13,7 @@ doi:10.1016/0005-1098(94)90209-7, for the exponent and the load.
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
@@ -136,6 +137,17 @@ class Stribeck:
     def dip(self) -> float:
         """Speed [m/s] beyond which the curve is flat; integrators stop at +dip and -dip."""
         return float(DIP_WIDTH ** (GAUSSIAN / self.delta) * self.v_s)
+
+    @property
+    def flat(self) -> float:
+        """Speed [m/s] beyond which the curve is F_c to the last bit.
+
+        There the rest is less than a quarter of the distance from F_c to the next number.
+        """
+        share = (self.F_s - self.F_c) / self.F_c * 2.0**55
+        if not share < math.inf:
+            return math.inf
+        return float(math.log(max(share, 1.0)) ** (1.0 / self.delta) * self.v_s * (1.0 + 1e-9))
 
     def __call__(self, v: ArrayLike) -> FloatArray:
         """Return s(v) [N] for velocities v [m/s] of any shape, computed exactly as in a run."""

@@ -114,7 +114,7 @@ class Forks:
     Parameters
     ----------
     model, rig, t_end, t_start, initial, settings, **options
-        As for `gms_fsm.Session`. By default the engine is ``"compiled"`` if numba is installed,
+        As for `gms_fsm.Session`. By default the engine is ``"compiled"`` if llvmlite is installed,
         else ``"ifelse"``.
 
     Attributes
@@ -151,7 +151,7 @@ class Forks:
         **options: Unpack[SettingOptions],
     ) -> None:
         if settings is None and "engine" not in options:
-            fast = importlib.util.find_spec("numba") is not None
+            fast = importlib.util.find_spec("llvmlite") is not None
             options["engine"] = "compiled" if fast else "ifelse"
         self.settings = checked_settings(settings, options)
         on, self.t_end = mounted("Forks", model, rig, t_end)

@@ -6,40 +6,41 @@ import functools
 import importlib.util
 import math
 import os
-import re
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm._extras import missing
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.errors import SignalError
-from gms_fsm.language import sgn
+from gms_fsm.language._functions import sgn
 from gms_fsm.lowering._generated import load
 from gms_fsm.lowering._store import Store
-from gms_fsm.lowering.program import Arguments, Program
+from gms_fsm.lowering.program import Arguments, Program, guarded
 from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
 
-__all__ = ["check_numba", "machine_code", "notify", "observe_rows", "packed", "store"]
+if TYPE_CHECKING:
+    from integrators.compiled import Engine, Run
+
+__all__ = ["check_llvmlite", "engine", "functions", "notify", "observe_rows", "packed", "store"]
 
 Packed = tuple[FloatArray, FloatArray, FloatArray]
 _lock = threading.RLock()  # a sweep may compile from several threads
 
 
-def check_numba() -> None:
-    """Raise an error unless numba is installed.
+def check_llvmlite() -> None:
+    """Raise an error unless llvmlite is installed.
 
     Raises
     ------
     MissingExtraError
         With advice on how to install it.
     """
-    for module in ("numba", "platformdirs"):
+    for module in ("llvmlite", "platformdirs"):
         if importlib.util.find_spec(module) is None:
             raise missing(module, "fast")
 
@@ -74,100 +75,80 @@ def _table(rows: list[list[float]]) -> FloatArray:
     return np.array(padded, dtype=np.float64).reshape(len(rows), length)
 
 
-def machine_code(program: Program, *names: str) -> list[Any]:
-    """Return some of a program's functions, compiled to machine code.
+def engine(program: Program, run: Run) -> Engine:
+    """Return the loop of a program as machine code.
 
     Parameters
     ----------
     program : Program
         From `gms_fsm.lowering.program.lower`.
-    *names : str
-        For example ``"flow"``.
+    run : Run
+        From `integrators.compiled.example`, with the functions from `functions`.
 
     Returns
     -------
-    list of callable
-        Functions that take the arrays from `packed`.
+    Engine
+        To be called with a block.
+    """
+    from integrators import compiled
+
+    with _lock:
+        return compiled.engine(_text(program), run, _calls(program), store(), notify)
+
+
+def _text(program: Program) -> str:
+    """Return what the machine code of a program depends on: its text, and what the text calls."""
+    from integrators.compiled import digest
+
+    return digest(sgn, piecewise_linear, piecewise_slope, text=program.source)
+
+
+def _calls(program: Program) -> list[Callable[[float], float]]:
+    """Return the signals that are Python functions, by number."""
+    return [guarded(name, call) for name, call in program.callables.items()]
+
+
+def functions(program: Program) -> Mapping[str, Any]:
+    """Return a program's functions in the form that is translated to machine code.
+
+    Parameters
+    ----------
+    program : Program
+        From `gms_fsm.lowering.program.lower`.
+
+    Returns
+    -------
+    mapping of str to callable
+        By name. Signals that are Python functions have been replaced by their numbers.
 
     Raises
     ------
     MissingExtraError
-        If numba is not installed.
-    SignalError
-        If numba cannot compile a Python function used as a signal.
+        If llvmlite is not installed.
     """
-    check_numba()
-    with _lock:
-        given = tuple(program.callables.items())
-        return [_machine_code(program.source, given, name) for name in names]
-
-
-@functools.lru_cache(maxsize=512)
-def _machine_code(
-    source: str, callables: tuple[tuple[str, Callable[[float], float]], ...], name: str
-) -> Any:
-    from integrators import compiled
-
-    function = _loaded(source, callables)[name]
-    # The linker identifies machine code loaded from disk by its function's name alone: without a
-    # unique name, the flow of one program would be run in place of another's.
-    stamp = compiled.digest(sgn, piecewise_linear, _loaded.__wrapped__, text=source)
-    function.__qualname__ = f"{name}_{stamp}"
-    # A user's function may change while its text stays the same: such code is not cached.
-    return compiled.compiled(name, function, None if callables else store())
+    check_llvmlite()
+    return _loaded(program.source, tuple(program.callables))
 
 
 @functools.lru_cache(maxsize=64)
-def _loaded(
-    source: str, callables: tuple[tuple[str, Callable[[float], float]], ...]
-) -> dict[str, Any]:
-    """Load a text together with the functions that machine code can call."""
-    from integrators import compiled
+def _loaded(source: str, callables: tuple[str, ...]) -> dict[str, Any]:
+    from integrators.machine_code.translate import HostFunction
 
-    for helper in (sgn, piecewise_linear, piecewise_slope):
-        compiled.usable_inside(helper)
-    # The name of an existing module: numba imports it when it loads machine code from disk.
     names: dict[str, Any] = {
         "piecewise_linear": piecewise_linear,
         "piecewise_slope": piecewise_slope,
-        "pow": _power(),
         "nan": math.nan,
         "__name__": __name__,
     }
-    for name, call in callables:
-        names[f"{name}_signal"] = _compiled_signal(name, call)
+    names |= {f"{name}_signal": HostFunction(k) for k, name in enumerate(callables)}
     return load("compiled program", source, names)
-
-
-@functools.cache
-def _power() -> Any:
-    """Return ``pow`` of the C library, which `math.pow` calls.
-
-    Otherwise LLVM would turn 8**z into exp2 and z**0.5 into sqrt, which differ in the last bits.
-    """
-    from numba import types
-    from numba.core.cgutils import ir
-    from numba.extending import intrinsic
-
-    def call(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        number = ir.DoubleType()
-        declared = builder.module.globals.get("pow") or ir.Function(
-            builder.module, ir.FunctionType(number, [number, number]), "pow"
-        )
-        declared.attributes.add("nobuiltin")
-        return builder.call(declared, arguments)
-
-    def power(_typing: Any, _base: Any, _exponent: Any) -> Any:
-        return types.float64(types.float64, types.float64), call
-
-    return intrinsic(power)
 
 
 @functools.cache
 def store() -> Store | None:
     """Return the cache for machine code, or None if no cache can be used.
 
-    It is in the platform's folder for caches, or in NUMBA_CACHE_DIR.
+    It is in the platform's folder for caches, or in GMS_FSM_CACHE.
 
     Returns
     -------
@@ -176,7 +157,7 @@ def store() -> Store | None:
     """
     from platformdirs import user_cache_path
 
-    given = os.environ.get("NUMBA_CACHE_DIR")
+    given = os.environ.get("GMS_FSM_CACHE")
     return Store.at((Path(given) if given else user_cache_path("gms-fsm")) / "machine-code")
 
 
@@ -189,25 +170,6 @@ def notify(text: str) -> None:
         What is being compiled, or how long that took.
     """
     print(f"gms-fsm: {text}", file=sys.stderr)
-
-
-def _compiled_signal(name: str, call: Callable[[float], float]) -> Any:
-    import numba
-
-    jit = numba.njit(
-        numba.types.float64(numba.types.float64), error_model="numpy", boundscheck=True
-    )
-    try:
-        return jit(getattr(call, "py_func", call))
-    except Exception as error:  # numba raises many kinds, including TypeError and its own
-        lines = (re.sub(r"\x1b\[\d*m", "", line).strip() for line in str(error).splitlines())
-        reason = next((u for u in lines if u and not u.startswith("Failed in nopython mode")), "")
-        raise SignalError(
-            f"numba cannot compile the function ({type(error).__name__}: {reason})",
-            place=f"signal {name!r}",
-            advice="use engine='machines', or give the signal as an expression in t or as "
-            "arrays (times, values)",
-        ) from None
 
 
 def observe_rows(
@@ -227,16 +189,37 @@ def observe_rows(
     ndarray, shape (rows, observed)
         Bit for bit the same as the readable engine.
     """
+    from integrators.machine_code.layout import Block
+
+    made, example = _observer(program)
+    block = Block(made.layout, example)
+    table = np.empty((t.size, program.layout.observed.size))
+    shared, own, tables = packed(program.p)
+    rows = block.contents._replace(
+        t=np.ascontiguousarray(t),
+        y=np.ascontiguousarray(y),
+        mode=np.ascontiguousarray(mode),
+        table=table,
+        p=(*block.contents.p[:2], tables),
+    )
+    rows.p[0][...], rows.p[1][...] = shared, own
+    block.update(rows)
+    made(block)
+    return table
+
+
+def _observer(program: Program) -> tuple[Any, Any]:
     from integrators import compiled
 
-    table = np.empty((t.size, program.layout.observed.size))
-    [observe] = machine_code(program, "observe")
-    compiled.for_each_row(
-        observe,
-        (np.ascontiguousarray(t), np.ascontiguousarray(y), np.ascontiguousarray(mode)),
-        np.array(program.live),
-        packed(program.p),
-        table,
-        store(),
-    )
-    return table
+    layout = program.layout
+    with _lock:
+        return compiled.observer(
+            _text(program),
+            functions(program)["observe"],
+            program.live,
+            packed(program.p),
+            (layout.y.size, layout.modes, layout.observed.size),
+            _calls(program),
+            store(),
+            notify,
+        )

@@ -9,10 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal, NamedTuple
 
-from gms_fsm.language import Binary, Name, Node, Value, spell
+from gms_fsm.language import Binary, Call, Name, Node, Value, spell
+from gms_fsm.language._tree import walk
 from gms_fsm.lowering._names import computed_names
 from gms_fsm.lowering._plan import Computed, Plan, RoughCall
 from gms_fsm.lowering.places import Places, total
+from gms_fsm.systems._assembly import of
 from integrators import LIVE
 
 __all__ = ["Line", "Signs", "Writer", "indented", "reads_of"]
@@ -20,14 +22,19 @@ __all__ = ["Line", "Signs", "Writer", "indented", "reads_of"]
 # Where a rough call takes its sign from: held ones, those seen now, or given ones, some of which
 # may be marked as live.
 Signs = Literal["held", "live", "given"]
+QUICK = ("abs", "min", "max", "sgn", "sqrt")  # functions that need no library
 TABLES = "the tables"  # what a signal that is a table reads
 
 
 class Line(NamedTuple):
-    """A line of text, and the names from the trees that it reads."""
+    """A line of text, and the names from the trees that it reads.
+
+    A lazy line stands for: compute this name here, unless it has been computed.
+    """
 
     text: str
     reads: frozenset[str] = frozenset()
+    lazy: str = ""
 
 
 def reads_of(lines: Iterable[Line]) -> frozenset[str]:
@@ -42,7 +49,7 @@ def _does_something(lines: Iterable[Line]) -> bool:
 
 def indented(lines: Iterable[Line]) -> list[Line]:
     """Return lines one level deeper."""
-    return [Line("    " + line.text, line.reads) for line in lines]
+    return [line._replace(text="    " + line.text) for line in lines]
 
 
 class Writer:
@@ -176,6 +183,8 @@ class Writer:
                 rows[state] = [
                     line for line in made if line.text.split(" =")[0] not in seen
                 ] + lines
+        if len(rows) > 1:
+            rows = {state: self.lazily(lines) for state, lines in rows.items()}
         body = [*before, *(self.by_state(bank, rows) if rows else []), *after]
         body = [*self.element(bank, first, signs), *body]
         if not body:
@@ -183,6 +192,29 @@ class Writer:
         text = f"for i in range({self.sizes[bank]}):"
         return self.outward(
             bank, [Line(text, frozenset({f"#{self.sizes[bank]}"})), *indented(body)]
+        )
+
+    def lazily(self, lines: list[Line]) -> list[Line]:
+        """Let what takes long be computed in these lines, which may not be reached."""
+        names = [
+            name
+            for name in self.read.defined
+            if name in self.closure(reads_of(lines)) and self.takes_long(name)
+        ]
+        if not names:
+            return lines
+        without = [line._replace(reads=line.reads - {*names}) for line in lines]
+        return [*(Line("", lazy=name) for name in names), *without]
+
+    def takes_long(self, name: str) -> bool:
+        """Return whether a shared quantity contains a function such as exp or a power."""
+        if name in self.late or name in self.read.owner or name not in self.plan.definitions:
+            return False
+        value = self.plan.definitions[name]
+        return not value.calls and any(
+            (isinstance(part, Call) and part.function not in QUICK)
+            or (isinstance(part, Binary) and part.op == "**")
+            for part in walk(value.tree)
         )
 
     def own(self, bank: int, reads: frozenset[str]) -> frozenset[str]:
@@ -203,7 +235,7 @@ class Writer:
             for name, owner in self.read.owner.items()
             if owner == bank and name not in self.read.own
         }
-        return [Line(line.text, line.reads - inside) for line in lines]
+        return [line._replace(reads=line.reads - inside) for line in lines]
 
     def by_state(self, bank: int, branches: Mapping[str, list[Line]]) -> list[Line]:
         """Write an if-else over the element's state."""
@@ -236,7 +268,20 @@ class Writer:
     # ------------------------------------------------------------------ functions
     def function(self, signature: str, doc: str, body: list[Line], signs: Signs) -> list[str]:
         """Assemble a function: signature, the values its body reads, then the body."""
-        lines = [*self.head(reads_of(body), signs), *body] or [Line("pass")]
+        at_once = self.closure(reads_of(body))
+        lazy = dict.fromkeys(line.lazy for line in body if line.lazy and line.lazy not in at_once)
+        found = {name: self.defined(name, signs) for name in lazy}
+        lines: list[Line] = []
+        for line in body:
+            if not line.lazy:
+                lines.append(line)
+            elif line.lazy in found:
+                name = self.local(line.lazy)
+                made = [Line(f"if {name} != {name}:"), *indented(found[line.lazy])]
+                lines += [each._replace(text=line.text + each.text) for each in made]
+        first = [Line(f"{self.local(name)} = nan  # computed where it is read") for name in lazy]
+        head = self.head(reads_of(lines) - {*lazy}, signs)
+        lines = [*head, *first, *lines] or [Line("pass")]
         return [f"def {signature}:", f'    """{doc}"""', *(f"    {line.text}" for line in lines)]
 
     def head(self, reads: frozenset[str], signs: Signs) -> list[Line]:
@@ -271,13 +316,30 @@ class Writer:
         target = self.local(name)
         value = self.plan.definitions.get(name)
         if value is not None:
-            note = "  # (2)" if name.endswith(".curve S") else ""
-            return self.computed(target, value, signs, note)
+            if not name.endswith(".curve S"):
+                return self.computed(target, value, signs)
+            return self.curve(name, value, signs)
         if (name, "times") in self.plan.tables.shared:
             return [
                 Line(f"{target} = piecewise_linear(t, {self.table(name)})", frozenset({TABLES}))
             ]
         return [Line(f"{target} = {name}_signal(t)")]
+
+    def curve(self, name: str, value: Computed, signs: Signs) -> list[Line]:
+        """Assign a Stribeck curve; where it is flat to the last bit, exp would be lost."""
+        contact = name.removesuffix("curve S")
+        (bank,) = [each for each in self.read.banks if of(each.name, "") == contact]
+        v, F_c, flat = bank.velocities[0], f"{contact}curve F_c", f"{contact}curve v flat"
+        *calls, line = self.computed(self.local(name), value, signs, "  # (2)")
+        test = f"if abs({self.local(v)}) > {self.local(flat)}:"
+        constant = Line(f"{self.local(name)} = {self.local(F_c)}", frozenset({F_c}))
+        return [
+            *calls,
+            Line(test, frozenset({v, flat})),
+            *indented([constant]),
+            Line("else:"),
+            *indented([line]),
+        ]
 
     def table(self, name: str) -> str:
         """Spell the corners of a signal: their times and values."""

@@ -104,7 +104,7 @@ def names_of(read: Assembly) -> Names:
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
     >>> names = names_of(assembled(system_of(model, Slider(1.0, "t"))))
     >>> [names.local[name] for name in (*names.shared, *names.own)]
-    ['F_c', 'F_s', 'v_s', 'v_dip', 'sigma_2', 'mass', 'v_c', 'weight', 'k', 'sigma', 'C']
+    ['F_c', 'F_s', 'v_s', 'v_dip', 'v_flat', 'sigma_2', 'mass', 'v_c', 'weight', 'k', 'sigma', 'C']
     """
     system, choice = read.system, _Choice(len(read.banks) == 1)
     choice.taken |= {*sizes_of(read.banks), *_names_of_locks(read)}
@@ -163,7 +163,12 @@ def _names_of_locks(read: Assembly) -> set[str]:
     return names | {f"L_{r}_{s}" for r in rows for s in rows} | {"hit"}
 
 
-_SHORT = {"curve S": "S", "curve v dip": "v_dip", "threshold weight": "weight"}
+_SHORT = {
+    "curve S": "S",
+    "curve v dip": "v_dip",
+    "curve v flat": "v_flat",
+    "threshold weight": "weight",
+}
 
 
 def _short(name: str) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from gms_fsm.charts.chart import SUPPLIED
 from gms_fsm.language import (
+    Binary,
     Comparison,
     Name,
     Negative,
@@ -486,10 +487,18 @@ class _Printer(Forces):
             simple = isinstance(comparison.right, Name | Number | Negative)
             margin = f"{margin} - {right if simple else f'({right})'}"
             reads |= computed_names(comparison.right)
-        return [
-            Line(f"if watch[{index}]:", sizes),
-            Line(f"    out[{index}] = {margin}", sizes | reads),
-        ]
+        inner = [Line(f"out[{index}] = {margin}", sizes | reads)]
+        bank = self.read.bank_of(Binary("-", comparison.left, comparison.right))
+        if bank is not None:  # what takes long, and what is computed from it
+            own = self.own(bank, reads)
+            inside = frozenset(
+                name for name in own if any(map(self.takes_long, self.closure(frozenset({name}))))
+            )
+            made = self.element(bank, inside, "live")
+            seen = {self.local(name) for name in self.closure(inside) & (own - inside)}
+            inner = [line for line in made if line.text.split(" =")[0] not in seen] + inner
+            inner = [line._replace(reads=line.reads - inside) for line in inner]
+        return [Line(f"if watch[{index}]:", sizes), *indented(self.lazily(inner))]
 
     def values(self) -> list[str]:
         shown, late = self.layout.shown, []

@@ -227,7 +227,7 @@ def _lowered(shape: _Shape) -> Program:
         "piecewise_slope": piecewise_slope,
         "nan": math.nan,
     }
-    names |= {f"{name}_signal": _guarded(name, call) for name, call in callables.items()}
+    names |= {f"{name}_signal": guarded(name, call) for name, call in callables.items()}
     namespace, careful = load(plan.title, source, names), load_careful(plan.title, source, names)
     return Program(
         source=source,
@@ -304,7 +304,28 @@ def equations(program: Program) -> integrators.Equations:
     )
 
 
-def _guarded(name: str, call: Callable[[float], float]) -> Callable[[float], float]:
+def guarded(name: str, call: Callable[[float], float]) -> Callable[[float], float]:
+    """Return a signal's function with errors that name the signal.
+
+    Parameters
+    ----------
+    name : str
+        Of the signal.
+    call : callable
+        The user's function of time.
+
+    Returns
+    -------
+    callable
+        Raises `SignalError` where the function raises an exception or returns no number.
+
+    Examples
+    --------
+    >>> guarded("v", lambda t: 1 / t)(0.0)
+    Traceback (most recent call last):
+    gms_fsm.errors.SignalError: signal 'v': the function raised ZeroDivisionError at t = 0.0 s: ...
+    """
+
     def sampled(t: float) -> float:
         try:
             return float(call(t))

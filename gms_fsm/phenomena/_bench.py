@@ -164,7 +164,7 @@ def fastest_engine() -> str:
     str
         ``"compiled"``, or ``"ifelse"`` without the extra ``fast``. The results are the same.
     """
-    return "compiled" if importlib.util.find_spec("numba") else "ifelse"
+    return "compiled" if importlib.util.find_spec("llvmlite") else "ifelse"
 
 
 def run(

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gms_fsm.errors import SignalError
 from gms_fsm.lowering import _compiled as compiled
 from gms_fsm.lowering.log_columns import LOG_NUMBERS, LOG_TEXTS, LogRecord
 from gms_fsm.lowering.program import equations
@@ -28,13 +29,18 @@ from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
 from integrators import hybrid, loop
-from integrators.advance import ROW, STEPS
+from integrators.advance import ROW, STEPS, Plan
 from integrators.columns import FIRINGS, STOPS, Log, Recorded
+from integrators.machine_code.layout import Block
 from integrators.sliding import Functions
 from integrators.steps import T
 
+if TYPE_CHECKING:
+    from integrators.compiled import Engine, Run
+
 __all__ = ["CompiledRun"]
 
+MOST_ENGINES = 256
 STEPS_AT_ONCE = 20_000  # between two checks for Ctrl-C and two calls of progress
 
 
@@ -51,10 +57,6 @@ class CompiledRun:
 
     def __init__(self, start: Start, machines: MachineEngine | None = None) -> None:
         self.start = start
-        program = start.program
-        flow = "flow" if start.options.located else "flow_live"
-        names = (flow, "arm", "margins", "normal", "switch", "act", "tick", "observe")
-        self.code = compiled.machine_code(program, *names)
         self.columns = Columns(start)
         self.recorder: Recording = self.columns
         self.engine = machines
@@ -103,30 +105,19 @@ class CompiledRun:
         SimulationError
             If it cannot continue.
         """
-        from integrators.compiled import record
-
         columns = self.columns
         columns.make_room()
         b, start, before = columns.buffers, columns.start, columns.latest
         try:
-            flow, arm, margins, normal, *machines = self.code
-            functions = Functions(flow, arm, margins, normal, columns.p)
-            switch, pause = loop.Machines(*machines), self.engine is not None
-            event = record(
-                (functions, switch, b, columns.log, columns.recorded, STEPS_AT_ONCE, pause),
-                compiled.store(),
-                compiled.notify,
-            )
-        except Exception as error:
-            if not start.program.callables:
-                raise
+            event = columns.run(STEPS_AT_ONCE, pause=self.engine is not None)
+        except SignalError as error:
             columns.interrupted(before)
-            names = " or ".join(map(repr, start.program.callables))
             raise SimulationError(
-                f"the function raised {type(error).__name__}: {error}",
-                columns.trace(),
-                place=f"signal {names}",
-            ) from error
+                error.reason, columns.trace(), place=error.place, advice=error.advice
+            ) from None
+        except KeyboardInterrupt:  # in a Python function
+            columns.interrupted(before)
+            raise
         if event == loop.DONE:
             check_end(columns)
             return False
@@ -165,29 +156,39 @@ class Columns:
     """
 
     def __init__(self, start: Start, p: compiled.Packed | None = None) -> None:
-        from integrators.compiled import arrays
-
         self.start = start
-        self.p = compiled.packed(start.program.p) if p is None else p
-        layout, options = start.program.layout, start.options
+        layout = start.program.layout
         size, modes = layout.y.size, layout.modes
-        made = equations(start.program)
-        b = arrays(hybrid.buffers(made, start.t_start, start.y, start.mode, start.last, options, 0))
+        given = compiled.packed(start.program.p) if p is None else p
+        self.engine, example, plan = _engine(start, given)
+        self.block = Block(self.engine.layout, example)
+        self.run_of: Run = self.block.contents
+        self.p = given
         few = max(16, min(1024, 4_000_000 // size))  # initial number of rows
         rows = {"all": few, "t_eval": len(start.options.times or ()), "end": 0}[start.output]
         stops = few if start.output == "t_eval" else 0
         floats: Any = np.empty  # the columns' fields are typed as lists; compiled code uses arrays
         ints: Any = functools.partial(np.zeros, dtype=np.int64)
-        out = b.out._replace(rows_t=floats(rows), rows_y=floats((rows, size)))
-        self.buffers: hybrid.Buffers = b._replace(out=out)
-        ints_of: Any = functools.partial(np.array, dtype=np.int64)
-        self.log = Log(
-            counts=ints(2),
+        numbers: Any = functools.partial(np.array, dtype=np.float64)
+        b = self.run_of.buffers
+        self.buffers: hybrid.Buffers = b._replace(
+            plan=b.plan._replace(
+                jumps=numbers(plan.jumps),
+                before_jumps=numbers(plan.before_jumps),
+                ticks=_integers(plan.ticks),
+                knots=numbers(plan.knots),
+            ),
+            out=b.out._replace(
+                times=numbers(start.options.times or ()),
+                rows_t=floats(rows),
+                rows_y=floats((rows, size)),
+            ),
+        )
+        self.log: Log = self.run_of.log._replace(
             t=floats(256),
             machine=ints(256),
             edge=ints(256),
             numbers=floats((256, len(LOG_NUMBERS))),
-            seen=floats(layout.observed.size),
             rows_microstep=ints(rows),
             rows_mode=ints((rows, modes)),
             stops_t=floats(stops),
@@ -195,11 +196,25 @@ class Columns:
             stops_y=floats((stops, size)),
             stops_mode=ints((stops, modes)),
         )
-        self.recorded = Recorded(*(ints_of(each) for each in layout.recorded))
         if stops:
             self.log.stops_t[0], self.log.stops_y[0] = start.t_start, self.buffers.now.y
             self.log.stops_mode[0] = list(layout.not_sliding(start.mode))
             self.log.counts[STOPS] = 1
+
+    def run(self, most_steps: int, *, pause: bool) -> int:
+        """Run the machine code; see `integrators.columns.record`."""
+        functions = self.run_of.functions
+        places: Any = functions.p
+        shared, own, tables = self.p
+        places[0][...], places[1][...] = shared, own
+        self.block.update(
+            self.run_of._replace(
+                functions=functions._replace(p=(*places[:2], tables)),
+                buffers=self.buffers,
+                log=self.log,
+            )
+        )
+        return self.engine(self.block, most_steps, pause)
 
     def reset(self, model: Model, rig: Rig) -> None:
         """Empty the columns and return to the start, with the numbers of a model and a rig."""
@@ -238,7 +253,10 @@ class Columns:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Restore what `state` returned."""
-        self.log = Log(**{name: state[name] for name in self.log._fields})
+        for name in ("counts", "seen"):  # places in the block
+            getattr(self.log, name)[...] = state[name]
+        columns = {n: state[n] for n in self.log._fields if n not in ("counts", "seen")}
+        self.log = self.log._replace(**columns)
         out = self.buffers.out._replace(rows_t=state["rows_t"], rows_y=state["rows_y"])
         self.buffers = self.buffers._replace(out=out)
 
@@ -346,6 +364,41 @@ class Columns:
                 log.stops_mode,
             )
         return start.trace(rows, stops, self.transitions())
+
+
+_engines: dict[Any, tuple[Engine, Any]] = {}
+
+
+def _engine(start: Start, p: compiled.Packed) -> tuple[Engine, Run, Plan]:
+    """Return the machine code of a run, an example of its arguments, and its plan."""
+    from integrators.compiled import example
+
+    program, layout = start.program, start.program.layout
+    flow = "flow" if start.options.located else "flow_live"
+    made = compiled.functions(program)
+    b = hybrid.buffers(
+        equations(program), start.t_start, start.y, start.mode, start.last, start.options, 0
+    )
+    places: Any = p
+    run = example(
+        Functions(made[flow], made["arm"], made["margins"], made["normal"], places),
+        loop.Machines(made["switch"], made["act"], made["tick"], made["observe"]),
+        b,
+        layout.observed.size,
+        Recorded(*map(_integers, layout.recorded)),
+        layout.modes,
+    )
+    key = id(program.functions), flow, start.options.method
+    found = _engines.get(key)
+    if found is None:
+        if len(_engines) >= MOST_ENGINES:
+            _engines.clear()
+        found = _engines[key] = compiled.engine(program, run), program.functions
+    return found[0], run, b.plan
+
+
+def _integers(numbers: Any) -> Any:
+    return np.array(numbers, dtype=np.int64)
 
 
 def _doubled(column: Any) -> Any:

@@ -50,7 +50,8 @@ def identity(call: Any) -> str:
     Parameters
     ----------
     call : callable
-        A Python function, a `functools.partial` of one, or one compiled by numba.
+        A Python function, a `functools.partial` of one, or one wrapped by a compiler that
+        keeps it as ``py_func``.
 
     Returns
     -------
@@ -122,7 +123,7 @@ def _parts(value: Any, inside: tuple[int, ...]) -> Iterator[bytes]:
     elif isinstance(value, CodeType):
         yield repr([getattr(value, name) for name in _CODE]).encode()
         yield from _parts(value.co_consts, inside)
-    elif isinstance(getattr(value, "py_func", None), FunctionType):  # compiled by numba
+    elif isinstance(getattr(value, "py_func", None), FunctionType):  # wrapped by a compiler
         yield from _parts(value.py_func, inside)
     else:
         raise _unknown(value)

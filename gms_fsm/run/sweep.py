@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from gms_fsm._arguments import checked_kind
 from gms_fsm.charts.parameters import WEIGHTS, FloatArray
 from gms_fsm.errors import GMSError, ParameterError, cut
-from gms_fsm.lowering._compiled import check_numba
+from gms_fsm.lowering._compiled import check_llvmlite
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
 from gms_fsm.run._compiled_run import CompiledRun
 from gms_fsm.run._moment import scope_of
@@ -106,7 +106,7 @@ def sweep(
     what, end, given = _arguments(model, rig, t_end, parameters)
     begin = _Common(end, t_start, initial, _chosen(settings, options))
     if begin.settings.engine == "compiled":
-        check_numba()
+        check_llvmlite()
     begin.start(what)  # errors common to all runs are raised once, here
     values = _values(what, given)
     runs = len(next(iter(values.values())))

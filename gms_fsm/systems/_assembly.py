@@ -368,7 +368,7 @@ class Reader:
         if model is None:
             return
         if (curve := model.stribeck) is not None:
-            for name, value in {**curve.numbers, "v dip": curve.dip}.items():
+            for name, value in {**curve.numbers, "v dip": curve.dip, "v flat": curve.flat}.items():
                 self.shared[of(contact.name, f"curve {name}")] = value
         self.shared[of(contact.name, "model sigma_2")] = model.sigma_2
 

@@ -33,7 +33,10 @@ def observed_rows(program: Program, rows: Rows, *, compiled: bool) -> FloatArray
         At the places of ``program.layout.observed``.
     """
     if compiled:
-        table = observe_rows(program, rows.t, rows.y, rows.mode)
+        try:
+            table = observe_rows(program, rows.t, rows.y, rows.mode)
+        except SignalError:  # a Python function failed at some row
+            return observed_rows(program, rows, compiled=False)
         slid = np.flatnonzero(rows.mode[:, program.layout.slides].any(axis=1))
         table[slid] = _one_by_one(program, rows.at(slid))
     else:

@@ -13,7 +13,7 @@ import pytest
 
 from tests.helpers import ROOT
 
-HEAVY = {"numpy", "scipy", "transitions", "matplotlib", "pydantic", "graphviz", "numba", "plots"}
+HEAVY = {"numpy", "scipy", "transitions", "matplotlib", "pydantic", "graphviz", "llvmlite", "plots"}
 CODE = """
 import contextlib, io, json, sys
 sys.argv[1:] = json.loads(sys.argv[1])

@@ -109,7 +109,7 @@ def test_a_sweep_over_its_own_f_c(model: ChartModel, tmp_path: Path) -> None:
 @pytest.mark.parametrize("engine", ["ifelse", "compiled"])
 def test_engines_agree(model: ChartModel, trace: Trace, engine: str) -> None:
     if engine == "compiled":
-        pytest.importorskip("numba")
+        pytest.importorskip("llvmlite")
     other = simulate(model, RIG, 5.0, engine=engine)
     same_bits(other, trace)
     assert len(trace.transitions) == 20

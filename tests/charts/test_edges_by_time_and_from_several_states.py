@@ -32,7 +32,7 @@ def lamp(T: float = 0.3) -> ChartModel:
 @pytest.mark.parametrize("engine", ["ifelse", "machines", "compiled"])
 def test_ages_are_met_exactly(engine: str) -> None:
     if engine == "compiled":
-        pytest.importorskip("numba")
+        pytest.importorskip("llvmlite")
     trace = simulate(lamp(), Prescribed("0"), 5.0, engine=engine)
     log = trace.transitions
     wanted = np.cumsum([0.3, 0.0, 0.6] * 6)[: len(log)]

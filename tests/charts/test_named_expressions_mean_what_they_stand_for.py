@@ -65,7 +65,7 @@ def test_a_gms_bank_in_words_is_the_gms_model() -> None:
 @pytest.mark.parametrize("engine", ENGINES[1:])
 def test_engines_agree_bit_for_bit(engine: str) -> None:
     if engine == "compiled":
-        pytest.importorskip("numba")
+        pytest.importorskip("llvmlite")
     one, other = (simulate(as_a_system(), 20.0, engine=each) for each in ("ifelse", engine))
     np.testing.assert_array_equal(one.rows.y, other.rows.y)
     np.testing.assert_array_equal(one.F_elements, other.F_elements)

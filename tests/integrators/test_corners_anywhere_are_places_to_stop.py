@@ -41,7 +41,7 @@ class Buffer:
 
 def needs(engine):
     if engine == "compiled":
-        pytest.importorskip("numba", reason="needs the extra fast")
+        pytest.importorskip("llvmlite", reason="needs the extra fast")
     return engine
 
 

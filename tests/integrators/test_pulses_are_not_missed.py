@@ -32,7 +32,7 @@ SPRING = ChartModel(
 @pytest.mark.parametrize("place", [0.137, 0.5, 0.9123])
 def test_the_pulse_is_found_wherever_it_is(share, place, engine):
     if engine == "compiled":
-        pytest.importorskip("numba", reason="needs the extra fast")
+        pytest.importorskip("llvmlite", reason="needs the extra fast")
     t_end, push = 100.0, 1.0
     width = share * t_end / 4.0
     text = f"{push / width} * exp(-((t - {place * t_end}) / {width})**2)"

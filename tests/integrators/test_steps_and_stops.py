@@ -11,7 +11,7 @@ import pytest
 from integrators import advance as kernel
 from integrators.hybrid import Buffers, Equations, Options, buffers
 from integrators.sliding import Surfaces
-from integrators.step_size import next_factor
+from integrators.step_size import LEAST_ROOT, memory_of, next_factor, root_of
 from integrators.steps import ERROR_BEFORE, T_STOP, H, Motion, T
 from integrators.tableaux import DP45, RK4
 
@@ -136,18 +136,30 @@ def test_a_narrowly_accepted_step_is_followed_by_a_shorter_one() -> None:
     for i in range(60):
         h = 0.04 + 0.001 * i
         run = _Run(lambda t, y: math.cos(40.0 * t))
-        _, t, h_next, error = run.to(10.0, h=h, steps=1)
-        assert error <= 1.0
-        if t == h and error > 0.8:
+        _, t, h_next, memory = run.to(10.0, h=h, steps=1)
+        assert memory <= 1.0
+        root = memory * memory  # of the error
+        if t == h and root > 0.97:
             narrow += 1
-            assert h_next == h * next_factor(error, 1.0, 5) < h
+            assert h_next == pytest.approx(h * next_factor(root, 1.0), rel=1e-14)
+            assert h_next < h
     assert narrow >= 1
 
 
-def test_the_remembered_error_is_that_of_the_last_step_but_never_vanishes() -> None:
-    assert _Run().to(1.0, steps=1)[3] == 1e-4
+def test_the_controller_remembers_the_last_error_but_never_that_there_was_none() -> None:
+    none = _Run().to(1.0, steps=1)[3]
+    assert none == memory_of(root_of(0.0, 5)) == math.sqrt(LEAST_ROOT)
     run = _Run(lambda t, y: math.cos(40.0 * t))
-    assert 1e-4 < run.to(10.0, h=0.04, steps=1)[3] <= 1.0
+    assert none < run.to(10.0, h=0.04, steps=1)[3] <= 1.0
+
+
+@pytest.mark.parametrize("order", [3, 5])
+def test_the_controller_computes_nearly_the_usual_powers_of_the_error(order: int) -> None:
+    for error in (1e-6, 0.01, 1.0):
+        for before in (0.01, 1.0):
+            usual = 0.9 * error ** (-0.7 / order) * before ** (0.35 / order)
+            factor = next_factor(root_of(error, order), memory_of(root_of(before, order)))
+            assert factor == pytest.approx(min(10.0, usual), rel=0.35)
 
 
 def test_it_returns_when_the_steps_or_the_rows_are_used_up() -> None:

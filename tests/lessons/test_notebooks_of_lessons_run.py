@@ -48,7 +48,7 @@ def test_those_in_the_repository_are_in_step(notebooks: ModuleType) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NOTEBOOKS)
 def test_it_runs_from_top_to_bottom(name: str, notebooks: ModuleType, tmp_path: Path) -> None:
-    for module in ("matplotlib", "numba", "pygraphviz", "uplot"):
+    for module in ("matplotlib", "llvmlite", "pygraphviz", "uplot"):
         pytest.importorskip(module, reason="a lesson uses the extra 'all'")
     text = (FOLDER / f"{name}.ipynb").read_text(encoding="utf-8")
     done = notebooks.executed(text, tmp_path, f"{FIRST}\n{notebooks.STRICT}")

@@ -31,7 +31,7 @@ FLOWS = {
 @pytest.mark.parametrize("name", FLOWS)
 def test_the_flow_is_what_its_text_says(name: str, engine: str) -> None:
     if engine == "compiled":
-        pytest.importorskip("numba", reason="needs the extra fast")
+        pytest.importorskip("llvmlite", reason="needs the extra fast")
     text, exact = FLOWS[name]
     chart = Chart(
         name="integral",

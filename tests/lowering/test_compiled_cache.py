@@ -1,9 +1,9 @@
 """Machine code is cached on disk, and damage to the cache costs time and nothing else.
 
 Another process does not compile again; two may start at the same time; an unwritable folder or a
-damaged file is tolerated, down to a single wrong bit; changed source has another name; programs
-compiled in different processes are never confused. Without numba, the message says what to
-install, and the machines run.
+damaged file is tolerated, down to a single wrong bit. The name of a file depends on all that the
+code depends on; programs compiled in different processes are never confused. Without llvmlite, the
+message says what to install, and the machines run.
 """
 
 from __future__ import annotations
@@ -13,28 +13,32 @@ import random
 import subprocess
 import sys
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from gms_fsm import Prescribed, simulate
+from gms_fsm import ChartModel, Prescribed, simulate
 from gms_fsm.lowering import _compiled as compiled
 from gms_fsm.lowering._store import Store
 from gms_fsm.lowering.program import lower
+from gms_fsm.run import _compiled_run
 from integrators import columns, loop, step_size
 from integrators import compiled as machine
-from tests.helpers import ROOT, open_loop, stick_slip
+from integrators.machine_code import statements
+from integrators.machine_code.layout import Layout
+from tests.helpers import CURVE, ROOT, open_loop, stick_slip
 
 pytestmark = pytest.mark.slow
 
-numba = pytest.importorskip("numba", reason="needs the extra fast")
+pytest.importorskip("llvmlite", reason="needs the extra fast")
 
-NOTE = "gms-fsm: compiling the engine, once on this machine"
+OPEN_LOOP = Prescribed("0.2*sin(2*pi*t/20)")
+NOTE = "gms-fsm: compiling, once for each chart and method"
 
-# A whole run, by both engines. On a new machine this takes some 10 s, most of it for the loop.
+# A whole run, by both engines. With an empty cache this takes some 4 s.
 RUN = """
     from gms_fsm import GMS, GMSParameters, Prescribed, simulate
     model = GMS(GMSParameters.paper("stick-slip"), law="signed")
@@ -70,7 +74,7 @@ def _start(code: str, *arguments: str, **environment: str) -> subprocess.Popen[s
     return subprocess.Popen(
         [sys.executable, "-W", "error", "-c", textwrap.dedent(code), *arguments],
         cwd=ROOT,
-        env={**os.environ, "NUMBA_OPT": "0", **environment},  # halves the compilation time
+        env={**os.environ, **environment},
         text=True,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -85,7 +89,7 @@ def _ended(process: subprocess.Popen[str]) -> tuple[str, str]:
 
 
 def _rows(folder: Path, *velocities: str) -> str:
-    out, err = _ended(_start(ROWS, *velocities, NUMBA_CACHE_DIR=str(folder)))
+    out, err = _ended(_start(ROWS, *velocities, GMS_FSM_CACHE=str(folder)))
     assert out == "equal\n"
     return err
 
@@ -99,7 +103,7 @@ def _kept(folder: Path) -> set[Path]:
 def warm(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A new cache folder after a first run, and what that run wrote to standard error."""
     folder = tmp_path_factory.mktemp("cache")
-    out, err = _ended(_start(RUN, NUMBA_CACHE_DIR=str(folder)))
+    out, err = _ended(_start(RUN, GMS_FSM_CACHE=str(folder)))
     assert out == "equal 24\n"
     return folder, err
 
@@ -107,11 +111,11 @@ def warm(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 def test_the_first_process_compiles_and_says_so(warm: tuple[Path, str]) -> None:
     folder, said = warm
     assert NOTE in said, "the wait is explained"
-    assert len([path for path in _kept(folder) if path.match("record-*")]) == 1
+    assert sorted(path.name.partition("-")[0] for path in _kept(folder)) == ["each_row", "record"]
 
 
 def test_two_processes_that_start_at_once_both_succeed(tmp_path: Path) -> None:
-    started = [_start(ROWS, "0.1*t", NUMBA_CACHE_DIR=str(tmp_path)) for _ in range(2)]
+    started = [_start(ROWS, "0.1*t", GMS_FSM_CACHE=str(tmp_path)) for _ in range(2)]
     assert [_ended(process)[0] for process in started] == ["equal\n"] * 2
     assert not list(tmp_path.rglob(".*")), "no half files are left"
 
@@ -119,22 +123,20 @@ def test_two_processes_that_start_at_once_both_succeed(tmp_path: Path) -> None:
 def test_the_next_process_does_not_compile_again(warm: tuple[Path, str]) -> None:
     folder, _ = warm
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
-    assert _ended(_start(RUN, NUMBA_CACHE_DIR=str(folder))) == ("equal 24\n", "")
+    assert _ended(_start(RUN, GMS_FSM_CACHE=str(folder))) == ("equal 24\n", "")
     after = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
     assert after == before
 
 
 def test_a_damaged_cache_only_costs_time(warm: tuple[Path, str]) -> None:
-    """Every file of it is garbage, or truncated. The loop is not compiled again (10 s)."""
+    """Every file of it is garbage, or truncated."""
     folder, _ = warm
     for turn, path in enumerate(sorted(_kept(folder))):
         content = path.read_bytes()
         path.write_bytes(b"garbage" * 9 if turn % 2 else content[: len(content) // 2])
-        if path.match("record-*"):
-            assert Store(path.parent).get(path.name) is None
-            path.write_bytes(content)
-    out, err = _ended(_start(RUN, NUMBA_CACHE_DIR=str(folder)))
+    out, err = _ended(_start(RUN, GMS_FSM_CACHE=str(folder)))
     assert out == "equal 24\n"
+    assert err.count(NOTE) == 2
     assert "Traceback" not in err
 
 
@@ -143,39 +145,33 @@ def test_a_wrong_bit_anywhere_is_detected_before_the_code_is_loaded(warm: tuple[
     folder, source = warm[0], random.Random(14)
     whole = _kept(folder)
     for _ in range(3):
-        small = [path for path in whole if not path.match("record-*")]  # that one takes 10 s
-        for path in small:
+        for path in whole:
             _flip(path, source)
-        assert _ended(_start(RUN, NUMBA_CACHE_DIR=str(folder))) == ("equal 24\n", "")
-        assert _kept(folder) == set(whole)
+        out, err = _ended(_start(RUN, GMS_FSM_CACHE=str(folder)))
+        assert (out, err.count(NOTE)) == ("equal 24\n", 2)
+        assert _kept(folder) == whole
         assert all(Store(path.parent).get(path.name) for path in whole), "all are recreated"
 
 
 # --------------------------------------------------------------------------- damage of every kind
-def _forget_all() -> None:
-    for cached in (compiled._machine_code, compiled._loaded):
-        cached.cache_clear()
-
-
 @pytest.fixture
-def observe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], Any]]:
-    """Return a function that compiles and tries one function, as a new process would."""
+def observe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], bool]:
+    """Return a function that uses one function of a program, and says whether it was compiled."""
+    said: list[str] = []
     monkeypatch.setattr(compiled, "store", lambda: Store.at(tmp_path))
+    monkeypatch.setattr(compiled, "notify", said.append)
     program = lower(stick_slip("signed"), Prescribed("0.1*t"))
     y, mode = [0.1, 0.2, 0.3, 0.2, 0.1], [0, 1, 0, 1]
     wanted = [0.0] * 14
     program.ieee["observe"](2.0, y, mode, program.live, program.p, wanted)
 
-    def once() -> Any:
-        _forget_all()
-        [code], found = compiled.machine_code(program, "observe"), np.zeros(14)
-        live = np.array(program.live)
-        code(2.0, np.array(y), np.array(mode), live, compiled.packed(program.p), found)
-        assert found.tolist() == wanted
-        return code
+    def once() -> bool:
+        said.clear()
+        rows = np.array([2.0]), np.array([y]), np.array([mode])
+        assert compiled.observe_rows(program, *rows).tolist() == [wanted]
+        return bool(said)
 
-    yield once
-    _forget_all()
+    return once
 
 
 def _flip(path: Path, source: random.Random) -> None:
@@ -214,27 +210,22 @@ def _another_name(path: Path) -> None:
     (path.parent / "other").unlink()
 
 
-def _unreadable(path: Path) -> None:
-    """A complete file whose content has another meaning."""
-    Store(path.parent).put(path.name, b"something else")
-
-
-DAMAGES = [_flipped, _truncated, _empty, _garbage, _another_name, _unreadable]
+DAMAGES = [_flipped, _truncated, _empty, _garbage, _another_name]
 
 
 @pytest.mark.parametrize("damage", [*DAMAGES, _another_kind])
 def test_a_damaged_file_is_tolerated(
-    damage: Callable[[Path], None], observe: Callable[[], Any], tmp_path: Path
+    damage: Callable[[Path], None], observe: Callable[[], bool], tmp_path: Path
 ) -> None:
-    observe()
+    assert observe()
     (path,) = _kept(tmp_path)
     damage(path)
-    assert not observe().stats.cache_hits
+    assert observe()
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_a_damaged_cache_is_rebuilt(
-    damage: Callable[[Path], None], observe: Callable[[], Any], tmp_path: Path
+    damage: Callable[[Path], None], observe: Callable[[], bool], tmp_path: Path
 ) -> None:
     """It costs the time once, not each time."""
     observe()
@@ -242,7 +233,7 @@ def test_a_damaged_cache_is_rebuilt(
     damage(path)
     observe()
     assert _kept(tmp_path) == {path}
-    assert observe().stats.cache_hits
+    assert not observe()
 
 
 def test_a_folder_that_cannot_be_written_only_costs_time(tmp_path: Path) -> None:
@@ -268,25 +259,32 @@ def test_programs_compiled_in_different_processes_are_not_confused(tmp_path: Pat
 
 def test_the_names_are_the_same_in_every_process(tmp_path: Path) -> None:
     for seed in ("0", "1", "random"):
-        out, _ = _ended(_start(ROWS, "0.1*t", NUMBA_CACHE_DIR=str(tmp_path), PYTHONHASHSEED=seed))
+        out, _ = _ended(_start(ROWS, "0.1*t", GMS_FSM_CACHE=str(tmp_path), PYTHONHASHSEED=seed))
         assert out == "equal\n"
-    assert len(_kept(tmp_path)) == 2  # the program's observe, and its caller for each row
+    assert len(_kept(tmp_path)) == 1
 
 
 # --------------------------------------------------------------------------- changed source
-def _other(a: Any, b: Any) -> Any:
-    return a - b
+def _of(module: str) -> Any:
+    """Return a function as if it had been written in a module."""
+
+    def other(a: Any, b: Any) -> Any:
+        return a - b
+
+    other.__module__ = module
+    return other
+
+
+_other_norm, _other_loop = _of(step_size.__name__), _of(columns.__name__)
+_other_key, _other_body = _of(Layout.__module__), _of(statements.__name__)
 
 
 def _changes(patch: pytest.MonkeyPatch) -> dict[str, Callable[[], None]]:
     return {
-        "an inlined function": lambda: patch.setattr(
-            machine, "_INLINED", (*machine._INLINED[:-1], _other)
-        ),
-        "a function of an arc": lambda: patch.setattr(
-            machine, "_OF_AN_ARC", (*machine._OF_AN_ARC[1:], _other)
-        ),
-        "the loop": lambda: patch.setattr(columns, "record", _other),
+        "a function of a step": lambda: patch.setattr(step_size, "error_norm", _other_norm),
+        "the loop": lambda: patch.setattr(columns, "record", _other_loop),
+        "a method of the front end": lambda: patch.setattr(Layout, "key", _other_key),
+        "how a statement is translated": lambda: patch.setattr(statements, "body", _other_body),
         "a number": lambda: patch.setattr(step_size, "SAFETY", 0.8),
         "a limit": lambda: patch.setattr(loop, "MOST_SWITCHES", 99),
         "Python": lambda: patch.setattr(sys, "version", "4.0"),
@@ -294,6 +292,7 @@ def _changes(patch: pytest.MonkeyPatch) -> dict[str, Callable[[], None]]:
 
 
 def test_changed_source_changes_the_edition() -> None:
+    machine.edition.cache_clear()
     usual = machine.edition()
     found = {"nothing": usual}
     with pytest.MonkeyPatch.context() as patch:
@@ -301,35 +300,64 @@ def test_changed_source_changes_the_edition() -> None:
     for name in names:
         with pytest.MonkeyPatch.context() as patch:
             _changes(patch)[name]()
+            machine.edition.cache_clear()
             found[name] = machine.edition()
     assert len(set(found.values())) == len(found), found
+    machine.edition.cache_clear()
     assert machine.edition() == usual
 
 
-def test_another_edition_signature_option_or_numba_changes_the_name(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    from numba.core.registry import cpu_target
+class _Names:
+    """A store that knows nothing, keeps nothing, and remembers the name that it was asked for."""
 
-    def name(signature: Any = "iifVIP", function: Any = _other) -> str:
-        return machine._VerifiedCache(function, None, machine._silent)._name(
-            signature, cpu_target.target_context
-        )
+    def __init__(self) -> None:
+        self.asked: list[str] = []
 
-    def sum_of(a: Any, b: Any) -> Any:
-        return a + b
+    def get(self, name: str) -> bytes | None:
+        self.asked.append(name)
+        raise LookupError
 
-    found = [name(), name("fiiVIP"), name(function=sum_of)]
-    for place, attribute, value in (
-        (machine, "edition", lambda: "another"),
-        (machine, "_OPTIONS", {"error_model": "python"}),
-        (numba, "__version__", "0.0"),
-    ):
+    def put(self, name: str, content: bytes) -> None:
+        raise AssertionError
+
+
+def _name(rig: Prescribed = OPEN_LOOP, elements: int = 4, **options: Any) -> str:
+    """Return the name of the machine code of a run."""
+    store = _Names()
+    values = {name: np.ravel(value)[0] for name, value in stick_slip("signed").values.items()}
+    model = ChartModel(stick_slip("signed").chart, values, n=elements, stribeck=CURVE)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(compiled, "store", lambda: store)
+        patch.setattr(_compiled_run, "_engines", {})
+        with pytest.raises(LookupError):
+            simulate(model, rig, 1.0, engine="compiled", **options)
+    return store.asked[0]
+
+
+def test_the_name_depends_on_all_that_the_code_depends_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = {
+        "usual": _name(),
+        "another text": _name(Prescribed("0.2*t")),
+        "another flow is called": _name(events="step", method="rk4", step=0.1),
+        "other coefficients": _name(method="heun", step=0.1),
+        "another layout": _name(elements=5),
+        "lengths that are variables": _name(elements=200),
+    }
+    for place, attribute in ((machine, "edition"), (machine, "target_name")):
         with monkeypatch.context() as patch:
-            patch.setattr(place, attribute, value)
-            found.append(name())
-    assert len(set(found)) == len(found)
-    assert name() == found[0]
+            patch.setattr(place, attribute, lambda: "another")
+            names[attribute] = _name()
+    with monkeypatch.context() as patch:
+        patch.setattr(compiled, "piecewise_linear", _other_loop)
+        names["a function that the text may call"] = _name()
+    assert len(set(names.values())) == len(names), names
+    assert _name() == names["usual"]
+
+
+def test_one_code_serves_all_numbers() -> None:
+    assert _name(t_eval=[0.1, 0.2]) == _name()
+    assert _name(rtol=1e-4, max_step=0.1) == _name()
+    assert _name(elements=300) == _name(elements=200)
 
 
 def test_a_digest_depends_on_code_and_constants_but_not_on_the_file() -> None:
@@ -354,41 +382,35 @@ def test_a_digest_depends_on_code_and_constants_but_not_on_the_file() -> None:
 
 
 # --------------------------------------------------------------------------- several threads
-def test_compiling_leaves_numbas_settings_unchanged() -> None:
-    """Many threads compile at once; the user's own numba functions must not be affected."""
+def test_threads_may_compile_at_the_same_time(tmp_path: Path) -> None:
     code = """
         import threading
-        import numba
         import numpy as np
-        from gms_fsm import GMS, GMSParameters, Prescribed
-        from gms_fsm.lowering import _compiled as compiled
-        from gms_fsm.lowering.program import lower
-        from integrators import compiled as machine
+        from gms_fsm import GMS, GMSParameters, Prescribed, simulate
 
-        before = numba.config.CACHE_DIR, numba.config.LOOP_VECTORIZE
         model = GMS(GMSParameters.paper("stick-slip"), law="signed")
-        begin = threading.Barrier(4)
+        begin, found = threading.Barrier(4), {}
 
-        def system() -> None:
+        def work(number: int, velocity: str) -> None:
             begin.wait()
-            compiled.machine_code(lower(model, Prescribed("0.1*t")), "act")
+            trace = simulate(model, Prescribed(velocity), 3.0, engine="compiled")
+            found[number] = trace.rows.y.tobytes() + trace.F.tobytes()
 
-        def rows() -> None:
-            begin.wait()
-            machine._compiled_each_row(compiled.store())
-
-        threads = [threading.Thread(target=work) for work in (system, rows, rows, system)]
+        velocities = ["0.1*t", "0.2*sin(t)"] * 2
+        threads = [threading.Thread(target=work, args=each) for each in enumerate(velocities)]
         for thread in threads:
             thread.start()
         for thread in threads:
             thread.join()
-        assert (numba.config.CACHE_DIR, numba.config.LOOP_VECTORIZE) == before
-        print("as before")
+        for number, velocity in enumerate(velocities):
+            trace = simulate(model, Prescribed(velocity), 3.0)
+            assert found[number] == trace.rows.y.tobytes() + trace.F.tobytes()
+        print("equal")
     """
-    assert _ended(_start(code))[0] == "as before\n"
+    assert _ended(_start(code, GMS_FSM_CACHE=str(tmp_path)))[0] == "equal\n"
 
 
-# --------------------------------------------------------------------------- without numba
+# --------------------------------------------------------------------------- without llvmlite
 WITHOUT = """
     import sys
     for name in {absent!r}:
@@ -416,7 +438,7 @@ WITHOUT = """
 """
 
 
-@pytest.mark.parametrize("absent", [["numba"], ["platformdirs"]])
+@pytest.mark.parametrize("absent", [["llvmlite"], ["platformdirs"]])
 def test_without_the_extra_the_message_says_what_to_install(
     absent: list[str], tmp_path: Path
 ) -> None:
@@ -432,7 +454,7 @@ def test_without_the_extra_the_message_says_what_to_install(
     assert err == ""
 
 
-def test_numba_is_not_loaded_before_it_is_needed() -> None:
+def test_llvmlite_is_not_loaded_before_it_is_needed() -> None:
     code = """
         import sys
         import gms_fsm
@@ -440,6 +462,6 @@ def test_numba_is_not_loaded_before_it_is_needed() -> None:
         model, rig = GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.2")
         simulate(model, rig, 3.0)
         sweep(model, rig, 3.0, {"F_s": [1.0, 2.0]}, engine="machines")
-        print(sorted({"numba", "llvmlite"} & set(sys.modules)))
+        print("llvmlite" in sys.modules)
     """
-    assert _ended(_start(code))[0] == "[]\n"
+    assert _ended(_start(code))[0] == "False\n"

@@ -12,6 +12,7 @@ import io
 import linecache
 import math
 import sys
+import textwrap
 import tokenize
 import traceback
 from types import FrameType
@@ -79,7 +80,15 @@ def test_flows_appear_as_in_the_chart(law: str) -> None:
     }[law]
     assert rate in source
     assert "dz = v\n" in source
-    assert "S = F_c + (F_s - F_c) * exp(-(v / v_s * (v / v_s)))  # (2)" in source
+    curve = """\
+if S != S:
+    if abs(v) > v_flat:
+        S = F_c
+    else:
+        S = F_c + (F_s - F_c) * exp(-(v / v_s * (v / v_s)))  # (2)
+"""
+    assert "\n    S = nan  # computed where it is read\n" in source
+    assert textwrap.indent(curve, 12 * " ") in source
     assert "F_i = k[i] * z + sigma[i] * dz  # (3)" in source
     assert "+ sigma_2 * v  # (4)" in source
 

@@ -45,7 +45,7 @@ CARRIAGE = GMS(
 def test_a_carriage_on_micrometres_creeps_and_does_not_break_away(engine):
     """k = 4e6 N/m, thresholds of 2 um: atol = 1e-9 made a break-away at 3.826 s."""
     if engine == "compiled":
-        pytest.importorskip("numba", reason="needs the extra fast")
+        pytest.importorskip("llvmlite", reason="needs the extra fast")
     times = np.linspace(0.0, 8.0, 8001)
     trace = simulate(CARRIAGE, PulledSlider(40, 1600, 1.8e-3), 8.0, engine=engine, t_eval=times)
     assert len(trace.transitions) == 0
@@ -176,7 +176,7 @@ def test_a_scipy_solver_requires_a_tolerance_for_components_without_scale():
 @pytest.mark.parametrize("engine", ["ifelse", "compiled"])
 def test_each_run_of_a_sweep_has_the_tolerances_of_its_own_model(engine):
     """The same buffers serve one run after the other."""
-    pytest.importorskip("numba", reason="needs the extra fast")
+    pytest.importorskip("llvmlite", reason="needs the extra fast")
     p = pulled_mass()[0].parameters
     weights = np.array([1e-6 * p.weights, p.weights])
     C = np.array([1e-6 * p.C, p.C])

@@ -21,7 +21,7 @@ from tests.scaled import AXES, Case, factors, other_bits, scaled, sequence
 
 pytestmark = pytest.mark.slow
 
-HAS_NUMBA = bool(importlib.util.find_spec("numba"))
+HAS_FAST = bool(importlib.util.find_spec("llvmlite"))
 EXPONENTS = (-40, -37, -33, -30, -27, -23, -20, -13, -10, -7, -3, -1, 4, 10, 15, 20)
 FEW = (-40, -13, 20)
 
@@ -29,7 +29,7 @@ FEW = (-40, -13, 20)
 def engine_for(rig: Rig) -> str:
     """Each new text of a signal would have to be compiled, which takes longer than its run."""
     texts = any(isinstance(signal, Formula) for signal in rig.signals.values())
-    return "compiled" if HAS_NUMBA and not texts else "ifelse"
+    return "compiled" if HAS_FAST and not texts else "ifelse"
 
 
 ON_A_RIG = [path for path in SHIPPED if "[[body]]" not in path.read_text(encoding="utf-8")]

@@ -41,7 +41,7 @@ from tests.helpers import same_bits
 pytestmark = pytest.mark.slow
 
 EXAMPLES = int(os.environ.get("GMS_FSM_EXAMPLES", "0"))
-HAS_NUMBA = bool(importlib.util.find_spec("numba"))
+HAS_FAST = bool(importlib.util.find_spec("llvmlite"))
 
 
 def hard(examples: int, most: int = 10**9) -> Any:
@@ -376,7 +376,7 @@ def test_machines_and_ifelse_agree_on_random_charts(
     fired(one)
 
 
-@pytest.mark.skipif(not HAS_NUMBA, reason="needs numba (extra: fast)")
+@pytest.mark.skipif(not HAS_FAST, reason="needs the extra fast")
 @hard(60)
 @given(banks(), ramps(jumps=True), options(), st.booleans())
 def test_compiled_agrees_on_random_banks(
@@ -391,7 +391,7 @@ def test_compiled_agrees_on_random_banks(
     fired(one)
 
 
-@pytest.mark.skipif(not HAS_NUMBA, reason="needs numba (extra: fast)")
+@pytest.mark.skipif(not HAS_FAST, reason="needs the extra fast")
 @hard(4, most=20)  # each is compiled, which takes seconds
 @given(chart_models(), ramps(), options())
 def test_compiled_agrees_on_random_charts(

@@ -13,7 +13,7 @@ from tests.trials import FAMILIES, JUDGED, is_finding, judge, reference, said, t
 
 pytestmark = pytest.mark.slow
 
-pytest.importorskip("numba", reason="needs the extra fast: the machines take too long for this")
+pytest.importorskip("llvmlite", reason="needs the extra fast: the machines take too long for this")
 
 COUNT = 40
 

@@ -56,9 +56,9 @@ def coulomb(outputs: str = "F_c * sgn(v)") -> ChartModel:
 
 
 def needs(engine: str) -> str:
-    """Skip without numba."""
+    """Skip without the extra."""
     if engine == "compiled":
-        pytest.importorskip("numba", reason="needs the extra fast")
+        pytest.importorskip("llvmlite", reason="needs the extra fast")
     return engine
 
 
@@ -80,7 +80,7 @@ def test_a_slipping_element_holds_v_at_zero_until_it_arrests(engine):
 
 
 def test_the_engines_agree_to_the_last_bit():
-    pytest.importorskip("numba", reason="needs the extra fast")
+    pytest.importorskip("llvmlite", reason="needs the extra fast")
     one = simulate(BANK, PUSHED, 0.6, engine="machines")
     assert len(one.sliding) == 1
     for engine in ("ifelse", "compiled"):

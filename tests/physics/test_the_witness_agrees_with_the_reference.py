@@ -18,8 +18,8 @@ from tests.witness import witness
 
 pytestmark = pytest.mark.slow
 
-HAS_NUMBA = bool(importlib.util.find_spec("numba"))
-ENGINE = "compiled" if HAS_NUMBA else "ifelse"
+HAS_FAST = bool(importlib.util.find_spec("llvmlite"))
+ENGINE = "compiled" if HAS_FAST else "ifelse"
 
 CARRIAGE = Trial(
     "a carriage",
@@ -93,7 +93,7 @@ def test_the_pulled_mass() -> None:
     agrees(Trial("pulled mass", 0, 0, *pulled_mass(), 60.0))
 
 
-@pytest.mark.skipif(not HAS_NUMBA, reason="needs the extra fast: Python takes half a minute")
+@pytest.mark.skipif(not HAS_FAST, reason="needs the extra fast: Python takes half a minute")
 @pytest.mark.parametrize("family", JUDGED)
 def test_a_trial_of_each_family(family: str) -> None:
     sample = (trial(family, 14, index) for index in range(100))

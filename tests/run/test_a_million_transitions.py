@@ -27,7 +27,7 @@ PERIOD, EACH_PERIOD = 20.0, 16  # of the sine [s]; four elements, four transitio
 compiled = pytest.param(
     "compiled",
     6_000,
-    marks=pytest.mark.skipif(not importlib.util.find_spec("numba"), reason="needs extra fast"),
+    marks=pytest.mark.skipif(not importlib.util.find_spec("llvmlite"), reason="needs extra fast"),
 )
 
 

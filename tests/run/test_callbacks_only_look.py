@@ -26,7 +26,7 @@ def model() -> GMS:
 
 def _run(machines: ElementMachines, engine: str) -> Trace:
     if engine == "compiled":
-        pytest.importorskip("numba")
+        pytest.importorskip("llvmlite")
     return simulate(machines.model, open_loop(), 20.0, engine=engine, machines=machines)
 
 

@@ -42,7 +42,7 @@ from tests.helpers import (
     wear,
 )
 
-pytest.importorskip("numba", reason="needs the extra fast")
+pytest.importorskip("llvmlite", reason="needs the extra fast")
 
 Call = tuple[Any, ...]
 

@@ -16,7 +16,7 @@ from tests.traces.test_monitors_see_what_happens import SLOWING, memoryless
 def test_the_error_names_the_element_and_says_that_it_chatters(weights, element, t, engine):
     """Whether the guard's or the machine's count fills up first does not matter."""
     if engine == "compiled":
-        pytest.importorskip("numba", reason="needs the extra fast")
+        pytest.importorskip("llvmlite", reason="needs the extra fast")
     with pytest.raises(LivelockError) as caught:
         simulate(memoryless(weights), SLOWING, 10.0, engine=engine)
     text, trace = str(caught.value), caught.value.trace

@@ -29,7 +29,8 @@ ENGINES = [
     pytest.param(
         "compiled",
         marks=pytest.mark.skipif(
-            not __import__("importlib.util").util.find_spec("numba"), reason="needs the extra fast"
+            not __import__("importlib.util").util.find_spec("llvmlite"),
+            reason="needs the extra fast",
         ),
     ),
 ]
@@ -88,7 +89,7 @@ def test_repeated_interruptions_change_nothing(
 @pytest.mark.parametrize("engine", ["machines", "compiled"])
 def test_user_machines_continue_in_their_states(engine: str, tmp_path: Path) -> None:
     if engine == "compiled":
-        pytest.importorskip("numba", reason="needs the extra fast")
+        pytest.importorskip("llvmlite", reason="needs the extra fast")
     model = stick_slip("signed")
     fired: list[str] = []
 

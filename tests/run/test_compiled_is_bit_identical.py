@@ -60,7 +60,7 @@ from tests.helpers import (
     wear,
 )
 
-pytest.importorskip("numba", reason="needs the extra fast")
+pytest.importorskip("llvmlite", reason="needs the extra fast")
 
 from gms_fsm.lowering import _compiled as compiled
 from tests.helpers import ROOT

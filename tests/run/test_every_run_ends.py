@@ -37,7 +37,7 @@ def stiff(C: float) -> GMS:
 
 def needs(engine):
     if engine == "compiled":
-        pytest.importorskip("numba", reason="needs the extra fast")
+        pytest.importorskip("llvmlite", reason="needs the extra fast")
     return engine
 
 

@@ -61,7 +61,7 @@ def test_machines_fire_at_ticks_only_and_once_each() -> None:
 @pytest.mark.parametrize("engine", ["machines", "compiled"])
 def test_engines_agree_bit_for_bit(engine: str) -> None:
     if engine == "compiled":
-        pytest.importorskip("numba")
+        pytest.importorskip("llvmlite")
     arguments = {"events": "held", "step": 0.01}
     one, other = (
         simulate(stick_slip("published"), open_loop(), 30.0, engine=each, **arguments)  # type: ignore[arg-type]

@@ -32,7 +32,8 @@ ENGINES = [
     pytest.param(
         "compiled",
         marks=pytest.mark.skipif(
-            not __import__("importlib.util").util.find_spec("numba"), reason="needs the extra fast"
+            not __import__("importlib.util").util.find_spec("llvmlite"),
+            reason="needs the extra fast",
         ),
     ),
 ]
@@ -131,7 +132,7 @@ LONG = OPEN_LOOP.replace("t_end = 1.0", "t_end = 1e8\nmax_steps = 1_000_000_000"
 @pytest.mark.parametrize("engine", ["machines", "compiled"])
 def test_the_command_line_keeps_the_results_and_says_so(engine: str, tmp_path: Path) -> None:
     if engine == "compiled":
-        pytest.importorskip("numba", reason="needs the extra fast")
+        pytest.importorskip("llvmlite", reason="needs the extra fast")
         load = load_scenario(_file(tmp_path, OPEN_LOOP), ["run.engine=compiled"])
         run_scenario(load, tmp_path / "warm")  # the machine code is there
     scenario = _file(tmp_path, LONG)

@@ -41,7 +41,7 @@ every_method = pytest.mark.parametrize("method", METHODS)
 def engine(request: pytest.FixtureRequest) -> str:
     """Each engine; the compiled one only if its extra is installed."""
     if request.param == "compiled":
-        pytest.importorskip("numba", reason="needs the extra fast")
+        pytest.importorskip("llvmlite", reason="needs the extra fast")
     return str(request.param)
 
 
@@ -197,7 +197,7 @@ def test_progress_is_reported_for_a_run_that_records_only_its_end() -> None:
     ],
 )
 def test_a_long_compiled_run_checks_for_ctrl_c(events: str, options: dict[str, Any]) -> None:
-    pytest.importorskip("numba", reason="needs the extra fast")
+    pytest.importorskip("llvmlite", reason="needs the extra fast")
     seen: list[float] = []
     simulate(
         stick_slip("signed"),

@@ -41,8 +41,8 @@ def goes_on(path: Path | None, engine: str, speed: Any = "0.1", **options: Any) 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("after", [0.5, 7.0])
 def test_it_goes_on(engine: str, after: float, tmp_path: Path) -> None:
-    if engine == "compiled" and not importlib.util.find_spec("numba"):
-        pytest.skip("needs numba (extra: fast)")
+    if engine == "compiled" and not importlib.util.find_spec("llvmlite"):
+        pytest.skip("needs the extra fast")
     path = tmp_path / "run.checkpoint"
     begun(path, engine, after)
     same_rows(goes_on(None, engine), goes_on(path, engine))

@@ -51,7 +51,7 @@ inside = sys.modules[sweep.__module__]  # the module; its name refers to the fun
 def engine(request: pytest.FixtureRequest) -> str:
     """Each engine; the compiled one only if its extra is installed."""
     if request.param == "compiled":
-        pytest.importorskip("numba", reason="needs the extra fast")
+        pytest.importorskip("llvmlite", reason="needs the extra fast")
     return str(request.param)
 
 
@@ -170,7 +170,7 @@ def test_each_row_is_a_run(case: str, options: dict[str, Any], engine: str) -> N
 @pytest.mark.slow
 def test_more_runs_than_a_task_holds_and_more_firings_than_a_column() -> None:
     """Buffers are reused by the next run of a task; nothing of the previous run shows."""
-    pytest.importorskip("numba", reason="needs the extra fast")
+    pytest.importorskip("llvmlite", reason="needs the extra fast")
     model, _ = pulled_mass()
     rig = Prescribed("0.3*sin(20*t)")
     level = np.resize([1.0, 40.0, 2.0], 200)  # hundreds of firings, then few
@@ -698,7 +698,7 @@ def test_files_that_cannot_be_written_or_read_say_so(mixed: Sweep, tmp_path: Pat
 @pytest.mark.slow
 def test_no_sequence_of_two_hundred_depends_on_the_tolerance() -> None:
     """About 72 transitions each: the same elements by the same edges in the same order."""
-    pytest.importorskip("numba", reason="needs the extra fast")
+    pytest.importorskip("llvmlite", reason="needs the extra fast")
     k = K * np.random.default_rng(0).uniform(0.8, 1.2, (200, 4))
     loose, tight = (
         sweep(*pulled_mass(), 60.0, {"k": k, "weights": 1 / (4 * k)}, rtol=rtol, atol=1e-3 * rtol)
@@ -715,7 +715,7 @@ def test_no_sequence_of_two_hundred_depends_on_the_tolerance() -> None:
 @pytest.mark.slow
 def test_memory_grows_with_the_results_only() -> None:
     """A run's steps are not recorded: at most its firings twice, while they are assembled."""
-    pytest.importorskip("numba", reason="needs the extra fast")
+    pytest.importorskip("llvmlite", reason="needs the extra fast")
     model, rig = pulled_mass()
 
     def peak(runs: int) -> tuple[int, int]:

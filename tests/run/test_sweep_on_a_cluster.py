@@ -101,7 +101,7 @@ class Deadly(Executor):
 @quiet
 def test_a_run_that_kills_every_worker_is_a_row_that_says_so() -> None:
     dask = pytest.importorskip("dask", reason="needs the extra cluster")
-    pytest.importorskip("numba", reason="needs the extra fast")
+    pytest.importorskip("llvmlite", reason="needs the extra fast")
     model, rig = pulled_mass()
     here = sweep(model, rig, 12.0, sets(8), engine="machines")
     with (

@@ -4,14 +4,24 @@ So the loop that fills the columns is correct as source, whatever a compiler mak
 compiled code does the same is the claim of test_compiled_is_bit_identical.py.
 """
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-import gms_fsm.lowering._compiled
+pytest.importorskip("llvmlite", reason="needs the extra fast")
+
 import integrators.compiled
 from gms_fsm import Slider, simulate
+from gms_fsm.lowering import _compiled as compiled
+from gms_fsm.run import _compiled_run
+from gms_fsm.traces import _observed
 from gms_fsm.traces.failures import LivelockError
 from integrators import columns
+from integrators.compiled import each_row
+from integrators.loop import Machines
+from integrators.machine_code.layout import Layout
+from integrators.sliding import Functions
 from tests.helpers import one_element, open_loop, pulled_mass, stick_slip
 from tests.traces.test_monitors_see_what_happens import SLOWING, memoryless
 
@@ -19,16 +29,38 @@ TIMES = np.linspace(0.0, 20.0, 41)
 
 
 @pytest.fixture
-def read(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Make engine="compiled" run the Python source."""
-    module = gms_fsm.lowering._compiled
-    monkeypatch.setattr(
-        module, "machine_code", lambda program, *names: [program.ieee[name] for name in names]
-    )
-    monkeypatch.setattr(module, "store", lambda: None)
-    kernel = integrators.compiled
-    monkeypatch.setattr(kernel, "record", lambda arguments, store, tell: columns.record(*arguments))
-    monkeypatch.setattr(kernel, "_compiled_each_row", lambda store: kernel._each_row)
+def read(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Make engine="compiled" run the Python source over its own arrays; return what it returned."""
+    returned = []
+
+    def engine(program, run):
+        inside = integrators.compiled._longest(run) <= integrators.compiled.LONGEST_INSIDE
+        return SimpleNamespace(layout=Layout(run, integrators.compiled._is_known, inside=inside))
+
+    def run(self, most_steps, *, pause):
+        code = self.start.program.ieee
+        flow = code["flow" if self.start.options.located else "flow_live"]
+        functions = Functions(flow, code["arm"], code["margins"], code["normal"], self.p)
+        machines = Machines(*(code[name] for name in ("switch", "act", "tick", "observe")))
+        recorded = self.run_of.recorded
+        with np.errstate(all="ignore"):
+            event = columns.record(
+                functions, machines, self.buffers, self.log, recorded, most_steps, pause
+            )
+        returned.append(event)
+        return event
+
+    def observe_rows(program, t, y, mode):
+        table = np.empty((t.size, program.layout.observed.size))
+        p = compiled.packed(program.p)
+        each_row(program.ieee["observe"], t, y, mode, program.live, p, table)
+        return table
+
+    monkeypatch.setattr(compiled, "engine", engine)
+    monkeypatch.setattr(_compiled_run, "_engines", {})
+    monkeypatch.setattr(_compiled_run.Columns, "run", run)
+    monkeypatch.setattr(_observed, "observe_rows", observe_rows)
+    return returned
 
 
 @pytest.mark.slow
@@ -50,6 +82,7 @@ def test_the_same_rows_and_the_same_log(case, options, read):
     ours = simulate(model, rig, 20.0, engine="compiled", **options)
     theirs = simulate(model, rig, 20.0, engine="ifelse", **options)
     assert len(theirs.transitions) > 2
+    assert read, "the source was run"
     for name in ("t", "microstep", "y", "mode"):
         np.testing.assert_array_equal(getattr(ours.rows, name), getattr(theirs.rows, name))
         np.testing.assert_array_equal(getattr(ours.stops, name), getattr(theirs.stops, name))

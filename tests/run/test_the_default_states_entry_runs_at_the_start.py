@@ -42,7 +42,7 @@ RIG = Prescribed("0.5 + 0 * t")
 @pytest.mark.parametrize("engine", ["ifelse", "machines", "compiled"])
 def test_every_element_enters_with_its_own_numbers(engine: str) -> None:
     if engine == "compiled":
-        pytest.importorskip("numba")
+        pytest.importorskip("llvmlite")
     trace = simulate(MODEL, RIG, 3.0, t_start=2.0, engine=engine)
     assert trace.z[0].tolist() == [2.5, 3.5]
     assert trace.variable("w")[0].tolist() == [5.0, 7.0]
@@ -61,7 +61,7 @@ def test_another_state_is_not_entered() -> None:
 
 @pytest.mark.slow
 def test_a_compiled_sweep_enters_with_the_numbers_of_each_run() -> None:
-    pytest.importorskip("numba")
+    pytest.importorskip("llvmlite")
     k = np.linspace(1.0, 2.0, 130)  # two runs per task, which share their buffers
     found = sweep(MODEL, RIG, 0.1, {"k": k}, engine="compiled", progress=False)
     np.testing.assert_allclose(found.z[:, 0] - found.z[0, 0], 0.5 * (k - 1.0), rtol=1e-9)

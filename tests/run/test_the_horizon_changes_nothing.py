@@ -14,7 +14,7 @@ from tests.helpers import pulled_mass, stick_slip
 @pytest.mark.parametrize("longer", [20.0, 1e3, 123456.789])
 def test_a_longer_horizon_gives_the_same_bits_up_to_the_shorter(longer, engine):
     if engine == "compiled":
-        pytest.importorskip("numba", reason="needs the extra fast")
+        pytest.importorskip("llvmlite", reason="needs the extra fast")
     cases = [pulled_mass(), (stick_slip("published"), Prescribed("0.15*sin(2*pi*t/25)"))]
     for model, rig in cases:
         short = simulate(model, rig, 15.0, engine=engine)

@@ -80,7 +80,9 @@ def test_integrators_know_nothing_about_friction(path: Path) -> None:
         for line in text.splitlines()
         if re.match(r"\s*(?:from|import)\s", line)
     }
-    outside = imported - set(sys.stdlib_module_names) - {"integrators", "numpy", "scipy", "numba"}
+    outside = (
+        imported - set(sys.stdlib_module_names) - {"integrators", "numpy", "scipy", "llvmlite"}
+    )
     assert outside == set()
 
 
@@ -89,7 +91,9 @@ def test_nothing_is_evaluated(path: Path) -> None:
     assert _calls(path, "eval") == []
     expected = path == ROOT / "gms_fsm" / "lowering" / "_generated.py"
     assert bool(_calls(path, "exec")) == expected
-    assert bool(_bare(path, "compile")) == expected
+    # The front end compiles the text of a function only to compare it with the code that is loaded.
+    compared = path == ROOT / "integrators" / "machine_code" / "sources.py"
+    assert bool(_bare(path, "compile")) == (expected or compared)
 
 
 def _bare(path: Path, function: str) -> list[int]:

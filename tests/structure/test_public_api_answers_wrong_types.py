@@ -48,7 +48,7 @@ from gms_fsm import (
     sweep,
 )
 
-for _module in ("numba", "matplotlib", "z3", "pandas", "xarray"):
+for _module in ("llvmlite", "matplotlib", "z3", "pandas", "xarray"):
     pytest.importorskip(_module, reason="the walk uses all extras")
 
 WRONG: tuple[Any, ...] = (None, object(), "x", -1, [], {}, math.nan, lambda: 0)

@@ -12,7 +12,7 @@ from tests.systems_cases import CASES, same_system_bits
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_engines_agree(name: str) -> None:
-    pytest.importorskip("numba", reason="needs numba (extra: fast)")
+    pytest.importorskip("llvmlite", reason="needs the extra fast")
     one = CASES[name]().run("compiled")
     assert len(one.transitions)
     for engine in ("ifelse", "machines"):

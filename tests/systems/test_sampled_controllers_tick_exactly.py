@@ -15,7 +15,7 @@ ENGINES = ["ifelse", "machines", "compiled"]
 
 def _run(system: System, t_end: float, engine: str, **options: object) -> Trace:
     if engine == "compiled":
-        pytest.importorskip("numba")
+        pytest.importorskip("llvmlite")
     return simulate(system, t_end, engine=engine, **options)  # type: ignore[arg-type]
 
 

@@ -29,6 +29,6 @@ def test_the_load_and_the_switches() -> None:
     same_system_bits(trace, _run("machines"))
 
 
-@pytest.mark.skipif(importlib.util.find_spec("numba") is None, reason="needs the extra 'fast'")
+@pytest.mark.skipif(importlib.util.find_spec("llvmlite") is None, reason="needs the extra 'fast'")
 def test_compiled_bits_are_equal() -> None:
     same_system_bits(_run("ifelse"), _run("compiled"))

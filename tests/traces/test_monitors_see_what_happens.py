@@ -441,7 +441,7 @@ def test_a_run_without_monitors_has_none() -> None:
 @pytest.mark.parametrize("engine", ["ifelse", "compiled"])
 def test_all_engines_say_the_same(engine: str) -> None:
     if engine == "compiled":
-        pytest.importorskip("numba", reason="needs the extra 'fast'")
+        pytest.importorskip("llvmlite", reason="needs the extra 'fast'")
     monitors = ["all", "abs(z) <= 1.1*s", "F < 1"]
     one, other = (
         simulate(stick_slip("published"), Prescribed(FIG4_SINE), 50.0, engine=e, monitors=monitors)

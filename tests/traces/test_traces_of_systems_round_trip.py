@@ -98,7 +98,7 @@ def test_all_bodies_contacts_and_states(
     ending: str, options: dict[str, Any], tmp_path: Path
 ) -> None:
     if "engine" in options:
-        pytest.importorskip("numba", reason="needs numba (extra: fast)")
+        pytest.importorskip("llvmlite", reason="needs the extra fast")
     trace = simulate(belt(), 8.0, initial={"q2": 0.2}, **options)
     assert set(trace.transitions.contact) == {"pad", "bank"}
     path = trace.save(tmp_path / f"run.{ending}")

@@ -42,7 +42,7 @@ def test_the_machines_give_the_bits_of_the_if_else_text(name: str) -> None:
     same_bits(run(name), run(name, engine="machines"))
 
 
-@pytest.mark.skipif(importlib.util.find_spec("numba") is None, reason="needs the extra 'fast'")
+@pytest.mark.skipif(importlib.util.find_spec("llvmlite") is None, reason="needs the extra 'fast'")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_machine_code_gives_the_same_bits(name: str) -> None:

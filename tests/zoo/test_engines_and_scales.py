@@ -14,7 +14,7 @@ MICROMETRE = 2.0**-20  # m, about
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("unit", [1.0, MICROMETRE])
 def test_engines_agree(name: str, unit: float) -> None:
-    pytest.importorskip("numba", reason="needs numba (extra: fast)")
+    pytest.importorskip("llvmlite", reason="needs the extra fast")
     one = CASES[name](unit).run("compiled")
     assert len(one) > 40
     for engine in ("ifelse", "machines"):

@@ -20,7 +20,7 @@ NAMES = (
     "friction_damper",
     "two_blocks_on_a_belt",
 )
-ENGINES = ["machines"] + ["compiled"] * bool(importlib.util.find_spec("numba"))
+ENGINES = ["machines"] + ["compiled"] * bool(importlib.util.find_spec("llvmlite"))
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -1,0 +1,329 @@
+"""The printer of C99, for people and for other tools.
+
+Compiled without contraction (``-ffp-contract=off``) it computes the same bits as LLVM's machine
+code, if the mathematical functions come from the same library.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+from integrators.machine_code.tree import (
+    Address,
+    AddressOf,
+    Break,
+    Callback,
+    Choose,
+    Const,
+    Continue,
+    Do,
+    Expr,
+    For,
+    Foreign,
+    Function,
+    Global,
+    If,
+    Invoke,
+    Load,
+    Local,
+    Logic,
+    Module,
+    Op,
+    Put,
+    Return,
+    Set,
+    SetMany,
+    Statement,
+    Table,
+    While,
+)
+
+__all__ = ["c99_text"]
+
+_TYPES = {"f": "double", "i": "int64_t", "b": "bool", "p": "char *"}
+HEAD = """\
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+static inline double min_f(double a, double b) { return b < a ? b : a; }
+static inline double max_f(double a, double b) { return b > a ? b : a; }
+static inline int64_t min_i(int64_t a, int64_t b) { return b < a ? b : a; }
+static inline int64_t max_i(int64_t a, int64_t b) { return b > a ? b : a; }
+static inline int64_t abs_i(int64_t a) { return a < 0 ? -a : a; }
+static inline int64_t mod_i(int64_t a, int64_t b)
+{
+    int64_t r = a % b;
+    return r && (r ^ b) < 0 ? r + b : r;
+}
+static inline int64_t div_i(int64_t a, int64_t b)
+{
+    return a / b - (a % b && (a ^ b) < 0);
+}
+"""
+# How tightly operators bind in C, for as few brackets as compilers accept without a warning.
+_BINDS = {
+    "*": 9, "/": 9, "+": 8, "-": 8, "<": 6, "<=": 6, ">": 6, ">=": 6, "==": 5, "!=": 5,
+}  # fmt: skip
+_UNARY, _WHOLE = 10, 11
+
+
+def c99_text(module: Module) -> str:
+    """Return a module as one C99 text.
+
+    Parameters
+    ----------
+    module : Module
+        From `integrators.machine_code.translate.Translator`.
+
+    Returns
+    -------
+    str
+        The text; entries are not static.
+
+    Examples
+    --------
+    >>> from integrators.machine_code.translate import Translator
+    >>> from integrators.machine_code.values import Number
+    >>> from integrators.step_size import memory_of
+    >>> translator = Translator()
+    >>> _ = translator.entry("entry", memory_of, [Number(Local("f", "root"))])
+    >>> print(c99_text(translator.module).partition("static double ")[2].strip())
+    memory_of(double root_0)
+    {
+        return sqrt(max_f(root_0, 0.3));
+    }
+    <BLANKLINE>
+    double entry(double root)
+    {
+        return memory_of(root);
+    }
+    """
+    kinds = sorted({f.results for f in module.functions if len(f.results) > 1})
+    parts = [HEAD, *map(_structure, kinds), *map(_table, module.tables)]
+    if module.callbacks:
+        parts.append(f"double (*callbacks[{module.callbacks}])(double);")
+    results = {f.name: f.results for f in module.functions}
+    taken = {*RESERVED.split(), *(table.name for table in module.tables)}
+    functions = _Names(taken - {f.name for f in module.functions if f.entry})
+    taken |= {functions(f.name) for f in module.functions}
+    parts += [_Writer(f, results, functions, _Names(taken)).text() for f in module.functions]
+    return "\n".join(parts)
+
+
+def _structure(kinds: str) -> str:
+    fields = " ".join(f"{_TYPES[kind]} v{k};" for k, kind in enumerate(kinds))
+    return f"typedef struct {{ {fields} }} many_{kinds};"
+
+
+def _table(table: Table) -> str:
+    entries = ", ".join(map(_float, table.values))
+    return f"static const double {table.name}[] = {{{entries}}};"
+
+
+def _float(value: float) -> str:
+    if value != value:
+        return "NAN"
+    if value in (float("inf"), float("-inf")):
+        return "INFINITY" if value > 0 else "-INFINITY"
+    return repr(value)
+
+
+def _result(kinds: str) -> str:
+    if len(kinds) > 1:
+        return f"many_{kinds}"
+    return _TYPES[kinds] if kinds else "void"
+
+
+class _Names:
+    """Names of C, each for one name of the module."""
+
+    def __init__(self, taken: Iterable[str]) -> None:
+        self._taken = {*taken}
+        self._found: dict[str, str] = {}
+
+    def __call__(self, name: str) -> str:
+        """Return the name of a variable or a function."""
+        if name not in self._found:
+            words = re.sub(r"\W+", "_", name).strip("_")
+            free = words = f"u{words}" if words[:1].isdigit() else words
+            number = 1
+            while free in self._taken:
+                number += 1
+                free = f"{words}_{number}"
+            self._taken.add(free)
+            self._found[name] = free
+        return self._found[name]
+
+
+RESERVED = """
+    auto bool break callbacks case char const continue default do double else enum extern false
+    float for goto if inline int long register restrict return short signed sizeof static struct
+    switch true typedef union unsigned void volatile while
+    acos asin asinh atan atan2 cos cosh exp fabs gamma j0 j1 jn log main pow sin sinh sqrt tan tanh
+    y0 y1 yn abs_i div_i max_f max_i min_f min_i mod_i
+"""
+
+
+class _Writer:
+    """Writes one function."""
+
+    def __init__(
+        self, function: Function, results: dict[str, str], functions: _Names, locals_: _Names
+    ) -> None:
+        self.function, self.results = function, results
+        self.functions, self.name = functions, locals_
+        self.counter = 0  # of results with several parts
+
+    def text(self) -> str:
+        """Return its text."""
+        function = self.function
+        names = ", ".join(f"{_TYPES[p.kind]} {self.name(p.name)}" for p in function.parameters)
+        head = "" if function.entry else "static "
+        opening = (
+            f"{head}{_result(function.results)} {self.functions(function.name)}({names or 'void'})"
+        )
+        lines = [opening, "{"]
+        for kind in "fibp":
+            own = [self.name(v.name) for v in function.variables if v.kind == kind]
+            if own:
+                star = ", *" if kind == "p" else ", "
+                lines.append(f"    {_TYPES[kind]} {star.join(own)};".replace("* ", "*"))
+        body = self.block(function.body, 1)
+        if body and body[-1] == "    return;":
+            body.pop()
+        return "\n".join([*lines, *body, "}", ""])
+
+    # ------------------------------------------------------------------ statements
+    def block(self, body: Sequence[Statement], depth: int) -> list[str]:
+        """Write statements."""
+        return [line for statement in body for line in self.statement(statement, depth)]
+
+    def statement(self, statement: Statement, depth: int) -> list[str]:
+        """Write a statement."""
+        space = "    " * depth
+        match statement:
+            case Set(target=target, value=value):
+                return [f"{space}{self.name(target.name)} = {self.value(value)};"]
+            case SetMany(targets=targets, call=call):
+                self.counter += 1
+                whole = self.name(f"many.{self.counter}")
+                made = f"{space}const many_{self.results[call.name]} {whole} = {self.value(call)};"
+                parts = [
+                    f"{space}{self.name(each.name)} = {whole}.v{k};"
+                    for k, each in enumerate(targets)
+                ]
+                return [made, *parts]
+            case Put(kind=kind, address=address, value=value):
+                return [f"{space}{self.place(kind, address)} = {self.value(value)};"]
+            case Do(call=call):
+                return [f"{space}{self.value(call)};"]
+            case If(test=test, body=body, orelse=orelse):
+                lines = [f"{space}if ({self.value(test)}) {{", *self.block(body, depth + 1)]
+                if orelse:
+                    lines += [f"{space}}} else {{", *self.block(orelse, depth + 1)]
+                return [*lines, f"{space}}}"]
+            case While(test=test, body=body):
+                head = f"{space}while ({self.value(test)}) {{"
+                return [head, *self.block(body, depth + 1), f"{space}}}"]
+            case For(target=target, start=start, stop=stop, step=step, body=body):
+                name = self.name(target.name)
+                more = f"{name}++" if step == 1 else f"{name} += {step}"
+                head = f"{name} = {self.value(start)}; {name} < {self.value(stop, 7)}; {more}"
+                return [f"{space}for ({head}) {{", *self.block(body, depth + 1), f"{space}}}"]
+            case Break():
+                return [f"{space}break;"]
+            case Continue():
+                return [f"{space}continue;"]
+            case Return(values=()):
+                return [f"{space}return;"]
+            case Return(values=(value,)):
+                return [f"{space}return {self.value(value)};"]
+            case Return(values=values):
+                parts_text = ", ".join(map(self.value, values))
+                return [f"{space}return (many_{self.function.results}){{{parts_text}}};"]
+        raise AssertionError(statement)
+
+    # ------------------------------------------------------------------ expressions
+    def value(self, expr: Expr, binds: int = 0) -> str:
+        """Write an expression, in brackets if it binds less tightly than its surroundings."""
+        text, own = self.bare(expr)
+        return f"({text})" if own < binds else text
+
+    def bare(self, expr: Expr) -> tuple[str, int]:
+        """Write an expression; return also how tightly it binds."""
+        match expr:
+            case Const(kind="f", value=value):
+                text = _float(value)
+                return text, _UNARY if text.startswith("-") else _WHOLE
+            case Const(kind="b", value=value):
+                return ("true" if value else "false"), _WHOLE
+            case Const(value=value):
+                return str(value), _UNARY if value < 0 else _WHOLE
+            case Local(name=name):
+                return self.name(name), _WHOLE
+            case Global(name=name):
+                return f"(char *){name}", _UNARY
+            case Load(kind=kind, address=address):
+                return self.place(kind, address), _WHOLE
+            case AddressOf(address=address):
+                return self.address(address)
+            case Logic(op=op, left=left, right=right):
+                sign, binds = ("&&", 3) if op == "and" else ("||", 2)
+                inner = binds if op == "and" else 3
+                # Brackets around && within ||, as compilers advise.
+                a, b = (self.value(each, inner + (op == "or")) for each in (left, right))
+                if isinstance(left, Logic) and left.op == op:
+                    a = self.value(left)
+                return f"{a} {sign} {b}", binds
+            case Choose(test=test, yes=yes, no=no):
+                parts = (self.value(each, 2) for each in (test, yes, no))
+                return "{} ? {} : {}".format(*parts), 1
+            case Op():
+                return self.operation(expr)
+            case Invoke(name=name, arguments=arguments):
+                return f"{self.functions(name)}({', '.join(map(self.value, arguments))})", _WHOLE
+            case Foreign(name=name, arguments=arguments):
+                return f"{name}({', '.join(map(self.value, arguments))})", _WHOLE
+            case Callback(number=number, arguments=arguments):
+                return f"callbacks[{number}]({', '.join(map(self.value, arguments))})", _WHOLE
+        raise AssertionError(expr)
+
+    def operation(self, expr: Op) -> tuple[str, int]:
+        """Write an operation."""
+        op, kind = expr.op, expr.operands[0].kind
+        if op in _BINDS:
+            binds = _BINDS[op]
+            a, b = expr.operands
+            # The right operand in brackets at equal rank: nothing may be reassociated.
+            return f"{self.value(a, binds)} {op} {self.value(b, binds + 1)}", binds
+        if op in ("&", "|", "^", "<<", ">>"):
+            a_text, b_text = (self.value(each, _UNARY) for each in expr.operands)
+            return f"{a_text} {op} {b_text}", 4
+        if op in ("neg", "not"):
+            return f"{'-' if op == 'neg' else '!'}{self.value(expr.operands[0], _WHOLE)}", _UNARY
+        if op in ("float", "int"):
+            type_ = _TYPES["f" if op == "float" else "i"]
+            return f"({type_}){self.value(expr.operands[0], _UNARY)}", _UNARY
+        names = {"abs": "fabs" if kind == "f" else "abs_i", "sqrt": "sqrt", "%": "mod_i"}
+        names |= {"//": "div_i", "min": f"min_{kind}", "max": f"max_{kind}"}
+        return f"{names[op]}({', '.join(map(self.value, expr.operands))})", _WHOLE
+
+    def place(self, kind: str, address: Address) -> str:
+        """Write a place in memory."""
+        type_ = _TYPES[kind] if kind != "p" else "char *"
+        base = self.value(address.base, 8)
+        if address.offset:
+            base = f"({base} + {address.offset})"
+        index = "0" if address.index is None else self.value(address.index)
+        return f"(({type_} *){base})[{index}]".replace("* *", "**")
+
+    def address(self, address: Address) -> tuple[str, int]:
+        """Write an address."""
+        text = self.value(address.base, 8)
+        if address.offset:
+            text += f" + {address.offset}"
+        if address.index is not None:
+            text += f" + {address.size} * {self.value(address.index, _UNARY)}"
+        return text, 8 if "+" in text else _UNARY

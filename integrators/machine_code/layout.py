@@ -1,0 +1,287 @@
+"""Blocks of memory that hold all arguments of a function, and what their fields are called.
+
+A block is described by an example: named tuples of numbers, of lists or arrays, and of `Column`.
+Lists become arrays inside the block, with constant lengths; a `Column` is an array elsewhere, of
+which the block holds the address and the lengths. Functions and what else is known while
+translating take no room.
+"""
+
+from __future__ import annotations
+
+import functools
+import typing
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from integrators.machine_code.tree import Address, Const, Expr, Load, Local
+from integrators.machine_code.values import Array, Fixed, Number, Record, Value
+
+__all__ = ["Block", "Column", "Layout"]
+
+_KINDS = {float: "f", int: "i", bool: "b"}
+# Of fields of named tuples; truth values that are not in lists take a word, as integers do.
+_FIELDS: dict[Any, str] = {
+    float: "f", int: "i", bool: "i", list[int]: "i", list[list[int]]: "i", list[bool]: "b",
+}  # fmt: skip
+_DTYPES = {"f": np.dtype(np.float64), "i": np.dtype(np.int64), "b": np.dtype(np.bool_)}
+
+
+@dataclass(frozen=True)
+class Column:
+    """An array outside the block.
+
+    Parameters
+    ----------
+    kind : {"f", "i", "b"}
+        Of its entries.
+    width : int, optional
+        Length of its rows, if it is a table.
+    table : bool
+        Whether it is a table whose rows may have any length.
+    """
+
+    kind: str = "f"
+    width: int | None = None
+    table: bool = False
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A field of a block: the way to it in the named tuples, where it is, and what it is."""
+
+    way: tuple[int, ...]
+    offset: int  # in words of eight bytes
+    kind: str
+    shape: tuple[int, ...] | None  # of an array inside the block
+    lengths: int = 0  # of a column
+
+
+class Layout:
+    """Where everything is in a block.
+
+    Parameters
+    ----------
+    example : named tuple or tuple
+        See the module docstring.
+    known : callable
+        Returns whether a named tuple or an object takes no room.
+    inside : bool
+        Whether lists are inside the block; otherwise they are columns, of any length.
+
+    Examples
+    --------
+    >>> from integrators.step_size import Control
+    >>> layout = Layout(Control(0.0, 0.0, 1e-6, [0.0, 0.0], 1.0, 0.0), lambda part: False)
+    >>> layout.words
+    7
+    """
+
+    def __init__(self, example: Any, known: Callable[[Any], bool], *, inside: bool = True) -> None:
+        self.known, self.inside, self.words = known, inside, 0
+        self.numbers: list[_Place] = []
+        self.arrays: list[_Place] = []
+        self.columns: list[_Place] = []
+        self.value = self._value(example, (), Local("p", "block"))
+
+    def _value(self, example: Any, way: tuple[int, ...], block: Expr) -> Record:
+        names = getattr(example, "_fields", None) or tuple(map(str, range(len(example))))
+        record: Any = type(example)
+        hints = _kinds(record) if hasattr(example, "_fields") else {}
+        fields: dict[str, Value] = {}
+        for k, (name, part) in enumerate(zip(names, example, strict=True)):
+            here = (*way, k)
+            if self.known(part):
+                fields[name] = _constant(part)
+            elif isinstance(part, tuple):
+                fields[name] = self._value(part, here, block)
+            elif isinstance(part, list | np.ndarray):
+                fields[name] = self._array(part, here, block, hints.get(name))
+            elif isinstance(part, Column):
+                fields[name] = self._column(part, here, block)
+            else:
+                kind = hints.get(name) or ("f" if isinstance(part, float) else "i")
+                place = Address(block, 8 * self.words)
+                fields[name] = Number(Load(kind, place))
+                self.numbers.append(_Place(here, self.words, kind, None))
+                self.words += 1
+        return Record(record, fields)
+
+    def _array(self, part: Any, way: tuple[int, ...], block: Expr, kind: str | None) -> Array:
+        if isinstance(part, np.ndarray):
+            kind, shape = part.dtype.kind, part.shape
+        else:
+            kind, shape = kind or "f", _shape(part)
+        if not self.inside:
+            made = self._column(Column(kind, table=len(shape) == 2), way, block)
+            self.arrays.append(_Place(way, -1, kind, shape))
+            return made
+        start = self.words
+        self.arrays.append(_Place(way, start, kind, shape))
+        self.words += -(-_DTYPES[kind].itemsize * int(np.prod(shape)) // 8)
+        return Array(kind, tuple(Const("i", each) for each in shape), block, 8 * start)
+
+    def _column(self, part: Column, way: tuple[int, ...], block: Expr) -> Array:
+        start = self.words
+        variable = part.width is not None and not self.inside
+        lengths = 2 if part.table or variable else 1
+        dims: tuple[Expr, ...] = tuple(
+            Load("i", Address(block, 8 * (start + 1 + k))) for k in range(lengths)
+        )
+        if part.width is not None and not variable:
+            dims = dims[0], Const("i", part.width)
+        self.columns.append(_Place(way, start, part.kind, None, lengths))
+        self.words += 1 + lengths
+        return Array(part.kind, dims, Load("p", Address(block, 8 * start)))
+
+    def key(self) -> str:
+        """Return a text that says where everything is."""
+        return repr((self.words, self.numbers, self.arrays if self.inside else (), self.columns))
+
+
+@dataclass(eq=False)
+class Block:
+    """The memory of one call.
+
+    Parameters
+    ----------
+    layout : Layout
+        Where everything is.
+    example : named tuple or tuple
+        The first contents; its lists become arrays in memory.
+
+    Attributes
+    ----------
+    contents : named tuple or tuple
+        Like the example, with arrays that are places in the block.
+    address : int
+        Of its first byte.
+
+    Examples
+    --------
+    >>> from integrators.step_size import Control
+    >>> control = Control(0.0, 0.0, 1e-6, [0.0, 0.5], 1.0, 0.0)
+    >>> block = Block(Layout(control, lambda part: False), control)
+    >>> block.contents.atol
+    array([0. , 0.5])
+    """
+
+    layout: Layout
+    example: Any
+    contents: Any = field(init=False)
+    address: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._words = np.zeros(self.layout.words, dtype=np.int64)
+        self._floats = self._words.view(np.float64)
+        self._bytes = self._words.view(np.uint8)
+        self._columns: dict[tuple[int, ...], Any] = {}
+        self._outside: list[Any] = []  # arrays of the example that are not inside the block
+        self.address = self._words.ctypes.data
+        self.contents = self._filled(self.example, ())
+
+    def _filled(self, example: Any, way: tuple[int, ...]) -> Any:
+        places = {place.way: place for place in self.layout.arrays}
+        parts = []
+        for k, part in enumerate(example):
+            here = (*way, k)
+            if self.layout.known(part):
+                parts.append(part)
+            elif isinstance(part, tuple):
+                parts.append(self._filled(part, here))
+            elif isinstance(part, Column):
+                shape = (0,) if part.width is None else (0, part.width)
+                parts.append(np.zeros((0, 0) if part.table else shape, _DTYPES[part.kind]))
+            elif here in places:
+                array = self._place(places[here])
+                if array.size:
+                    array[...] = part
+                parts.append(array)
+            else:
+                parts.append(part)
+        made = getattr(type(example), "_make", type(example))
+        return made(parts)
+
+    def _place(self, place: _Place) -> Any:
+        dtype, shape = _DTYPES[place.kind], place.shape or ()
+        if place.offset < 0:
+            self._outside.append(np.zeros(shape, dtype))
+            return self._outside[-1]
+        start = 8 * place.offset
+        size = dtype.itemsize * int(np.prod(shape))
+        return self._bytes[start : start + size].view(dtype).reshape(shape)
+
+    def update(self, contents: Any) -> None:
+        """Write numbers, and where the columns are, before a call.
+
+        Parameters
+        ----------
+        contents : named tuple or tuple
+            Like the example; arrays inside the block are not looked at.
+        """
+        words, floats, before = self._words, self._floats, self._columns
+        for place in self.layout.numbers:
+            value = contents
+            for k in place.way:
+                value = value[k]
+            if place.kind == "f":
+                floats[place.offset] = value
+            else:
+                words[place.offset] = value
+        for place in self.layout.columns:
+            array = contents
+            for k in place.way:
+                array = array[k]
+            if before.get(place.way) is not array:
+                assert array.dtype == _DTYPES[place.kind]
+                assert array.flags.c_contiguous
+                before[place.way] = array
+                words[place.offset] = array.ctypes.data
+                for k in range(place.lengths):
+                    words[place.offset + 1 + k] = array.shape[k]
+
+    def copy(self) -> list[Any]:
+        """Return the numbers and the arrays of the example, but no columns.
+
+        Returns
+        -------
+        list of ndarray
+            For `restore`.
+        """
+        return [array.copy() for array in (self._words, *self._outside)]
+
+    def restore(self, copy: list[Any]) -> None:
+        """Return to what `copy` returned.
+
+        Parameters
+        ----------
+        copy : list of ndarray
+            Of this block.
+        """
+        for array, before in zip((self._words, *self._outside), copy, strict=True):
+            array[...] = before
+
+
+def _constant(part: Any) -> Value:
+    if hasattr(part, "_fields"):
+        names = zip(part._fields, part, strict=True)
+        return Record(type(part), {name: _constant(each) for name, each in names})
+    if isinstance(part, bool | int | float):
+        return Number(Const(_KINDS[type(part)], part))
+    return Fixed(part)
+
+
+@functools.cache
+def _kinds(record: Any) -> dict[str, str]:
+    """Return the kinds of the fields of a named tuple, where its hints say them."""
+    hints = typing.get_type_hints(record)
+    return {name: _FIELDS[hint] for name, hint in hints.items() if hint in _FIELDS}
+
+
+def _shape(part: list[Any]) -> tuple[int, ...]:
+    """Return the lengths of a list, or of a list of lists."""
+    if part and isinstance(part[0], list):
+        return len(part), len(part[0])
+    return (len(part),)

@@ -1,0 +1,111 @@
+"""From LLVM's language to functions in memory, by llvmlite.
+
+Compiling takes a second; the object that it gives can be stored and is loaded in milliseconds.
+llvmlite is imported when one of these functions is called first.
+"""
+
+from __future__ import annotations
+
+import functools
+import threading
+from typing import Any
+
+__all__ = ["Library", "compiled", "target_name"]
+
+_lock = threading.RLock()  # LLVM's settings are those of the process
+
+
+@functools.cache
+def _binding() -> Any:
+    import llvmlite.binding as llvm
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm
+
+
+def _machine() -> Any:
+    llvm = _binding()
+    return llvm.Target.from_default_triple().create_target_machine(
+        cpu=llvm.get_host_cpu_name(),
+        features=llvm.get_host_cpu_features().flatten(),
+        opt=2,
+        reloc="pic",
+        codemodel="jitdefault",
+    )
+
+
+def target_name() -> str:
+    """Return what an object depends on besides its text: LLVM and the processor.
+
+    Returns
+    -------
+    str
+        Objects can be loaded where this text is the same.
+    """
+    llvm = _binding()
+    version = ".".join(map(str, llvm.llvm_version_info))
+    features = llvm.get_host_cpu_features().flatten()
+    return f"{version} {llvm.get_default_triple()} {llvm.get_host_cpu_name()} {features}"
+
+
+def compiled(text: str) -> bytes:
+    """Return the object of a module.
+
+    Parameters
+    ----------
+    text : str
+        From `integrators.machine_code.llvm.llvm_text`.
+
+    Returns
+    -------
+    bytes
+        The object, for this processor.
+
+    Examples
+    --------
+    >>> text = "define double @half(double %x) { %y = fmul double %x, 0.5 ret double %y }"
+    >>> import ctypes
+    >>> library = Library(compiled(text))
+    >>> ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(library.address("half"))(3.0)
+    1.5
+    """
+    llvm = _binding()
+    with _lock:
+        module = llvm.parse_assembly(text)
+        module.verify()
+        machine = _machine()
+        options = llvm.create_pipeline_tuning_options(speed_level=2)
+        # Short loops are not worth vectors.
+        options.loop_vectorization = False
+        options.slp_vectorization = False
+        builder = llvm.create_pass_builder(machine, options)
+        builder.getModulePassManager().run(module, builder)
+        return bytes(machine.emit_object(module))
+
+
+class Library:
+    """An object loaded into this process.
+
+    Parameters
+    ----------
+    content : bytes
+        From `compiled`. Damaged bytes may end the process: whoever stores them compares a hash.
+    """
+
+    def __init__(self, content: bytes) -> None:
+        llvm = _binding()
+        with _lock:
+            self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+            self._engine.add_object_file(llvm.ObjectFileRef.from_data(content))
+            self._engine.finalize_object()
+
+    def address(self, name: str) -> int:
+        """Return the address of an entry."""
+        found: int = self._engine.get_function_address(name)
+        return found
+
+    def variable(self, name: str) -> int:
+        """Return the address of a global variable."""
+        found: int = self._engine.get_global_value_address(name)
+        return found

@@ -1,0 +1,356 @@
+"""The typed program between the front end and the printers: numbers, addresses, plain statements.
+
+Kinds are ``"f"`` (64-bit float), ``"i"`` (64-bit integer), ``"b"`` (truth value, one byte in
+memory) and ``"p"`` (address). Names of locals are unique within a function.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+__all__ = [
+    "SIZES",
+    "Address",
+    "AddressOf",
+    "Break",
+    "Callback",
+    "Choose",
+    "Const",
+    "Continue",
+    "Do",
+    "Expr",
+    "For",
+    "Foreign",
+    "Function",
+    "Global",
+    "If",
+    "Invoke",
+    "Load",
+    "Local",
+    "Logic",
+    "Module",
+    "Op",
+    "Put",
+    "Return",
+    "Set",
+    "SetMany",
+    "Statement",
+    "Table",
+    "While",
+    "locals_in",
+    "parts_of",
+]
+
+SIZES = {"f": 8, "i": 8, "b": 1, "p": 8}  # bytes in memory
+
+
+# --------------------------------------------------------------------------- expressions
+@dataclass(frozen=True, eq=False)
+class Const:
+    """A number; equal to others with the same bits."""
+
+    kind: str
+    value: Any
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Const) and self._bits == other._bits
+
+    def __hash__(self) -> int:
+        return hash(self._bits)
+
+    @property
+    def _bits(self) -> tuple[str, str]:
+        return self.kind, repr(self.value)  # 0.0 is not -0.0, and NaN is NaN
+
+
+@dataclass(frozen=True)
+class Local:
+    """A variable or parameter of the function."""
+
+    kind: str
+    name: str
+
+
+@dataclass(frozen=True)
+class Global:
+    """The address of a table of constants."""
+
+    name: str
+    kind: str = "p"
+
+
+@dataclass(frozen=True)
+class Op:
+    """An operation on evaluated operands.
+
+    ``+ - * /``, integer ``// % & | ^ << >>``, comparisons, ``neg``, ``not``, ``abs``, ``sqrt``,
+    ``min`` and ``max`` (as Python's: the first operand unless the second is smaller or larger),
+    ``float`` and ``int`` (conversions).
+    """
+
+    kind: str
+    op: str
+    operands: tuple[Expr, ...]
+
+
+@dataclass(frozen=True)
+class Logic:
+    """``and`` or ``or``; the right operand is evaluated only if it matters."""
+
+    op: str
+    left: Expr
+    right: Expr
+    kind: str = "b"
+
+
+@dataclass(frozen=True)
+class Choose:
+    """``yes if test else no``; only one of them is evaluated."""
+
+    kind: str
+    test: Expr
+    yes: Expr
+    no: Expr
+
+
+@dataclass(frozen=True)
+class Address:
+    """A place in memory: base + offset bytes + index times the size of an entry."""
+
+    base: Expr
+    offset: int = 0
+    index: Expr | None = None
+    size: int = 8
+
+
+@dataclass(frozen=True)
+class Load:
+    """The content of a place in memory."""
+
+    kind: str
+    address: Address
+
+
+@dataclass(frozen=True)
+class AddressOf:
+    """An address as a value."""
+
+    address: Address
+    kind: str = "p"
+
+
+@dataclass(frozen=True)
+class Invoke:
+    """A call of a function of the module; its kind is empty unless it returns one number."""
+
+    kind: str
+    name: str
+    arguments: tuple[Expr, ...]
+
+
+@dataclass(frozen=True)
+class Foreign:
+    """A call of a function of the C library, from float to float."""
+
+    name: str
+    arguments: tuple[Expr, ...]
+    kind: str = "f"
+
+
+@dataclass(frozen=True)
+class Callback:
+    """A call of a function of the host program, from float to float, by its number."""
+
+    number: int
+    arguments: tuple[Expr, ...]
+    kind: str = "f"
+
+
+Expr = Const | Local | Global | Op | Logic | Choose | Load | AddressOf | Invoke | Foreign | Callback
+
+
+def parts_of(expr: Expr) -> Iterator[Expr]:
+    """Yield an expression and all its parts, from left to right.
+
+    Parameters
+    ----------
+    expr : Expr
+        Any expression.
+
+    Yields
+    ------
+    Expr
+        The expression itself first.
+
+    Examples
+    --------
+    >>> total = Op("f", "+", (Local("f", "a"), Const("f", 1.0)))
+    >>> [type(each).__name__ for each in parts_of(total)]
+    ['Op', 'Local', 'Const']
+    """
+    yield expr
+    below: tuple[Expr, ...] = ()
+    match expr:
+        case Op(operands=parts) | Invoke(arguments=parts):
+            below = parts
+        case Foreign(arguments=parts) | Callback(arguments=parts):
+            below = parts
+        case Logic(left=left, right=right):
+            below = left, right
+        case Choose(test=test, yes=yes, no=no):
+            below = test, yes, no
+        case Load(address=address) | AddressOf(address=address):
+            below = (address.base,) if address.index is None else (address.base, address.index)
+    for part in below:
+        yield from parts_of(part)
+
+
+def locals_in(expr: Expr) -> Iterator[Local]:
+    """Yield the locals that an expression reads.
+
+    Parameters
+    ----------
+    expr : Expr
+        Any expression.
+
+    Yields
+    ------
+    Local
+        From left to right.
+
+    Examples
+    --------
+    >>> [each.name for each in locals_in(Op("f", "+", (Local("f", "a"), Local("f", "b"))))]
+    ['a', 'b']
+    """
+    return (part for part in parts_of(expr) if isinstance(part, Local))
+
+
+# --------------------------------------------------------------------------- statements
+@dataclass(frozen=True)
+class Set:
+    """Assign to a local."""
+
+    target: Local
+    value: Expr
+
+
+@dataclass(frozen=True)
+class SetMany:
+    """Assign several results of a call to locals."""
+
+    targets: tuple[Local, ...]
+    call: Invoke
+
+
+@dataclass(frozen=True)
+class Put:
+    """Write to memory."""
+
+    kind: str
+    address: Address
+    value: Expr
+
+
+@dataclass(frozen=True)
+class Do:
+    """Call a function that returns nothing."""
+
+    call: Expr
+
+
+@dataclass(frozen=True)
+class If:
+    """A branch."""
+
+    test: Expr
+    body: tuple[Statement, ...]
+    orelse: tuple[Statement, ...]
+
+
+@dataclass(frozen=True)
+class While:
+    """A loop."""
+
+    test: Expr
+    body: tuple[Statement, ...]
+
+
+@dataclass(frozen=True)
+class For:
+    """A loop over a range with a constant step; the limit is evaluated once."""
+
+    target: Local
+    start: Expr
+    stop: Expr
+    step: int
+    body: tuple[Statement, ...]
+
+
+@dataclass(frozen=True)
+class Break:
+    """Leave the innermost loop."""
+
+
+@dataclass(frozen=True)
+class Continue:
+    """Begin the next turn of the innermost loop."""
+
+
+@dataclass(frozen=True)
+class Return:
+    """Return numbers."""
+
+    values: tuple[Expr, ...]
+
+
+Statement = Set | SetMany | Put | Do | If | While | For | Break | Continue | Return
+
+
+# --------------------------------------------------------------------------- modules
+@dataclass(frozen=True)
+class Function:
+    """A function; entries can be called from outside.
+
+    Parameters
+    ----------
+    name : str
+        Unique in its module.
+    parameters : tuple of Local
+        Numbers and addresses.
+    results : str
+        The kinds of what it returns, one letter each.
+    variables : tuple of Local
+        Its other locals.
+    body : tuple of Statement
+        What it does.
+    entry : bool
+        Whether it can be called from outside.
+    """
+
+    name: str
+    parameters: tuple[Local, ...]
+    results: str
+    variables: tuple[Local, ...]
+    body: tuple[Statement, ...]
+    entry: bool = False
+
+
+@dataclass(frozen=True)
+class Table:
+    """Constants in memory."""
+
+    name: str
+    kind: str
+    values: tuple[Any, ...]
+
+
+@dataclass
+class Module:
+    """Functions in the order in which they are needed, and tables."""
+
+    functions: list[Function] = field(default_factory=list)
+    tables: list[Table] = field(default_factory=list)
+    callbacks: int = 0

@@ -1,0 +1,195 @@
+"""What names stand for while a function is translated: numbers, arrays, records, Python objects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from integrators.machine_code.tree import (
+    SIZES,
+    Address,
+    AddressOf,
+    Const,
+    Expr,
+    Global,
+    Load,
+    Local,
+    Op,
+)
+
+__all__ = ["Array", "Fixed", "Number", "Record", "Value", "leaves", "plus", "substituted", "times"]
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number."""
+
+    expr: Expr
+
+
+@dataclass(frozen=True)
+class Array:
+    """A view of memory, row by row.
+
+    Parameters
+    ----------
+    kind : str
+        Of its entries.
+    dims : tuple of Expr
+        Its lengths.
+    base : Expr
+        An address.
+    offset : int
+        Bytes from there.
+    index : Expr, optional
+        Further entries from there.
+    """
+
+    kind: str
+    dims: tuple[Expr, ...]
+    base: Expr
+    offset: int = 0
+    index: Expr | None = None
+
+    @property
+    def address(self) -> Address:
+        """Where it begins."""
+        return Address(self.base, self.offset, self.index, SIZES[self.kind])
+
+    def at(self, place: Expr) -> Array | Number:
+        """Return an entry, or a row of a table."""
+        step = place
+        for length in self.dims[1:]:
+            step = times(step, length)
+        offset, index = self.offset, self.index
+        if isinstance(step, Const):
+            offset += SIZES[self.kind] * step.value
+        else:
+            index = step if index is None else plus(index, step)
+        row = replace(self, dims=self.dims[1:], offset=offset, index=index)
+        return row if row.dims else Number(Load(self.kind, row.address))
+
+
+@dataclass(frozen=True)
+class Record:
+    """A named tuple, or a tuple whose names are its places."""
+
+    cls: Any  # the class of a named tuple, or tuple
+    fields: Mapping[str, Value]
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """A Python object known while translating: a function, a class, a module."""
+
+    value: Any
+
+
+Value = Number | Array | Record | Fixed
+
+
+def plus(a: Expr, b: Expr) -> Expr:
+    """Return a sum of integers.
+
+    Examples
+    --------
+    >>> plus(Const("i", 2), Const("i", 3)).value
+    5
+    """
+    if isinstance(a, Const) and isinstance(b, Const):
+        return Const("i", a.value + b.value)
+    if isinstance(a, Const) and a.value == 0:
+        return b
+    if isinstance(b, Const) and b.value == 0:
+        return a
+    return Op("i", "+", (a, b))
+
+
+def times(a: Expr, b: Expr) -> Expr:
+    """Return a product of integers.
+
+    Examples
+    --------
+    >>> times(Const("i", 1), Local("i", "n")).name
+    'n'
+    """
+    if isinstance(a, Const) and isinstance(b, Const):
+        return Const("i", a.value * b.value)
+    if isinstance(a, Const) and a.value == 1:
+        return b
+    if isinstance(b, Const) and b.value == 1:
+        return a
+    return Op("i", "*", (a, b))
+
+
+def leaves(value: Value) -> Iterator[Number | Array | Fixed]:
+    """Yield the numbers, arrays and objects that a value is made of, in order.
+
+    Parameters
+    ----------
+    value : Value
+        A record is taken apart.
+
+    Yields
+    ------
+    Number, Array or Fixed
+        At least one, unless it is an empty record.
+
+    Examples
+    --------
+    >>> one, two = (Number(Const("i", each)) for each in (1, 2))
+    >>> [each.expr.value for each in leaves(Record(tuple, {"0": one, "1": two}))]
+    [1, 2]
+    """
+    if isinstance(value, Record):
+        for part in value.fields.values():
+            yield from leaves(part)
+    else:
+        yield value
+
+
+def substituted(part: Any, given: Mapping[Local, Expr]) -> Any:
+    """Return a value, or an expression in one, with locals replaced.
+
+    Parameters
+    ----------
+    part : Value or Expr
+        Expressions that would have been assigned to a local are not expected.
+    given : mapping of Local to Expr
+        What takes their places.
+
+    Returns
+    -------
+    Value or Expr
+        Of the same class.
+
+    Examples
+    --------
+    >>> substituted(Number(Local("i", "n")), {Local("i", "n"): Const("i", 5)}).expr.value
+    5
+    """
+    if not given:
+        return part
+    match part:
+        case Local():
+            return given.get(part, part)
+        case Op(operands=parts):
+            return replace(part, operands=tuple(substituted(each, given) for each in parts))
+        case Load(address=address) | AddressOf(address=address):
+            return replace(part, address=substituted(address, given))
+        case Address(base=base, index=index) | Array(base=base, index=index):
+            index = None if index is None else substituted(index, given)
+            moved = replace(part, base=substituted(base, given), index=index)
+            if isinstance(moved, Array):
+                dims = tuple(substituted(each, given) for each in moved.dims)
+                return replace(moved, dims=dims)
+            return moved
+        case Number(expr=inner):
+            return Number(substituted(inner, given))
+        case Record(fields=fields):
+            changed = {name: substituted(each, given) for name, each in fields.items()}
+            return replace(part, fields=changed)
+        case Const() | Global() | Fixed():
+            return part
+    raise AssertionError(part)  # anything else would have been assigned to a local before

@@ -1,0 +1,509 @@
+"""Translated functions compute what Python computes, to the last bit, through LLVM and through C99.
+
+Each function below uses a part of the subset. Random arguments come from a seed that is printed
+when a comparison fails.
+"""
+
+import ctypes
+import linecache
+import math
+import shutil
+import struct
+import subprocess
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+pytest.importorskip("llvmlite")
+
+from integrators.machine_code import objects
+from integrators.machine_code.c99 import c99_text
+from integrators.machine_code.layout import Block, Column, Layout
+from integrators.machine_code.llvm import llvm_text
+from integrators.machine_code.translate import HostFunction, TranslationError, Translator
+from integrators.machine_code.tree import Local
+from integrators.machine_code.values import Number
+
+SIZE = 5
+INFINITY = float("inf")
+WEIGHTS = (0.25, -1.5, 3.0, 0.125, 7.0)
+ROWS = ((1.0,), (2.0, 3.0), (4.0, 5.0, 6.0))
+
+
+class Pair(NamedTuple):
+    first: list[float]
+    second: list[float]
+
+
+class Given(NamedTuple):
+    x: list[float]
+    y: list[float]
+    i: list[int]
+    flags: list[bool]
+    table: list[list[float]]
+    out: list[float]
+    whole: list[int]
+    scale: float
+    count: int
+
+
+class Window(NamedTuple):
+    part: list[float]
+    factor: float
+    count: int
+
+
+def arithmetic(g):
+    for j in range(len(g.out)):
+        a, b = g.x[j], g.y[j]
+        g.out[j] = (a + b) * 3 - a / b + -a * g.scale
+    return 0
+
+
+def conversions(g):
+    for j in range(len(g.out)):
+        g.out[j] = int(g.x[j] * 10.0) / 3 + g.i[j] * 2 + abs(g.i[j]) - abs(g.x[j])
+        g.whole[j] = g.i[j] // 3 + g.i[j] % 4 + (g.i[j] & 6 | 1) + (g.i[j] ^ 5) + (g.count << 2)
+    return g.whole[0]
+
+
+def choices(g):
+    for j in range(len(g.out)):
+        a, b = g.x[j], g.y[j]
+        low = min(a, b, 0.5)
+        high = max(a, float(g.i[j]))
+        g.out[j] = low if a < b else high
+        if 0.0 < a <= 1.0:
+            g.out[j] += 1.0
+        elif not (g.flags[j] or a == b) and g.i[j] in (1, 2, 3):
+            g.out[j] -= 1.0
+        else:
+            g.out[j] = -g.out[j]
+    return 0
+
+
+def undefined(g):
+    for j in range(len(g.out)):
+        zero = g.x[j] - g.x[j]
+        nan = zero / zero
+        g.out[j] = min(nan, 1.0) if nan != nan else 2.0
+        g.whole[j] = 1 if nan < 1.0 or not nan >= 1.0 else 0
+        g.out[j] += 1.0 / zero if g.x[j] > 0.0 else -INFINITY
+    return 0
+
+
+def functions(g):
+    for j in range(len(g.out)):
+        u = abs(g.x[j]) + 0.1
+        a = math.exp(-u) + math.log(u) + math.sin(g.x[j]) + math.cos(g.y[j]) + math.tanh(g.x[j])
+        g.out[j] = a + math.atan(u) + math.asinh(u) + math.sqrt(u) + u**0.5 + math.pow(u, 2.0)
+    return 0
+
+
+def loops(g):
+    total, steps = 0.0, 0
+    while True:
+        steps += 1
+        if steps % 3 == 0:
+            continue
+        if steps > 20:
+            break
+        for j in range(1, len(g.x), 2):
+            total += g.x[j] * steps
+            if total > 50.0:
+                break
+    for u in g.y[: g.count]:
+        total -= u
+    while total > g.scale and steps < 100:
+        total *= 0.5
+        steps += 1
+    g.out[0] = total
+    return steps
+
+
+def both_of(a, b):
+    if a < b:
+        return a, b
+    return b, a
+
+
+def turned(pair, scale):
+    return Pair(pair.second, pair.first)
+
+
+def window(g, count):
+    factor = 2.0 * g.scale
+    return Window(g.x[:count], factor, count)
+
+
+def longer(g):
+    count = 0
+    for j in range(len(g.flags)):
+        if g.flags[j]:
+            count += 1
+    return window(g, count)
+
+
+def records(g):
+    pair = turned(Pair(g.x, g.y), g.scale)
+    first, second = pair
+    low, high = both_of(first[0], second[1])
+    g.out[0] = low - 2.0 * high
+    w = longer(g)
+    if g.flags[0]:
+        w = window(g, 1)
+    for u in w.part:
+        g.out[1] += u * w.factor
+    for j in (0, 2):
+        g.out[j] += second[j]
+    g.out[3], g.out[4] = g.out[4], g.out[3]
+    return len(w.part) + w.count
+
+
+def tables(g):
+    for r in range(len(g.table)):
+        row = g.table[r]
+        for c in range(len(row)):
+            row[c] = row[c] * WEIGHTS[c] + ROWS[r][0]
+        g.out[r] = row[-1]
+        picked = ROWS[r] if r < 2 else WEIGHTS
+        g.out[r] += picked[0]
+    g.whole[-1] |= 12
+    g.whole[0] = g.whole[1] = 7
+    return 0
+
+
+def applied(f, x, out):
+    for j in range(len(x)):
+        out[j] = f(x[j], j)
+
+
+def scaled(u, j):
+    return u * j
+
+
+def passed(g):
+    applied(scaled, g.x, g.out)
+    return 0
+
+
+def lengths(g):
+    """A variable has its present length where it is read, also before its last assignment."""
+    part, total = g.x, 0
+    for j in range(4):
+        total = 10 * total + len(part)
+        part = g.x[:j]
+        if j == 1:
+            part = g.y
+    w = Window(g.x, 1.0, 2)
+    for j in range(3):
+        g.out[j] += w.factor * w.part[0] + len(w.part)
+        w = Window(g.y[: j + 1], -0.0, j)
+        if j > 0:
+            w = Window(g.x, g.scale, 5)
+    return total + w.count
+
+
+def signs_of(zero, out, j):
+    out[j] = 1.0 / (zero if zero < 0.0 else math.atan2(zero, -1.0))
+
+
+def zeros(g):
+    """The two zeros are two constants."""
+    signs_of(0.0, g.out, 0)
+    signs_of(-0.0, g.out, 1)
+    w = Window(g.x, 0.0, 0)
+    if g.flags[0]:
+        w = Window(g.x, -0.0, 0)
+    g.out[2] = math.atan2(w.factor, -1.0)
+    return 0
+
+
+def longer_of(g, j):
+    if j > 1:
+        return g.x, 1.5
+    if j > 0:
+        return g.y, 2
+    return g.x[:j], 0.0
+
+
+def returns(g):
+    """What is returned may be one or the other."""
+    total = 0
+    for j in range(3):
+        part, factor = longer_of(g, j)
+        both = longer_of(g, 2 - j)
+        total = 10 * total + len(part) + len(both[0])
+        for u in part:
+            g.out[j] += u * factor - both[1]
+    return total
+
+
+def now_and_later(g):
+    """What was read stays as it was."""
+    g.whole[0], g.whole[1] = 1, 0
+    row = g.table[g.whole[0]]
+    w = (g.whole[0], row[0])
+    g.whole[0] = 2
+    g.out[0] = row[1] + w[0] + w[1]
+    head = first_of(g.x, g.whole[0])
+    g.whole[0] = 4
+    last = 0
+    for j in (1, 2, 3):
+        if g.i[j] > 0:
+            last = j
+            found = 2 * j
+            g.out[1] += found
+    a, b = g.x, g.y
+    for j in range(3):
+        a, b = b, a
+        g.out[2] += a[j] - 2.0 * b[j]
+    return 100 * len(head) + last
+
+
+def first_of(x, count):
+    return x[:count]
+
+
+def raised(g):
+    g.whole[2] += 1
+    return g.whole[2]
+
+
+def once(g):
+    """Calls happen once, in their order."""
+    g.whole[2] = 0
+    inside = 0 <= raised(g) < 2 and g.i[0] < 3
+    g.x[raised(g)] = g.y[g.whole[2] - 2]
+    g.whole[raised(g) - 3] = raised(g) - g.whole[2]
+    if raised(g) in (1, 5, 6):
+        g.out[0] = 1.0
+    return g.whole[2] + inside
+
+
+def last_turn(g, i):
+    for j in range(g.count):
+        g.out[j] += 1.0
+    for i in range(3):
+        g.out[i] += 1.0
+    for i in range(2, 2):
+        g.out[i] += 1.0
+    for k in range(0, 5, 2):
+        if g.flags[k]:
+            break
+    g.out[i] = 7.0
+    g.out[k] -= 8.0
+    return i
+
+
+def after_loops(g):
+    """A loop's variable keeps its last value."""
+    return last_turn(g, g.count) + 10 * last_turn(g, 0)
+
+
+CASES = [
+    arithmetic, conversions, choices, undefined, functions, loops, records, tables, passed,
+    lengths, zeros, returns, now_and_later, once,
+    after_loops,
+]  # fmt: skip
+
+
+def given(seed: int) -> Given:
+    """Return random arguments as lists."""
+    rng = np.random.default_rng(seed)
+    return Given(
+        x=rng.normal(0.0, 2.0, SIZE).tolist(),
+        y=rng.normal(0.0, 2.0, SIZE).tolist(),
+        i=rng.integers(-9, 9, SIZE).tolist(),
+        flags=rng.integers(0, 2, SIZE).astype(bool).tolist(),
+        table=rng.normal(0.0, 2.0, (3, SIZE)).tolist(),
+        out=rng.normal(0.0, 2.0, SIZE).tolist(),
+        whole=rng.integers(-9, 9, SIZE).tolist(),
+        scale=float(rng.normal()),
+        count=int(rng.integers(0, SIZE)),
+    )
+
+
+def plainly(function, arguments: Given) -> int:
+    """Call a function as Python, with numbers that do not raise."""
+    with np.errstate(all="ignore"):
+        wide = Given(*([np.float64(u) for u in part] if name in ("x", "y") else part
+                       for name, part in zip(Given._fields, arguments, strict=True)))  # fmt: skip
+        result = function(wide)
+    for name in ("x", "y"):
+        getattr(arguments, name)[:] = [float(u) for u in getattr(wide, name)]
+    return int(result)
+
+
+def bits(arguments: Given) -> list[bytes]:
+    """Return all arrays bit for bit."""
+    parts = [arguments.out, *arguments.table, arguments.whole]
+    return [struct.pack(f"<{len(p)}d", *map(float, p)) for p in parts]
+
+
+def module_of(function, inside: bool):
+    layout = Layout(given(0), callable, inside=inside)
+    translator = Translator()
+    translator.entry("entry", function, [layout.value])
+    return layout, translator.module
+
+
+def in_llvm(module):
+    library = objects.Library(objects.compiled(llvm_text(module)))
+    return library, library.address("entry")
+
+
+def in_c(module, folder):
+    (folder / "text.c").write_text(c99_text(module))
+    command = ["cc", "-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wno-unused", "-Werror",
+               "-fPIC", "-shared", "text.c", "-o", "text.so", "-lm"]  # fmt: skip
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    library = ctypes.CDLL(str(folder / "text.so"))
+    return library, ctypes.cast(library.entry, ctypes.c_void_p).value
+
+
+@pytest.mark.parametrize("inside", [True, False], ids=["inside", "outside"])
+@pytest.mark.parametrize("printer", ["llvm", "c99"])
+@pytest.mark.parametrize("function", CASES, ids=lambda each: each.__name__)
+def test_same_bits(function, printer, inside, tmp_path):
+    if printer == "c99" and shutil.which("cc") is None:
+        pytest.skip("there is no C compiler")
+    layout, module = module_of(function, inside)
+    library, address = in_llvm(module) if printer == "llvm" else in_c(module, tmp_path)
+    call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(address)
+    for seed in range(40):
+        expected = given(seed)
+        result = plainly(function, expected)
+        block = Block(layout, given(seed))
+        block.update(block.contents)
+        assert call(block.address) == result, f"given({seed})"
+        assert bits(block.contents) == bits(expected), f"given({seed})"
+    assert library
+
+
+def asks(g):
+    for j in range(len(g.out)):
+        g.out[j] = signal(g.x[j]) + 1.0
+    return 0
+
+
+signal = HostFunction(0)
+
+
+def test_a_host_function_is_called():
+    layout, module = module_of(asks, True)
+    library, address = in_llvm(module)
+    thunk = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(lambda t: 3.0 * t)
+    place = ctypes.c_void_p.from_address(library.variable("callbacks"))
+    place.value = ctypes.cast(thunk, ctypes.c_void_p).value
+    block = Block(layout, given(1))
+    block.update(block.contents)
+    ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(address)(block.address)
+    assert block.contents.out.tolist() == [3.0 * u + 1.0 for u in given(1).x]
+
+
+@pytest.mark.parametrize("new", ["u - 1.0", "u + 2.0", "abs(u)"])
+def test_a_text_that_has_changed_since_it_was_loaded_is_refused(new, tmp_path, monkeypatch):
+    path = tmp_path / "changed.py"
+    path.write_text("def function(u):\n    return u + 1.0\n")
+    names = {}
+    exec(compile(path.read_text(), str(path), "exec"), names)
+    assert Translator().translated(names["function"], [Number(Local("f", "u"))]).slots
+    path.write_text(f"def function(u):\n    return {new}\n")
+    linecache.checkcache()
+    linecache.cache.pop(str(path), None)
+    with pytest.raises(TranslationError, match="has changed since it was loaded"):
+        Translator().translated(names["function"], [Number(Local("f", "u"))])
+
+
+def columns_of(column, factor):
+    total = 0.0
+    for j in range(len(column)):
+        total += column[j] * factor
+    column[0] = total
+    return len(column)
+
+
+def test_a_column_may_change_between_calls():
+    example = (Column(), 2.0)
+    layout = Layout(example, callable)
+    translator = Translator()
+    translator.entry("entry", columns_of, list(layout.value.fields.values()))
+    library = objects.Library(objects.compiled(llvm_text(translator.module)))
+    call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(library.address("entry"))
+    block = Block(layout, example)
+    for length in (3, 10):
+        column = np.arange(1.0, length + 1.0)
+        total = 2.0 * column.sum()
+        block.update((column, 2.0))
+        assert call(block.address) == length
+        assert column[0] == total
+
+
+# --------------------------------------------------------------------------- what is refused
+def unknown_statement(g):
+    raise ValueError(g.count)
+
+
+def unknown_call(g):
+    g.out[0] = round(g.x[0])
+    return 0
+
+
+def unknown_name(g):
+    g.out[0] = nowhere  # noqa: F821
+    return 0
+
+
+def wrong_kind(g):
+    g.whole[0] = g.x[0]
+    return 0
+
+
+def own_variable(g):
+    for j in range(3):
+        j = j + 1
+    return 0
+
+
+def no_value(g):  # noqa: RET503
+    if g.count > 3:
+        return 0
+    g.out[0] = 1.0
+
+
+def two_kinds(g):
+    w = Pair(g.x, g.y)
+    w = Window(g.x, 1.0, 2)
+    return w.count
+
+
+def two_results(g):
+    if g.count > 3:
+        return g.x
+    return g.count
+
+
+@pytest.mark.parametrize(
+    ("function", "line"),
+    [
+        (unknown_statement, "raise ValueError(g.count)"),
+        (unknown_call, "g.out[0] = round(g.x[0])"),
+        (unknown_name, "g.out[0] = nowhere  # noqa: F821"),
+        (wrong_kind, "g.whole[0] = g.x[0]"),
+        (own_variable, "for j in range(3):"),
+        (no_value, "def no_value(g):  # noqa: RET503"),
+        (two_kinds, "w = Window(g.x, 1.0, 2)"),
+        (two_results, "return g.count"),
+    ],
+    ids=lambda each: getattr(each, "__name__", None),
+)
+def test_an_error_names_the_line(function, line):
+    with pytest.raises(TranslationError) as caught:
+        module_of(function, True)
+    assert caught.value.line == line
+    number = function.__code__.co_firstlineno
+    lines = [f"line {number + k}, in {function.__name__}" for k in range(4)]
+    assert any(caught.value.place.endswith(each) for each in lines)
