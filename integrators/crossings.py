@@ -50,6 +50,8 @@ FOR_A_SIGN, FOR_A_GUARD, WAITING = 1, 2, 4
 # Bend of a margin over a step, as a share of its size, that limits the step's growth where nothing
 # else does. A sine is then sampled every 2 radians or more often.
 MOST_BENT = 0.1
+# A margin above this is not below zero: there is no number between them. So one comparison decides.
+JUST_BELOW = -5e-324
 DEEPEST = 8  # halvings of a step: windows down to 1/256 of it are found
 
 
@@ -73,7 +75,7 @@ class Watched(NamedTuple):
     active: list[int]  # those indices
     truth: list[bool]  # truth values at the arc's start, shape (r,)
     changed: list[int]  # whether the value was different where the arc ended, shape (r,)
-    strict: list[bool]  # shape (r,)
+    above: Vector  # true where the margin is above this, shape (r,); see JUST_BELOW
     start: Vector  # margins at the step's start, shape (r,)
     end: Vector  # ... at its end
     search: Search
@@ -120,13 +122,14 @@ def watched(strict: list[bool], size: int) -> Watched:
         places=[0.0] * (DEEPEST + 1),
         depths=[0] * (DEEPEST + 1),
     )
-    return Watched([0] * r, [0] * r, [], [False] * r, [0] * r, strict, vector(), vector(), search)
+    above = [0.0 if each else JUST_BELOW for each in strict]
+    return Watched([0] * r, [0] * r, [], [False] * r, [0] * r, above, vector(), vector(), search)
 
 
 def listed(w: Watched, count: int) -> Watched:
     """Return the relations with the first `count` indices in `room` as the active ones."""
     return Watched(
-        w.watch, w.room, w.room[:count], w.truth, w.changed, w.strict, w.start, w.end, w.search
+        w.watch, w.room, w.room[:count], w.truth, w.changed, w.above, w.start, w.end, w.search
     )
 
 
@@ -145,10 +148,9 @@ def any_changed(w: Watched, margin: Vector) -> bool:
     bool
         True at the first difference.
     """
-    truth, strict = w.truth, w.strict
+    truth, above = w.truth, w.above
     for r in w.active:
-        g = margin[r]
-        if (g > 0.0 or (g == 0.0 and not strict[r])) != truth[r]:
+        if (margin[r] > above[r]) != truth[r]:
             return True
     return False
 
@@ -194,7 +196,7 @@ def is_quiet_step(motion: Motion, now: Now, t_new: float, scratch: Scratch, w: W
     for j in range(len(y)):
         middle[j] = 0.5 * (y[j] + y_new[j]) + 0.125 * h * (f[j] - f_new[j])
     margins(t + 0.5 * h, middle, mode, p, w.watch, probe)
-    return not any_changed(w, probe) and _is_quiet(w, w.start, probe, w.end)
+    return _is_quiet(w, w.start, probe, w.end)
 
 
 def longest_next(motion: Motion, now: Now, t_new: float, scratch: Scratch, w: Watched) -> float:
@@ -296,7 +298,7 @@ def _bracket(
             guess = high
             for r in w.active:
                 b = search.high[r]
-                if (b > 0.0 or (b == 0.0 and not w.strict[r])) != w.truth[r]:
+                if (b > w.above[r]) != w.truth[r]:
                     a = search.low[r]
                     if a != b:
                         guess = min(guess, low + (high - low) * (a / (a - b)))
@@ -347,9 +349,14 @@ def _search(path: Path, quiet: float, w: Watched) -> tuple[float, float]:
 
 
 def _is_quiet(w: Watched, left: Vector, middle: Vector, right: Vector) -> bool:
-    """Return whether no margin can have changed between three unchanged points."""
-    truth = w.truth
+    """Return whether no margin can have changed at or between three points.
+
+    Unchanged at both ends.
+    """
+    truth, above = w.truth, w.above
     for r in w.active:
+        if (middle[r] > above[r]) != truth[r]:
+            return False
         sign = -1.0 if truth[r] else 1.0  # makes an unchanged margin negative
         a, m, b = sign * left[r], sign * middle[r], sign * right[r]
         first, second = m - a, b - m

@@ -48,6 +48,7 @@ __all__ = [
     "TooManySteps",
     "buffers",
     "events",
+    "plan_of",
     "run",
     "state_of",
     "take_rows",
@@ -368,7 +369,7 @@ def buffers(
     size, n, surfaces = len(y), len(mode), equations.surfaces
     # After the relations of the equations, those that end a slide: sigma <= 1 and sigma >= -1.
     strict = equations.strict + [False] * (2 * min(len(surfaces.sign), MOST_SLIDING))
-    plan = _plan(equations, t, t_end, options, n)
+    plan = plan_of(equations, t, t_end, options, n)
     times = options.times
     if capacity is None:
         capacity = ROWS_AT_ONCE if times is None else len(times)
@@ -413,7 +414,23 @@ def buffers(
     )
 
 
-def _plan(equations: Equations, t: float, t_end: float, options: Options, machines: int) -> Plan:
+def plan_of(
+    equations: Equations, t: float, t_end: float, options: Options, machines: int
+) -> Plan:
+    """Return the settings of a run in the form that the kernel uses.
+
+    Parameters
+    ----------
+    equations, t, t_end, options
+        As in `run`.
+    machines : int
+        Their number.
+
+    Returns
+    -------
+    Plan
+        Made of lists.
+    """
     # A SciPy solver needs no coefficients, but the loop's signature requires them.
     tableau = options.method if isinstance(options.method, Tableau) else EULER
     ticks = {s: bits for s, bits in equations.ticks.items() if t <= s < t_end}

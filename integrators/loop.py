@@ -293,7 +293,7 @@ def _rearm(
             margins_on(t, y, mode, on, watch, w.start)
     for r in w.active:
         g = w.start[r]
-        w.truth[r] = g > 0.0 or (g == 0.0 and not w.strict[r])
+        w.truth[r] = g > w.above[r]
     for k in range(len(surfaces.sign)):  # one met exactly is left on the side of its sign
         sign = held[surfaces.sign[k]]
         if watch[surfaces.above[k]] and sign != 0.0:
@@ -474,7 +474,7 @@ def _often_changed(
     often = False
     for r in w.active:
         g = probe[r]
-        if (g > 0.0 or (g == 0.0 and not w.strict[r])) != w.truth[r]:
+        if (g > w.above[r]) != w.truth[r]:
             changes[r] += 1
             often = often or changes[r] >= MOST_SWITCHES
             w.changed[r] = 1

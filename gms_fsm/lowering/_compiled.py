@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["check_llvmlite", "engine", "functions", "notify", "observe_rows", "packed", "store"]
 
 Packed = tuple[FloatArray, FloatArray, FloatArray]
+MOST_ENGINES = 256  # in memory
 _lock = threading.RLock()  # a sweep may compile from several threads
 
 
@@ -208,12 +209,19 @@ def observe_rows(
     return table
 
 
+_observers: dict[int, tuple[Any, Any, Any]] = {}
+
+
 def _observer(program: Program) -> tuple[Any, Any]:
     from integrators import compiled
 
-    layout = program.layout
+    layout, key = program.layout, id(program.functions)
     with _lock:
-        return compiled.observer(
+        if key in _observers:
+            return _observers[key][:2]
+        if len(_observers) >= MOST_ENGINES:
+            _observers.clear()
+        made = compiled.observer(
             _text(program),
             functions(program)["observe"],
             program.live,
@@ -223,3 +231,5 @@ def _observer(program: Program) -> tuple[Any, Any]:
             store(),
             notify,
         )
+        _observers[key] = *made, program.functions  # kept, so that the key stays theirs
+        return made

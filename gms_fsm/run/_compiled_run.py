@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,7 +30,7 @@ from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
 from integrators import hybrid, loop
-from integrators.advance import ROW, STEPS, Plan
+from integrators.advance import ROW, STEPS
 from integrators.columns import FIRINGS, STOPS, Log, Recorded
 from integrators.machine_code.layout import Block
 from integrators.sliding import Functions
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
 
 __all__ = ["CompiledRun"]
 
-MOST_ENGINES = 256
 STEPS_AT_ONCE = 20_000  # between two checks for Ctrl-C and two calls of progress
 
 
@@ -159,31 +159,26 @@ class Columns:
         self.start = start
         layout = start.program.layout
         size, modes = layout.y.size, layout.modes
-        given = compiled.packed(start.program.p) if p is None else p
-        self.engine, example, plan = _engine(start, given)
-        self.block = Block(self.engine.layout, example)
+        prepared = _prepared(start)
+        self.engine, self.block = prepared.engine, prepared.block()
         self.run_of: Run = self.block.contents
-        self.p = given
+        self.p = compiled.packed(start.program.p) if p is None else p
         few = max(16, min(1024, 4_000_000 // size))  # initial number of rows
         rows = {"all": few, "t_eval": len(start.options.times or ()), "end": 0}[start.output]
         stops = few if start.output == "t_eval" else 0
         floats: Any = np.empty  # the columns' fields are typed as lists; compiled code uses arrays
         ints: Any = functools.partial(np.zeros, dtype=np.int64)
-        numbers: Any = functools.partial(np.array, dtype=np.float64)
         b = self.run_of.buffers
-        self.buffers: hybrid.Buffers = b._replace(
-            plan=b.plan._replace(
-                jumps=numbers(plan.jumps),
-                before_jumps=numbers(plan.before_jumps),
-                ticks=_integers(plan.ticks),
-                knots=numbers(plan.knots),
-            ),
-            out=b.out._replace(
-                times=numbers(start.options.times or ()),
-                rows_t=floats(rows),
-                rows_y=floats((rows, size)),
-            ),
+        plan = hybrid.plan_of(
+            equations(start.program), start.t_start, start.last, start.options, len(start.mode)
         )
+        out = b.out._replace(
+            times=_floats(start.options.times or ()),
+            every_step=start.options.times is None,
+            rows_t=floats(rows),
+            rows_y=floats((rows, size)),
+        )
+        self.buffers: hybrid.Buffers = b._replace(plan=_as_arrays(plan, b.plan), out=out)
         self.log: Log = self.run_of.log._replace(
             t=floats(256),
             machine=ints(256),
@@ -196,6 +191,7 @@ class Columns:
             stops_y=floats((stops, size)),
             stops_mode=ints((stops, modes)),
         )
+        self._begin()
         if stops:
             self.log.stops_t[0], self.log.stops_y[0] = start.t_start, self.buffers.now.y
             self.log.stops_mode[0] = list(layout.not_sliding(start.mode))
@@ -222,12 +218,19 @@ class Columns:
         self.p = compiled.packed(self.start.program.p)
         self.empty()
 
+    def _begin(self) -> None:
+        """Write the start into the buffers, which are otherwise as they were at the beginning."""
+        start = self.start
+        b: Any = self.buffers  # arrays
+        b.now.clock[:] = hybrid.beginning(start.t_start, start.last)
+        b.now.y[:], b.now.mode[:], b.memory.anchor[:] = start.y, start.mode, start.y
+        b.now.floor[:] = start.options.atol
+
     def empty(self) -> None:
         """Empty the columns and return to the start."""
         start, log = self.start, self.log
         b: Any = self.buffers  # arrays
-        now, memory, sliding = b.now, b.memory, b.sliding
-        now.clock[:] = hybrid.beginning(start.t_start, start.last)
+        memory, sliding = b.memory, b.sliding
         for counts in (
             memory.counts,
             memory.switches,
@@ -239,9 +242,9 @@ class Columns:
             sliding.arrived,
         ):
             counts[:] = 0
-        now.y[:], now.mode[:], memory.anchor[:] = start.y, start.mode, start.y
+        self._begin()
         sliding.live[:] = start.program.live
-        b.plan.control.atol[:] = now.floor[:] = start.options.atol
+        b.plan.control.atol[:] = start.options.atol
         control = b.plan.control._replace(time_scale=start.options.time_scale)
         self.buffers = b._replace(plan=b.plan._replace(control=control))
         log.counts[:] = [0, min(1, len(log.stops_t))]
@@ -366,35 +369,71 @@ class Columns:
         return start.trace(rows, stops, self.transitions())
 
 
-_engines: dict[Any, tuple[Engine, Any]] = {}
+@dataclass(frozen=True)
+class _Prepared:
+    """What runs of one kind have in common: machine code, and a block as it is at the beginning."""
+
+    engine: Engine
+    example: Run
+    first: Block
+    functions: Any  # kept, so that their `id` stays theirs
+
+    def block(self) -> Block:
+        """Return a block of its own for a run."""
+        return Block(self.engine.layout, self.example, self.first)
 
 
-def _engine(start: Start, p: compiled.Packed) -> tuple[Engine, Run, Plan]:
-    """Return the machine code of a run, an example of its arguments, and its plan."""
+_known: dict[Any, _Prepared] = {}
+
+
+def _prepared(start: Start) -> _Prepared:
+    """Return what a run has in common with others: what moves, the method, and the sizes."""
+    program = start.program
+    flow = "flow" if start.options.located else "flow_live"
+    key = id(program.functions), flow, start.options.method
+    if key not in _known:
+        if len(_known) >= compiled.MOST_ENGINES:
+            _known.clear()
+        run = _example(start, flow)
+        engine = compiled.engine(program, run)
+        first = Block(engine.layout, run)
+        _known[key] = _Prepared(engine, run, first, program.functions)
+    return _known[key]
+
+
+def _example(start: Start, flow: str) -> Run:
     from integrators.compiled import example
 
     program, layout = start.program, start.program.layout
-    flow = "flow" if start.options.located else "flow_live"
     made = compiled.functions(program)
-    b = hybrid.buffers(
-        equations(program), start.t_start, start.y, start.mode, start.last, start.options, 0
-    )
-    places: Any = p
-    run = example(
-        Functions(made[flow], made["arm"], made["margins"], made["normal"], places),
+    p: Any = compiled.packed(program.p)
+    return example(
+        Functions(made[flow], made["arm"], made["margins"], made["normal"], p),
         loop.Machines(made["switch"], made["act"], made["tick"], made["observe"]),
-        b,
+        hybrid.buffers(
+            equations(program), start.t_start, start.y, start.mode, start.last, start.options, 0
+        ),
         layout.observed.size,
         Recorded(*map(_integers, layout.recorded)),
         layout.modes,
     )
-    key = id(program.functions), flow, start.options.method
-    found = _engines.get(key)
-    if found is None:
-        if len(_engines) >= MOST_ENGINES:
-            _engines.clear()
-        found = _engines[key] = compiled.engine(program, run), program.functions
-    return found[0], run, b.plan
+
+
+def _as_arrays(plan: Any, places: Any) -> Any:
+    """Return a plan whose lists are arrays, those inside the block in their places."""
+    places.control.atol[:], places.discrete[:] = plan.control.atol, plan.discrete
+    return plan._replace(
+        control=plan.control._replace(atol=places.control.atol),
+        discrete=places.discrete,
+        jumps=_floats(plan.jumps),
+        before_jumps=_floats(plan.before_jumps),
+        ticks=_integers(plan.ticks),
+        knots=_floats(plan.knots),
+    )
+
+
+def _floats(numbers: Any) -> Any:
+    return np.array(numbers, dtype=np.float64)
 
 
 def _integers(numbers: Any) -> Any:

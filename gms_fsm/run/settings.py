@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-import itertools
+
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypedDict, Unpack
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 import integrators
@@ -263,11 +264,12 @@ def _check_count(max_steps: object) -> None:
 
 
 def _increasing(t_eval: ArrayLike) -> tuple[float, ...]:
-    wanted = as_floats(checked_array("t_eval", t_eval, None, "finite"))
-    for i, (one, after) in enumerate(itertools.pairwise(wanted)):
-        if after <= one:
-            raise ParameterError(
-                f"t_eval[{i}] = {one} is not before t_eval[{i + 1}] = {after}",
-                advice="times must increase",
-            )
-    return tuple(wanted)
+    wanted = checked_array("t_eval", t_eval, None, "finite")
+    wrong = np.flatnonzero(wanted[1:] <= wanted[:-1])
+    if wrong.size:
+        i = int(wrong[0])
+        raise ParameterError(
+            f"t_eval[{i}] = {wanted[i]} is not before t_eval[{i + 1}] = {wanted[i + 1]}",
+            advice="times must increase",
+        )
+    return tuple(as_floats(wanted))

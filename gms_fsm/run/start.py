@@ -291,8 +291,8 @@ def _wanted(chosen: Settings, t_start: float, t_end: float) -> list[float] | Non
     """Return the requested times, if any, after checking that all lie within the run."""
     if chosen.t_eval is None:
         return None
-    times = as_floats(np.asarray(chosen.t_eval))
-    for time in times:
+    times = list(chosen.t_eval)  # increasing
+    for time in (*times[:1], *times[-1:]):
         if not t_start <= time <= t_end:
             raise ParameterError(
                 f"t_eval has {time!r}, outside of t_start = {t_start!r} to t_end = {t_end!r}"

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import functools
 import typing
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -48,7 +48,7 @@ class Column:
     table: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Place:
     """A field of a block: the way to it in the named tuples, where it is, and what it is."""
 
@@ -57,6 +57,17 @@ class _Place:
     kind: str
     shape: tuple[int, ...] | None  # of an array inside the block
     lengths: int = 0  # of a column
+    width: int = 0  # of its rows
+
+    @functools.cached_property
+    def dtype(self) -> np.dtype[Any]:
+        """Of its entries."""
+        return _DTYPES[self.kind]
+
+    @functools.cached_property
+    def empty(self) -> Any:
+        """A column without entries."""
+        return np.zeros((0, self.width)[: 2 if self.width or self.lengths == 2 else 1], self.dtype)
 
 
 class Layout:
@@ -85,6 +96,12 @@ class Layout:
         self.arrays: list[_Place] = []
         self.columns: list[_Place] = []
         self.value = self._value(example, (), Local("p", "block"))
+
+    @functools.cached_property
+    def inner(self) -> frozenset[tuple[int, ...]]:
+        """The ways to named tuples that contain arrays."""
+        ways = [place.way for place in (*self.arrays, *self.columns)]
+        return frozenset(way[:k] for way in ways for k in range(1, len(way)))
 
     def _value(self, example: Any, way: tuple[int, ...], block: Expr) -> Record:
         names = getattr(example, "_fields", None) or tuple(map(str, range(len(example))))
@@ -132,7 +149,7 @@ class Layout:
         )
         if part.width is not None and not variable:
             dims = dims[0], Const("i", part.width)
-        self.columns.append(_Place(way, start, part.kind, None, lengths))
+        self.columns.append(_Place(way, start, part.kind, None, lengths, part.width or 0))
         self.words += 1 + lengths
         return Array(part.kind, dims, Load("p", Address(block, 8 * start)))
 
@@ -141,7 +158,6 @@ class Layout:
         return repr((self.words, self.numbers, self.arrays if self.inside else (), self.columns))
 
 
-@dataclass(eq=False)
 class Block:
     """The memory of one call.
 
@@ -150,14 +166,16 @@ class Block:
     layout : Layout
         Where everything is.
     example : named tuple or tuple
-        The first contents; its lists become arrays in memory.
+        Its lists become arrays in memory.
+    like : Block, optional
+        A block whose present contents are copied, instead of those of the example.
 
     Attributes
     ----------
     contents : named tuple or tuple
         Like the example, with arrays that are places in the block.
     address : int
-        Of its first byte.
+        What is passed to machine code.
 
     Examples
     --------
@@ -168,50 +186,25 @@ class Block:
     array([0. , 0.5])
     """
 
-    layout: Layout
-    example: Any
-    contents: Any = field(init=False)
-    address: int = field(init=False)
-
-    def __post_init__(self) -> None:
-        self._words = np.zeros(self.layout.words, dtype=np.int64)
+    def __init__(self, layout: Layout, example: Any, like: Block | None = None) -> None:
+        self.layout = layout
+        self._words = np.zeros(layout.words, dtype=np.int64) if like is None else like._words.copy()
         self._floats = self._words.view(np.float64)
-        self._bytes = self._words.view(np.uint8)
         self._columns: dict[tuple[int, ...], Any] = {}
-        self._outside: list[Any] = []  # arrays of the example that are not inside the block
-        self.address = self._words.ctypes.data
-        self.contents = self._filled(self.example, ())
-
-    def _filled(self, example: Any, way: tuple[int, ...]) -> Any:
-        places = {place.way: place for place in self.layout.arrays}
-        parts = []
-        for k, part in enumerate(example):
-            here = (*way, k)
-            if self.layout.known(part):
-                parts.append(part)
-            elif isinstance(part, tuple):
-                parts.append(self._filled(part, here))
-            elif isinstance(part, Column):
-                shape = (0,) if part.width is None else (0, part.width)
-                parts.append(np.zeros((0, 0) if part.table else shape, _DTYPES[part.kind]))
-            elif here in places:
-                array = self._place(places[here])
+        self.address: int = self._words.ctypes.data
+        made = {place.way: self._array(place) for place in layout.arrays}
+        if like is None or not layout.inside:
+            for way, array in made.items():
                 if array.size:
-                    array[...] = part
-                parts.append(array)
-            else:
-                parts.append(part)
-        made = getattr(type(example), "_make", type(example))
-        return made(parts)
+                    array[...] = _found(example if like is None else like.contents, way)
+        self._outside = [made[place.way] for place in layout.arrays if place.offset < 0]
+        made |= {place.way: place.empty for place in layout.columns if place.way not in made}
+        self.contents: Any = _rebuilt(example, (), made, layout.inner)
 
-    def _place(self, place: _Place) -> Any:
-        dtype, shape = _DTYPES[place.kind], place.shape or ()
+    def _array(self, place: _Place) -> Any:
         if place.offset < 0:
-            self._outside.append(np.zeros(shape, dtype))
-            return self._outside[-1]
-        start = 8 * place.offset
-        size = dtype.itemsize * int(np.prod(shape))
-        return self._bytes[start : start + size].view(dtype).reshape(shape)
+            return np.zeros(place.shape or (), place.dtype)
+        return np.ndarray(place.shape or (), place.dtype, self._words, 8 * place.offset)
 
     def update(self, contents: Any) -> None:
         """Write numbers, and where the columns are, before a call.
@@ -223,24 +216,38 @@ class Block:
         """
         words, floats, before = self._words, self._floats, self._columns
         for place in self.layout.numbers:
-            value = contents
-            for k in place.way:
-                value = value[k]
-            if place.kind == "f":
-                floats[place.offset] = value
-            else:
-                words[place.offset] = value
+            target = floats if place.kind == "f" else words
+            target[place.offset] = _found(contents, place.way)
         for place in self.layout.columns:
-            array = contents
-            for k in place.way:
-                array = array[k]
+            array = _found(contents, place.way)
             if before.get(place.way) is not array:
-                assert array.dtype == _DTYPES[place.kind]
-                assert array.flags.c_contiguous
+                assert array.dtype == place.dtype and array.flags.c_contiguous
                 before[place.way] = array
-                words[place.offset] = array.ctypes.data
-                for k in range(place.lengths):
-                    words[place.offset + 1 + k] = array.shape[k]
+                lengths = array.shape[: place.lengths]
+                words[place.offset : place.offset + 1 + place.lengths] = array.ctypes.data, *lengths
+
+
+def _found(contents: Any, way: tuple[int, ...]) -> Any:
+    for k in way:
+        contents = contents[k]
+    return contents
+
+
+def _rebuilt(
+    example: Any,
+    way: tuple[int, ...],
+    made: Mapping[tuple[int, ...], Any],
+    inner: frozenset[tuple[int, ...]],
+) -> Any:
+    """Return named tuples with some parts replaced."""
+    parts = []
+    for k, part in enumerate(example):
+        here = (*way, k)
+        if here in made:
+            parts.append(made[here])
+        else:
+            parts.append(_rebuilt(part, here, made, inner) if here in inner else part)
+    return getattr(type(example), "_make", type(example))(parts)
 
     def copy(self) -> list[Any]:
         """Return the numbers and the arrays of the example, but no columns.
