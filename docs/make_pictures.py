@@ -40,7 +40,7 @@ from gms_fsm.app.scenario import load_scenario, load_system
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.broken import BROKEN
 from plots import figures, panels
-from plots.schematic import schematic_figure
+from plots.mechanism import schematic_figure
 from plots.style import INK, LINE_GREY, PAPER, RC, TEXT_GREY, ramp
 
 FOLDER = Path(__file__).parent / "images"

@@ -18,7 +18,7 @@ from plots.mermaid import mermaid
 from plots.presets import preset
 from plots.render import render
 from plots.replay import replay, write_replay
-from plots.schematic import schematic
+from plots.mechanism import schematic
 from plots.statechart import statechart
 
 if TYPE_CHECKING:

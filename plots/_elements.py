@@ -103,7 +103,7 @@ def elements_at(
 
 
 def elements_figure(trace: Trace | None, row: int, elements: int, title: str) -> Figure:
-    """Draw the elements as a figure; see `plots.schematic.schematic_figure`."""
+    """Draw the elements as a figure; see `plots.mechanism.schematic_figure`."""
     with rc_context(RC):
         figure = Figure(layout="constrained")
         ax = figure.subplots()

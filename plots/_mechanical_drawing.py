@@ -42,7 +42,7 @@ FOOT = 90  # characters of a line below the drawing
 
 
 def mechanical_figure(system: System) -> Figure:
-    """Draw a system as a mechanism; see `plots.schematic.schematic`.
+    """Draw a system as a mechanism; see `plots.mechanism.schematic`.
 
     Parameters
     ----------

@@ -48,8 +48,8 @@ def places(
     from scipy.optimize import linprog
     from scipy.sparse import csr_array
 
-    n = len(wide)
-    if n == 1:
+    count = len(wide)
+    if count == 1:
         return [0.0]
     terms: list[tuple[dict[int, float], float, float]] = []  # |coefficients . x + constant|
     for upper, lower in segments:
@@ -63,17 +63,17 @@ def places(
     terms += [({a: -1.0, b: 1.0}, 0.0, NARROW) for a, b, _ in apart]
     rows: list[tuple[dict[int, float], float]] = []
     for k, (coefficients, constant, _) in enumerate(terms):
-        rows.append(({**coefficients, n + k: -1.0}, -constant))
-        rows.append(({**{i: -c for i, c in coefficients.items()}, n + k: -1.0}, constant))
+        rows.append(({**coefficients, count + k: -1.0}, -constant))
+        rows.append(({**{i: -c for i, c in coefficients.items()}, count + k: -1.0}, constant))
     rows += [({a: 1.0, b: -1.0}, -least) for a, b, least in apart]
     at = [(r, i, c) for r, (coefficients, _) in enumerate(rows) for i, c in coefficients.items()]
     where = np.array([(r, i) for r, i, _ in at]).T
-    matrix = csr_array(([c for *_, c in at], where), shape=(len(rows), n + len(terms)))
+    matrix = csr_array(([c for *_, c in at], where), shape=(len(rows), count + len(terms)))
     found = linprog(  # type: ignore[call-overload]  # matrices may be sparse
-        [*[0.0] * n, *(weight for *_, weight in terms)],
+        [*[0.0] * count, *(weight for *_, weight in terms)],
         A_ub=matrix,
         b_ub=[limit for _, limit in rows],
-        bounds=[(0, 1e6)] * (n + len(terms)),
+        bounds=[(0, 1e6)] * (count + len(terms)),
         method="highs",
     )
-    return [round(float(x), 1) for x in found.x[:n]]
+    return [round(float(x), 1) for x in found.x[:count]]

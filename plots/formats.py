@@ -183,7 +183,7 @@ def register(new: Format) -> None:
     >>> size = Format(".size", "graph", "a size", "me", lambda graph: b"%d" % len(graph.body))
     >>> register(size)
     >>> chosen("chart.size", "graph").write(statechart(LUGRE))
-    b'3'
+    b'4'
     >>> FORMATS.remove(size)
     """
     if any((old.ending, old.subject) == (new.ending, new.subject) for old in FORMATS):

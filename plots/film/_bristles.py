@@ -87,7 +87,8 @@ class Bristles:
         ax.set(xlim=(0, size[0]), ylim=(size[1], 0))
         ax.set_axis_off()
         self.names = [state.name[:LONGEST] for state in trace.model.chart.states]
-        self.left = 0.1 + WIDE * (len(f"E{trace.n} ") + max(map(len, self.names)))
+        label = f"E{trace.n} {max(self.names, key=len)}"
+        self.left = 0.1 + WIDE * len(label)
         self.wall = size[0] - NUMBERS - SLIDER
         self.height = row_height(len(self.elements))
         self.z = _deflection(curve)
@@ -210,15 +211,15 @@ class Bristles:
     def _ground_at(self, x: float) -> list[Any]:
         shift = -self.scale * x % PERIOD if np.isfinite(x) else 0.0
         step = PERIOD / TICKS
-        places = [(shift - PERIOD + n * step, n % TICKS) for n in range(int(self.wall / step) + 9)]
-        inside = [(at, n) for at, n in places if self.left + 0.06 <= at <= self.wall]
+        ticks = range(int(self.wall / step) + 9)
+        places = [(shift - PERIOD + tick * step, tick % TICKS) for tick in ticks]
+        inside = [(at, tick) for at, tick in places if self.left + 0.06 <= at <= self.wall]
         marks: list[Any] = []
         for k in range(len(self.elements)):
             floor = self._floor(k)
-            for at, n in inside:
-                deep = (
-                    0.24 if n == 0 else 0.11
-                ) * self.height  # one in six tells how far it has moved
+            for at, tick in inside:
+                share = 0.24 if tick == 0 else 0.11  # one in six tells how far it has moved
+                deep = share * self.height
                 marks.append([(at, floor), (at - 0.05, floor + deep)])
         return marks
 

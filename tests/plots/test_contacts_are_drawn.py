@@ -22,19 +22,10 @@ from plots._matplotlib import Axes, Figure
 
 FIGURES = ("overview", "ribbons_figure", "cascade_figure", "phase")
 LAGS = {"lag_between_ticks", "lag_over_period", "lag_over_time"}
-OTHERS = {
-    "cascade_window",
-    "difference",
-    "lettered",
-    "has_threshold",
-    "residual",
-    "shown",
-    "slip_bar",
-    *LAGS,
-}
+OTHERS = {"cascade_window", "difference", "has_threshold", "residual", "shown", "slip_bar", *LAGS}
 OF_AN_ELEMENT = {"landscape", "pins", "race"}
 UNFOLDED = {"Unfolded", "unfolded", "unfolded_force", "unfolded_states"}
-OTHERS |= {"arrows", "stribeck", *OF_AN_ELEMENT, *UNFOLDED}
+OTHERS |= {"arrows", "lettered", "stribeck", *OF_AN_ELEMENT, *UNFOLDED}
 PANELS = tuple(sorted({*panels.__all__} - OTHERS))
 
 

@@ -18,7 +18,7 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from plots import figures, panels
-from plots.schematic import schematic_figure
+from plots.mechanism import schematic_figure
 from tests.helpers import FIG4_SINE, ROOT, non_drifting, open_loop, pulled_mass, stick_slip
 
 pytestmark = pytest.mark.slow
@@ -148,7 +148,7 @@ def test_pyplot_is_never_imported() -> None:
 import sys
 from gms_fsm import GMS, GMSParameters, Prescribed, simulate
 from plots import figures
-from plots.schematic import schematic_figure
+from plots.mechanism import schematic_figure
 run = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.2"), 3.0)
 for number, make in enumerate((figures.overview, figures.ribbons_figure, schematic_figure)):
     figures.save(make(run), f"{sys.argv[1]}/{number}.png")

@@ -17,7 +17,7 @@ pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
 from matplotlib.figure import Figure
 
 from plots import _elements, figures, panels
-from plots.schematic import schematic_figure
+from plots.mechanism import schematic_figure
 from tests.helpers import open_loop, stick_slip
 
 
@@ -104,7 +104,9 @@ def test_figure_3_needs_one_force_per_row(run: Trace) -> None:
 
 
 def test_formats(run: Trace, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match=r"a\.bmp'; it must end in \.png, \.svg or \.pdf"):
+    with pytest.raises(
+        ParameterError, match=r"a\.bmp'; it must end in \.png, \.svg, \.pdf or \.pgf"
+    ):
         figures.save(Figure(), tmp_path / "a.bmp")
 
 

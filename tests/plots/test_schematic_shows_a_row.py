@@ -19,7 +19,7 @@ from matplotlib.patches import FancyArrowPatch, Rectangle
 from matplotlib.text import Text
 
 from plots import _elements
-from plots.schematic import schematic_figure
+from plots.mechanism import schematic_figure
 from plots.style import STATE_FILLS, element_colour, state_look
 from tests.helpers import pulled_mass
 from tests.plots.systems_to_draw import GMS12

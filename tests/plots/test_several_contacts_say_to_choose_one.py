@@ -21,7 +21,7 @@ ON_AXES = sorted(
     {*panels.__all__}
     - {"difference", "residual", "slip_bar"}
     - {"lag_between_ticks", "lag_over_period", "lag_over_time"}
-    - {"cascade_window", "has_threshold", "shown"}
+    - {"cascade_window", "has_threshold", "lettered", "shown"}
     - {"landscape", "pins", "race"}  # of one element
     - {"Unfolded", "arrows", "unfolded", "unfolded_force", "unfolded_states"}
 )

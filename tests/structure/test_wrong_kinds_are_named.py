@@ -170,7 +170,7 @@ def test_figures_need_a_trace(draw: str, wrong: Any) -> None:
     pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
     import plots
     from plots import figures, panels
-    from plots.schematic import schematic_figure
+    from plots.mechanism import schematic_figure
 
     calls: dict[str, Callable[[], object]] = {
         "overview": lambda: figures.overview(wrong),
