@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 from gms_fsm._extras import require
 from plots.block_diagram import block_diagram
 from plots.live_chart import LiveChart, live_statechart
+from plots.mechanism import schematic
 from plots.mermaid import mermaid
 from plots.presets import preset
 from plots.render import render
 from plots.replay import replay, write_replay
-from plots.mechanism import schematic
 from plots.statechart import statechart
 
 if TYPE_CHECKING:
