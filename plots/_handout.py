@@ -99,6 +99,10 @@ def handout_figure(
     model: Model, *, velocity: str | None = None, t_end: float | None = None
 ) -> Figure:
     """Return the page of `handout` as a figure; its parameters and errors are the same."""
+    if not (hasattr(model, "chart") and hasattr(model, "weights")):
+        raise ParameterError(
+            f"model is {model!r:.60}", advice="give a model, such as GMS(parameters, law='signed')"
+        )
     if (velocity is None) != (t_end is None):
         raise ParameterError(
             "velocity and t_end belong together", advice="give both of them, or neither"
