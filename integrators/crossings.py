@@ -150,7 +150,8 @@ def any_changed(w: Watched, margin: Vector) -> bool:
     """
     truth, above = w.truth, w.above
     for r in w.active:
-        if (margin[r] > above[r]) != truth[r]:
+        g = margin[r]
+        if (g > above[r]) != truth[r]:
             return True
     return False
 

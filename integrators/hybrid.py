@@ -414,9 +414,7 @@ def buffers(
     )
 
 
-def plan_of(
-    equations: Equations, t: float, t_end: float, options: Options, machines: int
-) -> Plan:
+def plan_of(equations: Equations, t: float, t_end: float, options: Options, machines: int) -> Plan:
     """Return the settings of a run in the form that the kernel uses.
 
     Parameters

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -291,7 +291,7 @@ def _wanted(chosen: Settings, t_start: float, t_end: float) -> list[float] | Non
     """Return the requested times, if any, after checking that all lie within the run."""
     if chosen.t_eval is None:
         return None
-    times = list(chosen.t_eval)  # increasing
+    times: list[float] = list(cast(tuple[float, ...], chosen.t_eval))  # increasing
     for time in (*times[:1], *times[-1:]):
         if not t_start <= time <= t_end:
             raise ParameterError(

@@ -188,8 +188,10 @@ class Block:
 
     def __init__(self, layout: Layout, example: Any, like: Block | None = None) -> None:
         self.layout = layout
-        self._words = np.zeros(layout.words, dtype=np.int64) if like is None else like._words.copy()
-        self._floats = self._words.view(np.float64)
+        self._words: Any = np.zeros(layout.words, dtype=np.int64)
+        if like is not None:
+            self._words[:] = like._words
+        self._floats: Any = self._words.view(np.float64)
         self._columns: dict[tuple[int, ...], Any] = {}
         self.address: int = self._words.ctypes.data
         made = {place.way: self._array(place) for place in layout.arrays}
@@ -221,10 +223,32 @@ class Block:
         for place in self.layout.columns:
             array = _found(contents, place.way)
             if before.get(place.way) is not array:
-                assert array.dtype == place.dtype and array.flags.c_contiguous
+                assert array.dtype == place.dtype
+                assert array.flags.c_contiguous
                 before[place.way] = array
                 lengths = array.shape[: place.lengths]
                 words[place.offset : place.offset + 1 + place.lengths] = array.ctypes.data, *lengths
+
+    def copy(self) -> list[Any]:
+        """Return the numbers and the arrays of the example, but no columns.
+
+        Returns
+        -------
+        list of ndarray
+            For `restore`.
+        """
+        return [array.copy() for array in (self._words, *self._outside)]
+
+    def restore(self, copy: list[Any]) -> None:
+        """Return to what `copy` returned.
+
+        Parameters
+        ----------
+        copy : list of ndarray
+            Of this block.
+        """
+        for array, before in zip((self._words, *self._outside), copy, strict=True):
+            array[...] = before
 
 
 def _found(contents: Any, way: tuple[int, ...]) -> Any:
@@ -248,27 +272,6 @@ def _rebuilt(
         else:
             parts.append(_rebuilt(part, here, made, inner) if here in inner else part)
     return getattr(type(example), "_make", type(example))(parts)
-
-    def copy(self) -> list[Any]:
-        """Return the numbers and the arrays of the example, but no columns.
-
-        Returns
-        -------
-        list of ndarray
-            For `restore`.
-        """
-        return [array.copy() for array in (self._words, *self._outside)]
-
-    def restore(self, copy: list[Any]) -> None:
-        """Return to what `copy` returned.
-
-        Parameters
-        ----------
-        copy : list of ndarray
-            Of this block.
-        """
-        for array, before in zip((self._words, *self._outside), copy, strict=True):
-            array[...] = before
 
 
 def _constant(part: Any) -> Value:

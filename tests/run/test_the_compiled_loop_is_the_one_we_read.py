@@ -57,7 +57,7 @@ def read(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         return table
 
     monkeypatch.setattr(compiled, "engine", engine)
-    monkeypatch.setattr(_compiled_run, "_engines", {})
+    monkeypatch.setattr(_compiled_run, "_known", {})
     monkeypatch.setattr(_compiled_run.Columns, "run", run)
     monkeypatch.setattr(_observed, "observe_rows", observe_rows)
     return returned
