@@ -132,16 +132,21 @@ def edition() -> str:
     front = (sources, work, bindings, passing, expressions, statements, translate)
     tools = (*front, values, tree, layouts, llvm, objects)
     functions: list[Callable[..., Any]] = []
-    constants = []
+    constants: list[tuple[str, Any]] = []
     for module in (*loops, *tools):
-        for name, value in vars(module).items():
+        for name, found in vars(module).items():
+            value = getattr(found, "__wrapped__", found)  # inside a cache
             if isinstance(value, FunctionType) and value.__module__ == module.__name__:
                 functions.append(value)
             elif isinstance(value, type) and value.__module__ == module.__name__:
                 members = vars(value).values()
                 functions += [each for each in members if isinstance(each, FunctionType)]
-            shown = value if isinstance(value, int | float) else getattr(value, "_fields", None)
-            constants.append((name, shown))
+            if isinstance(value, int | float | str) and not name.startswith("__"):
+                constants.append((name, value))
+            elif isinstance(value, dict) and all(isinstance(u, str) for u in value.values()):
+                constants.append((name, sorted(value.values())))
+            else:
+                constants.append((name, getattr(value, "_fields", None)))
     return digest(*functions, text=repr((sys.version, constants)))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections.abc import Sequence
 
 from integrators.machine_code.bindings import bind, give, own
@@ -179,7 +180,9 @@ def _over_range(work: Work, name: str, over: ast.Call, inside: Sequence[ast.stmt
     if work.scope[name] != bound or target.kind != "i":
         raise work.error(f"{name} would be of two kinds")
     stop = work.kept(stop)
-    if _read_after(work, name):  # then it is the last one that the body had, not the limit
+    if name in _read_after(
+        work.source.definition
+    ):  # then it is the last one that the body had, not the limit
         place = work.new("i")
         made: tuple[Statement, ...] = (Set(target, place), *_block(work, inside))
     else:
@@ -187,19 +190,22 @@ def _over_range(work: Work, name: str, over: ast.Call, inside: Sequence[ast.stmt
     work.out.append(For(place, start, stop, step.value, made))
 
 
-def _read_after(work: Work, name: str) -> bool:
-    """Return whether the variable of a loop is read outside the loops over it."""
-    waiting: list[ast.AST] = [work.source.definition]
+@functools.lru_cache(maxsize=1024)
+def _read_after(definition: ast.FunctionDef) -> frozenset[str]:
+    """Return the names that are read outside the loops over them."""
+    found = set[str]()
+    waiting: list[tuple[ast.AST, frozenset[str]]] = [(definition, frozenset())]
     while waiting:
-        node = waiting.pop()
-        if isinstance(node, ast.Name) and node.id == name and isinstance(node.ctx, ast.Load):
-            return True
+        node, loops = waiting.pop()
         match node:
-            case ast.For(target=ast.Name(id=other), iter=over) if other == name:
-                waiting.append(over)
+            case ast.Name(id=name, ctx=ast.Load()) if name not in loops:
+                found.add(name)
+            case ast.For(target=ast.Name(id=name), iter=over, body=inside):
+                waiting.append((over, loops))
+                waiting += [(each, loops | {name}) for each in inside]
             case _:
-                waiting += ast.iter_child_nodes(node)
-    return False
+                waiting += [(each, loops) for each in ast.iter_child_nodes(node)]
+    return frozenset(found)
 
 
 def _over_array(work: Work, name: str, array: Array, inside: Sequence[ast.stmt]) -> None:
