@@ -17,8 +17,10 @@ sys.path.insert(0, str(HERE))
 
 import mathml  # noqa: E402
 import notebooks  # noqa: E402
+import pictures  # noqa: E402
 
 import gms_fsm  # noqa: E402
+from plots.style import CHART_THEMES  # noqa: E402
 
 project = "gms-fsm"
 author = "The gms-fsm founders"
@@ -55,18 +57,21 @@ html_favicon = "favicon.svg"
 html_math_renderer = "mathml"
 html_copy_source = False
 html_show_sourcelink = False
-html_static_path = ["site.css"]
+html_static_path = ["site.css", "site.js"]
 html_css_files = ["site.css"]
+html_js_files = [("site.js", {"defer": "defer"})]
 html_theme_options = {
     "light_css_variables": {
         "color-brand-primary": "#005F96",
         "color-brand-content": "#005F96",
         "color-brand-visited": "#7A3E8E",
+        "color-now": CHART_THEMES["light"].fired,
     },
     "dark_css_variables": {
         "color-brand-primary": "#6CB9EA",
         "color-brand-content": "#6CB9EA",
         "color-brand-visited": "#C9A0DC",
+        "color-now": CHART_THEMES["dark"].fired,
     },
 }
 
@@ -110,12 +115,10 @@ def mend_ways_back(app: Sphinx, page: str, _: str, context: dict[str, Any], __: 
 
 
 def open_to_all(_: Sphinx, __: str, ___: str, context: dict[str, Any], ____: Any) -> None:
-    """Link pictures to themselves at full size, and make scrolling parts reachable by keyboard."""
+    """Make scrolling parts reachable by keyboard, and give the contents their level."""
     if "body" in context:
         wide = r'<(pre(?=>)|div(?= class="(?:math|table-wrapper)\b))'
         context["body"] = re.sub(wide, r'<\1 tabindex="0"', context["body"])
-        picture = r'<p>(<img [^>]*src="([^"]+)"[^>]*>)</p>'
-        context["body"] = re.sub(picture, r'<p><a href="\2">\1</a></p>', context["body"])
     tree = context.get("furo_navigation_tree", "")
     context["furo_navigation_tree"] = tree.replace(
         'role="heading"', 'role="heading" aria-level="2"'
@@ -137,6 +140,7 @@ def copy_replay_pages(app: Sphinx, error: Exception | None) -> None:
 def setup(app: Sphinx) -> None:
     """Register our handlers."""
     mathml.register(app)
+    pictures.register(app)
     app.add_lexer("csv", TextLexer)
     app.connect("autodoc-process-docstring", keep_bars, priority=100)  # before napoleon
     app.connect("html-page-context", mend_ways_back)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 import plots
@@ -35,12 +36,12 @@ from gms_fsm.app.lessons.notebooks import cells_of
 from gms_fsm.app.paper import FIG4_END, FORCE, VELOCITY
 from gms_fsm.app.paper.experiments import experiments, run_one
 from gms_fsm.app.paper.writing import held_figure
-from gms_fsm.app.scenario import load_scenario
+from gms_fsm.app.scenario import load_scenario, load_system
 from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.broken import BROKEN
 from plots import figures, panels
-from plots.schematic import schematic_figure
-from plots.style import BLUE, INK, LINE_GREY, RC, TEXT_ORANGE, VERMILION
+from plots.mechanism import schematic_figure
+from plots.style import INK, LINE_GREY, PAPER, RC, TEXT_GREY, ramp
 
 FOLDER = Path(__file__).parent / "images"
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -60,6 +61,7 @@ def main() -> None:
     figures.save(figures.compare_laws(runs), FOLDER / "fig4_laws.png")
     published, signed = runs.values()
     draw_charts(published, signed)
+    draw_systems()
     draw_figures(signed)
     draw_concepts(published)
     draw_howto()
@@ -83,7 +85,16 @@ def draw_charts(published: Trace, signed: Trace) -> None:
     row = int((signed.t == signed.transitions.t[first_alone]).nonzero()[0][-1])
     live = plots.live_statechart(signed, row=row, elements=4, values=True)
     write_whole(FOLDER / "chart_live.svg", lambda file: file.write(live.encode()))
-    plots.animate(signed, FOLDER / "film.gif", elements=[0], frames=50, t_end=50.0, fps=10)
+    # Four elements stick and load, break away one after another, slide, and are caught at once.
+    pulled = run("pulled_mass")
+    plots.animate(pulled, FOLDER / "film.gif", seconds=9.5, t_start=12.0, t_end=18.6)
+
+
+def draw_systems() -> None:
+    """Write the block diagram and the schematic of a servo."""
+    servo = load_system(SCENARIOS / "servo.toml")
+    plots.render(plots.block_diagram(servo), FOLDER / "system_blocks.png")
+    figures.save(plots.schematic(servo), FOLDER / "system_schematic.png")
 
 
 def draw_held() -> None:
@@ -142,13 +153,14 @@ def element_figure() -> Figure:
         panels.ratio(ratio, trace)
         panels.force(force, trace)
         panels.ribbons(states, trace)
-        for ax, title in (
-            (velocity, "a) the slider moves back and forth"),
-            (ratio, "b) deflection over threshold"),
-            (force, "c) force"),
-            (states, "d) state"),
-        ):
-            ax.set_title(title)
+        named = (
+            (velocity, "the slider moves back and forth"),
+            (ratio, "deflection over threshold"),
+            (force, "force"),
+            (states, "state"),
+        )
+        for letter, (ax, title) in zip("abcd", named, strict=True):
+            panels.lettered(ax, letter, title)
             if ax is not states:
                 ax.set_xlabel("")
                 ax.tick_params(labelbottom=False)
@@ -164,8 +176,8 @@ def microstep_figure(trace: Trace) -> Figure:
         over_time, by_step = figure.subplots(1, 2, width_ratios=(1, 1.5))
         t = float(log.t[0])
         panels.force(over_time, trace, window=(t - 1.5, t + 1.5))
-        over_time.set_title("a) over time: one jump of F")
-        by_step.set_title(f"b) at t = {t:.4f} s: four firings, five rows")
+        panels.lettered(over_time, "a", "over time: one jump of F")
+        panels.lettered(by_step, "b", f"at t = {t:.4f} s: four firings, five rows")
         by_step.plot(trace.microstep[rows], trace.F[rows], "o--", color=INK, markersize=6)
         for record, number in zip(log, range(1, 5), strict=True):
             by_step.annotate(
@@ -175,7 +187,7 @@ def microstep_figure(trace: Trace) -> Figure:
                 textcoords="offset points",
                 ha="left",
                 fontsize=8,
-                color=TEXT_ORANGE,
+                color=TEXT_GREY,
             )
         by_step.annotate(
             "before",
@@ -204,8 +216,8 @@ def crossing_figure() -> Figure:
         figure = Figure(figsize=(7.2, 3.6), layout="constrained")
         ax = figure.subplots()
         looks = (
-            (once, VERMILION, "s--", "guards checked once per step"),
-            (located, BLUE, "o-", "located"),
+            (once, TEXT_GREY, "s--", "guards checked once per step"),
+            (located, INK, "o-", "located"),
         )
         for trace, colour, look, name in looks:
             keep = (trace.t > true - 1.9 * step) & (trace.t < true + 2.9 * step)
@@ -216,21 +228,21 @@ def crossing_figure() -> Figure:
                 color=colour,
                 label=name,
                 markersize=7,
-                markerfacecolor="white" if colour == VERMILION else colour,
+                markerfacecolor=PAPER if trace is once else colour,
             )
         ax.axhline(0, color=LINE_GREY, linewidth=0.9, zorder=0)
         for time, text, colour, height in (
-            (true, "z >= s becomes true", BLUE, 0.97),
-            (found, "detected", TEXT_ORANGE, 0.62),
+            (true, "z >= s becomes true", INK, 0.97),
+            (found, "detected", TEXT_GREY, 0.62),
         ):
             ax.axvline(time, color=LINE_GREY, linestyle=":", linewidth=0.9, zorder=0)
             ax.annotate(
                 f"{text}\nt = {time:.2f} s",
                 (time, height),
-                (-6 if colour == BLUE else 6, 0),
+                (-6 if time == true else 6, 0),
                 xycoords=("data", "axes fraction"),
                 textcoords="offset points",
-                ha="right" if colour == BLUE else "left",
+                ha="right" if time == true else "left",
                 va="top",
                 color=colour,
             )
@@ -312,7 +324,7 @@ def loops_figure(bilinear: Chart) -> Figure:
     with rc_context(RC):
         figure = Figure(figsize=(5.4, 3.6), layout="constrained")
         ax = figure.subplots()
-        for H, colour, look in ((1e4, BLUE, "-"), (0.0, VERMILION, "--")):
+        for H, colour, look in ((1e4, INK, "-"), (0.0, TEXT_GREY, "--")):
             model = ChartModel(bilinear, {"k": 1e5, "H": H, "F_y": 1.0})
             trace = simulate(model, rig, 1.75)
             ax.plot(1e6 * trace.x, trace.F, look, color=colour, label=f"H = {H:g} N/m")
@@ -344,7 +356,9 @@ def sweep_figure() -> Figure:
     with rc_context(RC):
         figure = Figure(figsize=(6.0, 3.8), layout="constrained")
         ax = figure.subplots()
-        image = ax.pcolormesh(speed, v_s, counts, cmap="cividis", rasterized=True)
+        image = ax.pcolormesh(
+            speed, v_s, counts, cmap=ListedColormap(ramp("heat", 256)), rasterized=True
+        )
         ax.set(yscale="log", xlabel="pulling speed [m/s]", ylabel="v_s [m/s]")
         ax.set_title(f"arrests in 60 s, {len(result):,} runs; signed law")
         figure.colorbar(image, label="arrests")

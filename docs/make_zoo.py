@@ -33,7 +33,7 @@ from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.inspection._findings import Report, Status
 from gms_fsm.traces.failures import StepLimitError
 from plots import figures
-from plots.style import BLUE, LINE_GREY, RC
+from plots.style import INK, LINE_GREY, RC
 
 DOCS = Path(__file__).parent
 PAGES = DOCS / "zoo"
@@ -342,9 +342,9 @@ def run_figure(item: Item) -> Figure:
     with rc_context(RC):
         figure = Figure(figsize=(6.4, 3.4), layout="constrained")
         force, velocity = figure.subplots(2, 1, sharex=True)
-        force.plot(pad.t, pad.F, color=BLUE)
+        force.plot(pad.t, pad.F, color=INK)
         force.set(ylabel="F [N]", xlim=(0, T_END))
-        velocity.plot(pad.t, pad.v, color=BLUE)
+        velocity.plot(pad.t, pad.v, color=INK)
         velocity.set(xlabel="t [s]", ylabel="v [m/s]")
         for ax in (force, velocity):
             ax.axhline(0, color=LINE_GREY, linewidth=0.8, zorder=0)

@@ -187,6 +187,16 @@ def page(executed: Any, name: str, title: str) -> tuple[str, dict[str, bytes]]:
     return "\n\n".join(lines) + "\n", pictures
 
 
+def common_sources() -> bytes:
+    """Return the contents of all files of the three packages."""
+    return b"".join(
+        path.read_bytes()
+        for package in ("gms_fsm", "integrators", "plots")
+        for path in sorted((ROOT / package).rglob("*.*"))
+        if "__pycache__" not in path.parts
+    )
+
+
 def write_all(folder: Path) -> None:
     """Write every lesson that has changed: page, pictures, replay page.
 
@@ -198,12 +208,7 @@ def write_all(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     stamps = folder / ".stamps"
     stamps.mkdir(exist_ok=True)
-    sources = [Path(__file__)]
-    for package in ("gms_fsm", "integrators", "plots"):
-        sources += sorted(
-            path for path in (ROOT / package).rglob("*.*") if "__pycache__" not in path.parts
-        )
-    common = b"".join(path.read_bytes() for path in sources)
+    common = common_sources() + Path(__file__).read_bytes()
     for number in LESSONS:
         text, name = notebook(composed(number)), f"lesson_{number}"
         stamp, now = stamps / name, hashlib.sha256(common + text.encode()).hexdigest()

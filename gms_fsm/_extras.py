@@ -13,6 +13,7 @@ __all__ = ["EXTRAS", "missing", "require"]
 # For each extra: the feature that needs it, and the alternative without it.
 EXTRAS: Mapping[str, tuple[str, str]] = {
     "plots": ("figures and animations need", "runs, traces and charts need no extra"),
+    "film": ("videos need", "a film can be written as a .gif"),
     "render": (
         "pictures of charts need",
         "Graphviz's program dot draws them too, and charts can be written as text",

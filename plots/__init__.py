@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Any
 from gms_fsm._extras import require
 from plots.block_diagram import block_diagram
 from plots.live_chart import LiveChart, live_statechart
+from plots.mechanism import schematic
 from plots.mermaid import mermaid
+from plots.presets import preset
 from plots.render import render
 from plots.replay import replay, write_replay
 from plots.statechart import statechart
@@ -34,13 +36,16 @@ __all__ = [
     "animate",
     "block_diagram",
     "explore",
+    "handout",
     "landscape",
     "live_statechart",
     "mermaid",
     "overview",
     "phase",
+    "preset",
     "render",
     "replay",
+    "schematic",
     "statechart",
     "unfold",
     "write_replay",
@@ -48,7 +53,7 @@ __all__ = [
 
 
 def animate(trace: Trace, path: str | Path, **options: Any) -> Path:
-    """Make an animation of the live chart next to the force; see `plots.animation.animate`.
+    """Make a film of a run, slowed at transitions; see `plots.animation.animate`.
 
     Parameters
     ----------
@@ -134,6 +139,37 @@ def explore(
     from plots.widget._explorer import Explorer
 
     return Explorer(model, rig, t_end, sliders=sliders, height=height, **options)
+
+
+def handout(model: Model, path: str | Path, **options: Any) -> Path:
+    """Write a model on one A4 page: chart, equations, parameters, and a hysteresis loop.
+
+    Parameters
+    ----------
+    model : Model
+        For example `GMS`, or a `ChartModel` of a chart of the zoo.
+    path : str or Path
+        Its ending selects the format, for example ``.pdf``. An existing file is replaced.
+    **options
+        ``velocity``, v(t) of the loop in m/s as an expression in t, and ``t_end``, its end in s. By
+        default x(t) is a sine with an amplitude at which the model slips; a model that locks is
+        pulled through a spring instead.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ParameterError
+        If the chart does not fit on the page, or no suitable amplitude is found.
+    MissingExtraError
+        If matplotlib or Graphviz is not installed.
+    """
+    from plots import _handout
+
+    return _handout.handout(model, path, **options)
 
 
 def overview(trace: Trace, title: str = "") -> Figure:

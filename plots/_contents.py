@@ -10,14 +10,16 @@ from plots._notation import Writer
 
 __all__ = ["Texts", "chart_texts", "state_texts"]
 
+SAID_ONCE = 3  # states: where so many have the same force, it is said once for all of them
+
 Texts = list[tuple[str, list[str]]]  # kinds, such as during, each with its texts
 
 
 def state_texts(write: Writer, state: State) -> Texts:
     """Return what a picture shows in a state.
 
-    Not shown are a variable that flows in no state, the timer behind ``after(T)``, and a force that
-    is the same in all states.
+    Not shown are a variable that flows in no state and the timer behind ``after(T)``; nor, where
+    there are three states or more, a force that is the same in all of them: `chart_texts` has it.
 
     Parameters
     ----------
@@ -36,7 +38,7 @@ def state_texts(write: Writer, state: State) -> Texts:
     >>> from gms_fsm.charts import GMS_ELEMENT
     >>> write = Writer(GMS_ELEMENT["signed"], "stateflow")
     >>> [(kind, texts) for kind, texts in state_texts(write, write.chart.states[0]) if texts]
-    [('during', ['dz = v;'])]
+    [('during', ['dz = v;']), ('force', ['F = k * z + sigma * dz;'])]
     """
     chart = write.chart
     actions = {
@@ -46,7 +48,7 @@ def state_texts(write: Writer, state: State) -> Texts:
     }
     flowing = {name for each in chart.states for name in each.flow}
     flows = [name for name in chart.variables if name in flowing]
-    forces = _forces(chart, state) if _forces_differ(chart) else {}
+    forces = {} if _force_below(chart) else _forces(chart, state)
     return [
         ("entry", actions["entry"]),
         ("during", [write.flow(name, chart.flows[state.name, name]) for name in flows]),
@@ -67,18 +69,18 @@ def chart_texts(write: Writer) -> Texts:
     Returns
     -------
     list of (str, list of str)
-        Named expressions, the force of an element if it is the same in all states, and the force of
-        the contact. No texts for a chart that only has a force which is the same in all states.
+        Named expressions; the force of an element, if it is the same in three states or more; the
+        force of the contact, if it is not the sum over the elements.
     """
     chart = write.chart
-    totals = [write.total(name, tree) for name, tree in chart.totals.items()]
-    if not chart.lets and not totals:
-        return []
-    shared = {} if _forces_differ(chart) else _forces(chart, chart.default_state)
+    shared = _forces(chart, chart.default_state) if _force_below(chart) else {}
     return [
         ("let", _equations(write, chart.lets)),
-        ("force", _equations(write, shared)),
-        ("force of the contact", totals),
+        ("force in all states", _equations(write, shared)),
+        (
+            "force of the contact",
+            [write.total(name, tree) for name, tree in chart.totals.items()],
+        ),
     ]
 
 
@@ -86,10 +88,10 @@ def _equations(write: Writer, trees: Mapping[str, Value]) -> list[str]:
     return [write.equation(name, tree) for name, tree in trees.items()]
 
 
-def _forces_differ(chart: Chart) -> bool:
-    """Return whether forces are shown state by state: where they differ, or are all there is."""
+def _force_below(chart: Chart) -> bool:
+    """Return whether one force of many states is said once, below them."""
     own = any(state.outputs or state.locked for state in chart.states)
-    return own or not any(state.flow for state in chart.states)
+    return len(chart.states) >= SAID_ONCE and not own
 
 
 def _forces(chart: Chart, state: State) -> dict[str, Value]:
@@ -118,10 +120,12 @@ def chart_in_words(chart: Chart) -> str:
     GMS element, signed law
     stick (default)
       during: dz = v;
+      force: F = k * z + sigma * dz;
       1 -> slip [z >= s && v > v_c]
       2 -> slip [z <= -s && v < -v_c]
     slip
       during: dz = C * (sgn(v) - z / s);
+      force: F = k * z + sigma * dz;
       1 -> stick [|v| <= v_c && |z| < s]
     """
     write, lines = Writer(chart, "stateflow"), [chart.name]

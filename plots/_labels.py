@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import html
 import re
-import textwrap
+import warnings
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.traces.trace import Trace, dwell_times
+from plots._contents import chart_texts, state_texts
+from plots._fonts import missing_glyphs
+from plots._notation import Writer
 
 __all__ = [
     "Piece",
@@ -20,9 +23,12 @@ __all__ = [
     "escape",
     "part_id",
     "printable",
+    "warn_of_missing_glyphs",
+    "with_indices",
     "wrapped",
 ]
 
+SAID = 5  # missing characters in a warning
 LONGEST_LINE = 52  # characters; longer texts are wrapped
 DOT, TRUE, FALSE, UNKNOWN = "●", "✓", "✗", "?"
 
@@ -39,11 +45,14 @@ class Piece:
         ``title``, ``dot``, ``word``, ``code``, ``priority``, ``clause``, ``mark``, ...
     clause : int
         For a clause and its mark, the number of the clause in the guard; otherwise -1.
+    lowered : bool
+        Whether this is the index of a name.
     """
 
     text: str
     role: str = "code"
     clause: int = -1
+    lowered: bool = False
 
 
 Row = list[Piece]
@@ -84,18 +93,95 @@ class Tally:
         return "taken once" if times == 1 else f"taken {times} times"
 
 
-def wrapped(text: str) -> list[str]:
-    """Return a text as lines of limited length."""
-    if len(text) <= LONGEST_LINE:
-        return [text] if text else []
-    # Continuation lines are indented; a word longer than a line is not broken.
-    return textwrap.wrap(
-        text,
-        LONGEST_LINE,
-        subsequent_indent="  ",
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
+# The index of a name; what stands before the first underscore is its symbol. Raised digits, which
+# are a power, belong to neither.
+_INDEX = re.compile(r"(?<!\w)([^\W_]+)_(\w*?[^\W_⁰¹²³⁴⁵⁶⁷⁸⁹])(?![^\W⁰¹²³⁴⁵⁶⁷⁸⁹])")
+
+
+def with_indices(row: Row) -> Row:
+    """Return a row in which the indices of names, such as the c of v_c, are pieces of their own.
+
+    Parameters
+    ----------
+    row : Row
+        Pieces of a formula.
+
+    Returns
+    -------
+    Row
+        The same text without the underscores of names.
+
+    Examples
+    --------
+    >>> [(piece.text, piece.lowered) for piece in with_indices([Piece("v > v_c")])]
+    [('v > v', False), ('c', True)]
+    """
+    pieces: Row = []
+    for piece in row:
+        start = 0
+        for found in _INDEX.finditer(piece.text):
+            pieces.append(replace(piece, text=piece.text[start : found.end(1)]))
+            pieces.append(replace(piece, text=found[2], lowered=True))
+            start = found.end()
+        if start < len(piece.text):
+            pieces.append(replace(piece, text=piece.text[start:]))
+    return pieces
+
+
+def wrapped(text: str, limit: int = LONGEST_LINE) -> list[str]:
+    """Return a text as lines of limited length, broken at operators.
+
+    A line ends after ``&&``, ``||`` or a comma, or before a comparison or another operator; outside
+    of brackets if possible, and never inside a name or a number. Further lines are indented.
+
+    Parameters
+    ----------
+    text : str
+        The text; its operators stand between spaces.
+    limit : int
+        Most characters of a line; only a longer name or number is on a longer one.
+
+    Returns
+    -------
+    list of str
+        The lines; none for an empty text.
+
+    Examples
+    --------
+    >>> wrapped("max(z - w, 0) >= s && v > v_c", 20)
+    ['max(z - w, 0)', '  >= s && v > v_c']
+    """
+    lines, indent = [], ""
+    while len(indent + text) > limit:
+        at = _best_break(text, limit - len(indent))
+        if at < 0:
+            break
+        lines.append(indent + text[:at])
+        text, indent = text[at + 1 :], "  "
+    return [*lines, indent + text] if text.strip() else lines
+
+
+# After which words a line ends best, the best first; before others it never ends so well.
+_AFTER = (("||", "∨"), ("&&", "∧"), (",", ";"))
+_BEFORE = ((">=", "<=", ">", "<", "≥", "≤", "==", "=", ":="), ("+", "-", "−"), ("*", "/", "·"))
+
+
+def _best_break(text: str, limit: int) -> int:
+    """Return the best space to break a line at; -1 if there is none."""
+    depth, found = 0, []
+    words, at = text.split(" "), -1
+    for i, word in enumerate(words[:-1]):
+        at += len(word) + 1
+        depth += sum(map(word.count, "([{")) - sum(map(word.count, ")]}"))
+        if word not in ("||", "|") and word.replace("||", "").count("|") % 2:
+            depth += 1 if word.startswith(("|", "-|", "(|", "−|", "¬|")) else -1
+        after = (rank for rank, marks in enumerate(_AFTER) if word.endswith(marks))
+        before = (rank for rank, marks in enumerate(_BEFORE, 2) if words[i + 1] in marks)
+        rank = min([*after, *before, len(_BEFORE) + 2])
+        # A line that is nearly empty is worse than a break at a weaker operator.
+        short = at < limit / 4
+        found.append((max(at - limit, 0), short, depth, rank, -at, at))
+    return min(found)[-1] if found else -1
 
 
 def escape(text: str) -> str:
@@ -111,6 +197,43 @@ def escape(text: str) -> str:
 def printable(text: str) -> str:
     """Return a text without control characters."""
     return "".join(c if c.isprintable() else " " for c in text)
+
+
+def warn_of_missing_glyphs(write: Writer, note: str = "") -> None:
+    """Warn of characters that the font of charts cannot show, and say where they stand.
+
+    Parameters
+    ----------
+    write : Writer
+        The chart and its notation.
+    note : str
+        Text below the picture.
+    """
+    chart = write.chart
+    places = {"the note": note}
+    for state in chart.states:
+        own = (text for _, texts in state_texts(write, state) for text in texts)
+        places[f"state {state.name!r}"] = " ".join([state.name, *own])
+    for edge in chart.transitions:
+        action = write.actions(chart.assignments["action", edge.name])
+        places[f"edge {edge.name!r}"] = f"{write.text(chart.guards[edge.name])} {action}"
+    places["the texts of the whole chart"] = " ".join(
+        text for _, texts in chart_texts(write) for text in texts
+    )
+    found: dict[str, str] = {}
+    for place, text in places.items():
+        for character in missing_glyphs(printable(text)):
+            found.setdefault(character, place)
+    if found:
+        listed = ", ".join(
+            f"{c!r} (U+{ord(c):04X}) in {place}" for c, place in list(found.items())[:SAID]
+        )
+        more = f" and {len(found) - SAID} more" if len(found) > SAID else ""
+        warnings.warn(
+            f"the font of charts, DejaVu Sans Mono, has no {listed}{more}: the picture shows a box "
+            "or another font there",
+            stacklevel=3,
+        )
 
 
 def element_id(number: int) -> str:

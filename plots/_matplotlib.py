@@ -13,25 +13,31 @@ from gms_fsm._extras import require
 require("matplotlib", "plots")
 require("PIL", "plots")  # comes with matplotlib
 
-from matplotlib import colormaps, patches, rc_context
+from matplotlib import patches, rc_context
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pgf import RendererPgf
 from matplotlib.collections import LineCollection
-from matplotlib.colors import BoundaryNorm, ListedColormap, to_rgb
+from matplotlib.colors import BoundaryNorm, ListedColormap, to_hex, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Rectangle
 from matplotlib.path import Path as Curve
-from matplotlib.text import Text
-from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
-from matplotlib.transforms import Bbox, IdentityTransform
+from matplotlib.text import Annotation, Text
+from matplotlib.ticker import AutoLocator, LogLocator, MaxNLocator, NullLocator
+from matplotlib.transforms import Bbox, IdentityTransform, ScaledTranslation
 from PIL import Image
 
 __all__ = [
+    "Annotation",
     "Artist",
+    "AutoLocator",
     "Axes",
+    "Axis",
     "Bbox",
     "BoundaryNorm",
     "Curve",
@@ -40,6 +46,7 @@ __all__ = [
     "FigureCanvasAgg",
     "IdentityTransform",
     "Image",
+    "Legend",
     "Line2D",
     "LineCollection",
     "ListedColormap",
@@ -48,9 +55,11 @@ __all__ = [
     "NullLocator",
     "Rectangle",
     "RendererBase",
+    "RendererPgf",
+    "ScaledTranslation",
     "Text",
-    "colormaps",
     "patches",
     "rc_context",
+    "to_hex",
     "to_rgb",
 ]

@@ -1,11 +1,15 @@
 """Draw a system: bodies, contacts, signals, controllers, further states, and who acts on whom.
 
-Everything is read from the system. Thick lines join a contact to the bodies that it acts on: their
-velocities go one way, its force goes back. Thin arrows carry the values written on them; dashed
-ones are read at ticks only. Signals are on the left, and a contact of a single body is next to it.
+Everything is read from the system. Signals are on the left, then come controllers and further
+states, then the bodies and on the right the contacts. Thick lines join a contact to the bodies that
+it acts on: their velocities go one way, its force goes back. Thin arrows carry the values written
+on them; dashed ones are read at ticks only. Kinds of blocks differ in shape: signals and contacts
+have round corners, bodies and contacts thick outlines; what holds its values between ticks has a
+staircase.
 
 In the SVG, nodes have the classes ``signal``, ``sampled``, ``flow``, ``body`` and ``contact`` and
-the id ``kind-name``; lines have the classes ``acts`` (contact and body) and ``reads``.
+the id ``kind-name``; lines have the classes ``acts`` (contact and body) and ``reads``, and ids such
+as ``reads-signal-r-sampled-pid-1``, the last number counting their pieces.
 """
 
 from __future__ import annotations
@@ -30,30 +34,27 @@ from gms_fsm.language import (
 from gms_fsm.systems.signals import Corners, Formula, Signal
 from gms_fsm.systems.system import Body, Contact, System
 from plots._labels import escape, printable, wrapped
+from plots._system_routes import Box, Join, Sheet, routed
+from plots._wires import PLACED, caption, draw_wire, joint, position, sides
 from plots.drawings import DrawnGraph
-from plots.style import (
-    BLUE,
-    BLUE_TINT,
-    INK,
-    MONO,
-    PANEL,
-    PAPER,
-    SANS,
-    TEXT_GREY,
-    VERMILION,
-    VERMILION_TINT,
-)
+from plots.style import INK, MONO, PANEL, PAPER, SANS, TEXT_GREY
 
-__all__ = ["system_diagram"]
+__all__ = ["signal_text", "system_diagram"]
 
-# Outline, fill and border of each kind.
+# Column, corners, fill and width of the outline of each kind.
 LOOKS = {
-    "signal": (BLUE, BLUE_TINT, 1),
-    "sampled": (INK, PAPER, 1),
-    "flow": (INK, PAPER, 1),
-    "body": (VERMILION, VERMILION_TINT, 1),
-    "contact": (INK, PANEL, 2),
+    "signal": (0, "rounded,filled", PAPER, 1.1),
+    "sampled": (1, "filled", PAPER, 1.1),
+    "flow": (1, "filled", PAPER, 1.1),
+    "body": (2, "filled", PANEL, 1.8),
+    "contact": (3, "rounded,filled", PANEL, 1.8),
 }
+# Sizes in points; Graphviz would ask the fonts, and its programs have different ones.
+TITLE_ROW, ROW, ABOVE, SIDE = 19.0, 15.0, 5.0, 8.0
+WIDE, NARROW, BOLD = 6.1, 5.6, 7.4  # characters: 10 points mono, 10 points sans, 12 points bold
+LONGEST = 36  # characters of a line
+HOLD = (20.0, 10.0)  # the staircase of a sampler
+ACTS = 2.2  # width of a line between body and contact
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,8 @@ class Block:
         Equations.
     reads : tuple of str
         The names that its equations read.
+    held : bool
+        Whether it holds its values between ticks.
     """
 
     kind: str
@@ -79,6 +82,7 @@ class Block:
     note: str
     texts: tuple[str, ...]
     reads: tuple[str, ...]
+    held: bool = False
 
     @property
     def id(self) -> str:
@@ -99,35 +103,26 @@ def system_diagram(system: System) -> DrawnGraph:
     graphviz.Digraph
         The picture as a Graphviz graph.
     """
+    blocks = list(_blocks(system))
     graph = DrawnGraph(
         name=graphviz.escape(printable(system.name)),
-        graph_attr={
-            "rankdir": "LR",
-            "bgcolor": PAPER,
-            "pad": "0.2",
-            "nodesep": "0.35",
-            "ranksep": "0.5",
-            "fontname": SANS,
-            "label": f"<{_title(system)}>",
-            "labelloc": "t",
-            "labeljust": "l",
-        },
-        node_attr={"fontname": SANS, "shape": "plain"},
-        edge_attr={
-            "color": INK,
-            "arrowsize": "0.7",
-            "penwidth": "1.1",
-            "fontname": MONO,
-            "fontsize": "10",
-            "fontcolor": TEXT_GREY,
-        },
+        engine="neato",
+        graph_attr=PLACED | {"bgcolor": PAPER},
+        node_attr={"fontname": SANS, "fontcolor": INK, "color": INK, "fixedsize": "true"}
+        | {"margin": "0"},
+        edge_attr={"color": INK, "arrowsize": "0.7", "penwidth": "1.1"},
     )
-    blocks = list(_blocks(system))
     graph.text = "\n".join([system.name, *map(_in_words, blocks)])
+    columns = sorted({LOOKS[block.kind][0] for block in blocks})
+    boxes = [Box(block.id, *_size(block), columns.index(LOOKS[block.kind][0])) for block in blocks]
+    joins = [*_acting(system), *_reading(blocks, _owners(system))]
+    sheet = routed(boxes, joins)
+    _draw_title(graph, system, sheet)
     for block in blocks:
-        graph.node(block.id, f"<{_box(block)}>", id=block.id, **{"class": block.kind})
-    _draw_contacts(graph, system)
-    _draw_values(graph, blocks, _owners(system))
+        _draw_block(graph, block, sheet.boxes[block.id])
+    ticking = {block.id for block in blocks if block.kind == "sampled"}
+    for join in joins:
+        _draw_join(graph, join, sheet.paths[join.id], dashed=join.target in ticking)
     return graph
 
 
@@ -140,14 +135,15 @@ def _blocks(system: System) -> Iterator[Block]:
     """Yield every part, from what drives to what is driven."""
     names = system.names
     for name, signal in system.signals.items():
-        yield Block("signal", name, "signal", (_signal(name, signal),), ())
+        yield Block("signal", name, "signal", (signal_text(name, signal),), ())
     for part in system.sampled:
         trees = {each: parse_value(t, [*names, "period"]) for each, t in part.updates.items()}
         note = f"every {_seconds(part.period)}"
         if part.offset:
             note += f", first after {_seconds(part.offset)}"
         texts = tuple(_equation(each, tree) for each, tree in trees.items())
-        yield Block("sampled", part.name, note, texts, _read(system, trees.values()))
+        reads = _read(system, trees.values())
+        yield Block("sampled", part.name, note, texts, reads, held=True)
     for name, text in system.flow.items():
         tree = parse_value(text, names)
         yield Block("flow", name, "state", (_equation(f"d{name}/dt", tree),), _read(system, [tree]))
@@ -188,7 +184,9 @@ def _contact(system: System, contact: Contact) -> Block:
         title = f"{chart.name} × {contact.n}" if contact.n > 1 else chart.name
     else:
         title = contact.model.title
-    return Block("contact", contact.name, note, (title, *texts), _read(system, bound.values()))
+    held = contact.period is not None
+    reads = _read(system, bound.values())
+    return Block("contact", contact.name, note, (title, *texts), reads, held)
 
 
 def _forces(system: System) -> Iterator[tuple[str, str]]:
@@ -222,12 +220,13 @@ def _less(total: Value, share: Value, force: str) -> Value:
     return Binary("+" if negative else "-", total, term)
 
 
-def _signal(name: str, signal: Signal | str) -> str:
+def signal_text(name: str, signal: Signal | str) -> str:
+    """Return what a signal is, in one line."""
     match signal:
         case str():
-            return f"{name} = {signal}"
+            return f"{name} = {signal.replace('**', '^')}"
         case Formula(text=text):
-            return f"{name} = {text}"
+            return f"{name} = {text.replace('**', '^')}"
         case Corners(times=times, held=held):
             return f"{name}: {times.size} {'corners' if held else 'samples'}"
     return f"{name}: a Python function"
@@ -249,36 +248,15 @@ def _read(system: System, trees: Iterable[Value]) -> tuple[str, ...]:
     return tuple(name for name in system.names if name in found)
 
 
-def _draw_contacts(graph: graphviz.Digraph, system: System) -> None:
+def _acting(system: System) -> Iterator[Join]:
     for contact in system.contacts:
-        touched = [
-            body
-            for body in system.bodies
-            if any(_share(system, v, body) != Number(0.0) for v in contact.v)
-        ]
-        place = f"contact-{contact.name}"
-        for k, body in enumerate(touched):
-            first, other = f"body-{body.name}", place
-            if k:  # the contact is between its bodies, in the order in which they are given
-                first, other = other, first
-            graph.edge(
-                first,
-                other,
-                id=f"acts-{contact.name}-{body.name}",
-                dir="both",
-                penwidth="2.2",
-                **{"class": "acts"},
-            )
-        if len(touched) == 1:
-            with graph.subgraph() as level:
-                level.attr(rank="same")
-                level.node(f"body-{touched[0].name}")
-                level.node(place)
+        for body in system.bodies:
+            if any(_share(system, v, body) != Number(0.0) for v in contact.v):
+                name = f"acts-{contact.name}-{body.name}"
+                yield Join(name, f"body-{body.name}", f"contact-{contact.name}")
 
 
-def _draw_values(
-    graph: graphviz.Digraph, blocks: Iterable[Block], owners: Mapping[str, str]
-) -> None:
+def _reading(blocks: Iterable[Block], owners: Mapping[str, str]) -> Iterator[Join]:
     for block in blocks:
         carried: dict[str, list[str]] = {}
         for name in block.reads:
@@ -286,14 +264,82 @@ def _draw_values(
             if source != block.id:
                 carried.setdefault(source, []).append(name)
         for source, names in carried.items():
-            graph.edge(
-                source,
-                block.id,
-                label=f" {', '.join(names)} ",
-                id=f"reads-{source}-{block.id}",
-                style="dashed" if block.kind == "sampled" else "solid",
-                **{"class": "reads"},
-            )
+            yield Join(f"reads-{source}-{block.id}", source, block.id, ", ".join(names))
+
+
+# --------------------------------------------------------------------------- drawing
+def _draw_block(graph: graphviz.Digraph, block: Block, box: Box) -> None:
+    _, style, fill, line = LOOKS[block.kind]
+    graph.node(
+        block.id,
+        f"<{_rows(_lines(block), box)}>",
+        id=block.id,
+        pos=position((box.x, box.y)),
+        shape="box",
+        style=style,
+        fillcolor=fill,
+        penwidth=f"{line:g}",
+        **{"class": block.kind},
+        **sides((box.width, box.height)),
+    )
+    if block.held:
+        _draw_hold(graph, block.id, box)
+
+
+def _draw_hold(graph: graphviz.Digraph, name: str, box: Box) -> None:
+    """Draw the staircase of what is held between ticks."""
+    wide, high = HOLD
+    x, y = box.x + 0.5 * box.width - wide - 7.0, box.y + 0.5 * box.height - high - 8.0
+    places = [(0, 0), (1, 0), (1, 1), (2, 1), (2, 2), (3, 2)]
+    corners = [(x + wide * a / 3, y + high * b / 2) for a, b in places]
+    first, last = f"{name}-hold-first", f"{name}-hold-last"
+    joint(graph, first, corners[0])
+    joint(graph, last, corners[-1])
+    draw_wire(graph, f"{name}-hold", first, corners[1:-1], last, arrow="none", kind="hold")
+
+
+def _draw_join(
+    graph: graphviz.Digraph, join: Join, path: list[tuple[float, float]], *, dashed: bool
+) -> None:
+    first, last = f"{join.id}-first", f"{join.id}-last"
+    acts = join.id.startswith("acts-")
+    joint(graph, first, path[0])
+    joint(graph, last, path[-1])
+    draw_wire(
+        graph,
+        join.id,
+        first,
+        path[1:-1],
+        last,
+        arrow="both" if acts else "forward",
+        width=ACTS if acts else 1.1,
+        tip=ACTS if acts else 1.1,
+        kind="acts" if acts else "reads",
+        style="dashed" if dashed else "solid",
+    )
+    if join.text:
+        wide = WIDE * len(join.text)
+        at = (path[0][0] + 4.0 + 0.5 * wide, path[0][1] + 8.0)
+        text = _text(join.text, face=MONO, size=10, colour=TEXT_GREY)
+        caption(graph, f"{join.id}-name", at, text, width=wide, height="0.17")
+
+
+def _draw_title(graph: graphviz.Digraph, system: System, sheet: Sheet) -> None:
+    key = "thick: velocity to the contact, force to the body; thin: values that are read"
+    if system.sampled:
+        key += "; dashed: at ticks only"
+    rows = [_text(printable(system.name), bold=True), _text(key, size=10, colour=TEXT_GREY)]
+    wide = max(BOLD * len(system.name), NARROW * len(key))
+    box = Box("title", wide, 40.0, 0)
+    at = (sheet.left + 0.5 * wide, sheet.top + 42.0)
+    graph.node(
+        "title",
+        f"<{_rows(rows, box)}>",
+        pos=position(at),
+        shape="plaintext",
+        id="title",
+        **sides((wide, 40.0)),
+    )
 
 
 # --------------------------------------------------------------------------- texts
@@ -309,27 +355,33 @@ def _seconds(value: float) -> str:
     return f"{1e3 * value:g} ms" if value < 1.0 else f"{value:g} s"
 
 
-def _title(system: System) -> str:
-    key = "thick: velocity to the contact, force to the body; thin: values that are read"
-    if system.sampled:
-        key += "; dashed: at ticks only"
-    return _rows([_text(system.name, bold=True), _text(key, size=9, colour=TEXT_GREY)])
-
-
-def _box(block: Block) -> str:
-    colour, fill, border = LOOKS[block.kind]
+def _lines(block: Block) -> list[str]:
     title = f"{_text(block.name, bold=True)}&#160; {_text(block.note, colour=TEXT_GREY, size=10)}"
     boundary = 1 if block.kind == "contact" else 0  # the name of its chart
-    rows = [title, *(_text(text, size=10) for text in block.texts[:boundary])]
-    for text in block.texts[boundary:]:
-        rows += [_text(line, face=MONO, size=10) for line in wrapped(text)]
-    style = "" if block.kind in ("sampled", "flow") else 'STYLE="ROUNDED"'
-    return _rows(rows, f'BORDER="{border}" COLOR="{colour}" BGCOLOR="{fill}" {style}')
+    rows = [title]
+    for k, text in enumerate(block.texts):
+        face = SANS if k < boundary else MONO
+        rows += [_text(line, face=face, size=10) for line in wrapped(text, LONGEST)]
+    return rows
 
 
-def _rows(rows: Iterable[str], look: str = 'BORDER="0"') -> str:
-    cells = "".join(f'<TR><TD ALIGN="LEFT">{row}</TD></TR>' for row in rows)
-    return f'<TABLE {look} CELLBORDER="0" CELLSPACING="0" CELLPADDING="4">{cells}</TABLE>'
+def _size(block: Block) -> tuple[float, float]:
+    """Return the width and the height of a block."""
+    shown = [line for text in block.texts for line in wrapped(text, LONGEST)]
+    title = BOLD * len(block.name) + NARROW * (len(block.note) + 2) + (HOLD[0] + 8) * block.held
+    wide = max(title, *(WIDE * len(line) for line in shown), 60.0)
+    return wide + 2 * SIDE, TITLE_ROW + ROW * len(shown) + 2 * ABOVE
+
+
+def _rows(rows: Iterable[str], box: Box) -> str:
+    cells = "".join(
+        f'<TR><TD ALIGN="LEFT" HEIGHT="{TITLE_ROW if k == 0 else ROW:g}">{row}</TD></TR>'
+        for k, row in enumerate(rows)
+    )
+    # As wide as the block, so that texts begin at its left side.
+    wide = box.width - 2 * SIDE * (box.id != "title")
+    look = 'BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="0"'
+    return f'<TABLE {look} WIDTH="{wide:.0f}">{cells}</TABLE>'
 
 
 def _text(

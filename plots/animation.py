@@ -1,51 +1,32 @@
-"""An animation of a run: the live chart next to the friction force.
+"""A film of a run: chart, bristles, force and states, with time slowed where states change.
 
-Graphviz lays out the chart once and `plots.live_chart` paints it; here matplotlib draws the painted
-SVG, which contains only paths, polygons, circles and texts. A row therefore looks the same
-everywhere, no program is called per frame, and no SVG converter is needed. The chart is redrawn
-only when it changes; a cursor moves over the force in every frame.
+`plots.film` has its parts: which moment each frame shows, the chart, the bristles, the picture and
+the files.
 """
 
 from __future__ import annotations
 
-import itertools
-import re
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from io import BytesIO
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, cast
-from xml.etree import ElementTree
-
-import numpy as np
+from typing import cast
 
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.traces.trace import Trace, check_trace
 from plots import formats
-from plots._matplotlib import (
-    Artist,
-    Axes,
-    Curve,
-    Figure,
-    FigureCanvasAgg,
-    Image,
-    patches,
-    rc_context,
-    to_rgb,
-)
-from plots.live_chart import LiveChart
-from plots.statechart import Sheet
-from plots.style import CHART_THEMES, RC, ChartTheme
+from plots._matplotlib import rc_context
+from plots._svg_artists import EXACT
+from plots.film._chart import FilmChart
+from plots.film._movie import Movie
+from plots.film._pace import paced
+from plots.film._picture import FilmPicture
+from plots.panels._shown import shown as shown_rows
+from plots.statechart import Sheet, chosen
+from plots.style import RC, Theme
 
 __all__ = ["animate"]
 
-SMOOTH = 2000  # points of the force curve
-POINTS = 72.0  # per inch
-CURVE_WIDTH, CURVE_HEIGHT = 4.4, 3.4  # inches, of the force and its labels
-DPI = 100
 FASTEST = 50  # frames per second: GIF delays are in 10 ms, and readers reject a delay of 10 ms
-STEPS = 8  # shades of a colour along an edge; more could hardly be distinguished
-WIDE = 0.88  # matplotlib's sans serif is wider than the one used for the layout
+USUAL = 200  # frames
 
 
 def animate(
@@ -53,7 +34,8 @@ def animate(
     path: str | Path,
     *,
     elements: int | Sequence[int] | None = None,
-    frames: int = 200,
+    frames: int | None = None,
+    seconds: float | None = None,
     t_start: float | None = None,
     t_end: float | None = None,
     fps: float = 20.0,
@@ -61,7 +43,17 @@ def animate(
     theme: str = "light",
     progress: Callable[[int, int], object] | None = None,
 ) -> Path:
-    """Write a GIF of the live chart next to F(t) with a moving cursor.
+    """Write a film of a run: chart, bristles, force and states.
+
+    Time runs uniformly between transitions and four times slower near them; at every micro-step it
+    stands still for 0.4 s, or less if there are many. A fired edge is orange while time stands
+    still, and fades over three frames. If there are more micro-steps than three in four frames,
+    time runs uniformly.
+
+    The chart is that of one element if only one is chosen; otherwise one chart for all, which says
+    how many elements are in each state. Force, states and bristles are those of the whole contact;
+    bristles are contacts on the ground, with a spring each to the slider. Where the chart has no
+    deflection, they are rods.
 
     Parameters
     ----------
@@ -69,12 +61,15 @@ def animate(
         The run.
     path : str or Path
         Its ending must be that of an animation format in `plots.formats.FORMATS`, such as ``.gif``.
-        The folder must exist; an existing file is replaced atomically.
+        Videos need the extra ``film``. The folder must exist; an existing file is replaced
+        atomically.
     elements : int or sequence of int, optional
-        How many elements, or which ones, counted from 0; by default all.
-    frames : int
-        Number of frames, at evenly spaced times; at least 2. Consecutive frames without a visible
+        How many elements the chart shows, or which ones, counted from 0; by default all.
+    frames : int, optional
+        Number of frames, at least 2; by default 200. In a GIF, consecutive frames without a visible
         difference become one frame that is shown longer.
+    seconds : float, optional
+        s, length of the film, instead of the number of frames.
     t_start, t_end : float, optional
         s, the part of the run that is shown; by default the whole run.
     fps : float
@@ -98,7 +93,7 @@ def animate(
     OutputError
         If the folder cannot be written.
     MissingExtraError
-        If there is no Graphviz, neither program nor package.
+        If there is no Graphviz, neither program nor package, or no PyAV for a video.
 
     Examples
     --------
@@ -111,11 +106,11 @@ def animate(
     """
     check_trace(trace)
     formats.chosen(path, "animation")
-    if isinstance(frames, bool) or not isinstance(frames, int) or frames < 2:
-        raise ParameterError("it must be an integer of at least 2", place="frames", value=frames)
     if not 0 < fps <= FASTEST:
         raise ParameterError(f"it must be above 0 and at most {FASTEST}", place="fps", value=fps)
+    count = _frames(frames, seconds, fps)
     Sheet(trace.model.chart, notation, "TB", theme)  # refuses wrong options before any work
+    chosen(trace.n if elements is None else elements, trace.n)
     first, last = float(trace.t.min()), float(trace.t.max())
     begin = first if t_start is None else t_start
     end = last if t_end is None else t_end
@@ -124,237 +119,30 @@ def animate(
             f"t_start is {shown(begin)} s and t_end is {shown(end)} s",
             advice=f"they must lie within the run, {first:g} to {last:g} s, in this order",
         )
-    rows = trace.sample(np.linspace(begin, end, frames))
-    chart = LiveChart(rows, elements, notation=notation, theme=theme)
-    with rc_context(RC):
-        film = _Film(chart, trace.sample(np.linspace(begin, end, SMOOTH)), CHART_THEMES[theme])
-        return formats.save(Movie(film, frames, fps, progress), path, "animation")
+    window = (float(begin), float(end))
+    pace = paced(trace, window, count, fps)
+    chart = FilmChart(pace, elements, notation, theme)
+    with rc_context(RC | EXACT):
+        film = FilmPicture(pace, chart, shown_rows(trace, window), window, cast(Theme, theme))
+        return formats.save(Movie(film, fps, progress), path, "animation")
 
 
-@dataclass(frozen=True, eq=False)
-class Movie:
-    """An animation that is ready to be written.
-
-    Parameters
-    ----------
-    film : _Film
-        The moving picture.
-    frames : int
-        Number of frames.
-    fps : float
-        Frames per second.
-    progress : callable, optional
-        Called as ``progress(done, frames)``.
-    """
-
-    film: _Film
-    frames: int
-    fps: float
-    progress: Callable[[int, int], object] | None = None
-
-    def pictures(self) -> Iterator[Image.Image]:
-        """Draw frame by frame."""
-        for row in range(self.frames):
-            yield self.film.picture(row)
-            if self.progress is not None:
-                self.progress(row + 1, self.frames)
-
-
-def gif(movie: Movie) -> bytes:
-    """Return an animation as a GIF, which repeats forever.
-
-    Parameters
-    ----------
-    movie : Movie
-        What.
-
-    Returns
-    -------
-    bytes
-        The file.
-    """
-    palette, none = movie.film.palette(), Image.Dither.NONE
-    each = (picture.quantize(palette=palette, dither=none) for picture in movie.pictures())
-    file = BytesIO()
-    next(each).save(
-        file,
-        format="GIF",
-        save_all=True,
-        append_images=each,
-        duration=1000.0 / movie.fps,
-        loop=0,
-        optimize=False,
-    )
-    return file.getvalue()
-
-
-class _Film:
-    """The moving picture.
-
-    Parameters
-    ----------
-    chart : LiveChart
-        Chart of the rows to show.
-    curve : Trace
-        The same part of the run with enough points for a smooth curve.
-    colours : ChartTheme
-        Colours.
-    """
-
-    def __init__(self, chart: LiveChart, curve: Trace, colours: ChartTheme) -> None:
-        self.chart, self.colours = chart, colours
-        left, top, width, height = (float(n) for n in chart.root.get("viewBox", "").split())
-        tall = max(height / POINTS, CURVE_HEIGHT)
-        wide = width / POINTS + CURVE_WIDTH
-        self.figure = Figure(figsize=(wide, tall), dpi=DPI, facecolor=colours.paper)
-        # Half of its methods are untyped.
-        self.canvas = cast(Any, FigureCanvasAgg(self.figure))
-        box = (0, (1 - height / POINTS / tall) / 2, width / POINTS / wide, height / POINTS / tall)
-        ax = self.figure.add_axes(box)
-        ax.set(xlim=(left, left + width), ylim=(top + height, top))
-        ax.set_axis_off()
-        chart.paint(0)
-        self.parts = list(_drawn(ax, chart.root))
-        self._draw_force(curve, width / POINTS / wide, wide, tall)
-        self.canvas.draw()
-        self.ground = self.canvas.copy_from_bbox(self.figure.bbox)
-        self.look: object = None
-        self.layer: Any = None
-
-    def _draw_force(self, curve: Trace, start: float, wide: float, tall: float) -> None:
-        colours = self.colours
-        high = max(CURVE_HEIGHT / tall, 0.62)
-        ax = self.figure.add_axes(
-            (start + 0.75 / wide, (1 - high) / 2 + 0.55 / tall, 3.4 / wide, high - 1.0 / tall),
-            facecolor=colours.paper,
-        )
-        ax.plot(curve.t, curve.F, color=colours.ink, linewidth=1.2)
-        ax.margins(x=0)
-        ax.set_xlabel("t [s]", color=colours.ink)
-        ax.set_ylabel("F [N]", color=colours.ink)
-        ax.tick_params(colors=colours.ink)
-        for spine in ax.spines.values():
-            spine.set_color(colours.ink)
-        self.line = ax.axvline(curve.t[0], color=colours.fired, linewidth=1.2, animated=True)
-        (self.point,) = ax.plot([], [], "o", color=colours.fired, markersize=6, animated=True)
-        self.clock = ax.set_title("", color=colours.ink, animated=True)
-
-    def picture(self, row: int) -> Image.Image:
-        """Return the picture of a row of the chart's run."""
-        chart, trace = self.chart, self.chart.trace
-        look = chart.look(row)
-        if look != self.look:
-            chart.paint(row)
-            self.canvas.restore_region(self.ground)
-            for part in self.parts:
-                part.update()
-                part.draw(self.figure)
-            self.look, self.layer = look, self.canvas.copy_from_bbox(self.figure.bbox)
-        self.canvas.restore_region(self.layer)
-        t, force = float(trace.t[row]), float(trace.F[row])
-        self.line.set_xdata([t, t])
-        self.point.set_data([t], [force])
-        self.clock.set_text(f"t = {t:.3f} s    F = {force:+.3f} N")
-        for artist in (self.line, self.point, self.clock):
-            self.figure.draw_artist(artist)
-        return Image.fromarray(np.asarray(self.canvas.buffer_rgba())[..., :3].copy())
-
-    def palette(self) -> Image.Image:
-        """Return one palette for all frames: every colour, and its shades towards the background.
-
-        Separate palettes would make the file larger, and colours would flicker.
-        """
-        grounds = [np.array(to_rgb(c)) for c in (self.colours.paper, self.colours.active_fill)]
-        colours = set(vars(self.colours).values()) - {self.colours.paper, self.colours.active_fill}
-        shades = list(grounds)
-        for colour in (np.array(to_rgb(c)) for c in sorted(colours)):
-            for ground in grounds:
-                shades += [ground + k / STEPS * (colour - ground) for k in range(1, STEPS + 1)]
-        image = Image.new("P", (1, 1))
-        table = np.unique(np.round(255 * np.array(shades)).astype(np.uint8), axis=0)
-        image.putpalette(table.tobytes())  # at most 2 + 8 * 2 * 8 of the 256 that a GIF can have
-        return image
-
-
-# --------------------------------------------------------------------------- SVG to matplotlib
-class _Part:
-    """One part of the SVG and its artist.
-
-    Parameters
-    ----------
-    node : Element
-        Of the painted tree.
-    artist : Artist
-        Drawn for it.
-    """
-
-    def __init__(self, node: ElementTree.Element, artist: Artist) -> None:
-        self.node, self.artist = node, artist
-
-    def update(self) -> None:
-        """Update the artist from the tree."""
-        get = self.node.get
-        if self.node.tag == "text":
-            shown = get("visibility") != "hidden"
-            self.artist.set(color=get("fill"), text=self.node.text or "", visible=shown)
-        else:
-            fill, stroke = (
-                "none" if get(name) in (None, "transparent") else get(name)
-                for name in ("fill", "stroke")
+def _frames(frames: int | None, seconds: float | None, fps: float) -> int:
+    """Return the number of frames."""
+    if seconds is not None:
+        if frames is not None:
+            raise ParameterError(
+                f"frames is {shown(frames)} and seconds is {shown(seconds)}",
+                advice="give only one of them",
             )
-            width = float(get("stroke-width") or 1.0)
-            self.artist.set(facecolor=fill, edgecolor=stroke, linewidth=width)
-
-    def draw(self, figure: Figure) -> None:
-        """Draw the artist on the figure."""
-        figure.draw_artist(self.artist)
-
-
-def _drawn(ax: Axes, root: ElementTree.Element) -> Iterator[_Part]:
-    """Make an artist for each part of the SVG, in its order."""
-    (graph,) = root.findall("g")
-    moved = re.search(r"translate\((\S+) (\S+)\)", graph.get("transform", ""))
-    dx, dy = (float(n) for n in moved.groups()) if moved else (0.0, 0.0)
-    for node in graph.iter():
-        artist = _artist(ax, node, dx, dy)
-        if artist is not None:
-            part = _Part(node, artist)
-            part.update()
-            yield part
-
-
-def _artist(ax: Axes, node: ElementTree.Element, dx: float, dy: float) -> Artist | None:
-    get = node.get
-    if node.tag == "text":
-        return ax.text(
-            float(get("x", "0")) + dx,
-            float(get("y", "0")) + dy,
-            "",
-            ha={"start": "left", "middle": "center"}[get("text-anchor", "start")],
-            va="baseline",
-            fontweight=get("font-weight", "normal"),
-            animated=True,
-            parse_math=False,
-            **_font(node),
-        )
-    if node.tag == "ellipse":
-        at = (float(get("cx", "0")) + dx, float(get("cy", "0")) + dy)
-        size = 2 * float(get("rx", "0")), 2 * float(get("ry", "0"))
-        return ax.add_patch(patches.Ellipse(at, *size, animated=True))
-    if node.tag not in ("path", "polygon", "polyline"):
-        return None
-    numbers = [float(n) for n in re.findall(r"-?\d+(?:\.\d+)?", get("d") or get("points") or "")]
-    points = np.array(numbers).reshape(-1, 2) + (dx, dy)
-    # Graphviz writes a path as M followed by cubic curves only.
-    kind = Curve.CURVE4 if node.tag == "path" else Curve.LINETO
-    codes = [Curve.MOVETO, *itertools.repeat(kind, len(points) - 1)]
-    dashes = {"linestyle": (0, (5, 2))} if get("stroke-dasharray") else {}
-    return ax.add_patch(patches.PathPatch(Curve(points, codes), animated=True, **dashes))
-
-
-def _font(node: ElementTree.Element) -> dict[str, Any]:
-    # The two families that matplotlib ships, so that it never searches for fonts.
-    size = float(node.get("font-size", "10"))
-    if "Mono" in node.get("font-family", ""):
-        return {"fontfamily": "DejaVu Sans Mono", "fontsize": size}
-    return {"fontfamily": "DejaVu Sans", "fontsize": WIDE * size}
+        if not isinstance(seconds, float | int) or not 2 <= seconds * fps < float("inf"):
+            raise ParameterError(
+                f"it must be a time of at least two frames, {2 / fps:g} s",
+                place="seconds",
+                value=seconds,
+            )
+        return round(seconds * fps)
+    frames = USUAL if frames is None else frames
+    if isinstance(frames, bool) or not isinstance(frames, int) or frames < 2:
+        raise ParameterError("it must be an integer of at least 2", place="frames", value=frames)
+    return frames

@@ -115,10 +115,25 @@ def _matplotlib(form: str, **metadata: None) -> Callable[[Any], bytes]:
     return write
 
 
+def _pgf(figure: Any) -> bytes:
+    from plots.figures._pgf import pgf
+
+    return pgf(figure)
+
+
 def _gif(movie: Any) -> bytes:
-    from plots.animation import gif
+    from plots.film._files import gif
 
     return gif(movie)
+
+
+def _video(form: str, codec: str) -> Callable[[Any], bytes]:
+    def write(movie: Any) -> bytes:
+        from plots.film._files import video
+
+        return video(movie, form, codec)
+
+    return write
 
 
 def _html(page: Any) -> bytes:
@@ -139,7 +154,10 @@ FORMATS: list[Format] = [
     Format(".png", "figure", "a figure", "matplotlib", _matplotlib("png"), "plots", usual=True),
     Format(".svg", "figure", "a figure", "matplotlib", _svg, "plots", usual=True),
     Format(".pdf", "figure", "a figure", "matplotlib", _pdf, "plots"),
+    Format(".pgf", "figure", "a figure", "matplotlib", _pgf, "plots"),
     Format(".gif", "animation", "an animation", "Pillow", _gif, "plots"),
+    Format(".mp4", "animation", "an animation", "PyAV", _video("mp4", "libx264"), "film"),
+    Format(".webm", "animation", "an animation", "PyAV", _video("webm", "libvpx-vp9"), "film"),
     Format(".html", "page", "a replay page", "gms-fsm", _html, "replay", usual=True),
 ]
 INSTEAD = ".dot"  # written for a graph if there is no Graphviz
@@ -165,7 +183,7 @@ def register(new: Format) -> None:
     >>> size = Format(".size", "graph", "a size", "me", lambda graph: b"%d" % len(graph.body))
     >>> register(size)
     >>> chosen("chart.size", "graph").write(statechart(LUGRE))
-    b'3'
+    b'4'
     >>> FORMATS.remove(size)
     """
     if any((old.ending, old.subject) == (new.ending, new.subject) for old in FORMATS):
@@ -196,7 +214,7 @@ def endings(*subjects: Subject, usual: bool = False) -> list[str]:
     Examples
     --------
     >>> endings("figure")
-    ['.png', '.svg', '.pdf']
+    ['.png', '.svg', '.pdf', '.pgf']
     """
     return [each.ending for each in of(*subjects) if each.usual or not usual]
 
@@ -241,7 +259,7 @@ def listed(*subjects: Subject) -> str:
     Examples
     --------
     >>> listed("figure")
-    '.png, .svg or .pdf'
+    '.png, .svg, .pdf or .pgf'
     >>> listed("graph", "chart")
     '.svg, .png, .pdf for a picture or .dot, .gv for DOT text or .mmd for Mermaid text'
     """
@@ -288,7 +306,7 @@ def chosen(path: str | Path, *subjects: Subject) -> Format:
     'matplotlib'
     >>> chosen("a.bmp", "figure")
     Traceback (most recent call last):
-    gms_fsm.errors.ParameterError: path is 'a.bmp'; it must end in .png, .svg or .pdf
+    gms_fsm.errors.ParameterError: path is 'a.bmp'; it must end in .png, .svg, .pdf or .pgf
     """
     path = checked_path("path", path)
     for each in of(*subjects):

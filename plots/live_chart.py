@@ -29,7 +29,15 @@ from plots.drawings import Svg, image
 from plots.render import picture
 from plots.statechart import Sheet, chosen
 
-__all__ = ["ElementLook", "LiveChart", "live_statechart"]
+__all__ = [
+    "ElementLook",
+    "ElementParts",
+    "LiveChart",
+    "Marks",
+    "live_statechart",
+    "marks_of",
+    "plain_tree",
+]
 
 SVG = "http://www.w3.org/2000/svg"
 THIN, THICK, BORDER = "1.1", "2.6", "3"
@@ -127,7 +135,7 @@ class LiveChart:
         self.elements = chosen(trace.n if elements is None else elements, trace.n)
         self.values = values
         chart = trace.model.chart
-        self._sheet = Sheet(chart, notation, direction, theme, live=True)
+        self._sheet = Sheet(chart, notation, direction, theme, live=True).fitted()
         read = frozenset[str]().union(*map(names_in, chart.guards.values()))
         late = [name for name in (*chart.force_names, *chart.rate_names) if name in read]
         names = dict.fromkeys([*chart.variables, *chart.inputs, *chart.velocities, *late])
@@ -143,10 +151,10 @@ class LiveChart:
             values=self._value_rows(None),
             foot=f"t = {WIDEST} s" if values else "",
         )
-        self.root = _plain_tree(picture(graph, "svg"))
+        self.root = plain_tree(picture(graph, "svg"))
         self.root.set("style", f"background:{self._sheet.colours.paper}")
         groups = {group.get("id", ""): group for group in self.root.iter("g")}
-        self._parts = {i: _ElementParts(self._sheet, i, groups) for i in self.elements}
+        self.parts = {i: ElementParts(self._sheet, i, groups) for i in self.elements}
         # Below the picture: definitions, then the values, and last the time.
         defined = sum(map(len, self._sheet.definitions()))
         texts = groups["graph0"].findall("text")[defined:]
@@ -218,7 +226,7 @@ class LiveChart:
         state = chart.states[int(trace.modes[row, element])].name
         leaving = tuple(edge.name for _, edge in chart.leaving(state))
         values = values_at(trace, row, element)
-        marks = {edge: _marks(chart.guards[edge], values) for edge in leaving}
+        marks = {edge: marks_of(chart.guards[edge], values) for edge in leaving}
         own, count = self._own[element], int(self._log_count[row])
         past = int(np.searchsorted(own, count))  # firings of this element up to here
         if not past:
@@ -228,7 +236,7 @@ class LiveChart:
         fired, source = str(record.edge), str(record.source)
         if (record.t, self._steps[last]) == (trace.t[row], trace.microstep[row]):
             # This row is that firing; its marks are those of the row before.
-            marks[fired] = _marks(chart.guards[fired], values_at(trace, row - 1, element))
+            marks[fired] = marks_of(chart.guards[fired], values_at(trace, row - 1, element))
         return ElementLook(element, state, marks, leaving, fired, source)
 
     # ------------------------------------------------------------------ drawing
@@ -277,7 +285,7 @@ class LiveChart:
         """
         row = self._row(row)
         for look in self.look(row):
-            self._parts[look.element].paint(look)
+            self.parts[look.element].paint(look)
             if self.values:
                 for piece, node in _paired(
                     self._value_rows((row, look.element)), self._value_texts[look.element]
@@ -367,7 +375,8 @@ def _log_counts(trace: Trace) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
     return np.array([bisect_right(entries, row) for row in rows], dtype=np.int64)
 
 
-def _marks(guard: Condition, values: Mapping[str, float]) -> Marks:
+def marks_of(guard: Condition, values: Mapping[str, float]) -> Marks:
+    """Return whether each clause of a guard holds; None where the values do not say."""
     return tuple(_truth(part, values) for part in clauses(guard))
 
 
@@ -379,8 +388,8 @@ def _truth(part: Condition, values: Mapping[str, float]) -> bool | None:
 
 
 # --------------------------------------------------------------------------- reading the SVG
-def _plain_tree(picture: bytes) -> ElementTree.Element:
-    """Read an SVG; its namespace becomes an attribute, so that tags stay short."""
+def plain_tree(picture: bytes) -> ElementTree.Element:
+    """Return an SVG as a tree; its namespace becomes an attribute, so that tags stay short."""
     root = ElementTree.fromstring(picture)
     for node in root.iter():
         node.tag = node.tag.removeprefix(f"{{{SVG}}}")
@@ -409,7 +418,7 @@ def _paired(rows: Sequence[Row], nodes: Sequence[ElementTree.Element]) -> Texts:
     return list(zip(pieces, nodes, strict=True))
 
 
-class _ElementParts:
+class ElementParts:
     """The parts of one element in the SVG, and how they are painted."""
 
     def __init__(
@@ -433,34 +442,54 @@ class _ElementParts:
                 )
 
     def paint(self, look: ElementLook) -> None:
-        for state, (group, texts) in self.states.items():
-            self._paint_state(group, texts, state == look.active)
-        for (edge, source), (guard, texts, halves) in self.edges.items():
+        """Paint the element."""
+        for state in self.states:
+            self.paint_state(state, state == look.active)
+        for edge, source in self.edges:
             leaving, fired = source == look.active, (edge, source) == (look.fired, look.source)
-            colour = self.colours.ink if leaving else self.colours.pale
-            classes = ["leaving" if leaving else "pale"]
-            if fired:
-                colour = self.colours.fired
-                classes.append("fired")
-            for half in halves:
-                _classify(half, "edge", classes)
-                for shape in _shapes(half):
-                    shape.set("stroke", colour)
-                    shape.set("stroke-width", THICK if fired else THIN)
-                    if shape.get("fill") != "none":
-                        shape.set("fill", colour)
-            _classify(guard, "node guard", classes)
             marks = look.marks.get(edge) if leaving or fired else None
-            plain = self.colours.pale if classes == ["pale"] else self.colours.ink
-            for piece, node in texts:
-                self._paint_text(piece, node, marks, plain, colour)
+            self.paint_edge((edge, source), leaving, marks, self.colours.fired if fired else "")
 
-    def _paint_state(
-        self,
-        group: ElementTree.Element,
-        texts: Texts,
-        active: bool,
+    def paint_edge(
+        self, key: tuple[str, str], leaving: bool, marks: Marks | None, fired: str = ""
     ) -> None:
+        """Paint an edge, given its name and source.
+
+        Parameters
+        ----------
+        key : (str, str)
+            The edge, and the state that it leaves.
+        leaving : bool
+            Whether that state is active.
+        marks : tuple of bool or None
+            Truth values of the clauses; None for no marks.
+        fired : str
+            The colour of an edge just taken; empty for another edge.
+        """
+        guard, texts, halves = self.edges[key]
+        colour = fired or (self.colours.ink if leaving else self.colours.pale)
+        classes = ["leaving" if leaving else "pale"] + ["fired"] * bool(fired)
+        for half in halves:
+            _classify(half, "edge", classes)
+            for shape in _shapes(half):
+                shape.set("stroke", colour)
+                shape.set("stroke-width", THICK if fired else THIN)
+                if shape.get("fill") != "none":
+                    shape.set("fill", colour)
+        _classify(guard, "node guard", classes)
+        plain = self.colours.pale if classes == ["pale"] else self.colours.ink
+        for piece, node in texts:
+            self._paint_text(piece, node, marks, plain, colour)
+
+    def write_count(self, state: str, count: str) -> None:
+        """Write how many elements are in a state (`Sheet.among`)."""
+        for piece, node in self.states[state][1]:
+            if piece.role == "among":
+                node.text = count
+
+    def paint_state(self, state: str, active: bool) -> None:
+        """Paint a state, given its name."""
+        group, texts = self.states[state]
         colours = self.colours
         _classify(group, "node state", ["active"] if active else [])
         line = colours.active if active else colours.ink

@@ -46,8 +46,9 @@ def mermaid(chart: Chart) -> str:
     ---
     stateDiagram-v2
         [*] --> s1_bristle
-        state "Bristle" as s1_bristle
+        state "bristle" as s1_bristle
         s1_bristle : during#58; dz = v - sigma_0 * |v| * z / s#59;
+        s1_bristle : force#58; F = sigma_0 * z + sigma_1 * dz#59;
     <BLANKLINE>
     """
     checked_kind("chart", chart, Chart, "a Chart, of a model its .chart")
@@ -55,8 +56,8 @@ def mermaid(chart: Chart) -> str:
     title = json.dumps(_printable(chart.name), ensure_ascii=False)
     write, lines = Writer(chart, "stateflow"), [f"[*] --> {ids[chart.default_state.name]}"]
     for state in chart.states:
-        name, own = state.name[:1].upper() + state.name[1:], ids[state.name]
-        lines.append(f'state "{_escape(name)}" as {own}')
+        own = ids[state.name]
+        lines.append(f'state "{_escape(state.name)}" as {own}')
         # The space after the colon is needed: Mermaid would read ":#58;" as a style.
         lines += [f"{own} : {_escape(line)}" for line in _lines(state_texts(write, state))]
     for state in chart.states:

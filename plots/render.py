@@ -148,7 +148,8 @@ def _by_program(graph: graphviz.Digraph, form: str) -> bytes | None:
     program = shutil.which("dot")
     if program is None:
         return None
-    command = [program, f"-K{graph.engine}", f"-T{form}"]
+    # -q: our labels have fixed sizes, and Graphviz warns where its own font is wider.
+    command = [program, "-q", f"-K{graph.engine}", f"-T{form}"]
     if form == "png":
         command.append(f"-Gdpi={PNG_DPI}")
     done = subprocess.run(command, input=graph.source.encode(), capture_output=True, check=False)
@@ -168,7 +169,7 @@ def _by_package(graph: graphviz.Digraph, form: str) -> bytes | None:
         drawing = pygraphviz.AGraph(string=graph.source)
         if form == "png":
             drawing.graph_attr["dpi"] = PNG_DPI
-        picture: bytes = drawing.draw(format=form, prog=graph.engine)
+        picture: bytes = drawing.draw(format=form, prog=graph.engine, args="-q")
     except (ValueError, OSError) as error:
         raise OutputError(f"Graphviz (pygraphviz) cannot draw this graph: {error}") from None
     return picture

@@ -42,7 +42,7 @@ from plots._window import window_of
 from plots.page._chart import chart_svg
 from plots.page._rows import page_rows
 from plots.page._run import stored_run, views_of
-from plots.style import CHART_THEMES, ELEMENT_COLOURS, PAGE_THEMES
+from plots.style import CHART_THEMES, ELEMENT_STEPS, PAGE_THEMES
 
 __all__ = ["Replay", "page_data", "page_html", "replay", "replay_html", "write_replay"]
 
@@ -421,27 +421,37 @@ def _theme() -> str:
     for name, theme in CHART_THEMES.items():
         page = PAGE_THEMES[name]
         colours = {key.replace("_", "-"): value for key, value in vars(theme).items()}
-        colours |= {"panel": page.panel, "grid": page.grid}
+        colours |= {"panel": page.panel, "grid": page.grid, "chosen": page.chosen}
         colours |= {"fired-text": page.fired_text, "fired-fill": page.fired_fill}
-        for key, values in (("e", page.elements), ("fill", page.fills), ("edge", page.edges)):
+        steps = (
+            ("e", page.elements),
+            ("fill", page.fills),
+            ("hatch", page.hatches),
+            ("slip", page.slipping),
+            ("edge", page.edges),
+        )
+        for key, values in steps:
             colours |= {f"{key}{k}": value for k, value in enumerate(values)}
         texts[name] = "".join(f"--{key}:{value};" for key, value in colours.items())
     looks = "".join(
         f".state{k}{{background:{_hatched(k, angle)}}}\n" for k, angle in enumerate(HATCH_ANGLES)
     )
     swatches = "".join(
-        f".e{k}{{border-color:var(--e{k})!important}}\n" for k in range(len(ELEMENT_COLOURS))
+        f".e{k}{{border-color:var(--e{k})!important}}\n" for k in range(ELEMENT_STEPS)
     )
+    dark = texts["dark"]
     return (
         f":root{{color-scheme:light dark;{texts['light']}}}\n"
-        f"@media(prefers-color-scheme:dark){{:root{{{texts['dark']}}}}}\n{looks}{swatches}"
+        f"@media(prefers-color-scheme:dark){{:root:not([data-theme=light]){{{dark}}}}}\n"
+        f":root[data-theme=light]{{color-scheme:light}}\n"
+        f":root[data-theme=dark]{{color-scheme:dark;{dark}}}\n{looks}{swatches}"
     )
 
 
 def _hatched(k: int, angle: int | None) -> str:
     if angle is None:
         return f"var(--fill{k})"
-    return f"repeating-linear-gradient({angle}deg,var(--edge{k}) 0 1px,var(--fill{k}) 1px 6px)"
+    return f"repeating-linear-gradient({angle}deg,var(--hatch{k}) 0 1px,var(--fill{k}) 1px 6px)"
 
 
 def _inert(data: object) -> str:

@@ -1,18 +1,17 @@
 """Draw a friction chart in the style of Stateflow.
 
 Everything in the picture is read from the chart: states with their actions, edges with priority,
-guard and action. A guard is a node on its edge's path, because Graphviz places nodes without
-overlaps but places edge labels badly. Ids and classes are stable, so that the SVG can be restyled
-without a new layout: class ``state``, ``guard``, ``edge``, ``default`` and ``region``, and ids such
-as ``element1-state-slip``.
+guard and action. `plots._layers` and `plots._matrix` make the layout, and Graphviz only draws, so
+every Graphviz gives the same picture. A guard is a node on its edge's path. Ids and classes are
+stable, so that the SVG can be restyled without a new layout: class ``state``, ``guard``, ``edge``,
+``default`` and ``region``, and ids such as ``element1-state-slip``.
 """
 
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from math import ceil, sqrt
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import graphviz
 
@@ -21,7 +20,10 @@ from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.errors import ParameterError
 from gms_fsm.language import Both, Condition, Either, clauses
 from gms_fsm.traces.trace import Trace
+from plots._arrange import arrange
+from plots._cells import Cells
 from plots._contents import Texts, chart_in_words, chart_texts, state_texts
+from plots._drawing import graph_drawing
 from plots._labels import (
     DOT,
     LONGEST_LINE,
@@ -29,25 +31,30 @@ from plots._labels import (
     Piece,
     Row,
     Tally,
-    edge_id,
-    element_id,
-    escape,
-    part_id,
     printable,
+    warn_of_missing_glyphs,
+    with_indices,
     wrapped,
 )
+from plots._matrix import WIDEST
 from plots._notation import NOTATIONS, Writer
 from plots.drawings import DrawnGraph
-from plots.style import CHART_THEMES, MONO, SANS, ChartTheme
+from plots.style import CHART_THEMES, SANS, ChartTheme
 
 __all__ = ["ChartGraph", "statechart"]
 
 DIRECTIONS = {"TB": "top to bottom", "LR": "left to right"}
 
-# Length in points of a state's side for every edge that begins or ends there. On a shorter side
-# the edges would leave around the corners and overlap.
-ROOM_PER_EDGE = {"TB": 45, "LR": 16}
-MARKED = "2.6"  # points; width of highlighted lines
+FORMS = {
+    "auto": "graph or matrix",
+    "graph": "boxes and arrows",
+    "matrix": "a table of sources and targets",
+}
+
+MOST_EDGES = 20  # of a graph; a chart with more is drawn as a matrix
+MOST_LINES = 6  # of a guard on an edge; a longer one is written below the picture
+LONGEST_LABEL = 34  # characters of a line on an edge
+SMALLEST = 0.7  # smallest size of texts: 7 points instead of 10
 
 
 class ChartGraph(DrawnGraph):
@@ -67,6 +74,7 @@ def statechart(
     marked: Iterable[str] = (),
     names: bool = False,
     note: str = "",
+    form: str = "auto",
 ) -> DrawnGraph:
     """Draw a chart: one element, or a bank of elements as parallel states.
 
@@ -92,11 +100,21 @@ def statechart(
         Whether each edge's name, which the log and the debugger use, is written above its guard.
     note : str, optional
         Text below the picture, line by line.
+    form : {"auto", "graph", "matrix"}
+        Boxes and arrows; or a matrix with a row for each source and a column for each target, whose
+        cells have the priority and the number of the guard. ``"auto"`` is a matrix above 20 edges,
+        or where a graph would be wider than two A4 pages. Long guards are numbered ``g1``, ``g2``,
+        ... and written below the picture.
 
     Returns
     -------
     graphviz.Digraph
         The picture as a Graphviz graph; `plots.render` writes it to a file.
+
+    Warns
+    -----
+    UserWarning
+        If the chart has characters that the font of charts cannot show.
 
     Raises
     ------
@@ -129,7 +147,17 @@ def statechart(
     for name in pointed:
         one_of("marked", name, parts)
     tally = Tally(counts) if counts else None
-    sheet = Sheet(chart, notation, direction, theme, tally, marked=frozenset(pointed), names=names)
+    sheet = Sheet(
+        chart,
+        notation,
+        direction,
+        theme,
+        form,
+        tally,
+        marked=frozenset(pointed),
+        names=names,
+    )
+    warn_of_missing_glyphs(sheet.write, note)
     numbers = chosen(elements, None if counts is None else counts.n)
     bare = elements == 1 and (counts is None or counts.n == 1)
     return sheet.graph(numbers, bare=bare, foot=note)
@@ -229,7 +257,7 @@ class Sheet:
     ----------
     chart : Chart
         The chart.
-    notation, direction, theme : str
+    notation, direction, theme, form : str
         See `statechart`.
     tally : Tally, optional
         Counts to show.
@@ -239,21 +267,32 @@ class Sheet:
         States and edges to highlight.
     names : bool
         Write each edge's name above its guard.
+    numbered : mapping of str to int
+        Edges whose guards are written below the picture, with their numbers.
+    scale : float
+        Size of the texts, 1 for the usual one.
+    among : int
+        Leave room in each state for "3 of 4": how many of so many elements are in it.
     """
 
     chart: Chart
     notation: str = "stateflow"
     direction: str = "TB"
     theme: str = "light"
+    form: str = "auto"
     tally: Tally | None = None
     live: bool = False
     marked: frozenset[str] = frozenset()
     names: bool = False
+    numbered: Mapping[str, int] = field(default_factory=dict)
+    scale: float = 1.0
+    among: int = 0
 
     def __post_init__(self) -> None:
         one_of("notation", self.notation, NOTATIONS)
         one_of("direction", self.direction, DIRECTIONS)
         one_of("theme", self.theme, CHART_THEMES)
+        one_of("form", self.form, FORMS)
 
     @property
     def colours(self) -> ChartTheme:
@@ -264,6 +303,52 @@ class Sheet:
     def write(self) -> Writer:
         """The notation."""
         return Writer(self.chart, self.notation)
+
+    @property
+    def cells(self) -> Cells:
+        """What sets the labels."""
+        return Cells(self.colours, self.scale)
+
+    def fitted(self) -> Sheet:
+        """Return the sheet as it is drawn: a graph or a matrix, with or without numbers for guards.
+
+        Returns
+        -------
+        Sheet
+            The first of these whose picture of an element is at most `WIDEST` wide: guards on the
+            edges; guards of more than `MOST_LINES` lines as numbers; all guards as numbers; these
+            with the smallest texts; a matrix.
+        """
+        if self.scale < 1 or self.numbered:
+            return self
+        long, every = (self._numbers(all_of_them=flag) for flag in (False, True))
+        many = self.form == "auto" and not self.live and len(self._leaving) > MOST_EDGES
+        if self.form == "matrix" or many:
+            return replace(self, form="matrix", numbered=every)
+        for numbered, scale in ((long, 1.0), (every, 1.0), (every, SMALLEST)):
+            sheet = replace(self, form="graph", numbered=numbered, scale=scale)
+            if graph_drawing(sheet, 0).width <= WIDEST:
+                return sheet
+        if self.form == "graph" or self.live:
+            return sheet
+        return replace(self, form="matrix", numbered=every)
+
+    @property
+    def _leaving(self) -> list[Transition]:
+        states = self.chart.states
+        return [edge for state in states for _, edge in self.chart.leaving(state.name)]
+
+    def _numbers(self, all_of_them: bool) -> dict[str, int]:
+        """Return numbers for guards; edges with the same guard and action share one."""
+        texts: dict[str, int] = {}
+        numbers: dict[str, int] = {}
+        for edge in self._leaving:
+            if all_of_them or len(self._lines_of(edge)) > MOST_LINES:
+                numbers[edge.name] = texts.setdefault(self.legend_text(edge), len(texts) + 1)
+        return numbers
+
+    def _lines_of(self, edge: Transition) -> list[Row]:
+        return replace(self, tally=None, names=False, numbered={}).guard_rows(edge, 1, 0)
 
     def graph(
         self, numbers: Sequence[int], *, bare: bool, values: Sequence[Row] = (), foot: str = ""
@@ -286,121 +371,46 @@ class Sheet:
         graphviz.Digraph
             The picture.
         """
-        ink = self.colours.ink
+        sheet = self.fitted()
         graph = ChartGraph(
             name=graphviz.escape(printable(self.chart.name)),
+            engine="neato",
             graph_attr={
                 "fontname": SANS,
                 "bgcolor": self.colours.paper,
                 "pad": "0.15",
-                "nodesep": "0.16",
-                "ranksep": "0.3",
-                "rankdir": self.direction,
+                "layout": "nop2",  # all positions are given, and the DOT text is self-contained
                 "outputorder": "edgesfirst",
             },
             node_attr={"fontname": SANS, "shape": "plain"},
-            edge_attr={"color": ink, "arrowsize": "0.7", "penwidth": "1.1"},
+            edge_attr={"color": self.colours.ink, "arrowsize": "0.7", "penwidth": "1.1"},
         )
         graph.chart, graph.text = self.chart, chart_in_words(self.chart)
         below = self.definitions() + (list(values) if bare else [])
         below += [[Piece(line, "value")] for line in foot.splitlines()]
-        if below:
-            graph.attr(label=f"<{self._lines(below)}>", labeljust="l", labelloc="b")
-        if bare:
-            self._draw_element(graph, numbers[0])
-            return graph
-        # Regions are independent: each is laid out alone, so that all look the same, and placed in
-        # a grid.
-        columns = ceil(sqrt(len(numbers)))
-        order: list[int | None] = list(numbers)
-        if self.direction == "TB":
-            graph.attr(pack="12", packmode=f"array_i{columns}")
-        else:  # Graphviz turns the grid with the layout: its first row comes out at the bottom
-            graph.attr(pack="12", packmode=f"array_ic{columns}")
-            order += [None] * (-len(order) % columns)
-            lines = [order[i : i + columns] for i in range(0, len(order), columns)]
-            order = [number for line in reversed(lines) for number in line]
-        for place, number in enumerate(order, start=1):
-            with graph.subgraph(name=f"cluster_{place}") as region:
-                if number is None:
-                    region.attr(style="invis")
-                    region.node(f"blank{place}", "", style="invis")
-                    continue
-                name = element_id(number)
-                title = [
-                    Piece(f"Element{number + 1}  ", "region"),
-                    Piece(f"AND {number + 1}", "note"),
-                ]
-                region.attr(
-                    id=name,
-                    **{"class": "region"},
-                    label=f"<{self._lines([title, *values]) if values else self._line(title)}>",
-                    labeljust="l",
-                    labelloc="t",
-                    style="dashed,rounded",
-                    color=self.colours.line,
-                    margin="12",
-                )
-                self._draw_element(region, number)
+        arrange(graph, sheet, numbers, [] if bare else values, below, bare=bare)
         return graph
 
-    def _draw_element(self, graph: graphviz.Digraph, number: int) -> None:
-        chart, element, ink = self.chart, element_id(number), self.colours.ink
-        dot = f"{element}-default"
-        graph.node(
-            dot,
-            "",
-            id=dot,
-            **{"class": "default"},
-            shape="circle",
-            style="filled",
-            fillcolor=ink,
-            color=ink,
-            width="0.11",
-            fixedsize="true",
-        )
-        for state in chart.states:
-            name = part_id(element, "state", state.name)
-            kind = "state marked" if state.name in self.marked else "state"
-            graph.node(name, f"<{self._state_box(state, number)}>", id=name, **{"class": kind})
-        graph.edge(
-            dot,
-            part_id(element, "state", chart.default_state.name),
-            id=f"{element}-default-edge",
-            **{"class": "default"},
-        )
-        for state in chart.states:
-            for priority, (_, edge) in enumerate(chart.leaving(state.name), start=1):
-                self._draw_edge(graph, number, edge, priority)
+    def legend(self) -> list[Row]:
+        """Return the guards that stand below the picture: ``g1 = ...``, wrapped."""
+        rows: list[Row] = []
+        written = 0
+        for edge in self._leaving:
+            number = self.numbered.get(edge.name, 0)
+            if number > written:
+                written, head = number, f"g{number} = "
+                for line in wrapped(self.legend_text(edge)):
+                    rows.append([Piece(head, "word"), *self._indexed([Piece(line)])])
+                    head = " " * len(head)
+        return rows
 
-    def _draw_edge(
-        self, graph: graphviz.Digraph, number: int, edge: Transition, priority: int
-    ) -> None:
-        element = element_id(number)
-        source = part_id(element, "state", edge.source)
-        target = part_id(element, "state", edge.target)
-        guard = edge_id(self.chart, element, "guard", edge)
-        name = edge_id(self.chart, element, "edge", edge)
-        box = self._guard_box(edge, priority, number)
-        kind = "guard marked" if edge.name in self.marked else "guard"
-        graph.node(guard, f"<{box}>", id=guard, **{"class": kind})
-        before, after, left, right = "nswe" if self.direction == "TB" else "wens"
-        look = {}
-        if self.tally is not None and not self.tally.times(number, edge):
-            look = {"style": "dashed"}
-        if edge.name in self.marked:
-            look |= {"class": "marked", "color": self.colours.fired, "penwidth": MARKED}
-        into = {"id": f"{name}-1", "dir": "none", **look}
-        out = {"id": f"{name}-2", **look}
-        if edge.source == edge.target:
-            graph.edge(source, f"{guard}:{left}", **into)
-            graph.edge(source, f"{guard}:{right}", dir="back", **out)
-        elif self.chart.state_index(edge.source) < self.chart.state_index(edge.target):
-            graph.edge(source, f"{guard}:{before}", **into)
-            graph.edge(f"{guard}:{after}", target, **out)
-        else:  # against the layout's direction: drawn from target to source, arrow at the tail
-            graph.edge(target, f"{guard}:{before}", dir="back", **out)
-            graph.edge(f"{guard}:{after}", source, **into)
+    def legend_text(self, edge: Transition) -> str:
+        """Return an edge's guard and action as one text."""
+        action = self.write.actions(self.chart.assignments["action", edge.name])
+        return f"{self.write.text(self.chart.guards[edge.name])} {action}".rstrip()
+
+    def _indexed(self, row: Row) -> Row:
+        return with_indices(row) if self.write.math else row
 
     # ----------------------------------------------------------------- labels
     def definitions(self) -> list[Row]:
@@ -411,7 +421,7 @@ class Sheet:
         list of Row
             Named expressions and the force of the contact (see `plots._contents.chart_texts`).
         """
-        return _rows(chart_texts(self.write))
+        return [self._indexed(row) for row in _rows(chart_texts(self.write))]
 
     def state_rows(self, state: State, number: int) -> list[Row]:
         """Return the text in a state's box.
@@ -428,10 +438,15 @@ class Sheet:
         list of Row
             The title first.
         """
-        title = [Piece(state.name[:1].upper() + state.name[1:], "title")]
+        title = [Piece(state.name, "title")]
         if self.live:
             title.append(Piece(f" {DOT}", "dot"))
-        rows = [title, *_rows(state_texts(self.write, state))]
+        if self.among:
+            title += [Piece("  ", "note"), Piece(f"{self.among} of {self.among}", "among")]
+        narrow = self.direction == "LR" or self.form == "matrix"
+        limit = LONGEST_LABEL if narrow else LONGEST_LINE
+        texts = _rows(state_texts(self.write, state), limit)
+        rows = [title, *(self._indexed(row) for row in texts)]
         if self.tally is not None:
             rows.append([Piece(self.tally.of_state(number, state.name), "count")])
         return rows
@@ -453,13 +468,30 @@ class Sheet:
         list of Row
             The first piece of each is the priority, or a blank.
         """
+        rows: list[Row] = [[Piece(edge.name, "word")]] if self.names else []
+        rows += self._number_row(edge) if edge.name in self.numbered else self._guard_lines(edge)
+        if self.tally is not None:
+            taken = bool(self.tally.times(number, edge))
+            rows.append([Piece(self.tally.of_edge(number, edge), "count" if taken else "never")])
+        return [
+            [Piece(str(priority) if i == 0 else " ", "priority"), *row]
+            for i, row in enumerate(rows)
+        ]
+
+    def _number_row(self, edge: Transition) -> list[Row]:
+        marks = range(len(clauses(self.chart.guards[edge.name]))) if self.live else ()
+        number = Piece(f"g{self.numbered[edge.name]}", "clause")
+        row = [Piece("[", "bracket"), number, *(Piece(TRUE, "mark", c) for c in marks)]
+        return [[*row, Piece("]", "bracket")]]
+
+    def _guard_lines(self, edge: Transition) -> list[Row]:
         guard = self.chart.guards[edge.name]
         lines = [
             (line, clause)
             for clause, part in enumerate(clauses(guard))
             for line in self._clause_lines(part, inside=isinstance(guard, Both))
         ] or [(self.write.text(guard), -1)]  # always true
-        rows: list[Row] = [[Piece(edge.name, "word")]] if self.names else []
+        rows: list[Row] = []
         for i, (line, clause) in enumerate(lines):
             last = i + 1 == len(lines) or lines[i + 1][1] != clause
             row = [Piece("[" if i == 0 else " ", "bracket"), Piece(line, "clause", clause)]
@@ -470,23 +502,19 @@ class Sheet:
                 row += [Piece(" ", "bracket"), Piece(self.write.words[Both], "bracket")]
             if i + 1 == len(lines):
                 row.append(Piece("]", "bracket"))
-            rows.append(row)
+            rows.append(self._indexed(row))
         action = self.write.actions(self.chart.assignments["action", edge.name])
-        rows += [[Piece(line, "action")] for line in wrapped(action)]
-        if self.tally is not None:
-            taken = bool(self.tally.times(number, edge))
-            rows.append([Piece(self.tally.of_edge(number, edge), "count" if taken else "never")])
-        return [
-            [Piece(str(priority) if i == 0 else " ", "priority"), *row]
-            for i, row in enumerate(rows)
-        ]
+        lines_of_action = wrapped(action, LONGEST_LABEL)
+        return rows + [self._indexed([Piece(line, "action")]) for line in lines_of_action]
 
     def _clause_lines(self, part: Condition, inside: bool) -> list[str]:
         """Return a clause as lines: each alternative on a new line, long texts wrapped."""
         if not isinstance(part, Either):
             text = self.write.text(part)
             # The brackets around the guard when it is written as one text.
-            return wrapped(f"({text})" if inside and isinstance(part, Both) else text)
+            return wrapped(
+                f"({text})" if inside and isinstance(part, Both) else text, LONGEST_LABEL
+            )
         texts = [self.write.text(operand) for operand in part.operands]
         texts = [
             f"({text})" if isinstance(operand, Either) else text
@@ -495,76 +523,17 @@ class Sheet:
         texts[:-1] = [f"{text} {self.write.words[Either]}" for text in texts[:-1]]
         if inside:  # one of several clauses: && binds tighter than ||
             texts[0], texts[-1] = f"({texts[0]}", f"{texts[-1]})"
-            if sum(map(len, texts)) < LONGEST_LINE:
+            if sum(map(len, texts)) < LONGEST_LABEL:
                 texts = [" ".join(texts)]
-        return [line for text in texts for line in wrapped(text)]
-
-    def _state_box(self, state: State, number: int) -> str:
-        ends = sum((edge.source, edge.target).count(state.name) for edge in self.chart.transitions)
-        room = ends * ROOM_PER_EDGE[self.direction]
-        title, *rows = (self._line(row) for row in self.state_rows(state, number))
-        size = f'WIDTH="{room}"' if self.direction == "TB" else ""
-        height = 18 * (1 + len(rows))
-        blank = ""
-        if self.direction == "LR" and room > height:
-            blank = f'<TR><TD HEIGHT="{room - height}"></TD></TR>'
-        ink, paper, border = self.colours.ink, self.colours.paper, 1
-        if state.name in self.marked:
-            ink, border = self.colours.fired, 3
-        return (
-            f'<TABLE BORDER="{border}" COLOR="{ink}" BGCOLOR="{paper}" STYLE="ROUNDED" '
-            'CELLBORDER="0" CELLSPACING="0" CELLPADDING="3">'
-            f'<TR><TD ALIGN="LEFT" {size}>{title}</TD></TR><HR/>'
-            + "".join(f'<TR><TD ALIGN="LEFT">{row}</TD></TR>' for row in rows)
-            + f"{blank}</TABLE>"
-        )
-
-    def _guard_box(self, edge: Transition, priority: int, number: int) -> str:
-        rows = "".join(
-            f'<TR><TD ALIGN="LEFT">{self._line(row[:1])}</TD>'
-            f'<TD ALIGN="LEFT">{self._line(row[1:])}</TD></TR>'
-            for row in self.guard_rows(edge, priority, number)
-        )
-        frame = 'BORDER="0"'
-        if edge.name in self.marked:
-            frame = f'BORDER="1" COLOR="{self.colours.fired}"'
-        return (
-            f'<TABLE {frame} CELLBORDER="0" CELLSPACING="0" CELLPADDING="1" '
-            f'BGCOLOR="{self.colours.paper}">{rows}</TABLE>'
-        )
-
-    def _lines(self, rows: Iterable[Row]) -> str:
-        cells = "".join(f'<TR><TD ALIGN="LEFT">{self._line(row)}</TD></TR>' for row in rows)
-        return (
-            '<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="1">' + cells + "</TABLE>"
-        )
-
-    def _line(self, row: Iterable[Piece]) -> str:
-        return "".join(self._text(piece) for piece in row)
-
-    def _text(self, piece: Piece) -> str:
-        size, face, bold = {
-            "title": (12, SANS, True),
-            "dot": (12, SANS, False),
-            "region": (13, SANS, True),
-            "note": (10, SANS, False),
-            "count": (9, SANS, False),
-            "never": (9, SANS, True),
-            "priority": (10, MONO, True),
-        }.get(piece.role, (10, MONO, False))
-        soft = piece.role in ("word", "note", "count")
-        colour = self.colours.soft if soft else self.colours.ink
-        words = escape(piece.text)
-        words = f"<B>{words}</B>" if bold else words
-        return f'<FONT FACE="{face}" POINT-SIZE="{size}" COLOR="{colour}">{words}</FONT>'
+        return [line for text in texts for line in wrapped(text, LONGEST_LABEL)]
 
 
-def _rows(texts: Texts) -> list[Row]:
+def _rows(texts: Texts, limit: int = LONGEST_LINE) -> list[Row]:
     """Return texts as lines below one another, each kind before the first of its own."""
     rows: list[Row] = []
     for kind, own in texts:
         head = f"{kind}: "
-        for line in (line for text in own for line in wrapped(text)):
+        for line in (line for text in own for line in wrapped(text, limit)):
             rows.append([Piece(head, "word"), Piece(line)])
             head = " " * len(head)
     return rows

@@ -15,9 +15,15 @@ from gms_fsm.app.paper import FORCE, VELOCITY
 from gms_fsm.errors import ParameterError
 
 if TYPE_CHECKING:
-    from gms_fsm import Report, Rig
+    from gms_fsm import Model, Report, Rig
 
-__all__ = ["blocks_command", "chart_command", "check_command", "code_command"]
+__all__ = [
+    "blocks_command",
+    "chart_command",
+    "check_command",
+    "code_command",
+    "handout_command",
+]
 
 
 class RigName(enum.StrEnum):
@@ -90,6 +96,33 @@ def chart_command(
         names=names,
     )
     typer.echo(str(plots.render(graph, output)))
+
+
+def handout_command(
+    name: ChartName,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Output file, ending in {figure}.")
+    ] = Path("handout.pdf"),
+    law: Law = "",
+    contact: ContactName = "",
+) -> None:
+    """Print a model on one A4 page: chart, equations, parameters, a hysteresis loop.
+
+    An included chart has the numbers of its demonstration; a scenario file
+    has its own.
+    """
+    import plots
+    from gms_fsm.app._catalogue import chosen
+    from gms_fsm.app._own_files import own_file
+    from gms_fsm.systems.models import demonstration
+
+    own = own_file(name, law)
+    _no_contact(contact, own)
+    if own is None:
+        model: Model = demonstration(chosen("handout", name, law)[0], law)
+    else:
+        model = own.only_model(contact)
+    typer.echo(str(plots.handout(model, output)))
 
 
 def check_command(
@@ -189,11 +222,22 @@ def blocks_command(
         int | None,
         typer.Option(help="Number of elements of the paper's model; 4 by default."),
     ] = None,
+    schematic: Annotated[
+        bool,
+        typer.Option(
+            "--schematic",
+            help="Draw masses, springs, dampers, contacts instead, to a file ending in {figure}.",
+        ),
+    ] = False,
 ) -> None:
     """Draw the block diagram of a system, or of the paper's model (its Fig. 2a)."""
     import plots
 
     if not file:
+        if schematic:
+            raise ParameterError(
+                "no system is given", place="--schematic", advice="name a system or scenario file"
+            )
         picture = plots.block_diagram(4 if elements is None else elements)
         typer.echo(str(plots.render(picture, output)))
         return
@@ -210,6 +254,11 @@ def blocks_command(
         raise ParameterError(
             f"the number of elements is in {file}", place="--elements", advice="leave it out"
         )
+    if schematic:
+        from plots import figures
+
+        typer.echo(str(figures.save(plots.schematic(own.system), output)))
+        return
     typer.echo(str(plots.render(plots.block_diagram(own.system), output)))
 
 

@@ -14,6 +14,7 @@ __all__ = [
     "End",
     "Law",
     "Overrides",
+    "PresetName",
     "ScenarioFile",
     "Start",
     "TraceFile",
@@ -33,6 +34,13 @@ Overrides = Annotated[
     typer.Option("--set", help="Override a key, for example --set model.law=published."),
 ]
 TraceFile = Annotated[Path, typer.Argument(help="Trace file, .npz or .csv.", show_default=False)]
+PresetName = Annotated[
+    str,
+    typer.Option(
+        "--preset",
+        help="Sizes of figures: screen, ieee1 (one column), ieee2 (two), slide or poster.",
+    ),
+]
 Start = Annotated[float | None, typer.Option(help="Start time in s.")]
 End = Annotated[float | None, typer.Option(help="End time in s.")]
 ChartName = Annotated[

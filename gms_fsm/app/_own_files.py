@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from gms_fsm._toml import parsed
 from gms_fsm.app.scenario import kind_of, load_scenario, load_system
@@ -14,7 +15,7 @@ from gms_fsm.charts.parameters import Parameter, checked_values
 from gms_fsm.charts.registry import registered
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import GMSError, ParameterError
-from gms_fsm.systems.models import ChartModel
+from gms_fsm.systems.models import ChartModel, Model
 from gms_fsm.systems.system import System, system_of
 
 __all__ = ["OwnFile", "any_model", "domain_of", "own_file"]
@@ -75,6 +76,42 @@ class OwnFile:
             else:
                 names.append(each.name)
         return {", ".join(names): chart for names, chart in found}
+
+    def only_model(self, contact: str = "") -> Model:
+        """Return the model of its contact.
+
+        Parameters
+        ----------
+        contact : str
+            Which contact's; empty if there is only one.
+
+        Returns
+        -------
+        Model
+            With its numbers.
+
+        Raises
+        ------
+        ParameterError
+            If there are several contacts, or it is a chart file.
+        """
+        if self.system is None:
+            raise ParameterError(
+                "it is a chart file, which has no numbers",
+                place=str(self.path),
+                advice="give a scenario file",
+            )
+        several = self.system.contacts
+        if len(several) > 1 and not contact:
+            names = ", ".join(repr(each.name) for each in several)
+            raise ParameterError(
+                f"it has the contacts {names}",
+                place=str(self.path),
+                advice=f"give --contact {several[0].name}",
+            )
+        chosen: Any = self.system.contact(contact) if contact else several[0]
+        single: Model = chosen if len(several) > 1 or chosen.model is None else chosen.model
+        return single
 
     def only_chart(self, contact: str = "") -> Chart:
         """Return its chart.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gms_fsm.app._console import messages, note, progress_bars
-from gms_fsm.app._options import INTERRUPTED, ContactName, Overrides, ScenarioFile
+from gms_fsm.app._options import INTERRUPTED, ContactName, Overrides, PresetName, ScenarioFile
 from gms_fsm.app.paper import FORCE, VELOCITY
 
 if TYPE_CHECKING:
@@ -45,14 +45,16 @@ def paper_command(
     velocity: Annotated[
         str, typer.Option(help="Velocity of Fig. 4 in m/s, an expression of t (s).")
     ] = VELOCITY,
+    preset: PresetName = "screen",
 ) -> None:
     """Run the paper's two experiments; write figures, traces, logs and claims.md."""
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 
+    import plots
     from gms_fsm.app.paper import writing
 
     columns = (TextColumn("{task.description:<22}"), BarColumn(), TimeElapsedColumn())
-    with progress_bars(*columns) as bars:
+    with plots.preset(preset), progress_bars(*columns) as bars:
         tasks: dict[str, TaskID] = {}
 
         def show(name: str, done: float) -> None:
@@ -90,8 +92,10 @@ def run_command(
             help="Save the state in the output folder once a minute; the same command resumes it.",
         ),
     ] = False,
+    preset: PresetName = "screen",
 ) -> None:
     """Run a scenario; write the trace, transition log, overview figure and summary."""
+    import plots
     from gms_fsm.app.live import LiveView
     from gms_fsm.app.report import monitor_lines, note_lines, run_scenario, velocity_note
     from gms_fsm.app.scenario import load_scenario
@@ -104,7 +108,8 @@ def run_command(
     folder = Path("out") / scenario.stem if output is None else output
     start, end = loaded.arguments["t_start"], loaded.arguments["t_end"]
     try:
-        with LiveView(messages(), start, end, detail=live, pace=pace) as view:
+        view = LiveView(messages(), start, end, detail=live, pace=pace)
+        with plots.preset(preset), view:
             trace, files = run_scenario(loaded, folder, view, checkpoint=checkpoint)
     except KeyboardInterrupt as error:
         note(str(error) or "interrupted")

@@ -10,7 +10,7 @@ import typer
 
 from gms_fsm._files import output_folder, refuse_input
 from gms_fsm.app._console import progress_bars
-from gms_fsm.app._options import ContactName, End, Start, TraceFile
+from gms_fsm.app._options import ContactName, End, PresetName, Start, TraceFile
 from gms_fsm.errors import ParameterError, shown
 
 if TYPE_CHECKING:
@@ -62,15 +62,19 @@ def plot_command(
     start: Start = None,
     end: End = None,
     contact: ContactName = "",
+    preset: PresetName = "screen",
 ) -> None:
     """Draw a run: an overview, and its break-aways in detail."""
+    import plots
     from plots import figures, formats
 
     run = _of_contact(trace, contact)
     files = [formats.files(name, "figure") for name in ("overview", "ribbons")]
     folder = output_folder(output, chain(*files))
     window = _window(run, start, end)
-    pictures = (figures.overview(run, window=window), figures.ribbons_figure(run, window=window))
+    with plots.preset(preset):
+        overview = figures.overview(run, window=window)
+        pictures = (overview, figures.ribbons_figure(run, window=window))
     for figure, names in zip(pictures, files, strict=True):
         for name in names:
             typer.echo(str(figures.save(figure, folder / name)))
@@ -81,12 +85,16 @@ def animate_command(
     output: Annotated[
         Path, typer.Option("--output", "-o", help="Output file, ending in {animation}.")
     ] = Path("film.gif"),
-    frames: Annotated[int, typer.Option(help="Number of frames.")] = 200,
+    frames: Annotated[int | None, typer.Option(help="Number of frames; usually 200.")] = None,
+    seconds: Annotated[
+        float | None, typer.Option(help="Length of the film, instead of --frames.")
+    ] = None,
+    fps: Annotated[float, typer.Option(help="Frames per second, at most 50.")] = 20.0,
     start: Start = None,
     end: End = None,
     contact: ContactName = "",
 ) -> None:
-    """Make an animation of the chart next to the force."""
+    """Make a film of a run: chart, bristles, force and states, slowed at transitions."""
     from gms_fsm.traces.trace import files_of
     from plots.animation import animate
 
@@ -95,11 +103,20 @@ def animate_command(
     with progress_bars() as bar:
         task = bar.add_task("frames", total=frames)
 
-        def show(done: int, _: int) -> None:
+        def show(done: int, count: int) -> None:
             bar.start()
-            bar.update(task, completed=done)
+            bar.update(task, completed=done, total=count)
 
-        film = animate(run, output, frames=frames, t_start=start, t_end=end, progress=show)
+        film = animate(
+            run,
+            output,
+            frames=frames,
+            seconds=seconds,
+            fps=fps,
+            t_start=start,
+            t_end=end,
+            progress=show,
+        )
     typer.echo(str(film))
 
 

@@ -15,7 +15,13 @@ import typer
 from typer.core import TyperCommand, TyperGroup, TyperOption
 
 import gms_fsm
-from gms_fsm.app._chart_verbs import blocks_command, chart_command, check_command, code_command
+from gms_fsm.app._chart_verbs import (
+    blocks_command,
+    chart_command,
+    check_command,
+    code_command,
+    handout_command,
+)
 from gms_fsm.app._console import error_line, note
 from gms_fsm.app._run_verbs import (
     debug_command,
@@ -112,6 +118,7 @@ app.command("schema")(schema_command)
 app.command("chart", cls=_Drawing)(chart_command)
 app.command("check")(check_command)
 app.command("blocks", cls=_Drawing)(blocks_command)
+app.command("handout", cls=_Drawing)(handout_command)
 app.command("plot")(plot_command)
 app.command("animate", cls=_Drawing)(animate_command)
 app.command("replay", cls=_Drawing)(replay_command)

@@ -3,30 +3,32 @@
 from __future__ import annotations
 
 from textwrap import wrap
+from typing import Any
 
 from gms_fsm.errors import ParameterError
 from gms_fsm.inspection._findings import Report
 from gms_fsm.traces.trace import Trace, check_trace
 from plots import panels
-from plots._matplotlib import Figure, Line2D, rc_context
+from plots._matplotlib import Axes, Figure, Line2D, rc_context
 from plots._plane import Plane
 from plots._window import Window
+from plots.figures._layout import fitted, low, sheet
 from plots.figures._parts import head
 from plots.panels._landscapes import DASHED, acceleration, pinned, quantity
 from plots.panels._race import rows_of
 from plots.panels._shown import checked_row, one_element
-from plots.style import INK, LINE_GREY, RC
+from plots.presets import current, font, inches, pt, room, settings
+from plots.style import INK, LINE_GREY
 
 __all__ = ["landscape"]
 
-WIDTH, PLOT, TOP, LINE = (
-    11.6,
-    5.2,
-    0.95,
-    0.165,
-)  # inches: figure, panels, above them, a line of text
-LANE = 0.56  # inches: a row of the race, if there is room
-LETTERS = 165  # of the caption, per line
+# Inches: figure, panels, above them, a line of text.
+WIDTH, PLOT, TOP, LINE = 11.6, 5.2, 0.95, 0.165
+LEFT, RIGHT, BETWEEN = 0.72, 0.15, 0.43  # inches: beside the panels
+RACE = 3.6  # inches: width of the race, if the panels are next to each other
+OVER = 1.0  # inches: between the panels, if they are below each other
+LANE, LOWEST = 0.56, 0.36  # inches: a row of the race, if there is room; below the landscape
+LETTERS = 14.2  # of the caption, per inch
 
 
 def landscape(
@@ -83,7 +85,7 @@ def landscape(
     >>> run = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.2"), 3.0)
     >>> figure = landscape(run, 0, t=1.5)
     >>> [ax.get_title(loc="left") for ax in figure.axes]
-    ['a) guards that leave stick', 'b) race to fire']
+    ['guards that leave stick', 'race to fire']
     """
     check_trace(trace)
     element = one_element(trace, element)
@@ -94,34 +96,65 @@ def landscape(
     lines = _caption(trace, plane)
     if checks is not None:
         lines += _pins_listed(plane, checks)
-    lines = [part for line in lines for part in wrap(line, LETTERS, subsequent_indent="      ")]
-    below = 0.82 + LINE * len(lines)
-    height = TOP + PLOT + below
-    with rc_context(RC):
-        figure = Figure(figsize=(WIDTH, height))
-        bottom, tall = below / height, PLOT / height
-        left = figure.add_axes((0.72 / WIDTH, bottom, 6.7 / WIDTH, tall))
-        lanes = min(tall, LANE * rows_of(plane.why) / height)
-        right = figure.add_axes((7.85 / WIDTH, bottom + tall - lanes, 3.6 / WIDTH, lanes))
+    if low():  # no room for more
+        lines = lines[:1]
+    letters = int(LETTERS * (room(WIDTH) - 0.3))
+    lines = [part for line in lines for part in wrap(line, letters, subsequent_indent="      ")]
+    with rc_context(settings()):
+        figure, left, right = _axes(rows_of(plane.why), len(lines))
+        height = figure.get_figheight() / inches(1)
         panels.landscape(left, trace, element, row=row, window=window)
         if checks is not None:
             panels.pins(left, trace, element, checks, row=row)
         panels.race(right, trace, element, row=row)
         shown = "guards that leave" if plane.edges else "flow of"
-        left.set_title(f"a) {shown} {plane.state}")
-        right.set_title("b) race to fire")
+        panels.lettered(left, "a", f"{shown} {plane.state}")
+        panels.lettered(right, "b", "race to fire")
         looks = [("path before", INK, "-"), ("after", INK, DASHED)]
         handles = [Line2D([], [], color=c, linestyle=dash, label=n) for n, c, dash in looks]
         if plane.threshold is not None:
-            handles.append(Line2D([], [], color=LINE_GREY, linewidth=5, alpha=0.45, label="±s(v)"))
-        left.legend(handles=handles, loc="lower right", bbox_to_anchor=(1, 1), ncols=3)
+            handles.append(
+                Line2D([], [], color=LINE_GREY, linewidth=pt(5), alpha=0.45, label="±s(v)")
+            )
+        close: Any = {"handlelength": 1.4, "columnspacing": 1.0} if low() else {}
+        legend = left.legend(
+            handles=handles, loc="lower right", bbox_to_anchor=(1, 1), ncols=3, **close
+        )
+        if room(WIDTH) < WIDTH:  # it may be wider than the panel
+            legend.set_loc("lower left")
+            legend.set_bbox_to_anchor((0, 1), left.transAxes)
         figure.suptitle(
             _title(trace, plane, title), x=0.02, y=1 - 0.12 / height, ha="left", va="top"
         )
         for number, line in enumerate(lines):
             place = (LINE * (len(lines) - number) + 0.06) / height
-            figure.text(0.02, place, line, fontsize=8, va="top", color=INK)
-    return figure
+            figure.text(0.02, place, line, fontsize=font(8), va="top", color=INK)
+    return fitted(figure)
+
+
+def _axes(rows: float, lines: int) -> tuple[Figure, Axes, Axes]:
+    """Return an empty figure, and the axes of the landscape and of the race beside or below it."""
+    wide, below = room(WIDTH), 0.82 + LINE * lines
+    given = current().height
+    if given is not None or wide - LEFT - BETWEEN - RACE - RIGHT > RACE:
+        tall = PLOT if given is None else given / inches(1) - TOP - below
+        race = min(RACE, 0.46 * wide)
+        plot, lanes = wide - LEFT - BETWEEN - race - RIGHT, min(tall, LANE * rows)
+        height = TOP + tall + below
+        places = (
+            (LEFT, below, plot, tall),
+            (LEFT + plot + BETWEEN, below + tall - lanes, race, lanes),
+        )
+    else:
+        broad, lanes = wide - LEFT - RIGHT, LOWEST * rows
+        plot = 0.8 * broad
+        height = TOP + plot + OVER + lanes + below
+        places = ((LEFT, height - TOP - plot, broad, plot), (LEFT, below, broad, lanes))
+    figure = sheet(wide, height, layout=None)
+    left, right = (
+        figure.add_axes((x / wide, y / height, w / wide, h / height)) for x, y, w, h in places
+    )
+    return figure, left, right
 
 
 def _title(trace: Trace, plane: Plane, title: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +11,15 @@ from numpy.typing import NDArray
 from gms_fsm.errors import ParameterError
 from gms_fsm.traces.trace import Trace
 from plots import panels
-from plots._matplotlib import Figure, rc_context
+from plots._matplotlib import Axes, Figure, rc_context
 from plots._window import Window
-from plots.figures._parts import element_legend
+from plots.figures._layout import fitted, legend_below, low, narrow, sheet
+from plots.figures._parts import element_legend, lanes_height, letter_panels
+from plots.panels._axes import MANY, first_variable
 from plots.panels._held import Lag
-from plots.panels._shown import checked_window, scaled, shown
-from plots.style import BLUE, INK, LINE_GREY, RC, TEXT_GREY
+from plots.panels._shown import checked_elements, checked_window, scaled, shown
+from plots.presets import font, pt, settings, to_scale
+from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY
 
 __all__ = [
     "FIG3_PHASES",
@@ -26,6 +30,9 @@ __all__ = [
     "residuals",
 ]
 
+Floats = NDArray[np.float64]
+REACHED = "± s(v) away from reversals"
+ZOOM = 0.012  # half of the time of an inset, of the whole time
 FIG3_PHASES = (("rising", 2.0), ("falling", 4.0), ("oscillating", np.inf))
 
 
@@ -60,7 +67,7 @@ def figure_3(
     Returns
     -------
     Figure
-        Panels a to d.
+        Panels a to d; b to d have the same range of x.
 
     Raises
     ------
@@ -72,22 +79,20 @@ def figure_3(
             f"force has shape {np.shape(force)}",
             advice=f"it must have one value per row of the chart run, shape {chart.t.shape}",
         )
-    with rc_context(RC):
-        figure = Figure(figsize=(9.0, 6.2), layout="constrained")
-        axes = figure.subplots(2, 2).ravel()
-        axes[0].plot(chart.t, force, color=INK, linewidth=0.9)
+    with rc_context(settings()):
+        figure = sheet(4.2, 8.8) if narrow() else sheet(9.0, 6.2)
+        axes = figure.subplots(*(4, 1) if narrow() else (2, 2)).ravel()
+        axes[0].plot(chart.t, force, color=INK, linewidth=pt(0.9))
         axes[0].set_xlim(*checked_window(chart, window))
-        axes[0].set(xlabel="t [s]", ylabel=r"$F_a$ [N]", title="a) applied force (chosen by us)")
-        for ax, trace, name in zip(
-            axes[1:],
-            (chart, ifelse, lugre),
-            (f"b) {chart.model.title}; chart", "c) the same; if-else", "d) LuGre"),
-            strict=True,
-        ):
-            panels.hysteresis(ax, trace, phases, window=window)
-            ax.set_title(name)
+        axes[0].set(xlabel="t [s]", ylabel=r"$F_a$ [N]")
+        runs = chart, ifelse, lugre
+        # Drift is compared: one unit and one range of x.
+        scale = scaled(np.concatenate([trace.x - trace.x[0] for trace in runs]), "m")
+        for ax, trace in zip(axes[1:], runs, strict=True):
+            panels.hysteresis(ax, trace, phases, window=window, scale=scale)
+            ax.sharex(axes[1])
             peak = int(trace.F.argmax())
-            x_peak = scaled(trace.x, "m")[0] * (trace.x[peak] - trace.x[0])
+            x_peak = scale[0] * (trace.x[peak] - trace.x[0])
             if limit is not None and trace.F[peak] > limit:
                 ax.set_ylim(min(0.0, trace.F.min()) - 0.03 * limit, limit)
                 ax.annotate(
@@ -98,12 +103,14 @@ def figure_3(
                     ha="right",
                     va="top",
                     color=TEXT_GREY,
-                    fontsize=8,
+                    fontsize=font(8),
                 )
+        names = ["applied force (chosen by us)", f"{chart.model.title}; chart"]
+        letter_panels(axes, [*names, "the same; if-else", "LuGre"])
         if len(phases) > 1:
-            axes[1].legend(loc="upper left")
+            axes[1].legend(loc="lower right")
         figure.suptitle(title, x=0.01, ha="left")
-    return figure
+    return fitted(figure)
 
 
 def figure_4(
@@ -128,31 +135,82 @@ def figure_4(
     Returns
     -------
     Figure
-        Panels a to f.
+        Panels a to f; b and c have the same axis. Insets show the first peak of F, and of z of
+        LuGre, except on a slide.
     """
     chart, ifelse, lugre = (shown(trace, window) for trace in (chart, ifelse, lugre))
-    with rc_context(RC):
-        figure = Figure(figsize=(10.5, 6.2), layout="constrained")
-        axes = figure.subplots(2, 3, sharex=True).ravel()
+    with rc_context(settings()):
+        figure = sheet(4.2, 10.0) if narrow() else sheet(10.5, 6.2)
+        axes = figure.subplots(*(6, 1) if narrow() else (2, 3), sharex=True).ravel()
         panels.velocity(axes[0], chart)
-        axes[0].set_title("a) velocity (chosen by us)")
-        panels.deflections(axes[1], chart, elements=elements)
-        axes[1].set_title("b) deflections, GMS")
+        scale = _common_scale(chart, lugre)
+        panels.deflections(axes[1], chart, elements=elements, scale=scale)
         element_legend(figure, axes[1])
-        panels.deflections(axes[2], lugre)
-        axes[2].set_title("c) deflection, LuGre")
-        for ax, trace, title in zip(
-            axes[3:],
-            (chart, ifelse, lugre),
-            ("d) friction, chart", "e) friction, if-else", "f) friction, LuGre"),
-            strict=True,
-        ):
+        panels.deflections(axes[2], lugre, scale=scale)
+        if scale is not None:
+            axes[2].sharey(axes[1])
+            z = scale[0] * lugre.z[:, 0]
+            _zoom(axes[2], lugre, z, scale[1].partition("[")[2].rstrip("]"), (0.4, 0.15))
+        for ax, trace in zip(axes[3:], (chart, ifelse, lugre), strict=True):
             panels.force(ax, trace)
-            ax.set_title(title)
-        for ax in axes[:3]:
+            _make_room(ax)
+            _zoom(ax, trace, trace.F, "N", (0.5, 0.65))
+        names = ["velocity (chosen by us)", "deflections, GMS", "deflection, LuGre"]
+        kinds = ("chart", "if-else", "LuGre")
+        letter_panels(axes, [*names, *(f"friction, {kind}" for kind in kinds)])
+        for ax in axes[: 5 if narrow() else 3]:
             ax.set_xlabel("")
         figure.suptitle(f"Fig. 4, stick-slip: {chart.model.title}", x=0.01, ha="left")
-    return figure
+    return fitted(figure)
+
+
+def _common_scale(*runs: Trace) -> tuple[float, str] | None:
+    """Return factor and title of the deflections of all runs; None if a chart has none."""
+    if not all(trace.model.chart.variables for trace in runs):
+        return None
+    largest = max(runs, key=lambda trace: float(np.nanmax(np.abs(trace.z), initial=0.0)))
+    return first_variable(largest, largest.z)
+
+
+def _first_peak(trace: Trace, values: Floats) -> int:
+    """Return the row of the largest value up to the first reversal."""
+    back = np.flatnonzero(trace.v < 0)
+    last = int(back[0]) + 1 if back.size and back[0] > 0 else len(trace)
+    return int(np.nanargmax(np.abs(values[:last])))
+
+
+def _zoom(ax: Axes, trace: Trace, values: Floats, unit: str, place: tuple[float, float]) -> None:
+    """Show the first peak of the line of a panel in an inset, in the panel's unit."""
+    if low():
+        return
+    peak = _first_peak(trace, values)
+    half = ZOOM * float(trace.t[-1] - trace.t[0])
+    t0, t1 = max(trace.t[0], trace.t[peak] - half), min(trace.t[-1], trace.t[peak] + half)
+    near = values[(trace.t >= t0) & (trace.t <= t1)]
+    high = float(near.max())
+    # A fall that is much larger than the rise to the peak leaves the inset.
+    bottom = max(float(near.min()), high - 3 * float(high - near[0]))
+    edge = 0.1 * (high - bottom) or 1.0
+    size = int(np.floor(np.log10(abs(high)))) if high else 0
+    power = size if size < -2 else 0
+    inset = ax.inset_axes((*place, 0.46, 0.28))
+    inset.plot(trace.t, values / 10.0**power, color=ax.lines[0].get_color(), linewidth=pt(1.0))
+    inset.set(xlim=(t0, t1), ylim=((bottom - edge) / 10.0**power, (high + edge) / 10.0**power))
+    inset.tick_params(labelsize=font(7), length=2)
+    inset.locator_params(nbins=3, prune="both")
+    inset.spines[:].set(visible=True, color=LINE_GREY)
+    scale = rf"$10^{{{power}}}$ " if power else ""
+    inset.set_title(f"first peak [{scale}{unit}]".replace("-", "−"), fontsize=font(7), pad=2)
+    bounds = (t0, bottom - edge, t1 - t0, high - bottom + 2 * edge)
+    frame = ax.indicate_inset(bounds, inset, edgecolor=LINE_GREY, alpha=1.0)
+    for line in frame.connectors or ():
+        line.set_visible(False)
+
+
+def _make_room(ax: Axes) -> None:
+    """Leave the upper part of a panel free for an inset."""
+    bottom, top = ax.get_ylim()
+    ax.set_ylim(bottom, bottom + (top - bottom) / 0.58)
 
 
 def compare_laws(
@@ -177,39 +235,37 @@ def compare_laws(
     Figure
         Three rows.
     """
-    with rc_context(RC):
-        figure = Figure(figsize=(5.2 * len(runs), 7.2), layout="constrained")
+    with rc_context(settings()):
+        count = max(len(checked_elements(run, elements)) for run in runs.values())
+        tall = lanes_height(count, 2.1) if count > MANY else 2.1, 2.1, lanes_height(count, 1.4)
+        figure = sheet(5.2 * len(runs), sum(tall) + 1.6)
         grid = figure.subplots(
-            3, len(runs), sharex=True, sharey="row", squeeze=False, height_ratios=(1.2, 1.2, 0.8)
+            3, len(runs), sharex=True, sharey="row", squeeze=False, height_ratios=tall
         )
-        for column, (title, run) in zip(grid.T, runs.items(), strict=True):
+        scale = _common_scale(*runs.values())
+        for column, run in zip(grid.T, runs.values(), strict=True):
             trace = shown(run, window)
-            panels.deflections(column[0], trace, elements=elements)
+            many = count > MANY and all(map(panels.has_threshold, runs.values()))
+            if many:
+                panels.heat(column[0], trace, elements=elements)
+            else:
+                panels.deflections(column[0], trace, elements=elements, scale=scale)
             panels.force(column[1], trace)
             panels.ribbons(column[2], trace, elements=elements)
-            for sign in (1, -1) if panels.has_threshold(trace) else ():
-                column[0].axhline(sign * trace.s.min(), color=LINE_GREY, linewidth=0.7, zorder=0)
-            column[0].set_title(title)
+            for sign in (1, -1) if panels.has_threshold(trace) and not many else ():
+                level = sign * float(np.nanmin(trace.s)) * (scale[0] if scale else 1.0)
+                column[0].axhline(
+                    level, color=LINE_GREY, linewidth=pt(0.9), zorder=0, label=REACHED
+                )
             for ax in column[:2]:
                 ax.set_xlabel("")
-        if any(panels.has_threshold(run) for run in runs.values()):
-            grid[0, 0].annotate(
-                "grey lines: ± s(v) away from reversals",
-                (0.02, 0.04),
-                xycoords="axes fraction",
-                color=TEXT_GREY,
-                fontsize=8,
-            )
-        handles, labels = (
-            a + b
-            for a, b in zip(
-                grid[0, 0].get_legend_handles_labels(),
-                grid[2, 0].get_legend_handles_labels(),
-                strict=True,
-            )
-        )
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
-    return figure
+        letter_panels(grid[0], list(runs))
+        entries: dict[str, Any] = {}
+        for ax in (grid[0, 0], grid[2, 0]):
+            handles, labels = ax.get_legend_handles_labels()
+            entries |= dict(zip(labels, handles, strict=True))
+        legend_below(figure, list(entries.values()), list(entries))
+    return fitted(figure)
 
 
 def residuals(
@@ -234,14 +290,14 @@ def residuals(
     Figure
         One panel per run.
     """
-    with rc_context(RC):
-        figure = Figure(figsize=(9.0, 2.4 * len(runs) + 0.4), layout="constrained")
+    with rc_context(settings()):
+        figure = sheet(9.0, 2.4 * len(runs) + 0.4)
         axes = figure.subplots(len(runs), 1, squeeze=False)[:, 0]
-        for ax, (name, (times, difference)) in zip(axes, runs.items(), strict=True):
+        for ax, (times, difference) in zip(axes, runs.values(), strict=True):
             panels.difference(ax, times, difference, log=log)
-            ax.set_title(name)
+        letter_panels(list(axes), list(runs))
         figure.suptitle(title, x=0.01, ha="left")
-    return figure
+    return fitted(figure)
 
 
 def held_residuals(
@@ -275,24 +331,25 @@ def held_residuals(
     Figure
         Panels a to d.
     """
-    with rc_context(RC):
-        figure = Figure(figsize=(9.0, 6.2), layout="constrained")
-        force, place, between, period = figure.subplots(2, 2).ravel()
+    with rc_context(settings()):
+        figure = sheet(4.2, 9.2) if narrow() else sheet(9.0, 6.2)
+        force, place, between, period = figure.subplots(*(4, 1) if narrow() else (2, 2)).ravel()
         lines = panels.lag_over_time(force, lags, papers[0], window=(0.0, until))
         panels.lag_over_time(place, lags, papers[1], window=(0.0, until), place=True)
         panels.lag_between_ticks(between, lags, window=(zoom, zoom + 2 * lags[0].period))
         panels.lag_over_period(period, lags, papers, phases=phases)
-        force.set_title("a) friction, at the ticks")
-        place.set_title("b) position, at the ticks")
-        between.set_title("c) friction; dots: at the ticks")
-        period.set_title("d) largest at the ticks; lines: proportional to h")
-        period.legend(loc="upper left", ncols=2)
-        (paper,) = force.plot([], [], color=BLUE, linestyle="--", linewidth=0.9)
-        figure.legend(
-            [*lines, paper],
-            [*(str(line.get_label()) for line in lines), "the paper's residual"],
-            loc="outside lower left",
-            ncols=4,
+        letter_panels(
+            [force, place, between, period],
+            [
+                "friction, at the ticks",
+                "position, at the ticks",
+                "friction; dots: at the ticks",
+                "largest at the ticks; lines: proportional to h",
+            ],
         )
+        period.legend(loc="upper left", ncols=2)
+        (paper,) = force.plot([], [], **to_scale(REPORTED))
+        entries = [*(str(line.get_label()) for line in lines), "the paper's residual"]
+        legend_below(figure, [*lines, paper], entries)
         figure.suptitle(title, x=0.01, ha="left")
-    return figure
+    return fitted(figure)

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from string import ascii_lowercase
 
 import numpy as np
 
 from gms_fsm.traces.trace import Trace
-from plots._matplotlib import Axes, Figure
+from plots import panels
+from plots._matplotlib import Annotation, Axes, Figure
 from plots._window import Window
+from plots.figures._layout import legend_below
+from plots.panels._axes import MANY
+from plots.panels._shown import checked_elements
+from plots.presets import pt
+
+LANE = 0.15  # inches: a row of one element, with its label
 
 
 def head(trace: Trace, title: str) -> str:
@@ -17,36 +25,36 @@ def head(trace: Trace, title: str) -> str:
 
 
 def letter_panels(axes: Sequence[Axes], names: Sequence[str]) -> None:
-    """Name the panels of a figure: a), b), ..."""
-    for number, (ax, name) in enumerate(zip(axes, names, strict=True)):
+    """Name the panels of a figure: a bold letter, and the name."""
+    for letter, ax, name in zip(ascii_lowercase, axes, names, strict=False):
         # Above the labels of the marks, if there are any.
-        ax.set_title(f"{chr(ord('a') + number)}) {name}", pad=16 if ax.texts else 6)
+        marked = any(isinstance(text, Annotation) and text.xy[1] >= 1.0 for text in ax.texts)
+        panels.lettered(ax, letter, name, pad=pt(16 if marked else 6))
 
 
-def legend_above(ax: Axes) -> None:
-    """Put the legend next to the title, where there are no curves."""
-    ax.legend(
-        loc="lower right",
-        bbox_to_anchor=(1, 1),
-        ncols=6,
-        borderaxespad=0.1,
-        columnspacing=1.2,
-        handlelength=2.2,
-        handletextpad=0.5,
-    )
+def over_threshold(
+    ax: Axes, trace: Trace, *, window: Window | None, elements: Sequence[int] | None
+) -> str:
+    """Draw z / s of few elements as curves, of many as grey levels; return the panel's name."""
+    many = len(checked_elements(trace, elements)) > MANY and panels.has_threshold(trace)
+    (panels.heat if many else panels.ratio)(ax, trace, window=window, elements=elements)
+    if many or panels.has_threshold(trace):
+        return "deflection / threshold"
+    if "s" in trace.model.chart.inputs:
+        return "deflection / s(v)"
+    return "first variable" if trace.model.chart.variables else "deflection"
+
+
+def lanes_height(count: int, least: float, lane: float = LANE) -> float:
+    """Return the height in which the rows of so many elements can be read, inches."""
+    return max(least, lane * count)
 
 
 def element_legend(figure: Figure, *axes: Axes) -> None:
     """Add one legend of elements and states below the figure."""
     found = [ax.get_legend_handles_labels() for ax in axes]
     entries = {name: handle for pair in found for handle, name in zip(*pair, strict=True)}
-    figure.legend(
-        list(entries.values()),
-        list(entries),
-        loc="outside lower left",
-        ncols=min(10, len(entries)),
-        handlelength=2.6,
-    )
+    legend_below(figure, list(entries.values()), list(entries))
 
 
 def one_time_axis(column: Sequence[Axes]) -> None:

@@ -13,10 +13,12 @@ from gms_fsm.traces.trace import Trace, check_trace
 from plots import panels
 from plots._matplotlib import Axes, Figure, LineCollection, rc_context
 from plots._window import Window
+from plots.figures._layout import fitted, narrow, sheet
 from plots.figures._parts import head, letter_panels
 from plots.panels._axes import Artists
 from plots.panels._shown import checked_elements, checked_row, checked_window, scaled, shown
-from plots.style import PAPER, RC, VERMILION
+from plots.presets import pt, settings
+from plots.style import PAPER, VERMILION
 
 __all__ = ["phase"]
 
@@ -72,9 +74,9 @@ def phase(
             f"row {row} is at t = {trace.t[row]:g} s, outside the window {written(limits)}",
             advice="choose a row inside it",
         )
-    with rc_context(RC):
-        figure = Figure(figsize=(11.0, 4.6), layout="constrained")
-        loop, portrait = figure.subplots(1, 2, sharey=True)
+    with rc_context(settings()):
+        figure = sheet(4.2, 6.6) if narrow() else sheet(11.0, 4.6)
+        loop, portrait = figure.subplots(*(2, 1) if narrow() else (1, 2), sharey=True)
         over_x = panels.hysteresis(loop, trace, window=window, elements=elements, slipping=True)
         over_v = panels.portrait(portrait, trace, window=window, elements=elements, bar=False)
         x, v = trace.x[row] - trace.x[0], trace.v[row]
@@ -84,7 +86,8 @@ def phase(
         (lines,) = over_v
         assert isinstance(lines, LineCollection)
         panels.slip_bar(lines, trace, [loop, portrait])
-        portrait.set_ylabel("")
+        if not narrow():
+            portrait.set_ylabel("")
         portrait.tick_params(labelleft=True)
         letter_panels([loop, portrait], ["friction over position", "friction over velocity"])
         note = f"from {limits[0]:.6g} to {limits[1]:.6g} s, dot at t = {trace.t[row]:.9g} s"
@@ -92,13 +95,13 @@ def phase(
         figure.draw_without_rendering()  # arrows are evenly spaced in the laid out picture
         _arrows(loop, over_x)
         _arrows(portrait, over_v)
-    return figure
+    return fitted(figure)
 
 
 def _dot(ax: Axes, here: float, values: np.ndarray, unit: str, F: float) -> None:
     """Draw the dot in the unit of the axis, which is that of the values shown."""
     factor, _ = scaled(values, unit)
-    look: Any = {"color": VERMILION, "markersize": 9, "markeredgecolor": PAPER}
+    look: Any = {"color": VERMILION, "markersize": pt(9), "markeredgecolor": PAPER}
     ax.plot(factor * here, F, "o", zorder=8, clip_on=False, **look)
 
 

@@ -9,35 +9,23 @@ import numpy as np
 
 from gms_fsm.phenomena.results import MARKS, VERDICTS, Measured, PhenomenaTable, Phenomenon
 from plots._matplotlib import Axes, Figure, Rectangle, rc_context
+from plots.figures._layout import fitted, sheet
+from plots.presets import font, inches, pt, room, settings, to_scale
 from plots.style import (
-    BLUE,
-    BLUE_TINT,
-    ELEMENT_COLOURS,
-    ELEMENT_DASHES,
     INK,
     LINE_GREY,
     PALE_GREY,
-    PAPER,
-    RC,
     TEXT_GREY,
-    TEXT_ORANGE,
-    VERMILION,
-    VERMILION_TINT,
+    colour,
+    compared_look,
 )
 
 __all__ = ["phenomena_matrix", "phenomenon_figure"]
 
-COLUMNS, PANEL = 4, (2.7, 2.15)  # in
+COLUMNS, PANEL, NARROWEST = 4, (2.7, 2.15), 1.9  # in
 TOO_LARGE = 4.0  # times the median range: such a panel has its own axis
-# Colour, and with it a shape, so that neither is needed alone.
-COLOURS = {
-    "shows": BLUE,
-    "does not show": TEXT_GREY,
-    "shows wrongly": TEXT_ORANGE,
-    "does not apply": PALE_GREY,
-    "failed": INK,
-}
-TINTS = {"shows": BLUE_TINT, "shows wrongly": VERMILION_TINT}
+# Verdicts differ by shape; the grounds only help to find them.
+TINTS = {"shows": "chosen", "shows wrongly": "pale"}
 
 
 def phenomenon_figure(table: PhenomenaTable, name: str) -> Figure | None:
@@ -60,24 +48,25 @@ def phenomenon_figure(table: PhenomenaTable, name: str) -> Figure | None:
     shown = [(model, found) for model, found in shown if found.curves]
     if not shown:
         return None
-    columns = min(COLUMNS, len(shown))
+    wide = room(COLUMNS * PANEL[0] + 0.3)
+    columns = min(max(2, int((wide - 0.3) / NARROWEST)), COLUMNS, len(shown))
     rows = -(-len(shown) // columns)
-    with rc_context(RC):
+    with rc_context(settings()):
         size = (max(columns * PANEL[0], 5.4) + 0.3, rows * PANEL[1] + 0.95)
-        sheet = Figure(figsize=size, layout="constrained")
-        grid = sheet.subplots(rows, columns, squeeze=False)
+        figure = sheet(*size, grows=True)
+        grid = figure.subplots(rows, columns, squeeze=False)
         limits = [_common(shown, axis, phenomenon) for axis in ("x", "y")]
         for ax, (model, found) in zip(grid.flat, shown, strict=False):
             _panel(ax, model, found, phenomenon, limits)
         for ax in grid.flat[len(shown) :]:
             ax.set_axis_off()
-        sheet.supxlabel(phenomenon.axes[0], fontsize=9.5)
-        sheet.supylabel(phenomenon.axes[1], fontsize=9.5)
-        sheet.suptitle(phenomenon.title, x=0.01, ha="left", fontsize=12)
+        figure.supxlabel(phenomenon.axes[0], fontsize=font(9.5))
+        figure.supylabel(phenomenon.axes[1], fontsize=font(9.5))
+        figure.suptitle(phenomenon.title, x=0.01, ha="left", fontsize=font(12))
         handles, labels = grid.flat[0].get_legend_handles_labels()
         if labels:
-            sheet.legend(handles, labels, loc="outside upper right", ncols=len(labels))
-    return sheet
+            figure.legend(handles, labels, loc="outside upper right", ncols=len(labels))
+    return fitted(figure)
 
 
 def _panel(
@@ -87,18 +76,15 @@ def _panel(
     phenomenon: Phenomenon,
     limits: Sequence[tuple[float, float] | None],
 ) -> None:
-    looks = zip(ELEMENT_COLOURS, ELEMENT_DASHES, strict=True)
-    for curve, (colour, dash) in zip(found.curves, looks, strict=False):
+    for number, curve in enumerate(found.curves):
         marker = "o" if curve.x.size < 20 else ""
         ax.plot(
             curve.x,
             curve.y,
-            color=colour,
-            linestyle=dash,
             marker=marker,
-            markersize=3,
-            linewidth=1.1,
+            markersize=pt(3),
             label=curve.label,
+            **to_scale(compared_look(number)),
         )
     if phenomenon.log:
         ax.set_xscale("log")
@@ -112,17 +98,17 @@ def _panel(
     if not phenomenon.log:
         ax.locator_params(axis="x", nbins=4)
     ax.locator_params(axis="y", nbins=4)
-    ax.tick_params(labelsize=7.5, length=2.5)
-    ax.set_title(model, fontsize=9, fontweight="bold", pad=15)
+    ax.tick_params(labelsize=font(7.5), length=2.5)
+    ax.set_title(model, fontsize=font(9), fontweight="bold", pad=inches(15))
     brief = f"{MARKS[found.verdict]} {found.numbers[0]}" + (", own scale" if own else "")
     ax.annotate(
         brief,
         (0.0, 1.0),
-        (0, 4),
+        (0, inches(4)),
         xycoords="axes fraction",
         textcoords="offset points",
-        fontsize=8,
-        color=COLOURS[found.verdict],
+        fontsize=font(8),
+        color=INK,
         family="DejaVu Sans",
     )
 
@@ -167,68 +153,93 @@ def phenomena_matrix(
     Returns
     -------
     Figure
-        Models that take part in no experiment are left out.
+        Models that take part in no experiment are left out. In one column of a journal the cells
+        are too narrow for numbers and notes.
     """
     models = [model for model in table.models if model not in table.left_out()]
-    wide, high = 1.28, 0.46  # in, of a cell
     left = 0.11 * max([8, *map(len, models)])
-    heads = [_folded(each.short) for each in table.phenomena]
+    size = room(left + 1.28 * len(table.phenomena) + 0.2)
+    wide, high = (size - left - 0.2) / len(table.phenomena), 0.46  # in, of a cell
+    brief = wide < 1.0
+    heads = [each.short if brief else _folded(each.short) for each in table.phenomena]
     above = 0.25 + 0.14 * max(head.count("\n") + 1 for head in heads)
+    if brief:
+        high, above = 0.3, 0.25 + 0.064 * max(map(len, heads))
     above += 0.3 if title else 0.0
-    size = (left + wide * len(heads) + 0.2, above + 0.7 + high * max(1, len(models)))
-    with rc_context(RC):
-        total = size[1] + below
-        sheet = Figure(figsize=(size[0], total))
-        ax = sheet.add_axes((0.0, below / total, 1.0, size[1] / total))
-        ax.set(xlim=(0.0, size[0]), ylim=(0.0, size[1]))
+    found_any = {table.cell(model, one.name).verdict for model in models for one in table.phenomena}
+    key = [each for each in VERDICTS if each in found_any]
+    lines = _lines(key, size)
+    under = 0.35 + 0.2 * len(lines) + (0.15 if notes and not brief else 0.0)
+    tall = above + under + high * max(1, len(models))
+    with rc_context(settings()):
+        figure = sheet(size, tall + below, layout=None, grows=True)
+        total = figure.get_figheight() / inches(1)
+        ax = figure.add_axes((0.0, 1 - tall / total, 1.0, tall / total))
+        ax.set(xlim=(0.0, size), ylim=(0.0, tall))
         ax.set_axis_off()
         if title:
-            ax.text(0.1, size[1] - 0.08, title, ha="left", va="top", fontsize=12)
-        top = size[1] - above
+            ax.text(0.1, tall - 0.08, title, ha="left", va="top", fontsize=font(12))
+        top = tall - above
         for column, head in enumerate(heads):
-            x = left + (column + 0.5) * wide
-            ax.text(x, top + 0.1, head, ha="center", va="bottom", fontsize=8)
+            at = (left + (column + 0.5) * wide, top + 0.1)
+            turned = 90 if brief else 0
+            ax.text(*at, head, ha="center", va="bottom", fontsize=font(8), rotation=turned)
         for row, model in enumerate(models):
             y = top - (row + 0.5) * high
-            ax.text(left - 0.1, y, model, ha="right", va="center", fontsize=9)
+            ax.text(left - 0.1, y, model, ha="right", va="center", fontsize=font(9))
             for column, phenomenon in enumerate(table.phenomena):
                 found = table.cell(model, phenomenon.name)
                 corner = (left + column * wide, y - 0.5 * high)
-                tint: Any = TINTS.get(found.verdict, PAPER)
+                tint: Any = colour(TINTS.get(found.verdict, "paper"))
                 ax.add_patch(
-                    Rectangle(corner, wide, high, facecolor=tint, edgecolor=PALE_GREY, lw=0.6)
+                    Rectangle(corner, wide, high, facecolor=tint, edgecolor=PALE_GREY, lw=pt(0.6))
                 )
-                _symbol(ax, corner[0] + 0.2, y, found.verdict)
-                if found.numbers:
-                    ax.text(corner[0] + 0.36, y, str(found.numbers[0]), va="center", fontsize=8.5)
-        for column, note in enumerate(notes):
+                _symbol(ax, corner[0] + (0.5 * wide if brief else 0.2), y, found.verdict)
+                if found.numbers and not brief:
+                    number = str(found.numbers[0])
+                    ax.text(corner[0] + 0.36, y, number, va="center", fontsize=font(8.5))
+        for column, note in enumerate(() if brief else notes):
             x, side = (
                 (left - 0.1, "right") if column == 0 else (left + (column - 0.5) * wide, "center")
             )
-            ax.text(x, 0.56, note, ha=side, va="center", fontsize=7.5, color=TEXT_GREY)
-        x = left + 0.2
-        found_any = {
-            table.cell(model, one.name).verdict for model in models for one in table.phenomena
-        }
-        for verdict in (each for each in VERDICTS if each in found_any):
-            _symbol(ax, x, 0.3, verdict)
-            ax.text(x + 0.16, 0.3, verdict, va="center", fontsize=8.5)
-            x += 0.45 + 0.075 * len(verdict)
-    return sheet
+            ax.text(
+                x, under - 0.14, note, ha=side, va="center", fontsize=font(7.5), color=TEXT_GREY
+            )
+        for place, line in enumerate(reversed(lines)):
+            for x, verdict in line:
+                y = 0.15 + 0.2 * place
+                _symbol(ax, x, y, verdict)
+                ax.text(x + 0.16, y, verdict, va="center", fontsize=font(8.5))
+    return fitted(figure)
+
+
+def _lines(key: Sequence[str], wide: float) -> list[list[tuple[float, str]]]:
+    """Place the key of the symbols, in as many lines as it needs."""
+    lines: list[list[tuple[float, str]]] = [[]]
+    x = 0.3
+    for verdict in key:
+        long = 0.45 + 0.075 * len(verdict)
+        if lines[-1] and x + long > wide:
+            lines.append([])
+            x = 0.3
+        lines[-1].append((x, verdict))
+        x += long
+    return lines
 
 
 def _symbol(ax: Axes, x: float, y: float, verdict: str) -> None:
-    colour = COLOURS[verdict]
     if verdict == "shows":
-        ax.plot([x], [y], "o", color=colour, markersize=8)
+        ax.plot([x], [y], "o", color=INK, markersize=pt(8))
     elif verdict == "does not show":
-        ax.plot([x], [y], "o", color=colour, markersize=7.5, markerfacecolor="none", mew=1.4)
+        ax.plot(
+            [x], [y], "o", color=TEXT_GREY, markersize=pt(7.5), markerfacecolor="none", mew=pt(1.4)
+        )
     elif verdict == "shows wrongly":
-        ax.plot([x], [y], "X", color=VERMILION, markersize=8.5)
+        ax.plot([x], [y], "X", color=INK, markersize=pt(8.5))
     elif verdict == "does not apply":
-        ax.plot([x - 0.06, x + 0.06], [y, y], color=LINE_GREY, linewidth=1.4)
+        ax.plot([x - 0.06, x + 0.06], [y, y], color=LINE_GREY, linewidth=pt(1.4))
     else:
-        ax.text(x, y, "?", ha="center", va="center", color=colour, fontsize=10)
+        ax.text(x, y, "?", ha="center", va="center", color=INK, fontsize=font(10))
 
 
 def _folded(text: str) -> str:

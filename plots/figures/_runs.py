@@ -13,21 +13,25 @@ from gms_fsm.traces.trace import Trace, check_trace
 from plots import panels
 from plots._matplotlib import Axes, Figure, LineCollection, MaxNLocator, rc_context
 from plots._window import Window
+from plots.figures._layout import fitted, legend_above, low, narrow, sheet
 from plots.figures._parts import (
     element_legend,
     head,
+    lanes_height,
     last_cycles,
-    legend_above,
     letter_panels,
     one_time_axis,
+    over_threshold,
 )
-from plots.panels._axes import VECTOR_ROWS
+from plots.panels._axes import MANY, VECTOR_ROWS
 from plots.panels._cascades import CASCADE
-from plots.panels._shown import checked_window, scaled, shown
-from plots.style import BLUE, PALE_GREY, RC, VERMILION
+from plots.panels._shown import checked_elements, checked_window, scaled, shown
+from plots.presets import pt, settings
+from plots.style import LINE_GREY, PALE_GREY
 
 __all__ = ["Measured", "cascade_figure", "overview", "ribbons_figure"]
 
+LOW = 2  # panels below each other, on a slide
 MOST_SPANS = 30  # per element: more states are not readable side by side
 
 
@@ -95,54 +99,72 @@ def overview(
     whole = window is None and begin == trace.t[0]
     part = shown(trace, window)
     left_part = part if whole or window is not None else shown(trace, (begin, end))
-    with rc_context(RC):
-        figure = Figure(figsize=(11.0, 6.6), layout="constrained")
-        grid = figure.add_gridspec(1, 2, width_ratios=(1.5, 1))
-        left, right = (figure.add_subfigure(grid[0, column]) for column in (0, 1))
-        time = left.subplots(3, 1, sharex=True)
-        loop, portrait = right.subplots(2, 1)
+    count = len(checked_elements(trace, elements))
+    tall = [1.6, 1.6, *([1.0] if count > MANY else []), lanes_height(count, 1.6)]  # inches
+    with rc_context(settings()):
+        figure, time, (loop, portrait) = _overview_axes(tall)
         panels.velocity(time[0], left_part, window=(begin, end))
         panels.force(time[1], left_part, window=(begin, end))
-        panels.ribbons(time[2], left_part, window=(begin, end), elements=elements)
+        if count > MANY:
+            panels.slipping(time[2], left_part, window=(begin, end), elements=elements)
+        panels.ribbons(time[-1], left_part, window=(begin, end), elements=elements)
         panels.hysteresis(loop, trace, window=window)
         panels.portrait(portrait, part, elements=elements)
         if measured is not None:
             _add_measured(time[1], loop, measured, trace, (begin, end))
         if trace.model.chart.transitions:
-            legend_above(time[2])
-        for ax in time[:2]:
+            legend_above(time[-1])
+        for ax in time[:-1]:
             ax.set_xlabel("")
         note = "" if whole or window is not None else f", last {end - begin:.3g} s"
-        for ax, name in zip(time, ("velocity", "friction", "active states"), strict=True):
-            ax.set_title(name + note)
-        loop.set_title("hysteresis")
-        portrait.set_title("friction against velocity")
+        # Beside the third name there is the number at the end; the time axis is the same.
+        names = [f"velocity{note}", f"friction{note}", f"active states{note}"]
+        names[2:2] = ["how many slip"] if count > MANY else []
+        letter_panels([*time, loop, portrait], [*names, "hysteresis", "friction against velocity"])
         for ax in (loop, portrait):  # narrow, and labels such as -0.35 are wide
             ax.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
         figure.suptitle(head(trace, title), x=0.01, ha="left")
-    return figure
+    return fitted(figure)
+
+
+def _overview_axes(tall: Sequence[float]) -> tuple[Figure, Sequence[Axes], Sequence[Axes]]:
+    """Return an empty figure, its panels over time, and the others: next to or below them."""
+    if narrow():
+        figure = sheet(4.2, sum(tall) + 3.8)
+        axes = figure.subplots(len(tall) + 2, 1, height_ratios=(*tall, 2.0, 2.0))
+        time = axes[:-2]
+        for ax in time[1:]:
+            ax.sharex(time[0])
+        for ax in time[:-1]:
+            ax.tick_params(labelbottom=False)
+        return figure, time, axes[-2:]
+    figure = sheet(11.0, sum(tall) + 1.8)
+    grid = figure.add_gridspec(1, 2, width_ratios=(1.5, 1))
+    left, right = (figure.add_subfigure(grid[0, column]) for column in (0, 1))
+    over_time = left.subplots(len(tall), 1, sharex=True, height_ratios=tall)
+    return figure, over_time, right.subplots(2, 1)
 
 
 def _add_measured(ax: Axes, loop: Axes, measured: Measured, trace: Trace, window: Window) -> None:
     """Draw the measured friction over time and over x."""
     inside = (measured.t >= window[0]) & (measured.t <= window[1])
-    ax.lines[0].set(color=BLUE, label="model", zorder=3)
+    ax.lines[0].set(label="model", zorder=3)
     ax.plot(
         measured.t[inside],
         measured.F[inside],
-        color=VERMILION,
-        linewidth=1.0,
+        color=LINE_GREY,
+        linewidth=pt(2.4),
         label="measured",
         rasterized=bool(inside.sum() > VECTOR_ROWS),
     )
     legend_above(ax)
     factor, _ = scaled(trace.x - trace.x[0], "m")
-    loop.lines[0].set(linewidth=0.9, zorder=3, rasterized=True)
+    loop.lines[0].set(linewidth=pt(0.9), zorder=3, rasterized=True)
     loop.plot(
         factor * (measured.x - trace.x[0]),
         measured.F,
-        color=VERMILION,
-        linewidth=0.5,
+        color=LINE_GREY,
+        linewidth=pt(0.5),
         alpha=0.7,
         rasterized=True,
     )
@@ -179,7 +201,8 @@ def ribbons_figure(
     -------
     Figure
         Left: v, z / s, F and states over time. Middle: the zoom (omitted if nothing ever breaks
-        away and `around` is not given). Right: F against v and x.
+        away and `around` is not given). Right: F against v and x. On a slide there is room for four
+        panels: v and z / s are left out, and with a zoom also what is on the right.
     """
     limits = checked_window(trace, window)
     crowded = window is None and len(trace.transitions) > MOST_SPANS * trace.n
@@ -190,48 +213,69 @@ def ribbons_figure(
     zoom = panels.cascade_window(part if around is None else trace, around, within=within)
     if zoom is None and window is None:
         zoom = panels.cascade_window(trace, around, within=within)
-    with rc_context(RC):
-        figure = Figure(figsize=(13.2 if zoom else 9.6, 9.2), layout="constrained")
-        halves = figure.add_gridspec(1, 2, width_ratios=(2.1, 1) if zoom else (1.3, 1))
-        parts = [figure.add_subfigure(halves[0, column]) for column in (0, 1)]
-        grid = parts[0].subplots(
-            4,
-            2 if zoom else 1,
-            squeeze=False,
-            width_ratios=(1.45, 1) if zoom else None,
-            height_ratios=(1, 1.2, 1.2, 1),
-        )
-        left, right = list(grid[:, 0]), list(parts[1].subplots(2, 1))
-        panels.velocity(left[0], part, window=limits)
-        panels.ratio(left[1], part, window=limits, elements=elements)
-        panels.force(left[2], part, window=limits)
-        panels.ribbons(left[3], part, window=limits, elements=elements)
+    with rc_context(settings()):
+        tall = _heights(len(checked_elements(trace, elements)))
+        figure, left, middle, right = _ribbon_axes(tall, zoom=zoom is not None)
+        second = ""
+        if len(left) > LOW:
+            panels.velocity(left[0], part, window=limits)
+            second = over_threshold(left[1], part, window=limits, elements=elements)
+        panels.force(left[-2], part, window=limits)
+        panels.ribbons(left[-1], part, window=limits, elements=elements)
         one_time_axis(left)
-        axes = left + right
-        second = "first variable" if trace.model.chart.variables else "deflection"
-        if "s" in trace.model.chart.inputs:
-            second = (
-                "deflection / threshold" if panels.has_threshold(trace) else "deflection / s(v)"
-            )
         names = ["velocity", second, "friction", "active states"]
         if limits[0] > trace.t[0] and crowded:
             names = [f"{name}, last {limits[1] - limits[0]:.3g} s" for name in names]
+        names = names[-len(left) :]
         if zoom:
-            middle = list(grid[:, 1])
-            _cascade_column(middle, trace, zoom, elements)
+            margin = _cascade_column(middle, trace, zoom, elements)
             for ax in left:
-                ax.axvspan(*zoom, color=PALE_GREY, linewidth=1.0, alpha=0.6, zorder=0)
-            axes = left + middle + right
-            names += _zoom_names(zoom)
-        (lines,) = panels.portrait(right[0], trace, window=window, elements=elements, bar=False)
-        panels.hysteresis(right[1], trace, window=window, elements=elements, slipping=True)
-        assert isinstance(lines, LineCollection)
-        panels.slip_bar(lines, trace, right)
-        letter_panels(axes, [*names, "friction against velocity", "hysteresis"])
-        parts[0].align_ylabels(left)
+                ax.axvspan(*zoom, color=PALE_GREY, linewidth=pt(1.0), alpha=0.6, zorder=0)
+            names += _zoom_names(zoom, margin)[-len(middle) :]
+        if right:
+            (lines,) = panels.portrait(right[0], trace, window=window, elements=elements, bar=False)
+            panels.hysteresis(right[1], trace, window=window, elements=elements, slipping=True)
+            assert isinstance(lines, LineCollection)
+            panels.slip_bar(lines, trace, right)
+            names += ["friction against velocity", "hysteresis"]
+        letter_panels([*left, *middle, *right], names)
+        figure.align_ylabels(left)
         figure.suptitle(head(trace, title), x=0.01, ha="left")
-        element_legend(figure, left[1], left[3])
-    return figure
+        element_legend(figure, *left[1:4:2])
+    return fitted(figure)
+
+
+def _ribbon_axes(
+    tall: Sequence[float], *, zoom: bool
+) -> tuple[Figure, list[Axes], list[Axes], list[Axes]]:
+    """Return an empty figure and its panels: over time, of the zoom, and F against v and x.
+
+    On a slide there is room for four panels.
+    """
+    rows = LOW if low() else len(tall)
+    heights = list(tall[-rows:])
+    if narrow():
+        column = [0.75 * each for each in heights] * (2 if zoom else 1)
+        figure = sheet(4.2, sum(column) + 2.1 + 0.3 * len(column))
+        halves = figure.add_gridspec(2, 1, height_ratios=(len(column), 1.8))
+        axes = list(
+            figure.add_subfigure(halves[0, 0]).subplots(len(column), 1, height_ratios=column)
+        )
+        pair = list(figure.add_subfigure(halves[1, 0]).subplots(1, 2))
+        return figure, axes[:rows], axes[rows:], pair
+    figure = sheet(13.2 if zoom else 9.6, sum(tall) + 2.2)
+    beside = not (zoom and low())
+    widths = (2.1 if zoom else 1.3, 1)[: 1 + beside]
+    halves = figure.add_gridspec(1, len(widths), width_ratios=widths)
+    grid = figure.add_subfigure(halves[0, 0]).subplots(
+        rows,
+        2 if zoom else 1,
+        squeeze=False,
+        width_ratios=(1.45, 1) if zoom else None,
+        height_ratios=heights,
+    )
+    right = list(figure.add_subfigure(halves[0, 1]).subplots(2, 1)) if beside else []
+    return figure, list(grid[:, 0]), list(grid[:, 1]) if zoom else [], right
 
 
 def cascade_figure(
@@ -265,34 +309,53 @@ def cascade_figure(
     """
     zoom = window or panels.cascade_window(trace, around, within=within)
     limits = checked_window(trace, zoom)
-    with rc_context(RC):
-        figure = Figure(figsize=(6.4, 9.2), layout="constrained")
-        axes = list(figure.subplots(4, 1, height_ratios=(1, 1.2, 1.2, 1)))
-        _cascade_column(axes, trace, limits, elements)
-        names = _zoom_names(limits)
-        letter_panels(axes, names if zoom else ["velocity", "margin", "friction", "active states"])
+    with rc_context(settings()):
+        tall = _heights(len(checked_elements(trace, elements)))
+        figure = sheet(6.4, sum(tall) + 2.2)
+        if low():  # two columns, with a time axis each
+            axes = list(figure.subplots(2, 2, height_ratios=(1.2, 1)).T.ravel())
+            margin = _cascade_column(axes, trace, limits, elements)
+            axes[1].set_xlabel(axes[3].get_xlabel())
+            axes[1].tick_params(labelbottom=True)
+        else:
+            axes = list(figure.subplots(4, 1, height_ratios=tall))
+            margin = _cascade_column(axes, trace, limits, elements)
+        names = _zoom_names(limits, margin)
+        letter_panels(axes, names if zoom else ["velocity", margin, "friction", "active states"])
         figure.suptitle(head(trace, title), x=0.01, ha="left")
         element_legend(figure, axes[1], axes[3])
-    return figure
+    return fitted(figure)
 
 
 def _cascade_column(
     axes: Sequence[Axes], trace: Trace, zoom: Window, elements: Sequence[int] | None
-) -> None:
+) -> str:
+    """Draw the panels of a cascade; return the name of the second one."""
     part = shown(trace, zoom)
-    panels.velocity(axes[0], part, window=zoom)
-    panels.margins(axes[1], part, window=zoom, elements=elements)
-    panels.cascade(axes[2], part, window=zoom, elements=elements)
-    panels.ribbons(axes[3], part, window=zoom, elements=elements)
+    name = "margin to the threshold"
+    if len(axes) > LOW:
+        panels.velocity(axes[0], part, window=zoom)
+        if len(checked_elements(trace, elements)) > MANY:
+            name = over_threshold(axes[1], part, window=zoom, elements=elements)
+        else:
+            panels.margins(axes[1], part, window=zoom, elements=elements)
+    panels.cascade(axes[-2], part, window=zoom, elements=elements)
+    panels.ribbons(axes[-1], part, window=zoom, elements=elements)
     one_time_axis(axes)
+    return name
 
 
-def _zoom_names(zoom: Window) -> list[str]:
+def _heights(count: int) -> tuple[float, ...]:
+    """Return the heights of velocity, deflections, friction and states, inches."""
+    return 1.6, lanes_height(count, 1.9), 1.9, lanes_height(count, 1.6)
+
+
+def _zoom_names(zoom: Window, margin: str) -> list[str]:
     middle, width = (zoom[0] + zoom[1]) / 2, zoom[1] - zoom[0]
     factor, unit = scaled(np.array([width]), "s")
     return [
         f"velocity, {factor * width:.3g} {unit} at t = {middle:.5g} s",
-        "margin to the threshold",
+        margin,
         "jumps of F (open: before, filled: after)",
         "order of slipping",
     ]

@@ -57,8 +57,10 @@ def picture(figure: Figure, form: str, metadata: Mapping[str, None]) -> bytes:
         Identical for identical traces.
     """
     buffer = BytesIO()
-    with rc_context(RC):
-        figure.savefig(buffer, format=form, metadata=metadata)
+    # A journal's PDF has fonts that can be selected and edited: TrueType, Type 42.
+    with rc_context(RC | {"pdf.fonttype": 42}):
+        dpi = max(figure.dpi, RC["savefig.dpi"])
+        figure.savefig(buffer, format=form, metadata=metadata, dpi=dpi)
     return _named_clips(buffer.getvalue()) if form == "svg" else buffer.getvalue()
 
 

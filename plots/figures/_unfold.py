@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots._matplotlib import Figure, Rectangle, rc_context
+from plots.figures._layout import fitted, low, sheet
 from plots.figures._parts import head
 from plots.panels._shown import scaled
-from plots.panels._unfolded import FEW, column_width, edge_texts
-from plots.style import HATCHES, RC, STATE_EDGES, STATE_FILLS
+from plots.panels._unfolded import FEW, LETTER, LINE, column_width, edge_texts, time_texts
+from plots.presets import inches, room, settings, to_scale
+from plots.style import state_look
 
 __all__ = ["unfold"]
 
 COLUMN, NARROWEST, WIDEST, SIDES = 1.15, 6.4, 11.6, 1.0  # inches: a column, the figure, margins
 FORCE, ROW, FLATTEST = 2.3, 0.34, 0.22  # inches: the upper panel, a row of the lower one
 TOP, BELOW = 0.95, 1.25  # inches: above and below the panels
+HEAD = 0.55  # inches: the title alone
 
 
 def unfold(
@@ -50,7 +52,8 @@ def unfold(
     Returns
     -------
     Figure
-        Between instants, time is cut out; its length is written below.
+        Between instants, time is cut out; its length is written below. On a slide there is no room
+        for F.
 
     Raises
     ------
@@ -69,37 +72,42 @@ def unfold(
     """
     part = panels.unfolded(trace, t0, t1, elements=elements)
     count = len(part.elements)
-    wide = min(max(NARROWEST, SIDES + COLUMN * part.width), WIDEST)
-    _, _, head_room = edge_texts(part, column_width(wide - SIDES, part))
-    tall = count * (ROW if count <= FEW else FLATTEST)
-    between = 0.45 + head_room
-    height = TOP + FORCE + between + tall + BELOW
+    wide = room(min(max(NARROWEST, SIDES + COLUMN * part.width), WIDEST))
+    column = column_width(inches(wide - SIDES), part)
+    _, _, head_room = edge_texts(part, column)
+    _, upright, times_room = time_texts(part, column)
+    tall = count * (ROW if count <= FEW and not low() else FLATTEST)
+    above = (HEAD if low() else TOP + FORCE) + 0.45 + head_room
     names = [state.name for state in trace.model.chart.states]
-    with rc_context(RC):
-        figure = Figure(figsize=(wide, height))
+    shown = sorted({mode for each in part.columns for mode in each.modes})
+    entry = 0.75 + LETTER * max(len(names[mode]) for mode in shown)  # inches
+    columns = int(np.clip((wide - 0.2) / entry, 1, 6))
+    rows = -(-len(shown) // columns)
+    below = BELOW + (times_room - LINE if upright else 0.0) + 1.3 * LINE * (rows - 1)
+    height = above + tall + below
+    with rc_context(settings()):
+        figure = sheet(wide, height, layout=None, grows=True)
+        height = figure.get_figheight() / inches(1)
+        tall = height - above - below
         left, broad = (SIDES - 0.15) / wide, 1 - SIDES / wide
-        force = figure.add_axes((left, 1 - (TOP + FORCE) / height, broad, FORCE / height))
-        states = figure.add_axes((left, BELOW / height, broad, tall / height))
-        panels.unfolded_force(force, part)
+        letters = iter("ab")
+        if not low():
+            force = figure.add_axes((left, 1 - (TOP + FORCE) / height, broad, FORCE / height))
+            panels.unfolded_force(force, part)
+            panels.lettered(force, next(letters), "F before and after each firing")
+        states = figure.add_axes((left, below / height, broad, tall / height))
         panels.unfolded_states(states, part)
-        force.set_title("a) F before and after each firing")
-        place = left, (BELOW + tall + head_room + 0.14) / height
-        figure.text(*place, "b) who fires, and by which edge", fontsize=9.5)
-        shown = sorted({mode for each in part.columns for mode in each.modes})
+        up = inches(72 * (head_room + 0.12))  # points
+        panels.lettered(states, next(letters), "who fires, and by which edge", pad=up)
         handles = [_swatch(mode, names[mode]) for mode in shown]
-        figure.legend(handles=handles, loc="lower left", ncols=6)
+        figure.legend(handles=handles, loc="lower left", ncols=columns)
         title = f"{head(trace, title)}\n{_said(part)}"
         figure.suptitle(title, x=0.2 / wide, y=1 - 0.12 / height, ha="left", va="top")
-    return figure
+    return fitted(figure)
 
 
 def _swatch(mode: int, name: str) -> Rectangle:
-    look: Any = {
-        "facecolor": STATE_FILLS[mode % len(STATE_FILLS)],
-        "edgecolor": STATE_EDGES[mode % len(STATE_EDGES)],
-        "hatch": HATCHES[mode % len(HATCHES)],
-    }
-    return Rectangle((0, 0), 1, 1, label=name, linewidth=0.6, **look)
+    return Rectangle((0, 0), 1, 1, label=name, **to_scale(state_look(mode)))
 
 
 def _said(part: panels.Unfolded) -> str:

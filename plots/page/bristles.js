@@ -93,7 +93,7 @@ class BristlesPane {
     draw("rect", inside, { x: left, y: 0, width: wall - left, height: earth, fill: `url(#${ground})`, transform: `translate(0 ${floor})` });
     draw("path", inside, { class: "floor", d: `M${left} ${floor}H${wall}` });
     if (z) draw("path", inside, { class: "rest", d: `M${this.rest} ${y - 10 * tall}V${floor}` });
-    found.link = draw("g", inside, { class: `link e${i % COLOURS}` });
+    found.link = draw("g", inside, { class: `link e${elementStep(i, contact.n)}` });
     if (z) for (const d of [SPRING, DAMPER, FRAME]) draw("path", found.link, { d });
     else draw("path", found.link, { d: "M0 0H100" });
     Object.assign(found, { y, tall });

@@ -127,7 +127,7 @@ class RunView {
     box.hidden = contact.n < 2;
     this.tokens = contact.modes.map((_, i) => {
       const token = make("button", box, "", { class: "token" });
-      make("b", token, `E${i + 1}`, { class: `swatch e${i % COLOURS}` });
+      make("b", token, `E${i + 1}`, { class: `swatch e${elementStep(i, contact.n)}` });
       const track = make("span", token, "", { class: "track", "aria-hidden": "true" });
       contact.states.forEach(() => make("i", track));
       make("span", token, "", { class: "state" });

@@ -1,6 +1,6 @@
 "use strict";
 // A page inside another document, its host, for example a notebook's widget: the host sends data to show and times to go
-// to, and is told what is shown. Nothing is told before the host has sent something.
+// to, and is told what is shown. Nothing is told before the host has sent one of these. A host may also choose the theme.
 let hosted = false, told = "";
 
 // A picture is read as XML, and the policy of the page keeps scripts in it from running.
@@ -16,6 +16,11 @@ function adopt(pictures) {
 
 addEventListener("message", ({ source, data: sent }) => {
   if (source !== parent || parent === window) return;
+  if (sent?.theme === "light" || sent?.theme === "dark") {
+    document.documentElement.dataset.theme = sent.theme;
+    eachPlots((pane) => pane.recolour());
+  }
+  if (!sent?.load && !Number.isFinite(sent?.go)) return;
   if (sent?.load) {
     adopt(sent.load.charts);
     load(sent.load.data);

@@ -5,6 +5,7 @@ const AXIS = 58, GAP = 10, TIME_AXIS = 20; // px to the left and to the right of
 const LEAST = { 1: 46, 2: 34 }; // px, of a plot of one run or of two, so that the time axis stays in view
 const DASHES = [[], [7, 4], [2, 3], [8, 3, 2, 3], [12, 4], [4, 2, 1, 2, 1, 2]];
 const COLOURS = 7, STATES = 5; // of the style sheet: --e0 ..., --state0 ...
+const elementStep = (i, n) => (n > 1 ? Math.round((i * (COLOURS - 1)) / (n - 1)) : 0); // of the ramp from the first element to the last
 const WIDE = matchMedia("(min-width: 1000px)"); // there the page fills the screen and does not scroll
 const MOST_POINTS = 60000; // of lines that are drawn again when another element is selected
 let pointed = null, pinned = null; // frames: under the mouse, and where two runs first differ
@@ -179,7 +180,7 @@ function fillBetween(plot, [one, two]) {
   ctx.beginPath();
   ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
   ctx.clip();
-  ctx.fillStyle = colour("--fired-fill");
+  ctx.fillStyle = colour("--pale");
   ctx.fill(path);
   ctx.restore();
 }
@@ -230,7 +231,7 @@ class TimePane extends TimePlots {
     if (!name) return false;
     const over = contact.threshold && contact.columns.s;
     const get = (i) => (over ? (row) => contact.value(name, i, row) / contact.value("s", i, row) : (row) => contact.value(name, i, row));
-    const lines = contact.modes.map((_, i) => ({ get: get(i), run, stroke: `--e${i % COLOURS}`, dash: DASHES[i % DASHES.length] }));
+    const lines = contact.modes.map((_, i) => ({ get: get(i), run, stroke: `--e${elementStep(i, contact.n)}`, dash: DASHES[i % DASHES.length] }));
     const bounds = over ? [1, -1].map((u) => ({ get: () => u, run, stroke: "--line" })) : [];
     this.add({
       title: over ? `${name} / s(v), lines at ±1` : name, unit: over ? "" : contact.units[name] ?? "", lines: [...bounds, ...lines],

@@ -18,24 +18,28 @@ from plots.panels import (
     _differences,
     _held,
     _landscapes,
+    _many,
     _over_time,
     _portraits,
     _race,
     _shown,
     _states,
     _stribeck,
+    _titles,
     _unfolded,
 )
 from plots.panels._cascades import *  # noqa: F403
 from plots.panels._differences import *  # noqa: F403
 from plots.panels._held import *  # noqa: F403
 from plots.panels._landscapes import *  # noqa: F403
+from plots.panels._many import *  # noqa: F403
 from plots.panels._over_time import *  # noqa: F403
 from plots.panels._portraits import *  # noqa: F403
 from plots.panels._race import *  # noqa: F403
 from plots.panels._shown import *  # noqa: F403
 from plots.panels._states import *  # noqa: F403
 from plots.panels._stribeck import *  # noqa: F403
+from plots.panels._titles import *  # noqa: F403
 from plots.panels._unfolded import *  # noqa: F403
 
 __all__: list[str] = []
@@ -43,10 +47,12 @@ __all__ += _cascades.__all__
 __all__ += _differences.__all__
 __all__ += _held.__all__
 __all__ += _landscapes.__all__
+__all__ += _many.__all__
 __all__ += _over_time.__all__
 __all__ += _portraits.__all__
 __all__ += _race.__all__
 __all__ += _shown.__all__
 __all__ += _states.__all__
 __all__ += _stribeck.__all__
+__all__ += _titles.__all__
 __all__ += _unfolded.__all__

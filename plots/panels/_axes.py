@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,12 @@ from numpy.typing import NDArray
 from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Artist, Axes, MaxNLocator
 from plots.panels._shown import scaled
-from plots.style import ELEMENT_COLOURS, ELEMENT_DASHES, TEXT_GREY
+from plots.presets import font
+from plots.style import ELEMENT_DASHES, TEXT_GREY, element_colour
 
 Artists = list[Artist]
 
+MANY = 6  # more elements are drawn as rows and counted, not as curves
 VECTOR_ROWS = 6_000  # longer curves are rasterized in an SVG or PDF, which keeps the file small
 
 
@@ -27,10 +30,10 @@ def first_variable(trace: Trace, values: NDArray[np.float64]) -> tuple[float, st
     return factor, f"{name} [{unit}]"
 
 
-def element_look(i: int) -> dict[str, Any]:
-    """Return colour and dash of element i."""
+def element_look(i: int, n: int) -> dict[str, Any]:
+    """Return colour and dash of element i of n."""
     return {
-        "color": ELEMENT_COLOURS[i % len(ELEMENT_COLOURS)],
+        "color": element_colour(i, n),
         "linestyle": ELEMENT_DASHES[i % len(ELEMENT_DASHES)],
     }
 
@@ -55,7 +58,7 @@ def time_axis(ax: Axes, begin: float, end: float) -> None:
     low, high = factor * (begin - origin), factor * (end - origin)
     ticks = np.asarray(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high))
     ticks = ticks[(ticks >= low) & (ticks <= high)]
-    ax.set_xticks(origin + ticks / factor, [f"{tick:g}" for tick in ticks])
+    ax.set_xticks(origin + ticks / factor, [f"{tick:g}".replace("-", "−") for tick in ticks])
     ax.set_xlabel(f"t − {origin:.12g} s [{unit}]")
 
 
@@ -66,6 +69,16 @@ def log_axis(ax: Axes, values: NDArray[np.float64], axis: str) -> None:
     low = max(float(positive.min()) if positive.size else 0.1, 1e-6 * top)
     limits = (0.8 * low, 1.25 * top)
     ax.set(**{f"{axis}scale": "log", f"{axis}lim": limits})
+
+
+def lanes(ax: Axes, elements: Sequence[int]) -> None:
+    """Label the rows of a panel with one row per element, the first one on top."""
+    ax.set(
+        ylim=(len(elements) + 0.5, 0.5),
+        yticks=range(1, len(elements) + 1),
+        yticklabels=[f"E{i + 1}" for i in elements],
+    )
+    ax.tick_params(axis="y", length=0, labelsize=font(9 if len(elements) <= MANY else 8))
 
 
 def note(ax: Axes, text: str) -> Artist:

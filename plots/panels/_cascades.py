@@ -20,7 +20,8 @@ from plots.panels._shown import (
     is_number,
     shown,
 )
-from plots.style import INK, LINE_GREY
+from plots.presets import font, pt
+from plots.style import INK, LINE_GREY, PAPER
 
 __all__ = ["cascade", "cascade_window", "margins", "marks"]
 
@@ -121,13 +122,13 @@ def marks(
     begin, end = checked_window(trace, window)
     log = _in_window(trace, (begin, end), checked_elements(trace, elements))
     drawn: Artists = [
-        ax.axvline(t, linewidth=0.9, zorder=1, **element_look(int(i)))
+        ax.axvline(t, linewidth=pt(0.9), zorder=1, **element_look(int(i), trace.n))
         for t, i in zip(log.t.tolist(), log.element.tolist(), strict=True)
     ]
     if not labels or not end > begin:
         return drawn
     wide = 0.9 * ax.bbox.width / ax.figure.dpi * 72  # points; the layout may still move
-    letter = 5.5 * (end - begin) / wide  # s
+    letter = 5.5 / 8.0 * font(8) * (end - begin) / wide  # s
     groups: list[list[Any]] = []  # elements, first and last time
     for t, i in zip(log.t.tolist(), log.element.tolist(), strict=True):
         groups.append([[i], t, t])
@@ -144,7 +145,7 @@ def marks(
                 textcoords="offset points",
                 ha="center",
                 va="bottom",
-                fontsize=8,
+                fontsize=font(8),
                 color=INK,
             )
         )
@@ -204,19 +205,21 @@ def margins(
     lines: Artists = []
     dots: Artists = []
     for i in chosen:
-        lines += draw_curve(ax, part.t, factor * values[:, i], label=f"E{i + 1}", **element_look(i))
+        lines += draw_curve(
+            ax, part.t, factor * values[:, i], label=f"E{i + 1}", **element_look(i, trace.n)
+        )
         mine = log[log.element == i]
         if mine.size:
             dots += ax.plot(
                 mine.t,
                 factor * (1 - np.abs(mine.z / mine.s)),
                 "o",
-                color=element_look(i)["color"],
-                markersize=4,
+                color=element_look(i, trace.n)["color"],
+                markersize=pt(4),
                 clip_on=False,
                 zorder=4,
             )
-    lines.append(ax.axhline(0.0, color=LINE_GREY, linewidth=0.8, zorder=1))
+    lines.append(ax.axhline(0.0, color=LINE_GREY, linewidth=pt(0.8), zorder=1))
     ax.set_ylabel(f"10$^{power}$ (1 − |z|/s) [–]" if power else "1 − |z|/s [–]")
     time_axis(ax, *limits)
     return [*lines, *dots, *marks(ax, trace, window=limits, elements=chosen)]
@@ -263,13 +266,13 @@ def cascade(
             log.t,
             log.F_before,
             "o",
-            markersize=4.5,
+            markersize=pt(4.5),
             color=INK,
-            markerfacecolor="white",
+            markerfacecolor=PAPER,
             label="F before",
             zorder=3,
         ),
-        *ax.plot(log.t, log.F_after, "o", markersize=4.5, color=INK, label="F after", zorder=4),
+        *ax.plot(log.t, log.F_after, "o", markersize=pt(4.5), color=INK, label="F after", zorder=4),
     ]
     ax.set_ylabel("F [N]")
     time_axis(ax, *limits)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,13 @@ from plots._matplotlib import Axes
 from plots._window import Window
 from plots.panels._axes import Artists, draw_curve, time_axis
 from plots.panels._shown import SMOOTH, checked_window, is_number
-from plots.style import INK
+from plots.presets import pt
+from plots.style import INK, PALE_GREY
 
 __all__ = ["difference", "residual"]
+
+Floats = NDArray[np.float64]
+COLUMNS = 500  # of an envelope
 
 
 class Forces(Protocol):
@@ -57,7 +61,8 @@ def difference(
     Returns
     -------
     list of Artist
-        The line.
+        The line; of more than 1,000 points the band between the lowest and the highest value of
+        every 1/500 of the time, and its ends as lines (only the upper one on a logarithmic axis).
     """
     if not is_number(floor) or not 0 < floor < np.inf:
         raise ParameterError(f"floor is {written(floor)}", advice="it must be a force > 0 N")
@@ -71,7 +76,23 @@ def difference(
         values = np.maximum(np.abs(values), floor)
     ax.set_ylabel("|difference of F| [N]" if log else "difference of F [N]")
     time_axis(ax, float(times[0]), float(times[-1]))
-    return draw_curve(ax, times, values, color=INK, linewidth=0.8)
+    look: dict[str, Any] = {"color": INK, "linewidth": pt(0.8)}
+    if len(times) <= 2 * COLUMNS:
+        return draw_curve(ax, times, values, **look)
+    middles, low, high = _envelope(times, values)
+    band = ax.fill_between(middles, low, high, color=PALE_GREY, linewidth=0.0)
+    ends = [high] if log else [high, low]
+    return [band, *(line for end in ends for line in draw_curve(ax, middles, end, **look))]
+
+
+def _envelope(times: Floats, values: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return times, and the lowest and the highest value in every part of the time."""
+    edges = np.linspace(times[0], times[-1], COLUMNS + 1)
+    first = np.searchsorted(times, edges[:-1])
+    filled = np.diff(np.append(first, len(times))) > 0
+    first = first[filled]
+    middles = (edges[1:] + edges[:-1])[filled] / 2
+    return middles, np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
 
 
 def residual(
@@ -104,7 +125,7 @@ def residual(
     Returns
     -------
     list of Artist
-        The line.
+        As for `difference`.
 
     Raises
     ------

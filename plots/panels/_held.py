@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from plots._matplotlib import Axes, LogLocator
 from plots.panels._axes import Artists, draw_curve, time_axis
-from plots.style import BLUE, INK, LINE_GREY, TEXT_GREY, VERMILION
+from plots.presets import pt, to_scale
+from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY, compared_look
 
 __all__ = ["lag_between_ticks", "lag_over_period", "lag_over_time"]
 
-COLOURS = (VERMILION, INK, "#009E73")  # of the sample times; blue is the paper
 MILLI, MICRO = 1e3, 1e6
 
 
@@ -67,13 +67,13 @@ def lag_over_time(
     """
     factor = MICRO if place else MILLI
     lines: Artists = []
-    for lag, colour in zip(lags, COLOURS, strict=False):
+    for number, lag in enumerate(lags):
         shown = (lag.t >= window[0]) & (lag.t <= window[1])
         values = factor * (lag.place if place else lag.force)[shown]
         name = f"h = {MILLI * lag.period:g} ms"
-        lines += draw_curve(ax, lag.t[shown], values, color=colour, linewidth=1.0, label=name)
+        lines += draw_curve(ax, lag.t[shown], values, label=name, **to_scale(compared_look(number)))
     for sign in (1, -1):
-        ax.axhline(sign * factor * paper, color=BLUE, linestyle="--", linewidth=0.9)
+        ax.axhline(sign * factor * paper, **to_scale(REPORTED))
     time_axis(ax, *window)
     ax.set_ylabel("difference of x [µm]" if place else "difference of F [mN]")
     return lines
@@ -97,13 +97,14 @@ def lag_between_ticks(ax: Axes, lags: Sequence[Lag], *, window: tuple[float, flo
         One line per sample time.
     """
     lines: Artists = []
-    for lag, colour in zip(lags, COLOURS, strict=False):
+    for number, lag in enumerate(lags):
         shown = (lag.t > window[0] - lag.period) & (lag.t < window[1])
         begin = lag.t[shown]
         t = np.column_stack([begin, begin + lag.period]).ravel()
         both = np.column_stack([lag.force[shown], lag.before[shown]]).ravel()
-        lines += ax.plot(MILLI * (t - window[0]), MILLI * both, color=colour)
-        ax.plot(MILLI * (begin - window[0]), MILLI * lag.force[shown], "o", color=colour, ms=4)
+        lines += ax.plot(MILLI * (t - window[0]), MILLI * both, **to_scale(compared_look(number)))
+        ink = compared_look(number)["color"]
+        ax.plot(MILLI * (begin - window[0]), MILLI * lag.force[shown], "o", color=ink, ms=pt(4))
     ax.set(
         xlabel=f"t − {window[0]:g} s [ms]",
         ylabel="difference of F [mN]",
@@ -149,17 +150,17 @@ def lag_over_period(
                 sizes.append(float(np.abs(values[inside]).max()) / papers[quantity])
             found += [size for size in sizes if size > 0]
             line = sizes[0] * periods / periods[0]  # a slope of exactly one
-            ax.plot(periods, line, color=LINE_GREY, linewidth=0.9, zorder=1)
+            ax.plot(periods, line, color=LINE_GREY, linewidth=pt(0.9), zorder=1)
             marks += ax.plot(
                 periods,
                 sizes,
                 marker,
                 color=(INK, TEXT_GREY)[quantity],
                 fillstyle=fill,
-                markersize=6,
+                markersize=pt(6),
                 label=f"{'Fx'[quantity]}, {name}",
             )
-    ax.axhline(1.0, color=BLUE, linestyle="--", linewidth=0.9)
+    ax.axhline(1.0, **to_scale(REPORTED))
     ax.set(
         xscale="log", yscale="log", xlabel="sample time h [ms]", ylabel="largest / the paper's [1]"
     )

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError, SignalError
@@ -31,7 +32,17 @@ from plots._window import Window
 from plots.panels._axes import Artists
 from plots.panels._line_names import LineNames, NamedLine
 from plots.panels._shown import checked_row, checked_window, one_element, scaled, shown
-from plots.style import EDGE_COLOURS, EDGE_HATCHES, INK, LINE_GREY, PALE_GREY, TEXT_GREY
+from plots.presets import font, pt
+from plots.style import (
+    EDGE_COLOURS,
+    EDGE_HATCHES,
+    INK,
+    LINE_GREY,
+    PALE_GREY,
+    PAPER,
+    TEXT_GREY,
+    VERMILION,
+)
 
 __all__ = ["landscape", "pins"]
 
@@ -197,14 +208,14 @@ def landscape(
     _speed_ticks(ax, view)
     v, z = grid_of(ax, view, GRID)
     names = LineNames(ax)
-    drawn: Artists = _regions(ax, plane, v, z, view.factor)
+    drawn: Artists = _regions(ax, plane, v, z, view.factor, names)
     drawn += _flow(ax, trace, plane, view)
     drawn += _clauses(ax, plane, v, z, view.factor, names)
     drawn += _threshold(ax, plane, v, view.factor, names)
     around = path_window(trace, plane.row, element) if window is None else window
     drawn += _path(ax, trace, plane, element, checked_window(trace, around), view, names)
     here = plane.here[0], view.factor * plane.here[1]
-    (dot,) = ax.plot(*here, "o", color=INK, markersize=8, markeredgecolor="white", zorder=8)
+    (dot,) = ax.plot(*here, "o", color=VERMILION, markersize=pt(8), markeredgecolor=PAPER, zorder=8)
     names.avoid.append(here)
     return [*drawn, dot, names]
 
@@ -234,8 +245,10 @@ def _speed_ticks(ax: Axes, view: View) -> None:
     ax.xaxis.set_minor_locator(NullLocator())
 
 
-def _regions(ax: Axes, plane: Plane, v: Floats, z: Floats, factor: float) -> Artists:
-    """Draw where each guard is true."""
+def _regions(
+    ax: Axes, plane: Plane, v: Floats, z: Floats, factor: float, names: LineNames
+) -> Artists:
+    """Draw where each guard is true, with the number of its edge as in the race to fire."""
     drawn: Artists = []
     for number, edge in enumerate(plane.edges):
         inside = plane.truths(plane.chart.guards[edge.name], v, z)
@@ -252,7 +265,18 @@ def _regions(ax: Axes, plane: Plane, v: Floats, z: Floats, factor: float) -> Art
         lines.set(facecolor="none", edgecolor=to_rgb(colour) + (0.5,), linewidth=0.0)
         lines.set_label(edge.name)
         drawn.append(lines)
+        row, column = np.unravel_index(_depth(inside).argmax(), inside.shape)
+        place = float(v[0, column]), factor * float(z[row, 0])
+        box = {"boxstyle": "circle,pad=0.25", "facecolor": PAPER, "edgecolor": colour}
+        look = {"ha": "center", "va": "center", "fontsize": font(8), "fontweight": "bold"}
+        drawn.append(ax.text(*place, str(number + 1), color=INK, bbox=box, zorder=7, **look))
+        names.avoid.append(place)
     return drawn
+
+
+def _depth(inside: NDArray[np.bool_]) -> Floats:
+    """Return how far each point is inside a region, in points of the grid."""
+    return np.asarray(distance_transform_edt(np.pad(inside, 1)))[1:-1, 1:-1]
 
 
 def _clauses(
@@ -283,7 +307,7 @@ def _clauses(
             levels=[0.0],
             colors=[colour],
             linestyles=[dash],
-            linewidths=1.5,
+            linewidths=pt(1.5),
             zorder=4,
         )
         drawn.append(lines)
@@ -306,7 +330,13 @@ def _threshold(ax: Axes, plane: Plane, v: Floats, factor: float, names: LineName
     drawn: Artists = []
     for sign, name in ((1.0, "s(v)"), (-1.0, "−s(v)")):
         drawn += ax.plot(
-            v[0], sign * factor * s, color=LINE_GREY, linewidth=5, alpha=0.45, zorder=3, label=name
+            v[0],
+            sign * factor * s,
+            color=LINE_GREY,
+            linewidth=pt(5),
+            alpha=0.45,
+            zorder=3,
+            label=name,
         )
         curve = np.column_stack([v[0], sign * factor * s])
         names.lines.append(NamedLine(name, TEXT_GREY, (curve,)))
@@ -334,7 +364,7 @@ def _path(
     gaps = np.isnan(times)
     for keep, dash, name in ((times <= now, "-", "before"), (times >= now, DASHED, "after")):
         x, y = points[keep | gaps].T
-        drawn += ax.plot(x, y, color=INK, linestyle=dash, linewidth=1.2, zorder=6, label=name)
+        drawn += ax.plot(x, y, color=INK, linestyle=dash, linewidth=pt(1.2), zorder=6, label=name)
         names.curves.append(points[keep])
     return drawn
 
@@ -435,16 +465,16 @@ def pins(ax: Axes, trace: Trace, element: int, checks: Report, *, row: int = -1)
         point = float(np.clip(v, *ax.get_xlim())), float(np.clip(factor * z, *ax.get_ylim()))
         places.setdefault(point, []).append(str(number))
     for (v, z), numbers in places.items():
-        drawn += ax.plot(v, z, "D", color="white", markeredgecolor=INK, clip_on=False, zorder=10)
+        drawn += ax.plot(v, z, "D", color=PAPER, markeredgecolor=INK, clip_on=False, zorder=10)
         drawn.append(
             ax.annotate(
                 ", ".join(numbers),
                 (v, z),
                 (7, 7),
                 textcoords="offset points",
-                fontsize=8,
+                fontsize=font(8),
                 fontweight="bold",
-                bbox={"boxstyle": "circle,pad=0.25", "facecolor": "white", "edgecolor": INK},
+                bbox={"boxstyle": "circle,pad=0.25", "facecolor": PAPER, "edgecolor": INK},
                 zorder=11,
             )
         )

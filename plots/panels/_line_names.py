@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plots._matplotlib import Artist, Axes, Bbox, IdentityTransform, RendererBase, Text
+from plots.presets import font
+from plots.style import PAPER
 
 __all__ = ["LineNames", "NamedLine"]
 
@@ -78,6 +80,7 @@ class LineNames(Artist):
         self.lines: list[NamedLine] = []
         self.avoid: list[tuple[float, float]] = []
         self.curves: list[Floats] = []
+        self.size = font(8)  # when the names are drawn, another preset may be in use
         self.set_zorder(9)
         self.set_in_layout(False)
         ax.add_artist(self)
@@ -130,11 +133,11 @@ class LineNames(Artist):
         return self.axes
 
     def _text(self, line: NamedLine) -> Text:
-        box = {"boxstyle": f"square,pad={PAD / 10}", "facecolor": "white", "edgecolor": "none"}
+        box = {"boxstyle": f"square,pad={PAD / 10}", "facecolor": PAPER, "edgecolor": "none"}
         text = Text(
             text=line.name,
             color=line.colour,
-            fontsize=8,
+            fontsize=self.size,
             ha="center",
             va="center",
             bbox=box,

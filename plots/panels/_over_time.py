@@ -25,6 +25,7 @@ from plots.panels._shown import (
     scaled,
     shown,
 )
+from plots.presets import pt
 from plots.style import INK, LINE_GREY
 
 NO_VARIABLE = "no deflection:\nthis chart has no variables"
@@ -92,7 +93,7 @@ def force(
     lines = draw_curve(ax, part.t, part.F, color=INK, label="F")
     for i in chosen:
         lines += draw_curve(
-            ax, part.t, part.F_elements[:, i], label=f"$F_{{{i + 1}}}$", **element_look(i)
+            ax, part.t, part.F_elements[:, i], label=f"$F_{{{i + 1}}}$", **element_look(i, trace.n)
         )
     ax.set_ylabel("F [N]")
     time_axis(ax, *checked_window(trace, window))
@@ -105,6 +106,7 @@ def deflections(
     *,
     window: Window | None = None,
     elements: Sequence[int] | None = None,
+    scale: tuple[float, str] | None = None,
 ) -> Artists:
     """Draw z_i(t) of every element, or the chart's first variable if it has another name.
 
@@ -118,6 +120,9 @@ def deflections(
         Time interval to show, s.
     elements : sequence of int, optional
         Which elements, counted from 0; by default all.
+    scale : (float, str), optional
+        Factor and title of the axis, for panels that are compared; by default those that suit the
+        run.
 
     Returns
     -------
@@ -129,12 +134,14 @@ def deflections(
         time_axis(ax, *checked_window(trace, window))
         return [note(ax, NO_VARIABLE)]
     part = shown(trace, window)
-    factor, title = first_variable(trace, part.z[:, chosen])
+    factor, title = first_variable(trace, part.z[:, chosen]) if scale is None else scale
     name = trace.model.chart.variables[0]
     lines: Artists = []
     for i in chosen:
         label = f"$z_{{{i + 1}}}$" if name == "z" else f"{name}{i + 1}"
-        lines += draw_curve(ax, part.t, factor * part.z[:, i], label=label, **element_look(i))
+        lines += draw_curve(
+            ax, part.t, factor * part.z[:, i], label=label, **element_look(i, trace.n)
+        )
     ax.set_ylabel(title)
     time_axis(ax, *checked_window(trace, window))
     return lines
@@ -182,10 +189,12 @@ def ratio(
         factor, title = first_variable(trace, values)
     lines: Artists = []
     for i in chosen:
-        lines += draw_curve(ax, part.t, factor * values[:, i], label=f"E{i + 1}", **element_look(i))
+        lines += draw_curve(
+            ax, part.t, factor * values[:, i], label=f"E{i + 1}", **element_look(i, trace.n)
+        )
     if threshold:
         lines += [
-            ax.axhline(level, color=LINE_GREY, linewidth=0.8, zorder=1) for level in (1.0, -1.0)
+            ax.axhline(level, color=LINE_GREY, linewidth=pt(0.8), zorder=1) for level in (1.0, -1.0)
         ]
     ax.set_ylabel(title)
     time_axis(ax, *checked_window(trace, window))

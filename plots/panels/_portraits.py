@@ -10,14 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.traces.trace import Trace
-from plots._matplotlib import Axes, BoundaryNorm, LineCollection, ListedColormap, colormaps
+from plots._matplotlib import Axes, BoundaryNorm, LineCollection, ListedColormap
 from plots._window import Window
 from plots.panels._axes import VECTOR_ROWS, Artists, draw_curve, log_axis
+from plots.panels._many import place_of
 from plots.panels._shown import checked_elements, scaled, shown
-from plots.style import BLUE, INK, LINE_GREY, VERMILION
+from plots.presets import pt, to_scale
+from plots.style import INK, LINE_GREY, TEXT_GREY, ramp
 
 __all__ = ["arrows", "hysteresis", "portrait", "slip_bar"]
 
+# Phases; the third one may cover itself many times.
+PHASES: tuple[dict[str, Any], ...] = (
+    {"color": INK, "linestyle": "-", "linewidth": 1.6},
+    {"color": TEXT_GREY, "linestyle": "--", "linewidth": 1.6},
+    {"color": LINE_GREY, "linestyle": "-", "linewidth": 0.9},
+)
 MOST_ARROWS = 500  # looked at along one path
 OVERLAP, REPEATED = 0.22, 0.7  # inches between arrows, and between those of the same direction
 SHAFT = 0.05  # inches of the path whose direction an arrow has
@@ -34,20 +42,20 @@ def _by_slipping(
     cuts = np.concatenate([[0], np.flatnonzero(np.diff(away)) + 1, [len(points)]])
     pieces = [points[a : b + 1] for a, b in pairwise(cuts)]
     count = len(chosen)
-    # From light green to dark violet: the more elements slip, the darker, also in grey.
-    shades = ListedColormap(colormaps["viridis_r"](np.linspace(0.18, 1.0, count + 1)))
+    # The more elements slip, the darker, also in grey.
+    shades = ListedColormap(ramp("slipping", count + 1))
     lines = LineCollection(
         pieces,
         cmap=shades,
         norm=BoundaryNorm(np.arange(-0.5, count + 1.0), count + 1),
         array=away[cuts[:-1]],
-        linewidths=1.6,
+        linewidths=pt(1.6),
         capstyle="round",
         rasterized=len(points) > VECTOR_ROWS,
     )
     if not trace.model.chart.transitions:  # one state: nothing to count
         lines.set_array(None)
-        lines.set_color(BLUE)
+        lines.set_color(INK)
     ax.add_collection(lines)
     ax.autoscale_view()
     return lines
@@ -72,12 +80,10 @@ def slip_bar(lines: LineCollection, trace: Trace, axes: Axes | Sequence[Axes]) -
     norm = lines.norm
     assert isinstance(norm, BoundaryNorm)
     most = norm.N - 2
-    ticks = range(0, most + 1, 1 + most // 10)
+    step = 1 + most // 10
+    ticks = [*range(0, most - step // 2, step), most]
     bar = first.figure.colorbar(lines, ax=axes, ticks=ticks, aspect=30, fraction=0.05)
-    default = chart.default_state.name
-    others = [state.name for state in chart.states if state.name != default]
-    place = f"in {others[0]}" if len(others) == 1 else f"not in {default}"
-    bar.set_label(f"elements {place}")
+    bar.set_label(f"elements {place_of(trace)}")
     bar.ax.tick_params(length=0)
     bar.ax.minorticks_off()
 
@@ -136,6 +142,7 @@ def hysteresis(
     window: Window | None = None,
     elements: Sequence[int] | None = None,
     slipping: bool = False,
+    scale: tuple[float, str] | None = None,
 ) -> Artists:
     """Draw F against x, in one colour, in phases, or by the number of elements slipping.
 
@@ -153,6 +160,8 @@ def hysteresis(
         Elements that are counted with `slipping`; by default all.
     slipping : bool
         Colour as in `portrait`, instead of phases.
+    scale : (float, str), optional
+        Factor and unit of x, for panels that are compared; by default those that suit the run.
 
     Returns
     -------
@@ -162,25 +171,21 @@ def hysteresis(
     chosen = checked_elements(trace, elements)
     part = shown(trace, window)
     x = part.x - trace.x[0]
-    factor, unit = scaled(x, "m")
+    factor, unit = scaled(x, "m") if scale is None else scale
     ax.set(xlabel=f"x [{unit}]", ylabel="F [N]")
     if slipping:
         return [_by_slipping(ax, factor * x, part, chosen)]
-    looks = ((BLUE, "-"), (VERMILION, "-"), (LINE_GREY, "-"))
     begin = -np.inf
     lines: Artists = []
     for number, (name, end) in enumerate(phases or [("", np.inf)]):
         now = (part.t >= begin) & (part.t <= end)
-        colour, dash = looks[number % len(looks)]
         lines += draw_curve(
             ax,
             factor * x[now],
             part.F[now],
-            color=colour,
-            linestyle=dash,
             label=name,
             zorder=3 - number % 3,
-            linewidth=1.6 if number < 2 else 0.9,
+            **to_scale(PHASES[number % len(PHASES)]),
         )
         begin = end
     return lines
@@ -217,7 +222,7 @@ def arrows(ax: Axes, lines: LineCollection, *, apart: float = 1.1) -> Artists:
         return []
     apart = max(apart, length[-1] / MOST_ARROWS)
     look: dict[str, Any] = {"arrowstyle": "-|>,head_length=0.5,head_width=0.25"}
-    look |= {"color": INK, "linewidth": 0.0, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 11}
+    look |= {"color": INK, "linewidth": pt(0.0), "shrinkA": 0, "shrinkB": 0, "mutation_scale": 11}
     drawn: Artists = []
     known: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []  # tips, directions; inches
     for end in np.arange(apart / 2, length[-1], apart).tolist():

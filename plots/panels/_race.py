@@ -13,6 +13,7 @@ from plots._labels import FALSE, TRUE
 from plots._matplotlib import Axes, Rectangle
 from plots.panels._axes import Artists, note
 from plots.panels._shown import checked_row, one_element, scaled
+from plots.presets import font, pt
 from plots.style import EDGE_COLOURS, EDGE_HATCHES, INK, LINE_GREY, PAPER, TEXT_GREY
 
 __all__ = ["race"]
@@ -96,7 +97,7 @@ def race(ax: Axes, trace: Trace, element: int, *, row: int = -1) -> Artists:
         drawn += _lane(ax, each, number, y)
         # The zero of the bars, not through the name of the edge.
         ends = [y + 0.5, y + len(each.clauses) + 0.4]
-        ax.plot([0, 0], ends, color=LINE_GREY, linewidth=0.8, zorder=1)
+        ax.plot([0, 0], ends, color=LINE_GREY, linewidth=pt(0.8), zorder=1)
         y += 1.0 + len(each.clauses) + GAP
     ax.set(xlim=(-1.04, 1.04), ylim=(y - 0.75, -0.6), yticks=[])
     ax.set_xticks([-1, -0.5, 0, 0.5, 1], ["−1", "−0.5", "0", "0.5", "1"])
@@ -121,7 +122,7 @@ def _lane(ax: Axes, each: Explanation, number: int, y: float) -> Artists:
     name = f"{each.priority}  {each.edge.name} → {each.edge.target}"
     verdict = _verdict(each)
     size = 9.0 if len(name) + len(verdict) < LONGEST else 9.0 * LONGEST / (len(name) + len(verdict))
-    look: Any = {"va": "center", "fontsize": size}
+    look: Any = {"va": "center", "fontsize": font(size)}
     drawn.append(ax.text(-0.82, y, name, color=INK, **look))
     drawn.append(ax.text(1.03, y, verdict, ha="right", color=colour, **look))
     back = held_back_by(each)
@@ -143,7 +144,7 @@ def _clause(ax: Axes, clause: Clause, colour: str, y: float, *, bold: bool) -> A
     """Draw one clause: its text and numbers above its bar."""
     weight = "bold" if bold else "normal"
     mark = TRUE if clause.holds else FALSE
-    look: Any = {"fontsize": 8, "va": "center", "fontweight": weight}
+    look: Any = {"fontsize": font(8), "va": "center", "fontweight": weight}
     drawn: Artists = [
         ax.text(-1.03, y - 0.22, f"{mark}  {clause.text}", color=INK, **look),
         ax.text(
@@ -161,7 +162,7 @@ def _clause(ax: Axes, clause: Clause, colour: str, y: float, *, bold: bool) -> A
         0.3,
         facecolor=colour if clause.holds else PAPER,
         edgecolor=colour,
-        linewidth=1.8 if bold else 1.0,
+        linewidth=pt(1.8 if bold else 1.0),
         zorder=2,
     )
     drawn.append(ax.add_patch(bar))

@@ -9,11 +9,14 @@ import numpy as np
 from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Axes, RendererBase, Text
 from plots._window import Window
-from plots.panels._axes import VECTOR_ROWS, Artists, time_axis
+from plots.panels._axes import MANY, VECTOR_ROWS, Artists, lanes, time_axis
 from plots.panels._shown import checked_elements, checked_window
-from plots.style import HATCHES, INK, STATE_EDGES, STATE_FILLS
+from plots.presets import font, pt, to_scale
+from plots.style import INK, PAPER, state_look
 
 __all__ = ["ribbons"]
+
+LANE = 0.8  # height of a ribbon, in rows
 
 
 class _SpanName(Text):
@@ -29,11 +32,11 @@ class _SpanName(Text):
             name,
             ha="center",
             va="center",
-            fontsize=7.5,
+            fontsize=font(7.5),
             color=INK,
             bbox={
                 "boxstyle": "round,pad=0.12",
-                "facecolor": "white",
+                "facecolor": PAPER,
                 "edgecolor": "none",
                 "alpha": 0.85,
             },
@@ -44,10 +47,15 @@ class _SpanName(Text):
         self.set_clip_on(True)
 
     def fits(self, renderer: RendererBase) -> bool:
-        """Return whether the name is narrower than its span."""
+        """Return whether the name is smaller than its span."""
         assert self.axes is not None
-        pixels = self.axes.transData.transform([(t, 0.0) for t in self.span])[:, 0]
-        return bool(self.get_window_extent(renderer).width + 4 < pixels[1] - pixels[0])
+        row = self.get_position()[1]
+        corners = [
+            (t, row + half) for t, half in zip(self.span, (LANE / 2, -LANE / 2), strict=True)
+        ]
+        (left, low), (right, high) = self.axes.transData.transform(corners)
+        extent = self.get_window_extent(renderer)
+        return bool(extent.width + 4 < right - left and extent.height < high - low)
 
     def draw(self, renderer: RendererBase) -> None:
         """Draw the name if it fits."""
@@ -103,12 +111,16 @@ def ribbons(
     Returns
     -------
     list of Artist
-        One collection per state and element; then the names, each drawn only if it fits; then a
-        band for each interval in which a sign is held, for example on v = 0.
+        One collection per state and element; then the names, each drawn only if it fits, and none
+        of more than six elements; then a band for each interval in which a sign is held, for
+        example on v = 0.
     """
     chosen = checked_elements(trace, elements)
     begin, end = checked_window(trace, window)
     states = [state.name for state in trace.model.chart.states]
+    # Between many narrow rows there is no room for thicker outlines.
+    look = to_scale if len(chosen) <= MANY else dict
+    looks = [look(state_look(number)) for number in range(len(states))]
     drawn: Artists = []
     names: Artists = []
     for row, i in enumerate(chosen):
@@ -118,24 +130,18 @@ def ribbons(
             drawn.append(
                 ax.broken_barh(
                     mine,
-                    (row + 0.6, 0.8),
-                    facecolor=STATE_FILLS[number % len(STATE_FILLS)],
-                    edgecolor=STATE_EDGES[number % len(STATE_EDGES)],
-                    hatch=HATCHES[number % len(HATCHES)],
-                    linewidth=0.6,
+                    (row + 1.0 - LANE / 2, LANE),
                     label=state if row == 0 else None,
                     rasterized=len(mine) > VECTOR_ROWS // 20,
+                    **looks[number],
                 )
             )
-        # A name never fits into less than one hundredth of the axis.
-        wide = [span for span in found if span[2] - span[1] > 0.01 * (end - begin)]
+        # A name never fits into less than one hundredth of the axis. In many narrow rows names
+        # would hide what they name: fill and hatch say it.
+        few = len(chosen) <= MANY
+        wide = [span for span in found if few and span[2] - span[1] > 0.01 * (end - begin)]
         names += [_SpanName(ax, a, b, row + 1.0, name) for name, a, b in wide]
-    ax.set(
-        ylim=(len(chosen) + 0.5, 0.5),
-        yticks=range(1, len(chosen) + 1),
-        yticklabels=[f"E{i + 1}" for i in chosen],
-    )
-    ax.tick_params(axis="y", length=0)
+    lanes(ax, chosen)
     time_axis(ax, begin, end)
     return [*drawn, *names, *_held_bands(ax, trace, (begin, end))]
 
@@ -153,9 +159,9 @@ def _held_bands(ax: Axes, trace: Trace, window: Window) -> Artists:
                     begin,
                     end,
                     facecolor="none",
-                    edgecolor="black",
+                    edgecolor=INK,
                     hatch="xxx",
-                    linewidth=0.8,
+                    linewidth=pt(0.8),
                     zorder=3,
                     label=text,
                 )

@@ -14,7 +14,8 @@ from plots._matplotlib import Axes
 from plots._window import Window
 from plots.panels._axes import Artists, draw_curve
 from plots.panels._shown import scaled, shown
-from plots.style import INK, STATE_FILLS, VERMILION
+from plots.presets import pt
+from plots.style import INK, PALE_GREY, PAPER
 
 __all__ = ["stribeck"]
 
@@ -75,8 +76,8 @@ def stribeck(
         factor * speeds[steady],
         np.abs(part.F[steady]),
         "s",
-        markersize=5,
-        color=STATE_FILLS[0],
+        markersize=pt(5),
+        color=PALE_GREY,
         markeredgewidth=0,
         label="run, steady sliding",
         rasterized=True,
@@ -87,9 +88,9 @@ def stribeck(
             factor * points[0],
             points[1],
             "o",
-            markersize=4.5,
-            color=VERMILION,
-            markerfacecolor="white",
+            markersize=pt(4.5),
+            color=INK,
+            markerfacecolor=PAPER,
             label="measured",
             zorder=4,
         )

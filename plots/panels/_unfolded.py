@@ -19,7 +19,8 @@ from plots._matplotlib import Axes, Rectangle
 from plots._window import Window
 from plots.panels._axes import Artists
 from plots.panels._shown import checked_elements, checked_window, is_number, scaled
-from plots.style import HATCHES, INK, LINE_GREY, STATE_EDGES, STATE_FILLS, TEXT_GREY
+from plots.presets import font, inches, pt, to_scale
+from plots.style import INK, LINE_GREY, PAPER, TEXT_GREY, state_look
 
 __all__ = ["Unfolded", "unfolded", "unfolded_force", "unfolded_states"]
 
@@ -29,6 +30,7 @@ TURNS = 10  # of a zigzag, per inch
 FEW = 8  # elements; of more, only new states are named
 LETTER = 0.075  # inches: width of a letter of 8 points
 LINE = 0.15  # inches: height of a line of 8 points
+BOLD = 1.1  # width of a bold letter of 8.5 points, of that of 8 points
 
 
 @dataclass(frozen=True)
@@ -232,7 +234,7 @@ def unfolded_force(ax: Axes, part: Unfolded) -> Artists:
         own = part.of(instant)
         x = np.repeat([own[0].left, *(each.left + 1.0 for each in own)], 2)[1:-1]
         y = np.repeat([factor * each.F for each in own], 2)
-        drawn += ax.plot(x, y, color=INK, linewidth=1.8, solid_joinstyle="miter", zorder=3)
+        drawn += ax.plot(x, y, color=INK, linewidth=pt(1.8), solid_joinstyle="miter", zorder=3)
     for instant in range(1, part.times.size):
         before, after = part.of(instant - 1)[-1], part.of(instant)[0]
         drawn += ax.plot(
@@ -249,12 +251,12 @@ def unfolded_force(ax: Axes, part: Unfolded) -> Artists:
             ax.annotate(
                 text,
                 (each.left + 0.5, factor * each.F),
-                (0, 4),
+                (0, pt(4)),
                 textcoords="offset points",
                 ha="center",
                 va="bottom",
                 rotation=90 if upright else 0,
-                fontsize=8,
+                fontsize=font(8),
                 color=INK,
             )
         )
@@ -299,7 +301,7 @@ def unfolded_states(ax: Axes, part: Unfolded) -> Artists:
     """
     chart, count = part.trace.model.chart, len(part.elements)
     wide = column_width(ax.get_window_extent().width / ax.figure.dpi, part)
-    tall = ax.get_window_extent().height / ax.figure.dpi / count
+    tall = ax.get_window_extent().height / inches(ax.figure.dpi) / count
     cells: Artists = []
     drawn: Artists = []
     firsts = [part.of(instant)[0] for instant in range(part.times.size)]
@@ -309,16 +311,16 @@ def unfolded_states(ax: Axes, part: Unfolded) -> Artists:
             cells.append(ax.add_patch(_cell(each.left, row, mode)))
             told = count <= FEW or each in firsts or part.elements[row] == each.element
             if told and LETTER * len(name) + 0.05 < wide and tall > 0.16:
-                plain = {"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85}
+                plain = {"facecolor": PAPER, "edgecolor": "none", "pad": 0.8, "alpha": 0.85}
                 place = (each.left + 0.5, row + 1.0)
                 drawn.append(
-                    ax.text(*place, name, ha="center", va="center", fontsize=7.5, bbox=plain)
+                    ax.text(*place, name, ha="center", va="center", fontsize=font(7.5), bbox=plain)
                 )
     for each in part.columns:
         if each.element >= 0:
             row = part.elements.index(each.element)
             frame = Rectangle((each.left + 0.03, row + 0.55), 0.94, 0.9, fill=False, edgecolor=INK)
-            frame.set(linewidth=2.4, zorder=5)
+            frame.set(linewidth=pt(2.4), zorder=5)
             drawn.append(ax.add_patch(frame))
     drawn += _edge_names(ax, part, wide)
     ax.set(
@@ -330,28 +332,22 @@ def unfolded_states(ax: Axes, part: Unfolded) -> Artists:
     ax.set_xticks([each.left + 0.5 for each in part.columns], [str(c.step) for c in part.columns])
     ax.tick_params(length=0)
     ax.spines[:].set_visible(False)
+    texts, upright, high = time_texts(part, wide)
+    lower = 72 * high - 13 if upright else 0  # points: the times need more than a line
     ax.set_xlabel(
         "micro-step at each instant (0: before the first firing); time",
-        labelpad=20 if part.times.size == 1 else 33,
+        labelpad=inches(33 + lower if texts else 20),
     )
-    return [*cells, *drawn, *_times(ax, part), *_breaks(ax, part)]
+    return [*cells, *drawn, *_times(ax, part, texts, upright, lower), *_breaks(ax, part)]
 
 
 def _cell(left: float, row: int, mode: int) -> Rectangle:
-    return Rectangle(
-        (left, row + 0.58),
-        1.0,
-        0.84,
-        facecolor=STATE_FILLS[mode % len(STATE_FILLS)],
-        edgecolor=STATE_EDGES[mode % len(STATE_EDGES)],
-        hatch=HATCHES[mode % len(HATCHES)],
-        linewidth=0.6,
-    )
+    return Rectangle((left, row + 0.58), 1.0, 0.84, **to_scale(state_look(mode)))
 
 
 def column_width(wide: float, part: Unfolded) -> float:
-    """Return the width of a column in axes of a width."""
-    return wide / (part.width + 0.2)
+    """Return the width of a column in axes of a width, in inches of the screen."""
+    return wide / inches(part.width + 0.2)
 
 
 def edge_texts(part: Unfolded, wide: float) -> tuple[dict[str, str], bool, float]:
@@ -362,7 +358,7 @@ def edge_texts(part: Unfolded, wide: float) -> tuple[dict[str, str], bool, float
     part : Unfolded
         From `unfolded`.
     wide : float
-        Width of a column, inches.
+        Width of a column, inches of the screen.
 
     Returns
     -------
@@ -390,13 +386,13 @@ def _edge_names(ax: Axes, part: Unfolded, wide: float) -> Artists:
         ax.annotate(
             texts.get(each.edge, "others"),
             (each.left + 0.5, 1.0),
-            (0, 3),
+            (0, pt(3)),
             xycoords=ax.get_xaxis_transform(),
             textcoords="offset points",
             ha="center",
             va="bottom",
             rotation=90 if upright else 0,
-            fontsize=8,
+            fontsize=font(8),
             linespacing=1.15,
             color=INK if each.edge else TEXT_GREY,
             annotation_clip=False,
@@ -406,25 +402,55 @@ def _edge_names(ax: Axes, part: Unfolded, wide: float) -> Artists:
     ]
 
 
-def _times(ax: Axes, part: Unfolded) -> Artists:
-    """Write the time of the first instant, and the time between instants."""
-    places, texts = list(part.gaps), []
+def time_texts(part: Unfolded, wide: float) -> tuple[list[str], bool, float]:
+    """Return how the times between instants are written below columns of a width.
+
+    Parameters
+    ----------
+    part : Unfolded
+        From `unfolded`.
+    wide : float
+        Width of a column, inches of the screen.
+
+    Returns
+    -------
+    texts : list of str
+        One for each gap.
+    upright : bool
+        Whether they are rotated, because they would meet.
+    tall : float
+        Height of the highest one, inches.
+    """
+    texts = []
     for step in np.diff(part.times).tolist():
         factor, unit = scaled(np.array([step]), "s") if step >= 1e-10 else (1.0, "s")
         texts.append(f"+{factor * step:.4g} {unit}")
+    longest = BOLD * LETTER * max(map(len, texts), default=0)
+    upright = len(texts) > 1 and longest + 0.06 > wide * float(np.diff(part.gaps).min())
+    return texts, upright, longest if upright else LINE
+
+
+def _times(ax: Axes, part: Unfolded, texts: Sequence[str], upright: bool, lower: float) -> Artists:
+    """Write the time of the first instant, and the time between instants."""
     look: dict[str, Any] = {
         "xycoords": ax.get_xaxis_transform(),
         "textcoords": "offset points",
         "va": "top",
-        "fontsize": 8.5,
+        "fontsize": font(8.5),
         "fontweight": "bold",
         "annotation_clip": False,
     }
     # The first time is too long to stand between the others.
-    low = -31 if texts else -18
-    first = ax.annotate(f"t = {part.times[0]:.9g} s", (0.0, 0.0), (0, low), ha="left", **look)
-    between = zip(places, texts, strict=True)
-    return [first, *(ax.annotate(u, (x, 0.0), (0, -18), ha="center", **look) for x, u in between)]
+    low = -31 - lower if texts else -18
+    first = ax.annotate(
+        f"t = {part.times[0]:.9g} s", (0.0, 0.0), (0, inches(low)), ha="left", **look
+    )
+    look |= {"ha": "center", "rotation": 90 if upright else 0}
+    between = zip(part.gaps, texts, strict=True)
+    return [
+        first,
+        *(ax.annotate(text, (x, 0.0), (0, inches(-18)), **look) for x, text in between),
+    ]
 
 
 def _breaks(ax: Axes, part: Unfolded) -> Artists:
@@ -439,7 +465,7 @@ def _breaks(ax: Axes, part: Unfolded) -> Artists:
             heights,
             transform=ax.get_xaxis_transform(),
             color=LINE_GREY,
-            linewidth=0.8,
+            linewidth=pt(0.8),
             zorder=1,
         )
     return drawn

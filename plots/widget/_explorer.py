@@ -33,12 +33,37 @@ from gms_fsm.systems.system import System
 from gms_fsm.traces.trace import Trace
 from plots.page._chart import chart_svg
 from plots.replay import page_data, page_html
+from plots.style import Theme, colour
 
 __all__ = ["Explorer"]
 
 HERE = Path(__file__).parent
 WIDE = 100.0  # a positive range with such a ratio of its ends has a logarithmic slider
 TIMER = "age"  # a variable that is not poked
+# Names of the style sheet, and the roles of their colours.
+COLOURS = {
+    "ink": "ink",
+    "soft": "soft",
+    "paper": "paper",
+    "panel": "panel",
+    "line": "line",
+    "chosen": "chosen",
+    "now": "now",
+}
+
+
+def _style() -> str:
+    """Return the style sheet, with the colours of both themes as variables."""
+    themes: list[Theme] = ["light", "dark"]
+    light, dark = (
+        "".join(f"--gms-{name}:{colour(role, theme)};" for name, role in COLOURS.items())
+        for theme in themes
+    )
+    return (
+        f".gms-explore{{{light}}}\n"
+        f"@media(prefers-color-scheme:dark){{.gms-explore{{{dark}}}}}\n"
+        + (HERE / "widget.css").read_text(encoding="utf-8")
+    )
 
 
 class Explorer(anywidget.AnyWidget):
@@ -49,7 +74,7 @@ class Explorer(anywidget.AnyWidget):
     """
 
     _esm = HERE / "widget.js"
-    _css = HERE / "widget.css"
+    _css = _style()
     page = traitlets.Unicode().tag(sync=True)
     runs = traitlets.Dict().tag(sync=True)
     charts: traitlets.List[str] = traitlets.List().tag(sync=True)

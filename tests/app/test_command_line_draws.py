@@ -12,6 +12,7 @@ from tests.helpers import stick_slip
 from tests.scenario_files import Answer, CommandLine
 
 pytestmark = pytest.mark.slow
+SERVO = Path(__file__).parents[2] / "scenarios" / "servo.toml"
 
 pytest.importorskip("matplotlib", reason="figures and films need the extra 'plots'")
 pytest.importorskip("pygraphviz", reason="charts need Graphviz, extra 'render'")
@@ -48,6 +49,12 @@ def test_chart_and_blocks(draw: CommandLine, files: Path) -> None:
     said(draw("blocks", "--elements", "3", "-o", "blocks.svg"))
     blocks = ElementTree.parse(files / "blocks.svg")
     assert sum("integrator" in node.get("class", "").split() for node in blocks.iter()) == 3
+    said(draw("blocks", str(SERVO), "-o", "servo.svg"))
+    texts = [each.text for each in ElementTree.parse(files / "servo.svg").iter()]
+    assert {"pid", "motor", "bearing"} <= set(texts)
+    said(draw("blocks", str(SERVO), "--schematic", "-o", "servo.svg"))
+    ids = {node.get("id", "") for node in ElementTree.parse(files / "servo.svg").iter()}
+    assert {"body motor", "contact bearing", "spring k_s", "damper d_s", "force motor"} <= ids
     said(draw("chart", "lugre", "-o", "lugre.mmd"))
     assert "stateDiagram-v2" in (files / "lugre.mmd").read_text()
     look = ("--notation", "math", "--theme", "dark", "--direction", "LR")
@@ -81,9 +88,11 @@ def test_plot_animate_and_replay(draw: CommandLine, files: Path) -> None:
         (["chart", "gms", "--law", "signed", "-o", "c.jpg"], ".svg, .png, .pdf"),
         (["chart", "gms", "--law", "signed", "--elements", "0"], "elements is 0"),
         (["blocks", "--elements", "-1"], "elements is -1"),
+        (["blocks", "--schematic"], "no system is given"),
+        (["blocks", str(SERVO), "--schematic", "-o", "s.dot"], ".png, .svg, .pdf or .pgf"),
         (["plot", "bad.npz"], "damaged or incomplete"),
         (["plot", "none.npz"], "no such file"),
-        (["animate", "t.npz", "-o", "film.mp4"], ".gif"),
+        (["animate", "t.npz", "-o", "film.avi"], ".gif, .mp4 or .webm"),
         (["animate", "bad.npz"], "damaged or incomplete"),
         (["replay", "bad.npz"], "damaged or incomplete"),
         (["replay", "t.npz", "bad.npz"], "damaged or incomplete"),

@@ -143,7 +143,7 @@ def test_figure_4_has_the_panels_of_the_paper(folder: Path) -> None:
     for name, letters in (("fig3", "abcd"), ("fig4", "abcdef")):
         text = (folder / f"{name}.svg").read_text()
         for letter in letters:
-            assert f"<!-- {letter}) " in text, (name, letter)
+            assert f"<!-- {letter} -->" in text, (name, letter)
 
 
 def test_traces_and_logs_are_there_and_agree(folder: Path) -> None:

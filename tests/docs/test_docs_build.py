@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import subprocess
-import sys
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -14,7 +11,7 @@ from urllib.parse import unquote, urldefrag
 import pytest
 
 from gms_fsm.app.lessons import LESSONS
-from tests.helpers import ROOT
+from tests.docs.conftest import Built
 
 pytestmark = pytest.mark.slow
 
@@ -70,29 +67,10 @@ def outside(address: str) -> bool:
     return re.match(r"(?:[a-z]+:)?//", address) is not None
 
 
-def test_the_strict_build_passes_and_pages_load_nothing_external(tmp_path: Path) -> None:
-    site = tmp_path / "site"
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "sphinx",
-            "--quiet",
-            "--fail-on-warning",
-            "--keep-going",
-            "-d",
-            str(tmp_path / "doctrees"),
-            "docs",
-            str(site),
-        ],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, "PYTHONWARNINGS": "default"},
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "WARNING" not in done.stderr
+def test_the_strict_build_passes_and_pages_load_nothing_external(built: Built) -> None:
+    assert built.code == 0, built.said
+    assert "WARNING" not in built.said
+    site = built.site
     pages = {path: Links(path.read_text(encoding="utf-8")) for path in site.rglob("*.html")}
     assert len(pages) > 45
     for number in LESSONS:

@@ -43,10 +43,9 @@ ALLOWED = {
     },
     "gms_fsm/app/records.py": {"kept[:first]"},  # rows of a measured record
     "gms_fsm/lowering/_pulses.py": {"rests[first:last]"},  # samples of a signal
-    "plots/schematic.py": {  # lengths on paper
+    "plots/_elements.py": {  # lengths on paper
         "ROW * n + 0.15",
         "ROW * n + 0.3",
-        "0.4 + 0.82 * (ROW * n + 0.3)",
         "0.5 * ROW * n + 0.3",
         "0.5 * ROW * n - 0.3",
         "ROW * n - 0.1",

@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
-from gms_fsm import simulate
+import numpy as np
+
+from gms_fsm import (
+    GMS,
+    GMSParameters,
+    Prescribed,
+    PulledSlider,
+    Slider,
+    Stribeck,
+    simulate,
+)
+from gms_fsm.app.scenario import load_scenario, load_system
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.charts.parameters import Parameter
-from gms_fsm.systems.system import Body, Contact, Sampled, System
+from gms_fsm.systems.system import Body, Contact, Sampled, System, system_of
 from gms_fsm.traces.trace import Trace
 
 STICTION, END_STOP = CHARTS["stiction"], CHARTS["end-stop"]
@@ -43,6 +55,19 @@ SHARED = Chart(
     contact_outputs={"F": "F + b * v"},
 )
 DRY = {"F_c": 1.0, "F_s": 1.5, "b": 0.0}
+
+GMS12 = GMS(  # more elements than are drawn one by one
+    GMSParameters(
+        np.linspace(0.5, 1.5, 12),
+        np.full(12, 0.1),
+        np.full(12, 1.0),
+        sigma_2=0.4,
+        stribeck=Stribeck(1.0, 1.5, 0.1),
+        v_c=1e-6,
+        weights=np.linspace(0.05, 0.2, 12),
+    ),
+    law="signed",
+)
 
 PULLED = System(
     "pulled mass",
@@ -90,6 +115,56 @@ SERVO = System(
     ),
     numbers={"J_m": 1e-3, "J_l": 5e-3, "k_t": 1.0, "k_p": 2.0, "k_i": 1.0, "tau": 2e-3},
 )
+
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+
+NUMBERS = dict.fromkeys(("m", "k", "k_c", "k_l", "P", "w", "d", "J", "r", "k_f"), 1.0)
+TRAIN = System(
+    "a train of four",
+    bodies=(
+        Body(
+            "one",
+            inertia="m",
+            force="-k * x_1 + k_c * (x_2 - x_1) + k_l * (x_4 - x_1) + P * sin(w * t)",
+            x="x_1",
+            v="v_1",
+        ),
+        Body("two", inertia="m", force="k_c*x_1 - k_c*x_2 + 0.5*d*(v_3 - v_2)", x="x_2", v="v_2"),
+        Body("three", inertia="m + J/r**2", force="0.5*d*(v_2 - v_3) - k*x_3", x="x_3", v="v_3"),
+        Body("four", inertia="m", force="k_l*(x_1 - x_4) - k_f*x_1", x="x_4", v="v_4"),
+    ),
+    contacts=(
+        Contact("slip", STICTION, DRY, v="v_2 - v_3"),
+        Contact("dog", CHARTS["dog-clutch"], {"t_on": 1.0, "t_off": 2.0}, v="v_3 - v_4"),
+        Contact("pads", STICTION, DRY, v="v_1"),
+        Contact("differential", STICTION, DRY, v="v_1 + v_2 - v_4"),
+    ),
+    numbers=NUMBERS,
+)
+PLANE = System(
+    "a puck",
+    bodies=(Body("east", inertia=1.0), Body("north", inertia=1.0, x="y", v="w")),
+    contacts=(Contact("floor", PLANAR, dict.fromkeys(PLANAR.parameter_names, 1.0), v=("v", "w")),),
+)
+RIGS = (Prescribed("0.1*sin(t)"), Slider(1.0, "0.3*t"), PulledSlider(1.0, 2.0, 0.1))
+
+
+@cache
+def systems() -> dict[str, System]:
+    """Return the scenarios without a measured record, the rigs, and the systems of the tests."""
+    found = {each.name: each for each in (PULLED, BALL, SERVO, TRAIN, PLANE)}
+    found |= {rig.title: system_of(GMS12, rig) for rig in RIGS}
+    for path in sorted(SCENARIOS.glob("*.toml")):
+        text = path.read_text(encoding="utf-8")
+        if "[record]" in text:
+            continue
+        if "[model]" in text and "[[body]]" not in text:
+            loaded = load_scenario(path)
+            found[path.stem] = system_of(loaded.model, loaded.rig)
+        else:
+            found[path.stem] = load_system(path)
+    return found
 
 
 @cache

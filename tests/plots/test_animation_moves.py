@@ -1,4 +1,4 @@
-"""An animation has the requested number of frames, each with the chart and cursor of its row.
+"""A film has the requested number of frames, each with the chart and cursor of its row.
 
 The chart is laid out once, whatever the number of frames, and drawn again only where it changes.
 """
@@ -23,6 +23,7 @@ from gms_fsm.errors import OutputError, ParameterError
 from plots.animation import animate
 from plots.style import CHART_THEMES
 from tests.helpers import one_element, open_loop, stick_slip
+from tests.plots.films import count, frames_of
 
 pytestmark = pytest.mark.slow
 
@@ -43,20 +44,6 @@ def one() -> Trace:
     return simulate(one_element("signed"), open_loop(), 45.0)
 
 
-def frames(path: Path) -> list[Image.Image]:
-    with Image.open(path) as film:
-        found = []
-        for k in range(film.n_frames):  # type: ignore[attr-defined]
-            film.seek(k)
-            found.append(film.convert("RGB"))
-        return found
-
-
-def count(picture: Image.Image, colour: str) -> int:
-    wanted = tuple(round(255 * part) for part in to_rgb(colour))
-    return sum(n for n, found in picture.getcolors(1 << 24) or [] if found == wanted)
-
-
 @pytest.mark.parametrize("theme", CHART_THEMES)
 def test_frames(theme: str, tmp_path: Path) -> None:
     path = animate(bank(), tmp_path / "run.gif", frames=6, fps=10, theme=theme, notation="math")
@@ -66,14 +53,14 @@ def test_frames(theme: str, tmp_path: Path) -> None:
         assert film.n_frames == 6  # type: ignore[attr-defined]
         assert film.info["duration"] == 100
         assert film.info["loop"] == 0
-    pictures = frames(path)
+    pictures = frames_of(path)
     assert {picture.size for picture in pictures} == {pictures[0].size}
     assert min(pictures[0].size) > 300
     assert len({picture.tobytes() for picture in pictures}) == 6
     colours = CHART_THEMES[theme]
     assert pictures[0].getpixel((3, 3)) == tuple(round(255 * c) for c in to_rgb(colours.paper))
     for picture in pictures:
-        assert count(picture, colours.active) > 500  # four borders
+        assert count(picture, colours.active) > 500
         assert count(picture, colours.fired) > 50  # the cursor
 
 
@@ -81,7 +68,7 @@ def test_the_active_state_moves_with_the_run(tmp_path: Path) -> None:
     trace, colours = one(), CHART_THEMES["light"]
     first = float(trace.transitions.t[0])
     path = animate(trace, tmp_path / "one.gif", frames=2, t_start=first - 0.5, t_end=first + 0.5)
-    before, after = frames(path)
+    before, after = frames_of(path)
 
     def centre(picture: Image.Image) -> float:
         """Return the height of the border of the active state."""
@@ -123,7 +110,10 @@ def test_one_layout_serves_all_frames(tmp_path: Path, monkeypatch: pytest.Monkey
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"path": "run.mp4"}, r"path is 'run\.mp4'; it must end in \.gif"),
+        ({"path": "run.avi"}, r"path is 'run\.avi'; it must end in \.gif, \.mp4 or \.webm"),
+        ({"seconds": 0.05}, r"seconds is 0\.05; it must be a time of at least two frames, 0\.1 s"),
+        ({"seconds": float("nan")}, "seconds is nan"),
+        ({"seconds": 3.0, "frames": 60}, r"frames is 60 and seconds is 3\.0; give only one"),
         ({"frames": 1}, "frames is 1; it must be an integer of at least 2"),
         ({"frames": 2.5}, r"frames is 2\.5"),
         ({"frames": True}, "frames is True"),

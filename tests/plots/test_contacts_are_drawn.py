@@ -17,7 +17,7 @@ from tests.plots.systems_to_draw import BALL, BLOCKS, END_STOP, PULLED, STICTION
 
 pytest.importorskip("matplotlib", reason="figures need the extra 'plots'")
 
-from plots import figures, panels, schematic  # after the skip
+from plots import _elements, figures, panels  # after the skip
 from plots._matplotlib import Axes, Figure
 
 FIGURES = ("overview", "ribbons_figure", "cascade_figure", "phase")
@@ -25,7 +25,7 @@ LAGS = {"lag_between_ticks", "lag_over_period", "lag_over_time"}
 OTHERS = {"cascade_window", "difference", "has_threshold", "residual", "shown", "slip_bar", *LAGS}
 OF_AN_ELEMENT = {"landscape", "pins", "race"}
 UNFOLDED = {"Unfolded", "unfolded", "unfolded_force", "unfolded_states"}
-OTHERS |= {"arrows", "stribeck", *OF_AN_ELEMENT, *UNFOLDED}
+OTHERS |= {"arrows", "lettered", "stribeck", *OF_AN_ELEMENT, *UNFOLDED}
 PANELS = tuple(sorted({*panels.__all__} - OTHERS))
 
 
@@ -78,7 +78,7 @@ def test_a_chart_without_variables_has_no_deflection(name: str, ax: Axes) -> Non
 
 def test_a_chart_without_variables_has_no_schematic(ax: Axes) -> None:
     with pytest.raises(ParameterError, match=r"this chart has no variables; draw the chart with"):
-        schematic.schematic(ax, run(PULLED))
+        _elements.elements_at(ax, run(PULLED))
 
 
 def test_the_picture_of_a_run_counts_bounces() -> None:

@@ -36,7 +36,7 @@ def test_each_source_has_its_own_line() -> None:
     for state, priority in (("low", 2), ("high", 1)):
         guard = f'"element1-guard-stop-from-{state}"'
         assert f'"element1-state-{state}" -> {guard}' in source
-        assert f'{guard}:s -> "element1-state-off"' in source
+        assert f'{guard} -> "element1-state-off"' in source
         (drawn,) = (line for line in source.splitlines() if line.strip().startswith(f"{guard} ["))
         assert f"<B>{priority}</B>" in drawn
     assert "element1-guard-up-from" not in source

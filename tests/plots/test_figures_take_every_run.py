@@ -18,7 +18,7 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from plots import figures, panels
-from plots.schematic import schematic_figure
+from plots.mechanism import schematic_figure
 from tests.helpers import FIG4_SINE, ROOT, non_drifting, open_loop, pulled_mass, stick_slip
 
 pytestmark = pytest.mark.slow
@@ -101,7 +101,7 @@ def test_ribbons_figure_has_the_columns_of_the_run(runs: dict[str, Trace]) -> No
         return [ax.get_title(loc="left") for ax in figure.axes if ax.get_title(loc="left")]
 
     assert len(titles(runs["Fig. 4, signed"])) == 10
-    assert "f) margin to the threshold" in titles(runs["Fig. 4, signed"])
+    assert "margin to the threshold" in titles(runs["Fig. 4, signed"])
     assert len(titles(runs["LuGre"])) == 6
     assert len(titles(runs["LuGre"], around=2.0)) == 10
 
@@ -109,13 +109,13 @@ def test_ribbons_figure_has_the_columns_of_the_run(runs: dict[str, Trace]) -> No
 def test_window_and_elements_reach_every_panel(runs: dict[str, Trace]) -> None:
     run = runs["Fig. 4, published"]
     figure = figures.ribbons_figure(run, 20.14, window=(10.0, 30.0), elements=[0, 3])
-    axes = {ax.get_title(loc="left")[:2]: ax for ax in figure.axes}
+    axes = {ax.get_title(): ax for ax in figure.axes}
     for letter in "abcd":
-        assert axes[f"{letter})"].get_xlim() == (10.0, 30.0)
+        assert axes[letter].get_xlim() == (10.0, 30.0)
     for letter in "dh":
-        names = [label.get_text() for label in axes[f"{letter})"].get_yticklabels()]
+        names = [label.get_text() for label in axes[letter].get_yticklabels()]
         assert names == ["E1", "E4"]
-    (pieces,) = axes["i)"].collections
+    (pieces,) = axes["i"].collections
     assert set(pieces.get_array()) == {0, 1, 2}
     figure = figures.overview(run, window=(10.0, 30.0), elements=[1])
     assert figure.axes[0].get_xlim() == (10.0, 30.0)
@@ -148,7 +148,7 @@ def test_pyplot_is_never_imported() -> None:
 import sys
 from gms_fsm import GMS, GMSParameters, Prescribed, simulate
 from plots import figures
-from plots.schematic import schematic_figure
+from plots.mechanism import schematic_figure
 run = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.2"), 3.0)
 for number, make in enumerate((figures.overview, figures.ribbons_figure, schematic_figure)):
     figures.save(make(run), f"{sys.argv[1]}/{number}.png")
@@ -170,6 +170,6 @@ print("matplotlib.pyplot" in sys.modules)
 def test_the_zoom_is_inside_the_requested_window(runs: dict[str, Trace]) -> None:
     for window in ((3.0, 7.0), (30.0, 40.0)):
         figure = figures.ribbons_figure(runs["Fig. 4, published"], window=window)
-        (margins,) = (ax for ax in figure.axes if ax.get_title(loc="left")[:2] == "f)")
+        (margins,) = (ax for ax in figure.axes if ax.get_title() == "f")
         low, high = margins.get_xlim()
         assert window[0] <= low < high <= window[1]

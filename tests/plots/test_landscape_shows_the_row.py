@@ -115,7 +115,7 @@ def test_regions_end_where_the_guard_turns(run: Trace) -> None:
 def test_a_row_made_by_a_firing_shows_the_row_before(run: Trace) -> None:
     row = row_of(run, "break_away_forward", 1)
     figure = figures.landscape(run, 1, row=row)
-    assert figure.axes[0].get_title(loc="left") == "a) guards that leave stick"
+    assert figure.axes[0].get_title(loc="left") == "guards that leave stick"
     texts = [text.get_text() for text in figure.texts[1:]]
     assert f"Row {row} was made by break_away_forward; shown is row {row - 1} before it" in texts[0]
     lanes = [text.get_text() for text in figure.axes[1].texts]

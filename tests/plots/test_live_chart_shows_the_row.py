@@ -233,7 +233,7 @@ def test_values_are_those_of_the_row() -> None:
         assert foot.text == f"t = {trace.t[row]:.6g} s"
     one = groups(LiveChart(run("five states"), values=True).frame(3))
     texts = [t.text or "" for t in one["graph0"].findall("text")]
-    assert [text.split()[0] for text in texts] == ["z", "s", "t"]  # z w v, s, t
+    assert [text.split()[0] for text in texts] == ["force", "F", "z", "s", "t"]  # F; z w v, s, t
 
 
 def test_at_is_the_last_row_at_or_before_a_time() -> None:

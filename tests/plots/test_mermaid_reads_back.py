@@ -112,11 +112,15 @@ def printable(text: str) -> str:
 def expected(chart: Chart) -> tuple[list[list[str]], list[tuple[int, int, str]]]:
     states = []
     for state in chart.states:
-        lines = [state.name[0].upper() + state.name[1:]]
+        lines = [state.name]
         flow = {f"d{v}": chart.flows[state.name, v] for v in chart.variables}
+        own = any(each.outputs or each.locked for each in chart.states)
+        names = chart.force_names if own or len(chart.states) < 3 else ()
+        forces = {name: chart.forces[state.name, name] for name in names}
         for kind, trees in (
             ("entry", chart.assignments["entry", state.name]),
             ("during", flow),
+            ("force", {name: tree for name, tree in forces.items() if tree is not None}),
             ("exit", chart.assignments["exit", state.name]),
         ):
             lines += [f"{kind}: {n} = {spell(tree, MATLAB_LIKE)};" for n, tree in trees.items()]
@@ -184,5 +188,5 @@ def test_characters_that_mermaid_could_misread_are_escaped(chart: Chart) -> None
 
 def test_invalid_names(hostile: Chart) -> None:
     lines = mermaid(hostile).splitlines()
-    assert len(lines) == 8
+    assert len(lines) == 9
     assert not [line for line in lines[4:] if "evil:" in line or "%%" in line]

@@ -16,7 +16,8 @@ pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
 
 from matplotlib.figure import Figure
 
-from plots import figures, panels, schematic
+from plots import _elements, figures, panels
+from plots.mechanism import schematic_figure
 from tests.helpers import open_loop, stick_slip
 
 
@@ -103,17 +104,19 @@ def test_figure_3_needs_one_force_per_row(run: Trace) -> None:
 
 
 def test_formats(run: Trace, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match=r"a\.bmp'; it must end in \.png, \.svg or \.pdf"):
+    with pytest.raises(
+        ParameterError, match=r"a\.bmp'; it must end in \.png, \.svg, \.pdf or \.pgf"
+    ):
         figures.save(Figure(), tmp_path / "a.bmp")
 
 
 @pytest.mark.parametrize("row", [10_000, -10_000, 1.5, True, None], ids=str)
 def test_rows_of_a_schematic(run: Trace, row: object) -> None:
     with pytest.raises(ParameterError, match=r"row is .* integer from"):
-        schematic.schematic(Figure().subplots(), run, row)  # type: ignore[arg-type]
+        _elements.elements_at(Figure().subplots(), run, row)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("elements", [0, 13, 2.0, True], ids=str)
 def test_elements_of_a_schematic(elements: object) -> None:
     with pytest.raises(ParameterError, match=r"elements is .* 1 to 12 elements"):
-        schematic.schematic_figure(elements=elements)  # type: ignore[arg-type]
+        schematic_figure(elements=elements)  # type: ignore[arg-type]

@@ -188,10 +188,14 @@ def test_stribeck_curve_and_measured_points(run: Trace, ax: Axes) -> None:
 
 def test_residual_against_a_run_and_a_measurement(run: Trace, ax: Axes) -> None:
     other = simulate(stick_slip("published"), open_loop(), 60.0)
-    (line,) = panels.residual(ax, run, other)
-    t, size = drawn(line)
-    expected = np.abs(run.sample(t).F - other.sample(t).F)
-    np.testing.assert_array_equal(size, np.maximum(expected, 1e-12))
+    band, line = panels.residual(ax, run, other)
+    t, highest = drawn(line)
+    width = float(t[1] - t[0])
+    for place, high in list(zip(t.tolist(), highest.tolist(), strict=True))[1:-1:40]:
+        part = np.linspace(place - width / 2, place + width / 2, 9)[1:-1]
+        expected = np.abs(run.sample(part).F - other.sample(part).F)
+        assert expected.max() <= 1.05 * high + 1e-9
+    assert band.get_paths()[0].vertices[:, 1].max() == highest.max()
     assert (ax.get_yscale(), ax.get_ylabel()) == ("log", "|difference of F| [N]")
     times = np.linspace(2.0, 8.0, 50)
     measured = figures.Measured(times, times, run.sample(times).F + 0.25)
@@ -199,6 +203,20 @@ def test_residual_against_a_run_and_a_measurement(run: Trace, ax: Axes) -> None:
     (line,) = panels.residual(ax, run, measured, log=False)
     np.testing.assert_allclose(drawn(line)[1], -0.25)
     assert ax.get_yscale() == "linear"
+
+
+def test_a_difference_of_many_points_is_its_envelope() -> None:
+    times = np.linspace(0.0, 10.0, 5000)
+    values = 2.0 + np.sin(200 * times)
+    band, line = panels.difference(Figure().subplots(), times, values, log=True)
+    t, highest = drawn(line)
+    for place, high in zip(t.tolist(), highest.tolist(), strict=True):
+        inside = np.abs(times - place) < 0.0099
+        assert values[inside].max() <= high <= values.max()
+    low, high = (f(band.get_paths()[0].vertices[:, 1]) for f in (np.min, np.max))
+    assert (low, high) == (values.min(), values.max())
+    (few,) = panels.difference(Figure().subplots(), times[:900], values[:900])
+    np.testing.assert_array_equal(drawn(few)[1], values[:900])
 
 
 @pytest.mark.slow

@@ -1,6 +1,8 @@
-"""The schematic shows one row: contacts follow the deflections, and are open where they slip."""
+"""The schematic shows one row: contacts follow the deflections, and are hatched where they slip."""
 
 from __future__ import annotations
+
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -10,14 +12,17 @@ from gms_fsm import LuGre, Prescribed, Stribeck, Trace, simulate
 pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
 
 from matplotlib.artist import Artist
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, Rectangle
 from matplotlib.text import Text
 
-from plots import schematic
-from plots.style import BLUE, PAPER
+from plots import _elements
+from plots.mechanism import schematic_figure
+from plots.style import STATE_FILLS, element_colour, state_look
 from tests.helpers import pulled_mass
+from tests.plots.systems_to_draw import GMS12
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +39,7 @@ def texts(drawn: list[Artist]) -> list[str]:
 
 
 def test_symbols_without_a_run() -> None:
-    drawn = schematic.schematic(Figure().subplots(), elements=3)
+    drawn = _elements.elements_at(Figure().subplots(), elements=3)
     for kind in ("contact", "spring", "damper"):
         assert len(parts(drawn, kind)) == 3
     wanted = {"$k_{1}$", r"$\sigma_{3}$", "$z_{2}$", "$v$", "$F$", "slider", "E3"}
@@ -43,24 +48,24 @@ def test_symbols_without_a_run() -> None:
 
 def test_contact_positions_follow_the_deflections(run: Trace) -> None:
     for row in (0, 400, -1):
-        drawn = schematic.schematic(Figure().subplots(), run, row)
+        drawn = _elements.elements_at(Figure().subplots(), run, row)
         centres = [c.get_x() + c.get_width() / 2 for c in parts(drawn, "contact")]  # type: ignore[attr-defined]
-        shift = schematic.WALL - schematic.REST - np.array(centres)
-        expected = schematic.SWING * run.z[row] / np.abs(run.z).max()
+        shift = _elements.WALL - _elements.REST - np.array(centres)
+        expected = _elements.SWING * run.z[row] / np.abs(run.z).max()
         np.testing.assert_allclose(shift, expected, atol=1e-12)
 
 
-def test_sticking_contacts_are_filled_and_slipping_ones_open(run: Trace) -> None:
+def test_sticking_contacts_are_plain_and_slipping_ones_hatched(run: Trace) -> None:
     slipping = (run.states == "slip").sum(axis=1)
     row = int(np.flatnonzero(slipping == 2)[5])
-    drawn = schematic.schematic(Figure().subplots(), run, row)
+    drawn = _elements.elements_at(Figure().subplots(), run, row)
     for i, box in enumerate(parts(drawn, "contact")):
         assert isinstance(box, Rectangle)
-        open_one = run.states[row, i] == "slip"
-        assert to_hex(box.get_facecolor()).upper() == (PAPER if open_one else BLUE)
-        assert box.get_linestyle() == ("--" if open_one else "-")
+        look = state_look(int(run.states[row, i] == "slip"))
+        assert to_hex(box.get_facecolor()).upper() == look["facecolor"]
+        assert (box.get_hatch() or "") == look["hatch"]
         assert f"E{i + 1} {run.states[row, i]}" in texts(drawn)
-    full = schematic.schematic(Figure().subplots(), run, 0)
+    full = _elements.elements_at(Figure().subplots(), run, 0)
 
     def arrows(artists: list[Artist]) -> int:
         return sum(isinstance(a, FancyArrowPatch) for a in artists)
@@ -70,7 +75,7 @@ def test_sticking_contacts_are_filled_and_slipping_ones_open(run: Trace) -> None
 
 
 def test_numbers_have_units(run: Trace) -> None:
-    drawn = schematic.schematic(Figure().subplots(), run, 900)
+    drawn = _elements.elements_at(Figure().subplots(), run, 900)
     shown = texts(drawn)
     for symbol, unit in (
         ("$k_{1}$", "N/m"),
@@ -82,16 +87,48 @@ def test_numbers_have_units(run: Trace) -> None:
         (text,) = [t for t in shown if t.startswith(symbol + " = ")]
         assert text.endswith(unit)
     (force,) = [t for t in shown if t.startswith("$F$")]
-    assert float(force.split()[2]) == pytest.approx(run.F[900], rel=1e-3)
+    number = force.split()[2].replace("\N{MINUS SIGN}", "-")
+    assert float(number) == pytest.approx(run.F[900], rel=5e-3)
+
+
+def test_deflections_have_equal_digits_and_a_true_minus(run: Trace) -> None:
+    for row in (100, 400, 900):
+        shown = texts(_elements.elements_at(Figure().subplots(), run, row))
+        numbers = [text.split()[2] for text in shown if text.startswith("$z_")]
+        assert len(numbers) == run.n
+        assert len({len(number.partition(".")[2]) for number in numbers}) == 1
+        assert not [text for text in shown if "-" in text]
+
+
+def test_springs_have_the_colours_of_elements(run: Trace) -> None:
+    drawn = _elements.elements_at(Figure().subplots(), run)
+    colours = [to_hex(a.get_color()).upper() for a in parts(drawn, "spring")]  # type: ignore[attr-defined]
+    assert colours == [element_colour(i, run.n) for i in range(run.n)]
+
+
+def test_twelve_elements_fit_on_a_page_without_overlaps() -> None:
+    run = simulate(GMS12, Prescribed("0.3*sin(t)"), 4.0)
+    figure = schematic_figure(run, len(run) // 2)
+    wide, tall = figure.get_size_inches()
+    assert wide <= 8.27
+    assert tall <= 11.69
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    shown = [each for each in figure.axes[0].texts if each.get_text()]
+    assert len(shown) == 12 * 4 + 3
+    assert min(each.get_fontsize() for each in shown) >= 7
+    boxes = [each.get_window_extent() for each in shown]
+    for (a, one), (b, other) in combinations(zip(boxes, shown, strict=True), 2):
+        assert not a.overlaps(b), (one.get_text(), other.get_text())
 
 
 def test_lugre_is_one_bristle_that_neither_sticks_nor_slips() -> None:
     model = LuGre(sigma_0=1e3, sigma_1=31.6, sigma_2=4, stribeck=Stribeck(1, 1.5, 1e-3))
     run = simulate(model, Prescribed("0.01"), 0.1)
-    drawn = schematic.schematic(Figure().subplots(), run)
+    drawn = _elements.elements_at(Figure().subplots(), run)
     shown = texts(drawn)
     assert r"$\sigma_0$ = 1000 N/m" in shown
     assert r"$\sigma_1$ = 31.6 Ns/m" in shown
     assert "E1 bristle" in shown
     (box,) = parts(drawn, "contact")
-    assert to_hex(box.get_facecolor()).upper() not in (BLUE, PAPER)  # type: ignore[attr-defined]
+    assert to_hex(box.get_facecolor()).upper() not in STATE_FILLS  # type: ignore[attr-defined]

@@ -13,7 +13,7 @@ from tests.plots.systems_to_draw import BLOCKS, STICTION, run
 
 pytest.importorskip("matplotlib", reason="figures need the extra 'plots'")
 
-from plots import figures, panels, schematic  # after the skip
+from plots import _elements, figures, panels  # after the skip
 from plots._matplotlib import Figure
 
 AX = Figure().subplots()
@@ -21,7 +21,7 @@ ON_AXES = sorted(
     {*panels.__all__}
     - {"difference", "residual", "slip_bar"}
     - {"lag_between_ticks", "lag_over_period", "lag_over_time"}
-    - {"cascade_window", "has_threshold", "shown"}
+    - {"cascade_window", "has_threshold", "lettered", "shown"}
     - {"landscape", "pins", "race"}  # of one element
     - {"Unfolded", "arrows", "unfolded", "unfolded_force", "unfolded_states"}
 )
@@ -30,7 +30,7 @@ DRAWN: dict[str, Callable[..., object]] = {
     "live_statechart": partial(live_statechart, row=0),
     "animate": partial(animate, path="run.gif"),
     "statechart": lambda trace: statechart(STICTION, counts=trace),
-    "schematic": partial(schematic.schematic, AX),
+    "schematic": partial(_elements.elements_at, AX),
     "cascade_window": panels.cascade_window,
     "shown": panels.shown,
     **{name: partial(getattr(panels, name), AX) for name in ON_AXES},

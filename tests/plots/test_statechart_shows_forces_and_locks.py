@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from gms_fsm.charts import GMS_ELEMENT, LUGRE
+from gms_fsm.charts import CHARTS, GMS_ELEMENT, LUGRE
 from gms_fsm.charts.chart import Chart, State
 from plots.mermaid import mermaid
 from plots.statechart import Sheet
@@ -40,8 +40,8 @@ def guards(chart: Chart, notation: str = "stateflow") -> list[tuple[str, str]]:
         (BACKLASH, "left", ["force: F = k * (x + gap) + d * v;"]),
         (END_STOP, "free", ["force: F = 0;"]),
         (PLANAR, "start", ["force: F = F_c * h;", "       F_w = F_c * g;"]),
-        (SHARED, "stick", ["during: dz = v;"]),
-        (SHARED, "slip", ["during: dz = 0;"]),
+        (SHARED, "stick", ["during: dz = v;", "force: F = k * z;"]),
+        (SHARED, "slip", ["during: dz = 0;", "force: F = k * z;"]),
     ],
     ids=lambda given: given if isinstance(given, str) else "",
 )
@@ -84,7 +84,6 @@ def test_named_expressions_and_the_force_of_the_contact_are_below() -> None:
     assert below == [
         "let: limit = F_c / k;",
         "     far = |z| / limit;",
-        "force: F = k * z;",
         "force of the contact: F = sum(F) + b * v;",
     ]
     math = ["".join(p.text for p in row) for row in Sheet(SHARED, "math").definitions()]
@@ -92,9 +91,33 @@ def test_named_expressions_and_the_force_of_the_contact_are_below() -> None:
 
 
 @pytest.mark.parametrize("chart", [*GMS_ELEMENT.values(), LUGRE], ids=lambda chart: chart.name)
-def test_a_chart_with_one_force_for_all_states_shows_none(chart: Chart) -> None:
+def test_a_force_that_is_the_same_in_all_states_stands_in_each(chart: Chart) -> None:
     assert Sheet(chart).definitions() == []
+    for state in chart.states:
+        assert len([line for line in lines(chart, state.name) if "force: F = " in line]) == 1
+
+
+def test_charts_that_differ_in_their_force_only_look_different() -> None:
+    one, other = (CHARTS[name] for name in ("lugre", "lugre-sigma1"))
+    assert lines(one, "bristle")[:-1] == lines(other, "bristle")[:-1]
+    assert lines(one, "bristle")[-1] == "force: F = sigma_0 * z + sigma_1 * dz;"
+    assert lines(other, "bristle")[-1].startswith("force: F = sigma_0 * z + sigma_1 * exp(")
+
+
+def test_one_force_of_three_states_is_said_once_below() -> None:
+    chart = CHARTS["elasto-plastic"]
     assert not [line for s in chart.states for line in lines(chart, s.name) if "F" in line]
+    below = ["".join(p.text for p in row) for row in Sheet(chart).definitions()]
+    assert below[-1] == "force in all states: F = sigma_0 * z + sigma_1 * dz;"
+
+
+def test_every_chart_says_every_force() -> None:
+    for name, chart in CHARTS.items():
+        below = " ".join("".join(p.text for p in row) for row in Sheet(chart).definitions())
+        for state in chart.states:
+            own = " ".join(lines(chart, state.name))
+            for force in chart.force_names:
+                assert re.search(rf"\b{force}\b", own + below), (name, state.name, force)
 
 
 def test_mermaid_says_the_same() -> None:
@@ -103,6 +126,7 @@ def test_mermaid_says_the_same() -> None:
         "s1_stuck : locked: v = 0, F holds it",
         "s2_forward : force: F = F_c + b * v;",
         "note right of s1_stick",
+        "s1_stick : force: F = k * z;",
         "let: limit = F_c / k;",
         "force of the contact: F = sum(F) + b * v;",
     ):

@@ -183,24 +183,31 @@ def of_class(drawn: dict[str, Drawn], name: str) -> set[str]:
     return {group.id for group in drawn.values() if name in group.classes}
 
 
+def legend(drawn: dict[str, Drawn]) -> str:
+    """Return the numbered guards below the picture, and a mark after the last one."""
+    return squeezed(*(text for name in of_class(drawn, "legend") for text in drawn[name].texts))
+
+
 @pytest.mark.parametrize(("chart", "elements"), CASES)
-def test_every_state_shows_its_flow(chart: Chart, elements: int, draw: Draw) -> None:
+def test_every_state_shows_its_flow_and_its_force(chart: Chart, elements: int, draw: Draw) -> None:
     drawn = draw(chart, elements)
+    names, below = chart.force_names, len(chart.states) > 2
     expected = set()
     for element in range(1, elements + 1):
         for state in chart.states:
             expected.add(f"element{element}-state-{state.name}")
             flow = {f"d{v}": chart.flows[state.name, v] for v in chart.variables}
-            lines = [state.name[0].upper() + state.name[1:]]
+            lines = [state.name]
             for kind, trees in (
                 ("entry", chart.assignments["entry", state.name]),
                 ("during", flow),
+                ("force", {} if below else {f: chart.forces[state.name, f] for f in names}),
                 ("exit", chart.assignments["exit", state.name]),
             ):
                 lines += [f"{kind}:"] if trees else []
                 lines += [f"{name} = {spell(tree, MATLAB_LIKE)};" for name, tree in trees.items()]
             shown = drawn[f"element{element}-state-{state.name}"]
-            assert [text for text in shown.texts if text] == lines
+            assert squeezed(*shown.texts) == squeezed(*lines)
     assert of_class(drawn, "state") == expected
 
 
@@ -219,6 +226,10 @@ def test_every_guard_is_complete(chart: Chart, elements: int, draw: Draw) -> Non
                 ]
                 action = "{" + "".join(actions) + "}" if actions else ""
                 guard = chart.guard_text(edge.name)
+                number = re.fullmatch(rf"{priority}\[(g\d+)\]", squeezed(*shown.texts))
+                if number:  # the guard is below the picture
+                    assert squeezed(f"{number[1]} = {guard}{action}") in legend(drawn)
+                    continue
                 assert squeezed(*shown.texts) == squeezed(f"{priority}[{guard}]{action}")
                 for clause in clauses(chart.guards[edge.name]):
                     text = spell(clause, MATLAB_LIKE)
@@ -269,21 +280,33 @@ def test_nothing_overlaps(chart: Chart, elements: int, draw: Draw) -> None:
     assert not [(a.id, b.id) for a, b in combinations(solid, 2) if a.box.meets(b.box)]
 
 
-@pytest.mark.parametrize(("elements", "rows"), [(2, 1), (4, 2), (5, 2), (12, 3)])
+@pytest.mark.parametrize(
+    ("elements", "rows"),
+    [(2, {"TB": 1, "LR": 2}), (4, {"TB": 2, "LR": 4}), (5, {"TB": 3, "LR": 5})],
+)
 def test_several_elements_are_a_grid_of_parallel_regions(
-    elements: int, rows: int, draw: Draw
+    elements: int, rows: dict[str, int], draw: Draw, request: pytest.FixtureRequest
 ) -> None:
+    """The grid is as wide as a printed page, with type of at least 7 points."""
     drawn = draw(GMS_ELEMENT["signed"], elements)
     regions = [drawn[f"element{element}"] for element in range(1, elements + 1)]
     assert of_class(drawn, "region") == {region.id for region in regions}
     for element, region in enumerate(regions, start=1):
-        assert region.texts == [f"Element{element}", f"AND {element}"]
+        assert region.texts == [f"Element {element}", f"AND {element}"]
         inside = [group for name, group in drawn.items() if name.startswith(f"element{element}-")]
         assert all(region.box.holds(group.box) for group in inside if group.line)
     assert not [1 for a, b in combinations(regions, 2) if a.box.meets(b.box)]
     reading_order = [(round(region.box.top), round(region.box.left)) for region in regions]
     assert reading_order == sorted(reading_order)
-    assert len({top for top, _ in reading_order}) == rows
+    direction = "TB" if "TB" in request.node.name else "LR"
+    assert len({top for top, _ in reading_order}) == rows[direction]
+    assert Box.around([p for r in regions for p in r.line]).right < 482 * 10 / 7  # 170 mm
+
+
+def test_many_elements_that_are_alike_are_drawn_once(draw: Draw) -> None:
+    drawn = draw(GMS_ELEMENT["signed"], 12)
+    assert of_class(drawn, "region") == {"element1"}
+    assert drawn["element1"].texts[:2] == ["Elements 1 to 12", "× 12"]
 
 
 def test_one_element_has_no_region_and_lugre_no_edges(draw: Draw) -> None:
@@ -313,7 +336,7 @@ def test_hostile_names_are_shown_literally(draw: Draw, monkeypatch: pytest.Monke
     assert len(of_class(drawn, "node")) == 4
     assert len(of_class(drawn, "edge")) == 3
     (shown,) = (drawn[name] for name in of_class(drawn, "state") if "slip" in name)
-    assert squeezed(shown.texts[0]) == squeezed("S" + bad_state[1:].replace("\x01", ""))
+    assert squeezed(shown.texts[0]) == squeezed(bad_state.replace("\x01", ""))
     assert shown.texts[2] == f"d{bad_variable} = 0;"
 
 

@@ -15,32 +15,71 @@ from gms_fsm import GMS, GMSParameters, Prescribed, PulledSlider
 from gms_fsm.systems.system import Body, Contact, System, system_of
 from plots.block_diagram import block_diagram
 from plots.render import render
-from tests.plots.systems_to_draw import BALL, BLOCKS, DRY, PULLED, SERVO, STICTION
+from tests.plots.systems_to_draw import BLOCKS, DRY, SERVO, STICTION, systems
 
 SVG = "{http://www.w3.org/2000/svg}"
 MODEL = GMS(GMSParameters.paper("stick-slip"), law="signed")
 
 
+KINDS = {"signal", "sampled", "flow", "body", "contact"}
+Span = tuple[float, float, float, float]  # left, bottom, right, top
+
+
+def nodes(system: System) -> dict[str, dict[str, str]]:
+    """Return the attributes of every node, by its id."""
+    found = {}
+    for line in block_diagram(system).body:
+        named = re.match(r'\s*"?([\w-]+)"? \[label=(<.*>|"") (.*)', line)
+        if named:
+            rest = dict(re.findall(r'(\w+)="?([^" \]]*)"?', named[3]))
+            found[named[1]] = rest | {"label": named[2]}
+    return found
+
+
 def parts(system: System) -> dict[str, str]:
     """Return the texts of every part, by its id."""
     found = {}
-    for line in block_diagram(system).body:
-        named = re.match(r'\s*"?([\w-]+)"? \[label=<(.*)> class=(\w+) id="?([\w-]+)', line)
-        if named:
-            cells = re.findall(r"<TD[^>]*>(.*?)</TD>", named[2])
+    for name, look in nodes(system).items():
+        if look.get("class") in KINDS:
+            cells = re.findall(r"<TD[^>]*>(.*?)</TD>", look["label"])
             texts = [html.unescape(re.sub(r"<[^>]*>", "", cell)) for cell in cells]
-            found[named[1]] = " | ".join(text.replace("\xa0", " ") for text in texts)
+            shown = " | ".join(text.replace("\xa0", " ") for text in texts)
+            found[name] = re.sub(r" \|  +", " ", shown)  # lines that go on
+    return found
+
+
+def pieces(system: System) -> dict[str, list[tuple[str, str, str]]]:
+    """Return for each wire its pieces: where they begin and end, and the line in the graph."""
+    found: dict[str, list[tuple[str, str, str]]] = {}
+    for line in block_diagram(system).body:
+        ends = re.match(r'\s*"?([\w-]+)"? -> "?([\w-]+)"? \[(.*)', line)
+        if ends and "-hold" not in ends[1]:
+            name = re.search(r'id="?([\w-]+)-\d+"?', ends[3])
+            assert name is not None
+            found.setdefault(name[1], []).append((ends[1], ends[2], ends[3]))
     return found
 
 
 def lines(system: System) -> set[tuple[str, str, str]]:
     """Return tail, head, and what is written on each line; contacts have none."""
+    texts = {
+        name.removesuffix("-name"): re.sub(r"<[^>]*>", "", look["label"][1:-1])
+        for name, look in nodes(system).items()
+        if name.endswith("-name")
+    }
+    ids = "|".join(map(re.escape, parts(system)))
     found = set()
-    for line in block_diagram(system).body:
-        ends = re.match(r'\s*"?([\w-]+)"? -> "?([\w-]+)"? \[(.*)', line)
-        if ends:
-            label = re.search(r'label="? ?([\w, ]*?) ?"? ', ends[3])
-            found.add((ends[1], ends[2], label[1] if label else ""))
+    for name in pieces(system):
+        read = re.fullmatch(f"reads-({ids})-({ids})", name)
+        if read:
+            found.add((read[1], read[2], texts[name]))
+        else:
+            assert name.startswith("acts-")
+            assert name not in texts
+            bodies = "|".join(each.name for each in system.bodies)
+            acting = re.fullmatch(f"acts-(.*)-({bodies})", name)
+            assert acting is not None
+            found.add((f"body-{acting[2]}", f"contact-{acting[1]}", ""))
     return found
 
 
@@ -65,7 +104,7 @@ def test_the_lines_of_a_servo() -> None:
         ("flow-i", "body-motor", "i"),
         ("body-motor", "contact-bearing", ""),
         ("body-motor", "contact-gear", ""),
-        ("contact-gear", "body-load", ""),
+        ("body-load", "contact-gear", ""),
     }
 
 
@@ -75,9 +114,14 @@ def test_a_spring_between_bodies_is_a_line_each_way() -> None:
 
 
 def test_what_is_read_at_ticks_is_dashed() -> None:
-    for line in block_diagram(SERVO).body:
-        if "class=reads" in line:
-            assert ("style=dashed" in line) == ('-> "sampled-pid"' in line)
+    for name, found in pieces(SERVO).items():
+        for _, _, look in found:
+            assert ("style=dashed" in look) == name.endswith("-sampled-pid"), name
+
+
+def test_what_is_held_has_a_staircase() -> None:
+    held = {name.split("-hold")[0] for name in nodes(SERVO) if "-hold" in name}
+    assert held == {"sampled-pid"}
 
 
 def test_an_input_of_a_contact_comes_from_what_its_text_reads() -> None:
@@ -120,23 +164,94 @@ def test_a_model_on_a_rig_is_the_picture_of_its_system() -> None:
     assert parts(driven)["body-body"] == "body  driven body"
 
 
-@pytest.mark.parametrize(
-    "system", [PULLED, BALL, BLOCKS, SERVO], ids=lambda system: system.name.replace(" ", "-")
-)
-def test_no_two_parts_overlap(system: System, tmp_path: Path) -> None:
+# --------------------------------------------------------------------------- places
+def span(look: dict[str, str]) -> Span:
+    """Return what a node covers."""
+    x, y = (float(part) for part in look["pos"].rstrip("!").split(","))
+    half = [36 * float(look[side]) for side in ("width", "height")]
+    return x - half[0], y - half[1], x + half[0], y + half[1]
+
+
+def meet(a: Span, b: Span, room: float = 0.0) -> bool:
+    return a[0] < b[2] + room and b[0] < a[2] + room and a[1] < b[3] + room and b[1] < a[3] + room
+
+
+@pytest.mark.parametrize("name", sorted(systems()))
+def test_blocks_wires_and_texts_keep_apart(name: str) -> None:
+    system = systems()[name]
+    found = nodes(system)
+    spans = {each: span(look) for each, look in found.items()}
+    blocks = {each: spans[each] for each, look in found.items() if look.get("class") in KINDS}
+    texts = {each: spans[each] for each in found if each.endswith("-name") or each == "title"}
+    for (a, one), (b, other) in combinations((blocks | texts).items(), 2):
+        assert not meet(one, other), (a, b)
+    runs = []
+    for wire, wired in pieces(system).items():
+        for tail, head, _ in wired:
+            (x0, y0), (x1, y1) = (
+                (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
+                for box in (spans[tail], spans[head])
+            )
+            assert x0 == x1 or y0 == y1, wire
+            runs.append((wire, (min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))))
+    for wire, run in runs:
+        inside = {each: (s[0] + 1, s[1] + 1, s[2] - 1, s[3] - 1) for each, s in blocks.items()}
+        assert not [each for each, box in (inside | texts).items() if meet(run, box, -0.5)], wire
+    for (a, one), (b, other) in combinations(runs, 2):
+        if a == b:
+            continue
+        for along, across in ((0, 1), (1, 0)):
+            level = one[across] == one[across + 2] and other[across] == other[across + 2]
+            if level and abs(one[across] - other[across]) < 4.0:
+                shared = min(one[along + 2], other[along + 2]) - max(one[along], other[along])
+                assert shared <= 0, (a, b)
+
+
+@pytest.mark.parametrize("name", sorted(systems()))
+def test_no_diagram_is_wider_than_two_pages(name: str) -> None:
+    spans = [span(look) for look in nodes(systems()[name]).values() if "pos" in look]
+    assert max(each[2] for each in spans) - min(each[0] for each in spans) <= 2 * 8.27 * 72
+
+
+def test_program_and_package_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+    if shutil.which("dot") is None:
+        pytest.skip("needs the program dot")
+    pytest.importorskip("pygraphviz", reason="needs the package pygraphviz")
+    from plots.render import drawn as picture_of
+
+    def drawn(graph: object) -> tuple[list[str], list[float]]:
+        picture = picture_of(graph, "svg")  # type: ignore[arg-type]
+        assert picture is not None
+        root = ElementTree.fromstring(picture)
+        texts = sorted(text.text or "" for text in root.iter(SVG + "text"))
+        return texts, [float(root.get(side, "")[:-2]) for side in ("width", "height")]
+
+    for system in (SERVO, BLOCKS):
+        texts, size = drawn(block_diagram(system))
+        with monkeypatch.context() as patch:
+            patch.setattr(shutil, "which", lambda _: None)
+            other_texts, other_size = drawn(block_diagram(system))
+        assert other_texts == texts
+        assert other_size == pytest.approx(size, rel=0.02)
+
+
+@pytest.mark.parametrize("name", ["two-mass servo", "ball_screw_table", "a train of four"])
+def test_texts_fit_into_their_blocks(name: str, tmp_path: Path) -> None:
+    """The widths of characters that blocks are made for are not less than those drawn."""
     if shutil.which("dot") is None:
         pytest.importorskip("pygraphviz", reason="drawing needs Graphviz, program or package")
-    svg = render(block_diagram(system), tmp_path / "system.svg")
-    boxes = []
+    svg = render(block_diagram(systems()[name]), tmp_path / "system.svg")
     for group in ElementTree.parse(svg).iter(SVG + "g"):
-        if set(group.get("class", "").split()) & {"signal", "sampled", "flow", "body", "contact"}:
-            found = [shape.get("d") or shape.get("points") or "" for shape in group.iter()]
-            numbers = [float(n) for text in found for n in re.findall(r"-?\d+(?:\.\d+)?", text)]
-            xs, ys = numbers[::2], numbers[1::2]
-            boxes.append((min(xs), min(ys), max(xs), max(ys)))
-    assert len(boxes) == len(parts(system))
-    for a, b in combinations(boxes, 2):
-        assert a[2] < b[0] or b[2] < a[0] or a[3] < b[1] or b[3] < a[1]
+        if not set(group.get("class", "").split()) & KINDS:
+            continue
+        shape = next(each for each in group.iter() if each.get("d") or each.get("points"))
+        numbers = re.findall(r"-?\d+(?:\.\d+)?", shape.get("d") or shape.get("points") or "")
+        left, right = (f(map(float, numbers[::2])) for f in (min, max))
+        for text in group.iter(SVG + "text"):
+            start, size = float(text.get("x", "")), float(text.get("font-size", ""))
+            wide = 0.602 if "Mono" in text.get("font-family", "") else 0.5
+            assert left <= start, text.text
+            assert start + wide * size * len(text.text or "") <= right + 1, text.text
 
 
 def test_the_force_on_each_body_has_its_share() -> None:

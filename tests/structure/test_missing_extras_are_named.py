@@ -78,7 +78,7 @@ def test_a_function_names_the_module_and_the_extra(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("absent", ["matplotlib", "PIL"])
-@pytest.mark.parametrize("module", ["figures", "panels", "schematic", "animation"])
+@pytest.mark.parametrize("module", ["figures", "panels", "_elements", "animation"])
 def test_a_module_names_the_module_and_the_extra(absent: str, module: str) -> None:
     if absent == "PIL":  # which only matplotlib needs
         pytest.importorskip("matplotlib", reason="needs the extra plots")

@@ -142,14 +142,17 @@ def _entries(tmp: Path) -> Iterator[Entry]:
         "animate": {"trace": _trace(), "path": tmp / "a.gif"},
         "block_diagram": {"elements": 1},
         "explore": run | options | {"sliders": {"v_c": (1e-9, 2.0)}, "height": 500},
+        "handout": {"model": MODEL, "path": tmp / "a.pdf", "velocity": "0.1", "t_end": 1.0},
         "live_statechart": {"trace": _trace(), "row": 0} | view,
         "landscape": {"trace": _trace(), "element": 0, "row": -1, "t": None, "window": None}
         | {"checks": None, "title": ""},
         "mermaid": {"chart": CHART},
         "overview": {"trace": _trace(), "title": ""},
         "phase": {"trace": _trace(), "row": None, "window": None, "elements": None, "title": ""},
+        "preset": {"chosen": "ieee1"},
         "render": {"graph": plots.block_diagram(1), "path": tmp / "a.dot"},
         "replay": {"trace": _trace(), "other": None, "title": "", "names": ()},
+        "schematic": {"system": SYSTEM},
         "statechart": {"chart": CHART, "elements": 1, "notation": "stateflow", "direction": "TB"}
         | {"theme": "light", "counts": None, "marked": (), "names": False, "note": ""},
         "unfold": {"trace": _switching(), "t0": 1.0, "t1": 3.0, "elements": None, "title": ""},

@@ -169,13 +169,14 @@ def test_an_edge_is_not_an_element() -> None:
 def test_figures_need_a_trace(draw: str, wrong: Any) -> None:
     pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
     import plots
-    from plots import figures, panels, schematic
+    from plots import figures, panels
+    from plots.mechanism import schematic_figure
 
     calls: dict[str, Callable[[], object]] = {
         "overview": lambda: figures.overview(wrong),
         "ribbons_figure": lambda: figures.ribbons_figure(wrong),
         "cascade_figure": lambda: figures.cascade_figure(wrong),
-        "schematic_figure": lambda: schematic.schematic_figure(wrong),
+        "schematic_figure": lambda: schematic_figure(wrong),
         "landscape": lambda: figures.landscape(wrong, 0),
         "unfold": lambda: figures.unfold(wrong, 0.0, 1.0),
         "phase": lambda: figures.phase(wrong),

@@ -236,46 +236,49 @@ def _thresholds(result: Result) -> list[str]:
 
 
 def _draw_drift(ax: Axes, result: Result) -> None:
-    from plots.style import BLUE, TEXT_GREY, TEXT_ORANGE, VERMILION
+    from plots import panels
+    from plots.style import INK, LINE_GREY, TEXT_GREY
 
     grey = TEXT_GREY
     for model, look, colour, text, tint, place in (
-        ("lugre", "-", VERMILION, NAMES["lugre"], TEXT_ORANGE, (6.5, 55.0)),
-        ("gms-signed", "-", BLUE, NAMES["gms-signed"], BLUE, (10.5, 14.0)),
+        ("lugre", "-", LINE_GREY, NAMES["lugre"], TEXT_GREY, (6.5, 55.0)),
+        ("gms-signed", "-", INK, NAMES["gms-signed"], INK, (10.5, 14.0)),
         ("elasto-plastic", "--", grey, "elasto-plastic", grey, (10.5, -6.5)),
     ):
         curve = result.table.cell(model, "drift").curves[0]
         ax.plot(curve.x, curve.y, look, color=colour, linewidth=0.9)
         ax.annotate(text, place, color=tint, fontsize=8)
     ax.set(xlabel="t [s]", ylabel="x [µm]", xlim=(0, 24), ylim=(-10, 95))
-    ax.set_title("a) bias and ripple: LuGre drifts")
+    panels.lettered(ax, "a", "bias and ripple: LuGre drifts")
 
 
 def _draw_memory(ax: Axes, result: Result) -> None:
-    from plots.style import BLUE, INK, TEXT_ORANGE, VERMILION
+    from plots import panels
+    from plots.style import INK, TEXT_GREY
 
-    for model, look, colour in (("lugre", "--", VERMILION), ("gms-signed", "-", BLUE)):
+    for model, look, colour in (("lugre", "--", TEXT_GREY), ("gms-signed", "-", INK)):
         curve = result.table.cell(model, "memory").curves[0]
         ax.plot(curve.x, curve.y, look, color=colour)
     gap, end = result.number("lugre", "memory", "gap"), result.nested["lugre"].x[-1] * 1e6
     arrow = {"arrowstyle": "<->", "color": INK, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
     ax.annotate("", (end, 1.55), (end - gap, 1.55), arrowprops=arrow)
-    ax.annotate(f"LuGre: gap {gap:.1f} µm", (end, 1.68), color=TEXT_ORANGE, fontsize=8, ha="right")
-    ax.annotate(NAMES["gms-signed"], (17.0, -1.38), color=BLUE, fontsize=8)
+    ax.annotate(f"LuGre: gap {gap:.1f} µm", (end, 1.68), color=TEXT_GREY, fontsize=8, ha="right")
+    ax.annotate(NAMES["gms-signed"], (17.0, -1.38), color=INK, fontsize=8)
     ax.set(xlabel="x [µm]", ylabel="applied force [N]", xlim=(-15, 66), ylim=(-1.5, 1.95))
-    ax.set_title("b) reversals: GMS remembers")
+    panels.lettered(ax, "b", "reversals: GMS remembers")
 
 
 def _draw_energy(ax: Axes, result: Result) -> None:
-    from plots.style import BLUE, LINE_GREY, TEXT_ORANGE, VERMILION
+    from plots import panels
+    from plots.style import INK, LINE_GREY, TEXT_GREY
 
     for model, look, colour, tint, place in (
-        ("gms-published", "--", VERMILION, TEXT_ORANGE, (10.0, -3.6)),
-        ("gms-signed", "-", BLUE, BLUE, (10.0, 0.75)),
+        ("gms-published", "--", TEXT_GREY, TEXT_GREY, (10.0, -3.6)),
+        ("gms-signed", "-", INK, INK, (10.0, 0.75)),
     ):
         curve = result.table.cell(model, "passivity").curves[0]
         ax.plot(curve.x, curve.y, look, color=colour)
         ax.annotate(NAMES[model], place, color=tint, fontsize=8)
     ax.axhline(0, color=LINE_GREY, linewidth=0.8, zorder=0)
     ax.set(xlabel="t [ms]", ylabel="energy taken [mJ]", xlim=(0, 450), ylim=(-4.2, 1.3))
-    ax.set_title("c) energy in three cycles")
+    panels.lettered(ax, "c", "energy in three cycles")

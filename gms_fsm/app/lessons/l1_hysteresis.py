@@ -262,7 +262,7 @@ def figure(result: Result) -> Figure:
     from matplotlib.figure import Figure
 
     from plots import panels
-    from plots.style import INK, LINE_GREY, RC, TEXT_GREY, VERMILION
+    from plots.style import INK, LINE_GREY, PAPER, RC, TEXT_GREY
 
     gms, lugre = result.gms, result.lugre
     end = float(result.turn_times[-1])
@@ -277,26 +277,27 @@ def figure(result: Result) -> Figure:
             1e6 * x,
             masing(t, x, result.turn_times),
             "o",
-            color=VERMILION,
+            color=TEXT_GREY,
             markersize=4.5,
-            markerfacecolor="white",
+            markerfacecolor=PAPER,
             zorder=4,
         )
-        axes["a"].set_title(f"a) {gms.model.title}: loops close")
+        panels.lettered(axes["a"], "a", f"{gms.model.title}: loops close")
         notes = {
             "a": "circles: doubled first loading\n(Masing's rule)",
-            "b": "dashed: first loading\norange: last stroke, D to E\nsquares: back at C and A",
+            "b": "dashed: first loading\nblack: last stroke, D to E\nsquares: back at C and A",
         }
         for name, note in notes.items():
             axes[name].annotate(
                 note, (0.98, 0.04), xycoords="axes fraction", ha="right", color=TEXT_GREY
             )
-        axes["b"].set_title("b) LuGre, same initial stiffness: open loops")
+        panels.lettered(axes["b"], "b", "LuGre, same initial stiffness: open loops")
         axes["b"].sharey(axes["a"])
 
         motion = axes["c"]
         motion.plot(gms.t, 1e6 * gms.x, color=INK)
-        motion.set(xlim=(0, end), ylabel="x [µm]", title="c) motion (chosen by us)")
+        motion.set(xlim=(0, end), ylabel="x [µm]")
+        panels.lettered(motion, "c", "motion (chosen by us)")
         motion.tick_params(labelbottom=False)
         motion.margins(y=0.25)
         for name, time, place in zip(NAMES, result.turn_times, TURNS, strict=True):
@@ -321,7 +322,7 @@ def figure(result: Result) -> Figure:
                 va="bottom" if left else "top",
             )
         panels.ribbons(axes["d"], gms)
-        axes["d"].set_title("d) states of the elements")
+        panels.lettered(axes["d"], "d", "states of the elements")
         for time in result.turn_times[:-1]:
             axes["d"].axvline(time, color=LINE_GREY, linewidth=0.7, zorder=0)
         sheet.suptitle(f"Lesson 1: {QUESTION}", x=0.01, ha="left", fontsize=12)
@@ -331,11 +332,11 @@ def figure(result: Result) -> Figure:
 def _loops(ax: Axes, trace: Trace, result: Result) -> None:
     """Draw F over x, label the reversals, and mark where the last stroke returns to them."""
     from plots import panels
-    from plots.style import BLUE, INK, VERMILION
+    from plots.style import INK, LINE_GREY
 
     phases = [("", float(result.turn_times[0])), ("", float(result.turn_times[3])), ("", np.inf)]
     lines = panels.hysteresis(ax, trace, phases)
-    looks = ((INK, "--", 1.4), (BLUE, "-", 1.4), (VERMILION, "-", 1.8))
+    looks = ((INK, "--", 1.4), (LINE_GREY, "-", 2.4), (INK, "-", 1.4))
     for line, (colour, dash, width) in zip(lines, looks, strict=True):
         line.set(color=colour, linestyle=dash, linewidth=width)
     corners = trace.sample(result.turn_times)

@@ -166,18 +166,18 @@ def figure(result: Result) -> Figure:
     from matplotlib.figure import Figure
 
     from plots import panels
-    from plots.style import BLUE, INK, RC, TEXT_GREEN, TEXT_GREY, TEXT_ORANGE, VERMILION
+    from plots.style import INK, RC, TEXT_GREY
 
     runs = (
-        ("c", result.lugre, "LuGre", "creeps with every stroke", VERMILION, TEXT_ORANGE),
-        ("d", result.springs, "GMS, Table I", "published law, no element can slip", BLUE, BLUE),
+        ("c", result.lugre, "LuGre", "creeps with every stroke", INK, TEXT_GREY),
+        ("d", result.springs, "GMS, Table I", "published law, no element can slip", INK, TEXT_GREY),
         (
             "e",
             result.slipping,
             "GMS, weights 0.25/k",
             "signed law, element 1 slips",
-            TEXT_GREEN,
-            TEXT_GREEN,
+            INK,
+            TEXT_GREY,
         ),
     )
     grid = np.linspace(0.0, END, 6001)
@@ -190,10 +190,10 @@ def figure(result: Result) -> Figure:
         push, place = axes["a"], axes["b"]
         push.plot(grid, F_a, color=INK, linewidth=0.9)
         push.set(xlim=(0, END), ylim=(0, 0.55), ylabel="$F_a$ [N]")
-        push.set_title("a) applied force (chosen by us)")
+        panels.lettered(push, "a", "applied force (chosen by us)")
         push.tick_params(labelbottom=False)
         place.set(xlim=(0, END), ylim=(0, 19), xlabel="t [s]", ylabel="x [mm]")
-        place.set_title("b) position")
+        panels.lettered(place, "b", "position")
         for letter, trace, name, what, colour, ink in runs:
             x = 1e3 * trace.sample(grid).x
             place.plot(grid, x, color=colour, linewidth=0.9)
@@ -213,7 +213,7 @@ def figure(result: Result) -> Figure:
             )
             lines[1].set(linestyle="--")
             ax.set_ylim(-0.02, 0.62)
-            ax.set_title(f"{letter}) {name}")
+            panels.lettered(ax, letter, name)
         peak = int(result.slipping.F.argmax())
         axes["e"].annotate(
             f"{result.slipping.F[peak]:.2f} N for a moment:\n" r"$\sigma_1$ dz as it stops",

@@ -209,7 +209,7 @@ def figure(result: Result) -> Figure:
     from matplotlib.figure import Figure
 
     from plots import panels
-    from plots.style import BLUE, INK, RC, STATE_FILLS, TEXT_GREY, TEXT_ORANGE, VERMILION
+    from plots.style import INK, LINE_GREY, PALE_GREY, RC, TEXT_GREY
 
     found = {"located": result.located, "once per step": result.once}
     with rc_context(RC):
@@ -224,11 +224,11 @@ def figure(result: Result) -> Figure:
         t = t[np.abs(t - turn) < 2e-3]
         line = turn + np.array([-2e-3, 2e-3])
         up = np.sign(_velocity(line)[1])
-        near.axhspan(-1e6 * V_C, 1e6 * V_C, color=VERMILION, linewidth=0.8, zorder=1)
+        near.axhspan(-1e6 * V_C, 1e6 * V_C, color=LINE_GREY, linewidth=0.8, zorder=1)
         near.plot(1e3 * (line - turn), 1e6 * _velocity(line), color=INK, zorder=2)
-        near.plot(1e3 * (t - turn), 1e6 * _velocity(t), "o", color=BLUE, markersize=7, zorder=3)
+        near.plot(1e3 * (t - turn), 1e6 * _velocity(t), "o", color=INK, markersize=7, zorder=3)
         near.set(xlabel=f"t − {turn:g} s [ms]", ylabel="v [µm/s]", xlim=(-2, 2))
-        near.set_title(f"a) samples of {1e3 * STEP:g} ms at a reversal")
+        panels.lettered(near, "a", f"samples of {1e3 * STEP:g} ms at a reversal")
         near.annotate(
             f"|v| ≤ $v_c$, {1e6 * window_width():.0f} µs long",
             (1.95, 0),
@@ -236,11 +236,11 @@ def figure(result: Result) -> Figure:
             textcoords="offset points",
             ha="right",
             va="top" if up > 0 else "bottom",
-            color=TEXT_ORANGE,
+            color=TEXT_GREY,
         )
 
         places = np.arange(len(STEPS))
-        counts.bar(places, result.counts, width=0.62, facecolor=STATE_FILLS[0], edgecolor=BLUE)
+        counts.bar(places, result.counts, width=0.62, facecolor=PALE_GREY, edgecolor=INK)
         for place, count, met in zip(places, result.counts, result.met, strict=True):
             counts.annotate(
                 f"{met} of {REVERSALS.size}",
@@ -252,7 +252,7 @@ def figure(result: Result) -> Figure:
             )
         counts.set_xticks(places, [f"{1e3 * h:g}" for h in STEPS], fontsize=8)
         counts.set(xlabel="step [ms]", ylabel="switches found once per step", ylim=(0, 62))
-        counts.set_title("b) luck (above: reversals hit by a sample)")
+        panels.lettered(counts, "b", "luck (above: reversals hit by a sample)")
         counts.axhline(len(result.located.transitions), color=INK, linestyle="--", linewidth=0.9)
         counts.annotate(
             f"located, {1e3 * STEP:g} ms: {len(result.located.transitions)}",
@@ -264,15 +264,17 @@ def figure(result: Result) -> Figure:
             fontsize=8,
         )
 
-        looks = ((INK, "-"), (VERMILION, "--"))
+        looks = ((INK, "-"), (TEXT_GREY, "--"))
         for (name, trace), (colour, dash) in zip(found.items(), looks, strict=True):
             lines = panels.force(force, trace)
             lines[0].set(color=colour, linestyle=dash, label=name, linewidth=1.4)
-        force.set_title(f"c) friction, {MODEL.title}")
+        panels.lettered(force, "c", f"friction, {MODEL.title}")
         force.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2)
         for letter, (name, trace) in zip("de", found.items(), strict=True):
             panels.ribbons(axes[letter], trace)
-            axes[letter].set_title(f"{letter}) states, {name}: {len(trace.transitions)} switches")
+            panels.lettered(
+                axes[letter], letter, f"states, {name}: {len(trace.transitions)} switches"
+            )
         for letter in "cd":
             axes[letter].set_xlabel("")
             axes[letter].tick_params(labelbottom=False)

@@ -220,10 +220,12 @@ def figure(result: Result) -> Figure:
                 ax.set_xlabel("")
         for ax in axes[:, 1]:
             ax.set_ylabel("")
-        axes[0, 0].set_title("a) " + columns[0][0])
-        axes[0, 1].set_title("b) " + columns[1][0])
-        axes[1, 0].set_title("c) energy (hatched: heat turns back)")
-        axes[1, 1].set_title(f"d) energy ({1e3 * result.vanished[1]:.1f} mJ turn back: invisible)")
+        panels.lettered(axes[0, 0], "a", columns[0][0])
+        panels.lettered(axes[0, 1], "b", columns[1][0])
+        panels.lettered(axes[1, 0], "c", "energy (hatched: heat turns back)")
+        panels.lettered(
+            axes[1, 1], "d", f"energy ({1e3 * result.vanished[1]:.1f} mJ turn back: invisible)"
+        )
         axes[0, 1].annotate(
             "all four $z_i$ together\ngrey: ± s(v) away from reversals",
             (0.97, 0.04),
@@ -247,12 +249,12 @@ def figure(result: Result) -> Figure:
 
 
 def _balance(ax: Axes, balance: Energy) -> None:
-    from plots.style import BLUE, INK, VERMILION, VERMILION_TINT
+    from plots.style import INK, LINE_GREY, PALE_GREY, TEXT_GREY
 
     for values, colour, dash, name in (
         (balance.work, INK, "-", "work of the motion"),
-        (balance.stored, BLUE, "--", "stored in the springs"),
-        (balance.heat, VERMILION, "-", "heat: work minus stored"),
+        (balance.stored, TEXT_GREY, "--", "stored in the springs"),
+        (balance.heat, LINE_GREY, "-", "heat: work minus stored"),
     ):
         ax.plot(balance.t, values, color=colour, linestyle=dash, linewidth=1.5, label=name)
     # Where more than 0.05 W turns back.
@@ -263,8 +265,8 @@ def _balance(ax: Axes, balance: Energy) -> None:
         1,
         where=falls,
         transform=ax.get_xaxis_transform(),
-        facecolor=VERMILION_TINT,
-        edgecolor=VERMILION,
+        facecolor=PALE_GREY,
+        edgecolor=LINE_GREY,
         linewidth=0.0,
         hatch="////",
         alpha=0.6,

@@ -202,9 +202,11 @@ def figure(result: Result) -> Figure:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    from plots.style import ELEMENT_COLOURS, ELEMENT_DASHES, PALE_GREY, RC, TEXT_GREY
+    from plots import panels
+    from plots.style import ELEMENT_DASHES, PALE_GREY, RC, TEXT_GREY, ramp
 
-    looks = list(zip(COUNTS, ELEMENT_COLOURS, ELEMENT_DASHES, strict=False))
+    colours = ramp("compared", len(COUNTS))
+    looks = list(zip(COUNTS, colours, ELEMENT_DASHES, strict=False))
     with rc_context(RC):
         sheet = Figure(figsize=(8.2, 6.8), layout="constrained")
         (loading, loop), (error, loss) = sheet.subplots(2, 2, height_ratios=(1.5, 1))
@@ -229,9 +231,9 @@ def figure(result: Result) -> Figure:
         loading.plot([], [], color=PALE_GREY, linewidth=6, label="smooth curve")
         loading.legend(loc="lower right", handlelength=3.2)
         loading.set(xlabel="x [µm]", ylabel="F [N]", xlim=(0, None), ylim=(0, None))
-        loading.set_title("a) first loading, signed law, $F_s$ = $F_c$")
+        panels.lettered(loading, "a", "first loading, signed law, $F_s$ = $F_c$")
         loop.set(xlabel="x [µm]", ylabel="F [N]")
-        loop.set_title(f"b) back and forth by {1e6 * SMALL:g} µm")
+        panels.lettered(loop, "b", f"back and forth by {1e6 * SMALL:g} µm")
         loop.annotate(
             "n = 1 and n = 2: no element slips,\na line and no loop",
             (0.03, 0.97),
@@ -246,8 +248,8 @@ def figure(result: Result) -> Figure:
         error.set_xticks(COUNTS, [str(n) for n in COUNTS])
         error.set_xticks([], minor=True)
         error.set(xlabel="elements n", ylabel="largest error [% of $F_c$]")
-        error.set_title("c) error of the first loading")
-        for n, colour, e in zip(COUNTS, ELEMENT_COLOURS, result.errors, strict=False):
+        panels.lettered(error, "c", "error of the first loading")
+        for n, colour, e in zip(COUNTS, colours, result.errors, strict=True):
             error.plot(n, 100 * e / F_c, "o", color=colour, markersize=7, zorder=3)
         _draw_losses(loss, result)
         sheet.suptitle(f"Lesson 5: {QUESTION}", x=0.01, ha="left", fontsize=12)
@@ -256,11 +258,12 @@ def figure(result: Result) -> Figure:
 
 def _draw_losses(ax: Axes, result: Result) -> None:
     """Draw the energy dissipated in the small loop over n."""
-    from plots.style import BLUE, INK, STATE_FILLS, TEXT_GREY
+    from plots import panels
+    from plots.style import INK, PALE_GREY, TEXT_GREY
 
     share = 100 * np.abs(result.losses) / smooth_loss(SMALL)
     places = np.arange(len(COUNTS))
-    ax.bar(places, share, width=0.6, facecolor=STATE_FILLS[0], edgecolor=BLUE)
+    ax.bar(places, share, width=0.6, facecolor=PALE_GREY, edgecolor=INK)
     ax.axhline(100, color=INK, linestyle="--", linewidth=0.9)
     for place, value in zip(places, share, strict=True):
         ax.annotate(
@@ -281,4 +284,4 @@ def _draw_losses(ax: Axes, result: Result) -> None:
     )
     ax.set_xticks(places, [str(n) for n in COUNTS])
     ax.set(xlabel="elements n", ylabel="energy per loop [%]", ylim=(0, 112))
-    ax.set_title("d) damping of the small loop")
+    panels.lettered(ax, "d", "damping of the small loop")

@@ -235,7 +235,7 @@ def figure(result: Result) -> Figure:
     from matplotlib.figure import Figure
 
     from plots import panels
-    from plots.style import BLUE, INK, LINE_GREY, RC, TEXT_GREY, TEXT_ORANGE, VERMILION
+    from plots.style import INK, LINE_GREY, RC, TEXT_GREY
 
     trace = result.portrait
     window = (30.0, 60.0)
@@ -243,11 +243,11 @@ def figure(result: Result) -> Figure:
         sheet = Figure(figsize=(8.2, 7.8), layout="constrained")
         axes = sheet.subplot_mosaic([["a", "a"], ["b", "b"], ["c", "d"]], height_ratios=(1, 0.9, 2))
         panels.velocity(axes["a"], trace, window=window)
-        axes["a"].set_title(f"a) velocity, pulled at {SPEED:g} m/s; {trace.model.title}")
+        panels.lettered(axes["a"], "a", f"velocity, pulled at {SPEED:g} m/s; {trace.model.title}")
         axes["a"].set_xlabel("")
         axes["a"].tick_params(labelbottom=False)
         panels.ribbons(axes["b"], trace, window=window)
-        axes["b"].set_title("b) states")
+        panels.lettered(axes["b"], "b", "states")
         loop = axes["c"]
         panels.portrait(loop, trace, window=window)
         v = np.linspace(0.0, 0.38, 400)
@@ -255,7 +255,7 @@ def figure(result: Result) -> Figure:
         assert curve is not None  # a GMS model has one
         steady = curve(v) + SIGMA_2 * v
         loop.plot(v, steady, color=LINE_GREY, linestyle="--", linewidth=1.2, zorder=1)
-        loop.set_title("c) friction over velocity")
+        panels.lettered(loop, "c", "friction over velocity")
         loop.set_ylim(0.6, 1.55)
         for text, place in (
             ("thrown forward →", (0.13, 1.31)),
@@ -281,8 +281,8 @@ def figure(result: Result) -> Figure:
         )
         curves = (
             ("period", result.waits + result.slips, "D-", INK, INK),
-            ("wait", result.waits, "o-", BLUE, BLUE),
-            ("slip", result.slips, "s--", VERMILION, TEXT_ORANGE),
+            ("wait", result.waits, "o-", TEXT_GREY, TEXT_GREY),
+            ("slip", result.slips, "s--", LINE_GREY, TEXT_GREY),
         )
         for name, times, look, colour, ink in curves:
             parts.loglog(V, times, look, color=colour, markersize=5)
@@ -294,6 +294,6 @@ def figure(result: Result) -> Figure:
         parts.set_yticks(ticks["y"], [f"{tick:g}" for tick in ticks["y"]])
         parts.minorticks_off()
         parts.set(xlabel="pulling speed V [m/s]", ylabel="time [s]", xlim=(0.009, 0.33))
-        parts.set_title("d) a cycle and its parts")
+        panels.lettered(parts, "d", "a cycle and its parts")
         sheet.suptitle(f"Lesson 6: {QUESTION}", x=0.01, ha="left", fontsize=12)
     return sheet

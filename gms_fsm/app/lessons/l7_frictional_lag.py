@@ -161,18 +161,20 @@ def figure(result: Result) -> Figure:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
+    from plots import panels
     from plots.style import (
-        ELEMENT_COLOURS,
         ELEMENT_DASHES,
         INK,
         LINE_GREY,
         PALE_GREY,
         RC,
         TEXT_GREY,
+        ramp,
     )
 
-    looks = list(zip(SHOWN, ELEMENT_COLOURS, ELEMENT_DASHES, strict=False))
-    colours = dict(zip(SHOWN, ELEMENT_COLOURS, strict=False))
+    shades = ramp("compared", len(SHOWN))
+    looks = list(zip(SHOWN, shades, ELEMENT_DASHES, strict=False))
+    colours = dict(zip(SHOWN, shades, strict=True))
     with rc_context(RC):
         sheet = Figure(figsize=(8.2, 4.8), layout="constrained")
         loops, widths = sheet.subplots(1, 2, width_ratios=(1.5, 1))
@@ -205,7 +207,7 @@ def figure(result: Result) -> Figure:
         loops.annotate("accelerating", (1.55, 1.235), color=TEXT_GREY)
         loops.annotate("decelerating", (0.75, 0.99), color=TEXT_GREY)
         loops.set(xlabel="v [mm/s]", ylabel="F [N]", ylim=(0.96, None))
-        loops.set_title(f"a) loops, {MODEL.title}")
+        panels.lettered(loops, "a", f"loops, {MODEL.title}")
         loops.legend(loc="upper right", handlelength=3.2)
 
         widths.semilogx(OMEGAS, 1e3 * result.widths, "-", color=LINE_GREY, zorder=1)
@@ -218,7 +220,7 @@ def figure(result: Result) -> Figure:
             "C/F$_c$", (C / STRIBECK.F_c, 4), (4, 0), textcoords="offset points", color=TEXT_GREY
         )
         widths.set(xlabel="w [rad/s]", ylabel=f"width at {1e3 * MEAN:g} mm/s [mN]", ylim=(0, 200))
-        widths.set_title("b) width of the loop")
+        panels.lettered(widths, "b", "width of the loop")
         ticks = (1, 3, 10, 30, 100, 300)
         widths.set_xticks(ticks, [str(tick) for tick in ticks])
         widths.minorticks_off()

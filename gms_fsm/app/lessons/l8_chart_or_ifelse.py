@@ -243,7 +243,7 @@ def figure(result: Result) -> Figure:
     from matplotlib.figure import Figure
 
     from plots import panels
-    from plots.style import BLUE, INK, RC, TEXT_GREY, VERMILION
+    from plots.style import INK, RC, REPORTED, TEXT_GREY
 
     log = result.chart.transitions
     first, arrest = float(log.t[0]), float(log.t[log.edge == "arrest"][0])
@@ -255,20 +255,20 @@ def figure(result: Result) -> Figure:
         force, residual, zoom, lateness = (axes[letter] for letter in "abcd")
         looks = (
             (result.chart, "chart, located", INK, "-"),
-            (result.ifelse_once, "if-else, once per step", VERMILION, "--"),
+            (result.ifelse_once, "if-else, once per step", TEXT_GREY, "--"),
         )
         for trace, name, colour, dash in looks:
             (line,) = panels.force(force, trace)
             line.set(color=colour, linestyle=dash, label=name, linewidth=1.4)
-        force.set_title(f"a) friction, {MODEL.title}")
+        panels.lettered(force, "a", f"friction, {MODEL.title}")
         force.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2)
         force.set_xlabel("")
         force.tick_params(labelbottom=False)
 
         panels.difference(residual, result.t, result.residual)
         residual.set(ylim=(1e-7, 30), xlim=(0, END))
-        residual.set_title("b) their difference")
-        residual.axhline(PAPERS, color=BLUE, linestyle="--", linewidth=0.9)
+        panels.lettered(residual, "b", "their difference")
+        residual.axhline(PAPERS, **REPORTED)
         for text, place, align in (
             ("the paper's $10^{-3}$ N", (0.3, 1.5 * PAPERS), "left"),
             ("spike at the\nbreak-away", (first + 0.25, 0.06), "left"),
@@ -280,9 +280,7 @@ def figure(result: Result) -> Figure:
                 "right",
             ),
         ):
-            residual.annotate(
-                text, place, ha=align, fontsize=8, color=BLUE if "paper" in text else TEXT_GREY
-            )
+            residual.annotate(text, place, ha=align, fontsize=8, color=TEXT_GREY)
 
         window = (first - 0.8e-3, first + 1.2e-3)
         for trace, _, colour, dash in looks:
@@ -290,9 +288,9 @@ def figure(result: Result) -> Figure:
             zoom.plot(1e3 * (part.t - first), part.F, color=colour, linestyle=dash, linewidth=1.6)
         rows = result.ifelse_once
         near = (rows.t > window[0]) & (rows.t < window[1]) & (rows.microstep == 0)
-        zoom.plot(1e3 * (rows.t[near] - first), rows.F[near], "o", color=VERMILION, markersize=5)
+        zoom.plot(1e3 * (rows.t[near] - first), rows.F[near], "o", color=TEXT_GREY, markersize=5)
         zoom.set(xlabel=f"t − {first:.4f} s [ms]", ylabel="F [N]", xlim=(-0.8, 1.2))
-        zoom.set_title("c) the break-away: late if once per step")
+        panels.lettered(zoom, "c", "the break-away: late if once per step")
         zoom.annotate(
             "dots: ends of steps",
             (0.97, 0.94),
@@ -311,18 +309,19 @@ def figure(result: Result) -> Figure:
 
 def _draw_lateness(ax: Axes, result: Result) -> None:
     """Draw the residual of a switch over its delay."""
-    from plots.style import BLUE, LINE_GREY, TEXT_GREY, VERMILION
+    from plots import panels
+    from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY
 
     times = np.geomspace(0.5 * result.late.min(), 2 * result.late.max(), 20)
     ax.loglog(1e3 * times, predicted(times, result.chart), color=LINE_GREY, zorder=1)
-    ax.loglog(1e3 * result.late, result.left, "o", color=VERMILION, markersize=5)
-    ax.axhline(PAPERS, color=BLUE, linestyle="--", linewidth=0.9)
+    ax.loglog(1e3 * result.late, result.left, "o", color=INK, markersize=5)
+    ax.axhline(PAPERS, **REPORTED)
     ax.annotate(
         f"the paper's $10^{{-3}}$ N:\n{1e3 * result.late_for_the_papers:.1f} ms late",
         (1e3 * times[0], PAPERS),
         (2, 4),
         textcoords="offset points",
-        color=BLUE,
+        color=TEXT_GREY,
         fontsize=8,
     )
     ax.annotate(
@@ -334,13 +333,13 @@ def _draw_lateness(ax: Axes, result: Result) -> None:
         fontsize=8,
     )
     ax.set(xlabel="delay of the switch [ms]", ylabel=f"difference at {LOOK:g} s [N]")
-    ax.set_title("d) residual of a late switch")
+    panels.lettered(ax, "d", "residual of a late switch")
 
 
 def _draw_held(over_time: Axes, over_period: Axes, result: Result) -> None:
     """Draw the residual of held outputs in the experiment of Fig. 3."""
     from plots import panels
-    from plots.style import BLUE
+    from plots.style import TEXT_GREY
 
     panels.lag_over_time(over_time, result.pushed, PAPERS_FORCE, window=(0.0, PUSHED_END))
     over_time.legend(loc="upper left")
@@ -351,10 +350,10 @@ def _draw_held(over_time: Axes, over_period: Axes, result: Result) -> None:
         xycoords=("axes fraction", "data"),
         textcoords="offset points",
         va="top",
-        color=BLUE,
+        color=TEXT_GREY,
         fontsize=8,
     )
-    over_time.set_title("e) outputs held for h, in Fig. 3")
+    panels.lettered(over_time, "e", "outputs held for h, in Fig. 3")
     panels.lag_over_period(
         over_period,
         result.pushed,
@@ -362,4 +361,4 @@ def _draw_held(over_time: Axes, over_period: Axes, result: Result) -> None:
         phases={"ramp": RAMP, "oscillation": OSCILLATION},
     )
     over_period.legend(loc="upper left", ncols=2)
-    over_period.set_title("f) the same at its largest, over h")
+    panels.lettered(over_period, "f", "the same at its largest, over h")

@@ -341,42 +341,45 @@ def figure(result: Result) -> Figure:
         )
         _draw_pulled(axes["a"], axes["c"], result)
         panels.ribbons(axes["b"], result.stiction)
-        axes["b"].set(yticklabels=["pad"], title="b) states with stiction")
+        axes["b"].set(yticklabels=["pad"])
+        panels.lettered(axes["b"], "b", "states with stiction")
         _draw_gear(axes["d"], result)
         _draw_pair(axes["e"], result.impact, MASSES, "v [m/s]", "centre of mass")
-        axes["e"].set_title("e) impact at a stop")
+        panels.lettered(axes["e"], "e", "impact at a stop")
         _draw_pair(axes["f"], result.clutch, INERTIAS, "speed [rad/s]", "mean by inertia")
-        axes["f"].set_title("f) a dog clutch closes")
+        panels.lettered(axes["f"], "f", "a dog clutch closes")
         sheet.suptitle(f"Lesson 9: {QUESTION}", x=0.01, ha="left", fontsize=12)
     return sheet
 
 
 def _draw_pulled(moving: Axes, before: Axes, result: Result) -> None:
-    from plots.style import BLUE, TEXT_ORANGE, VERMILION
+    from plots import panels
+    from plots.style import INK, TEXT_GREY
 
-    for trace, look, colour in ((result.stiction, "-", BLUE), (result.bristles, "--", VERMILION)):
+    for trace, look, colour in ((result.stiction, "-", INK), (result.bristles, "--", TEXT_GREY)):
         fine = trace.sample(np.linspace(0.0, trace.t[-1], 2001))
         moving.plot(fine.t, fine.v, look, color=colour)
         shown = fine.t <= result.released
         before.plot(fine.t[shown], 1e3 * fine.x[shown], look, color=colour)
     moving.set(ylabel="v [m/s]", xlim=(0, result.stiction.t[-1]))
     moving.tick_params(labelbottom=False)
-    moving.set_title(f"a) pulled mass; dashed: {bank().title}")
+    panels.lettered(moving, "a", f"pulled mass; dashed: {bank().title}")
     for text, height, colour in (
-        ("bank: the bristles yield", 0.6 * 1e3 * result.crept[1], TEXT_ORANGE),
-        ("stiction: x = 0", 1.0, BLUE),
+        ("bank: the bristles yield", 0.6 * 1e3 * result.crept[1], TEXT_GREY),
+        ("stiction: x = 0", 1.0, INK),
     ):
         before.annotate(text, (3.0, height), color=colour, fontsize=8)
     before.set(xlabel="t [s]", ylabel="x [mm]", xlim=(0, 8))
-    before.set_title("c) before stiction lets go")
+    panels.lettered(before, "c", "before stiction lets go")
 
 
 def _draw_gear(ax: Axes, result: Result) -> None:
-    from plots.style import BLUE, INK, LINE_GREY, TEXT_GREY
+    from plots import panels
+    from plots.style import INK, LINE_GREY, TEXT_GREY
 
     for begin, end in result.dead:
         ax.axvspan(begin, end, color=LINE_GREY, alpha=0.25, linewidth=0, zorder=0)
-    for name, look, colour in (("motor", "--", INK), ("load", "-", BLUE)):
+    for name, look, colour in (("motor", "--", TEXT_GREY), ("load", "-", INK)):
         body = result.gear.body(name)
         ax.plot(result.gear.t, body.x, look, color=colour, label=name)
     ax.axhline(0, color=LINE_GREY, linewidth=0.8, zorder=0)
@@ -391,18 +394,18 @@ def _draw_gear(ax: Axes, result: Result) -> None:
     )
     ax.legend(loc="upper right")
     ax.set(xlabel="t [s]", ylabel="angle [rad]", xlim=(0, 2 * PERIOD))
-    ax.set_title("d) gear with backlash; shaded: no contact")
+    panels.lettered(ax, "d", "gear with backlash; shaded: no contact")
 
 
 def _draw_pair(
     ax: Axes, trace: Trace, inertias: tuple[float, float], label: str, mean: str
 ) -> None:
     """Draw two velocities, and the mean weighted by inertia, which the contact cannot change."""
-    from plots.style import BLUE, LINE_GREY, VERMILION
+    from plots.style import INK, LINE_GREY, TEXT_GREY
 
     speeds = [trace.body(name).v for name in ("one", "two")]
-    ax.plot(trace.t, speeds[0], color=BLUE, label="one")
-    ax.plot(trace.t, speeds[1], "--", color=VERMILION, label="two")
+    ax.plot(trace.t, speeds[0], color=INK, label="one")
+    ax.plot(trace.t, speeds[1], "--", color=TEXT_GREY, label="two")
     ax.plot(
         trace.t,
         np.average(speeds, axis=0, weights=inertias),

@@ -1,4 +1,4 @@
-"""The paper's Fig. 1: a slider on n Maxwell elements, each a spring and a damper in parallel.
+"""Draw the paper's Fig. 1: a slider on n Maxwell elements, each a spring and a damper in parallel.
 
 When a row of a run is drawn, the deflections give the positions of the contacts: z_i is the
 distance that the slider has moved relative to the rest position of the contact.
@@ -6,29 +6,29 @@ distance that the slider has moved relative to the rest position of the contact.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
+from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError
 from gms_fsm.traces.trace import Trace, check_trace
 from plots._matplotlib import Artist, Axes, FancyArrowPatch, Figure, Rectangle, rc_context
+from plots._mechanical_symbols import damper_points, spring_points
 from plots.panels._shown import checked_row, scaled
 from plots.style import (
-    BLUE,
-    ELEMENT_COLOURS,
     INK,
     LINE_GREY,
     PALE_GREY,
     PANEL,
     PAPER,
     RC,
-    TEXT_GREEN,
-    TEXT_ORANGE,
-    VERMILION,
+    element_colour,
+    state_look,
 )
 
-__all__ = ["schematic", "schematic_figure"]
+__all__ = ["elements_at", "elements_figure"]
 
 ROW = 1.35  # height of one element
 WALL = 6.0  # position of the slider's face, to which springs and dampers are attached
@@ -37,18 +37,19 @@ SWING = 1.4  # displacement of a contact by the largest deflection of a run
 CONTACT = 0.5  # width of a contact
 GROUND = 0.36  # its extent below the middle of its row
 MOST = 12  # elements
+INCHES, TALLEST = 0.82, 10.2  # of one unit of height; of all of them, on a page of A4
 
 STIFFNESS = {"k": r"$k_{{{}}}$", "sigma_0": r"$\sigma_0$"}
 DAMPING = {"sigma": r"$\sigma_{{{}}}$", "sigma_1": r"$\sigma_1$"}
 
 
-def schematic(
+def elements_at(
     ax: Axes, trace: Trace | None = None, row: int = -1, elements: int = 4
 ) -> list[Artist]:
     """Draw a slider on Maxwell elements, deflected as in one row of a run.
 
-    A contact in the default state (stick) is filled and held by a peg; in another state (slip) it
-    is open, with an arrow in the direction in which the slider moves.
+    A contact in the default state (stick) is plain pale blue and held by a peg; in another state
+    (slip) it is hatched, with an arrow in the direction in which the slider moves.
 
     Parameters
     ----------
@@ -94,40 +95,23 @@ def schematic(
         if largest > 0:
             shift = SWING * np.nan_to_num(trace.z[row]) / largest
     for i in range(n):
-        drawn += _element(ax, ROW * (n - i - 0.5), i, WALL - REST - float(shift[i]), trace, row)
+        drawn += _element(ax, ROW * (n - i - 0.5), i, n, WALL - REST - float(shift[i]), trace, row)
     drawn += _slider(ax, n, trace, row)
     ax.set(xlim=(-0.7, WALL + 3.6), ylim=(-0.15, ROW * n + 0.15), aspect="equal")
     ax.set_axis_off()
     return drawn
 
 
-def schematic_figure(
-    trace: Trace | None = None, row: int = -1, elements: int = 4, *, title: str = ""
-) -> Figure:
-    """Draw the schematic as a figure.
-
-    Parameters
-    ----------
-    trace : Trace, optional
-        The run.
-    row : int
-        Row of the run.
-    elements : int
-        Number of elements drawn without a run.
-    title : str
-        Of the figure; with a run, the model, its law and the time are added.
-
-    Returns
-    -------
-    Figure
-        One panel.
-    """
+def elements_figure(trace: Trace | None, row: int, elements: int, title: str) -> Figure:
+    """Draw the elements as a figure; see `plots.mechanism.schematic_figure`."""
     with rc_context(RC):
         figure = Figure(layout="constrained")
         ax = figure.subplots()
-        schematic(ax, trace, row, elements)
+        elements_at(ax, trace, row, elements)
         n = elements if trace is None else trace.n
-        figure.set_size_inches(8.4, 0.4 + 0.82 * (ROW * n + 0.3))
+        rows = ROW * n + 0.3
+        scale = min(INCHES, TALLEST / rows)  # no taller than a page, with type of the same size
+        figure.set_size_inches(10.3 * scale, 0.4 + scale * rows)
         parts = [title] if title else []
         if trace is not None:
             parts += [trace.model.title, f"t = {trace.t[row]:.6g} s"]
@@ -137,37 +121,26 @@ def schematic_figure(
 
 
 def _element(
-    ax: Axes, y: float, i: int, contact: float, trace: Trace | None, row: int
+    ax: Axes, y: float, i: int, n: int, contact: float, trace: Trace | None, row: int
 ) -> list[Artist]:
     """Draw element i at height y, its contact at x = contact."""
-    colour = ELEMENT_COLOURS[i % len(ELEMENT_COLOURS)]
+    colour = element_colour(i, n)
     top, bottom = y + 0.22, y - 0.14
     left, right = contact + CONTACT / 2 + 0.2, WALL - 0.2
     look: dict[str, Any] = {"color": colour, "linewidth": 1.3, "solid_capstyle": "round"}
+    look["linestyle"] = "-"
     drawn: list[Artist] = []
     # Frames that connect spring and damper, at the contact and at the slider.
     for x, end in ((left, contact + CONTACT / 2), (right, WALL)):
         drawn += ax.plot([x, x], [bottom, top], **look)
         drawn += ax.plot([x, end], [y, y], **look)
-    turns = np.linspace(left + 0.25, right - 0.25, 15)
-    zigzag = top + 0.1 * np.array([0, *([1, -1] * 6), 1, 0])[: turns.size]
-    drawn += ax.plot([left, *turns, right], [top, *zigzag, top], gid=f"spring {i + 1}", **look)
-    # A dashpot: a rod and piston from the slider into a cup that opens towards it.
-    cup, piston = left + 0.35 * (right - left), left + 0.5 * (right - left)
-    mouth = left + 0.65 * (right - left)
-    strokes = (
-        [(left, bottom), (cup, bottom), (cup, bottom + 0.11), (mouth, bottom + 0.11)],
-        [(cup, bottom), (cup, bottom - 0.11), (mouth, bottom - 0.11)],
-        [(piston, bottom), (right, bottom)],
-        [(piston, bottom - 0.08), (piston, bottom + 0.08)],
-    )
-    # One line with gaps, so that a damper is a single artist.
-    points = [point for stroke in strokes for point in (*stroke, (np.nan, np.nan))]
-    drawn += ax.plot(*np.transpose(points[:-1]), gid=f"damper {i + 1}", **look)
+    spring, damper = spring_points(left, right, top), damper_points(left, right, bottom)
+    drawn += ax.plot(*spring.T, gid=f"spring {i + 1}", **look)
+    drawn += ax.plot(*damper.T, gid=f"damper {i + 1}", **look)
     names = _numbers(trace, i)
     middle = (left + right) / 2
     text: dict[str, Any] = {"ha": "center", "fontsize": 8, "color": INK}
-    drawn.append(ax.text(middle, top + 0.13, names[0], va="bottom", **text))
+    drawn.append(ax.text(middle, top + 0.16, names[0], va="bottom", **text))
     drawn.append(ax.text(middle, y - GROUND - 0.2, names[1], va="center", **text))
     drawn += _contact(ax, y, i, contact, trace, row)
     drawn += _deflection(ax, y, i, contact, trace, row)
@@ -210,34 +183,36 @@ def _contact(
         )
     ]
     ax.add_patch(drawn[0])  # type: ignore[arg-type]
-    drawn += ax.plot([low, high], [ground, ground], color=LINE_GREY, linewidth=0.9, zorder=1)
+    drawn += ax.plot([low, high], [ground, ground], "-", color=LINE_GREY, linewidth=0.9, zorder=1)
     chart = None if trace is None else trace.model.chart
     name = "stick" if trace is None else str(trace.states[row, i])
     held = chart is None or name == chart.default_state.name
     alone = chart is not None and not chart.transitions  # one state: neither stick nor slip
-    full = PALE_GREY if alone else BLUE
+    mode = 0 if chart is None else chart.state_index(name)
+    look = {"facecolor": PALE_GREY, "edgecolor": LINE_GREY} if alone else state_look(mode)
     box = Rectangle(
         (contact - CONTACT / 2, ground),
         CONTACT,
         GROUND + 0.22,
-        linewidth=1.4,
         zorder=3,
-        facecolor=full if held else PAPER,
-        edgecolor=full if held else VERMILION,
-        linestyle="-" if held else "--",
         gid=f"contact {i + 1}",
+        **(look | {"linewidth": 1.4}),
     )
     drawn.append(ax.add_patch(box))
-    colour = INK if trace is None or alone else TEXT_GREEN if held else TEXT_ORANGE
     label = f"E{i + 1}" if trace is None else f"E{i + 1} {name}"
-    drawn.append(ax.text(low - 0.15, y, label, ha="right", va="center", fontsize=8.5, color=colour))
+    drawn.append(ax.text(low - 0.15, y, label, ha="right", va="center", fontsize=8.5, color=INK))
     if held and not alone:  # a peg into the ground
         drawn += ax.plot(
-            [contact, contact], [ground + 0.1, ground - 0.16], color=INK, linewidth=2.0, zorder=4
+            [contact, contact],
+            [ground + 0.1, ground - 0.16],
+            "-",
+            color=INK,
+            linewidth=2.0,
+            zorder=4,
         )
     elif trace is not None and not held:
         way = 1.0 if trace.v[row] >= 0 else -1.0
-        drawn.append(_arrow(ax, (contact, y), (contact + 0.85 * way * CONTACT, y), VERMILION))
+        drawn.append(_arrow(ax, (contact, y), (contact + 0.85 * way * CONTACT, y), INK))
     return drawn
 
 
@@ -259,7 +234,8 @@ def _deflection(
     label = f"$z_{{{i + 1}}}$"
     if trace is not None:
         factor, unit = scaled(trace.z[row], "m")
-        label += f" = {factor * trace.z[row, i]:.3g} {unit}"
+        shown = factor * trace.z[row]
+        label += f" = {_signed(shown[i], _decimals(shown))} {unit}"
     if abs(contact - rest) > 0.15:
         drawn.append(_arrow(ax, (contact, height), (rest, height), INK, size=7))
     drawn.append(
@@ -268,6 +244,17 @@ def _deflection(
         )
     )
     return drawn
+
+
+def _decimals(values: FloatArray) -> int:
+    """Return how many decimals give the largest of some numbers three digits."""
+    largest = float(np.nanmax(np.abs(values), initial=0.0))
+    return max(0, 2 - math.floor(math.log10(largest))) if largest > 0.0 else 0
+
+
+def _signed(value: float, decimals: int) -> str:
+    """Write a number with a minus sign instead of a hyphen."""
+    return f"{value:.{min(decimals, 9)}f}".replace("-", "\N{MINUS SIGN}")
 
 
 def _slider(ax: Axes, n: int, trace: Trace | None, row: int) -> list[Artist]:
@@ -291,8 +278,8 @@ def _slider(ax: Axes, n: int, trace: Trace | None, row: int) -> list[Artist]:
     speed, push = "$v$", "$F$"
     if trace is not None:
         factor, unit = scaled(np.array([v]), "m/s")
-        speed += f" = {factor * v:.3g} {unit}"
-        push += f" = {F:.4g} N"
+        speed += f" = {_signed(factor * v, _decimals(np.array([factor * v])))} {unit}"
+        push += f" = {_signed(F, _decimals(np.array([F])))} N"
     edge = WALL + 0.9
     # v to the right is positive; positive friction pulls the slider to the left.
     for height, text, forward in (

@@ -1,0 +1,117 @@
+"""Pieces of block diagrams whose positions are given, in points: wires, corners, labels.
+
+Graphviz only draws what is placed here, so that every program that draws it gives the same sizes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import graphviz
+
+from plots.style import INK
+
+__all__ = ["PLACED", "THICK", "THIN", "Point", "caption", "draw_wire", "joint", "position", "sides"]
+
+Point = tuple[float, float]
+
+THIN, THICK = 1.1, 3.0  # lines of one value and of several
+PLACED = {
+    "layout": "neato",  # so that the DOT text is self-contained
+    "inputscale": "72",  # positions are points, not inches
+    "splines": "line",
+    "outputorder": "nodesfirst",
+    "pad": "0.2",
+}
+
+
+def caption(
+    graph: graphviz.Digraph, name: str, at: Point, text: str, width: float = 40, **look: str
+) -> None:
+    """Write a text, in the markup of Graphviz, around a place."""
+    # With this, Graphviz does not warn of a text that it takes to be larger than its room.
+    plain = {"shape": "plaintext", "fixedsize": "shape"} | sides((width, 18))
+    graph.node(name, f"<{text}>", id=name, pos=position(at), **(plain | look))
+
+
+def joint(
+    graph: graphviz.Digraph, name: str, at: Point, colour: str = INK, width: float = THIN
+) -> None:
+    """Draw a square of a wire's width where wires end or turn, so that corners have no notch."""
+    graph.node(
+        name,
+        "",
+        id=name,
+        pos=position(at),
+        shape="box",
+        style="filled",
+        fillcolor=colour,
+        peripheries="0",  # an outline would make it wider than its wire
+        **sides((width, width)),
+    )
+
+
+def draw_wire(
+    graph: graphviz.Digraph,
+    name: str,
+    start: str,
+    corners: Sequence[Point],
+    end: str,
+    *,
+    colour: str = INK,
+    arrow: str = "forward",
+    width: float = THIN,
+    tip: float = THIN,
+    kind: str = "wire",
+    style: str = "solid",
+) -> None:
+    """Draw a line from node to node with corners between them.
+
+    Parameters
+    ----------
+    graph : graphviz.Digraph
+        Where.
+    name : str
+        What ids of its parts begin with.
+    start, end : str
+        Nodes.
+    corners : sequence of (float, float)
+        Between them.
+    colour, style, kind : str
+        Of the line: colour, ``"solid"`` or ``"dashed"``, class in the SVG.
+    arrow : {"forward", "both", "none"}
+        Which ends have arrowheads.
+    width, tip : float
+        Of the line, and of its last piece.
+    """
+    stops = [start, *(f"{name}-corner{k}" for k in range(1, len(corners) + 1)), end]
+    for stop, corner in zip(stops[1:], corners, strict=False):  # the last stop is not a corner
+        joint(graph, stop, corner, colour, width)
+    for k, (here, there) in enumerate(pairwise(stops), start=1):
+        first, last = here == start, there == end
+        heads = {(True, True): "both", (True, False): "back", (False, True): "forward"}
+        shown = heads.get((first and arrow == "both", last and arrow != "none"), "none")
+        graph.edge(
+            here,
+            there,
+            id=f"{name}-{k}",
+            **{"class": kind},
+            color=colour,
+            penwidth=f"{tip if last else width:g}",
+            style=style,
+            # A line that ended at the side of a corner's square would leave a gap.
+            tailclip=str(first).lower(),
+            headclip=str(last).lower(),
+            dir=shown,
+        )
+
+
+def position(at: Point) -> str:
+    """Return a place as Graphviz reads it."""
+    return f"{at[0]:g},{at[1]:g}!"
+
+
+def sides(of: Point) -> dict[str, str]:
+    """Return width and height as attributes of a node."""
+    return {"width": f"{of[0] / 72:.4f}", "height": f"{of[1] / 72:.4f}"}

@@ -1,0 +1,163 @@
+"""Panels for many elements: deflections over thresholds as grey levels, and how many slip."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gms_fsm.traces.trace import Trace
+from plots._matplotlib import Axes, ListedColormap
+from plots._window import Window
+from plots.panels._axes import Artists, lanes, note, time_axis
+from plots.panels._shown import checked_elements, checked_window, has_threshold, shown
+from plots.presets import font, pt
+from plots.style import INK, PAPER, ramp
+
+__all__ = ["heat", "slipping"]
+
+COLUMNS = 900  # of the picture over time
+LEVELS = 256
+CROWDED = 40  # boundaries per lane that can be told apart
+
+
+def heat(
+    ax: Axes,
+    trace: Trace,
+    *,
+    window: Window | None = None,
+    elements: Sequence[int] | None = None,
+    bar: bool = True,
+) -> Artists:
+    """Draw |z| / s of each element as a row in grey levels, from white at 0 to ink at 1.
+
+    Parameters
+    ----------
+    ax : Axes
+        Axes to draw on.
+    trace : Trace
+        The run.
+    window : (float, float), optional
+        Time interval to show, s.
+    elements : sequence of int, optional
+        Which elements, counted from 0; by default all.
+    bar : bool
+        Add a colour bar.
+
+    Returns
+    -------
+    list of Artist
+        The picture, then a set of lines per element at the changes of its state. For a chart
+        without edges, or without the input s, there is no threshold, and only a note is drawn.
+
+    Examples
+    --------
+    >>> from plots._matplotlib import Figure
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    >>> run = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.2"), 3.0)
+    >>> picture, *boundaries = heat(Figure().subplots(), run)
+    >>> len(boundaries), picture.get_clim()
+    (4, (0.0, 1.0))
+    """
+    chosen = checked_elements(trace, elements)
+    if not has_threshold(trace):
+        missing = "input s" if trace.model.chart.transitions else "edges"
+        return [note(ax, f"no threshold:\nthis chart has no {missing}")]
+    begin, end = checked_window(trace, window)
+    part = shown(trace, (begin, end))
+    values = np.abs(part.z / part.s)[:, chosen]
+    edges = np.linspace(begin, end, COLUMNS + 1)
+    middles = (edges[1:] + edges[:-1]) / 2
+    rows = np.array([np.interp(middles, part.t, column) for column in values.T])
+    picture = ax.pcolormesh(
+        edges,
+        np.arange(len(chosen) + 1) + 0.5,
+        rows,
+        cmap=ListedColormap(ramp("heat", LEVELS)),
+        vmin=0.0,
+        vmax=1.0,
+        rasterized=True,
+    )
+    drawn: Artists = [picture]
+    log = trace.transitions
+    for row, i in enumerate(chosen):
+        times = log.t[(log.element == i) & (log.t >= begin) & (log.t <= end)]
+        if times.size > CROWDED:
+            times = times[:0]
+        ends = row + 0.58, row + 1.42
+        # White below ink, visible on every grey.
+        ax.vlines(times, *ends, color=PAPER, linewidth=pt(2.4))
+        drawn.append(ax.vlines(times, *ends, color=INK, linewidth=pt(0.9)))
+    lanes(ax, chosen)
+    time_axis(ax, begin, end)
+    if bar:
+        side = ax.inset_axes((1.015, 0.0, 0.02, 1.0))
+        scale = ax.figure.colorbar(picture, cax=side, ticks=[0, 0.5, 1], extend="max")
+        scale.set_label("|z| / s(v) [–]")
+        side.tick_params(length=2)
+    return drawn
+
+
+def slipping(
+    ax: Axes,
+    trace: Trace,
+    *,
+    window: Window | None = None,
+    elements: Sequence[int] | None = None,
+) -> Artists:
+    """Draw how many elements have left their default state.
+
+    Parameters
+    ----------
+    ax : Axes
+        Axes to draw on.
+    trace : Trace
+        The run.
+    window : (float, float), optional
+        Time interval to show, s.
+    elements : sequence of int, optional
+        Elements that are counted, from 0; by default all.
+
+    Returns
+    -------
+    list of Artist
+        One collection per number from 1, the line, and a text with the number at the end.
+
+    Examples
+    --------
+    >>> from plots._matplotlib import Figure
+    >>> from gms_fsm import GMS, GMSParameters, Prescribed, simulate
+    >>> run = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("0.2"), 3.0)
+    >>> slipping(Figure().subplots(), run)[-1].get_text()
+    'at the end 4 of 4 in slip'
+    """
+    chosen = checked_elements(trace, elements)
+    begin, end = checked_window(trace, window)
+    part = shown(trace, (begin, end))
+    chart, count = trace.model.chart, len(chosen)
+    default = chart.state_index(chart.default_state.name)
+    away = (part.modes[:, chosen] != default).sum(axis=1)
+    changes = np.flatnonzero(np.diff(away)) + 1
+    starts = part.t[np.concatenate([[0], changes])]
+    ends = np.concatenate([starts[1:], part.t[-1:]])
+    numbers = away[np.concatenate([[0], changes])]
+    shades = ramp("slipping", count + 1)
+    drawn: Artists = []
+    for number in range(1, count + 1):
+        now = numbers == number
+        pieces = np.column_stack([starts, ends - starts])[now & (ends > starts)]
+        drawn.append(ax.broken_barh(pieces.tolist(), (0, number), facecolor=shades[number]))
+    drawn += ax.step(part.t, away, where="post", color=INK, linewidth=pt(0.9))
+    ax.set(ylim=(0, 1.05 * count), ylabel=place_of(trace))
+    ax.set_yticks([0, count // 2, count] if count > 1 else [0, 1])
+    time_axis(ax, begin, end)
+    said = f"at the end {away[-1]} of {count} {place_of(trace)}"
+    return [*drawn, ax.set_title(said, loc="right", fontsize=font(8))]
+
+
+def place_of(trace: Trace) -> str:
+    """Return where an element is that has left its default state, for example "in slip"."""
+    chart = trace.model.chart
+    default = chart.default_state.name
+    others = [state.name for state in chart.states if state.name != default]
+    return f"in {others[0]}" if len(others) == 1 else f"not in {default}"

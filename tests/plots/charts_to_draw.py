@@ -1,0 +1,67 @@
+"""Charts that are hard to draw: many edges, self-loops, long guards; and random ones."""
+
+from __future__ import annotations
+
+import random
+
+from gms_fsm.charts.chart import Chart, State, Transition
+
+CLAUSES = (
+    "z - w * k > s * (1 + 0.5 * abs(v) / v_c)",
+    "abs(v) <= v_c * (1 + k * z)",
+    "z < 2 * s",
+    "v_hi < v",
+    "z * v > -0.25 * k * (s - w)",
+    "(v > 0 or w > v_c)",
+    "not (z <= -s and v > 0)",
+)
+FLOWS = ("0", "v - k * abs(v) * z / s", "-v")
+
+
+def guard(rng: random.Random, length: int) -> str:
+    """Return a guard of at least so many characters."""
+    text = rng.choice(CLAUSES)
+    while len(text) < length:
+        text += " and " + rng.choice(CLAUSES)
+    return text
+
+
+def random_chart(
+    seed: int, states: int, edges: int, *, loops: int = 0, longest: int = 60, least: int = 1
+) -> Chart:
+    """Return a chart with edges between any states, and loops at the last one."""
+    rng = random.Random(seed)
+    names = [f"state_{i + 1}" for i in range(states)]
+    ends = [(rng.choice(names), rng.choice(names)) for _ in range(edges)]
+    ends += [(names[-1], names[-1])] * loops
+    return Chart(
+        f"random chart {seed}",
+        inputs=("v", "s"),
+        variables=("z", "w"),
+        parameters=("k", "v_c", "v_hi"),
+        states=tuple(State(name, flow={"z": "v", "w": rng.choice(FLOWS)}) for name in names),
+        transitions=tuple(
+            Transition(
+                f"edge_{k}",
+                source,
+                target,
+                guard=guard(rng, rng.randint(least, longest)),
+                actions={"z": "s * sgn(v)"} if rng.random() < 0.2 else {},
+            )
+            for k, (source, target) in enumerate(ends)
+        ),
+        outputs={"F": "k * z"},
+    )
+
+
+def any_chart(seed: int) -> Chart:
+    """Return a chart of 1 to 12 states and 0 to 40 edges."""
+    rng = random.Random(seed)
+    return random_chart(
+        seed, rng.randint(1, 12), rng.choice([rng.randint(0, 12), rng.randint(0, 40)]), longest=140
+    )
+
+
+MANY_EDGES = random_chart(1, 12, 40)
+THREE_LOOPS = random_chart(2, 3, 4, loops=3)
+LONG_GUARDS = random_chart(3, 3, 5, longest=150, least=120)

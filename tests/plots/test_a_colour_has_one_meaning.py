@@ -1,0 +1,165 @@
+"""A colour has one meaning: all are roles of `plots.style`, in the docs, readable in grey."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from itertools import combinations, pairwise
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("matplotlib")
+
+import plots
+from plots import style
+from plots.style import CHART_THEMES, PAGE_THEMES, ROLES, Theme, ramp
+from tests.plots.vision import contrast, deuteranopia, luminance
+
+THEMES: tuple[Theme, ...] = ("light", "dark")
+PACKAGE = Path(plots.__file__).parent
+DOCS = Path(__file__).parents[2] / "docs" / "colours.md"
+# Hexadecimal, or a named or numbered colour of matplotlib or CSS where a colour is expected.
+HEXADECIMAL = re.compile(r"(?<!&)#(?:[0-9a-fA-F]{6}|[0-9a-fA-F]{3})\b(?![\w-])")
+NAMED = re.compile(
+    r"""(?:colou?rs?|facecolor|edgecolor|fill|stroke|fillStyle|strokeStyle)["']?\s*[=:]\s*\[?["']"""
+    r"(?:tab:\w+|C\d|0?\.\d+|white|black|red|blue|green|gr[ae]y|orange|purple)"
+)
+CSS_NAMED = re.compile(r"(?:color|fill|stroke|background)\s*:\s*(?:white|black|red|blue|gr[ae]y)\b")
+
+
+def sources() -> Iterable[Path]:
+    found = [path for path in PACKAGE.rglob("*") if path.suffix in {".py", ".css", ".js", ".html"}]
+    assert len(found) > 50
+    return (path for path in found if path.name != "style.py")
+
+
+@pytest.mark.parametrize("pattern", [HEXADECIMAL, NAMED, CSS_NAMED], ids=["hex", "named", "css"])
+def test_no_other_module_has_colours(pattern: re.Pattern[str]) -> None:
+    found = [
+        f"{path.relative_to(PACKAGE)}: {match[0]}"
+        for path in sources()
+        for match in pattern.finditer(path.read_text(encoding="utf-8"))
+    ]
+    assert not found
+
+
+def test_the_patterns_find_colours() -> None:
+    assert HEXADECIMAL.search('color="#0072B2"')
+    assert HEXADECIMAL.search("fill: #fff;")
+    assert not HEXADECIMAL.search("url(#hatch0)")
+    assert NAMED.search('ax.plot(x, color="0.6")')
+    assert CSS_NAMED.search("color: white")
+
+
+def test_the_docs_list_every_role() -> None:
+    rows = [
+        f"| {role.name} | {_listed(role.light)} | {_listed(role.dark)} | {role.meaning} |"
+        for role in ROLES.values()
+    ]
+    text = DOCS.read_text(encoding="utf-8").splitlines()
+    assert [line for line in text if line.startswith("| ")][1:] == rows
+
+
+def _listed(colours: Iterable[str]) -> str:
+    return " ".join(f"`{each}`" for each in colours)
+
+
+@pytest.mark.parametrize("theme", THEMES)
+def test_no_two_meanings_share_a_hue(theme: Theme) -> None:
+    """Greys recur: a hatch, a dash or a sign distinguishes them. Colours do not."""
+    families = {
+        "blue": {"active", "active fill", "states", "hatches", "slipping"},
+        "orange": {"now", "now text", "now fill"},
+        "purple": {"elements"},
+        "green": {"holds"},
+    }
+    for name, role in ROLES.items():
+        for colour in role.colours(theme):
+            hue = _hue(colour)
+            if hue is None:
+                assert not any(name in family for family in families.values()), name
+            else:
+                assert name in families[hue], (name, colour)
+
+
+def _hue(colour: str) -> str | None:
+    """Return the family of a colour; None if it is a grey."""
+    import colorsys
+
+    parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    hue, light, saturation = colorsys.rgb_to_hls(*parts)
+    if saturation * (1 - abs(2 * light - 1)) < 0.08 and not (light > 0.85 and saturation > 0.4):
+        return None
+    degrees = 360 * hue
+    ends = {"orange": (5, 50), "green": (140, 175), "blue": (190, 230), "purple": (255, 290)}
+    return next(name for name, (low, high) in ends.items() if low <= degrees <= high)
+
+
+@pytest.mark.parametrize("theme", THEMES)
+@pytest.mark.parametrize("name", [role.name for role in ROLES.values() if role.least > 1])
+def test_lines_and_texts_have_contrast(name: str, theme: Theme) -> None:
+    ground = style.colour("paper", theme)
+    grounds = [ground]
+    if ROLES[name].kind == "text" and name not in ("now text", "active"):
+        grounds += [style.colour(each, theme) for each in ("panel", "chosen")]
+    if name in ("ink", "now text"):
+        grounds.append(style.colour("now fill", theme))
+    if name in ("ink", "active"):
+        grounds += ROLES["states"].colours(theme)[: 1 if name == "active" else None]
+    least = 3.0 if name == "active" else ROLES[name].least  # text in blue stands on paper only
+    for colour in (
+        ramp(name, 12, theme) if len(ROLES[name].light) > 1 else ROLES[name].colours(theme)
+    ):
+        assert contrast(colour, ground) >= ROLES[name].least
+        assert all(contrast(colour, each) >= least for each in grounds), (colour, grounds)
+
+
+@pytest.mark.parametrize("theme", THEMES)
+def test_states_differ_in_grey(theme: Theme) -> None:
+    page = PAGE_THEMES[theme]
+    for one, other in combinations(page.fills, 2):
+        assert contrast(one, other) >= 1.15
+    # The first two are in nearly every picture.
+    assert contrast(page.fills[0], page.fills[1]) >= 1.4
+    for fill, hatch in zip(page.fills, page.hatches, strict=True):
+        assert contrast(fill, hatch) >= 3.0
+
+
+@pytest.mark.parametrize("theme", THEMES)
+@pytest.mark.parametrize("name", ["elements", "slipping", "heat"])
+def test_scales_are_monotone_for_every_eye(name: str, theme: Theme) -> None:
+    steps = ramp(name, 25, theme)
+    for seen in (steps, [deuteranopia(each) for each in steps]):
+        values = [luminance(each) for each in seen]
+        changes = [b - a for a, b in pairwise(values)]
+        assert all(c > 0 for c in changes) or all(c < 0 for c in changes)
+    few = ramp(name, 5, theme)
+    assert all(contrast(a, b) >= 1.25 for a, b in pairwise(few))
+
+
+def test_families_stay_apart_for_deuteranopes() -> None:
+    """What cannot be told by shape alone: now against elements and states, at equal places."""
+    now = deuteranopia(style.colour("now"))
+    for name in ("active", "elements"):
+        for other in ROLES[name].light:
+            assert _distance(now, deuteranopia(other)) > 60
+
+
+def _distance(one: str, other: str) -> float:
+    a, b = ([int(each[k : k + 2], 16) for k in (1, 3, 5)] for each in (one, other))
+    return float(sum((x - y) ** 2 for x, y in zip(a, b, strict=True)) ** 0.5)
+
+
+def test_themes_are_the_roles() -> None:
+    known = {
+        theme: {c for role in ROLES.values() for c in role.colours(theme)}
+        | set(ramp("elements", style.ELEMENT_STEPS, theme))
+        | set(ramp("slipping", 7, theme))
+        for theme in THEMES
+    }
+    for theme in THEMES:
+        used = set(vars(CHART_THEMES[theme]).values())
+        for value in vars(PAGE_THEMES[theme]).values():
+            used |= {value} if isinstance(value, str) else set(value)
+        assert used <= known[theme]

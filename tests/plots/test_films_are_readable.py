@@ -1,0 +1,194 @@
+"""A film shows what happens: the fired edge, the micro-step, bristles that move with the run.
+
+All texts have room and a size of at least 7 points, also for 12 elements; every chart has a film.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+from functools import cache
+from itertools import combinations, pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("matplotlib", reason="films need the extra 'plots'")
+
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
+
+from gms_fsm import LivelockError, PulledSlider, Trace, simulate
+from gms_fsm.charts.registry import entry
+from plots.film._movie import Movie
+from plots.film._pace import Frame
+from plots.style import CHART_THEMES
+from tests.charts.test_registry_finds_what_is_there import every, mounted
+from tests.helpers import bank, open_loop, stick_slip
+from tests.plots.films import count, with_movie
+
+pytestmark = pytest.mark.slow
+LABEL = re.compile(r"E\d+ (stick|slip)")  # of a bristle
+
+
+@pytest.fixture(autouse=True)
+def _graphviz() -> None:
+    if shutil.which("dot") is None:
+        pytest.importorskip("pygraphviz", reason="drawing needs Graphviz, program or package")
+
+
+@cache
+def cascade() -> Trace:
+    return simulate(stick_slip("published"), open_loop(), 8.0)
+
+
+@pytest.mark.parametrize("elements", [None, [2]], ids=["all", "one"])
+@pytest.mark.parametrize("theme", CHART_THEMES)
+def test_the_fired_edge_is_lit_and_fades(
+    theme: str, elements: list[int] | None, tmp_path: Path
+) -> None:
+    """Beside the cursor, nothing but the edge, its contact and the number is orange."""
+    orange = CHART_THEMES[theme].fired
+
+    def use(movie: Movie) -> tuple[list[int], tuple[Frame, ...]]:
+        return [count(picture, orange) for picture in movie.pictures()], movie.film.pace.frames
+
+    options = {"t_start": 3.3, "t_end": 5.0, "frames": 60, "theme": theme, "elements": elements}
+    seen, frames = with_movie(cascade(), tmp_path, use, **options)
+    plain = [n for n, frame in zip(seen, frames, strict=True) if not frame.fired]
+    wanted = {2} if elements else {0, 1, 2, 3}
+    for n, frame in zip(seen, frames, strict=True):
+        element = cascade().transitions.element[frame.entry]
+        if frame.entry >= 0 and element in wanted:
+            assert n > max(plain) + 100
+    last = max(k for k, frame in enumerate(frames) if frame.entry >= 0)
+    assert seen[last + 4] in range(min(plain), max(plain) + 1)
+
+
+def test_the_texts_say_what_happens(tmp_path: Path) -> None:
+    def use(movie: Movie) -> list[list[str]]:
+        said = []
+        for frame in movie.film.pace.frames:
+            movie.film.show(frame)
+            said.append([text.get_text() for text in movie.film.texts])
+        return said
+
+    said = with_movie(cascade(), tmp_path, use, t_start=3.3, t_end=5.0, frames=60)
+    assert {title for title, _, _ in said} == {"GMS, 4 elements, published law"}
+    assert [note for _, _, note in said if note][::7][:4] == [
+        f"micro-step {k} of 4: E{k} break_away_forward, stick → slip" for k in range(1, 5)
+    ]
+    marks = {clock.partition(" N")[2].strip() for _, clock, _ in said}
+    assert marks == {"", "slowed ×4", "held"}
+
+
+def test_the_chart_counts_the_elements_in_each_state(tmp_path: Path) -> None:
+    def use(movie: Movie) -> list[set[str]]:
+        said = []
+        for frame in movie.film.pace.frames:
+            movie.film.chart.paint(frame)
+            texts = {node.text or "" for node in movie.film.chart.root.iter("text")}
+            said.append({text for text in texts if " of " in text})
+        return said
+
+    said = with_movie(cascade(), tmp_path, use, t_start=3.3, t_end=5.0, frames=60)
+    order = [tuple(sorted(each)) for each in said]
+    assert list(dict.fromkeys(order)) == [
+        ("0 of 4", "4 of 4"),
+        ("1 of 4", "3 of 4"),
+        ("2 of 4",),
+    ]
+    assert order[0] == order[-1]
+
+
+def test_contacts_that_stick_stay_on_the_ground(tmp_path: Path) -> None:
+    """A contact moves by -scale * dz, the ground by -scale * dx; both are equal while it sticks."""
+
+    def use(movie: Movie) -> None:
+        bristles = movie.film.bristles
+        for before, after in pairwise(movie.film.pace.frames):
+            places = []
+            for frame in (before, after):
+                bristles.show(frame)
+                at = np.array([contact.get_x() for contact in bristles.contacts])
+                ends = np.array([spring.get_xdata()[0] for spring in bristles.springs])
+                assert np.allclose(ends - at, ends[0] - at[0])
+                assert (ends < bristles.wall).all()
+                places.append(at)
+            moved = places[1] - places[0]
+            ground = -bristles.scale * (movie.film.trace.x[[before.row, after.row]] @ [-1, 1])
+            for i in range(4):
+                states = movie.film.trace.states[[before.row, after.row], i]
+                if set(states) == {"stick"}:
+                    assert moved[i] == pytest.approx(ground, abs=1e-6)
+
+    with_movie(cascade(), tmp_path, use, t_start=3.3, t_end=5.0, frames=60)
+
+
+@cache
+def pulled(n: int) -> Trace:
+    return simulate(bank(n), PulledSlider(mass=1.0, stiffness=2.0, speed=0.1), 20.0)
+
+
+def boxes(movie: Movie) -> list[tuple[str, float, Bbox]]:
+    """Return the texts outside the chart, and the chart as a whole."""
+    film = movie.film
+    chart = {id(part.artist) for part in film.parts}
+    unseen = set()  # labels of ticks beyond the ends of an axis exist, but are not drawn
+    for axis in (axis for ax in film.figure.axes for axis in (ax.xaxis, ax.yaxis)):
+        low, high = sorted(axis.get_view_interval())
+        for tick in axis.get_major_ticks():
+            if not low <= tick.get_loc() <= high:
+                unseen |= {id(tick.label1), id(tick.label2)}
+    found, inside = [], []
+    renderer = film.canvas.get_renderer()
+    for text in film.figure.findobj(Text):
+        assert isinstance(text, Text)
+        if id(text) in unseen or not text.get_visible() or not text.get_text().strip():
+            continue
+        box = text.get_window_extent(renderer)
+        if id(text) in chart:
+            assert text.get_fontsize() >= 7
+            inside.append(box)
+        else:
+            found.append((text.get_text(), float(text.get_fontsize()), box))
+    return [*found, ("the chart", 10.0, Bbox.union(inside))]
+
+
+@pytest.mark.parametrize("n", [1, 4, 12, 24])
+def test_texts_have_room(n: int, tmp_path: Path) -> None:
+    def use(movie: Movie) -> None:
+        held = movie.held()
+        for number in (0, held[0], held[-1], movie.frames - 1):
+            picture = movie.picture(number)
+            found = boxes(movie)
+            assert sum(bool(LABEL.fullmatch(text)) for text, _, _ in found) == n
+            for text, size, box in found:
+                assert size >= 7, text
+                assert box.x0 >= 0, text
+                assert box.y0 >= 0, text
+                assert box.x1 <= picture.size[0], text
+                assert box.y1 <= picture.size[1], text
+            for (a, _, first), (b, _, second) in combinations(found, 2):
+                assert not first.overlaps(second), (a, b)
+
+    with_movie(pulled(n), tmp_path, use, frames=120)
+
+
+@pytest.mark.parametrize(("name", "law"), every())
+def test_every_chart_has_a_film(name: str, law: str, tmp_path: Path) -> None:
+    try:
+        run = simulate(*mounted(entry(name), law), 2.0)
+    except LivelockError as error:
+        assert entry(name).wrong
+        run = error.trace
+    trace = run.contact(run.contacts[0])
+
+    def use(movie: Movie) -> int:
+        found = boxes(movie)
+        pictures = list(movie.pictures())
+        assert all(size >= 7 for _, size, _ in found)
+        return len(pictures)
+
+    assert with_movie(trace, tmp_path, use, frames=6) == 6

@@ -1,0 +1,127 @@
+"""A handout is one A4 page: chart, equations, every parameter with its unit, and a loop."""
+
+from __future__ import annotations
+
+import re
+import zlib
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")
+pytest.importorskip("pygraphviz", reason="charts need Graphviz, extra 'render'")
+
+from matplotlib import rc_context
+
+import plots
+from gms_fsm.charts.registry import registered
+from gms_fsm.errors import ParameterError
+from gms_fsm.systems.models import Model, demonstration
+from plots._excitation import excited
+from plots._handout import PAGE, SMALLEST, handout_figure
+from plots._svg_artists import EXACT
+from tests.helpers import bank, stick_slip
+from tests.plots.printed import drawn_texts, problems
+from tests.plots.systems_to_draw import SCENARIOS
+from tests.scenario_files import CommandLine
+
+ZOO = [
+    (name, law)
+    for name, each in registered().items()
+    if not each.wrong and name != "planar-coulomb"  # no model: it has two velocities
+    for law in each.laws or ("",)
+]
+
+
+MONO = "DejaVu Sans Mono"
+
+
+def checked(model: Model) -> set[str]:
+    """Check a page, and return its texts."""
+    figure = handout_figure(model)
+    assert tuple(72 * figure.get_size_inches()) == pytest.approx(PAGE)
+    with rc_context(EXACT):
+        drawn = drawn_texts(figure)
+        formulas = [t for t, _ in drawn if t.axes is not None and t.get_family() == [MONO]]
+        index = 0.7 * Counter(t.get_fontsize() for t in formulas).most_common(1)[0][0]
+        found = problems(figure, SMALLEST)
+    assert [each for each in found if not each.startswith(f"{index:.6f}"[:6])] == []
+    texts = [text.get_text() for text, _ in drawn]
+    for each in model.chart.parameters:
+        assert each.name in texts
+        assert (each.unit or "–") in texts
+    assert {"Equations", "Parameters", "Hysteresis", model.title} <= {*texts}
+    return {*texts}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "law"), ZOO)
+def test_charts_of_the_zoo(name: str, law: str) -> None:
+    chart = registered()[name].chart(law)
+    texts = checked(demonstration(registered()[name], law))
+    assert chart.reference.split()[0] in " ".join(texts)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [1, 2, 7, 12])
+def test_banks(n: int) -> None:
+    texts = checked(bank(n))
+    assert {"N/m", "F_s", "v_s", "sigma_2"} <= texts
+    assert any("law" in text for text in texts)
+    assert any(text.startswith("x(t) = A sin(2πt/T), A = ") for text in texts)
+
+
+@pytest.mark.slow
+def test_the_file_has_one_page_of_a4(tmp_path: Path) -> None:
+    path = plots.handout(stick_slip("signed"), tmp_path / "a4.pdf")
+    content = path.read_bytes()
+    assert len(re.findall(rb"/Type /Page\b", content)) == 1
+    (box,) = re.findall(rb"/MediaBox \[ ?0 0 ([\d.]+) ([\d.]+) ?\]", content)
+    assert [float(each) for each in box] == pytest.approx(PAGE, abs=0.1)
+    drawn = b"".join(
+        zlib.decompressobj().decompress(each)
+        for each in re.findall(rb"stream\r?\n(x.*?)\r?\nendstream", content, re.DOTALL)
+    )
+    assert drawn.count(b" Tj") + drawn.count(b" TJ") > 60  # text, no outlines
+    assert b"/Subtype /Image" not in content
+
+
+@pytest.mark.slow
+def test_at_the_command_line(gms_fsm: CommandLine) -> None:
+    assert gms_fsm("handout", "maxwell-slip", "-o", "a.svg").out == "a.svg\n"
+    assert "handout gms needs --law" in gms_fsm("handout", "gms").err
+    assert "in the plane" in gms_fsm("handout", "planar-coulomb").err
+
+
+@pytest.mark.slow
+def test_contacts_of_a_system(gms_fsm: CommandLine) -> None:
+    file = str(SCENARIOS / "two_blocks_on_a_belt.toml")
+    assert gms_fsm("handout", file).err.endswith(
+        "it has the contacts 'pad_1', 'pad_2'; give --contact pad_1\n"
+    )
+    assert gms_fsm("handout", file, "--contact", "pad_2", "-o", "b.svg").out == "b.svg\n"
+    assert "has no contacts" in gms_fsm("handout", "karnopp", "--contact", "pad_2").err
+
+
+@pytest.mark.slow
+def test_a_large_chart_is_a_matrix() -> None:
+    """Its letters would be too small otherwise; an index may be smaller than other texts."""
+    figure = handout_figure(demonstration(registered()["modelica"], ""))
+    texts = {text.get_text() for text, _ in drawn_texts(figure)}
+    assert any(text.startswith("from ↓") for text in texts)
+
+
+def test_a_model_without_a_length_moves_visibly() -> None:
+    assert (
+        ", A = 0.1 m, " in excited(demonstration(registered()["dog-clutch"], ""), None, None).about
+    )
+
+
+@pytest.mark.slow
+def test_a_motion_of_ones_own() -> None:
+    model = stick_slip("signed")
+    figure = handout_figure(model, velocity="0.1*cos(t)", t_end=7.0)
+    assert "v(t) = 0.1*cos(t) m/s" in [text.get_text() for text, _ in drawn_texts(figure)]
+    with pytest.raises(ParameterError, match="velocity and t_end belong together"):
+        handout_figure(model, velocity="0.1")
