@@ -296,8 +296,10 @@ class _Writer:
         if op in _BINDS:
             binds = _BINDS[op]
             a, b = expr.operands
-            # The right operand in brackets at equal rank: nothing may be reassociated.
-            return f"{self.value(a, binds)} {op} {self.value(b, binds + 1)}", binds
+            # The right operand in brackets at equal rank: nothing may be reassociated. Comparisons
+            # of comparisons in brackets, as compilers advise.
+            least = max(binds, 7) if binds < 8 else binds
+            return f"{self.value(a, least)} {op} {self.value(b, least + 1)}", binds
         if op in ("&", "|", "^", "<<", ">>"):
             a_text, b_text = (self.value(each, _UNARY) for each in expr.operands)
             return f"{a_text} {op} {b_text}", 4

@@ -241,7 +241,7 @@ def test_where_the_run_ends_with_a_firing_no_step_is_promised() -> None:
         ),
         ("print state(1) == STATIC", "true"),
         ("print not state( 1 ) != Static and v < 1", "true"),
-        ("until state(1)==Rising", "row 10"),
+        ("until state(1)==Rising", "row 11"),
         ("poke state1=KINETIC", "branch 1, from branch 0: state 1 = kinetic"),
         ("why Break_away", "element 1 is in static"),
         ("break Risen", "error: no edge or state 'Risen'; edges: break_away"),

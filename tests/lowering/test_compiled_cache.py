@@ -328,7 +328,7 @@ def _name(rig: Prescribed = OPEN_LOOP, elements: int = 4, **options: Any) -> str
     model = ChartModel(stick_slip("signed").chart, values, n=elements, stribeck=CURVE)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(compiled, "store", lambda: store)
-        patch.setattr(_compiled_run, "_engines", {})
+        patch.setattr(_compiled_run, "_known", {})
         with pytest.raises(LookupError):
             simulate(model, rig, 1.0, engine="compiled", **options)
     return store.asked[0]

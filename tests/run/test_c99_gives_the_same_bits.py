@@ -64,7 +64,7 @@ def by_c(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
             return ctypes.addressof(ctypes.c_void_p.in_dll(self.library, name))
 
     monkeypatch.setattr(compiled, "store", lambda: None)
-    monkeypatch.setattr(_compiled_run, "_engines", {})
+    monkeypatch.setattr(_compiled_run, "_known", {})
     monkeypatch.setattr(machine, "llvm_text", c99_text)
     monkeypatch.setattr(machine, "Library", Library)
     monkeypatch.setattr(objects, "compiled", built)
