@@ -149,7 +149,8 @@ class Layout:
         )
         if part.width is not None and not variable:
             dims = dims[0], Const("i", part.width)
-        self.columns.append(_Place(way, start, part.kind, None, lengths, part.width or 0))
+        width = 0 if variable else part.width or 0
+        self.columns.append(_Place(way, start, part.kind, None, lengths, width))
         self.words += 1 + lengths
         return Array(part.kind, dims, Load("p", Address(block, 8 * start)))
 

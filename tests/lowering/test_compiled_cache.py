@@ -167,6 +167,7 @@ def observe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], boo
 
     def once() -> bool:
         said.clear()
+        monkeypatch.setattr(compiled, "_observers", {})
         rows = np.array([2.0]), np.array([y]), np.array([mode])
         assert compiled.observe_rows(program, *rows).tolist() == [wanted]
         return bool(said)
