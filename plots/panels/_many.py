@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Axes, ListedColormap
@@ -134,9 +135,8 @@ def slipping(
     chosen = checked_elements(trace, elements)
     begin, end = checked_window(trace, window)
     part = shown(trace, (begin, end))
-    chart, count = trace.model.chart, len(chosen)
-    default = chart.state_index(chart.default_state.name)
-    away = (part.modes[:, chosen] != default).sum(axis=1)
+    count = len(chosen)
+    away = counted_away(part, chosen)
     changes = np.flatnonzero(np.diff(away)) + 1
     starts = part.t[np.concatenate([[0], changes])]
     ends = np.concatenate([starts[1:], part.t[-1:]])
@@ -153,6 +153,15 @@ def slipping(
     time_axis(ax, begin, end)
     said = f"at the end {away[-1]} of {count} {place_of(trace)}"
     return [*drawn, ax.set_title(said, loc="right", fontsize=font(8))]
+
+
+def counted_away(trace: Trace, elements: Sequence[int]) -> NDArray[np.int64]:
+    """Return how many of some elements have left their default state, shape (rows,)."""
+    chart = trace.model.chart
+    counts: NDArray[np.int64] = (
+        trace.modes[:, elements] != chart.state_index(chart.default_state.name)
+    ).sum(axis=1)
+    return counts
 
 
 def place_of(trace: Trace) -> str:

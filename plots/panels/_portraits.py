@@ -13,7 +13,7 @@ from gms_fsm.traces.trace import Trace
 from plots._matplotlib import Axes, BoundaryNorm, LineCollection, ListedColormap
 from plots._window import Window
 from plots.panels._axes import VECTOR_ROWS, Artists, draw_curve, log_axis
-from plots.panels._many import place_of
+from plots.panels._many import counted_away, place_of
 from plots.panels._shown import checked_elements, scaled, shown
 from plots.presets import pt, to_scale
 from plots.style import INK, LINE_GREY, TEXT_GREY, ramp
@@ -35,8 +35,7 @@ def _by_slipping(
     ax: Axes, x: NDArray[np.float64], trace: Trace, chosen: Sequence[int]
 ) -> LineCollection:
     """Draw F against x in pieces, coloured by how many elements have left their default state."""
-    default = trace.model.chart.state_index(trace.model.chart.default_state.name)
-    away = (trace.modes[:, chosen] != default).sum(axis=1)
+    away = counted_away(trace, chosen)
     points = np.column_stack([x, trace.F])
     # A piece has one colour; the next piece begins where it ends.
     cuts = np.concatenate([[0], np.flatnonzero(np.diff(away)) + 1, [len(points)]])
