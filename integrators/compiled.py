@@ -71,6 +71,7 @@ class Rows(NamedTuple):
     mode: Any
     live: Any
     p: Any
+    seen: Any
     table: Any
 
 
@@ -372,13 +373,16 @@ def example(functions: Functions, machines: Machines, b: Buffers, observed: int,
     return Run(functions, machines, b._replace(plan=plan, out=out), log, recorded)
 
 
-def each_row(observe: Any, t: Any, y: Any, mode: Any, live: Any, p: Any, table: Any) -> int:
+def each_row(observe: Any, t: Any, y: Any, mode: Any, live: Any, p: Any, seen: Any, table: Any,
+             start: int) -> int:  # fmt: skip
     """Observe many rows.
 
     Parameters
     ----------
-    observe, t, y, mode, live, p, table
-        See `observer`; the table is filled.
+    observe, t, y, mode, live, p, seen, table
+        See `observer`; the table is filled with the observed values of each row, from one on.
+    start : int
+        The place of the first observed value that is kept.
 
     Returns
     -------
@@ -386,7 +390,10 @@ def each_row(observe: Any, t: Any, y: Any, mode: Any, live: Any, p: Any, table: 
         Their number.
     """
     for row in range(len(t)):
-        observe(t[row], y[row], mode[row], live, p, table[row])
+        observe(t[row], y[row], mode[row], live, p, seen)
+        kept = table[row]
+        for k in range(len(kept)):
+            kept[k] = seen[start + k]
     return len(t)
 
 
@@ -418,7 +425,7 @@ def observer(
     Returns
     -------
     Engine
-        To be called with a block.
+        To be called with a block, and with the place of the first observed value that is kept.
     Rows
         The example that its block begins with.
     """
@@ -431,6 +438,7 @@ def observer(
         mode=Column("i", modes),
         live=live,
         p=(shared, own, Column(table=True)),
-        table=Column("f", seen),
+        seen=[0.0] * seen,
+        table=Column(table=True),
     )
-    return _made(text, each_row, rows, (), calls, store, notify), rows
+    return _made(text, each_row, rows, ("start",), calls, store, notify), rows

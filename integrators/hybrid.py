@@ -142,7 +142,7 @@ class Options:
     located : bool
         Stop at crossings; otherwise guards are evaluated once at the end of each step, and each
         machine takes at most one edge.
-    times : list of float, optional
+    times : list of float or ndarray, optional
         Requested rows; every accepted step if omitted.
     rows_at_once : int
         Maximum number of steps in each arc that is yielded.
@@ -156,7 +156,7 @@ class Options:
     time_scale: float
     max_steps: int
     located: bool
-    times: list[float] | None
+    times: Sequence[float] | Any | None
     rows_at_once: int = ROWS_AT_ONCE
 
 
@@ -398,7 +398,7 @@ def buffers(
         relations=watched(strict, size),
         sliding=sliding_scratch(surfaces, size, equations.held, len(strict), equations.seen),
         out=Output(
-            times=times or [],
+            times=[] if times is None else _as_list(times),
             every_step=times is None,
             rows_t=[0.0] * capacity,
             rows_y=[vector() for _ in range(capacity)],
@@ -412,6 +412,11 @@ def buffers(
             dense=Dense(vector(), vector(), vector(), vector(), vector()),
         ),
     )
+
+
+def _as_list(numbers: Sequence[float] | Any) -> Vector:
+    """Return Python numbers: those of numpy are slow one by one."""
+    return numbers.tolist() if hasattr(numbers, "tolist") else list(numbers)
 
 
 def plan_of(equations: Equations, t: float, t_end: float, options: Options, machines: int) -> Plan:

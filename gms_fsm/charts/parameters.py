@@ -333,12 +333,11 @@ def checked_array(name: str, values: ArrayLike, n: int | None, rule: str) -> Flo
         )
     if n is not None and array.size != n:
         raise ParameterError(f"{name} has {array.size} entries, but there are {n} elements")
-    broken = ~np.isfinite(array)
-    for bound in bounds_of(rule):
-        if not isinstance(bound.limit, str):
-            broken |= ~bound.holds(array, bound.limit)
-    for i in np.flatnonzero(broken)[:1]:
-        checked_scalar(f"{name}[{i}] (element {i + 1})", float(array[i]), rule)
+    bounds = [bound for bound in bounds_of(rule) if not isinstance(bound.limit, str)]
+    sound = all(bool(bound.holds(array, bound.limit).all()) for bound in bounds)
+    if not (sound and np.isfinite(array).all()):
+        for i, number in enumerate(array.tolist()):  # the first one is refused
+            checked_scalar(f"{name}[{i}] (element {i + 1})", number, rule)
     array.setflags(write=False)
     return array
 
@@ -420,6 +419,8 @@ def _checked(parameter: Parameter, value: Any, n: int) -> float | FloatArray:
 
 
 def _is_list(value: Any) -> bool:
+    if isinstance(value, float):
+        return False
     try:
         return np.ndim(value) > 0
     except ValueError:  # rows of different lengths
@@ -430,6 +431,9 @@ def _compare(
     one: Parameter, other: Parameter, bound: Bound, values: Mapping[str, float | FloatArray]
 ) -> None:
     """Check a bound that refers to another parameter."""
+    held = bound.holds(values[one.name], values[other.name])
+    if held is True or np.all(held):
+        return
     pair = np.broadcast_arrays(values[one.name], values[other.name])
     value, limit = (np.atleast_1d(each) for each in pair)
     for i in np.flatnonzero(~bound.holds(value, limit))[:1]:

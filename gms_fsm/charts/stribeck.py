@@ -15,7 +15,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -83,6 +83,9 @@ def _part(text: str) -> str:
     return text if simple else f"({text})"
 
 
+_TEXTS = stribeck_text(delta="delta"), stribeck_text(delta=GAUSSIAN)
+
+
 @dataclass(frozen=True)
 class Stribeck:
     """The Stribeck curve ``s(v) = F_c + (F_s - F_c) * exp(-abs(v / v_s)**delta)``, eq. (2).
@@ -117,13 +120,13 @@ class Stribeck:
     delta: float = GAUSSIAN
 
     def __post_init__(self) -> None:
-        for name, value in checked_values(STRIBECK, asdict(self)).items():
+        for name, value in checked_values(STRIBECK, vars(self)).items():
             object.__setattr__(self, name, value)
 
     @property
     def numbers(self) -> Mapping[str, float]:
         """The numbers that the text names."""
-        found: dict[str, float] = asdict(self)
+        found: dict[str, float] = dict(vars(self))
         if self.delta == GAUSSIAN:
             del found["delta"]
         return found
@@ -131,7 +134,7 @@ class Stribeck:
     @property
     def text(self) -> str:
         """The curve in the expression language; every reader evaluates this text."""
-        return stribeck_text(delta=GAUSSIAN if self.delta == GAUSSIAN else "delta")
+        return _TEXTS[self.delta == GAUSSIAN]
 
     @property
     def dip(self) -> float:

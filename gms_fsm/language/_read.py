@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import ast
 import difflib
+import functools
 import math
 import re
 import warnings
 from collections.abc import Iterable, Mapping
-from functools import cached_property
 from typing import NamedTuple
 
 from gms_fsm.errors import ExpressionError, shown
@@ -119,6 +119,14 @@ def parse_value(text: str, names: Iterable[str]) -> Value:
     >>> parse_value("2 * v", ["v"])
     Binary(op='*', left=Number(value=2.0), right=Name(id='v'))
     """
+    if not isinstance(text, str):
+        return _Reader(text, names).value(_parsed(text), 0)
+    return _read_value(text, tuple(names))
+
+
+@functools.lru_cache(maxsize=4096)
+def _read_value(text: str, names: tuple[str, ...]) -> Value:
+    """Parse a text; trees cannot be changed, so that all who give the same text share one."""
     return _Reader(text, names).value(_parsed(text), 0)
 
 
@@ -300,7 +308,7 @@ class _Reader:
             f"the names {known}, and pi",
         )
 
-    @cached_property
+    @functools.cached_property
     def dotted(self) -> bool:
         """Whether names with a dot may occur."""
         return any("." in name for name in self.names)

@@ -174,9 +174,9 @@ def notify(text: str) -> None:
 
 
 def observe_rows(
-    program: Program, t: FloatArray, y: FloatArray, mode: NDArray[np.int64]
+    program: Program, t: FloatArray, y: FloatArray, mode: NDArray[np.int64], kept: range
 ) -> FloatArray:
-    """Return the result of `observe` for many rows, with all signs evaluated live.
+    """Return some results of `observe` for many rows, with all signs evaluated live.
 
     Parameters
     ----------
@@ -184,17 +184,19 @@ def observe_rows(
         The program.
     t, y, mode : ndarray, shapes (rows,), (rows, m), (rows, n)
         The rows.
+    kept : range
+        Places in ``program.layout.observed``, one after the other.
 
     Returns
     -------
-    ndarray, shape (rows, observed)
+    ndarray, shape (rows, kept)
         Bit for bit the same as the readable engine.
     """
     from integrators.machine_code.layout import Block
 
     made, example = _observer(program)
     block = Block(made.layout, example)
-    table = np.empty((t.size, program.layout.observed.size))
+    table = np.empty((t.size, len(kept)))
     shared, own, tables = packed(program.p)
     rows = block.contents._replace(
         t=np.ascontiguousarray(t),
@@ -205,7 +207,7 @@ def observe_rows(
     )
     rows.p[0][...], rows.p[1][...] = shared, own
     block.update(rows)
-    made(block)
+    made(block, kept.start)
     return table
 
 

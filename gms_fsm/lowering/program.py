@@ -41,6 +41,7 @@ from gms_fsm.lowering._generated import ieee, load, load_careful
 from gms_fsm.lowering._plan import Plan, both_sides, plan_of
 from gms_fsm.lowering._python import FUNCTIONS, python
 from gms_fsm.lowering.layout import Layout
+from gms_fsm.systems._assembly import numbers_of
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import (
@@ -159,7 +160,7 @@ def _key(system: System) -> tuple[Any, ...]:
     spelled = tuple(map(_spelling, system.signals.values()))
     # A ratio that is 1 or 0 is left out of no text; an inertia that is not positive is refused.
     zeros = tuple(name for name, value in system.numbers.items() if value == 0.0)
-    first = system.assembly.system
+    first = system.shape
     if first is not system:  # its texts are those of the system whose texts were read
         return id(first), tuple(contact.n for contact in system.contacts), spelled, zeros
     contacts = [
@@ -260,15 +261,14 @@ def arguments(system: System) -> Arguments:
     tuple of lists
         See `Program`.
     """
-    read = system.assembly
+    shared, own = numbers_of(system)
     tables = [
         as_floats(column)
         for s in system.signals.values()
         if isinstance(s, Corners)
         for column in (s.times, s.values)
     ]
-    own = [as_floats(values) for _, values in read.own.values()]
-    return list(read.shared.values()), own, tables
+    return list(shared.values()), [as_floats(values) for _, values in own.values()], tables
 
 
 def equations(program: Program) -> integrators.Equations:

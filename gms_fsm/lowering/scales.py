@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import as_floats
+from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.language import (
     Binary,
     Number,
@@ -33,7 +34,6 @@ from gms_fsm.language import (
 )
 from gms_fsm.lowering._generated import load
 from gms_fsm.lowering.layout import held_of
-from gms_fsm.systems._assembly import of
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact, System
 
@@ -111,30 +111,38 @@ def scales_of(model: Model | Contact) -> Scales:
     """
     if isinstance(model, Contact) and model.model is not None:
         model = model.model
-    return _scales_of(_ByIdentity(model))
+    curve, n = None, model.n
+    thresholds = [0.0] * n
+    if not isinstance(model, Contact) and "s" in model.chart.inputs:
+        curve = model.stribeck
+    if curve is not None:
+        thresholds = as_floats(model.weights * curve.F_c)
+    numbers = [
+        as_floats(value) if np.ndim(value) else [float(value)] * n
+        for value in model.values.values()
+    ]
+    elements = tuple(zip(thresholds, *numbers, strict=True))
+    return _scales_of(_ByIdentity(model.chart), elements, curve)
 
 
-@functools.lru_cache(maxsize=64)
-def _scales_of(key: _ByIdentity[Model | Contact]) -> Scales:
-    model = key.it
-    chart = model.chart
-    sizes = _sizes(_ByIdentity(chart))
-    curve, weights = None, np.ones(1)
-    if not isinstance(model, Contact) and "s" in chart.inputs:
-        curve, weights = model.stribeck, model.weights
-    numbers = [as_floats(np.broadcast_to(value, model.n)) for value in model.values.values()]
-    thresholds = [0.0] * model.n if curve is None else as_floats(weights * curve.F_c)
+@functools.lru_cache(maxsize=256)
+def _scales_of(
+    key: _ByIdentity[Chart], elements: tuple[tuple[float, ...], ...], curve: Stribeck | None
+) -> Scales:
+    chart = key.it
+    sizes = _sizes(key)
     found: dict[str, list[float]] = {name: [] for name in sizes.reach}
     lengths: list[float] = []
-    for values in zip(thresholds, *numbers, strict=True):
+    for values in elements:
+        at_rest = sizes.at_rest(values)
         for name, row in found.items():
-            reaches = [_reach(margin, values) for margin in sizes.reach[name]]
+            reaches = [_reach([at_rest[k] for k in margin]) for margin in sizes.reach[name]]
             if curve is not None:
                 slopes = sizes.stiffness.get(name, ())
-                reaches += [_divided(curve.F_c, _number(slope, values)) for slope in slopes]
+                reaches += [_divided(curve.F_c, at_rest[k]) for k in slopes]
             row.append(min((u for u in reaches if u > 0.0), default=0.0))
         for name, follows in sizes.follows.items():
-            most = max(abs(_number(rate, values)) for rate in follows)
+            most = max(abs(at_rest[k]) for k in follows)
             lengths.append(_divided(found[name][-1], most))
     speeds = [u for name in chart.velocities for u in found[name]]
     windows = [WINDOW * u for u in speeds]
@@ -142,11 +150,7 @@ def _scales_of(key: _ByIdentity[Model | Contact]) -> Scales:
     least_x = min((u for u in [*found["x"], *lengths] if u > 0.0), default=0.0)
     least_v = min((u for u in v if u > 0.0), default=0.0)
     speed = least_v if curve is None else curve.v_s
-    rates = [
-        abs(_number(rate, (speed, *values)))
-        for values in zip(thresholds, *numbers, strict=True)
-        for rate in sizes.paces
-    ]
+    rates = [abs(rate) for values in elements for rate in sizes.paces((speed, *values))]
     time = _divided(1.0, max(rates, default=0.0)) or _divided(least_x, speed)
     variables = {name: tuple(found[name]) for name in chart.variables}
     slowest = min((u for u in speeds if u > 0.0), default=0.0)
@@ -186,15 +190,15 @@ def scales_of_system(system: System) -> SystemScales:
     SystemScales
         Those of its contacts; a body's are the smallest of the contacts it takes part in.
     """
-    read = system.assembly
+    banks = list(zip(system.shape.assembly.banks, system.contacts, strict=True))
     sizes: dict[str, list[float]] = {}
     times: list[float] = []
     moved: dict[str, tuple[list[float], list[float]]] = {b.name: ([], []) for b in system.bodies}
-    for bank in read.banks:
-        scales = scales_of(bank.contact)
+    for bank, contact in banks:
+        scales = scales_of(contact)
         times.append(scales.time)
-        for name in bank.chart.variables:
-            sizes[of(bank.name, name)] = [*scales.variables[name]]
+        for name, plain in zip(bank.variables, bank.chart.variables, strict=True):
+            sizes[name] = [*scales.variables[plain]]
         for row in bank.jacobian:
             for body, coefficient in row.items():
                 ratio = _constant(coefficient, system)
@@ -203,9 +207,10 @@ def scales_of_system(system: System) -> SystemScales:
     for each in system.bodies:
         for name, found in zip((each.x, each.v), moved[each.name], strict=True):
             sizes[name] = [min((u for u in found if u > 0.0), default=0.0)]
-    for bank in read.banks:
-        sizes |= {name: [0.0] * bank.n for name in held_of(bank)}
-        sizes |= {bank.held(force): [0.0] for force in bank.forces if bank.periodic}
+    for bank, contact in banks:
+        if bank.periodic:
+            sizes |= {name: [0.0] * contact.n for name in held_of(bank)}
+            sizes |= {bank.held(force): [0.0] for force in bank.forces}
     for name in (*system.flow, *(u for sampler in system.sampled for u in sampler.updates)):
         sizes[name] = [0.0]
     return SystemScales(sizes, min((u for u in times if u > 0.0), default=0.0))
@@ -213,6 +218,8 @@ def scales_of_system(system: System) -> SystemScales:
 
 def _constant(tree: Value, system: System) -> float:
     """Return the value of a coefficient; 0 if it cannot be computed."""
+    if isinstance(tree, Number):
+        return tree.value
     try:
         return float(evaluate(tree, system.numbers))
     except (ArithmeticError, ValueError, KeyError):
@@ -220,17 +227,46 @@ def _constant(tree: Value, system: System) -> float:
 
 
 # --------------------------------------------------------------------------- derived from a chart
-Numbers = Callable[..., float]  # of the threshold s and the parameters
+@dataclass(frozen=True, eq=False)
+class _Numbers:
+    """Values of the threshold s and the parameters of a chart, 0 where one is undefined."""
+
+    title: str
+    arguments: str
+    texts: Sequence[str]
+
+    @functools.cached_property
+    def _together(self) -> Callable[..., tuple[float, ...]]:
+        return self._loaded("".join(f"{text}, " for text in self.texts))
+
+    @functools.cached_property
+    def _one_by_one(self) -> list[Callable[..., tuple[float, ...]]]:
+        return [self._loaded(f"{text}, ") for text in self.texts]
+
+    def _loaded(self, values: str) -> Callable[..., tuple[float, ...]]:
+        text = f"def numbers({self.arguments}):\n    return ({values})\n"
+        made: Callable[..., tuple[float, ...]] = load(self.title, text, {"sgn": _sign_from_above})[
+            "numbers"
+        ]
+        return made
+
+    def __call__(self, values: Sequence[float]) -> list[float]:
+        try:
+            found: Sequence[float] = self._together(*values)
+        except (ArithmeticError, ValueError):
+            found = [_number(each, values) for each in self._one_by_one]
+        return [number if math.isfinite(number) else 0.0 for number in found]
 
 
 @dataclass(frozen=True, eq=False)
 class _Sizes:
-    """Functions of a chart's parameters, all evaluated at rest in the origin."""
+    """Functions of a chart's parameters; the numbers are places in `at_rest`."""
 
-    reach: Mapping[str, Sequence[tuple[Numbers, ...]]]  # margins of guards, slopes and bends
-    stiffness: Mapping[str, Sequence[Numbers]]  # slopes of the forces
-    follows: Mapping[str, Sequence[Numbers]]  # slope of a variable with respect to x, by state
-    paces: Sequence[Numbers]  # relaxation rates of the variables and of v
+    at_rest: _Numbers  # all at rest in the origin
+    paces: _Numbers  # relaxation rates of the variables and of v
+    reach: Mapping[str, Sequence[tuple[int, ...]]]  # margins of guards, slopes and bends
+    stiffness: Mapping[str, Sequence[int]]  # slopes of the forces
+    follows: Mapping[str, Sequence[int]]  # slope of a variable with respect to x, by state
 
 
 class _ByIdentity(Generic[T]):
@@ -257,14 +293,11 @@ def _sizes(key: _ByIdentity[Chart]) -> _Sizes:
     lets: dict[str, Value] = {}
     for name, tree in chart.lets.items():
         lets[name] = renamed(tree, lets)
-    arguments = ", ".join(("s", *chart.parameter_names))
+    title, arguments = f"scale in {chart.name}", ", ".join(("s", *chart.parameter_names))
+    places: dict[str, int] = {}
 
-    def function(tree: Value, *, moving: bool = False) -> Numbers:
-        still = {name: zero for name, zero in rest.items() if not (moving and name == "v")}
-        names = f"v, {arguments}" if moving else arguments
-        text = f"def number({names}):\n    return {spell(renamed(tree, still))}\n"
-        made: Numbers = load(f"scale in {chart.name}", text, {"sgn": _sign_from_above})["number"]
-        return made
+    def place(tree: Value) -> int:
+        return places.setdefault(spell(renamed(tree, rest)), len(places))
 
     guards = chart.guards.values()
     late = {*chart.force_names, *chart.rate_names} - {*chart.parameter_names}
@@ -278,32 +311,37 @@ def _sizes(key: _ByIdentity[Chart]) -> _Sizes:
     flows = {key: renamed(tree, lets) for key, tree in chart.flows.items()}
     reach = {
         name: [
-            tuple(function(tree) for tree in (margin, slope, derivative(slope, name)) if tree)
+            tuple(place(tree) for tree in (margin, slope, derivative(slope, name)) if tree)
             for margin in margins
             if name in names_in(margin) and (slope := derivative(margin, name)) is not None
         ]
         for name in states
     }
     stiffness = {
-        name: [
-            function(slope) for force in forces if (slope := derivative(force, name)) is not None
-        ]
+        name: [place(slope) for force in forces if (slope := derivative(force, name)) is not None]
         for name in chart.variables
     }
     follows = {
         name: [
-            function(rate)
+            place(rate)
             for state in chart.states
             if (rate := derivative(flows[state.name, name], "v")) is not None
         ]
         for name in chart.variables
     }
+    moving = {name: zero for name, zero in rest.items() if name != "v"}
     paces = [
-        function(rate, moving=True)
+        spell(renamed(rate, moving))
         for (_, name), flow in flows.items()
         if (rate := derivative(flow, name)) is not None
     ]
-    return _Sizes(reach, stiffness, {name: row for name, row in follows.items() if row}, paces)
+    return _Sizes(
+        _Numbers(title, arguments, [*places]),
+        _Numbers(title, f"v, {arguments}", list(dict.fromkeys(paces))),
+        reach,
+        stiffness,
+        {name: row for name, row in follows.items() if row},
+    )
 
 
 def _sign_from_above(u: float) -> float:
@@ -311,18 +349,17 @@ def _sign_from_above(u: float) -> float:
     return 1.0 if u >= 0.0 else -1.0
 
 
-def _number(function: Numbers, values: Sequence[float]) -> float:
+def _number(function: Callable[..., tuple[float, ...]], values: Sequence[float]) -> float:
     """Evaluate a value at rest; 0 if it has none."""
     try:
-        number = function(*values)
+        return function(*values)[0]
     except (ArithmeticError, ValueError):
         return 0.0
-    return number if math.isfinite(number) else 0.0
 
 
-def _reach(margin: Sequence[Numbers], values: Sequence[float]) -> float:
+def _reach(margin: Sequence[float]) -> float:
     """Return where a margin is zero; by its bend if it is flat at rest, as v**2 + w**2 - e**2."""
-    height, slope, *bend = (_number(each, values) for each in margin)
+    height, slope, *bend = margin
     if slope or not bend:
         return _divided(height, slope)
     return math.sqrt(_divided(2.0 * height, bend[0]))

@@ -169,7 +169,8 @@ def _identity(start: Start) -> str:
                     "over plain values, or leave checkpoint out",
                 ) from None
     text = start.program.source
-    what = head, functions, text, start.output, start.options.times, start.y, start.mode
+    times = None if start.options.times is None else [*map(float, start.options.times)]
+    what = head, functions, text, start.output, times, start.y, start.mode
     return hashlib.sha256(repr(what).encode()).hexdigest()
 
 

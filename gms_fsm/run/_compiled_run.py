@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CompiledRun"]
 
+MOST_SPARE = 4  # blocks that are kept for further runs
 STEPS_AT_ONCE = 20_000  # between two checks for Ctrl-C and two calls of progress
 
 
@@ -159,12 +160,14 @@ class Columns:
         self.start = start
         layout = start.program.layout
         size, modes = layout.y.size, layout.modes
-        prepared = _prepared(start)
-        self.engine, self.block = prepared.engine, prepared.block()
+        self.prepared = _prepared(start)
+        self.engine, self.block = self.prepared.engine, self.prepared.block()
         self.run_of: Run = self.block.contents
         self.p = compiled.packed(start.program.p) if p is None else p
         few = max(16, min(1024, 4_000_000 // size))  # initial number of rows
-        rows = {"all": few, "t_eval": len(start.options.times or ()), "end": 0}[start.output]
+        rows = {"all": few, "t_eval": 0, "end": 0}[start.output]
+        if start.options.times is not None:
+            rows = len(start.options.times)
         stops = few if start.output == "t_eval" else 0
         floats: Any = np.empty  # the columns' fields are typed as lists; compiled code uses arrays
         ints: Any = functools.partial(np.zeros, dtype=np.int64)
@@ -173,7 +176,7 @@ class Columns:
             equations(start.program), start.t_start, start.last, start.options, len(start.mode)
         )
         out = b.out._replace(
-            times=_floats(start.options.times or ()),
+            times=_floats(() if start.options.times is None else start.options.times),
             every_step=start.options.times is None,
             rows_t=floats(rows),
             rows_y=floats((rows, size)),
@@ -196,6 +199,10 @@ class Columns:
             self.log.stops_t[0], self.log.stops_y[0] = start.t_start, self.buffers.now.y
             self.log.stops_mode[0] = list(layout.not_sliding(start.mode))
             self.log.counts[STOPS] = 1
+
+    def __del__(self) -> None:
+        if hasattr(self, "block"):
+            self.prepared.take_back(self.block)
 
     def run(self, most_steps: int, *, pause: bool) -> int:
         """Run the machine code; see `integrators.columns.record`."""
@@ -377,10 +384,21 @@ class _Prepared:
     example: Run
     first: Block
     functions: Any  # kept, so that their `id` stays theirs
+    spare: list[Block] = field(default_factory=list)  # of runs that have ended
 
     def block(self) -> Block:
         """Return a block of its own for a run."""
-        return Block(self.engine.layout, self.example, self.first)
+        try:
+            block = self.spare.pop()
+        except IndexError:
+            return Block(self.engine.layout, self.example, self.first)
+        block.become(self.first)
+        return block
+
+    def take_back(self, block: Block) -> None:
+        """Keep the block of a run that nothing refers to any more, for the next one."""
+        if len(self.spare) < MOST_SPARE:
+            self.spare.append(block)
 
 
 _known: dict[Any, _Prepared] = {}
@@ -397,6 +415,7 @@ def _prepared(start: Start) -> _Prepared:
         run = _example(start, flow)
         engine = compiled.engine(program, run)
         first = Block(engine.layout, run)
+        first.update(first.contents)
         _known[key] = _Prepared(engine, run, first, program.functions)
     return _known[key]
 
@@ -425,10 +444,10 @@ def _as_arrays(plan: Any, places: Any) -> Any:
     return plan._replace(
         control=plan.control._replace(atol=places.control.atol),
         discrete=places.discrete,
-        jumps=_floats(plan.jumps),
-        before_jumps=_floats(plan.before_jumps),
-        ticks=_integers(plan.ticks),
-        knots=_floats(plan.knots),
+        jumps=_floats(plan.jumps) if plan.jumps else places.jumps,
+        before_jumps=_floats(plan.before_jumps) if plan.jumps else places.before_jumps,
+        ticks=_integers(plan.ticks) if plan.ticks else places.ticks,
+        knots=_floats(plan.knots) if plan.knots else places.knots,
     )
 
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
 import integrators
 from gms_fsm.charts.chart import Chart, Transition
-from gms_fsm.charts.parameters import as_floats, checked_array, checked_scalar
+from gms_fsm.charts.parameters import FloatArray, as_floats, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError, SignalError, shown
 from gms_fsm.language import evaluate
 from gms_fsm.lowering._pulses import waking_times
@@ -95,7 +96,9 @@ class Start:
         Trace
             With what it was made from.
         """
-        return Trace(rows, stops, log, self.model, self.rig, self.settings, system=self.given)
+        trace = Trace(rows, stops, log, self.model, self.rig, self.settings, system=self.given)
+        vars(trace)["program"] = self.program  # it need not be generated again
+        return trace
 
     def edge(self, machine: int, edge: int) -> tuple[BankPlaces, Transition]:
         """Return the contact of a machine and one of its edges, by their numbers in the run."""
@@ -287,12 +290,12 @@ def _check_resolution(chosen: Settings, t_start: float, t_end: float) -> None:
             )
 
 
-def _wanted(chosen: Settings, t_start: float, t_end: float) -> list[float] | None:
+def _wanted(chosen: Settings, t_start: float, t_end: float) -> FloatArray | None:
     """Return the requested times, if any, after checking that all lie within the run."""
     if chosen.t_eval is None:
         return None
-    times: list[float] = list(cast(tuple[float, ...], chosen.t_eval))  # increasing
-    for time in (*times[:1], *times[-1:]):
+    times: FloatArray = np.asarray(chosen.t_eval)  # increasing
+    for time in (float(times[0]), float(times[-1])):
         if not t_start <= time <= t_end:
             raise ParameterError(
                 f"t_eval has {time!r}, outside of t_start = {t_start!r} to t_end = {t_end!r}"
@@ -392,6 +395,8 @@ def _initial(
 ) -> tuple[list[float], list[int]]:
     """Build the state vector and the modes."""
     layout = program.layout
+    if initial == {} and _is_plain(system.shape):
+        return [0.0] * layout.y.size, [0] * layout.n
     if not isinstance(initial, Mapping):
         raise ParameterError(
             "it must be a mapping, for example {'x': 0}", place="initial", value=initial
@@ -446,6 +451,13 @@ def _initial(
     state = _entered(system, program, t_start, state, mode, {*given})
     _check_locks(system, program, t_start, state, mode)
     return state, mode
+
+
+@functools.lru_cache(maxsize=64)
+def _is_plain(shape: System) -> bool:
+    """Return whether systems of a shape start with 0 everywhere unless something else is given."""
+    locked = any(contact.chart.default_state.locked for contact in shape.contacts)
+    return not (shape.sampled or locked or _enters(shape))
 
 
 def _check_locks(

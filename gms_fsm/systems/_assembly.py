@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -34,7 +34,16 @@ from gms_fsm.systems._given import derivative_free, is_positive
 from gms_fsm.systems.signals import Formula, Signal
 from gms_fsm.systems.system import Body, Contact, System
 
-__all__ = ["Assembly", "Bank", "Definition", "Edge", "assembled", "of"]
+__all__ = [
+    "Assembly",
+    "Bank",
+    "Definition",
+    "Edge",
+    "assembled",
+    "numbers_of",
+    "of",
+    "renumbered",
+]
 
 ZERO, ONE = Number(0.0), Number(1.0)
 
@@ -286,12 +295,68 @@ def assembled(system: System) -> Assembly:
     return Reader(system).read()
 
 
+def renumbered(read: Assembly, system: System) -> Assembly:
+    """Return what was read with the numbers of another system of the same texts.
+
+    Parameters
+    ----------
+    read : Assembly
+        Of a system.
+    system : System
+        One that differs from it in numbers only.
+
+    Returns
+    -------
+    Assembly
+        With the same trees. Its `system` stays the first one: a circle would have to wait for the
+        garbage collector.
+    """
+    shared, own = numbers_of(system)
+    pairs = zip(read.banks, system.contacts, strict=True)
+    banks = tuple(replace(bank, contact=contact) for bank, contact in pairs)
+    return replace(read, banks=banks, shared=shared, own=own)
+
+
+def numbers_of(system: System) -> tuple[dict[str, float], dict[str, tuple[int, np.ndarray]]]:
+    """Return all numbers of a system by name.
+
+    Parameters
+    ----------
+    system : System
+        What runs.
+
+    Returns
+    -------
+    (dict, dict)
+        `Assembly.shared` and `Assembly.own`. Their order does not depend on the numbers.
+    """
+    shared: dict[str, float] = {}
+    own: dict[str, tuple[int, np.ndarray]] = {}
+    for contact in system.contacts:  # what a model brings besides its chart's parameters
+        if (model := contact.model) is not None:
+            if (curve := model.stribeck) is not None:
+                for name, value in curve.numbers.items():
+                    shared[of(contact.name, f"curve {name}")] = value
+                shared[of(contact.name, "curve v dip")] = curve.dip
+                shared[of(contact.name, "curve v flat")] = curve.flat
+            shared[of(contact.name, "model sigma_2")] = model.sigma_2
+    shared |= system.numbers
+    for index, contact in enumerate(system.contacts):
+        weights = contact.weights
+        own[of(contact.name, "threshold weight")] = index, np.asarray(weights, dtype=np.float64)
+        for name, value in contact.values.items():
+            if np.ndim(value) == 0:
+                shared[of(contact.name, name)] = float(value)
+            else:
+                own[of(contact.name, name)] = index, np.asarray(value, dtype=np.float64)
+    return shared, own
+
+
 class Reader:
     def __init__(self, system: System) -> None:
         self.system, self.here = system, Part(f"system {system.name!r}")
         self.definitions: list[Definition] = []
-        self.shared: dict[str, float] = {}
-        self.own: dict[str, tuple[int, np.ndarray]] = {}
+        self.shared, self.own = numbers_of(system)
 
     def value(self, text: str | float, names: Iterable[str], owner: Part) -> Value:
         try:
@@ -301,9 +366,6 @@ class Reader:
 
     def read(self) -> Assembly:
         system, numbers = self.system, self.system.numbers
-        for contact in system.contacts:
-            self.model_numbers(contact)
-        self.shared |= numbers
         for name, signal in system.signals.items():
             if isinstance(signal, str):
                 owner = self.here.of(f"signal {name!r}", "signals", name)
@@ -362,20 +424,12 @@ class Reader:
             self.own,
         )
 
-    def model_numbers(self, contact: Contact) -> None:
-        """Note what a model brings besides its chart's parameters."""
-        model = contact.model
-        if model is None:
-            return
-        if (curve := model.stribeck) is not None:
-            for name, value in {**curve.numbers, "v dip": curve.dip, "v flat": curve.flat}.items():
-                self.shared[of(contact.name, f"curve {name}")] = value
-        self.shared[of(contact.name, "model sigma_2")] = model.sigma_2
-
     def bank(self, index: int, contact: Contact) -> Bank:
         chart, model, c = contact.chart, contact.model, contact.name
         owner = self.here.of(f"contact {c!r}", "contacts", index)
-        names: dict[str, Value] = {"t": Name("t"), **self.numbers(index, contact)}
+        names: dict[str, Value] = {"t": Name("t")}
+        names |= {name: Name(of(c, name)) for name in contact.values}
+        self.check_inputs(index, contact)
         own_names: dict[str, str] = {}  # of what an action can set
         # Velocities and the position, those of a body where they are just that.
         jacobian, moved = [], {body.v: body for body in self.system.bodies}
@@ -454,25 +508,15 @@ class Reader:
             means=names,
         )
 
-    def numbers(self, index: int, contact: Contact) -> dict[str, Value]:
-        """Note the numbers of a contact; return what its chart's parameters are called."""
-        c, model = contact.name, contact.model
-        weights = np.ones(contact.n) if model is None else model.weights
-        self.own[of(c, "threshold weight")] = (index, np.asarray(weights, dtype=np.float64))
-        for name, value in contact.values.items():
-            if np.ndim(value) == 0:
-                self.shared[of(c, name)] = float(value)
-            else:
-                self.own[of(c, name)] = (index, np.asarray(value, dtype=np.float64))
+    def check_inputs(self, index: int, contact: Contact) -> None:
         for name in contact.inputs:
             if name not in contact.chart.inputs:
                 raise ParameterError(
                     f"inputs has {shown(name)}, which its chart does not read",
-                    place=f"{self.here.words}, contact {c!r}",
+                    place=f"{self.here.words}, contact {contact.name!r}",
                     advice=f"the chart's inputs are {', '.join(contact.chart.inputs) or 'none'}",
                     key=("contacts", index, "inputs", name),
                 )
-        return {name: Name(of(c, name)) for name in contact.values}
 
     def check_locks(self, banks: Iterable[Bank]) -> None:
         """Refuse locks that nothing can keep, and those that always hold and repeat each other."""

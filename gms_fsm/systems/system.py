@@ -6,8 +6,8 @@ relative velocity, which is linear in the bodies' velocities.
 
 from __future__ import annotations
 
-import copy
 import functools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -103,7 +103,6 @@ class System:
     numbers: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     flow: Mapping[str, str] = field(default_factory=dict, kw_only=True)
     sampled: tuple[Sampled, ...] = field(default=(), kw_only=True)
-    assembly: Assembly = field(init=False, repr=False)  # its texts, read
 
     def __post_init__(self) -> None:
         put, here = object.__setattr__, f"system {shown(self.name)}"
@@ -123,10 +122,7 @@ class System:
         self._check_names(here)
         signals = {name: self._signal(name, given, here) for name, given in self.signals.items()}
         put(self, "signals", signals)
-        # Imported here: the reader itself needs the classes of this module.
-        from gms_fsm.systems._assembly import assembled
-
-        put(self, "assembly", assembled(self))
+        _ = self.assembly  # raises errors of the texts
 
     def __repr__(self) -> str:
         bodies, contacts = (
@@ -185,6 +181,20 @@ class System:
                         f"the name {part.name!r} is used twice", place=here, key=key
                     )
                 seen.add(part.name)
+
+    @property
+    def shape(self) -> System:
+        """The system whose texts were read: this one, or one that differs in numbers only."""
+        found: System = vars(self).get("_like", self)
+        return found
+
+    @functools.cached_property
+    def assembly(self) -> Assembly:
+        """Its texts, read."""
+        # Imported here: the reader itself needs the classes of this module.
+        from gms_fsm.systems._assembly import assembled, renumbered
+
+        return assembled(self) if self.shape is self else renumbered(self.shape.assembly, self)
 
     # ------------------------------------------------------------------ files
     @classmethod
@@ -379,18 +389,18 @@ def with_model(system: System, model: Model, rig: Rig) -> System:
     System
         With these.
     """
-    from gms_fsm.systems._renumbered import renumbered
-
-    old, new = system.contacts[0], copy.copy(system)
-    contact = Contact(old.name, model, v=old.v, period=old.period)
-    numbers = {
-        name: checked_scalar(f"system {shown(system.name)}: {name}", rig.numbers[name], "finite")
-        for name in system.numbers
-    }
-    changed = {"contacts": (contact,), "numbers": numbers, "signals": dict(rig.signals)}
-    for name, value in changed.items():
-        object.__setattr__(new, name, value)
-    object.__setattr__(new, "assembly", renumbered(system.assembly, new))
+    given, new = rig.numbers, object.__new__(System)
+    numbers = {name: float(given[name]) for name in system.numbers}
+    if not all(map(math.isfinite, numbers.values())):
+        for name, value in numbers.items():  # the first one is refused
+            checked_scalar(f"system {shown(system.name)}: {name}", value, "finite")
+    vars(new).update(
+        {name: value for name, value in vars(system).items() if name != "assembly"},
+        contacts=(system.contacts[0].with_model(model),),
+        numbers=numbers,
+        signals=dict(rig.signals),
+        _like=system.shape,
+    )
     return new
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
@@ -12,11 +14,14 @@ from gms_fsm.lowering.program import Program
 from gms_fsm.traces.rows import Rows
 from integrators import LIVE
 
-__all__ = ["observed_rows"]
+__all__ = ["Observed"]
 
 
-def observed_rows(program: Program, rows: Rows, *, compiled: bool) -> FloatArray:
-    """Return the observed quantities at all rows.
+class Observed(Mapping[str, FloatArray]):
+    """The observed quantities by their names in the layout, elements on the second axis.
+
+    They are computed when one of them is first asked for; with machine code those with one value
+    per row apart from those of elements, which take much more memory.
 
     Parameters
     ----------
@@ -26,38 +31,67 @@ def observed_rows(program: Program, rows: Rows, *, compiled: bool) -> FloatArray
         All rows of the run.
     compiled : bool
         Whether to use machine code; the numbers are the same.
-
-    Returns
-    -------
-    ndarray, shape (rows, observed)
-        At the places of ``program.layout.observed``.
     """
+
+    def __init__(self, program: Program, rows: Rows, *, compiled: bool) -> None:
+        self._program, self._rows, self._compiled = program, rows, compiled
+        self._places = program.layout.observed
+        self._tables: dict[range, FloatArray] = {}  # by the places in them
+
+    def __getitem__(self, name: str) -> FloatArray:
+        if name not in self:
+            raise KeyError(name)
+        shared, where = len(self._places.shared), self._places.all_of(name)
+        kept = range(self._places.size)
+        if self._compiled:
+            kept = kept[:shared] if where.start < shared else kept[shared:]
+        if kept not in self._tables:
+            self._tables[kept] = _observed_rows(
+                self._program, self._rows, kept, compiled=self._compiled
+            )
+        column = self._tables[kept][:, where.start - kept.start : where.stop - kept.start]
+        return column[:, 0] if where.start < shared else column
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._places.shared or name in self._places.own
+
+    def __iter__(self) -> Iterator[str]:
+        return iter((*self._places.shared, *self._places.own))
+
+    def __len__(self) -> int:
+        return len(self._places.shared) + len(self._places.own)
+
+
+def _observed_rows(program: Program, rows: Rows, kept: range, *, compiled: bool) -> FloatArray:
+    """Return the observed quantities at some places at all rows, shape (rows, kept)."""
     if compiled:
         try:
-            table = observe_rows(program, rows.t, rows.y, rows.mode)
+            table = observe_rows(program, rows.t, rows.y, rows.mode, kept)
         except SignalError:  # a Python function failed at some row
-            return observed_rows(program, rows, compiled=False)
+            return _observed_rows(program, rows, kept, compiled=False)
         slid = np.flatnonzero(rows.mode[:, program.layout.slides].any(axis=1))
-        table[slid] = _one_by_one(program, rows.at(slid))
+        if slid.size:
+            table[slid] = _one_by_one(program, rows.at(slid), kept)
     else:
-        table = _one_by_one(program, rows)
-    _show_one_side(program, rows, table)
+        table = _one_by_one(program, rows, kept)
+    if program.layout.surfaces:
+        _show_one_side(program, rows, kept, table)
     return table
 
 
-def _one_by_one(program: Program, rows: Rows) -> FloatArray:
+def _one_by_one(program: Program, rows: Rows, kept: range) -> FloatArray:
     # With scalar functions, as in the run itself.
-    table = np.empty((len(rows), program.layout.observed.size))
+    table = np.empty((len(rows), len(kept)))
     modes = rows.mode.tolist()
     for row, (t, y) in enumerate(zip(rows.t.tolist(), rows.y.tolist(), strict=True)):
         try:
-            table[row] = observe(program, t, y, modes[row])
+            table[row] = observe(program, t, y, modes[row])[kept.start : kept.stop]
         except SignalError:  # a Python function failed at this row
             table[row] = np.nan
     return table
 
 
-def _show_one_side(program: Program, rows: Rows, table: FloatArray) -> None:
+def _show_one_side(program: Program, rows: Rows, kept: range, table: FloatArray) -> None:
     """Observe the rows next to a slide with the signs held by the arc they belong to.
 
     These rows lie on the surface or a rounding error past it, so the sign computed from the state
@@ -81,4 +115,4 @@ def _show_one_side(program: Program, rows: Rows, table: FloatArray) -> None:
             program.ieee["observe"](
                 float(t[row]), rows.y[row].tolist(), mode, signs, program.p, out
             )
-            table[row] = out
+            table[row] = out[kept.start : kept.stop]

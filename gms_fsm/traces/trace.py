@@ -9,7 +9,7 @@ the log is always complete.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,7 +34,7 @@ from gms_fsm.systems.system import System, system_of
 from gms_fsm.traces import _csv
 from gms_fsm.traces._between import between
 from gms_fsm.traces._columns import columns_of
-from gms_fsm.traces._observed import observed_rows
+from gms_fsm.traces._observed import Observed
 from gms_fsm.traces._parts import held_period
 from gms_fsm.traces._views import (
     BodyTrace,
@@ -133,6 +133,10 @@ class Trace:
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: generated functions cannot be, and are made again."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     # ------------------------------------------------------------------ columns
     @property
@@ -382,9 +386,8 @@ class Trace:
         """What was observed, by its name in the layout; elements on the second axis."""
         if self.stored:
             return self.stored
-        compiled, layout = self.settings.get("engine") == "compiled", self.program.layout
-        table = observed_rows(self.program, self.rows, compiled=compiled)
-        return {name: column.T for name, column in layout.observed.named(table.T).items()}
+        compiled = self.settings.get("engine") == "compiled"
+        return Observed(self.program, self.rows, compiled=compiled)
 
     # ------------------------------------------------------------------ sampling
     def sample(self, times: ArrayLike) -> Trace:

@@ -190,19 +190,32 @@ class Block:
     def __init__(self, layout: Layout, example: Any, like: Block | None = None) -> None:
         self.layout = layout
         self._words: Any = np.zeros(layout.words, dtype=np.int64)
-        if like is not None:
-            self._words[:] = like._words
         self._floats: Any = self._words.view(np.float64)
         self._columns: dict[tuple[int, ...], Any] = {}
         self.address: int = self._words.ctypes.data
         made = {place.way: self._array(place) for place in layout.arrays}
-        if like is None or not layout.inside:
+        self._outside = [made[place.way] for place in layout.arrays if place.offset < 0]
+        if like is not None:
+            self.become(like)
+        else:
             for way, array in made.items():
                 if array.size:
-                    array[...] = _found(example if like is None else like.contents, way)
-        self._outside = [made[place.way] for place in layout.arrays if place.offset < 0]
+                    array[...] = _found(example, way)
         made |= {place.way: place.empty for place in layout.columns if place.way not in made}
         self.contents: Any = _rebuilt(example, (), made, layout.inner)
+
+    def become(self, like: Block) -> None:
+        """Take over what another block contains.
+
+        Parameters
+        ----------
+        like : Block
+            Of the same layout and example.
+        """
+        self._columns = dict(like._columns)
+        self._words[:] = like._words
+        for array, other in zip(self._outside, like._outside, strict=True):
+            array[...] = other
 
     def _array(self, place: _Place) -> Any:
         if place.offset < 0:
@@ -228,7 +241,8 @@ class Block:
                 assert array.flags.c_contiguous
                 before[place.way] = array
                 lengths = array.shape[: place.lengths]
-                words[place.offset : place.offset + 1 + place.lengths] = array.ctypes.data, *lengths
+                address, _ = array.__array_interface__["data"]
+                words[place.offset : place.offset + 1 + place.lengths] = address, *lengths
 
     def copy(self) -> list[Any]:
         """Return the numbers and the arrays of the example, but no columns.

@@ -61,7 +61,7 @@ ROWS = """
     y, mode = np.full((50, 5), 0.1), np.zeros((50, 4), dtype=np.int64)
     for velocity in sys.argv[1:]:
         program = lower(model, Prescribed(velocity))
-        found = compiled.observe_rows(program, t, y, mode)
+        found = compiled.observe_rows(program, t, y, mode, range(14))
         for row in range(50):
             out = [0.0] * 14
             program.ieee["observe"](t[row], y[row].tolist(), [0] * 4, program.live, program.p, out)
@@ -169,7 +169,7 @@ def observe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], boo
         said.clear()
         monkeypatch.setattr(compiled, "_observers", {})
         rows = np.array([2.0]), np.array([y]), np.array([mode])
-        assert compiled.observe_rows(program, *rows).tolist() == [wanted]
+        assert compiled.observe_rows(program, *rows, range(14)).tolist() == [wanted]
         return bool(said)
 
     return once

@@ -50,10 +50,11 @@ def read(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         returned.append(event)
         return event
 
-    def observe_rows(program, t, y, mode):
-        table = np.empty((t.size, program.layout.observed.size))
+    def observe_rows(program, t, y, mode, kept):
+        table, seen = np.empty((t.size, len(kept))), np.empty(program.layout.observed.size)
         p = compiled.packed(program.p)
-        each_row(program.ieee["observe"], t, y, mode, program.live, p, table)
+        observe = program.ieee["observe"]
+        each_row(observe, t, y, mode, program.live, p, seen, table, kept.start)
         return table
 
     monkeypatch.setattr(compiled, "engine", engine)

@@ -45,7 +45,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         monkeypatch.setattr(monitors, name, noting(name, getattr(monitors, name)))
     for name in ("checked", "watched"):
         monkeypatch.setattr(sys.modules["gms_fsm.run.simulate"], name, getattr(monitors, name))
-    monkeypatch.setattr(trace, "observed_rows", noting("observe", trace.observed_rows))
+    monkeypatch.setattr(trace, "Observed", noting("observe", trace.Observed))
     return noted
 
 
