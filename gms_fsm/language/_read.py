@@ -119,9 +119,7 @@ def parse_value(text: str, names: Iterable[str]) -> Value:
     >>> parse_value("2 * v", ["v"])
     Binary(op='*', left=Number(value=2.0), right=Name(id='v'))
     """
-    if not isinstance(text, str):
-        return _Reader(text, names).value(_parsed(text), 0)
-    return _read_value(text, tuple(names))
+    return _read_value(_as_text(text), tuple(names))
 
 
 @functools.lru_cache(maxsize=4096)
@@ -177,11 +175,16 @@ def parse_condition(
     return reader.condition(_parsed(text), 0)
 
 
-def _parsed(text: str) -> ast.expr:
+def _as_text(text: object) -> str:
     if not isinstance(text, str):
         raise ExpressionError(
             f"expected a text, got {type(text).__name__}", repr(text), 1, "a text in quotes"
         )
+    return text
+
+
+def _parsed(text: str) -> ast.expr:
+    _as_text(text)
     if len(text) > LONGEST_TEXT:
         raise ExpressionError(
             f"the text has {len(text)} characters",

@@ -118,7 +118,7 @@ def scales_of(model: Model | Contact) -> Scales:
     if curve is not None:
         thresholds = as_floats(model.weights * curve.F_c)
     numbers = [
-        as_floats(value) if np.ndim(value) else [float(value)] * n
+        as_floats(np.asarray(value)) if np.ndim(value) else [float(value)] * n
         for value in model.values.values()
     ]
     elements = tuple(zip(thresholds, *numbers, strict=True))

@@ -344,11 +344,11 @@ def numbers_of(system: System) -> tuple[dict[str, float], dict[str, tuple[int, n
     for index, contact in enumerate(system.contacts):
         weights = contact.weights
         own[of(contact.name, "threshold weight")] = index, np.asarray(weights, dtype=np.float64)
-        for name, value in contact.values.items():
-            if np.ndim(value) == 0:
-                shared[of(contact.name, name)] = float(value)
+        for name, given in contact.values.items():
+            if np.ndim(given) == 0:
+                shared[of(contact.name, name)] = float(given)
             else:
-                own[of(contact.name, name)] = index, np.asarray(value, dtype=np.float64)
+                own[of(contact.name, name)] = index, np.asarray(given, dtype=np.float64)
     return shared, own
 
 
