@@ -130,29 +130,30 @@ def take_step(
         first[j] = f[j]
     for i in range(1, stages + 1):
         row = A[i] if i < stages else B
-        a = row[0]
+        a = h * row[0]
         if i == 1:
             for j in range(size):
-                y_new[j] = y[j] + h * (a * first[j])
+                y_new[j] = y[j] + a * first[j]
         else:
-            # Two stages at a time: half the number of loads and stores.
-            b = row[1]
+            # Two stages at a time: half the number of loads and stores. The newest slope comes
+            # last, because it is known last.
+            b = h * row[1]
             second = k[1]
             for j in range(size):
                 y_new[j] = a * first[j] + b * second[j]
             for m in range(2, i - 1, 2):
-                a, b = row[m], row[m + 1]
+                a, b = h * row[m], h * row[m + 1]
                 k_m, k_n = k[m], k[m + 1]
                 for j in range(size):
                     y_new[j] = y_new[j] + a * k_m[j] + b * k_n[j]
             if i % 2 == 1:
-                a = row[i - 1]
+                a = h * row[i - 1]
                 k_m = k[i - 1]
                 for j in range(size):
-                    y_new[j] = y[j] + h * (y_new[j] + a * k_m[j])
+                    y_new[j] = y[j] + (y_new[j] + a * k_m[j])
             else:
                 for j in range(size):
-                    y_new[j] = y[j] + h * y_new[j]
+                    y_new[j] = y[j] + y_new[j]
         if i < stages:
             flow(t + C[i] * h, y_new, mode, held, p, k[i])
     flow(t_new, y_new, mode, held, p, scratch.f_new)

@@ -138,7 +138,9 @@ class _Writer:
         function = self.function
         names = ", ".join(f"{_TYPES[p.kind]} %{_name(p.name)}" for p in function.parameters)
         head = "define" if function.entry else "define internal"
-        opening = f"{head} {self.result(function.results)} @{function.name}({names}) nounwind {{"
+        rare = " noinline cold" if function.seldom else ""
+        returned = self.result(function.results)
+        opening = f"{head} {returned} @{function.name}({names}) nounwind{rare} {{"
         self.lines = [opening, "entry:"]
         for each in function.variables:
             self.lines.append(f"  %{_name(each.name)} = alloca {_TYPES[each.kind]}")

@@ -75,7 +75,7 @@ def compiled(text: str) -> bytes:
         module = llvm.parse_assembly(text)
         module.verify()
         machine = _machine()
-        options = llvm.create_pipeline_tuning_options(speed_level=2)
+        options = llvm.create_pipeline_tuning_options(speed_level=3)
         # Short loops are not worth vectors.
         options.loop_vectorization = False
         options.slp_vectorization = False

@@ -13,7 +13,7 @@ found from.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 from integrators.machine_code.expressions import FOREIGN, HostFunction
@@ -43,6 +43,12 @@ __all__ = ["HostFunction", "TranslationError", "Translator"]
 class Translator:
     """Translates functions into one module.
 
+    Parameters
+    ----------
+    seldom : collection of str
+        Names of functions that are called so seldom that they need not be put inline: less to
+        compile.
+
     Attributes
     ----------
     module : Module
@@ -60,7 +66,8 @@ class Translator:
     ['retry_factor', 'retry']
     """
 
-    def __init__(self) -> None:
+    def __init__(self, seldom: Collection[str] = ()) -> None:
+        self.seldom = seldom
         self.module = Module()
         self._done: dict[Any, Specialised] = {}
         self._kept: list[Any] = []  # objects whose `id` is part of a key
@@ -163,7 +170,8 @@ class Translator:
         variables = tuple(work.variables.values())
         kinds = "".join(slot.kind for slot in slots)
         name = self._free(function.__name__.strip("_"))
-        made = Function(name, tuple(work.parameters), kinds, variables, statements)
+        seldom = function.__name__ in self.seldom
+        made = Function(name, tuple(work.parameters), kinds, variables, statements, seldom=seldom)
         self.module.functions.append(made)
         return Specialised(made, work.first.get("return"), slots)
 

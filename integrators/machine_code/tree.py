@@ -328,6 +328,8 @@ class Function:
         What it does.
     entry : bool
         Whether it can be called from outside.
+    seldom : bool
+        Whether it is called so seldom that it need not be put inline.
     """
 
     name: str
@@ -336,6 +338,7 @@ class Function:
     variables: tuple[Local, ...]
     body: tuple[Statement, ...]
     entry: bool = False
+    seldom: bool = False
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,8 @@ import pytest
 
 pytest.importorskip("llvmlite")
 
+from integrators import advance, columns, crossings, loop, sliding, step_size
+from integrators.compiled import SELDOM
 from integrators.machine_code import objects
 from integrators.machine_code.c99 import c99_text
 from integrators.machine_code.layout import Block, Column, Layout
@@ -24,6 +26,7 @@ from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.translate import HostFunction, TranslationError, Translator
 from integrators.machine_code.tree import Local
 from integrators.machine_code.values import Number
+from integrators.step_size import retry_factor
 
 SIZE = 5
 INFINITY = float("inf")
@@ -507,3 +510,18 @@ def test_an_error_names_the_line(function, line):
     number = function.__code__.co_firstlineno
     lines = [f"line {number + k}, in {function.__name__}" for k in range(4)]
     assert any(caught.value.place.endswith(each) for each in lines)
+
+
+def test_every_function_that_is_seldom_called_exists():
+    """Those of the loop are in its modules, the others in every generated program."""
+    modules = (advance, columns, crossings, loop, sliding, step_size)
+    known = {name for module in modules for name in vars(module)}
+    assert SELDOM - known == {"arm", "normal", "observe", "switch", "tick"}
+
+
+def test_seldom_called_functions_are_marked():
+    translator = Translator({"retry_factor"})
+    translator.entry("entry", retry_factor, [Number(Local("f", "e")), Number(Local("i", "order"))])
+    text = llvm_text(translator.module)
+    assert text.count("noinline") == 1
+    assert "@retry_factor(double" in text[: text.index("noinline")].splitlines()[-1]
