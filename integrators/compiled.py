@@ -53,46 +53,13 @@ LONGEST_INSIDE = 64 + 8
 
 # Functions that run once per arc, once per event, or never in most runs. Not putting them inline
 # saves a fifth of the compilation and costs nothing; with those of the bracket it does.
-SELDOM = frozenset(
-    [
-        "arm",
-        "normal",
-        "observe",
-        "switch",
-        "tick",
-        "_solve",
-        "slope_on",
-        "seize",
-        "look",
-        "scaled_size",
-        "starting_step",
-        "retry_factor",
-        "next_on_grid",
-        "raise_floor",
-        "longest_next",
-        "_search",
-        "_put_wanted",
-        "_put_firing",
-        "_put_stop",
-        "_begin_arc",
-        "_choose_stop",
-        "_fired",
-        "_finish",
-        "_held",
-        "_jump",
-        "_list",
-        "_make_due",
-        "_no_progress",
-        "_often_changed",
-        "_only_due",
-        "_pick",
-        "_rearm",
-        "_reset_counts",
-        "_reset_if_advanced",
-        "_start",
-        "_undefined",
-    ]
-)
+SELDOM = frozenset([
+    "arm", "normal", "observe", "switch", "tick", "_solve", "slope_on", "seize", "look",
+    "scaled_size", "starting_step", "retry_factor", "next_on_grid", "raise_floor", "longest_next",
+    "_search", "_put_wanted", "_put_firing", "_put_stop", "_begin_arc", "_choose_stop", "_fired",
+    "_finish", "_held", "_jump", "_list", "_make_due", "_no_progress", "_often_changed",
+    "_only_due", "_pick", "_rearm", "_reset_counts", "_reset_if_advanced", "_start", "_undefined",
+])  # fmt: skip
 
 
 class Run(NamedTuple):

@@ -69,7 +69,7 @@ def test_a_number_before_a_key_shows_what_it_can_become() -> None:
         await press(pilot, "3", "left")
         assert _row(app) == 7
         await press(pilot, "1", "2", ".", "5", "g")
-        assert app.said[-2].startswith("row 32, t = 12.4999735 s")
+        assert app.said[-2].startswith("row 34, t = 12.4999735 s")
         await press(pilot, "3", "e")
         assert app.commands.element == 2
 
