@@ -260,12 +260,13 @@ def first_change(path: Path, w: Watched, resolution: float) -> float:
     motion, search = path.motion, w.search
     motion.margins(path.t_new, path.y_new, path.mode, motion.p, w.watch, w.end)
     found = NO_CHANGE
+    low, high = 0.0, 1.0
     quiet = 1.0  # the step up to this point must be searched; its margins are in rights[0]
     copy_margins(w, w.end, search.rights[0])
     if any_changed(w, w.end):
         copy_margins(w, w.start, search.low)
         copy_margins(w, w.end, search.high)
-        quiet, found = _bracket(path, 0.0, 1.0, w, resolution)
+        quiet, found = _bracket(path, low, high, w, resolution)
     while quiet > 0.0:
         low, high = _search(path, quiet, w)
         if high == NO_CHANGE:

@@ -9,6 +9,7 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,11 +26,22 @@ from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
 
 if TYPE_CHECKING:
     from integrators.compiled import Engine, Run
+    from integrators.machine_code.layout import Block
 
-__all__ = ["check_llvmlite", "engine", "functions", "notify", "observe_rows", "packed", "store"]
+__all__ = [
+    "Prepared",
+    "check_llvmlite",
+    "engine",
+    "functions",
+    "notify",
+    "observe_rows",
+    "packed",
+    "store",
+]
 
 Packed = tuple[FloatArray, FloatArray, FloatArray]
 MOST_ENGINES = 256  # in memory
+MOST_SPARE = 4  # blocks that are kept for further calls
 _lock = threading.RLock()  # a sweep may compile from several threads
 
 
@@ -192,10 +204,8 @@ def observe_rows(
     ndarray, shape (rows, kept)
         Bit for bit the same as the readable engine.
     """
-    from integrators.machine_code.layout import Block
-
-    made, example = _observer(program)
-    block = Block(made.layout, example)
+    made = _observer(program)
+    block = made.block()
     table = np.empty((t.size, len(kept)))
     shared, own, tables = packed(program.p)
     rows = block.contents._replace(
@@ -207,20 +217,64 @@ def observe_rows(
     )
     rows.p[0][...], rows.p[1][...] = shared, own
     block.update(rows)
-    made(block, kept.start)
+    made.engine(block, kept.start)
+    made.take_back(block)
     return table
 
 
-_observers: dict[int, tuple[Any, Any, Any]] = {}
+@dataclass(frozen=True)
+class Prepared:
+    """What calls of one kind have in common: machine code, and a block as it is at the beginning.
+
+    Parameters
+    ----------
+    engine : Engine
+        The machine code.
+    example : named tuple
+        Of its arguments.
+    functions : mapping
+        Of the program; kept, so that their `id` stays theirs.
+    """
+
+    engine: Engine
+    example: Any
+    functions: Any
+    _spare: list[Block] = field(default_factory=list)  # of calls that have ended
+
+    @functools.cached_property
+    def _first(self) -> Block:
+        from integrators.machine_code.layout import Block
+
+        first = Block(self.engine.layout, self.example)
+        first.update(first.contents)
+        return first
+
+    def block(self) -> Block:
+        """Return a block of its own for a call."""
+        from integrators.machine_code.layout import Block
+
+        try:
+            return self._spare.pop()
+        except IndexError:
+            return Block(self.engine.layout, self.example, self._first)
+
+    def take_back(self, block: Block) -> None:
+        """Keep a block that nothing refers to any more for the next call."""
+        if len(self._spare) < MOST_SPARE:
+            block.become(self._first)  # and refer to no columns
+            self._spare.append(block)
 
 
-def _observer(program: Program) -> tuple[Any, Any]:
+_observers: dict[int, Prepared] = {}
+
+
+def _observer(program: Program) -> Prepared:
     from integrators import compiled
 
     layout, key = program.layout, id(program.functions)
     with _lock:
         if key in _observers:
-            return _observers[key][:2]
+            return _observers[key]
         if len(_observers) >= MOST_ENGINES:
             _observers.clear()
         made = compiled.observer(
@@ -233,5 +287,5 @@ def _observer(program: Program) -> tuple[Any, Any]:
             store(),
             notify,
         )
-        _observers[key] = *made, program.functions  # kept, so that the key stays theirs
-        return made
+        _observers[key] = Prepared(*made, program.functions)
+        return _observers[key]

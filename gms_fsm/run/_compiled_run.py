@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,16 +31,14 @@ from gms_fsm.traces.trace import Trace
 from integrators import hybrid, loop
 from integrators.advance import ROW, STEPS
 from integrators.columns import FIRINGS, STOPS, Log, Recorded
-from integrators.machine_code.layout import Block
 from integrators.sliding import Functions
 from integrators.steps import T
 
 if TYPE_CHECKING:
-    from integrators.compiled import Engine, Run
+    from integrators.compiled import Run
 
 __all__ = ["CompiledRun"]
 
-MOST_SPARE = 4  # blocks that are kept for further runs
 STEPS_AT_ONCE = 20_000  # between two checks for Ctrl-C and two calls of progress
 
 
@@ -376,35 +373,10 @@ class Columns:
         return start.trace(rows, stops, self.transitions())
 
 
-@dataclass(frozen=True)
-class _Prepared:
-    """What runs of one kind have in common: machine code, and a block as it is at the beginning."""
-
-    engine: Engine
-    example: Run
-    first: Block
-    functions: Any  # kept, so that their `id` stays theirs
-    spare: list[Block] = field(default_factory=list)  # of runs that have ended
-
-    def block(self) -> Block:
-        """Return a block of its own for a run."""
-        try:
-            block = self.spare.pop()
-        except IndexError:
-            return Block(self.engine.layout, self.example, self.first)
-        block.become(self.first)
-        return block
-
-    def take_back(self, block: Block) -> None:
-        """Keep the block of a run that nothing refers to any more, for the next one."""
-        if len(self.spare) < MOST_SPARE:
-            self.spare.append(block)
+_known: dict[Any, compiled.Prepared] = {}
 
 
-_known: dict[Any, _Prepared] = {}
-
-
-def _prepared(start: Start) -> _Prepared:
+def _prepared(start: Start) -> compiled.Prepared:
     """Return what a run has in common with others: what moves, the method, and the sizes."""
     program = start.program
     flow = "flow" if start.options.located else "flow_live"
@@ -414,9 +386,7 @@ def _prepared(start: Start) -> _Prepared:
             _known.clear()
         run = _example(start, flow)
         engine = compiled.engine(program, run)
-        first = Block(engine.layout, run)
-        first.update(first.contents)
-        _known[key] = _Prepared(engine, run, first, program.functions)
+        _known[key] = compiled.Prepared(engine, run, program.functions)
     return _known[key]
 
 

@@ -31,6 +31,7 @@ from gms_fsm.language import (
 )
 from gms_fsm.language._normal import renamed_in
 from gms_fsm.systems._given import derivative_free, is_positive
+from gms_fsm.systems._numbers import numbers_of, of
 from gms_fsm.systems.signals import Formula, Signal
 from gms_fsm.systems.system import Body, Contact, System
 
@@ -40,17 +41,11 @@ __all__ = [
     "Definition",
     "Edge",
     "assembled",
-    "numbers_of",
     "of",
     "renumbered",
 ]
 
 ZERO, ONE = Number(0.0), Number(1.0)
-
-
-def of(contact: str, name: str) -> str:
-    """Return what a name of a contact is called in the trees."""
-    return f"{contact}.{name}"
 
 
 @dataclass(frozen=True)
@@ -315,41 +310,6 @@ def renumbered(read: Assembly, system: System) -> Assembly:
     pairs = zip(read.banks, system.contacts, strict=True)
     banks = tuple(replace(bank, contact=contact) for bank, contact in pairs)
     return replace(read, banks=banks, shared=shared, own=own)
-
-
-def numbers_of(system: System) -> tuple[dict[str, float], dict[str, tuple[int, np.ndarray]]]:
-    """Return all numbers of a system by name.
-
-    Parameters
-    ----------
-    system : System
-        What runs.
-
-    Returns
-    -------
-    (dict, dict)
-        `Assembly.shared` and `Assembly.own`. Their order does not depend on the numbers.
-    """
-    shared: dict[str, float] = {}
-    own: dict[str, tuple[int, np.ndarray]] = {}
-    for contact in system.contacts:  # what a model brings besides its chart's parameters
-        if (model := contact.model) is not None:
-            if (curve := model.stribeck) is not None:
-                for name, value in curve.numbers.items():
-                    shared[of(contact.name, f"curve {name}")] = value
-                shared[of(contact.name, "curve v dip")] = curve.dip
-                shared[of(contact.name, "curve v flat")] = curve.flat
-            shared[of(contact.name, "model sigma_2")] = model.sigma_2
-    shared |= system.numbers
-    for index, contact in enumerate(system.contacts):
-        weights = contact.weights
-        own[of(contact.name, "threshold weight")] = index, np.asarray(weights, dtype=np.float64)
-        for name, given in contact.values.items():
-            if np.ndim(given) == 0:
-                shared[of(contact.name, name)] = float(given)
-            else:
-                own[of(contact.name, name)] = index, np.asarray(given, dtype=np.float64)
-    return shared, own
 
 
 class Reader:

@@ -69,12 +69,13 @@ def _observed_rows(program: Program, rows: Rows, kept: range, *, compiled: bool)
             table = observe_rows(program, rows.t, rows.y, rows.mode, kept)
         except SignalError:  # a Python function failed at some row
             return _observed_rows(program, rows, kept, compiled=False)
-        slid = np.flatnonzero(rows.mode[:, program.layout.slides].any(axis=1))
-        if slid.size:
-            table[slid] = _one_by_one(program, rows.at(slid), kept)
     else:
         table = _one_by_one(program, rows, kept)
-    if program.layout.surfaces:
+    slides = rows.mode[:, program.layout.slides]
+    if slides.any():
+        if compiled:
+            slid = np.flatnonzero(slides.any(axis=1))
+            table[slid] = _one_by_one(program, rows.at(slid), kept)
         _show_one_side(program, rows, kept, table)
     return table
 

@@ -9,8 +9,9 @@ translating take no room.
 from __future__ import annotations
 
 import functools
+import operator
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -96,6 +97,8 @@ class Layout:
         self.arrays: list[_Place] = []
         self.columns: list[_Place] = []
         self.value = self._value(example, (), Local("p", "block"))
+        self.look_at_numbers = _looker(example, [place.way for place in self.numbers])
+        self.look_at_columns = _looker(example, [place.way for place in self.columns])
 
     @functools.cached_property
     def inner(self) -> frozenset[tuple[int, ...]]:
@@ -191,7 +194,9 @@ class Block:
         self.layout = layout
         self._words: Any = np.zeros(layout.words, dtype=np.int64)
         self._floats: Any = self._words.view(np.float64)
-        self._columns: dict[tuple[int, ...], Any] = {}
+        self._columns: list[Any] = [None] * len(layout.columns)  # what they were last time
+        kinds = [self._floats if each.kind == "f" else self._words for each in layout.numbers]
+        self._targets = kinds, [place.offset for place in layout.numbers]
         self.address: int = self._words.ctypes.data
         made = {place.way: self._array(place) for place in layout.arrays}
         self._outside = [made[place.way] for place in layout.arrays if place.offset < 0]
@@ -212,7 +217,7 @@ class Block:
         like : Block
             Of the same layout and example.
         """
-        self._columns = dict(like._columns)
+        self._columns[:] = like._columns
         self._words[:] = like._words
         for array, other in zip(self._outside, like._outside, strict=True):
             array[...] = other
@@ -230,16 +235,16 @@ class Block:
         contents : named tuple or tuple
             Like the example; arrays inside the block are not looked at.
         """
-        words, floats, before = self._words, self._floats, self._columns
-        for place in self.layout.numbers:
-            target = floats if place.kind == "f" else words
-            target[place.offset] = _found(contents, place.way)
-        for place in self.layout.columns:
-            array = _found(contents, place.way)
-            if before.get(place.way) is not array:
+        layout, words, before = self.layout, self._words, self._columns
+        numbers = layout.look_at_numbers(contents)
+        for target, offset, number in zip(*self._targets, numbers, strict=True):
+            target[offset] = number
+        for k, array in enumerate(layout.look_at_columns(contents)):
+            if before[k] is not array:
+                place = layout.columns[k]
                 assert array.dtype == place.dtype
                 assert array.flags.c_contiguous
-                before[place.way] = array
+                before[k] = array
                 lengths = array.shape[: place.lengths]
                 address, _ = array.__array_interface__["data"]
                 words[place.offset : place.offset + 1 + place.lengths] = address, *lengths
@@ -264,6 +269,32 @@ class Block:
         """
         for array, before in zip((self._words, *self._outside), copy, strict=True):
             array[...] = before
+
+
+def _looker(example: Any, ways: Sequence[tuple[int, ...]]) -> Callable[[Any], Sequence[Any]]:
+    """Return a function that returns what ways lead to.
+
+    Walking them all anew in Python takes longer than some runs.
+    """
+    names = [_dotted(example, way) for way in ways]
+    if len(names) < 2 or "" in names:
+        parts = [operator.attrgetter(name) if name else None for name in names]
+        pairs = list(zip(parts, ways, strict=True))
+        return lambda contents: [
+            _found(contents, way) if part is None else part(contents) for part, way in pairs
+        ]
+    return operator.attrgetter(*names)
+
+
+def _dotted(example: Any, way: tuple[int, ...]) -> str:
+    """Return the names on a way, with dots; nothing if there is a tuple without names."""
+    names = []
+    for k in way:
+        if not hasattr(example, "_fields"):
+            return ""
+        names.append(example._fields[k])
+        example = example[k]
+    return ".".join(names)
 
 
 def _found(contents: Any, way: tuple[int, ...]) -> Any:

@@ -108,6 +108,8 @@ def _float(value: float) -> str:
     return f"0x{bits:016X}"
 
 
+_INLINE = {True: " alwaysinline", False: " noinline", None: ""}
+LONGEST = 300  # lines of a function that is put inline because that was asked for
 MOST_TURNS = 8  # of loops that call functions and are written out
 
 
@@ -138,16 +140,15 @@ class _Writer:
         function = self.function
         names = ", ".join(f"{_TYPES[p.kind]} %{_name(p.name)}" for p in function.parameters)
         head = "define" if function.entry else "define internal"
-        rare = " noinline cold" if function.seldom else ""
-        returned = self.result(function.results)
-        opening = f"{head} {returned} @{function.name}({names}) nounwind{rare} {{"
-        self.lines = [opening, "entry:"]
         for each in function.variables:
             self.lines.append(f"  %{_name(each.name)} = alloca {_TYPES[each.kind]}")
         self.block(function.body)
         if not self.ended:
             self.lines.append("  ret void" if not function.results else "  unreachable")
-        return "\n".join([*self.lines, "}"])
+        inline = _INLINE[None if function.inline and len(self.lines) > LONGEST else function.inline]
+        results = self.result(function.results)
+        opening = f"{head} {results} @{function.name}({names}) nounwind{inline} {{"
+        return "\n".join([opening, "entry:", *self.lines, "}"])
 
     @staticmethod
     def result(kinds: str) -> str:

@@ -13,7 +13,8 @@ found from.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from integrators.machine_code.expressions import FOREIGN, HostFunction
@@ -45,9 +46,9 @@ class Translator:
 
     Parameters
     ----------
-    seldom : collection of str
-        Names of functions that are called so seldom that they need not be put inline: less to
-        compile.
+    inline : mapping of str to bool, optional
+        By a function's name whether it is put inline (if it is short), or not; LLVM decides about
+        the others.
 
     Attributes
     ----------
@@ -66,11 +67,12 @@ class Translator:
     ['retry_factor', 'retry']
     """
 
-    def __init__(self, seldom: Collection[str] = ()) -> None:
-        self.seldom = seldom
+    def __init__(self, inline: Mapping[str, bool] | None = None) -> None:
+        self.inline = inline or {}
         self.module = Module()
         self._done: dict[Any, Specialised] = {}
         self._kept: list[Any] = []  # objects whose `id` is part of a key
+        self._made: dict[Any, list[Function]] = {}
         self._names = {*FOREIGN.values(), "callbacks"}
         self._tables: dict[str, Array] = {}
 
@@ -169,9 +171,16 @@ class Translator:
         slots = tuple(work.slots.values())
         variables = tuple(work.variables.values())
         kinds = "".join(slot.kind for slot in slots)
-        name = self._free(function.__name__.strip("_"))
-        seldom = function.__name__ in self.seldom
-        made = Function(name, tuple(work.parameters), kinds, variables, statements, seldom=seldom)
+        name = function.__name__.strip("_")
+        inline = self.inline.get(function.__name__)
+        made = Function(name, tuple(work.parameters), kinds, variables, statements, inline=inline)
+        # Other types may have led to the same statements.
+        alike = self._made.setdefault((id(function), replace(made, body=())), [])
+        for other in alike:
+            if other.body == statements:
+                return Specialised(other, work.first.get("return"), slots)
+        made = replace(made, name=self._free(name))
+        alike.append(made)
         self.module.functions.append(made)
         return Specialised(made, work.first.get("return"), slots)
 

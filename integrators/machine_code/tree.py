@@ -328,8 +328,8 @@ class Function:
         What it does.
     entry : bool
         Whether it can be called from outside.
-    seldom : bool
-        Whether it is called so seldom that it need not be put inline.
+    inline : bool, optional
+        Whether it is put inline; LLVM decides if omitted.
     """
 
     name: str
@@ -338,7 +338,7 @@ class Function:
     variables: tuple[Local, ...]
     body: tuple[Statement, ...]
     entry: bool = False
-    seldom: bool = False
+    inline: bool | None = None
 
 
 @dataclass(frozen=True)

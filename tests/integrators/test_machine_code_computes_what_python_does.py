@@ -18,14 +18,14 @@ import pytest
 pytest.importorskip("llvmlite")
 
 from integrators import advance, columns, crossings, loop, sliding, step_size
-from integrators.compiled import SELDOM
-from integrators.machine_code import objects
+from integrators.compiled import INLINE
+from integrators.machine_code import llvm, objects
 from integrators.machine_code.c99 import c99_text
 from integrators.machine_code.layout import Block, Column, Layout
 from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.translate import HostFunction, TranslationError, Translator
-from integrators.machine_code.tree import Local
-from integrators.machine_code.values import Number
+from integrators.machine_code.tree import Const, Local
+from integrators.machine_code.values import Array, Number
 from integrators.step_size import retry_factor
 
 SIZE = 5
@@ -512,16 +512,40 @@ def test_an_error_names_the_line(function, line):
     assert any(caught.value.place.endswith(each) for each in lines)
 
 
-def test_every_function_that_is_seldom_called_exists():
+def test_what_is_said_about_putting_inline_is_said_about_functions_that_exist():
     """Those of the loop are in its modules, the others in every generated program."""
     modules = (advance, columns, crossings, loop, sliding, step_size)
     known = {name for module in modules for name in vars(module)}
-    assert SELDOM - known == {"arm", "normal", "observe", "switch", "tick"}
+    program = {"arm", "flow", "flow_live", "normal", "observe", "switch", "tick"}
+    assert INLINE.keys() - known == program
 
 
-def test_seldom_called_functions_are_marked():
-    translator = Translator({"retry_factor"})
+@pytest.mark.parametrize(("inline", "mark"), [(True, "alwaysinline"), (False, "noinline")])
+def test_functions_are_put_inline_as_said(inline, mark):
+    translator = Translator({"retry_factor": inline})
     translator.entry("entry", retry_factor, [Number(Local("f", "e")), Number(Local("i", "order"))])
     text = llvm_text(translator.module)
-    assert text.count("noinline") == 1
-    assert "@retry_factor(double" in text[: text.index("noinline")].splitlines()[-1]
+    assert text.count(mark) == 1
+    assert "@retry_factor(double" in text[: text.index(mark)].splitlines()[-1]
+
+
+def test_long_functions_are_not_put_inline(monkeypatch):
+    monkeypatch.setattr(llvm, "LONGEST", 3)
+    translator = Translator({"retry_factor": True})
+    translator.entry("entry", retry_factor, [Number(Local("f", "e")), Number(Local("i", "order"))])
+    assert "inline" not in llvm_text(translator.module)
+
+
+def half(x, _ignored):
+    return 0.5 * x
+
+
+def halves(a):
+    return half(a[0], half) + half(a[1], halves)
+
+
+def test_equal_statements_are_compiled_once():
+    """The types of arguments may differ where the statements do not depend on them."""
+    translator = Translator()
+    translator.entry("entry", halves, [Array("f", (Const("i", 2),), Local("p", "a"))])
+    assert [each.name for each in translator.module.functions] == ["half", "halves", "entry"]
