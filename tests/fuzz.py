@@ -828,7 +828,7 @@ def _mutated_array(choices: Choices, array: Any) -> Any:
     if how == 6:
         return np.asfortranarray(array)
     changed = array.copy()
-    if changed.size and changed.dtype.kind in "fi":
+    if changed.size and changed.dtype.kind in "fiu":
         flat = changed.reshape(-1)
         numbers = [0, -1, 1, 2, 7, 2**40, np.nan, np.inf, -np.inf, 1e308, -1e308, 5e-324]
         number = choices.one_of(numbers if changed.dtype.kind == "f" else numbers[:6])

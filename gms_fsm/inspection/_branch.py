@@ -22,7 +22,6 @@ from gms_fsm.lowering._observing import sigmas
 from gms_fsm.lowering.log_columns import LogRecord
 from gms_fsm.run.simulate import Run
 from gms_fsm.traces._between import interpolated
-from gms_fsm.traces._log import log_of
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.scope import Scope
@@ -254,7 +253,7 @@ class Branch:
                 len(raw), start.program.layout.modes
             ),
         )
-        return start.trace(rows, rows, log_of(self.log()))
+        return start.trace(rows, rows, start.firings(self.log()))
 
 
 def _nothing() -> None:

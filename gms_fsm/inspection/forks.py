@@ -495,8 +495,7 @@ class Forks:
             own = [here.t], [0], [here.y], [here.mode]
             shared = _joined(shared, Rows(*map(np.array, own)))
         early = before.made <= place
-        logs = [before.trace.transitions[early], after.trace.transitions]
-        log = np.concatenate([each for each in logs if len(each)] or logs[:1]).view(np.recarray)
+        log = before.trace.firings.at(early).followed_by(after.trace.firings)
         new = after.trace.rows
         # Micro-steps count the firings at one time, also those before the poke.
         more = np.where(new.t == here.t, here.microstep, 0)
@@ -512,8 +511,8 @@ def _joined(first: Rows, second: Rows) -> Rows:
 
 def _made(trace: Trace) -> NDArray[np.int64]:
     """Return the number of the row that each firing of a run made."""
-    low = np.searchsorted(trace.t, trace.transitions.t, side="left")
-    high = np.searchsorted(trace.t, trace.transitions.t, side="right")
+    low = np.searchsorted(trace.t, trace.firings.t, side="left")
+    high = np.searchsorted(trace.t, trace.firings.t, side="right")
     spans = zip(low.tolist(), high.tolist(), steps_of(trace).tolist(), strict=True)
     rows = [a + int(np.searchsorted(trace.microstep[a:b], step)) for a, b, step in spans]
     return np.array(rows, dtype=np.int64)

@@ -202,9 +202,26 @@ class Layout:
         return tuple(np.array(column, dtype=np.str_) for column in columns)
 
     @cached_property
+    def edge_owners(self) -> NDArray[np.int64]:
+        """The number of the contact of each edge."""
+        firsts = [bank.first_edge for bank in self.banks]
+        return np.searchsorted(firsts, np.arange(len(self.edges)), "right") - 1
+
+    @cached_property
+    def edge_codes(self) -> Mapping[tuple[str, ...], int]:
+        """The number of each edge, by its contact and its texts in the log."""
+        owners = (self.banks[k].name for k in self.edge_owners.tolist())
+        named = zip(owners, self.edges, strict=True)
+        return {(owner, *texts): k for k, (owner, texts) in enumerate(named)}
+
+    @cached_property
     def firsts(self) -> NDArray[np.int64]:
         """The first machine of each contact, over all contacts."""
         return np.array([bank.first for bank in self.banks])
+
+    def owners(self, machines: NDArray[Any]) -> NDArray[np.int64]:
+        """Return the number of the contact of each of some machines."""
+        return np.searchsorted(self.firsts, machines, "right") - 1
 
     def bank(self, machine: int) -> BankPlaces:
         """Return the contact of a machine, which are counted over all contacts."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from gms_fsm.errors import SignalError
 from gms_fsm.lowering import _compiled as compiled
-from gms_fsm.lowering.log_columns import LOG_NUMBERS, LOG_TEXTS, LogRecord
+from gms_fsm.lowering.log_columns import LOG_NUMBERS, LogRecord
 from gms_fsm.lowering.program import equations
 from gms_fsm.run._moment import Place, Recording
 from gms_fsm.run._recording import (
@@ -24,7 +24,7 @@ from gms_fsm.run.machines import Interference, MachineEngine
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
-from gms_fsm.traces._log import log_from
+from gms_fsm.traces._firings import Firings
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.trace import Trace
@@ -327,7 +327,7 @@ class Columns:
 
     def firings(self, after: int) -> list[LogRecord]:
         """Return the records of the log from a number on."""
-        return [LogRecord(*each) for each in self.transitions()[after:].tolist()]
+        return [LogRecord(*each) for each in self.fired().at(slice(after, None)).records.tolist()]
 
     def as_lists(self) -> hybrid.Buffers:
         """Return the buffers with time, state and modes as Python numbers, for messages."""
@@ -337,20 +337,13 @@ class Columns:
         sliding = b.sliding._replace(flags=b.sliding.flags.tolist())
         return self.buffers._replace(now=b.now._replace(**lists), memory=memory, sliding=sliding)
 
-    def transitions(self) -> Any:
-        """Return the transition log."""
+    def fired(self) -> Firings:
+        """Return the firings so far."""
         start, count = self.start, int(self.log.counts[FIRINGS])
-        log: Any = self.log  # arrays
-        edges, machines = log.edge[:count], log.machine[:count]
-        layout = start.program.layout
-        whose = np.searchsorted(layout.firsts, machines, "right") - 1
-        columns: dict[str, Any] = {"t": log.t[:count], "element": machines - layout.firsts[whose]}
-        texts = zip(LOG_TEXTS, layout.log_texts, strict=True)
-        columns |= {name: text[edges] for name, text in texts}
-        columns |= zip(LOG_NUMBERS, log.numbers[:count].T, strict=True)
-        if start.given is not None and count:
-            columns["contact"] = np.array([bank.name for bank in layout.banks])[whose]
-        return log_from(columns)
+        names = ("t", "machine", "edge", "numbers")
+        columns = {name: getattr(self.log, name)[:count] for name in names}
+        of_system = start.given is not None
+        return Firings.copied(columns, start.program.layout, of_system=of_system)
 
     def trace(self) -> Trace:
         """Return the trace of all recorded data."""
@@ -370,7 +363,7 @@ class Columns:
                 log.stops_y,
                 log.stops_mode,
             )
-        return start.trace(rows, stops, self.transitions())
+        return start.trace(rows, stops, self.fired())
 
 
 _known: dict[Any, compiled.Prepared] = {}

@@ -20,7 +20,6 @@ from gms_fsm.lowering.log_columns import CONTACT, LogRecord
 from gms_fsm.run._moment import Place, Recording, scope_of
 from gms_fsm.run.machines import Interference
 from gms_fsm.run.start import Start
-from gms_fsm.traces._log import log_of
 from gms_fsm.traces.failures import (
     CallbackError,
     LivelockError,
@@ -152,7 +151,7 @@ class Recorder:
             for name, table in tables.items()
             for column, values in vars(table.rows(layout)).items()
         }
-        return kept | {"log": np.asarray(log_of(self.log))}
+        return kept | {"log": np.asarray(self.start.firings(self.log).records)}
 
     def restore(
         self, state: Mapping[str, Any], latest: tuple[float, list[float], tuple[int, ...]]
@@ -198,7 +197,7 @@ class Recorder:
             self.rows.add(t, 0, y, mode)
         rows = self.rows.rows(layout)
         stops = self.stops.rows(layout) if start.output == "t_eval" else rows
-        return start.trace(rows, stops, log_of(self.log))
+        return start.trace(rows, stops, start.firings(self.log))
 
 
 # --------------------------------------------------------------------------- wording of errors

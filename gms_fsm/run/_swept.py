@@ -17,7 +17,7 @@ from gms_fsm._files import write_whole
 from gms_fsm.charts.parameters import QUANTITIES, FloatArray
 from gms_fsm.errors import OutputError, ParameterError, TraceFileError, cut, shown, why
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
-from gms_fsm.traces._archives import member
+from gms_fsm.traces._archives import member, write_arrays
 from gms_fsm.traces._log import Log
 from gms_fsm.traces.rows import column_name
 
@@ -294,7 +294,7 @@ class Sweep:
             arrays |= {"owners": self.owners} if self.contacts else {}
             arrays |= {"transitions": np.asarray(self.transitions), "elements": self.z.shape[1]}
             arrays["edges"] = np.array(self.edges, dtype=np.str_)
-            return write_whole(path, lambda file: np.savez_compressed(file, **arrays))
+            return write_whole(path, lambda file: write_arrays(file, arrays))
         if path.suffix == ".parquet":
             pandas = require("pandas", "sweep")
             require("pyarrow", "sweep")

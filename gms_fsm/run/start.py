@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,6 +17,7 @@ from gms_fsm.errors import ParameterError, SignalError, shown
 from gms_fsm.language import evaluate
 from gms_fsm.lowering._pulses import waking_times
 from gms_fsm.lowering.layout import BankPlaces, Layout
+from gms_fsm.lowering.log_columns import LogRecord
 from gms_fsm.lowering.program import Program, arguments, lower
 from gms_fsm.lowering.scales import Setting, Tolerance, scales_of_system
 from gms_fsm.run.settings import Settings
@@ -24,6 +25,7 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Corners, Formula
 from gms_fsm.systems.system import Mounting, System, origin_of, system_of, with_model
+from gms_fsm.traces._firings import Firings
 from gms_fsm.traces.rows import Rows
 from gms_fsm.traces.scope import GuardValues, parameter_values
 from gms_fsm.traces.trace import Trace
@@ -81,24 +83,28 @@ class Start:
         """The system, if it is the user's and not a model on a rig."""
         return self.system if isinstance(self.rig, Mounting) else None
 
-    def trace(self, rows: Rows, stops: Rows, log: Any) -> Trace:
+    def trace(self, rows: Rows, stops: Rows, firings: Firings) -> Trace:
         """Return the trace of a run.
 
         Parameters
         ----------
         rows, stops : Rows
             What was kept.
-        log : recarray
-            The transitions.
+        firings : Firings
+            The log.
 
         Returns
         -------
         Trace
             With what it was made from.
         """
-        trace = Trace(rows, stops, log, self.model, self.rig, self.settings, system=self.given)
+        trace = Trace(rows, stops, firings, self.model, self.rig, self.settings, system=self.given)
         vars(trace)["program"] = self.program  # it need not be generated again
         return trace
+
+    def firings(self, records: Iterable[LogRecord]) -> Firings:
+        """Return the firings of a run from its records."""
+        return Firings.of(records, self.program.layout, of_system=self.given is not None)
 
     def edge(self, machine: int, edge: int) -> tuple[BankPlaces, Transition]:
         """Return the contact of a machine and one of its edges, by their numbers in the run."""

@@ -30,6 +30,7 @@ from gms_fsm.systems._varied import numbers_in, with_numbers_of
 from gms_fsm.systems.models import Model, parameter_names, with_values
 from gms_fsm.systems.rigs import Rig, with_numbers
 from gms_fsm.systems.system import Contact, System
+from gms_fsm.traces._firings import Firings
 from gms_fsm.traces._log import Log
 from gms_fsm.traces.rows import Rows, column_name
 from gms_fsm.traces.trace import Trace
@@ -369,21 +370,13 @@ def _result(run: Run | CompiledRun | None, outcome: str, message: str) -> _Resul
     if run.start.given is not None:
         return _result_of_system(run, outcome, message)
     recorder, trace = run.recorder, run.recorder.trace()
-    edges = {edge.name: index for index, edge in enumerate(trace.model.chart.transitions)}
-    log = np.empty(len(trace.transitions), dtype=LOG)
-    for name in (LOG.names or ())[1:]:
-        log[name] = (
-            trace.transitions[name]
-            if name != "edge"
-            else [edges[edge] for edge in trace.transitions.edge.tolist()]
-        )
     rows = None
     if recorder.start.output == "t_eval":
         rows = {name: getattr(trace, name) for name in ("x", "v", "F", "z")}
     here = scope_of(recorder.start, *recorder.latest)
     end = {name: getattr(here, name) for name in ("t", "x", "v", "F", "z")}
     end["mode"] = here.mode[here.layout.elements]
-    return _Result(outcome, message, end, log, rows)
+    return _Result(outcome, message, end, _log_of(trace.firings), rows)
 
 
 def _result_of_system(run: Run | CompiledRun, outcome: str, message: str) -> _Result:
@@ -392,15 +385,7 @@ def _result_of_system(run: Run | CompiledRun, outcome: str, message: str) -> _Re
     trace, layout = recorder.trace(), start.program.layout
     t, y, mode = recorder.latest
     now = Rows(np.array([t]), np.zeros(1, dtype=np.int64), np.array([y]), np.array([mode]))
-    last = start.trace(now, now, trace.transitions)
-    log = np.empty(len(trace.transitions), dtype=LOG)
-    for name in ("t", "element", *LOG_NUMBERS):
-        log[name] = trace.transitions[name]
-    for bank, contact in zip(layout.banks, start.system.contacts, strict=True):
-        edges = {edge.name: bank.first_edge + k for k, edge in enumerate(contact.chart.transitions)}
-        here = trace.transitions.contact == bank.name if len(log) else []
-        log["element"][here] += bank.first
-        log["edge"][here] = [edges[edge] for edge in trace.transitions.edge[here].tolist()]
+    last = start.trace(now, now, trace.firings)
     end = {name: values[0] for name, values in _of_contacts(last).items()}
     end |= {"t": t, "mode": list(mode)[layout.elements]}
     ends = {name: float(values[0]) for name, values in _of_parts(last).items()}
@@ -408,7 +393,15 @@ def _result_of_system(run: Run | CompiledRun, outcome: str, message: str) -> _Re
     if start.output == "t_eval":
         rows = {row_name(name): values for name, values in _of_parts(trace).items()}
         rows |= _of_contacts(trace)
-    return _Result(outcome, message, end, log, rows, ends)
+    return _Result(outcome, message, end, _log_of(trace.firings), rows, ends)
+
+
+def _log_of(firings: Firings) -> NDArray[Any]:
+    log = np.empty(len(firings), dtype=LOG)
+    log["t"], log["element"], log["edge"] = firings.t, firings.machine, firings.edge
+    for name, column in zip(LOG_NUMBERS, firings.numbers.T, strict=True):
+        log[name] = column
+    return log
 
 
 def _of_contacts(trace: Trace) -> dict[str, FloatArray]:

@@ -21,7 +21,9 @@ from gms_fsm.systems.rigs import Prescribed, PulledSlider, Rig, Slider, TextRig
 from gms_fsm.systems.system import System
 from gms_fsm.traces.verdicts import Verdict
 
-__all__ = ["Header"]
+__all__ = ["FORMATS", "Header"]
+
+FORMATS = ("gms-fsm trace 1", "gms-fsm trace 2")  # CSV files are of the first
 
 RigKind = Literal["Prescribed", "Slider", "PulledSlider", "custom"]
 RIGS: Mapping[type, RigKind] = {
@@ -78,7 +80,7 @@ class Header(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, ser_json_inf_nan="constants")
 
-    format: Literal["gms-fsm trace 1"] = "gms-fsm trace 1"
+    format: Literal["gms-fsm trace 1", "gms-fsm trace 2"] = "gms-fsm trace 1"
     model: ModelTable | None = None
     rig: RigTable | None = None
     system: SystemTable | None = None

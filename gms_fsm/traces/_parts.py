@@ -12,14 +12,14 @@ import numpy as np
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import TraceFileError
 from gms_fsm.lowering.layout import Layout
-from gms_fsm.lowering.log_columns import CONTACT, LOG_TEXTS
+from gms_fsm.lowering.log_columns import LOG_NUMBERS
 from gms_fsm.lowering.program import lower
 from gms_fsm.lowering.scales import Setting
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System, origin_of, system_of
+from gms_fsm.traces._firings import Firings
 from gms_fsm.traces._header import Header
-from gms_fsm.traces._log import is_log
 from gms_fsm.traces.rows import Rows
 
 __all__ = ["Parts", "Ran", "checked", "held_period", "stored_names"]
@@ -114,9 +114,9 @@ class Parts:
     ran : Ran
         What ran.
     rows, stops : Rows
-        The rows, and both sides of every stop.
-    log : recarray
-        The log, as in ``Trace.transitions``.
+        The rows, and both sides of every stop; one object if they are the same.
+    firings : Firings
+        The log.
     stored : mapping of str to ndarray
         Observed quantities, by their names in the layout.
     """
@@ -125,7 +125,7 @@ class Parts:
     ran: Ran
     rows: Rows
     stops: Rows
-    log: Any
+    firings: Firings
     stored: Mapping[str, FloatArray]
 
 
@@ -140,7 +140,8 @@ def checked(parts: Parts) -> Parts:
     Returns
     -------
     Parts
-        With slide flags for the surfaces, which files of older versions lack.
+        With slide flags for the surfaces, which files of older versions lack, and with integers of
+        the size that a run has.
 
     Raises
     ------
@@ -149,24 +150,32 @@ def checked(parts: Parts) -> Parts:
     """
     layout, system = parts.ran.layout, parts.ran.whole
     states = [len(each.chart.states) for each in system.contacts for _ in range(each.n)]
-    rows, stops = (_with_slides(table, layout) for table in (parts.rows, parts.stops))
-    for kind, table in (("rows", rows), ("stops", stops)):
+    tables = {"rows": _with_slides(parts.rows, layout)}
+    if parts.stops is not parts.rows:
+        tables["stops"] = _with_slides(parts.stops, layout)
+    for kind, table in tables.items():
         _check_table(kind, table, layout, np.array(states))
+        tables[kind] = replace(
+            table,
+            microstep=table.microstep.astype(np.int64, copy=False),
+            mode=table.mode.astype(np.int64, copy=False),
+        )
+    rows = tables["rows"]
     if not len(rows):
         raise TraceFileError("the file has no rows")
     for name, value in parts.stored.items():
         own = name in layout.observed.own
         shape = (len(rows), len(layout.observed.all_of(name))) if own else (len(rows),)
         _expect(name, value, shape, "f")
-    _check_log(parts.log, parts.ran)
-    for kind, table in (("rows", rows), ("stops", stops)):
-        times = parts.log.t
+    firings = _checked_firings(parts.firings)
+    for kind, table in tables.items():
+        times = firings.t
         fired = np.searchsorted(times, table.t, "right") - np.searchsorted(times, table.t)
         if not ((table.microstep >= 0) & (table.microstep <= fired)).all():
             raise TraceFileError(
                 f"{kind} microstep: the micro-steps do not match the firings in the log"
             )
-    return replace(parts, rows=rows, stops=stops)
+    return replace(parts, rows=rows, stops=tables.get("stops", rows), firings=firings)
 
 
 def _check_table(kind: str, table: Rows, layout: Layout, states: Any) -> None:
@@ -184,28 +193,27 @@ def _check_table(kind: str, table: Rows, layout: Layout, states: Any) -> None:
         raise TraceFileError(f"{kind} mode: a slide flag must be 0 or 1")
 
 
-def _check_log(log: Any, ran: Ran) -> None:
-    if not is_log(log) or (CONTACT in log.dtype.names) != (ran.system is not None and log.size > 0):
-        raise TraceFileError("the transition log does not have the columns of a trace")
-    if not (np.diff(log.t) >= 0).all() or not np.isfinite(log.t).all():
+def _checked_firings(firings: Firings) -> Firings:
+    layout, count = firings.layout, firings.t.size
+    _expect("log t", firings.t, (count,), "f")
+    _expect("log machine", firings.machine, (count,), "i")
+    _expect("log edge", firings.edge, (count,), "i")
+    _expect("log numbers", firings.numbers, (count, len(LOG_NUMBERS)), "f")
+    if not (np.diff(firings.t) >= 0).all() or not np.isfinite(firings.t).all():
         raise TraceFileError("the transition log: times must be finite and must not decrease")
-    known = {each.name: each for each in ran.whole.contacts}
-    named = CONTACT in log.dtype.names
-    of_contact = log.contact if named else np.full(log.size, next(iter(known)))
-    for name in np.unique(of_contact).tolist():
-        if name not in known:
-            raise TraceFileError("the transition log names a contact that the system does not have")
-        mine, contact = log[of_contact == name], known[name]
-        if not 0 <= mine.element.min() <= mine.element.max() < contact.n:
-            raise TraceFileError("the transition log names an element that the model does not have")
-        edges = {(edge.name, edge.source, edge.target) for edge in contact.chart.transitions}
-        if not edges >= set(zip(*(mine[name].tolist() for name in LOG_TEXTS), strict=True)):
-            raise TraceFileError("the transition log names an edge that the chart does not have")
+    machine, edge = firings.machine, firings.edge
+    if not ((machine >= 0) & (machine < layout.n)).all():
+        raise TraceFileError("the transition log names an element that the model does not have")
+    if not ((edge >= 0) & (edge < len(layout.edges))).all() or not np.array_equal(
+        layout.edge_owners[edge], layout.owners(machine)
+    ):
+        raise TraceFileError("the transition log names an edge that the chart does not have")
+    return replace(firings, machine=machine.astype(np.int32), edge=edge.astype(np.int32))
 
 
 def _with_slides(rows: Rows, layout: Layout) -> Rows:
     """Return rows with slide flags for the surfaces, which files of older versions lack."""
-    if rows.mode.ndim != 2 or rows.mode.shape[1] != layout.n or not layout.surfaces:
+    if rows.mode.shape != (len(rows), layout.n) or not layout.surfaces:
         return rows
     none = np.zeros((len(rows.mode), layout.surfaces), dtype=np.int64)
     return replace(rows, mode=np.concatenate([rows.mode, none], axis=1))
@@ -213,7 +221,8 @@ def _with_slides(rows: Rows, layout: Layout) -> Rows:
 
 def _expect(name: str, array: Any, shape: tuple[int, ...], kind: str) -> None:
     """Raise unless an array from a file has the expected shape and type."""
-    if not isinstance(array, np.ndarray) or array.shape != shape or array.dtype.kind != kind:
+    kinds = {"f": "f", "i": "iu"}[kind]
+    if not isinstance(array, np.ndarray) or array.shape != shape or array.dtype.kind not in kinds:
         found = getattr(array, "shape", None), str(getattr(array, "dtype", type(array).__name__))
         wanted = shape, {"f": "float", "i": "integer"}[kind]
         raise TraceFileError(f"{name} is {found}, expected {wanted}")

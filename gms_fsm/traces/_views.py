@@ -78,21 +78,19 @@ def steps_of(trace: Trace) -> NDArray[np.int64]:
     ndarray of int, shape (transitions,)
         Micro-steps count the firings of all contacts at one time.
     """
-    log = trace.transitions if trace.every is None else trace.every
-    counted: NDArray[np.int64] = np.arange(log.size) - np.searchsorted(log.t, log.t) + 1
-    if trace.every is None or not log.size:
-        return counted
-    return np.asarray(counted[log.contact == trace.places.name])
+    log = trace.firings if trace.every is None else trace.every
+    counted: NDArray[np.int64] = np.arange(len(log)) - np.searchsorted(log.t, log.t) + 1
+    return counted if trace.every is None else counted[log.within(trace.places.name)]
 
 
-def picked(trace: Trace, keep: NDArray[Any]) -> Trace:
+def picked(trace: Trace, keep: NDArray[Any] | slice) -> Trace:
     """Return some of the rows, with what was observed there, and the whole log.
 
     Parameters
     ----------
     trace : Trace
         A run.
-    keep : ndarray of int or bool
+    keep : ndarray of int or bool, or slice
         Which rows.
 
     Returns
@@ -101,7 +99,8 @@ def picked(trace: Trace, keep: NDArray[Any]) -> Trace:
         Nothing is computed again.
     """
     rows = trace.rows.at(keep)
-    part = replace(trace, rows=rows, stops=rows, stored={})
+    stored = {name: column[keep] for name, column in trace.stored.items()}
+    part = replace(trace, rows=rows, stops=rows, stored=stored)
     seen = {name: column[keep] for name, column in trace.seen.items()}
     vars(part).update({"program": trace.program, "seen": seen})
     return part
@@ -198,12 +197,13 @@ def write_trace(trace: Trace, path: Path) -> Path:
     system = trace.system
     header = Header.of(trace.model, trace.rig, system, trace.settings, trace.monitors)
     if path.suffix == ".csv":
-        return _csv.write(path, header, trace.columns(), trace.transitions)
+        starts = range(0, len(trace), _csv.AT_ONCE)
+        parts = (picked(trace, slice(start, start + _csv.AT_ONCE)) for start in starts)
+        return _csv.write(path, header, (part.columns() for part in parts), trace.firings)
     ran = Ran(trace.model, trace.rig, system, held_period(trace.settings))
     driven = () if system is None else (body for body in system.bodies if body.driven)
     stored = {**trace.seen, **{body.v: trace.body(body.name).v for body in driven}}
-    stops = merged(trace.rows, trace.stops)
-    return _npz.write(path, Parts(header, ran, trace.rows, stops, trace.transitions, stored))
+    return _npz.write(path, Parts(header, ran, trace.rows, trace.stops, trace.firings, stored))
 
 
 def read_parts(path: Path) -> Parts:

@@ -34,6 +34,7 @@ from gms_fsm.systems.system import System, system_of
 from gms_fsm.traces import _csv
 from gms_fsm.traces._between import between
 from gms_fsm.traces._columns import columns_of
+from gms_fsm.traces._firings import Firings
 from gms_fsm.traces._observed import Observed
 from gms_fsm.traces._parts import held_period
 from gms_fsm.traces._views import (
@@ -93,6 +94,8 @@ class Trace:
     F_elements : ndarray, shape (rows, n), N
     transitions : numpy.recarray
         Records with ``t, element`` (from 0), ``edge, source, target, z, v, s, F_before, F_after``.
+    firings : Firings
+        The same with codes in place of names, in a third of the memory.
     model, rig
         The simulated system; after `load` the model is a generic `ChartModel`.
     settings : dict
@@ -111,7 +114,7 @@ class Trace:
 
     rows: Rows
     stops: Rows  # both sides of every stop; needed if `rows` has requested times only
-    transitions: Any
+    firings: Firings  # the log, with codes in place of names
     model: Model
     rig: Rig
     settings: Mapping[str, Setting]
@@ -119,10 +122,10 @@ class Trace:
     monitors: Mapping[str, Verdict] = field(default_factory=dict, repr=False)
     system: System | None = field(default=None, repr=False)  # where it is not a model on a rig
     which: str = field(default="", repr=False)  # the contact, of a system with several
-    every: Any = field(default=None, repr=False)  # the log of all contacts, where one is chosen
+    every: Firings | None = field(default=None, repr=False)  # of all contacts, where one is chosen
 
     def __repr__(self) -> str:
-        return f"<Trace: {self.title}; {len(self.rows)} rows, {len(self.transitions)} transitions>"
+        return f"<Trace: {self.title}; {len(self.rows)} rows, {len(self.firings)} transitions>"
 
     @property
     def title(self) -> str:
@@ -148,6 +151,11 @@ class Trace:
     def microstep(self) -> NDArray[np.int64]:
         """Micro-step of each row, shape (rows,)."""
         return self.rows.microstep
+
+    @property
+    def transitions(self) -> Any:
+        """The log as a record array, made from the codes when it is first read."""
+        return self.firings.records
 
     # ------------------------------------------------------------------ systems
     @cached_property
@@ -181,10 +189,10 @@ class Trace:
         bank = self.program.layout.contact(name)
         if self.system is None:
             return self
-        log = self.transitions if self.every is None else self.every
-        mine = log[log.contact == bank.name] if "contact" in log.dtype.names else log
+        every = self.firings if self.every is None else self.every
+        mine = every.at(every.within(bank.name))
         model: Any = self.system.contact(bank.name)
-        chosen = replace(self, model=model, transitions=mine, which=bank.name, every=log)
+        chosen = replace(self, model=model, firings=mine, which=bank.name, every=every)
         vars(chosen).update({k: u for k, u in vars(self).items() if k in ("program", "seen")})
         return chosen
 
@@ -487,7 +495,8 @@ class Trace:
         """Write the trace to ``.npz``, or to ``.csv`` with the log in a second file.
 
         The file is written completely or not at all. CSV numbers are printed so that they read
-        back equal; the log is written to ``<name>.transitions.csv``.
+        back equal; the log is written to ``<name>.transitions.csv``. `numpy.load` reads ``.npz``
+        too; its ``log_machine`` and ``log_edge`` count over all contacts.
 
         Parameters
         ----------
@@ -531,7 +540,7 @@ class Trace:
         return cls(
             parts.rows,
             parts.stops,
-            parts.log,
+            parts.firings,
             parts.ran.model,
             parts.ran.rig,
             parts.header.settings,
@@ -577,7 +586,7 @@ class Trace:
         str
             With a header line.
         """
-        return _csv.log_text(self.transitions)
+        return "".join(_csv.log_texts(self.firings))
 
 
 def files_of(path: Path) -> list[Path]:

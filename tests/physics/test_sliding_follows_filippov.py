@@ -23,6 +23,7 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.inspection.explain import explain
+from tests import older_files
 from tests.helpers import same_bits
 
 ENGINES = ["machines", "ifelse", "compiled"]
@@ -276,13 +277,10 @@ def test_older_files_without_sliding_are_read(tmp_path):
     """Their rows have no flags of surfaces, which means no sliding."""
     trace = simulate(BANK, PUSHED, 0.3, engine="ifelse")
     assert len(trace.sliding) == 0
-    path = trace.save(tmp_path / "a.npz")
-    with np.load(path) as file:
-        arrays = dict(file)
+    arrays = older_files.format_1(trace, tmp_path / "a.npz")
     for kind in ("rows_mode", "stops_mode"):
         arrays[kind] = arrays[kind][:, :3]
-    np.savez(tmp_path / "old.npz", **arrays)
-    same_bits(trace, Trace.load(tmp_path / "old.npz"))
+    same_bits(trace, Trace.load(older_files.write(tmp_path / "old.npz", arrays)))
 
 
 @pytest.mark.parametrize("engine", ["ifelse", "compiled"])

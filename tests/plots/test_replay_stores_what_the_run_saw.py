@@ -272,10 +272,10 @@ def test_two_runs_of_one_model_are_distinguished_by_their_names() -> None:
 @uplot
 def test_a_log_with_an_edge_of_another_chart_is_rejected() -> None:
     trace = fig4("signed")
-    log = trace.transitions.copy()
-    log.edge[0] = "warp"
+    layout = trace.program.layout
+    other = replace(layout, edges=tuple(("warp", *ends) for _, *ends in layout.edges))
     with pytest.raises(TraceFileError, match="'warp'"):
-        replay_html(replace(trace, transitions=log))
+        replay_html(replace(trace, firings=replace(trace.firings, layout=other)))
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import json
+import tracemalloc
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -20,6 +21,7 @@ from gms_fsm.errors import (
     TraceFileError,
 )
 from gms_fsm.traces.trace import dwell_times
+from tests import older_files
 from tests.helpers import stick_slip
 
 
@@ -42,7 +44,7 @@ def rewritten(saved: bytes, path: Path, change: Callable[[dict[str, Any]], objec
 def test_a_trace_without_rows_is_rejected(saved: bytes, tmp_path: Path) -> None:
     def empty(arrays: dict[str, Any]) -> None:
         for name in list(arrays):
-            if name not in ("header", "transitions"):
+            if name != "header" and not name.startswith("log_"):
                 arrays[name] = arrays[name][:0]
 
     with pytest.raises(TraceFileError, match=r"run\.npz: the file has no rows"):
@@ -61,12 +63,34 @@ def test_a_trace_without_rows_is_rejected(saved: bytes, tmp_path: Path) -> None:
     ],
 )
 def test_a_log_that_does_not_fit_the_chart_is_rejected(
-    column: str, value: Any, saved: bytes, tmp_path: Path
+    column: str, value: Any, tmp_path: Path
 ) -> None:
     """It broke the table of dwell times, and the explanation of a row."""
 
+    run = simulate(stick_slip("signed"), Prescribed("0.3"), 3.0)
+    arrays = older_files.format_1(run, tmp_path / "run.npz")
+    arrays["transitions"][column][1] = value
+    with pytest.raises(TraceFileError, match=r"run\.npz: the transition log|run\.npz: rows micro"):
+        Trace.load(older_files.write(tmp_path / "run.npz", arrays))
+
+
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [
+        ("edge", 3),
+        ("edge", 255),
+        ("machine", 4),
+        ("machine", 255),
+        ("t", np.nan),
+        ("t", 9e9),
+        ("t", -1.0),
+    ],
+)
+def test_codes_that_do_not_fit_the_chart_are_rejected(
+    column: str, value: Any, saved: bytes, tmp_path: Path
+) -> None:
     def change(arrays: dict[str, Any]) -> None:
-        arrays["transitions"][column][1] = value
+        arrays[f"log_{column}"][1] = value
 
     with pytest.raises(TraceFileError, match=r"run\.npz: the transition log|run\.npz: rows micro"):
         Trace.load(rewritten(saved, tmp_path / "run.npz", change))
@@ -77,6 +101,7 @@ def test_microsteps_without_firings_are_rejected(
     microstep: int, saved: bytes, tmp_path: Path
 ) -> None:
     def change(arrays: dict[str, Any]) -> None:
+        arrays["rows_microstep"] = arrays["rows_microstep"].astype(np.int64)
         arrays["rows_microstep"][-1] = microstep
 
     with pytest.raises(TraceFileError, match="microstep"):
@@ -97,9 +122,8 @@ def test_a_trace_without_an_engine_name_can_be_sampled(saved: bytes, tmp_path: P
 @pytest.mark.parametrize("value", [1e308, np.inf, np.nan])
 def test_samples_that_overflow_are_not_finite(value: float, saved: bytes, tmp_path: Path) -> None:
     def change(arrays: dict[str, Any]) -> None:
-        for name in ("rows_y", "stops_y"):
-            arrays[name][1::2] = value
-            arrays[name][::2] = -value
+        arrays["rows_y"][1::2] = value
+        arrays["rows_y"][::2] = -value
 
     trace = Trace.load(rewritten(saved, tmp_path / "run.npz", change))
     sampled = trace.sample(np.linspace(0.1, 2.9, 5))
@@ -107,7 +131,9 @@ def test_samples_that_overflow_are_not_finite(value: float, saved: bytes, tmp_pa
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["header", "rows_t", "rows_y", "transitions", "observed_F"])
+@pytest.mark.parametrize(
+    "name", ["header", "rows_t", "rows_y", "rows_mode", "log_t", "log_edge", "observed_F"]
+)
 def test_an_array_that_unpacks_to_a_thousand_times_its_size_is_rejected(
     name: str, saved: bytes, tmp_path: Path
 ) -> None:
@@ -140,3 +166,28 @@ def test_a_long_run_at_rest_is_accepted(tmp_path: Path) -> None:
     trace = simulate(stick_slip("signed"), Prescribed("0"), 1.0, t_eval=np.linspace(0, 1, 300_000))
     path = trace.save(tmp_path / "run.npz")
     assert Trace.load(path).z.shape == (300_000, 4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["rows_mode", "log_edge"])
+def test_bytes_are_not_made_longer_before_their_number_is_checked(
+    name: str, saved: bytes, tmp_path: Path
+) -> None:
+    """Integers have eight bytes in a trace, and may have one in its file."""
+    rows = 200_000
+
+    def change(arrays: dict[str, Any]) -> None:
+        for column in ("rows_t", "rows_microstep", "rows_y", "observed_v", "observed_F"):
+            arrays[column] = np.repeat(arrays[column][:1], rows, axis=0)
+        for column in ("t", "machine", "edge", "numbers"):
+            arrays[f"log_{column}"] = np.repeat(arrays[f"log_{column}"][:1], rows, axis=0)
+        arrays[name] = np.zeros(rows * (80 if name == "rows_mode" else 8), dtype=np.uint8)
+
+    path = rewritten(saved, tmp_path / "run.npz", change)
+    tracemalloc.start()
+    try:
+        with pytest.raises(TraceFileError):
+            Trace.load(path)
+        assert tracemalloc.get_traced_memory()[1] < 2 * path.stat().st_size
+    finally:
+        tracemalloc.stop()

@@ -7,6 +7,7 @@ Files are written completely or not at all. Reading executes nothing and raises 
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import json
 import os
@@ -37,6 +38,8 @@ from gms_fsm import (
 )
 from gms_fsm._files import write_whole
 from gms_fsm.errors import GMSError, OutputError, SignalError, TraceFileError
+from gms_fsm.traces import _csv
+from tests import older_files
 from tests.helpers import non_drifting, pulled_mass, stick_slip
 
 ENDINGS = pytest.mark.parametrize("ending", [".npz", ".csv"])
@@ -199,6 +202,33 @@ def test_files_are_found_by_a_name_or_a_path_and_overwritten(ending: str, tmp_pa
     equal(Trace.load(path), made("no transitions"))
     expected = ["run.npz"] if ending == ".npz" else ["run.csv", "run.transitions.csv"]
     assert sorted(os.listdir(tmp_path)) == expected
+
+
+@pytest.mark.parametrize("at_once", [1, 7, _csv.AT_ONCE])
+@pytest.mark.parametrize("case", CASES)
+def test_csv_has_one_line_for_each_row_whatever_is_written_at_once(
+    case: str, at_once: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def cell(value: object) -> str:
+        text = repr(value) if isinstance(value, float) else str(value)
+        return f'"{text}"' if any(c in text for c in ',"\n') else text
+
+    def text(columns: dict[str, Any]) -> str:
+        rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+        return "".join(f"{','.join(map(cell, row))}\n" for row in [columns, *rows])
+
+    monkeypatch.setattr(_csv, "AT_ONCE", at_once)
+    trace = made(case)
+    path = trace.save(tmp_path / "run.csv")
+    head, _, rows = path.read_bytes().decode().partition("\n")
+    log = trace.transitions
+    numbered = {n: log[n] + 1 if n == "element" else log[n] for n in log.dtype.names}
+    assert rows == text(trace.columns())
+    assert (tmp_path / "run.transitions.csv").read_bytes().decode() == text(numbered)
+    assert trace.transitions_csv() == text(numbered)
+    stamp = hashlib.sha256("\n".join(text(numbered).splitlines()).encode()).hexdigest()[:16]
+    assert json.loads(head[2:])["log"] == stamp
+    equal(Trace.load(path), trace)
 
 
 def test_csv_is_csv(tmp_path: Path) -> None:
@@ -397,7 +427,7 @@ def test_a_damaged_csv_loads_or_is_rejected(
 
 @pytest.mark.slow
 @settings(max_examples=150, deadline=None)
-@given(mutations, st.sampled_from(["rows_t", "rows_y", "rows_mode", "transitions", "header"]))
+@given(mutations, st.sampled_from(["rows_t", "rows_y", "rows_mode", "log_edge", "header"]))
 def test_a_damaged_array_in_a_valid_archive_loads_or_is_rejected(
     changes: list[tuple[str, float, int]], member: str
 ) -> None:
@@ -457,13 +487,24 @@ def _set(*path: Any, value: Any) -> Callable[[dict[str, Any]], None]:
     return change
 
 
+def _set_stops(name: str, value: Callable[[Any], Any]) -> Callable[[dict[str, Any]], None]:
+    """Add stops to an archive's arrays, one of them changed."""
+
+    def change(arrays: dict[str, Any]) -> None:
+        columns = ("t", "microstep", "y", "mode")
+        arrays |= {f"stops_{each}": arrays[f"rows_{each}"] for each in columns}
+        arrays[f"stops_{name}"] = value(arrays[f"stops_{name}"])
+
+    return change
+
+
 HOSTILE = {
     "y has a column too few": _set("rows_y", value=lambda a: a[:, :-1]),
     "y has a column too many": _set("rows_y", value=lambda a: np.hstack([a, a])),
     "y is flat": _set("rows_y", value=lambda a: a[:, 0]),
     "y has three axes": _set("rows_y", value=lambda a: a[:, :, None]),
-    "stops y has a column too few": _set("stops_y", value=lambda a: a[:, :-1]),
-    "stops y is flat": _set("stops_y", value=lambda a: a[:, 0]),
+    "stops y has a column too few": _set_stops("y", lambda a: a[:, :-1]),
+    "stops y is flat": _set_stops("y", lambda a: a[:, 0]),
     "y holds text": _set("rows_y", value=lambda a: a.astype("U32")),
     "y is complex": _set("rows_y", value=lambda a: a + 1j),
     "t is shorter": _set("rows_t", value=lambda a: a[:-1]),
@@ -478,22 +519,28 @@ HOSTILE = {
     "state numbers have a column too few": _set("rows_mode", value=lambda a: a[:, :-1]),
     "state numbers are text": _set("rows_mode", value=lambda a: a.astype("U4")),
     "state numbers are fractions": _set("rows_mode", value=lambda a: a + 0.5),
-    "stops have a wrong state number": _set("stops_mode", value=lambda a: a + 7),
+    "stops have a wrong state number": _set_stops("mode", lambda a: a + 7),
     "F is shorter": _set("observed_F", value=lambda a: a[:-1]),
     "F holds text": _set("observed_F", value=lambda a: a.astype("U32")),
     "s has a column too few": _set("observed_s", value=lambda a: a[:, :-1]),
     "dz is missing": lambda arrays: arrays.pop("observed_dz"),
-    "the log is missing": lambda arrays: arrays.pop("transitions"),
-    "the log has no columns": _set("transitions", value=np.zeros(3)),
-    "the log has other columns": _set("transitions", value=np.zeros(3, dtype=[("a", "f8")])),
-    "the log has two axes": _set("transitions", value=lambda a: a[:, None]),
-    "the log's times are text": _set(
-        "transitions",
-        value=lambda a: a.astype([(n, "U9" if n == "t" else a.dtype[n]) for n in a.dtype.names]),
+    "the log is missing": lambda arrays: arrays.pop("log_t"),
+    "the log has no edges": lambda arrays: arrays.pop("log_edge"),
+    "the log has two axes": _set("log_t", value=lambda a: a[:, None]),
+    "the log's times are text": _set("log_t", value=lambda a: a.astype("U32")),
+    "the log's times are records": _set("log_t", value=np.zeros(3, dtype=[("a", "f8")])),
+    "the log's edges are shorter": _set("log_edge", value=lambda a: a[:-1]),
+    "the log's edges are fractions": _set("log_edge", value=lambda a: a + 0.5),
+    "the log's edges are negative": _set("log_edge", value=lambda a: a.astype(np.int64) - 1),
+    "the log's edges are too large": _set("log_edge", value=lambda a: a + 99),
+    "the log's edges are huge": _set("log_edge", value=lambda a: a.astype(np.uint64) + 2**63),
+    "the log's edges are 2**32 too large": _set(
+        "log_edge", value=lambda a: a.astype(np.int64) + 2**32
     ),
-    "the log has an element too many": _set(
-        "transitions", value=lambda a: np.array([(0.0, 99, *list(r)[2:]) for r in a], a.dtype)
-    ),
+    "the log's machines are text": _set("log_machine", value=lambda a: a.astype("U4")),
+    "the log has an element too many": _set("log_machine", value=lambda a: a + 99),
+    "the log's numbers are one too few": _set("log_numbers", value=lambda a: a[:, :-1]),
+    "the log's numbers are flat": _set("log_numbers", value=lambda a: a[:, 0]),
     "the header is missing": lambda arrays: arrays.pop("header"),
     "the header is a number": lambda arrays: arrays.update(header=np.zeros(3)),
     "the header is no JSON": lambda arrays: arrays.update(header=np.array("{not json")),
@@ -570,6 +617,34 @@ def test_a_hostile_npz_is_rejected(case: str, tmp_path: Path) -> None:
         Trace.load(path)
 
 
+HOSTILE_LOGS = {  # in files of format 1
+    "it is missing": lambda arrays: arrays.pop("transitions"),
+    "it has no columns": _set("transitions", value=np.zeros(3)),
+    "it has other columns": _set("transitions", value=np.zeros(3, dtype=[("a", "f8")])),
+    "it has two axes": _set("transitions", value=lambda a: a[:, None]),
+    "its times are text": _set(
+        "transitions",
+        value=lambda a: a.astype([(n, "U9" if n == "t" else a.dtype[n]) for n in a.dtype.names]),
+    ),
+    "it has an element too many": _set(
+        "transitions", value=lambda a: np.array([(0.0, 99, *list(r)[2:]) for r in a], a.dtype)
+    ),
+    "it names contacts": _set(
+        "transitions", value=lambda a: np.zeros(3, [*a.dtype.descr, ("contact", a.dtype["edge"])])
+    ),
+}
+
+
+@pytest.mark.parametrize("case", HOSTILE_LOGS)
+def test_a_hostile_log_of_format_1_is_rejected(case: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.npz"
+    arrays = older_files.format_1(made("expression"), path)
+    assert len(Trace.load(older_files.write(path, arrays))) == len(made("expression"))
+    HOSTILE_LOGS[case](arrays)
+    with pytest.raises(TraceFileError):
+        Trace.load(older_files.write(path, arrays))
+
+
 class _Bomb:
     """Executes something when it is unpickled."""
 
@@ -580,7 +655,7 @@ class _Bomb:
         return (open, (self.path, "w"))
 
 
-@pytest.mark.parametrize("member", ["rows_y", "header", "transitions", "observed_F"])
+@pytest.mark.parametrize("member", ["rows_y", "header", "log_edge", "observed_F"])
 def test_a_pickle_in_a_trace_is_not_opened(member: str, tmp_path: Path) -> None:
     canary = tmp_path / "canary"
     arrays = _arrays()

@@ -13,6 +13,7 @@ from gms_fsm import GMS, Chart, GMSParameters, State, Trace, Transition, simulat
 from gms_fsm.errors import OutputError, SignalError, TraceFileError
 from gms_fsm.systems.rigs import Slider
 from gms_fsm.systems.system import Body, Contact, System
+from tests import older_files
 from tests.helpers import same_bits, stick_slip
 
 STICTION = Chart(
@@ -151,14 +152,21 @@ def test_what_one_contact_sees_is_no_whole_run(tmp_path: Path) -> None:
 def test_a_log_that_does_not_fit_is_refused(
     name: str, value: Any, reason: str, tmp_path: Path
 ) -> None:
-    path = simulate(belt(), 8.0, initial={"q2": 0.2}).save(tmp_path / "run.npz")
-    with np.load(path) as file:
-        arrays = dict(file)
+    path = tmp_path / "run.npz"
+    arrays = older_files.format_1(simulate(belt(), 8.0, initial={"q2": 0.2}), path)
     log = arrays["transitions"]
     log[name][np.flatnonzero(log["contact"] == "pad")[0]] = value
-    np.savez(path, **arrays)
     with pytest.raises(TraceFileError, match=reason):
-        Trace.load(path)
+        Trace.load(older_files.write(path, arrays))
+
+
+def test_an_edge_of_another_contact_is_refused(tmp_path: Path) -> None:
+    path = simulate(belt(), 8.0, initial={"q2": 0.2}).save(tmp_path / "run.npz")
+    arrays = older_files.arrays_of(path)
+    pad = np.flatnonzero(arrays["log_machine"] == 0)
+    arrays["log_edge"][pad[0]] = len(STICTION.transitions)  # the first of the bank
+    with pytest.raises(TraceFileError, match="names an edge"):
+        Trace.load(older_files.write(path, arrays))
 
 
 # --------------------------------------------------------------------------- rigs of your own
@@ -190,7 +198,7 @@ def test_a_header_describes_a_run_once(tmp_path: Path) -> None:
     with np.load(path) as file:
         arrays = dict(file)
     header = json.loads(str(arrays["header"]))
-    assert header["format"] == "gms-fsm trace 1"
+    assert header["format"] == "gms-fsm trace 2"
     del header["system"]
     arrays["header"] = np.array(json.dumps(header))
     np.savez(path, **arrays)

@@ -36,8 +36,8 @@ def chattering(monitor: Chattering, trace: Trace, error: Exception | None) -> Ch
 
 def _switched_last(trace: Trace) -> bool:
     """Return whether the contact was among those that switched when the run ended."""
-    log, every = trace.transitions, trace.transitions if trace.every is None else trace.every
-    return not every.size or (log.size > 0 and bool(log.t[-1] == every.t[-1]))
+    log, every = trace.firings, trace.firings if trace.every is None else trace.every
+    return not len(every) or (len(log) > 0 and bool(log.t[-1] == every.t[-1]))
 
 
 def _advice(trace: Trace, episode: Episode) -> str:
