@@ -9,7 +9,7 @@
 #   make lowest  the tests close to a dependency, with the lowest versions that pyproject.toml allows
 #   make bench   speed and error compared with C, SciPy, CVODE and PathSim
 #   make soak    stress tests: fuzzing, kills, a million transitions, 2,000 runs checked against a
-#                reference; SOAK_MINUTES=10 for each fuzzer
+#                reference, 500 systems in all engines; SOAK_MINUTES=10 for each fuzzer
 #   make foreign the widget, driven in JupyterLab and marimo by their own user interfaces, in Chromium
 #   make gallery the pictures in docs/images, shown in docs/gallery.md, and the pages in docs/zoo
 #   make docs    the documentation -> folder site/, which can be opened from disk
