@@ -1,5 +1,5 @@
 /* A loop written by hand in C for exactly one model, as c_loop.c: a mass with Coulomb friction and
- * stiction is pulled through a spring for 600 s (150 transitions).
+ * stiction is pulled through a spring for 600 s (164 transitions).
  *
  * At rest the friction is what holds the mass, up to F_S; in motion it is F_C against it, and viscous
  * friction. Dormand-Prince 5(4), max-norm, dense output, every switch located on it, a new small

@@ -164,7 +164,7 @@ def _loop(
 
     @plain
     def bracket(dense, left, right, tick, t, h, watch, zone, any_z, low, high, y, g):
-        """g holds the margins at the left end, at the right end, and where it looks."""
+        """Shrink the bracket; g: margins at the left end, at the right end, and in between."""
         halve = False
         while right - left > tick:
             width = right - left
