@@ -96,6 +96,11 @@ def put_row(out: Output, t: float, y: Vector) -> None:
     out.cursor[ROW] = row + 1
 
 
+def is_full(out: Output) -> bool:
+    """Return whether there is no room for the row of another step."""
+    return out.every_step and out.cursor[ROW] >= len(out.rows_t)
+
+
 def tick_at(t: float) -> float:
     """Return the smallest significant difference of times at t."""
     return TICK * abs(t)
@@ -176,8 +181,7 @@ def advance(
         t = clock[T]
         if t >= clock[T_STOP]:
             return REACHED
-        full = most_steps <= 0 or (out.every_step and cursor[ROW] >= len(out.rows_t))
-        if full and not (rejected or redone):
+        if not (rejected or redone) and (most_steps <= 0 or is_full(out)):
             return FULL
         t_new, tick = _next_end(plan, clock, cursor)
         if not t_new > t:
