@@ -48,7 +48,7 @@ class Sweeps:
         self.time_sweep()
 
     def time_sweep(self) -> None:
-        """A hundred pulled masses on one core."""
+        """Run a hundred pulled masses on one core."""
         with ThreadPoolExecutor(1) as executor:
             sweep(*pulled(), 60.0, self.varied, executor=executor)
 
@@ -56,7 +56,7 @@ class Sweeps:
 class Files:
     """A trace of 41,000 rows."""
 
-    params = ["npz", "csv"]
+    params = ("npz", "csv")
     param_names = ("kind",)
 
     def setup(self, kind: str) -> None:
@@ -83,11 +83,11 @@ class Starts:
     """Fresh processes."""
 
     def timeraw_import(self) -> str:
-        """What a script needs."""
+        """Import what a script needs."""
         return "from gms_fsm import GMS, GMSParameters, PulledSlider, Stribeck, simulate"
 
     def timeraw_help(self) -> str:
-        """The command line says what it can do."""
+        """Ask the command line what it can do."""
         return """
         import contextlib, os, sys
         from gms_fsm.app.cli import main

@@ -103,11 +103,11 @@ def test_scipys_steps_are_limited_too():
 
 @pytest.mark.parametrize("most", [700, 1300])
 def test_the_limit_ends_every_engine_at_the_same_row(most):
-    rig, ends = Slider(1.0, "3*sin(2*t) + 0.5*sin(31*t)"), []
+    model, rig = stick_slip("signed"), Slider(1.0, "3*sin(2*t) + 0.5*sin(31*t)")
+    how, ends = {"max_steps": most, "method": "bs23", "rtol": 1e-7}, []
     for engine in ("ifelse", needs("compiled")):
         with pytest.raises(StepLimitError) as caught:
-            model = stick_slip("signed")
-            simulate(model, rig, 600.0, engine=engine, max_steps=most, method="bs23", rtol=1e-7)
+            simulate(model, rig, 600.0, engine=engine, **how)
         trace = caught.value.trace
         assert len(trace) < most  # some were attempted in vain
         ends.append((len(trace), trace.t[-1]))
