@@ -7,9 +7,10 @@
 #   make lint    formatting, style, types, import contracts
 #   make core    the tests that are not slow, with only the required dependencies
 #   make lowest  the tests close to a dependency, with the lowest versions that pyproject.toml allows
-#   make bench   speed and error compared with C, SciPy, CVODE and PathSim
+#   make bench   speed and error compared with C, numba, SciPy, CVODE and PathSim
+#   make regressions  speed compared with an older commit, in interleaved rounds; OLD=main
 #   make soak    stress tests: fuzzing, kills, a million transitions, 2,000 runs checked against a
-#                reference; SOAK_MINUTES=10 for each fuzzer
+#                reference, 500 systems in all engines; SOAK_MINUTES=10 for each fuzzer
 #   make foreign the widget, driven in JupyterLab and marimo by their own user interfaces, in Chromium
 #   make gallery the pictures in docs/images, shown in docs/gallery.md, and the pages in docs/zoo
 #   make docs    the documentation -> folder site/, which can be opened from disk
@@ -20,9 +21,10 @@ LOWEST_PYTHON ?= python3.11
 VENV ?= .venv
 RUN := $(VENV)/bin
 SOAK_MINUTES ?= 10
+OLD ?= main
 PIP := $(RUN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: help paper test quick coverage lint core lowest bench soak foreign gallery docs wheel clean
+.PHONY: help paper test quick coverage lint core lowest bench regressions soak foreign gallery docs wheel clean
 .DEFAULT_GOAL := test
 
 $(VENV)/bin/python:
@@ -101,6 +103,11 @@ bench: $(VENV)/bench.stamp
 	$(RUN)/python benchmarks/overview_figure.py
 	$(RUN)/python benchmarks/monitors.py
 
+# asv installs both commits in .asv; it exits with 1 if something has become slower by a tenth.
+regressions: $(VENV)/bench.stamp
+	cd benchmarks && $(abspath $(RUN))/asv machine --yes
+	cd benchmarks && $(abspath $(RUN))/asv continuous --interleave-rounds --factor 1.1 $(OLD) HEAD
+
 soak: $(VENV)/dev.stamp
 	$(RUN)/python -m tests.soak --minutes $(SOAK_MINUTES)
 
@@ -128,4 +135,4 @@ wheel: | $(VENV)/bin/python
 	venv/bin/gms-fsm replay paper/traces/fig4_chart.npz -o page.html
 
 clean:
-	rm -rf $(VENV) .venv-core .venv-lowest .docs-cache paper site build dist *.egg-info
+	rm -rf $(VENV) .venv-core .venv-lowest .asv .docs-cache paper site build dist *.egg-info

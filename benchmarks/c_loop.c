@@ -1,9 +1,10 @@
 /* A loop written by hand in C for exactly one model: the reference of compare.py.
  *
- * Four GMS elements under the signed law. Without OPEN_LOOP a mass is pulled through a spring for
- * 60 s (72 transitions); with it v = 0.2 sin(2 pi t / 20) is given for 61 s (48 transitions).
- * Dormand-Prince 5(4), max-norm, dense output, every crossing located on it, a new small step
- * after each. All numbers are constants; nothing is general.
+ * Four GMS elements under the signed law. A mass is pulled through a spring for 60 s (72
+ * transitions); with OPEN_LOOP v = 0.2 sin(2 pi t / 20) is given for 61 s (48 transitions); with
+ * SERVO a motor drives the mass through a shaft for 0.2 s (24 transitions), under a PID controller
+ * that runs every millisecond. Dormand-Prince 5(4), max-norm, dense output, every crossing located
+ * on it, a new small step after each. All numbers are constants; nothing is general.
  *
  *     cc -O3 -march=native -std=c99 -ffp-contract=off -shared -fPIC [-DOPEN_LOOP] c_loop.c -lm
  *
@@ -17,16 +18,30 @@
 #define MAX(a, b) ((a) > (b) ? (a) : (b))
 #define MIN(a, b) ((a) < (b) ? (a) : (b))
 
+#ifdef SERVO
+typedef struct { double z[4], x, v, x_m, v_m; } State;
+#else
 typedef struct { double z[4], x, v; } State;
+#endif
 
 #define ELEMENTS for (int i = 0; i < 4; i++)
 
 enum { STICK, SLIP };
 enum { FORWARD, BACKWARD, ARREST };
-enum { COLUMNS = 8, MOST_STOPS = 1000 };
+enum { MOST_STOPS = 1000 };
 
-static const double RTOL = 1e-6, ATOL = 1e-9, V_C = 1e-6;
-#ifdef OPEN_LOOP
+static const double RTOL = 1e-6, V_C = 1e-6;
+#ifdef SERVO
+enum { COLUMNS = 11, TICKS = 200 };
+static const double ATOL = 1e-12, K[4] = {4e4, 3e4, 2e4, 1e4};
+static const double C[4] = {2e-4, 2e-4, 2e-4, 2e-4}, W[4] = {1e-5, 1e-5, 1e-5, 1e-5};
+static const double F_C = 1.0, F_S = 1.5, V_S = 1e-3, T_END = 0.2, H_START = 1e-4;
+static const double MASS = 1.0, MOTOR = 0.5, SHAFT = 2e4, DAMPING = 5.0, PERIOD = 1e-3;
+#define VELOCITY(t, y) ((y).v)
+#define ACCELERATION(t, f) ((f).v)
+#elif defined OPEN_LOOP
+enum { COLUMNS = 8 };
+static const double ATOL = 1e-9;
 static const double K[4] = {0.7, 0.7, 0.7, 0.7}, SIGMA[4] = {0.3, 0.4, 0.5, 0.6};
 static const double C[4] = {0.1, 0.05, 0.025, 1e-4}, W[4] = {1.0, 1.0, 1.0, 1.0};
 static const double SIGMA_2 = 0.1, F_C = 0.4, F_S = 1.5, V_S = 1e-3, T_END = 61.0;
@@ -35,6 +50,8 @@ static const double H_START = 0.01;
 #define VELOCITY(t, y) (AMPLITUDE * sin(OMEGA * (t)))
 #define ACCELERATION(t, f) ((void)(f), AMPLITUDE * OMEGA * cos(OMEGA * (t)))
 #else
+enum { COLUMNS = 8 };
+static const double ATOL = 1e-9;
 static const double K[4] = {40.0, 30.0, 20.0, 10.0}, SIGMA[4] = {0.4, 0.3, 0.2, 0.1};
 static const double C[4] = {0.02, 0.02, 0.02, 0.02};
 static const double W[4] = {1.0 / 160.0, 1.0 / 120.0, 1.0 / 80.0, 1.0 / 40.0};
@@ -51,6 +68,7 @@ typedef struct {
     int slips, pinned; /* any element in slip; any watched one with |z| >= s */
     int any_z, watch[4], zone[4];
     double v_low, v_high; /* v stays in [v_low, v_high] as long as nothing changes */
+    double u; /* of the controller */
 } Arc;
 
 typedef struct { State y, rise, bend, twist, bump; double t, h; } Dense;
@@ -66,26 +84,41 @@ static inline State plus(State y, double a, State k)
     ELEMENTS y.z[i] += a * k.z[i];
     y.x += a * k.x;
     y.v += a * k.v;
+#ifdef SERVO
+    y.x_m += a * k.x_m;
+    y.v_m += a * k.v_m;
+#endif
     return y;
 }
 
 static inline double force(const double *z, const double *dz)
 {
     double F = 0.0;
+#ifdef SERVO
+    (void)dz;
+    ELEMENTS F += K[i] * z[i];
+#else
     ELEMENTS F += K[i] * z[i] + SIGMA[i] * dz[i];
+#endif
     return F;
 }
 
 /* Slope with all states frozen; sets s(v) if it is needed. */
 static inline State flow(const Arc *arc, double t, double v, State y, double *S)
 {
-    State f = {{0.0}, v, 0.0};
+    State f = {.x = v};
     ELEMENTS f.z[i] = arc->a[i] * v + arc->b[i];
     if (arc->slips) {
         double share = 1.0 / (*S = stribeck(v));
         ELEMENTS f.z[i] -= arc->c[i] * y.z[i] * share;
     }
-#ifdef OPEN_LOOP
+#ifdef SERVO
+    (void)t;
+    double shaft = SHAFT * (y.x_m - y.x) + DAMPING * (y.v_m - v);
+    f.v = (shaft - force(y.z, f.z)) / MASS;
+    f.x_m = y.v_m;
+    f.v_m = (arc->u - shaft) / MOTOR;
+#elif defined OPEN_LOOP
     (void)t;
 #else
     f.v = (SPRING * (SPEED * t - y.x) - SIGMA_2 * v - force(y.z, f.z)) / MASS;
@@ -246,7 +279,14 @@ static inline void put(const Arc *arc, double t, State y, double *row)
     row[1] = y.x;
     row[2] = v;
     ELEMENTS row[3 + i] = y.z[i];
+#ifdef SERVO
+    row[7] = force(y.z, dz);
+    row[8] = y.x_m;
+    row[9] = y.v_m;
+    row[10] = arc->u;
+#else
     row[7] = force(y.z, dz) + SIGMA_2 * v;
+#endif
 }
 
 #define FLOW(c) flow(&arc, t + (c) * h, VELOCITY(t + (c) * h, y_new), y_new, &S_new)
@@ -257,12 +297,28 @@ static inline int run(int rows, double *out, double *times, int *what)
 {
     Arc arc = {.state = {STICK, STICK, STICK, STICK}};
     Dense d;
-    State y = {{0.0}, 0.0, 0.0}, y_new, k1, k2, k3, k4, k5, k6, k7;
+    State y = {.x = 0.0}, y_new, k1, k2, k3, k4, k5, k6, k7;
     double g[12], t = 0.0, spacing = rows > 1 ? T_END / (rows - 1) : 0.0;
+    double t_stop = T_END, h = H_START;
     int count = 0, row = 0;
+#ifdef SERVO
+    double I = 0.0, e_before = 0.0;
+    int tick = 0;
+    t_stop = 0.0;
+#endif
     for (int stops = 0; t < T_END; stops++) {
         if (stops == MOST_STOPS) return -1;
-        double v = VELOCITY(t, y), h = H_START;
+#ifdef SERVO
+        if (t == t_stop) { /* the step stays as long as it was */
+            double e = 2e-3 - y.x_m;
+            arc.u = 400.0 * e + I + 40.0 * (e - e_before) / PERIOD;
+            I += 500.0 * PERIOD * e;
+            e_before = e;
+            t_stop = ++tick < TICKS ? tick * PERIOD : T_END;
+        } else
+#endif
+            h = H_START;
+        double v = VELOCITY(t, y);
         count = fire(&arc, t, v, y.z, count, times, what);
         arm(&arc, v, y.z);
         double S = stribeck(v);
@@ -271,11 +327,11 @@ static inline int run(int rows, double *out, double *times, int *what)
         changed(&arc, S, v, y.z, g);
         float before = -13.0f; /* log2 of the last error */
         int rejected = 0, redone = 0;
-        for (int crossed = 0; !crossed && t < T_END;) {
-            double t_new = t + h;
-            if (t_new + 1e-13 >= T_END) {
-                t_new = T_END;
-                h = T_END - t;
+        for (int crossed = 0; !crossed && t < t_stop;) {
+            double t_new = t + h, uncut = h;
+            if (t_new + 1e-13 >= t_stop) {
+                t_new = t_stop;
+                h = t_stop - t;
             }
             double S_new = S;
             y_new = plus(y, h * 0.2, k1);
@@ -298,11 +354,14 @@ static inline int run(int rows, double *out, double *times, int *what)
             v_new = y_new.v;
 #endif
             k7 = flow(&arc, t_new, v_new, y_new, &S_new);
-            State e = {{0.0}, 0.0, 0.0};
+            State e = {.x = 0.0};
             e = plus(plus(e, 71.0 / 57600.0, k1), -71.0 / 16695.0, k3);
             e = plus(plus(e, 71.0 / 1920.0, k4), -17253.0 / 339200.0, k5);
             e = plus(plus(e, 22.0 / 525.0, k6), -1.0 / 40.0, k7);
             double worst = MAX(SHARE(x), SHARE(v));
+#ifdef SERVO
+            worst = MAX(worst, MAX(SHARE(x_m), SHARE(v_m)));
+#endif
             ELEMENTS worst = MAX(worst, SHARE(z[i]));
             float size = log2f(MAX((float)worst, 1e-10f));
             if (!(worst <= 1.0)) {
@@ -313,6 +372,7 @@ static inline int run(int rows, double *out, double *times, int *what)
             }
             float factor = MAX(0.2f, 0.9f * exp2f(0.08f * before - 0.14f * size));
             double h_next = h * MIN(rejected ? 1.0f : 10.0f, factor);
+            if (uncut > h && !rejected) h_next = MAX(h_next, uncut);
             before = MAX(size, -13.0f);
             rejected = 0;
 
@@ -323,7 +383,7 @@ static inline int run(int rows, double *out, double *times, int *what)
             if (doubt || (row < rows && row * spacing < t_new)) {
                 d.t = t;
                 d.h = h;
-                State none = {{0.0}, 0.0, 0.0};
+                State none = {.x = 0.0};
                 d.y = y;
                 d.rise = plus(y_new, -1.0, y);
                 d.bend = plus(plus(none, h, k1), -1.0, d.rise);
@@ -388,11 +448,11 @@ static inline int run(int rows, double *out, double *times, int *what)
     return count;
 }
 
-/* End state only: out has 8 numbers (t, x, v, z1..z4, F). times and what (3 * element + edge; edges
+/* End state only: out has 8 numbers (t, x, v, z1..z4, F; of the servo 3 more: x_m, v_m, u). times and what (3 * element + edge; edges
  * forward, backward, arrest) get one entry per transition. Returns their number, or -1. */
 int run_end(double *out, double *times, int *what) { return run(0, out, times, what); }
 
-/* The same with evenly spaced rows: out has shape (rows, 8). */
+/* The same with evenly spaced rows: out has shape (rows, 8), or (rows, 11). */
 int run_rows(int rows, double *out, double *times, int *what)
 {
     return run(rows, out, times, what);

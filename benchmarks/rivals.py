@@ -86,7 +86,7 @@ class Case:
 
 
 PULLED_MASS = Case(
-    "Pulled mass, closed loop, 60 s",
+    "Pulled mass, 60 s",
     60.0,
     72,
     np.array([40.0, 30.0, 20.0, 10.0]),
@@ -99,7 +99,7 @@ PULLED_MASS = Case(
     v_s=0.05,
 )
 OPEN_LOOP = Case(
-    "Table I stick-slip, open loop, 61 s",
+    "Open loop, 61 s",
     61.0,
     48,
     np.full(4, 0.7),

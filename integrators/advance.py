@@ -96,6 +96,11 @@ def put_row(out: Output, t: float, y: Vector) -> None:
     out.cursor[ROW] = row + 1
 
 
+def is_full(out: Output) -> bool:
+    """Return whether there is no room for the row of another step."""
+    return out.every_step and out.cursor[ROW] >= len(out.rows_t)
+
+
 def tick_at(t: float) -> float:
     """Return the smallest significant difference of times at t."""
     return TICK * abs(t)
@@ -152,7 +157,7 @@ def advance(
     out, scratch
         Buffers.
     most_steps : int
-        Maximum number of steps.
+        Attempted steps after which it returns; one that is being repeated is completed.
 
     Returns
     -------
@@ -176,13 +181,14 @@ def advance(
         t = clock[T]
         if t >= clock[T_STOP]:
             return REACHED
-        if most_steps <= 0 or (out.every_step and cursor[ROW] >= len(out.rows_t)):
+        if not (rejected or redone) and (most_steps <= 0 or is_full(out)):
             return FULL
         t_new, tick = _next_end(plan, clock, cursor)
         if not t_new > t:
             return TOO_SMALL
         h = t_new - t
         cursor[STEPS] += 1
+        most_steps -= 1
         take_step(motion, plan.method, now, t_new, scratch)
         status = _assess_step(plan, now, h, tick, scratch, rejected)
         rejected = status == REJECTED
@@ -228,7 +234,6 @@ def advance(
                 y[j] = y_new[j]
                 f[j] = f_new[j]
         clock[T] = t_new
-        most_steps -= 1
         if scaleless:
             raise_floor(plan.control, now)
         if out.every_step:

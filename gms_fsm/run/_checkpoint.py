@@ -24,7 +24,6 @@ from gms_fsm.run.start import Start
 from gms_fsm.systems.signals import Function
 from gms_fsm.systems.system import Contact
 from gms_fsm.traces._archives import member
-from gms_fsm.traces._header import Header
 from integrators import FOR_A_GUARD, FOR_A_SIGN, WAITING, hybrid, loop
 from integrators.advance import NEXT_KNOT, NEXT_TIME, ROW
 from integrators.steps import T
@@ -155,6 +154,8 @@ def _program() -> str:
 
 def _identity(start: Start) -> str:
     """Return a hash of everything that determines a run."""
+    from gms_fsm.traces._header import Header  # only files need pydantic
+
     header = Header.of(start.model, start.rig, start.given, start.settings)
     head = header.model_dump_json()
     functions = {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,8 +19,10 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System, origin_of, system_of
 from gms_fsm.traces._firings import Firings
-from gms_fsm.traces._header import Header
 from gms_fsm.traces.rows import Rows
+
+if TYPE_CHECKING:
+    from gms_fsm.traces._header import Header
 
 __all__ = ["Parts", "Ran", "checked", "held_period", "stored_names"]
 

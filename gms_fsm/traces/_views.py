@@ -15,8 +15,6 @@ from gms_fsm.errors import OutputError, TraceFileError, why
 from gms_fsm.lowering._observing import armed, rate, sigmas
 from gms_fsm.lowering.program import Program
 from gms_fsm.systems.system import Body
-from gms_fsm.traces import _csv, _npz
-from gms_fsm.traces._header import Header
 from gms_fsm.traces._log import Log
 from gms_fsm.traces._parts import Parts, Ran, checked, held_period
 from gms_fsm.traces.rows import Rows, merged
@@ -194,6 +192,9 @@ def write_trace(trace: Trace, path: Path) -> Path:
             place=str(path),
             advice="save the trace of the whole run",
         )
+    from gms_fsm.traces import _csv, _npz  # only files need pydantic
+    from gms_fsm.traces._header import Header
+
     system = trace.system
     header = Header.of(trace.model, trace.rig, system, trace.settings, trace.monitors)
     if path.suffix == ".csv":
@@ -208,6 +209,8 @@ def write_trace(trace: Trace, path: Path) -> Path:
 
 def read_parts(path: Path) -> Parts:
     """Return the parts of a trace file, checked."""
+    from gms_fsm.traces import _csv, _npz
+
     reader = {".npz": _npz.read, ".csv": _csv.read}.get(path.suffix)
     if reader is None:
         raise TraceFileError(

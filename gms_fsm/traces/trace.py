@@ -31,7 +31,6 @@ from gms_fsm.lowering.scales import Setting
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System, system_of
-from gms_fsm.traces import _csv
 from gms_fsm.traces._between import between
 from gms_fsm.traces._columns import columns_of
 from gms_fsm.traces._firings import Firings
@@ -586,9 +585,13 @@ class Trace:
         str
             With a header line.
         """
-        return "".join(_csv.log_texts(self.firings))
+        from gms_fsm.traces._csv import log_texts
+
+        return "".join(log_texts(self.firings))
 
 
 def files_of(path: Path) -> list[Path]:
     """Return the files of a trace: one, or for ``.csv`` also that of its log."""
-    return [path, _csv.log_path(path)] if path.suffix == ".csv" else [path]
+    from gms_fsm.traces._csv import log_path
+
+    return [path, log_path(path)] if path.suffix == ".csv" else [path]

@@ -15,6 +15,7 @@ from gms_fsm import (
     GMSParameters,
     Prescribed,
     Session,
+    Slider,
     State,
     Stribeck,
     Transition,
@@ -22,7 +23,7 @@ from gms_fsm import (
 )
 from gms_fsm.errors import ParameterError
 from gms_fsm.traces.failures import LivelockError, StepLimitError
-from tests.helpers import ROOT, banging, pulled_mass
+from tests.helpers import ROOT, banging, pulled_mass, stick_slip
 
 ENGINES = ["machines", "ifelse", "compiled"]
 
@@ -98,6 +99,19 @@ def test_scipys_steps_are_limited_too():
     model, rig = pulled_mass()
     with pytest.raises(StepLimitError, match="max_steps = 50 steps"):
         simulate(model, rig, 60.0, method=Radau, max_steps=50)
+
+
+@pytest.mark.parametrize("most", [700, 1300])
+def test_the_limit_ends_every_engine_at_the_same_row(most):
+    model, rig = stick_slip("signed"), Slider(1.0, "3*sin(2*t) + 0.5*sin(31*t)")
+    how, ends = {"max_steps": most, "method": "bs23", "rtol": 1e-7}, []
+    for engine in ("ifelse", needs("compiled")):
+        with pytest.raises(StepLimitError) as caught:
+            simulate(model, rig, 600.0, engine=engine, **how)
+        trace = caught.value.trace
+        assert len(trace) < most  # some were attempted in vain
+        ends.append((len(trace), trace.t[-1]))
+    assert ends[0] == ends[1]
 
 
 @pytest.mark.parametrize("given", [0, -3, 2.5, True, "many"])

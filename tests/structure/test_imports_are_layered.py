@@ -120,8 +120,12 @@ def test_the_search_by_tokens_finds_calls(tmp_path: Path) -> None:
     assert _bare(path, "compile") == [3]
 
 
+# What simulating does not need: drawing, reading files, integrators of others.
+UNUSED = {"matplotlib", "pygraphviz", "plots", "pandas", "IPython", "pydantic", "scipy"}
+
+
 @pytest.mark.slow
-def test_simulating_loads_neither_matplotlib_nor_graphviz_nor_plots() -> None:
+def test_simulating_loads_nothing_that_draws_or_reads_files() -> None:
     code = """
 import json, sys
 from gms_fsm import GMS, GMSParameters, LuGre, Prescribed, Slider, Stribeck, simulate
@@ -133,7 +137,46 @@ print(json.dumps(sorted({name.partition(".")[0] for name in sys.modules})))
 """
     loaded = set(json.loads(_python(code)))
     assert {"gms_fsm", "integrators", "transitions", "numpy"} <= loaded
-    assert loaded & {"matplotlib", "pygraphviz", "plots", "pandas", "IPython"} == set()
+    assert loaded & (UNUSED | {"llvmlite"}) == set()
+
+
+@pytest.mark.slow
+def test_machine_code_loads_llvmlite_and_nothing_else_that_is_large() -> None:
+    pytest.importorskip("llvmlite", reason="needs the extra fast")
+    code = """
+import json, sys
+from gms_fsm import GMS, GMSParameters, PulledSlider, simulate, sweep
+model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+simulate(model, PulledSlider(1.0, 2.0, 0.1), 1.0, engine="compiled").columns()
+sweep(model, PulledSlider(1.0, 2.0, 0.1), 1.0, {"sigma_2": [0.1, 0.2]}, engine="compiled")
+print(json.dumps(sorted({name.partition(".")[0] for name in sys.modules})))
+"""
+    loaded = set(json.loads(_python(code)))
+    assert "llvmlite" in loaded
+    assert loaded & UNUSED == set()
+
+
+@pytest.mark.slow
+def test_files_load_what_they_need_when_used() -> None:
+    code = """
+import json, sys, tempfile, pathlib
+from gms_fsm import GMS, GMSParameters, Prescribed, Trace, simulate
+model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+trace = simulate(model, Prescribed("0.1*t"), 1.0)
+before = "pydantic" in sys.modules
+with tempfile.TemporaryDirectory() as folder:
+    Trace.load(trace.save(pathlib.Path(folder, "run.npz")))
+print(json.dumps([before, "pydantic" in sys.modules]))
+"""
+    assert json.loads(_python(code)) == [False, True]
+
+
+@pytest.mark.parametrize("name", ["gms_fsm", "integrators"])
+def test_importing_a_package_loads_nothing_large(name: str) -> None:
+    code = f"import json, sys, {name}\nprint(json.dumps(sorted(sys.modules)))"
+    loaded = {each.partition(".")[0] for each in json.loads(_python(code))}
+    assert name in loaded
+    assert loaded & (UNUSED | {"llvmlite", "transitions"}) == set()
 
 
 def test_integrators_load_no_other_package_of_ours() -> None:

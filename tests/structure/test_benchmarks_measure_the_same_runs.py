@@ -1,0 +1,80 @@
+"""The C loops of the benchmarks compute what gms-fsm computes, and the tables have their places."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from tests.helpers import FASTEST, ROOT
+
+FOLDER = ROOT / "benchmarks"
+AGREE = """
+import json, sys, tempfile
+from pathlib import Path
+import numpy as np
+from cases import PROBLEMS
+from compare import c_loop, ours
+one, (engine, name) = PROBLEMS[sys.argv[2]], (sys.argv[1], sys.argv[2])
+times = np.linspace(0.0, one.t_end, 101)
+with tempfile.TemporaryDirectory() as folder:
+    loop = c_loop(one, Path(folder))
+    rows, end = loop(times), loop(np.empty(0))
+exact = ours(one, t_eval=times, engine=engine, rtol=1e-12, atol=1e-15)
+coarse = ours(one, t_eval=times, engine=engine)
+def taken(outcome, i):
+    mine = outcome.element == i
+    return [outcome.edge[k] for k in np.flatnonzero(mine)], outcome.t[mine]
+late, same = 0.0, True
+for i in np.unique(exact.element):
+    (edges, t), (true, t_true) = taken(rows, i), taken(exact, i)
+    same = same and edges == true
+    late = max(late, float(np.abs(t - t_true).max())) if edges == true else late
+def far(outcome, rows=slice(None)):
+    return float(np.abs(outcome.z - exact.z[rows]).max())
+print(json.dumps([len(exact.t), one.transitions, same, late / one.t_end, far(rows), far(coarse),
+                  far(end, slice(-1, None))]))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    sys.platform != "linux" or shutil.which("cc") is None, reason="needs a C compiler on Linux"
+)
+@pytest.mark.parametrize("name", ["pulled", "open", "servo", "stiction"])
+def test_the_c_loop_agrees(name: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", AGREE, FASTEST, name],
+        cwd=FOLDER,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    count, told, same, late, error, ours, at_end = json.loads(done.stdout.splitlines()[-1])
+    assert count == told
+    assert same  # for each element the same edges in the same order
+    assert late < 1e-6
+    assert max(error, at_end) < 3 * ours  # of gms-fsm at the same rtol
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/numerics.md"])
+def test_pages_have_a_place_for_the_tables(page: str) -> None:
+    text = (ROOT / page).read_text(encoding="utf-8")
+    place = "<!-- measured table: begin; made by `python benchmarks/compare.py --write` -->\n"
+    assert text.count(place) == text.count("<!-- measured table: end -->") == 1
+    between = text.partition(place)[2].partition("<!-- measured table: end -->")[0]
+    assert between.count("| C loop, hand-written for this model ") == 1
+
+
+def test_the_regressions_are_those_of_all_cases() -> None:
+    code = "import regressions.runs as r; print(len(r.Runs.params[0]))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=FOLDER, capture_output=True, text=True, check=True
+    )
+    readme = (FOLDER / "README.md").read_text(encoding="utf-8")
+    assert len(re.findall(r"^\| .* transitions \| `c_", readme, re.MULTILINE)) == int(done.stdout)
