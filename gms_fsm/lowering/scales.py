@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeAlias, TypeVar
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,12 +34,12 @@ from gms_fsm.language import (
 )
 from gms_fsm.lowering._generated import load
 from gms_fsm.lowering.layout import held_of
+from gms_fsm.systems._texts import ByIdentity
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact, System
 
 __all__ = ["Scales", "Setting", "SystemScales", "Tolerance", "scales_of", "scales_of_system"]
 
-T = TypeVar("T")
 Tolerance: TypeAlias = float | Mapping[str, ArrayLike] | None  # absolute, as given
 Setting: TypeAlias = str | float | Mapping[str, float | list[float]] | None  # of a run, as stored
 
@@ -122,12 +122,12 @@ def scales_of(model: Model | Contact) -> Scales:
         for value in model.values.values()
     ]
     elements = tuple(zip(thresholds, *numbers, strict=True))
-    return _scales_of(_ByIdentity(model.chart), elements, curve)
+    return _scales_of(ByIdentity(model.chart), elements, curve)
 
 
 @functools.lru_cache(maxsize=256)
 def _scales_of(
-    key: _ByIdentity[Chart], elements: tuple[tuple[float, ...], ...], curve: Stribeck | None
+    key: ByIdentity[Chart], elements: tuple[tuple[float, ...], ...], curve: Stribeck | None
 ) -> Scales:
     chart = key.it
     sizes = _sizes(key)
@@ -136,24 +136,24 @@ def _scales_of(
     for values in elements:
         at_rest = sizes.at_rest(values)
         for name, row in found.items():
-            reaches = [_reach([at_rest[k] for k in margin]) for margin in sizes.reach[name]]
+            reaches = [_reach(at_rest, *margin) for margin in sizes.reach[name]]
             if curve is not None:
                 slopes = sizes.stiffness.get(name, ())
                 reaches += [_divided(curve.F_c, at_rest[k]) for k in slopes]
-            row.append(min((u for u in reaches if u > 0.0), default=0.0))
+            row.append(_least(reaches))
         for name, follows in sizes.follows.items():
             most = max(abs(at_rest[k]) for k in follows)
             lengths.append(_divided(found[name][-1], most))
     speeds = [u for name in chart.velocities for u in found[name]]
     windows = [WINDOW * u for u in speeds]
     v = [*windows, curve.v_s] if curve is not None else windows
-    least_x = min((u for u in [*found["x"], *lengths] if u > 0.0), default=0.0)
-    least_v = min((u for u in v if u > 0.0), default=0.0)
+    least_x = _least([*found["x"], *lengths])
+    least_v = _least(v)
     speed = least_v if curve is None else curve.v_s
     rates = [abs(rate) for values in elements for rate in sizes.paces((speed, *values))]
     time = _divided(1.0, max(rates, default=0.0)) or _divided(least_x, speed)
     variables = {name: tuple(found[name]) for name in chart.variables}
-    slowest = min((u for u in speeds if u > 0.0), default=0.0)
+    slowest = _least(speeds)
     return Scales(least_x, least_v, variables, slowest, time)
 
 
@@ -206,14 +206,14 @@ def scales_of_system(system: System) -> SystemScales:
                 moved[body][1].append(_divided(scales.v, ratio))
     for each in system.bodies:
         for name, found in zip((each.x, each.v), moved[each.name], strict=True):
-            sizes[name] = [min((u for u in found if u > 0.0), default=0.0)]
+            sizes[name] = [_least(found)]
     for bank, contact in banks:
         if bank.periodic:
             sizes |= {name: [0.0] * contact.n for name in held_of(bank)}
             sizes |= {bank.held(force): [0.0] for force in bank.forces}
     for name in (*system.flow, *(u for sampler in system.sampled for u in sampler.updates)):
         sizes[name] = [0.0]
-    return SystemScales(sizes, min((u for u in times if u > 0.0), default=0.0))
+    return SystemScales(sizes, _least(times))
 
 
 def _constant(tree: Value, system: System) -> float:
@@ -269,21 +269,8 @@ class _Sizes:
     follows: Mapping[str, Sequence[int]]  # slope of a variable with respect to x, by state
 
 
-class _ByIdentity(Generic[T]):
-    """A chart or a model compared by identity, because its data cannot be hashed."""
-
-    def __init__(self, it: T) -> None:
-        self.it = it
-
-    def __hash__(self) -> int:
-        return id(self.it)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _ByIdentity) and other.it is self.it
-
-
 @functools.lru_cache(maxsize=64)
-def _sizes(key: _ByIdentity[Chart]) -> _Sizes:
+def _sizes(key: ByIdentity[Chart]) -> _Sizes:
     chart = key.it
     states = tuple(dict.fromkeys(("x", "v", *chart.velocities, *chart.variables)))
     rates = [f"d{name}" for name in chart.variables]
@@ -357,12 +344,20 @@ def _number(function: Callable[..., tuple[float, ...]], values: Sequence[float])
         return 0.0
 
 
-def _reach(margin: Sequence[float]) -> float:
+def _reach(numbers: Sequence[float], height: int, slope: int, bend: int | None = None) -> float:
     """Return where a margin is zero; by its bend if it is flat at rest, as v**2 + w**2 - e**2."""
-    height, slope, *bend = margin
-    if slope or not bend:
-        return _divided(height, slope)
-    return math.sqrt(_divided(2.0 * height, bend[0]))
+    if numbers[slope] or bend is None:
+        return _divided(numbers[height], numbers[slope])
+    return math.sqrt(_divided(2.0 * numbers[height], numbers[bend]))
+
+
+def _least(numbers: Iterable[float]) -> float:
+    """Return the smallest number above 0; 0 if there is none."""
+    least = math.inf
+    for number in numbers:
+        if 0.0 < number < least:
+            least = number
+    return least if least < math.inf else 0.0
 
 
 def _divided(a: float, b: float) -> float:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -40,9 +40,9 @@ __all__ = [
     "Bank",
     "Definition",
     "Edge",
+    "Reader",
     "assembled",
     "of",
-    "renumbered",
 ]
 
 ZERO, ONE = Number(0.0), Number(1.0)
@@ -290,28 +290,6 @@ def assembled(system: System) -> Assembly:
     return Reader(system).read()
 
 
-def renumbered(read: Assembly, system: System) -> Assembly:
-    """Return what was read with the numbers of another system of the same texts.
-
-    Parameters
-    ----------
-    read : Assembly
-        Of a system.
-    system : System
-        One that differs from it in numbers only.
-
-    Returns
-    -------
-    Assembly
-        With the same trees. Its `system` stays the first one: a circle would have to wait for the
-        garbage collector.
-    """
-    shared, own = numbers_of(system)
-    pairs = zip(read.banks, system.contacts, strict=True)
-    banks = tuple(replace(bank, contact=contact) for bank, contact in pairs)
-    return replace(read, banks=banks, shared=shared, own=own)
-
-
 class Reader:
     def __init__(self, system: System) -> None:
         self.system, self.here = system, Part(f"system {system.name!r}")
@@ -342,13 +320,6 @@ class Reader:
                 assert body.inertia is not None
                 forces[body.name] = self.value(body.force, system.names, owner.of("force", "force"))
                 tree = self.value(body.inertia, system.names, owner.of("inertia", "inertia"))
-                if not is_positive(tree, numbers):
-                    raise ParameterError(
-                        f"the inertia {body.inertia!r} is not positive, or not finite",
-                        place=owner.words,
-                        advice="every free body needs one",
-                        key=(*owner.key, "inertia"),
-                    )
                 inertias[body.name] = tree
             elif not (body.velocity == body.v and body.v in system.signals):
                 tree = self.value(body.velocity, given, owner.of("velocity", "velocity"))
@@ -371,6 +342,7 @@ class Reader:
                 for name, text in each.updates.items()
             }
         banks = tuple(self.bank(i, contact) for i, contact in enumerate(system.contacts))
+        self.check_inertias(inertias)
         self.check_locks(banks)
         return Assembly(
             system,
@@ -476,6 +448,17 @@ class Reader:
                     place=f"{self.here.words}, contact {contact.name!r}",
                     advice=f"the chart's inputs are {', '.join(contact.chart.inputs) or 'none'}",
                     key=("contacts", index, "inputs", name),
+                )
+
+    def check_inertias(self, inertias: Mapping[str, Value]) -> None:
+        for i, body in enumerate(self.system.bodies):
+            if not body.driven and not is_positive(inertias[body.name], self.system.numbers):
+                owner = self.here.of(f"body {body.name!r}", "bodies", i)
+                raise ParameterError(
+                    f"the inertia {body.inertia!r} is not positive, or not finite",
+                    place=owner.words,
+                    advice="every free body needs one",
+                    key=(*owner.key, "inertia"),
                 )
 
     def check_locks(self, banks: Iterable[Bank]) -> None:

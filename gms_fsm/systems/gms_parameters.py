@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +25,7 @@ from gms_fsm.errors import ParameterError
 __all__ = ["GMSParameters"]
 
 RULES = {each.name: each.rule for each in PARAMETERS}
+EVERY = {each.name: each for each in (*PARAMETERS, SIGMA_2, WEIGHTS)}  # in the order of checks
 
 
 @displayed("html")
@@ -83,28 +85,46 @@ class GMSParameters:
         weights: ArrayLike | None = None,
     ) -> None:
         n = checked_array("k", k, None, RULES["k"]).size
-        if not isinstance(stribeck, Stribeck):
-            raise ParameterError(
-                "it must be a Stribeck, for example Stribeck(1, 1.5, 1e-3)",
-                place="stribeck",
-                value=stribeck,
-            )
-        object.__setattr__(self, "stribeck", stribeck)
         given = {"k": k, "sigma": sigma, "C": C, "sigma_2": sigma_2, "v_c": v_c}
         given["weights"] = np.ones(n) if weights is None else weights
-        for each in (*PARAMETERS, SIGMA_2, WEIGHTS):
-            name, value = each.name, given[each.name]
-            checked: float | FloatArray = (
-                checked_array(name, value, n, each.rule)
-                if each.per_element
-                else checked_scalar(name, value, each.rule)
-            )
-            object.__setattr__(self, name, checked)
+        vars(self).update(_checked(given | {"stribeck": stribeck}, n))
 
     @property
     def n(self) -> int:
         """Number of elements."""
         return int(self.k.size)
+
+    def replaced(self, **given: Any) -> GMSParameters:
+        """Return the same parameters with some of them replaced.
+
+        Parameters
+        ----------
+        **given : float, array_like of shape (n,), or Stribeck
+            By name.
+
+        Returns
+        -------
+        GMSParameters
+            A new object; what is given is checked.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such parameter, or a value violates its rule.
+
+        Examples
+        --------
+        >>> GMSParameters.paper("stick-slip").replaced(v_c=1e-5).v_c
+        1e-05
+        """
+        for name in given:
+            if name not in EVERY and name != "stribeck":
+                raise ParameterError(
+                    f"there is no parameter {name!r}", advice=f"there are {', '.join(vars(self))}"
+                )
+        new = object.__new__(GMSParameters)
+        vars(new).update(vars(self) | _checked(given, self.n))
+        return new
 
     def with_weights(self, weights: ArrayLike) -> GMSParameters:
         """Return the same parameters with different threshold weights.
@@ -119,15 +139,7 @@ class GMSParameters:
         GMSParameters
             A new object.
         """
-        return GMSParameters(
-            self.k,
-            self.sigma,
-            self.C,
-            sigma_2=self.sigma_2,
-            stribeck=self.stribeck,
-            v_c=self.v_c,
-            weights=weights,
-        )
+        return self.replaced(weights=weights)
 
     @classmethod
     def paper(cls, column: str) -> GMSParameters:
@@ -231,3 +243,25 @@ class GMSParameters:
             v_c=v_c,
             weights=shares / stiffness,
         )
+
+
+def _checked(given: Mapping[str, Any], n: int) -> dict[str, Any]:
+    """Return values that satisfy their rules, by name."""
+    found: dict[str, Any] = {}
+    if "stribeck" in given:
+        found["stribeck"] = given["stribeck"]
+        if not isinstance(found["stribeck"], Stribeck):
+            raise ParameterError(
+                "it must be a Stribeck, for example Stribeck(1, 1.5, 1e-3)",
+                place="stribeck",
+                value=found["stribeck"],
+            )
+    for name, each in EVERY.items():
+        if name in given:
+            value = given[name]
+            found[name] = (
+                checked_array(name, value, n, each.rule)
+                if each.per_element
+                else checked_scalar(name, value, each.rule)
+            )
+    return found

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -19,6 +19,7 @@ from gms_fsm.charts.gms import GMS_ELEMENT, Law, check_law
 from gms_fsm.charts.lugre import LUGRE
 from gms_fsm.charts.parameters import (
     SIGMA_2,
+    STRIBECK,
     WEIGHTS,
     FloatArray,
     Parameter,
@@ -468,23 +469,26 @@ def with_values(model: Model, values: Mapping[str, ArrayLike]) -> Model:
     def array(name: str, old: float | FloatArray) -> FloatArray:
         return np.full(model.n, values.get(name, old), dtype=np.float64)
 
-    def common(name: str, old: float) -> float:
-        return old if name in model.values else number(name, old)
-
-    stribeck = old = model.stribeck
-    if old is not None:
-        stribeck = Stribeck(**{name: common(name, value) for name, value in asdict(old).items()})
-    shared: Any = {"stribeck": stribeck, "sigma_2": common("sigma_2", model.sigma_2)}
+    own_names = model.values
+    common = {name for name in values if name not in own_names}
+    stribeck = model.stribeck
+    if stribeck is not None and common & {each.name for each in STRIBECK}:
+        numbers = vars(stribeck).items()
+        stribeck = Stribeck(**{u: number(u, v) if u in common else v for u, v in numbers})
+    sigma_2 = number("sigma_2", model.sigma_2) if "sigma_2" in common else model.sigma_2
+    shared: Any = {"stribeck": stribeck, "sigma_2": sigma_2}
     if isinstance(model, LuGre):
         own: Any = {name: number(name, float(value)) for name, value in model.values.items()}
         return LuGre(**own, **shared)
-    fixed = old is None or "weights" in model.values
-    weights = model.weights if fixed else array("weights", model.weights)
     if isinstance(model, GMS):
-        p = model.parameters
-        arrays = [array(name, getattr(p, name)) for name in ("k", "sigma", "C")]
-        v_c = number("v_c", p.v_c)
-        return GMS(GMSParameters(*arrays, v_c=v_c, weights=weights, **shared), law=model.law)
+        new_ones = {
+            each.name: array(each.name, 0.0) if each.per_element else number(each.name, 0.0)
+            for each in (*model.chart.parameters, WEIGHTS)
+            if each.name in values
+        }
+        return GMS(model.parameters.replaced(**new_ones, **shared), law=model.law)
+    fixed = stribeck is None or "weights" in own_names
+    weights = model.weights if fixed else array("weights", model.weights)
     new = {
         name: number(name, value) if isinstance(value, float) else array(name, value)
         for name, value in model.values.items()

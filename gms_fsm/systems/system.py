@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -39,6 +39,7 @@ from gms_fsm.systems._given import (
     texts_of,
 )
 from gms_fsm.systems._parts import Body, Contact, Sampled
+from gms_fsm.systems._texts import texts_of_system
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Signal, as_signal
@@ -122,7 +123,7 @@ class System:
         self._check_names(here)
         signals = {name: self._signal(name, given, here) for name, given in self.signals.items()}
         put(self, "signals", signals)
-        _ = self.assembly  # raises errors of the texts
+        self._read()
 
     def __repr__(self) -> str:
         bodies, contacts = (
@@ -182,6 +183,26 @@ class System:
                     )
                 seen.add(part.name)
 
+    def _read(self) -> None:
+        """Read the texts, unless another system with the same texts has been read."""
+        # Imported here: the reader itself needs the classes of this module.
+        from gms_fsm.systems._renumbered import check_numbers
+
+        key = texts_of_system(self)
+        like = _read_before.get(key)
+        if like is None:
+            _ = self.assembly  # raises errors of the texts
+            if len(_read_before) >= MOST_READ:
+                _read_before.clear()
+            _read_before[key] = self
+        else:
+            check_numbers(like.assembly, self)
+            object.__setattr__(self, "_like", like)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: texts are read again."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
+
     @property
     def shape(self) -> System:
         """The system whose texts were read: this one, or one that differs in numbers only."""
@@ -191,8 +212,8 @@ class System:
     @functools.cached_property
     def assembly(self) -> Assembly:
         """Its texts, read."""
-        # Imported here: the reader itself needs the classes of this module.
-        from gms_fsm.systems._assembly import assembled, renumbered
+        from gms_fsm.systems._assembly import assembled
+        from gms_fsm.systems._renumbered import renumbered
 
         return assembled(self) if self.shape is self else renumbered(self.shape.assembly, self)
 
@@ -297,6 +318,10 @@ class System:
             If there is none.
         """
         return _found(self.contacts, name, f"system {self.name!r} has no contact")
+
+
+MOST_READ = 64
+_read_before: dict[Any, System] = {}  # by its texts
 
 
 Named = TypeVar("Named", "Body", "Contact")

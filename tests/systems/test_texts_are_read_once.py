@@ -1,0 +1,69 @@
+"""A system whose texts were read before is not read again, and its numbers still count."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any
+
+import pytest
+
+from gms_fsm import GMS, Body, Contact, GMSParameters, Sampled, System, simulate
+from gms_fsm.charts import CHARTS
+from gms_fsm.errors import ParameterError
+from gms_fsm.systems import system as module
+
+
+def pulled(m: float = 1.0, K: float = 2.0, *, start: float = 0.0, signal: Any = "0.1*t") -> System:
+    return System(
+        "pulled",
+        bodies=(Body("mass", inertia="m", force="K * (end - x) + u"),),
+        contacts=(
+            Contact("pad", GMS(GMSParameters.paper("stick-slip"), law="signed")),
+            Contact("stop", CHARTS["stiction"], {"F_c": 0.1, "F_s": 0.2, "b": 0.1}),
+        ),
+        signals={"end": signal},
+        numbers={"m": m, "K": K},
+        sampled=(Sampled("hand", period=0.5, updates={"u": "u / 2"}, initial={"u": start}),),
+    )
+
+
+def run(system: System) -> list[Any]:
+    trace = simulate(system, 8.0, engine="ifelse")
+    return [trace.t.tolist(), trace.rows.y.tolist(), trace.transitions.tolist()]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"m": 3.0}, {"K": 5.0}, {"start": 1.0}, {"signal": ([0.0, 4.0, 9.0], [0.0, 0.4, 0.1])}],
+    ids=str,
+)
+def test_other_numbers_give_what_a_new_reading_gives(
+    change: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = pulled(**({"signal": ([0.0, 9.0], [0.0, 1.0])} if "signal" in change else {}))
+    second = pulled(**change)
+    assert second.shape is first.shape
+    found = run(second)
+    assert found != run(first)
+    monkeypatch.setattr(module, "_read_before", {})
+    again = pulled(**change)
+    assert again.shape is again
+    assert run(again) == found
+
+
+def test_functions_stay_apart() -> None:
+    one, other = pulled(signal=lambda t: 0.1 * t), pulled(signal=lambda t: 0.2 * t)
+    assert run(one) != run(other)
+    assert run(pulled(signal=lambda t: 0.2 * t)) == run(other)
+
+
+def test_an_inertia_that_is_not_positive_is_refused_each_time() -> None:
+    pulled()
+    with pytest.raises(ParameterError, match="the inertia 'm' is not positive"):
+        pulled(m=0.0)
+
+
+def test_a_pickled_system_runs_alike() -> None:
+    system = pulled(m=2.0)
+    again = pickle.loads(pickle.dumps(system))
+    assert run(again) == run(system)
