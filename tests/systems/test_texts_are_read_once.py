@@ -27,9 +27,9 @@ def pulled(m: float = 1.0, K: float = 2.0, *, start: float = 0.0, signal: Any = 
     )
 
 
-def run(system: System) -> list[Any]:
+def run(system: System) -> str:
     trace = simulate(system, 8.0, engine="ifelse")
-    return [trace.t.tolist(), trace.rows.y.tolist(), trace.transitions.tolist()]
+    return repr([trace.t.tolist(), trace.rows.y.tolist(), trace.transitions.tolist()])
 
 
 @pytest.mark.parametrize(
