@@ -125,7 +125,7 @@ def scales_of(model: Model | Contact) -> Scales:
     return _scales_of(ByIdentity(model.chart), elements, curve)
 
 
-@functools.lru_cache(maxsize=256)
+@functools.lru_cache(maxsize=32)
 def _scales_of(
     key: ByIdentity[Chart], elements: tuple[tuple[float, ...], ...], curve: Stribeck | None
 ) -> Scales:

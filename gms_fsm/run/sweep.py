@@ -19,9 +19,9 @@ from gms_fsm._arguments import checked_kind
 from gms_fsm.charts.parameters import WEIGHTS, FloatArray
 from gms_fsm.errors import GMSError, ParameterError, cut
 from gms_fsm.lowering._compiled import check_llvmlite
+from gms_fsm.lowering._observing import observe
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
 from gms_fsm.run._compiled_run import CompiledRun
-from gms_fsm.run._moment import scope_of
 from gms_fsm.run._swept import LOG, LONGEST, Sweep, row_name
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import Run
@@ -373,9 +373,13 @@ def _result(run: Run | CompiledRun | None, outcome: str, message: str) -> _Resul
     rows = None
     if recorder.start.output == "t_eval":
         rows = {name: getattr(trace, name) for name in ("x", "v", "F", "z")}
-    here = scope_of(recorder.start, *recorder.latest)
-    end = {name: getattr(here, name) for name in ("t", "x", "v", "F", "z")}
-    end["mode"] = here.mode[here.layout.elements]
+    t, y, mode = recorder.latest
+    program = recorder.start.program
+    layout, bank = program.layout, program.layout.contact()
+    seen = layout.y.named(y) | layout.observed.named(observe(program, t, y, mode))
+    names = {"x": bank.position, "v": bank.of(bank.velocity), "F": bank.of("F")}
+    end = {"t": t, "mode": mode[layout.elements]} | {u: seen[name] for u, name in names.items()}
+    end["z"] = seen[bank.of(bank.variables[0])] if bank.variables else np.nan
     return _Result(outcome, message, end, _log_of(trace.firings), rows)
 
 
