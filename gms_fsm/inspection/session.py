@@ -533,7 +533,7 @@ class Session:
         1
         >>> print(session.compare())
         branches 0 and 1 until t = 30 s: 16 and 16 transitions
-          first different transition at t = 12.4999735 s
+          first different transition at t = 19.3981272 s
           largest difference: z 0.598 m, F 0.374 N
         """
         pair = chosen_pair(a, b, self.current, [branch.parent for branch in self.branches])

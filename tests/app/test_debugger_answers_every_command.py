@@ -179,14 +179,14 @@ def test_moves() -> None:
 
 def test_next_reports_that_there_is_no_other() -> None:
     said = answers(FIG_4, "goto 99.9", "next", "next", "next")[3]
-    assert said.startswith("no transition before the end\nrow 329, t = 100 s")
+    assert said.startswith("no transition before the end\nrow 330, t = 100 s")
 
 
 def test_until_reports_where_and_whether() -> None:
     said = answers(FIG_4, "u z1 > 0.123", "u state(1) == slip", "u z1 > 99")
     assert said[0].startswith("between rows 8 and 9, t = 2.60048188")
     assert "element 1: stick -> slip by break_away_forward" in said[1]
-    assert said[2].startswith("it does not become true before the end\nrow 329, t = 100 s")
+    assert said[2].startswith("it does not become true before the end\nrow 330, t = 100 s")
 
 
 @pytest.mark.slow
@@ -257,7 +257,7 @@ def test_breakpoints() -> None:
         "clear all",
         "b",
     )
-    assert said[0].startswith("no breakpoint is set\nrow 329")
+    assert said[0].startswith("no breakpoint is set\nrow 330")
     assert said[2] == "no breakpoint is set"
     assert said[3] == "breakpoint 1: fires arrest, element 2"
     assert said[4] == "breakpoint 2: enter slip, element 3, if v < 0, from hit 2 on"

@@ -97,7 +97,7 @@ def test_pulled_mass_story() -> None:
         "branches",
     )
     # It is pulled forward and never breaks away backward by itself.
-    assert said[1].startswith("no breakpoint was hit\nrow 2001, t = 60 s")
+    assert said[1].startswith("no breakpoint was hit\nrow 1998, t = 60 s")
     assert "arrest does not fire: |v| <= v_c is false by" in said[2]
     assert said[4].startswith("branch 1, from branch 0: v = -0.5")
     assert said[5].startswith("breakpoint 1: fires break_away_backward, element 2")
