@@ -86,8 +86,8 @@ def ours(problem: Problem, built: tuple[Any, ...] | None = None, **how: Any) -> 
     trace = simulate(*(built or problem.build()), problem.t_end, **how)
     kept, friction = problem.compared(trace)
     assert np.isfinite(friction).all()
-    log = trace.transitions
-    return Outcome(log.t, log.element, log.edge.tolist(), kept)
+    log, edges = trace.firings, trace.program.layout.edges
+    return Outcome(log.t, log.machine, [edges[k][0] for k in log.edge.tolist()], kept)
 
 
 def c_loop(problem: Problem, folder: Path) -> Callable[[Array], Outcome]:

@@ -167,16 +167,18 @@ class Columns:
             rows = len(start.options.times)
         stops = few if start.output == "t_eval" else 0
         floats: Any = np.empty  # the columns' fields are typed as lists; compiled code uses arrays
-        ints: Any = functools.partial(np.zeros, dtype=np.int64)
+        ints: Any = functools.partial(np.empty, dtype=np.int64)
+        rows_t, rows_microstep, rows_y, rows_mode = _empty_rows(rows, size, modes)
+        stops_t, stops_microstep, stops_y, stops_mode = _empty_rows(stops, size, modes)
         b = self.run_of.buffers
         plan = hybrid.plan_of(
             equations(start.program), start.t_start, start.last, start.options, len(start.mode)
         )
         out = b.out._replace(
-            times=_floats(() if start.options.times is None else start.options.times),
+            times=np.asarray(() if start.options.times is None else start.options.times, float),
             every_step=start.options.times is None,
-            rows_t=floats(rows),
-            rows_y=floats((rows, size)),
+            rows_t=rows_t,
+            rows_y=rows_y,
         )
         self.buffers: hybrid.Buffers = b._replace(plan=_as_arrays(plan, b.plan), out=out)
         self.log: Log = self.run_of.log._replace(
@@ -184,17 +186,19 @@ class Columns:
             machine=ints(256),
             edge=ints(256),
             numbers=floats((256, len(LOG_NUMBERS))),
-            rows_microstep=ints(rows),
-            rows_mode=ints((rows, modes)),
-            stops_t=floats(stops),
-            stops_microstep=ints(stops),
-            stops_y=floats((stops, size)),
-            stops_mode=ints((stops, modes)),
+            rows_microstep=rows_microstep,
+            rows_mode=rows_mode,
+            stops_t=stops_t,
+            stops_microstep=stops_microstep,
+            stops_y=stops_y,
+            stops_mode=stops_mode,
         )
+        self.handed_out = False  # whether a trace has the columns of rows, and not a copy
         self._begin()
         if stops:
             self.log.stops_t[0], self.log.stops_y[0] = start.t_start, self.buffers.now.y
             self.log.stops_mode[0] = list(layout.not_sliding(start.mode))
+            self.log.stops_microstep[0] = 0
             self.log.counts[STOPS] = 1
 
     def __del__(self) -> None:
@@ -232,6 +236,8 @@ class Columns:
 
     def empty(self) -> None:
         """Empty the columns and return to the start."""
+        if self.handed_out:
+            self._replace_rows()
         start, log = self.start, self.log
         b: Any = self.buffers  # arrays
         memory, sliding = b.memory, b.sliding
@@ -252,6 +258,15 @@ class Columns:
         control = b.plan.control._replace(time_scale=start.options.time_scale)
         self.buffers = b._replace(plan=b.plan._replace(control=control))
         log.counts[:] = [0, min(1, len(log.stops_t))]
+
+    def _replace_rows(self) -> None:
+        """Leave the columns of rows to the trace that has them."""
+        out: Any = self.buffers.out
+        layout = self.start.program.layout
+        t, microstep, y, mode = _empty_rows(len(out.rows_t), layout.y.size, layout.modes)
+        self.buffers = self.buffers._replace(out=out._replace(rows_t=t, rows_y=y))
+        self.log = self.log._replace(rows_microstep=microstep, rows_mode=mode)
+        self.handed_out = False
 
     def state(self) -> dict[str, Any]:
         """Return the contents as arrays, for a checkpoint."""
@@ -353,7 +368,9 @@ class Columns:
             t, y, mode = self.latest
             rows = Rows(np.array([t]), np.zeros(1, dtype=np.int64), np.array([y]), np.array([mode]))
         else:
-            rows = _rows(count, out.rows_t, log.rows_microstep, out.rows_y, log.rows_mode)
+            columns: Any = out.rows_t, log.rows_microstep, out.rows_y, log.rows_mode
+            self.handed_out = count == len(out.rows_t)
+            rows = Rows(*columns) if self.handed_out else _rows(count, *columns)
         stops = rows
         if start.output == "t_eval":
             stops = _rows(
@@ -420,6 +437,19 @@ def _floats(numbers: Any) -> Any:
 
 def _integers(numbers: Any) -> Any:
     return np.array(numbers, dtype=np.int64)
+
+
+def _empty_rows(rows: int, size: int, modes: int) -> tuple[Any, Any, Any, Any]:
+    """Return columns for times, micro-steps, states and modes, in one piece of memory.
+
+    In several pieces they would be given back to the system after each run and fetched again for
+    the next one, which takes longer than filling them.
+    """
+    numbers = np.empty(rows * (2 + size + modes))
+    whole = numbers.view(np.int64)
+    start, end = 2 * rows, (2 + size) * rows  # of the states
+    y, mode = numbers[start:end].reshape(rows, size), whole[end:].reshape(rows, modes)
+    return numbers[:rows], whole[rows:start], y, mode
 
 
 def _doubled(column: Any) -> Any:
