@@ -166,8 +166,8 @@ class Columns:
         if start.options.times is not None:
             rows = len(start.options.times)
         stops = few if start.output == "t_eval" else 0
-        floats: Any = np.empty  # the columns' fields are typed as lists; compiled code uses arrays
-        ints: Any = functools.partial(np.empty, dtype=np.int64)
+        floats: Any = np.zeros  # the columns' fields are typed as lists; compiled code uses arrays
+        ints: Any = functools.partial(np.zeros, dtype=np.int64)
         rows_t, rows_microstep, rows_y, rows_mode = _empty_rows(rows, size, modes)
         stops_t, stops_microstep, stops_y, stops_mode = _empty_rows(stops, size, modes)
         b = self.run_of.buffers
@@ -269,9 +269,16 @@ class Columns:
         self.handed_out = False
 
     def state(self) -> dict[str, Any]:
-        """Return the contents as arrays, for a checkpoint."""
+        """Return the contents as arrays, for a checkpoint; 0 where nothing has been written."""
         out = self.buffers.out
-        return {**self.log._asdict(), "rows_t": out.rows_t, "rows_y": out.rows_y}
+        found: dict[str, Any] = {**self.log._asdict(), "rows_t": out.rows_t, "rows_y": out.rows_y}
+        taken = self.buffers.memory.counts[loop.TAKEN]  # the modes of further rows come later
+        filled = dict.fromkeys(("rows_mode", "rows_microstep"), taken)
+        filled |= dict.fromkeys(("rows_t", "rows_y"), out.cursor[ROW])
+        filled |= {name: self.log.counts[STOPS] for name in found if name.startswith("stops")}
+        for name, count in filled.items():
+            found[name][count:] = 0
+        return found
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Restore what `state` returned."""
