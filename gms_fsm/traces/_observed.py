@@ -16,6 +16,8 @@ from integrators import LIVE
 
 __all__ = ["Observed"]
 
+FEW = 8  # rows that are observed without machine code
+
 
 class Observed(Mapping[str, FloatArray]):
     """The observed quantities by their names in the layout, elements on the second axis.
@@ -34,7 +36,8 @@ class Observed(Mapping[str, FloatArray]):
     """
 
     def __init__(self, program: Program, rows: Rows, *, compiled: bool) -> None:
-        self._program, self._rows, self._compiled = program, rows, compiled
+        # Machine code has to be made once, and entering it takes as long as a few rows.
+        self._program, self._rows, self._compiled = program, rows, compiled and len(rows) > FEW
         self._places = program.layout.observed
         self._tables: dict[range, FloatArray] = {}  # by the places in them
 
