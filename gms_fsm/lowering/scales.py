@@ -138,8 +138,9 @@ def _scales_of(
         for name, row in found.items():
             reaches = [_reach(at_rest, *margin) for margin in sizes.reach[name]]
             if curve is not None:
-                slopes = sizes.stiffness.get(name, ())
-                reaches += [_divided(curve.F_c, at_rest[k]) for k in slopes]
+                reaches += [
+                    abs(curve.F_c / at_rest[k]) for k in sizes.stiffness.get(name, ()) if at_rest[k]
+                ]
             row.append(_least(reaches))
         for name, follows in sizes.follows.items():
             most = max(abs(at_rest[k]) for k in follows)
@@ -346,9 +347,9 @@ def _number(function: Callable[..., tuple[float, ...]], values: Sequence[float])
 
 def _reach(numbers: Sequence[float], height: int, slope: int, bend: int | None = None) -> float:
     """Return where a margin is zero; by its bend if it is flat at rest, as v**2 + w**2 - e**2."""
-    if numbers[slope] or bend is None:
-        return _divided(numbers[height], numbers[slope])
-    return math.sqrt(_divided(2.0 * numbers[height], numbers[bend]))
+    if steepness := numbers[slope]:
+        return abs(numbers[height] / steepness)
+    return 0.0 if bend is None else math.sqrt(_divided(2.0 * numbers[height], numbers[bend]))
 
 
 def _least(numbers: Iterable[float]) -> float:

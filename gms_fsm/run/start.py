@@ -374,10 +374,10 @@ def _ticks(system: System, origin: float, t_start: float, t_end: float) -> dict[
                 advice=f"at most {MOST_TICKS:,} fit into a run",
             )
         done = origin < t_start and bit < len(system.sampled)  # a tick at t_start itself
-        for k in range(first, count):
-            time = origin + offset + k * period
-            if t_start <= time < t_end and not (done and time == t_start):
-                found[time] = found.get(time, 0) | 1 << bit
+        times: FloatArray = origin + offset + np.arange(first, count) * period
+        begun = times > t_start if done else times >= t_start
+        for time in as_floats(times[begun & (times < t_end)]):
+            found[time] = found.get(time, 0) | 1 << bit
     return dict(sorted(found.items()))
 
 
