@@ -374,9 +374,9 @@ def _ticks(system: System, origin: float, t_start: float, t_end: float) -> dict[
                 advice=f"at most {MOST_TICKS:,} fit into a run",
             )
         done = origin < t_start and bit < len(system.sampled)  # a tick at t_start itself
-        times: FloatArray = origin + offset + np.arange(first, count) * period
+        times = origin + offset + np.arange(first, count) * period
         begun = times > t_start if done else times >= t_start
-        for time in as_floats(times[begun & (times < t_end)]):
+        for time in times[begun & (times < t_end)].tolist():
             found[time] = found.get(time, 0) | 1 << bit
     return dict(sorted(found.items()))
 
