@@ -106,6 +106,8 @@ class System:
     sampled: tuple[Sampled, ...] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            raise ParameterError("it must be a text", place="name", value=self.name)
         put, here = object.__setattr__, f"system {shown(self.name)}"
         for each, kind in (("bodies", Body), ("contacts", Contact), ("sampled", Sampled)):
             put(self, each, several(getattr(self, each), kind, f"{here}: {each}"))
