@@ -379,7 +379,7 @@ def main() -> None:
         findings += bool(differ)
         firings += 0 if trace is None else len(trace.transitions)
         drawn.update(one.kinds)
-        drawn["to the end"] += trace is not None and bool(trace.t[-1] == T_END)
+        drawn["to the end"] += trace is not None and bool((trace.t[-1:] == T_END).any())
         if differ:
             print(f"FINDING {'; '.join(differ)}\n  {one.again}", flush=True)
         if given.index is not None:
