@@ -33,7 +33,9 @@ def renumbered(read: Assembly, system: System) -> Assembly:
     shared, own = numbers_of(system)
     pairs = zip(read.banks, system.contacts, strict=True)
     banks = tuple(replace(bank, contact=contact) for bank, contact in pairs)
-    return replace(read, banks=banks, shared=shared, own=own)
+    signals = {name: each for name, each in system.signals.items() if not isinstance(each, str)}
+    definitions = tuple(replace(each, signal=signals.get(each.name)) for each in read.definitions)
+    return replace(read, definitions=definitions, banks=banks, shared=shared, own=own)
 
 
 def check_numbers(read: Assembly, system: System) -> None:

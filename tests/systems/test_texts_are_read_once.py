@@ -11,6 +11,7 @@ from gms_fsm import GMS, Body, Contact, GMSParameters, Sampled, System, simulate
 from gms_fsm.charts import CHARTS
 from gms_fsm.errors import ParameterError
 from gms_fsm.systems import system as module
+from gms_fsm.traces.system_scope import given_values
 
 
 def pulled(m: float = 1.0, K: float = 2.0, *, start: float = 0.0, signal: Any = "0.1*t") -> System:
@@ -67,3 +68,18 @@ def test_a_pickled_system_runs_alike() -> None:
     system = pulled(m=2.0)
     again = pickle.loads(pickle.dumps(system))
     assert run(again) == run(system)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (([0.0, 9.0], [0.0, 1.0]), ([0.0, 9.0], [0.0, 2.0])),
+        (lambda t: t / 9.0, lambda t: 2.0 * t / 9.0),
+    ],
+    ids=["record", "function"],
+)
+def test_expressions_see_the_signals_of_their_own_system(one: Any, other: Any) -> None:
+    first, second = pulled(signal=one), pulled(signal=other)
+    assert second.shape is first.shape
+    assert given_values(first, 9.0 - 1e-12)["end"] == pytest.approx(1.0)
+    assert given_values(second, 9.0 - 1e-12)["end"] == pytest.approx(2.0)
