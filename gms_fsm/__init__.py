@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from gms_fsm.run.machines import ElementMachines as ElementMachines
     from gms_fsm.run.settings import Settings as Settings
     from gms_fsm.run.simulate import simulate as simulate
+    from gms_fsm.run.stepping import FrictionState as FrictionState
     from gms_fsm.run.sweep import Sweep as Sweep
     from gms_fsm.run.sweep import sweep as sweep
     from gms_fsm.systems.gms_parameters import GMSParameters as GMSParameters
@@ -87,6 +88,7 @@ _HOMES = {
     "run.machines": "Element ElementMachines",
     "run.settings": "Settings",
     "run.simulate": "simulate",
+    "run.stepping": "FrictionState",
     "run.sweep": "Sweep sweep",
     "systems.gms_parameters": "GMSParameters",
     "systems.models": "ChartModel GMS LuGre Model",
