@@ -152,7 +152,8 @@ def run_to_event(
         ROWS (to be taken, all with the present mode; possibly none if the steps are used up),
         FIRING (before) and FIRED (after an edge), STOPPED (a crossing, either side of a jump),
         SLID (sliding started or ended), ADVANCE (a foreign solver must continue), PAUSED (settled
-        at the time ``clock[PAUSE]``), DONE; or the error TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK, RELATION_LIVELOCK, TOO_MANY_STEPS.
+        at the time ``clock[PAUSE]``), DONE; or the error TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK,
+        RELATION_LIVELOCK, TOO_MANY_STEPS.
     """
     plan, now, memory = b.plan, b.now, b.memory
     relations, sliding, scratch = b.relations, b.sliding, b.scratch
