@@ -108,17 +108,18 @@ class Plain:
 
     def copy(self) -> dict[str, list[Any]]:
         """Return the present state."""
-        found = state_of(self) | {name: getattr(self.sample, name) for name in FOUND}
-        return {name: list(place) for name, place in found.items()}
+        return {name: list(place) for name, place in self._all().items()}
 
     def take(self, copy: Mapping[str, list[Any]]) -> None:
         """Return to what `copy` returned."""
-        places = state_of(self) | {name: getattr(self.sample, name) for name in FOUND}
-        for name, place in places.items():
+        for name, place in self._all().items():
             place[:] = copy[name]
 
-
-FOUND = ("end", "counts", "force", "t", "machine", "edge")
+    def _all(self) -> dict[str, Any]:
+        """Return all lists that a copy contains."""
+        found = ("end", "counts", "force", "t", "machine", "edge")
+        sample = {f"sample {name}": getattr(self.sample, name) for name in found}
+        return {**state_of(self), **sample}
 
 
 def _buffers(start: Start) -> Buffers:
