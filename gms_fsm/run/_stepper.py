@@ -192,11 +192,11 @@ class Machine:
         """Return to the state that was kept last."""
         self._words[:] = self._kept
 
-    def copy(self) -> NDArray[np.int64]:
+    def copy(self) -> Any:
         """Return the present state."""
         return self._words.copy()
 
-    def take(self, copy: NDArray[np.int64]) -> None:
+    def take(self, copy: Any) -> None:
         """Return to what `copy` returned."""
         self._words[:] = copy
 
