@@ -272,7 +272,8 @@ class Joint:
         """Return the present state as finite numbers."""
         places = self._places().values()
         flat = np.concatenate([np.asarray(place, dtype=np.float64).ravel() for place in places])
-        return np.clip(flat, -MOST, MOST)
+        found: FloatArray = np.clip(flat, -MOST, MOST)
+        return found
 
     @functools.cached_property
     def sizes(self) -> list[int]:

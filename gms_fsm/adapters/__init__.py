@@ -1,0 +1,1 @@
+"""Friction in the loops of other programs: SciPy, PathSim, python-control, MuJoCo, gymnasium."""
