@@ -290,9 +290,9 @@ class FrictionState:
 
 def _checked(v0: Any, v1: Any, dt: Any) -> tuple[float, float, float]:
     """Return the arguments of a sample as floats, or refuse them."""
-    if isinstance(v0, float) and isinstance(v1, float) and isinstance(dt, float):  # the usual case
-        if isfinite(v0) and isfinite(v1) and 0.0 <= dt <= LATEST:
-            return v0, v1, dt
+    usual = isinstance(v0, float) and isinstance(v1, float) and isinstance(dt, float)
+    if usual and isfinite(v0) and isfinite(v1) and 0.0 <= dt <= LATEST:
+        return v0, v1, dt
     v0, v1 = checked_scalar("v0", v0, "finite"), checked_scalar("v1", v1, "finite")
     dt = checked_scalar("dt", dt, ">= 0")
     if dt > LATEST:
