@@ -11,3 +11,7 @@ if not importlib.util.find_spec("textual"):
 # The examples compile (extra: fast).
 if not importlib.util.find_spec("llvmlite"):
     collect_ignore += ["integrators/machine_code/objects.py"]
+# These examples run in other programs (extras: gymnasium, mujoco).
+for host in ("gymnasium", "mujoco"):
+    if not importlib.util.find_spec(host):
+        collect_ignore += [f"gms_fsm/adapters/{host}.py"]

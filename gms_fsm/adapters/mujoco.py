@@ -73,7 +73,7 @@ class JointFriction:
     >>> model = mujoco.MjModel.from_xml_string(door)
     >>> data = mujoco.MjData(model)
     >>> friction = GMS(GMSParameters.paper("stick-slip"), law="signed")
-    >>> data.qfrc_applied[0] = 2.0  # Nm
+    >>> data.qfrc_applied[0] = 1.0  # Nm
     >>> with JointFriction(model, data, {"hinge": friction}) as joints:
     ...     mujoco.mj_step(model, data, 500)
     >>> joints.states["hinge"]
@@ -205,7 +205,9 @@ class JointFriction:
     def _commit(self, t: float, v: list[float]) -> None:
         for i, (name, stepper) in enumerate(zip(self._frictions, self._steppers, strict=True)):
             stepper.advance_to(self._v[i], v[i], t)
-            self._switches += [JointSwitch(at, name, *rest) for at, *rest in stepper.switches]
+            self._switches += [
+                JointSwitch(each.t, name, each.element, each.edge) for each in stepper.switches
+            ]
         self._t, self._v = t, v
 
     def _catch_up(self) -> None:
