@@ -20,7 +20,7 @@ from gms_fsm.run.machines import IfElse
 from gms_fsm.run.settings import MOST_STEPS
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
-from integrators import Arc, Firing, Functions, Held, HybridError, Tableau, hybrid, look
+from integrators import Arc, Firing, Functions, Held, HybridError, Livelock, NotFinite, Tableau, hybrid, look
 
 __all__ = ["Carried", "Solution", "Switch", "solve_ivp"]
 
@@ -127,6 +127,7 @@ def solve_ivp(
     rtol: float = 1e-6,
     atol: ArrayLike | None = None,
     max_step: float = math.inf,
+    max_steps: int = MOST_STEPS,
     t_eval: ArrayLike | None = None,
     initial: Mapping[str, Any] | None = None,
 ) -> Solution:
@@ -161,6 +162,8 @@ def solve_ivp(
         positions in m and velocities in m/s; give your own for other quantities.
     max_step : float
         s.
+    max_steps : int
+        Maximum number of steps.
     t_eval : array_like, optional
         Times of the rows [s]; all steps if omitted.
     initial : mapping, optional
@@ -204,7 +207,7 @@ def solve_ivp(
         atol=tolerances,
         max_step=max_step if max_step == math.inf else checked_scalar("max_step", max_step, "> 0"),
         time_scale=driven.start.options.time_scale,
-        max_steps=MOST_STEPS,
+        max_steps=_count(max_steps),
         located=True,
         times=None if t_eval is None else _wanted(t_eval, start, end),
     )
@@ -363,7 +366,7 @@ class _Host:
                     place, edge = self.driven.place(event.machine), self.driven.edge(event.edge)
                     switches.append(Switch(event.t, *place, edge))
         except HybridError as error:
-            message = f"it stopped at t = {error.t!r} s: {error}"
+            message = f"it stopped at t = {error.t!r} s: {error}; {_advice(error)}"
         nfev = self.nfev
         forces = [
             self._observed(whole, b, *row) for row in zip(t, rows, modes, strict=True)
@@ -404,6 +407,15 @@ class _Host:
         return [out[k] for k in self.driven.forces]
 
 
+def _advice(error: HybridError) -> str:
+    """Say what to do where the solver gives up."""
+    if isinstance(error, NotFinite):
+        return "fun, velocity or the friction gives NaN or infinity there"
+    if isinstance(error, Livelock):
+        return "states keep switching without progress: prove() finds such guards"
+    return "try a stiff method ('Radau'), or a larger rtol and atol"
+
+
 # --------------------------------------------------------------------------- arguments
 def _carried(
     friction: Friction | Sequence[Friction] | Carried,
@@ -433,6 +445,12 @@ def _span(t_span: Sequence[float]) -> tuple[float, float]:
             f"t_span ends at {end!r} s and begins at {start!r} s", advice="the end must be later"
         )
     return start, end
+
+
+def _count(max_steps: int) -> int:
+    if isinstance(max_steps, bool) or not isinstance(max_steps, int) or max_steps < 1:
+        raise ParameterError("it must be an integer, at least 1", place="max_steps", value=max_steps)
+    return max_steps
 
 
 def _wanted(t_eval: ArrayLike, start: float, end: float) -> list[float]:
