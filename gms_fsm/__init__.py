@@ -45,10 +45,12 @@ if TYPE_CHECKING:
     from gms_fsm.phenomena.measure import Bench as Bench
     from gms_fsm.phenomena.measure import PhenomenaTable as PhenomenaTable
     from gms_fsm.phenomena.measure import measure_phenomena as measure_phenomena
+    from gms_fsm.run.bank import FrictionBank as FrictionBank
     from gms_fsm.run.machines import Element as Element
     from gms_fsm.run.machines import ElementMachines as ElementMachines
     from gms_fsm.run.settings import Settings as Settings
     from gms_fsm.run.simulate import simulate as simulate
+    from gms_fsm.run.stepping import FrictionState as FrictionState
     from gms_fsm.run.sweep import Sweep as Sweep
     from gms_fsm.run.sweep import sweep as sweep
     from gms_fsm.systems.gms_parameters import GMSParameters as GMSParameters
@@ -84,9 +86,11 @@ _HOMES = {
     "inspection.prove": "Finding Report prove",
     "inspection.session": "Session",
     "phenomena.measure": "Bench PhenomenaTable measure_phenomena",
+    "run.bank": "FrictionBank",
     "run.machines": "Element ElementMachines",
     "run.settings": "Settings",
     "run.simulate": "simulate",
+    "run.stepping": "FrictionState",
     "run.sweep": "Sweep sweep",
     "systems.gms_parameters": "GMSParameters",
     "systems.models": "ChartModel GMS LuGre Model",

@@ -222,7 +222,7 @@ def advance(
                 theta = first_change(path, w, tick)
         redone = False
         if theta < 1.0:
-            t_new = t + theta * h
+            t_new = min(t + theta * h, t_new)
         else:
             copy_margins(w, w.end, w.start)
         if wanted:

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from integrators import advance, columns, crossings, loop, sliding, step_size, steps
+from integrators import advance, columns, crossings, loop, sliding, step_size, stepping, steps
 from integrators.columns import Log, Recorded
 from integrators.loop import Buffers, Machines
 from integrators.machine_code import (
@@ -44,9 +44,22 @@ from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import Local
 from integrators.machine_code.values import Number
 from integrators.sliding import Functions
+from integrators.stepping import Sample
 from integrators.steps import Coefficients
 
-__all__ = ["Engine", "Run", "Store", "digest", "edition", "engine", "example", "observer"]
+__all__ = [
+    "Engine",
+    "Run",
+    "Step",
+    "Stepper",
+    "Store",
+    "digest",
+    "edition",
+    "engine",
+    "example",
+    "observer",
+    "stepper",
+]
 
 # Arrays longer than this are not inside the block, and their lengths are variables.
 LONGEST_INSIDE = 64 + 8
@@ -60,7 +73,7 @@ NOT_INLINE = [
     "_search", "_put_wanted", "_put_firing", "_put_stop", "_begin_arc", "_choose_stop", "_fired",
     "_finish", "_held", "_jump", "_list", "_make_due", "_no_progress", "_often_changed",
     "_only_due", "_pick", "_rearm", "_reset_counts", "_reset_if_advanced", "_start", "_undefined",
-    "advance",
+    "advance", "_begin", "_impulse", "step_to",
 ]  # fmt: skip
 # A step calls these seven times. Inline, the slopes stay in registers: a tenth of the time.
 INLINE = dict.fromkeys(NOT_INLINE, False) | dict.fromkeys(("flow", "flow_live", "flow_on"), True)
@@ -74,6 +87,15 @@ class Run(NamedTuple):
     buffers: Buffers
     log: Log
     recorded: Recorded
+
+
+class Step(NamedTuple):
+    """The arguments of `integrators.stepping.step_to`."""
+
+    functions: Functions
+    machines: Machines
+    buffers: Buffers
+    sample: Sample
 
 
 class Rows(NamedTuple):
@@ -143,7 +165,7 @@ def edition() -> str:
     >>> len(edition())
     16
     """
-    loops = (steps, step_size, crossings, advance, sliding, loop, columns)
+    loops = (steps, step_size, crossings, advance, sliding, loop, columns, stepping)
     front = (sources, work, bindings, passing, expressions, statements, translate)
     tools = (*front, values, tree, layouts, llvm, objects)
     functions: list[Callable[..., Any]] = []
@@ -270,8 +292,23 @@ def _made(
     notify: Callable[[str], None],
 ) -> Engine:
     """Return an engine from the store, or compile it."""
-    inside = _longest(arguments) <= LONGEST_INSIDE
-    layout = Layout(arguments, _is_known, inside=inside)
+    layout = Layout(arguments, _is_known, inside=_longest(arguments) <= LONGEST_INSIDE)
+    library = _library(text, function, arguments, layout, extra, store, notify)
+    return Engine(layout, library, calls, len(extra))
+
+
+def _library(
+    text: str,
+    function: Callable[..., Any],
+    arguments: Any,
+    layout: Layout,
+    extra: Sequence[str],
+    store: Store | None,
+    notify: Callable[[str], None],
+    *,
+    each: bool = False,
+) -> Library:
+    """Return machine code from the store, or compile it."""
     # Which of the functions in the text are called, and the coefficients.
     fixed = [getattr(part, "__name__", part) for part in _parts(arguments) if _is_known(part)]
     what = edition(), function.__name__, text, layout.key(), fixed, target_name()
@@ -283,12 +320,14 @@ def _made(
         fields = layout.value.fields.values()
         translator = Translator(INLINE)
         numbers = [Number(Local("i", each)) for each in extra]
-        translator.entry("entry", function, [*fields, *numbers])
+        made = translator.entry("entry", function, [*fields, *numbers])
+        if each:
+            translator.for_each("each", made, layout.words)
         content = objects.compiled(llvm_text(translator.module))
         if store is not None:
             store.put(name, content)
         notify(f"compiled in {time.perf_counter() - started:.1f} s")
-    return Engine(layout, Library(content), calls, len(extra))
+    return Library(content)
 
 
 def _parts(record: Any) -> list[Any]:
@@ -339,6 +378,52 @@ def engine(
         To be called with a block, the largest number of steps, and whether to pause.
     """
     return _made(text, columns.record, arguments, ("steps", "pause"), calls, store, notify)
+
+
+@dataclass(eq=False)
+class Stepper:
+    """Machine code that advances one block by a sample, or many of them.
+
+    Parameters
+    ----------
+    layout : Layout
+        Of a block, which contains all its arrays.
+    library : Library
+        Contains `entry` and `each`.
+    """
+
+    layout: Layout
+    library: Library
+
+    def __post_init__(self) -> None:
+        # It takes microseconds: to release the GIL would take a tenth of them.
+        one = ctypes.PYFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
+        self.one = one(self.library.address("entry"))
+        each = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64)
+        self.each = each(self.library.address("each"))
+
+
+def stepper(
+    text: str, arguments: Step, store: Store | None, notify: Callable[[str], None]
+) -> Stepper:
+    """Return `integrators.stepping.step_to` as machine code for one system.
+
+    Parameters
+    ----------
+    text, store, notify
+        As in `engine`.
+    arguments : Step
+        Made of lists, with the system's functions; these call no functions of the host program.
+
+    Returns
+    -------
+    Stepper
+        ``one(address)`` returns what `step_to` returns; ``each(address, count)`` calls it for many
+        blocks, one after the other in memory, and returns the sum of what it returns.
+    """
+    layout = Layout(arguments, _is_known)
+    step_to = stepping.step_to
+    return Stepper(layout, _library(text, step_to, arguments, layout, (), store, notify, each=True))
 
 
 def example(functions: Functions, machines: Machines, b: Buffers, observed: int, recorded: Recorded,

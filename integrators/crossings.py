@@ -279,7 +279,7 @@ def _probe(path: Path, place: float, w: Watched) -> bool:
     """Fill the margins at a point; return whether any has changed there."""
     motion, search = path.motion, w.search
     path.interpolate(path.dense, place, search.y_probe)
-    t = path.t + place * (path.t_new - path.t)
+    t = min(path.t + place * (path.t_new - path.t), path.t_new)
     motion.margins(t, search.y_probe, path.mode, motion.p, w.watch, search.probe)
     return any_changed(w, search.probe)
 

@@ -507,7 +507,7 @@ def modes_of(b: Buffers) -> tuple[int, ...]:
 
 def beginning(t: float, t_end: float) -> Vector:
     """Return `Now.clock` for a run that has not started."""
-    return [t, 0.0, 1.0, t_end, t, -math.inf]
+    return [t, 0.0, 1.0, t_end, t, -math.inf, math.inf, abs(t_end)]
 
 
 def failure(event: int, b: Buffers, relations: list[str]) -> HybridError:

@@ -23,6 +23,7 @@ from integrators.advance import (
     Output,
     Plan,
     advance,
+    limit_after,
     put_row,
     raise_floor,
 )
@@ -38,6 +39,8 @@ from integrators.step_size import error_norm, starting_step
 from integrators.steps import (
     ANCHOR,
     ERROR_BEFORE,
+    LATEST,
+    PAUSE,
     SWITCHED,
     T_STOP,
     H,
@@ -68,7 +71,7 @@ STATE_STANDS = 0.1
 
 # Events (TOO_SMALL and NOT_FINITE are the kernel's).
 ROWS, FIRING, FIRED, STOPPED, DONE, SLID = 10, 11, 12, 13, 14, 15
-MACHINE_LIVELOCK, RELATION_LIVELOCK, ADVANCE, TOO_MANY_STEPS = 16, 17, 18, 19
+MACHINE_LIVELOCK, RELATION_LIVELOCK, ADVANCE, TOO_MANY_STEPS, PAUSED = 16, 17, 18, 19, 20
 NOTHING = -1  # no event yet
 # Indices into Memory.counts.
 PLACES = 12
@@ -148,8 +151,9 @@ def run_to_event(
     int
         ROWS (to be taken, all with the present mode; possibly none if the steps are used up),
         FIRING (before) and FIRED (after an edge), STOPPED (a crossing, either side of a jump),
-        SLID (sliding started or ended), ADVANCE (a foreign solver must continue), DONE; or the
-        error TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK, RELATION_LIVELOCK, TOO_MANY_STEPS.
+        SLID (sliding started or ended), ADVANCE (a foreign solver must continue), PAUSED (settled
+        at the time ``clock[PAUSE]``), DONE; or the error TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK,
+        RELATION_LIVELOCK, TOO_MANY_STEPS.
     """
     plan, now, memory = b.plan, b.now, b.memory
     relations, sliding, scratch = b.relations, b.sliding, b.scratch
@@ -171,6 +175,8 @@ def run_to_event(
             switch.act(counts[EDGE], counts[MACHINE], clock[T], now.y, now.mode, p)
             event = _fired(plan, now, memory, scratch)
         elif phase == SETTLED:
+            if clock[T] >= clock[PAUSE]:
+                return PAUSED
             if counts[HOLD] > 0:  # discrete machines have fired: what they give out is held now
                 switch.tick(counts[HOLD], clock[T], now.y, now.mode, p)
                 event = _held(now, counts, out)
@@ -179,7 +185,7 @@ def run_to_event(
             if event == NOTHING and plan.located and counts[PHASE] == BEGIN:
                 event = _rearm(functions, now, relations, sliding, counts)
         elif phase == BEGIN:
-            event = _begin_arc(motion, plan, now, scratch, counts)
+            event = _begin_arc(motion, plan, now, cursor, scratch, counts)
         elif phase == ARC:
             steps = _steps_ahead(plan, cursor, most_steps)
             if steps > 0 and not plan.foreign:
@@ -242,7 +248,7 @@ def _fired(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> int:
     counts[FIRED_ONE] = 1
     counts[FRESH] = 1
     counts[PHASE] = PICK
-    _reset_if_advanced(plan, now, memory)
+    _reset_if_advanced(now, memory)
     memory.switches[i] += 1
     if memory.switches[i] >= MOST_SWITCHES and _no_progress(plan, now, memory, scratch):
         counts[PHASE] = AFTER
@@ -329,7 +335,9 @@ def _undefined(w: Watched) -> bool:
     return undefined
 
 
-def _begin_arc(motion: Motion, plan: Plan, now: Now, scratch: Scratch, counts: list[int]) -> int:
+def _begin_arc(
+    motion: Motion, plan: Plan, now: Now, cursor: list[int], scratch: Scratch, counts: list[int]
+) -> int:
     """Compute the slope and choose the first step after a switch or a jump."""
     control, clock = plan.control, now.clock
     counts[PHASE] = ARC
@@ -341,7 +349,9 @@ def _begin_arc(motion: Motion, plan: Plan, now: Now, scratch: Scratch, counts: l
             # Without location the solver knows nothing of switches: it keeps its step.
             if control.step <= 0.0 and (plan.located or clock[H] <= 0.0):
                 clock[ERROR_BEFORE] = 1.0
-                clock[H] = starting_step(motion, plan.method.error_order, control, now, scratch)
+                limit = limit_after(plan, clock, cursor)
+                order = plan.method.error_order
+                clock[H] = starting_step(motion, order, control, now, limit, scratch)
     return ADVANCE if plan.foreign else NOTHING
 
 
@@ -425,10 +435,10 @@ def _finish(now: Now, counts: list[int], out: Output) -> None:
 
 
 # --------------------------------------------------------------------------- progress
-def _reset_if_advanced(plan: Plan, now: Now, memory: Memory) -> None:
+def _reset_if_advanced(now: Now, memory: Memory) -> None:
     """Restart the count of switches if time has advanced since the last one."""
     t = now.clock[T]
-    if t - now.clock[SWITCHED] > max(CLOCK_CRAWLS * abs(t), END_STANDS * abs(plan.t_end)):
+    if t - now.clock[SWITCHED] > max(CLOCK_CRAWLS * abs(t), END_STANDS * now.clock[LATEST]):
         _reset_counts(now, memory)
     now.clock[SWITCHED] = t
 
@@ -447,7 +457,7 @@ def _no_progress(plan: Plan, now: Now, memory: Memory, scratch: Scratch) -> bool
     """Return whether the counted switches made no progress; otherwise restart the count here."""
     y, anchor, moved = now.y, memory.anchor, scratch.error
     t, elapsed = now.clock[T], now.clock[T] - now.clock[ANCHOR]
-    stands = elapsed <= MOST_SWITCHES * max(CLOCK_STANDS * abs(t), END_STANDS * abs(plan.t_end))
+    stands = elapsed <= MOST_SWITCHES * max(CLOCK_STANDS * abs(t), END_STANDS * now.clock[LATEST])
     if not stands and elapsed <= MOST_SWITCHES * CLOCK_CRAWLS * abs(t):
         for j in range(len(y)):
             moved[j] = y[j] - anchor[j]
@@ -469,7 +479,7 @@ def _often_changed(
 ) -> bool:
     """Count the relations that have just changed; return whether one has changed too often."""
     changes, probe, surfaces = memory.changes, w.search.probe, sliding.surfaces
-    _reset_if_advanced(plan, now, memory)
+    _reset_if_advanced(now, memory)
     motion.margins(now.clock[T], now.y, now.mode, motion.p, w.watch, probe)
     often = False
     for r in w.active:

@@ -27,8 +27,9 @@ Vector = list[float]
 Flow = Callable[..., Any]  # flow(t, y, mode, held, p, dy) -> None, fills dy
 Margins = Callable[..., Any]  # margins(t, y, mode, p, watch, out) -> None, fills watched entries
 # Indices into Now.clock: the time, the next step, the controller's memory, the next stop; the time
-# since which switches are counted, and the time of the last one.
-T, H, ERROR_BEFORE, T_STOP, ANCHOR, SWITCHED = range(6)
+# since which switches are counted, and the time of the last one; the time at which the loop returns
+# once the states are settled, and the latest time that the clock must resolve.
+T, H, ERROR_BEFORE, T_STOP, ANCHOR, SWITCHED, PAUSE, LATEST = range(8)
 
 
 class Coefficients(NamedTuple):
@@ -155,7 +156,8 @@ def take_step(
                 for j in range(size):
                     y_new[j] = y[j] + y_new[j]
         if i < stages:
-            flow(t + C[i] * h, y_new, mode, held, p, k[i])
+            # Rounding must not put a stage beyond the end: another line of a record begins there.
+            flow(t + C[i] * h if C[i] < 1.0 else t_new, y_new, mode, held, p, k[i])
     flow(t_new, y_new, mode, held, p, scratch.f_new)
 
 

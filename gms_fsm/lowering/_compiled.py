@@ -37,6 +37,7 @@ __all__ = [
     "observe_rows",
     "packed",
     "store",
+    "text_of",
 ]
 
 Packed = tuple[FloatArray, FloatArray, FloatArray]
@@ -106,11 +107,22 @@ def engine(program: Program, run: Run) -> Engine:
     from integrators import compiled
 
     with _lock:
-        return compiled.engine(_text(program), run, _calls(program), store(), notify)
+        return compiled.engine(text_of(program), run, _calls(program), store(), notify)
 
 
-def _text(program: Program) -> str:
-    """Return what the machine code of a program depends on: its text, and what the text calls."""
+def text_of(program: Program) -> str:
+    """Return what the machine code of a program depends on: its text, and what the text calls.
+
+    Parameters
+    ----------
+    program : Program
+        From `gms_fsm.lowering.program.lower`.
+
+    Returns
+    -------
+    str
+        Of fixed length.
+    """
     from integrators.compiled import digest
 
     return digest(sgn, piecewise_linear, piecewise_slope, text=program.source)
@@ -278,7 +290,7 @@ def _observer(program: Program) -> Prepared:
         if len(_observers) >= MOST_ENGINES:
             _observers.clear()
         made = compiled.observer(
-            _text(program),
+            text_of(program),
             functions(program)["observe"],
             program.live,
             packed(program.p),

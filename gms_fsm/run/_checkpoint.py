@@ -20,13 +20,13 @@ from gms_fsm._files import write_whole
 from gms_fsm.errors import CheckpointError, ParameterError, SignalError, cut, shown, why
 from gms_fsm.lowering.log_columns import CONTACT, LOG_TEXTS
 from gms_fsm.run._identity import identity
+from gms_fsm.run._plausible import check_ranges, check_state, last_edges, last_states
 from gms_fsm.run.start import Start
 from gms_fsm.systems.signals import Function
 from gms_fsm.systems.system import Contact
 from gms_fsm.traces._archives import member
-from integrators import FOR_A_GUARD, FOR_A_SIGN, WAITING, hybrid, loop
-from integrators.advance import NEXT_KNOT, NEXT_TIME, ROW
-from integrators.steps import T
+from integrators import hybrid, loop
+from integrators.advance import ROW
 
 __all__ = ["Checkpointer"]
 
@@ -179,47 +179,17 @@ def _identity(start: Start) -> str:
 def _check(run: Resumable, state: Mapping[str, Any], kept: Mapping[str, Any]) -> None:
     """Raise a ValueError unless a run like this one can have reached such values."""
     start, b, layout = run.start, run.buffers, run.start.program.layout
-    contacts = {each.name: each for each in start.system.contacts}
-    charts = [contacts[bank.name].chart for bank in layout.banks for _ in range(bank.n)]
-    # Of each machine: its last state, and its first and last edge, which are counted over all.
-    last = np.array([len(chart.states) - 1 for chart in charts])
-    first_edge = np.array([bank.first_edge for bank in layout.banks for _ in range(bank.n)])
-    last_edge = first_edge + [len(chart.transitions) - 1 for chart in charts]
     for name, place in hybrid.state_of(b).items():
         _expect(name, state[name], np.asarray(place), rows=False)
     for name, column in run.kept().items():
         _expect(name, kept[name], np.asarray(column), rows=name not in ("counts", "seen"))
-    n = len(b.now.mode)
-    counts, cursor = state["counts"], state["cursor"]
+    check_state(start, b, state, start.t_end)
+    counts, cursor, last = state["counts"], state["cursor"], last_states(start)
     # Compiled rows are in the saved columns, others in the buffer.
     capacity = max(len(kept["rows_t"]), len(b.out.rows_t))
-    machine = 0 if counts[loop.PHASE] == loop.FIRE else -1
-    enabled = np.asarray(state["edges"]) >= 0
-    fired = 0, max(0, last_edge.max())
-    if machine == 0 and 0 <= counts[loop.MACHINE] < n:
-        fired = first_edge[counts[loop.MACHINE]], last_edge[counts[loop.MACHINE]]
     within = {
-        "time": (state["clock"][T], start.t_start, start.t_end),
-        "mode": (state["mode"], 0, last),
-        "edges": (state["edges"], -1, last_edge),
-        "enabled edges": (state["edges"][enabled], first_edge[enabled], last_edge[enabled]),
-        "room": (state["room"], 0, len(b.relations.watch) - 1),
-        "watch": (state["watch"], 0, FOR_A_SIGN | FOR_A_GUARD | WAITING),
-        "due": (state["due"], 0, 1),
-        "held": (counts[loop.HOLD], 0, sum({*start.program.discrete})),
-        "phase": (counts[loop.PHASE], loop.START, loop.END),
-        "machine": (counts[loop.MACHINE], machine, n - 1),
-        "edge": (counts[loop.EDGE], *fired),
-        "jump": (counts[loop.JUMP], 0, len(b.plan.jumps)),
-        "active relations": (counts[loop.ACTIVE], 0, len(b.relations.watch)),
         "row": (cursor[ROW], 0, capacity),
         "rows taken": (counts[loop.TAKEN], 0, cursor[ROW]),
-        "wanted time": (cursor[NEXT_TIME], 0, len(b.out.times)),
-        "knot": (cursor[NEXT_KNOT], 0, len(b.plan.knots)),
-        "surfaces": (state["which"][:-1], 0, max(0, layout.surfaces - 1)),
-        "surfaces slid on": (state["which"][-1], 0, len(b.sliding.sigma)),
-        "slid": (state["slid"], 0, 1),
-        "arrived": (state["arrived"], 0, 1),
         "rows' mode": (kept["rows_mode"][:, layout.elements], 0, last),
         "stops' mode": (kept["stops_mode"][:, layout.elements], 0, last),
         "rows slid": (kept["rows_mode"][:, layout.slides], 0, 1),
@@ -227,21 +197,20 @@ def _check(run: Resumable, state: Mapping[str, Any], kept: Mapping[str, Any]) ->
     }
     groups = [[name for name in kept if name.startswith(kind)] for kind in ("rows_", "stops_")]
     if "log" in kept:  # from a run in Python
-        log = kept["log"]
-        _check_log(log, contacts, named=start.given is not None)
+        contacts = {each.name: each for each in start.system.contacts}
+        _check_log(kept["log"], contacts, named=start.given is not None)
     else:  # from a compiled run
         groups.append(["t", "machine", "edge", "numbers"])
         firings, stops = kept["counts"]
+        _, last_edge = last_edges(start)
         within["firings"] = firings, 0, len(kept["t"])
         within["stops"] = stops, 0, len(kept["stops_t"])
-        within["firing machines"] = kept["machine"], 0, n - 1
+        within["firing machines"] = kept["machine"], 0, len(b.now.mode) - 1
         within["fired edges"] = kept["edge"], 0, max(0, last_edge.max())
     for group in groups:
         if len({len(kept[name]) for name in group}) != 1:
             raise ValueError(f"{', '.join(group)}: lengths differ")
-    for name, (found, least, most) in within.items():
-        if not np.all((np.asarray(found) >= least) & (np.asarray(found) <= most)):
-            raise ValueError(f"{name}: not within {least} to {most}")
+    check_ranges(within)
 
 
 def _check_log(log: Any, contacts: Mapping[str, Contact], *, named: bool) -> None:

@@ -173,6 +173,8 @@ class Block:
         Its lists become arrays in memory.
     like : Block, optional
         A block whose present contents are copied, instead of those of the example.
+    words : ndarray of int, optional
+        The memory, ``layout.words`` long; the block's own if omitted.
 
     Attributes
     ----------
@@ -180,6 +182,8 @@ class Block:
         Like the example, with arrays that are places in the block.
     address : int
         What is passed to machine code.
+    words : ndarray of int
+        The memory.
 
     Examples
     --------
@@ -190,9 +194,11 @@ class Block:
     array([0. , 0.5])
     """
 
-    def __init__(self, layout: Layout, example: Any, like: Block | None = None) -> None:
+    def __init__(
+        self, layout: Layout, example: Any, like: Block | None = None, words: Any = None
+    ) -> None:
         self.layout = layout
-        self._words: Any = np.zeros(layout.words, dtype=np.int64)
+        self._words: Any = np.zeros(layout.words, dtype=np.int64) if words is None else words
         self._floats: Any = self._words.view(np.float64)
         self._columns: list[Any] = [None] * len(layout.columns)  # what they were last time
         kinds = [self._floats if each.kind == "f" else self._words for each in layout.numbers]
@@ -208,6 +214,11 @@ class Block:
                     array[...] = _found(example, way)
         made |= {place.way: place.empty for place in layout.columns if place.way not in made}
         self.contents: Any = _rebuilt(example, (), made, layout.inner)
+
+    @property
+    def words(self) -> Any:
+        """The memory."""
+        return self._words
 
     def become(self, like: Block) -> None:
         """Take over what another block contains.

@@ -22,15 +22,20 @@ from integrators.machine_code.passing import passed_of, take
 from integrators.machine_code.sources import TranslationError
 from integrators.machine_code.statements import body
 from integrators.machine_code.tree import (
+    Address,
+    AddressOf,
     Const,
     Do,
     Expr,
+    For,
     Function,
     Global,
     Invoke,
     Local,
     Module,
+    Op,
     Return,
+    Set,
     Statement,
     Table,
     locals_in,
@@ -112,6 +117,36 @@ class Translator:
         entry = Function(name, tuple(parameters), kind, (), made, entry=True)
         self.module.functions.append(entry)
         return entry
+
+    def for_each(self, name: str, entry: Function, words: int) -> Function:
+        """Add a function that calls an entry for many blocks, one after the other in memory.
+
+        Parameters
+        ----------
+        name : str
+            Its name outside.
+        entry : Function
+            Its only parameter is the address of a block; it returns an integer.
+        words : int
+            Length of a block.
+
+        Returns
+        -------
+        Function
+            With the address of the first block and their number as parameters. It returns the sum
+            of what the entry returned.
+        """
+        self._names.add(name)
+        (block,) = entry.parameters
+        count, i, total = (Local("i", each) for each in ("count", "i", "total"))
+        here = Address(block, 0, Op("i", "*", (i, Const("i", words))))
+        result = Invoke("i", entry.name, (AddressOf(here),))
+        add = Set(total, Op("i", "+", (total, result)))
+        loop = For(i, Const("i", 0), count, 1, (add,))
+        body = (Set(total, Const("i", 0)), loop, Return((total,)))
+        made = Function(name, (block, count), "i", (i, total), body, entry=True)
+        self.module.functions.append(made)
+        return made
 
     def translated(self, function: Callable[..., Any], arguments: Sequence[Value]) -> Specialised:
         """Return a function specialised for the types of its arguments.

@@ -1,0 +1,119 @@
+"""A friction model, or a contact of a system, whose velocity somebody else's loop prescribes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from gms_fsm.charts.parameters import checked_scalar
+from gms_fsm.errors import ParameterError
+from gms_fsm.language import CONSTANTS, FUNCTIONS
+from gms_fsm.run.settings import Settings
+from gms_fsm.run.start import Start
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.signals import Corners
+from gms_fsm.systems.system import Body, Contact, System
+
+__all__ = ["start_of"]
+
+WORD = re.compile(r"(?<![\w.])[A-Za-z_]\w*")  # not the exponent of a number
+GIVEN = ("t", "x", "v")  # what a contact knows by itself: x is the integral of v
+
+
+def start_of(
+    given: Model | Contact,
+    t: float,
+    initial: Mapping[str, Any] | None,
+    rtol: float,
+    values: Mapping[str, float] | None = None,
+) -> Start:
+    """Return a friction model or a contact, moved by a velocity that is a straight line.
+
+    Parameters
+    ----------
+    given : Model or Contact
+        What steps.
+    t : float
+        s.
+    initial : mapping, optional
+        As for `gms_fsm.simulate`.
+    rtol : float
+        Relative tolerance.
+    values : mapping of str to float, optional
+        The velocity and the other inputs at t; 0 if omitted.
+
+    Returns
+    -------
+    Start
+        Its signals are the inputs: ``v``, then those that the texts of a contact name.
+
+    Raises
+    ------
+    ParameterError
+        If it cannot be stepped, or an argument violates its rule.
+    """
+    contact = _alone(given)
+    t = checked_scalar("t", t, "finite")
+    now = {} if values is None else values
+    signals = {
+        name: Corners([t, t + 1.0], [now.get(name, 0.0)] * 2, held=True)
+        for name in ("v", *_other_inputs(contact))
+    }
+    system = System(
+        "prescribed velocity",
+        bodies=(Body("body", velocity="v"),),
+        contacts=(contact,),
+        signals=signals,
+    )
+    settings = Settings(rtol=rtol, engine="ifelse", output="end")
+    return Start.of(system, None, t + 1.0, settings, t_start=t, initial=initial)
+
+
+def _alone(given: Model | Contact) -> Contact:
+    """Return a contact that needs no bodies but its own, or refuse."""
+    if not hasattr(given, "chart"):
+        raise ParameterError(
+            "it must be a model or a contact, for example GMS(parameters, law='signed')",
+            place="model_or_contact",
+            value=given,
+        )
+    chart = given.chart
+    here = f"chart {chart.name!r}"
+    if len(chart.velocities) != 1:
+        raise ParameterError(
+            f"it has the velocities {', '.join(chart.velocities)}",
+            place=here,
+            advice="only charts with one velocity can be stepped; use a System and simulate",
+        )
+    if chart.locks or chart.sets_velocity:
+        why = (
+            "it locks the contact, and the force of a lock depends on the masses that it holds"
+            if chart.locks
+            else "it sets the velocity, which your loop owns"
+        )
+        raise ParameterError(
+            why,
+            place=here,
+            advice="use a System and simulate, or a chart without locks, such as GMS or LuGre",
+        )
+    if not isinstance(given, Contact):
+        return Contact("friction", given)
+    if given.period is not None:
+        raise ParameterError(
+            f"it has a period of {given.period!r} s",
+            place=f"contact {given.name!r}",
+            advice="leave it out, and call the contact at the ticks of your loop",
+        )
+    # Its x is the integral of the velocity given; the bodies of its system are not here.
+    inputs = {name: text for name, text in given.inputs.items() if name != "x"}
+    if given.model is not None:
+        return Contact(given.name, given.model, inputs=inputs)
+    return Contact(given.name, chart, given.values, n=given.n, inputs=inputs)
+
+
+def _other_inputs(contact: Contact) -> list[str]:
+    """Return what the texts of a contact name, except what it knows by itself."""
+    texts = [contact.inputs.get(name, name) for name in contact.chart.inputs if name != "s"]
+    found = dict.fromkeys(name for text in texts for name in WORD.findall(str(text)))
+    return [name for name in found if name not in {*GIVEN, *FUNCTIONS, *CONSTANTS}]

@@ -1,0 +1,244 @@
+"""What carries out the steps of a `FrictionState`: machine code, or the same in Python."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm.lowering import _compiled as compiled
+from gms_fsm.lowering.program import equations
+from gms_fsm.run.machines import IfElse
+from gms_fsm.run.start import Start
+from integrators import hybrid
+from integrators.loop import Buffers, Machines
+from integrators.sliding import Functions
+from integrators.stepping import Sample, step_to
+
+if TYPE_CHECKING:
+    from integrators.compiled import Stepper as MachineCode
+
+__all__ = ["Machine", "Plain", "Stepper", "fast", "machine_code", "state_of"]
+
+MOST_SWITCHES = 64  # in the log of a sample; when it is full, it is emptied and the sample goes on
+
+
+class Stepper(Protocol):
+    """A state that can be advanced by a sample, and put back."""
+
+    buffers: Buffers
+    tables: Any  # the straight lines: of each input its times, then its values
+    sample: Sample
+
+    def run(self) -> int:
+        """Advance; see `integrators.stepping.step_to`."""
+
+    def keep(self) -> None:
+        """Keep the present state for `back`."""
+
+    def back(self) -> None:
+        """Return to the state that was kept last."""
+
+    def copy(self) -> Any:
+        """Return the present state."""
+
+    def take(self, copy: Any) -> None:
+        """Return to what `copy` returned, here or in a stepper of the same system."""
+
+
+def fast() -> bool:
+    """Return whether machine code can be made here."""
+    return all(map(importlib.util.find_spec, ("llvmlite", "platformdirs")))
+
+
+def state_of(stepper: Stepper) -> dict[str, Any]:
+    """Return the arrays (or lists) that make up a state, without copying them.
+
+    Parameters
+    ----------
+    stepper : Stepper
+        Between two samples.
+
+    Returns
+    -------
+    dict
+        As `integrators.hybrid.state_of`, and the values of the inputs.
+    """
+    inputs = {f"input {k}": stepper.tables[2 * k + 1] for k in range(len(stepper.sample.inputs))}
+    return {**hybrid.state_of(stepper.buffers), **inputs}
+
+
+# --------------------------------------------------------------------------- in Python
+class Plain:
+    """The steps as Python functions on lists.
+
+    Parameters
+    ----------
+    start : Start
+        The system, with its inputs as corner tables.
+    """
+
+    def __init__(self, start: Start) -> None:
+        program = start.program
+        made = equations(program)
+        switch = IfElse(program)
+        self.functions = made.functions(located=True)
+        observe = program.ieee["observe"]
+        self.machines = Machines(switch.ask, switch.act, switch.tick, observe)
+        self.buffers = _buffers(start)
+        self.sample = _sample(start)
+        _, _, self.tables = self.functions.p
+        self._kept = self.copy()
+
+    def run(self) -> int:
+        """Advance; see `integrators.stepping.step_to`."""
+        return step_to(self.functions, self.machines, self.buffers, self.sample)
+
+    def keep(self) -> None:
+        """Keep the present state for `back`."""
+        self._kept = self.copy()
+
+    def back(self) -> None:
+        """Return to the state that was kept last."""
+        self.take(self._kept)
+
+    def copy(self) -> dict[str, list[Any]]:
+        """Return the present state."""
+        found = state_of(self) | {name: getattr(self.sample, name) for name in FOUND}
+        return {name: list(place) for name, place in found.items()}
+
+    def take(self, copy: Mapping[str, list[Any]]) -> None:
+        """Return to what `copy` returned."""
+        places = state_of(self) | {name: getattr(self.sample, name) for name in FOUND}
+        for name, place in places.items():
+            place[:] = copy[name]
+
+
+FOUND = ("end", "counts", "force", "t", "machine", "edge")
+
+
+def _buffers(start: Start) -> Buffers:
+    """Return the buffers of a run without an end, whose only knot is the end of the sample."""
+    made = equations(start.program)
+    b = hybrid.buffers(
+        made, start.t_start, start.y, start.mode, math.inf, start.options, capacity=1
+    )
+    return b._replace(plan=b.plan._replace(jumps=[], before_jumps=[], ticks=[], knots=[0.0]))
+
+
+def _sample(start: Start) -> Sample:
+    program, size = start.program, start.program.layout.y.size
+    (bank,), observed = program.layout.banks, program.layout.observed
+    return Sample(
+        end=[start.t_start],
+        inputs=[[0.0, 0.0] for _ in start.system.signals],
+        counts=[0, 0, 0, 0],
+        wanted=[observed.index(bank.of("F"))],
+        force=[0.0, 0.0],
+        seen=[0.0] * observed.size,
+        t=[0.0] * MOST_SWITCHES,
+        machine=[0] * MOST_SWITCHES,
+        edge=[0] * MOST_SWITCHES,
+        before=[0.0] * size,
+        middle=[0.0] * size,
+        slope=[0.0] * size,
+    )
+
+
+# --------------------------------------------------------------------------- machine code
+class Machine:
+    """The steps as machine code on a block of memory.
+
+    Parameters
+    ----------
+    start : Start
+        The system, with its inputs as corner tables.
+    memory : (ndarray of int, ndarray of int), optional
+        For the block, and for the state that is kept; its own if omitted.
+    """
+
+    def __init__(
+        self, start: Start, memory: tuple[NDArray[np.int64], NDArray[np.int64]] | None = None
+    ) -> None:
+        from integrators.machine_code.layout import Block
+
+        self.code = machine_code(start)
+        arguments = _arguments(start)
+        self.block = Block(self.code.layout, arguments, words=None if memory is None else memory[0])
+        self.block.update(self.block.contents)  # numbers; there are no columns
+        contents = self.block.contents
+        self.buffers, self.sample = contents.buffers, contents.sample
+        _, _, self.tables = contents.functions.p
+        self._one, self._address = self.code.one, self.block.address
+        self._words = self.block.words
+        self._kept = np.empty_like(self._words) if memory is None else memory[1]
+        self.keep()
+
+    def run(self) -> int:
+        """Advance; see `integrators.stepping.step_to`."""
+        result: int = self._one(self._address)
+        return result
+
+    def keep(self) -> None:
+        """Keep the present state for `back`."""
+        self._kept[:] = self._words
+
+    def back(self) -> None:
+        """Return to the state that was kept last."""
+        self._words[:] = self._kept
+
+    def copy(self) -> NDArray[np.int64]:
+        """Return the present state."""
+        return self._words.copy()
+
+    def take(self, copy: NDArray[np.int64]) -> None:
+        """Return to what `copy` returned."""
+        self._words[:] = copy
+
+
+_known: dict[int, tuple[MachineCode, Any]] = {}
+
+
+def machine_code(start: Start) -> MachineCode:
+    """Return the steps of a system as machine code.
+
+    Parameters
+    ----------
+    start : Start
+        The system.
+
+    Returns
+    -------
+    integrators.compiled.Stepper
+        The same one for systems that differ in numbers only.
+    """
+    from integrators import compiled as machine
+
+    program = start.program
+    key = id(program.functions)
+    if key not in _known:
+        if len(_known) >= compiled.MOST_ENGINES:
+            _known.clear()
+        made = machine.stepper(
+            compiled.text_of(program), _arguments(start), compiled.store(), compiled.notify
+        )
+        _known[key] = made, program.functions  # kept, so that their `id` stays theirs
+    return _known[key][0]
+
+
+def _arguments(start: Start) -> Any:
+    """Return the arguments of `integrators.stepping.step_to`, made of lists."""
+    from integrators.compiled import Step
+
+    made = compiled.functions(start.program)
+    p: Any = compiled.packed(start.program.p)
+    return Step(
+        Functions(made["flow"], made["arm"], made["margins"], made["normal"], p),
+        Machines(made["switch"], made["act"], made["tick"], made["observe"]),
+        _buffers(start),
+        _sample(start),
+    )

@@ -1,0 +1,146 @@
+"""One sample of somebody else's loop: inputs on straight lines from its start to its end.
+
+The end of a sample is a knot, as in a record: steps end there, but nothing is asked, armed or
+restarted. So the results are those of a run over the same samples as a record, to the last bit.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from integrators.advance import NEXT_KNOT, STEPS
+from integrators.loop import (
+    ARC,
+    ASK,
+    EDGE,
+    FIRED,
+    FIRING,
+    MACHINE,
+    PAUSED,
+    PHASE,
+    ROWS,
+    SETTLED,
+    SLID,
+    START,
+    STOPPED,
+    Buffers,
+    Machines,
+    run_to_event,
+)
+from integrators.sliding import Functions, Held, flow_on, look, margins_on
+from integrators.steps import LATEST, PAUSE, Motion, T, Vector
+
+__all__ = ["CODE", "FULL_LOG", "MEAN", "RESUMED", "SWITCHES", "Sample", "step_to"]
+
+FULL_LOG = 21  # the log is full: empty it, and call again
+# Indices into Sample.counts: switches in the log; whether this call continues one that returned
+# FULL_LOG; whether the mean is wanted; what was returned.
+SWITCHES, RESUMED, MEAN, CODE = range(4)
+
+
+class Sample(NamedTuple):
+    """What a call is given, and what it finds."""
+
+    end: Vector  # [time]
+    inputs: list[Vector]  # of each input its value at the start and at the end
+    counts: list[int]  # see the indices above
+    wanted: list[int]  # [place of the force among the observed values]
+    force: Vector  # [at the end, integral over the sample]
+    seen: Vector  # observed values at the end
+    t: Vector  # of each switch its time
+    machine: list[int]
+    edge: list[int]
+    before: Vector  # scratch space: the state at the start of a step
+    middle: Vector  # ... and in its middle
+    slope: Vector
+
+
+def step_to(functions: Functions, machines: Machines, b: Buffers, sample: Sample) -> int:
+    """Advance to the end of a sample.
+
+    Parameters
+    ----------
+    functions, machines
+        The system; its inputs are the corner tables among its parameters.
+    b : Buffers
+        The state, changed in place. The plan has one knot and no end.
+    sample : Sample
+        What is given and found. A sample that has no length shows the force at its end.
+
+    Returns
+    -------
+    int
+        0 at its end, FULL_LOG, or an error as in `run_to_event`.
+    """
+    now, counts, observe = b.now, b.memory.counts, machines.observe
+    clock, done = now.clock, sample.counts
+    end = sample.end[0]
+    on = Held(functions, now.held, b.sliding)
+    motion = Motion(flow_on, margins_on, on)
+    if done[RESUMED] == 0:
+        _begin(functions, b, sample)
+    done[CODE] = 0
+    while clock[T] < end or not (counts[PHASE] == ARC or counts[PHASE] == SETTLED):
+        t = clock[T]
+        for j in range(len(now.y)):
+            sample.before[j] = now.y[j]
+        event = run_to_event(functions, machines, motion, b, 1)
+        if done[MEAN] > 0 and clock[T] > t:
+            impulse = _impulse(machines, motion, b, sample, t)
+            sample.force[1] += impulse
+        if event == FIRED:
+            row = done[SWITCHES]
+            sample.t[row] = clock[T]
+            sample.machine[row] = counts[MACHINE]
+            sample.edge[row] = counts[EDGE]
+            done[SWITCHES] = row + 1
+            if row + 1 == len(sample.t):
+                done[CODE] = FULL_LOG
+                return FULL_LOG
+        elif event not in (ROWS, FIRING, STOPPED, SLID, PAUSED):
+            done[CODE] = event
+            return event
+    look(observe, on, clock[T], now.y, now.mode, sample.seen)
+    sample.force[0] = sample.seen[sample.wanted[0]]
+    return 0
+
+
+def _begin(functions: Functions, b: Buffers, sample: Sample) -> None:
+    """Write the straight lines; where an input jumps, guards are asked again."""
+    clock, counts, end = b.now.clock, b.memory.counts, sample.end[0]
+    _shared, _own, tables = functions.p
+    first = 1 if clock[T] >= end else 0  # of a sample without length only its end matters
+    for k in range(len(sample.inputs)):
+        times, values, given = tables[2 * k], tables[2 * k + 1], sample.inputs[k]
+        if values[1] != given[first] and counts[PHASE] != START:
+            counts[PHASE] = ASK
+        times[0] = clock[T]
+        times[1] = end
+        values[0] = given[0]
+        values[1] = given[1]
+    clock[PAUSE] = end
+    clock[LATEST] = abs(end)
+    b.plan.knots[0] = end
+    b.out.cursor[NEXT_KNOT] = 0
+    b.out.cursor[STEPS] = 0
+    sample.counts[SWITCHES] = 0
+    sample.force[1] = 0.0
+
+
+def _impulse(machines: Machines, motion: Motion, b: Buffers, sample: Sample, t: float) -> float:
+    """Return the integral of the force over the step from t, with the signs held in it (Simpson).
+
+    The state in the middle is on the cubic through both ends.
+    """
+    now, p, place = b.now, motion.p.functions.p, sample.wanted[0]
+    before, middle, slope, first = sample.before, sample.middle, sample.slope, b.scratch.k[0]
+    h = now.clock[T] - t
+    motion.flow(now.clock[T], now.y, now.mode, now.held, motion.p, slope)
+    for j in range(len(now.y)):
+        middle[j] = 0.5 * (before[j] + now.y[j]) + 0.125 * h * (first[j] - slope[j])
+    machines.observe(t, before, now.mode, now.held, p, sample.seen)
+    total = sample.seen[place]
+    machines.observe(t + 0.5 * h, middle, now.mode, now.held, p, sample.seen)
+    total += 4.0 * sample.seen[place]
+    machines.observe(now.clock[T], now.y, now.mode, now.held, p, sample.seen)
+    return h * (total + sample.seen[place]) / 6.0
