@@ -3,124 +3,42 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple, TypeAlias
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
 import scipy.integrate
 from numpy.typing import ArrayLike
 
 import integrators
+from gms_fsm.adapters._scipy_located import Located
+from gms_fsm.adapters._scipy_parts import Caller, Carried, Solution, Stepped, Switch
+from gms_fsm.adapters._scipy_sampled import Solver, sampled, samples
 from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError, shown
-from gms_fsm.lowering.program import equations
+from gms_fsm.lowering.scales import scales_of
 from gms_fsm.run._driven import Driven
-from gms_fsm.run.machines import IfElse
+from gms_fsm.run.bank import FrictionBank
 from gms_fsm.run.settings import MOST_STEPS
+from gms_fsm.run.stepping import FrictionState
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
-from integrators import Arc, Firing, Functions, Held, HybridError, Livelock, NotFinite, Tableau, hybrid, look
+from integrators import Tableau
 
-__all__ = ["Carried", "Solution", "Switch", "solve_ivp"]
+__all__ = ["Carried", "Solution", "Stepped", "Switch", "solve_ivp"]
 
 Friction: TypeAlias = Model | Contact
+Given: TypeAlias = Friction | Sequence[Friction] | Carried | Stepped
 Velocity: TypeAlias = int | Sequence[int] | Callable[[FloatArray], ArrayLike]
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")  # of SciPy
 OURS = tuple(name for name, tableau in integrators.METHODS.items() if tableau.adaptive)
-NUDGE = 1e-6  # of a component of y, to see how the velocities depend on it
-
-
-class Switch(NamedTuple):
-    """An edge taken by an element.
-
-    Parameters
-    ----------
-    t : float
-        s.
-    contact : str
-        The friction's name: that of a contact; a model is called ``friction``, and of several
-        ``friction1`` and so on.
-    element : int
-        Counted from 0.
-    edge : str
-        Its name in the chart.
-    """
-
-    t: float
-    contact: str
-    element: int
-    edge: str
-
-
-@dataclass(frozen=True, eq=False)
-class Carried:
-    """The frictions at the end of a call of `solve_ivp`, to begin the next one with.
-
-    Parameters
-    ----------
-    driven : Driven
-        The frictions.
-    y : tuple of float
-        Their own state.
-    mode : tuple of int
-        The states of their elements.
-    several : bool
-        Whether they were given as a sequence.
-    """
-
-    driven: Driven = field(repr=False)
-    y: tuple[float, ...]
-    mode: tuple[int, ...]
-    several: bool
-
-    @property
-    def states(self) -> dict[str, tuple[str, ...]]:
-        """By friction the names of its elements' states."""
-        banks = self.driven.program.layout.banks
-        return dict(zip((b.name for b in banks), self.driven.states(self.mode), strict=True))
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """What `solve_ivp` returns.
-
-    Parameters
-    ----------
-    t : ndarray, shape (rows,)
-        s.
-    y : ndarray, shape (n, rows)
-        The caller's state.
-    F : ndarray, shape (rows,) or (m, rows)
-        Force of the friction, N; of several frictions one row each. At a switch it is the force
-        just before it.
-    switches : tuple of Switch
-        All edges taken, in order.
-    friction : Carried
-        The frictions at the end: pass it on as `friction` to go on.
-    nfev : int
-        Number of calls of `fun`.
-    success : bool
-        Whether the end was reached.
-    message : str
-        Why not, otherwise.
-    """
-
-    t: FloatArray
-    y: FloatArray
-    F: FloatArray
-    switches: tuple[Switch, ...] = field(repr=False)
-    friction: Carried = field(repr=False)
-    nfev: int
-    success: bool
-    message: str
 
 
 def solve_ivp(
     fun: Callable[[float, FloatArray, Any], ArrayLike],
     t_span: Sequence[float],
     y0: ArrayLike,
-    friction: Friction | Sequence[Friction] | Carried,
+    friction: Given,
     velocity: Velocity,
     *,
     method: str | type[scipy.integrate.OdeSolver] = "RK45",
@@ -129,6 +47,7 @@ def solve_ivp(
     max_step: float = math.inf,
     max_steps: int = MOST_STEPS,
     t_eval: ArrayLike | None = None,
+    sample: float | None = None,
     initial: Mapping[str, Any] | None = None,
 ) -> Solution:
     """Solve the equations of somebody's own machine with friction in it.
@@ -145,7 +64,7 @@ def solve_ivp(
         s: start and end.
     y0 : array_like, shape (n,)
         The caller's state at the start.
-    friction : Model, Contact, sequence of them, or Carried
+    friction : Model, Contact, sequence of them, Carried or Stepped
         What rubs. To go on from an earlier call, for example after each tick of a controller, pass
         its ``solution.friction``.
     velocity : int, sequence of int, or callable
@@ -166,9 +85,15 @@ def solve_ivp(
         Maximum number of steps.
     t_eval : array_like, optional
         Times of the rows [s]; all steps if omitted.
+    sample : float, optional
+        s: instead of locating the switches in the combined equations, let `gms_fsm.FrictionState`
+        step from sample to sample. Within one, `fun` sees the force that results if the velocity
+        goes to its present value on a straight line. Rows are the samples. For `fun` that must not
+        be interrupted at switches; the result depends on the length of the sample.
     initial : mapping, optional
         Initial values of the friction, as for `gms_fsm.simulate`: ``z`` [m], ``states``, ``x`` [m].
-        Of several frictions with their names: ``"friction1.z"``, ``"x_friction1"``.
+        Of several frictions with their names: ``"friction1.z"``, ``"x_friction1"``; with samples,
+        as for `gms_fsm.FrictionBank`.
 
     Returns
     -------
@@ -193,249 +118,94 @@ def solve_ivp(
     >>> solution.success, len(solution.switches), solution.switches[0].edge
     (True, 4, 'break_away_forward')
     """
-    carried = _carried(friction, t_span, initial)
-    driven = carried.driven
-    y = checked_array("y0", y0, None, "finite")
     start, end = _span(t_span)
-    solver, tolerances = _method(method), _tolerances(driven, rtol, atol, len(y))
-    host = _Host(fun, _velocities(velocity, len(y), carried), carried, len(y))
-    host.check(start, y)
+    y = checked_array("y0", y0, None, "finite")
+    rtol = checked_scalar("rtol", rtol, "> 0")
+    solver, limit = _method(method), _longest(max_step)
+    if sample is not None:
+        sample = checked_scalar("sample", sample, "> 0")
+        stepped = _stepped(friction, start, initial, rtol)
+        caller = Caller(fun, _velocities(velocity, len(y), stepped), stepped.several, len(y))
+        caller.check(start, y, len(stepped.names))
+        scales = [u for each in stepped.given for u in _all_tolerances(each, rtol)]
+        how = Solver(
+            _of_scipy(solver, t_eval),
+            rtol,
+            _of_host(scales, atol, len(y)),
+            limit,
+            _count(max_steps),
+        )
+        return sampled(caller, stepped, y, samples(start, end, sample), how)
+    carried = _carried(friction, start, initial)
+    caller = Caller(fun, _velocities(velocity, len(y), carried), carried.several, len(y))
+    caller.check(start, y, len(carried.names))
+    driven = carried.driven
     options = integrators.Options(
         method=solver,
         step=None,
-        rtol=checked_scalar("rtol", rtol, "> 0"),
-        atol=tolerances,
-        max_step=max_step if max_step == math.inf else checked_scalar("max_step", max_step, "> 0"),
+        rtol=rtol,
+        atol=_tolerances(driven, rtol, atol, len(y)),
+        max_step=limit,
         time_scale=driven.start.options.time_scale,
         max_steps=_count(max_steps),
         located=True,
         times=None if t_eval is None else _wanted(t_eval, start, end),
     )
-    return host.solution([*y.tolist(), *carried.y], list(carried.mode), start, end, options)
-
-
-class _Host:
-    """The caller's equations and the frictions as one set of equations.
-
-    The state vector is the caller's, followed by that of the frictions.
-    """
-
-    def __init__(
-        self,
-        fun: Callable[[float, FloatArray, Any], ArrayLike],
-        velocities: Callable[[FloatArray], list[float]],
-        carried: Carried,
-        n: int,
-    ) -> None:
-        self.fun, self.velocities, self.carried, self.n = fun, velocities, carried, n
-        self.driven = driven = carried.driven
-        self.program = program = driven.program
-        self.nfev = 0
-        self._rates = [0.0] * program.layout.y.size
-        self._seen = [0.0] * program.layout.observed.size
-        self._gradient = [0.0] * (program.layout.y.size + 1)
-        self._act = IfElse(program).act
-        self.tick = IfElse(program).tick
-
-    def check(self, t: float, y: FloatArray) -> None:
-        """Call the caller's functions once, for clear errors."""
-        v = self.velocities(y)
-        if not all(map(math.isfinite, v)):
-            raise ParameterError("it must be finite", place="velocity(y0)", value=v)
-        self._called(t, y, self._force([0.0] * len(self.driven.forces)))
-
-    def _force(self, forces: list[float]) -> Any:
-        return np.array(forces) if self.carried.several else forces[0]
-
-    def _called(self, t: float, y: FloatArray, force: Any) -> list[float]:
-        self.nfev += 1
-        dy = np.asarray(self.fun(t, y, force), dtype=np.float64)
-        if dy.shape != (self.n,):
-            raise ParameterError(
-                f"fun returns the shape {dy.shape}, but y0 has {self.n} components"
-            )
-        found: list[float] = dy.tolist()
-        return found
-
-    def _full(self, y: Sequence[float]) -> list[float]:
-        return self.driven.full(y[self.n :], self.velocities(np.array(y[: self.n])))
-
-    # ------------------------------------------------------------------ as integrators.Equations
-    def equations(self) -> integrators.Equations:
-        """Return both as one."""
-        whole = equations(self.program)
-        return integrators.Equations(
-            flow=self.flow,
-            flow_live=self.flow,  # for runs without located crossings only
-            arm=self.arm,
-            margins=self.margins,
-            normal=self.normal,
-            p=whole.p,
-            held=whole.held,
-            strict=whole.strict,
-            relations=whole.relations,
-            surfaces=whole.surfaces,
-            seen=whole.seen,
-        )
-
-    def flow(
-        self, t: float, y: list[float], mode: list[int], held: list[float], p: Any, dy: list[float]
-    ) -> None:
-        host, rates, seen = np.array(y[: self.n]), self._rates, self._seen
-        full = self.driven.full(y[self.n :], self.velocities(host))
-        self.program.ieee["flow"](t, full, mode, held, p, rates)
-        self.program.ieee["observe"](t, full, mode, held, p, seen)
-        force = self._force([seen[k] for k in self.driven.forces])
-        dy[: self.n] = self._called(t, host, force)
-        dy[self.n :] = [rates[k] for k in self.driven.own]
-
-    def arm(
-        self,
-        t: float,
-        y: list[float],
-        mode: list[int],
-        p: Any,
-        held: list[float],
-        watch: list[int],
-    ) -> None:
-        self.program.ieee["arm"](t, self._full(y), mode, p, held, watch)
-
-    def margins(
-        self, t: float, y: list[float], mode: list[int], p: Any, watch: list[int], out: list[float]
-    ) -> None:
-        self.program.ieee["margins"](t, self._full(y), mode, p, watch, out)
-
-    def normal(
-        self, surface: int, t: float, y: list[float], mode: list[int], p: Any, out: list[float]
-    ) -> None:
-        gradient, host = self._gradient, np.array(y[: self.n])
-        self.program.ieee["normal"](surface, t, self._full(y), mode, p, gradient)
-        for j, slopes in enumerate(self._slopes(host)):
-            out[j] = math.fsum(
-                gradient[k] * slope
-                for k, slope in zip(self.driven.velocities, slopes, strict=True)
-            )
-        own = [gradient[k] for k in self.driven.own]
-        out[self.n : self.n + len(own) + 1] = [*own, gradient[-1]]
-
-    def _slopes(self, host: FloatArray) -> Iterator[list[float]]:
-        """Yield for each component of the caller's state how the velocities depend on it."""
-        for j in range(self.n):
-            step = NUDGE * (abs(host[j]) or 1.0)
-            after, before = host.copy(), host.copy()
-            after[j], before[j] = host[j] + step, host[j] - step
-            width = after[j] - before[j]
-            pairs = zip(self.velocities(after), self.velocities(before), strict=True)
-            yield [float((b - a) / width) for b, a in pairs]
-
-    def observe(
-        self, t: float, y: list[float], mode: list[int], signs: list[float], p: Any, out: Any
-    ) -> None:
-        self.program.ieee["observe"](t, self._full(y), mode, signs, p, out)
-
-    # ------------------------------------------------------------------ as integrators.Switch
-    def ask(self, t: float, y: list[float], mode: list[int], p: Any, edges: list[int]) -> None:
-        self.program.ieee["switch"](t, self._full(y), mode, p, edges)
-
-    def act(
-        self, edge: int, machine: int, t: float, y: list[float], mode: list[int], p: Any
-    ) -> None:
-        full = self._full(y)
-        self._act(edge, machine, t, full, mode, p)
-        y[self.n :] = [full[k] for k in self.driven.own]
-
-    # ------------------------------------------------------------------ running
-    def solution(
-        self, y: list[float], mode: list[int], start: float, end: float, options: Any
-    ) -> Solution:
-        """Run, and collect rows and switches."""
-        t: list[float] = []
-        rows: list[list[float]] = []
-        modes: list[tuple[int, ...]] = []
-        switches: list[Switch] = []
-        whole = self.equations()
-        b = hybrid.buffers(whole, start, y, mode, end, options)
-        message = ""
-        try:
-            for event in hybrid.events(whole, self, b, options):
-                if isinstance(event, Arc):
-                    t += event.t
-                    rows += event.y
-                    modes += [event.mode] * len(event.t)
-                elif isinstance(event, Firing):
-                    place, edge = self.driven.place(event.machine), self.driven.edge(event.edge)
-                    switches.append(Switch(event.t, *place, edge))
-        except HybridError as error:
-            message = f"it stopped at t = {error.t!r} s: {error}; {_advice(error)}"
-        nfev = self.nfev
-        forces = [
-            self._observed(whole, b, *row) for row in zip(t, rows, modes, strict=True)
-        ]
-        table = np.array(forces).reshape(-1, len(self.driven.forces)).T
-        states = np.array(rows).reshape(len(t), len(y)).T
-        return Solution(
-            t=np.array(t),
-            y=states[: self.n],
-            F=table if self.carried.several else table[0],
-            switches=tuple(switches),
-            friction=Carried(
-                self.driven, tuple(b.now.y[self.n :]), tuple(b.now.mode), self.carried.several
-            ),
-            nfev=nfev,
-            success=not message,
-            message=message or "the end was reached",
-        )
-
-    def _observed(
-        self, whole: integrators.Equations, b: Any, t: float, y: list[float], mode: tuple[int, ...]
-    ) -> list[float]:
-        """Return the forces at a row; on a surface with the sigmas there."""
-        layout = self.program.layout
-        out = [0.0] * layout.observed.size
-        sliding = integrators.sliding_scratch(
-            whole.surfaces, len(y), whole.held, len(whole.strict), whole.seen, mode[layout.slides]
-        )
-        functions = Functions(whole.flow, whole.arm, whole.margins, whole.normal, whole.p)
-        look(
-            self.observe,
-            Held(functions, [0.0] * whole.held, sliding),
-            t,
-            y,
-            list(mode[layout.elements]),
-            out,
-        )
-        return [out[k] for k in self.driven.forces]
-
-
-def _advice(error: HybridError) -> str:
-    """Say what to do where the solver gives up."""
-    if isinstance(error, NotFinite):
-        return "fun, velocity or the friction gives NaN or infinity there"
-    if isinstance(error, Livelock):
-        return "states keep switching without progress: prove() finds such guards"
-    return "try a stiff method ('Radau'), or a larger rtol and atol"
+    return Located(caller, carried).solution(y, start, end, options)
 
 
 # --------------------------------------------------------------------------- arguments
-def _carried(
-    friction: Friction | Sequence[Friction] | Carried,
-    t_span: Sequence[float],
-    initial: Mapping[str, Any] | None,
-) -> Carried:
-    if isinstance(friction, Carried):
-        if initial is not None:
+def _carried(given: Given, start: float, initial: Mapping[str, Any] | None) -> Carried:
+    if isinstance(given, Stepped):
+        raise ParameterError(
+            "it is from a call with sample=...", place="friction", advice="give sample=... again"
+        )
+    if isinstance(given, Carried):
+        _has_its_state(initial)
+        return given
+    several = isinstance(given, Sequence)
+    driven = Driven.of(_listed(given), start, initial, several=several)
+    return Carried(driven, tuple(driven.initial), tuple(driven.start.mode), several)
+
+
+def _stepped(given: Given, start: float, initial: Mapping[str, Any] | None, rtol: float) -> Stepped:
+    if isinstance(given, Carried):
+        raise ParameterError(
+            "it is from a call without sample=...", place="friction", advice="leave it out again"
+        )
+    if isinstance(given, Stepped):
+        _has_its_state(initial)
+        now = given.snapshot.t
+        if now != start:
             raise ParameterError(
-                "it goes on from an earlier call, so it has its state",
-                place="friction",
-                advice="leave out initial=...",
+                f"t_span begins at {start!r} s, but the friction has come to {now!r} s",
+                advice="begin there: t_span = (solution.t[-1], ...)",
             )
-        return friction
-    several = isinstance(friction, Sequence)
-    frictions: list[Friction] = list(friction) if isinstance(friction, Sequence) else [friction]
+        given.stepper.restore(given.snapshot)
+        return given
+    frictions = _listed(given)
+    stepper: FrictionState | FrictionBank
+    if isinstance(given, Sequence):
+        stepper = FrictionBank(frictions, t=start, initial=initial, rtol=rtol)
+    else:
+        stepper = FrictionState(frictions[0], t=start, initial=initial, rtol=rtol)
+    return Stepped(stepper, stepper.snapshot(), tuple(frictions))
+
+
+def _listed(given: Friction | Sequence[Friction]) -> list[Friction]:
+    frictions: list[Friction] = list(given) if isinstance(given, Sequence) else [given]
     if not frictions:
         raise ParameterError("it is empty", place="friction", advice="give at least one")
-    driven = Driven.of(frictions, _span(t_span)[0], initial)
-    return Carried(driven, tuple(driven.initial), tuple(driven.start.mode), several)
+    return frictions
+
+
+def _has_its_state(initial: Mapping[str, Any] | None) -> None:
+    if initial is not None:
+        raise ParameterError(
+            "it goes on from an earlier call, so it has its state",
+            place="friction",
+            advice="leave out initial=...",
+        )
 
 
 def _span(t_span: Sequence[float]) -> tuple[float, float]:
@@ -449,7 +219,9 @@ def _span(t_span: Sequence[float]) -> tuple[float, float]:
 
 def _count(max_steps: int) -> int:
     if isinstance(max_steps, bool) or not isinstance(max_steps, int) or max_steps < 1:
-        raise ParameterError("it must be an integer, at least 1", place="max_steps", value=max_steps)
+        raise ParameterError(
+            "it must be an integer, at least 1", place="max_steps", value=max_steps
+        )
     return max_steps
 
 
@@ -473,16 +245,29 @@ def _method(method: str | type[Any]) -> Tableau | type[Any]:
         return method
     known = ", ".join(map(repr, (*METHODS, *OURS)))
     raise ParameterError(
-        "it is no method", place="method", value=method, advice=f"use {known}, or an OdeSolver class"
+        "it is no method",
+        place="method",
+        value=method,
+        advice=f"use {known}, or an OdeSolver class",
     )
+
+
+def _longest(max_step: float) -> float:
+    return max_step if max_step == math.inf else checked_scalar("max_step", max_step, "> 0")
 
 
 def _tolerances(driven: Driven, rtol: float, atol: ArrayLike | None, n: int) -> list[float]:
     """Return the absolute tolerance of each component of the combined state, all > 0."""
-    found = driven.tolerances(checked_scalar("rtol", rtol, "> 0"))
-    least = min((u for u in found if u > 0.0), default=None)
-    own = found[: len(driven.own)]
+    found = driven.tolerances(rtol)
+    host = _of_host(found, atol, n)
+    least = min((u for u in found if u > 0.0), default=min(host))
+    return [*host, *(u or least for u in found[: len(driven.own)])]
+
+
+def _of_host(found: Iterable[float], atol: ArrayLike | None, n: int) -> list[float]:
+    """Return the absolute tolerances of the caller's state, given those of the frictions."""
     if atol is None:
+        least = min((u for u in found if u > 0.0), default=None)
         if least is None:
             raise ParameterError(
                 "the friction's chart gives no scale",
@@ -490,33 +275,32 @@ def _tolerances(driven: Driven, rtol: float, atol: ArrayLike | None, n: int) -> 
                 value=None,
                 advice="give one, for example atol=1e-9",
             )
-        host = [least] * n
-    elif np.ndim(atol) == 0:
-        host = [checked_scalar("atol", atol, "> 0")] * n
-    else:
-        host = checked_array("atol", atol, n, "> 0").tolist()
-    return [*host, *(u or least or min(host) for u in own)]
+        return [least] * n
+    if np.ndim(atol) == 0:
+        return [checked_scalar("atol", atol, "> 0")] * n
+    several: list[float] = checked_array("atol", atol, n, "> 0").tolist()
+    return several
 
 
 def _velocities(
-    velocity: Velocity, n: int, carried: Carried
+    velocity: Velocity, n: int, frictions: Carried | Stepped
 ) -> Callable[[FloatArray], list[float]]:
     """Return the velocities of the frictions as a function of the caller's state."""
-    m = len(carried.driven.forces)
+    m, several = len(frictions.names), frictions.several
     if callable(velocity):
 
         def called(y: FloatArray) -> list[float]:
             v = np.asarray(velocity(y), dtype=np.float64)
-            if v.shape != ((m,) if carried.several else ()):
+            if v.shape != ((m,) if several else ()):
                 raise ParameterError(
                     f"velocity(y) has the shape {v.shape}",
-                    advice=f"it must be ({m},)" if carried.several else "it must be one number",
+                    advice=f"it must be ({m},)" if several else "it must be one number",
                 )
             return [float(u) for u in np.atleast_1d(v)]
 
         return called
     given = velocity if isinstance(velocity, Sequence) else [velocity]
-    if len(given) != m or isinstance(velocity, Sequence) != carried.several:
+    if len(given) != m or isinstance(velocity, Sequence) != several:
         raise ParameterError(
             f"there {'is 1 friction' if m == 1 else f'are {m} frictions'}",
             place="velocity",
@@ -534,3 +318,20 @@ def _velocities(
         return [float(y[place]) for place in given]
 
     return picked
+
+
+def _all_tolerances(friction: Friction, rtol: float) -> list[float]:
+    return [u for row in scales_of(friction).tolerances(rtol).values() for u in row]
+
+
+def _of_scipy(solver: Tableau | type[Any], t_eval: ArrayLike | None) -> type[Any]:
+    if isinstance(solver, Tableau):
+        raise ParameterError(
+            "sample=... takes the methods of SciPy only",
+            place="method",
+            value=solver.name,
+            advice=f"use one of {', '.join(METHODS)}",
+        )
+    if t_eval is not None:
+        raise ParameterError("the rows are the samples", place="t_eval", advice="leave it out")
+    return solver

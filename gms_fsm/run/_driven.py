@@ -10,10 +10,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.language import names_in
 from gms_fsm.lowering.program import Program
+from gms_fsm.run._steppable import alone, other_inputs
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
@@ -45,7 +45,12 @@ class Driven:
 
     @classmethod
     def of(
-        cls, frictions: Sequence[Model | Contact], t: float, initial: Mapping[str, Any] | None
+        cls,
+        frictions: Sequence[Model | Contact],
+        t: float,
+        initial: Mapping[str, Any] | None,
+        *,
+        several: bool,
     ) -> Driven:
         """Lower some frictions.
 
@@ -57,6 +62,9 @@ class Driven:
             s: when they start.
         initial : mapping, optional
             As for `gms_fsm.simulate`, without velocities.
+        several : bool
+            Whether names are numbered: ``friction1`` instead of ``friction``, ``x_friction1``
+            instead of ``x``.
 
         Returns
         -------
@@ -68,10 +76,8 @@ class Driven:
         ParameterError
             If one of them cannot be run by a velocity alone, or a value breaks its rule.
         """
-        contacts = [
-            _contact(each, k, len(frictions) == 1) for k, each in enumerate(frictions, start=1)
-        ]
-        bodies = [_body(each, len(frictions) == 1) for each in contacts]
+        contacts = [_contact(each, k, several) for k, each in enumerate(frictions, start=1)]
+        bodies = [_body(each, several) for each in contacts]
         for body in bodies:
             for key in (body.v, f"{body.name}.v"):
                 if isinstance(initial, Mapping) and key in initial:
@@ -149,68 +155,44 @@ class Driven:
         return self.program.layout.edges[edge][0]
 
 
-def _contact(given: Model | Contact, number: int, alone: bool) -> Contact:
-    """Return a friction as a contact that moves with a body of its own."""
-    if isinstance(given, Contact):
-        name, inputs = given.name, given.inputs
-    elif hasattr(given, "chart"):
-        name, inputs = "friction" if alone else f"friction{number}", {}
-    else:
-        raise ParameterError(
-            "it must be a model or a contact, for example GMS(parameters, law='signed')",
-            place="friction" if alone else f"friction {number}",
-            value=given,
-        )
-    _refuse(given, given.chart, f"friction {name!r}")
-    v = _body_name("v", name, alone)
-    if isinstance(given, Contact) and given.model is None:
-        return Contact(name, given.chart, given.values, v=v, n=given.n, inputs=inputs)
-    model = given.model if isinstance(given, Contact) else given
-    return Contact(name, model, v=v, inputs=inputs)  # type: ignore[arg-type]  # it has one
+def _contact(given: Model | Contact, number: int, several: bool) -> Contact:
+    """Return a friction as a contact that moves with a body of its own, or refuse."""
+    contact = alone(given)
+    name = contact.name
+    if several and not isinstance(given, Contact):
+        name = f"{name}{number}"
+    _refuse(contact)
+    v = _name("v", name, several)
+    if contact.model is not None:
+        return Contact(name, contact.model, v=v, inputs=contact.inputs)
+    return Contact(name, contact.chart, contact.values, n=contact.n, v=v, inputs=contact.inputs)
 
 
-def _body(contact: Contact, alone: bool) -> Body:
-    x, v = (_body_name(letter, contact.name, alone) for letter in "xv")
+def _body(contact: Contact, several: bool) -> Body:
+    x, v = (_name(letter, contact.name, several) for letter in "xv")
     return Body(f"{contact.name}_body", inertia=1.0, x=x, v=v)
 
 
-def _body_name(letter: str, contact: str, alone: bool) -> str:
-    return letter if alone else f"{letter}_{contact}"
+def _name(letter: str, contact: str, several: bool) -> str:
+    return f"{letter}_{contact}" if several else letter
 
 
-def _refuse(given: Model | Contact, chart: Chart, here: str) -> None:
-    """Refuse what a velocity alone does not determine."""
-    if chart.locks:
-        raise ParameterError(
-            f"chart {chart.name!r} has a state that locks it: its force is then whatever keeps "
-            "v = 0, which only the owner of the masses knows",
-            place=here,
-            advice="simulate a System that contains them, or use a chart without locked states",
-        )
-    if chart.sets_velocity:
-        raise ParameterError(
-            f"chart {chart.name!r} sets the velocity, which is the caller's",
-            place=here,
-            advice="simulate a System, or use a chart without such assignments",
-        )
-    if len(chart.velocities) > 1:
-        raise ParameterError(
-            f"chart {chart.name!r} has the velocities {', '.join(chart.velocities)}, and only one "
-            "can be given",
-            place=here,
-            advice="simulate a System",
-        )
-    if getattr(given, "period", None) is not None:
-        raise ParameterError(
-            "it has a period: it is asked at ticks only, which the caller's equations do not have",
-            place=here,
-            advice="leave out period=..., or simulate a System",
-        )
+def _refuse(contact: Contact) -> None:
+    """Refuse what reads more than its own velocity and the time."""
+    chart = contact.chart
+    here = f"chart {chart.name!r}"
     trees = [*chart.guards.values(), *(u for s in chart.assignments.values() for u in s.values())]
     own = {*chart.inputs, *chart.variables, *chart.parameter_names, *chart.let}
     if any("a" in names_in(tree) for tree in trees) and "a" not in own:
         raise ParameterError(
-            f"chart {chart.name!r} reads a, the acceleration, which a velocity does not tell",
+            "it reads a, the acceleration, which a velocity at one time does not tell",
             place=here,
-            advice="simulate a System, or use a chart whose guards do without it",
+            advice="use FrictionState, or a System and simulate",
+        )
+    if others := other_inputs(contact):
+        raise ParameterError(
+            f"its texts name {', '.join(map(repr, others))}, which nobody gives here",
+            place=here,
+            advice="give the contact formulas in t (inputs=...), or use FrictionState, which takes "
+            "inputs",
         )

@@ -8,7 +8,7 @@ integrates `FrictionEquations.derivatives` beside its own equations, stops where
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,30 +17,13 @@ from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
 from gms_fsm.errors import ChartError, ParameterError
 from gms_fsm.run._driven import Driven
 from gms_fsm.run.machines import IfElse
+from gms_fsm.run.stepping import Switch
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 from integrators import MOST_SWITCHES
 from integrators.crossings import watched
 
-__all__ = ["FrictionEquations", "Switch"]
-
-
-class Switch(NamedTuple):
-    """An edge taken by an element.
-
-    Parameters
-    ----------
-    t : float
-        s.
-    element : int
-        Counted from 0.
-    edge : str
-        Its name in the chart.
-    """
-
-    t: float
-    element: int
-    edge: str
+__all__ = ["FrictionEquations"]
 
 
 class FrictionEquations:
@@ -51,8 +34,9 @@ class FrictionEquations:
 
     Parameters
     ----------
-    model : Model or Contact
-        What rubs. A chart with a locked state has no force law, and is refused.
+    model_or_contact : Model or Contact
+        What rubs: friction with one velocity and without locks. The force of a locked state is
+        whatever keeps v = 0, which only the owner of the masses knows.
     t : float
         s: when it starts.
     initial : mapping, optional
@@ -97,9 +81,15 @@ class FrictionEquations:
     """
 
     def __init__(
-        self, model: Model | Contact, *, t: float = 0.0, initial: Mapping[str, Any] | None = None
+        self,
+        model_or_contact: Model | Contact,
+        *,
+        t: float = 0.0,
+        initial: Mapping[str, Any] | None = None,
     ) -> None:
-        self._driven = driven = Driven.of([model], checked_scalar("t", t, "finite"), initial)
+        self._driven = driven = Driven.of(
+            [model_or_contact], checked_scalar("t", t, "finite"), initial, several=False
+        )
         program = driven.program
         self.size = len(driven.own)
         self.initial: FloatArray = np.array(driven.initial)
