@@ -23,7 +23,7 @@ from integrators.advance import (
     Output,
     Plan,
     advance,
-    limit_after,
+    knot_after,
     put_row,
     raise_floor,
 )
@@ -349,9 +349,9 @@ def _begin_arc(
             # Without location the solver knows nothing of switches: it keeps its step.
             if control.step <= 0.0 and (plan.located or clock[H] <= 0.0):
                 clock[ERROR_BEFORE] = 1.0
-                limit = limit_after(plan, clock, cursor)
+                knot = knot_after(plan, clock, cursor)
                 order = plan.method.error_order
-                clock[H] = starting_step(motion, order, control, now, limit, scratch)
+                clock[H] = starting_step(motion, order, control, now, knot, scratch)
     return ADVANCE if plan.foreign else NOTHING
 
 

@@ -27,8 +27,10 @@ class Located:
     """
 
     def __init__(self, caller: Caller, carried: Carried) -> None:
-        self.caller, self.carried, self.n = caller, carried, caller.n
+        self.caller, self.carried = caller, carried
         self.driven = driven = carried.driven
+        # The places of the caller's state, and of the frictions' own.
+        self._host, self._own = slice(0, caller.n), slice(caller.n, caller.n + len(driven.own))
         self.program = program = driven.program
         self._rates = [0.0] * program.layout.y.size
         self._seen = [0.0] * program.layout.observed.size
@@ -37,7 +39,7 @@ class Located:
         self.tick = IfElse(program).tick
 
     def _full(self, y: Sequence[float]) -> list[float]:
-        return self.driven.full(y[self.n :], self.caller.velocities(np.array(y[: self.n])))
+        return self.driven.full(y[self._own], self.caller.velocities(np.array(y[self._host])))
 
     # ------------------------------------------------------------------ as integrators.Equations
     def equations(self) -> integrators.Equations:
@@ -60,12 +62,12 @@ class Located:
     def flow(
         self, t: float, y: list[float], mode: list[int], held: list[float], p: Any, dy: list[float]
     ) -> None:
-        host, rates, seen = np.array(y[: self.n]), self._rates, self._seen
-        full = self.driven.full(y[self.n :], self.caller.velocities(host))
+        host, rates, seen = np.array(y[self._host]), self._rates, self._seen
+        full = self.driven.full(y[self._own], self.caller.velocities(host))
         self.program.ieee["flow"](t, full, mode, held, p, rates)
         self.program.ieee["observe"](t, full, mode, held, p, seen)
-        dy[: self.n] = self.caller.rates(t, host, [seen[k] for k in self.driven.forces])
-        dy[self.n :] = [rates[k] for k in self.driven.own]
+        dy[self._host] = self.caller.rates(t, host, [seen[k] for k in self.driven.forces])
+        dy[self._own] = [rates[k] for k in self.driven.own]
 
     def arm(
         self,
@@ -86,18 +88,19 @@ class Located:
     def normal(
         self, surface: int, t: float, y: list[float], mode: list[int], p: Any, out: list[float]
     ) -> None:
-        gradient, host = self._gradient, np.array(y[: self.n])
+        gradient, host = self._gradient, np.array(y[self._host])
         self.program.ieee["normal"](surface, t, self._full(y), mode, p, gradient)
         for j, slopes in enumerate(self._slopes(host)):
             out[j] = math.fsum(
                 gradient[k] * slope for k, slope in zip(self.driven.velocities, slopes, strict=True)
             )
         own = [gradient[k] for k in self.driven.own]
-        out[self.n : self.n + len(own) + 1] = [*own, gradient[-1]]
+        out[self._own] = own
+        out[self._own.stop] = gradient[-1]
 
     def _slopes(self, host: FloatArray) -> Iterator[list[float]]:
         """Yield for each component of the caller's state how the velocities depend on it."""
-        for j in range(self.n):
+        for j in range(len(host)):
             step = NUDGE * (abs(host[j]) or 1.0)
             after, before = host.copy(), host.copy()
             after[j], before[j] = host[j] + step, host[j] - step
@@ -119,7 +122,7 @@ class Located:
     ) -> None:
         full = self._full(y)
         self._act(edge, machine, t, full, mode, p)
-        y[self.n :] = [full[k] for k in self.driven.own]
+        y[self._own] = [full[k] for k in self.driven.own]
 
     # ------------------------------------------------------------------ running
     def solution(
@@ -151,11 +154,11 @@ class Located:
         states = np.array(rows).reshape(len(t), len(y)).T
         return Solution(
             t=np.array(t),
-            y=states[: self.n],
+            y=states[self._host],
             F=table if self.carried.several else table[0],
             switches=tuple(switches),
             friction=Carried(
-                self.driven, tuple(b.now.y[self.n :]), tuple(b.now.mode), self.carried.several
+                self.driven, tuple(b.now.y[self._own]), tuple(b.now.mode), self.carried.several
             ),
             nfev=nfev,
             success=not message,

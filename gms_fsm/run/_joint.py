@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import math
 import sys
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
@@ -18,7 +17,7 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.lowering.scales import scales_of
 from gms_fsm.run._plausible import check_state
 from gms_fsm.run._steppable import start_of
-from gms_fsm.run._stepper import Machine, Plain, fast, state_of
+from gms_fsm.run._stepper import Machine, Plain, Stepper, fast, state_of
 from gms_fsm.run.settings import MOST_STEPS
 from gms_fsm.run.start import LATEST, Start
 from gms_fsm.systems.models import Model
@@ -101,7 +100,7 @@ class Joint:
     """
 
     def __init__(
-        self, given: Model | Contact, asked: Asked, start: Start, stepper: Machine | Plain
+        self, given: Model | Contact, asked: Asked, start: Start, stepper: Stepper
     ) -> None:
         self.given, self.asked, self.start, self.stepper = given, asked, start, stepper
         self.t = start.t_start
@@ -190,13 +189,15 @@ class Joint:
         row = Rows(*where)
         kind, reason = FAILURES[code]
         element = f"element {int(b.memory.counts[loop.MACHINE]) + 1}"
-        return kind(
+        error = kind(
             reason,
             start.trace(row, row, start.firings([])),
             t=t,
             place=element if code == loop.MACHINE_LIVELOCK else "",
             advice=f"the friction is as it was before the call, at t = {self.t!r} s",
         )
+        error.kept = ""  # a sample has no rows
+        return error
 
     # ------------------------------------------------------------------ what it found
     @property
@@ -224,7 +225,7 @@ class Joint:
     def dF_dv(self) -> float:
         """The derivative of the last force with respect to the velocity there."""
         last = self._sample()
-        change = CHANGE * max(abs(last.v0), abs(last.v1), self._speed)
+        change = CHANGE * max(abs(float(last.v0)), abs(float(last.v1)), self._speed)
         return (self._again(change) - self._again(-change)) / (2.0 * change)
 
     @functools.cached_property
@@ -260,18 +261,24 @@ class Joint:
         """Forget the last sample: the stepper has been given another state."""
         self.t, self.last, self.more = t, None, []
 
+    @property
+    def engine(self) -> str:
+        """The name of its engine."""
+        return "compiled" if isinstance(self.stepper, Machine) else "ifelse"
+
     @functools.cached_property
     def identity(self) -> tuple[str, str]:
         """What states can be exchanged with: the same numbers, and the same engine."""
         program, options = self.start.program, self.start.options
         what = program.source, program.p[:2], options.rtol, options.atol
-        return hashlib.sha256(repr(what).encode()).hexdigest(), type(self.stepper).__name__
+        return hashlib.sha256(repr(what).encode()).hexdigest(), self.engine
 
     def to_array(self) -> FloatArray:
         """Return the present state as finite numbers."""
         places = self._places().values()
         flat = np.concatenate([np.asarray(place, dtype=np.float64).ravel() for place in places])
-        return np.nan_to_num(flat, nan=math.nan, posinf=MOST, neginf=-MOST)
+        found: FloatArray = np.clip(flat, -MOST, MOST)
+        return found
 
     @functools.cached_property
     def sizes(self) -> list[int]:
@@ -311,7 +318,14 @@ class Joint:
 
 
 def _view(place: Any) -> Any:
-    return memoryview(place) if isinstance(place, np.ndarray) else place
+    return memoryview(place) if isinstance(place, np.ndarray) else place  # type: ignore[arg-type]
+
+
+def made_again(kind: Any, given: Any, arguments: Mapping[str, Any], array: FloatArray) -> Any:
+    """Return a copy of a `FrictionState` or a `FrictionBank`, also in another process."""
+    new = kind(given, **arguments)
+    new.from_array(array)
+    return new
 
 
 # --------------------------------------------------------------------------- arguments

@@ -108,17 +108,18 @@ class Plain:
 
     def copy(self) -> dict[str, list[Any]]:
         """Return the present state."""
-        found = state_of(self) | {name: getattr(self.sample, name) for name in FOUND}
-        return {name: list(place) for name, place in found.items()}
+        return {name: list(place) for name, place in self._all().items()}
 
     def take(self, copy: Mapping[str, list[Any]]) -> None:
         """Return to what `copy` returned."""
-        places = state_of(self) | {name: getattr(self.sample, name) for name in FOUND}
-        for name, place in places.items():
+        for name, place in self._all().items():
             place[:] = copy[name]
 
-
-FOUND = ("end", "counts", "force", "t", "machine", "edge")
+    def _all(self) -> dict[str, Any]:
+        """Return all lists that a copy contains."""
+        found = ("end", "counts", "force", "t", "machine", "edge")
+        sample = {f"sample {name}": getattr(self.sample, name) for name in found}
+        return {**state_of(self), **sample}
 
 
 def _buffers(start: Start) -> Buffers:
@@ -191,11 +192,11 @@ class Machine:
         """Return to the state that was kept last."""
         self._words[:] = self._kept
 
-    def copy(self) -> NDArray[np.int64]:
+    def copy(self) -> Any:
         """Return the present state."""
         return self._words.copy()
 
-    def take(self, copy: NDArray[np.int64]) -> None:
+    def take(self, copy: Any) -> None:
         """Return to what `copy` returned."""
         self._words[:] = copy
 

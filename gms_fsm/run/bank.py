@@ -21,12 +21,13 @@ from gms_fsm.run._joint import (
     content_of,
     later,
     line_of,
+    made_again,
     numbers_of,
     stepper_kind,
     too_late,
 )
 from gms_fsm.run._steppable import start_of
-from gms_fsm.run._stepper import Machine, Plain, machine_code
+from gms_fsm.run._stepper import Machine, Plain, Stepper, machine_code
 from gms_fsm.run.start import LATEST, Start
 from gms_fsm.run.stepping import Snapshot
 from gms_fsm.systems.models import Model
@@ -64,7 +65,7 @@ class FrictionBank:
     >>> from gms_fsm import GMS, FrictionBank, GMSParameters
     >>> bank = FrictionBank([GMS(GMSParameters.paper("stick-slip"), law="signed")] * 3)
     >>> bank.advance([0.0, 0.0, 0.0], [0.02, 0.0, -0.02], 0.5).round(6)
-    array([ 0.0058,  0.    , -0.0058])
+    array([ 0.052,  0.   , -0.052])
     """
 
     def __init__(
@@ -99,7 +100,7 @@ class FrictionBank:
         for places in _alike(starts) if kind is Machine else [[*range(len(given))]]:
             memory = _memory(starts[places[0]], len(places)) if kind is Machine else None
             for row, i in enumerate(places):
-                stepper: Machine | Plain = (
+                stepper: Stepper = (
                     Plain(starts[i])
                     if memory is None
                     else Machine(starts[i], (memory[0, row], memory[1, row]))
@@ -275,6 +276,22 @@ class FrictionBank:
             joint.last = None if self._last is None else self._last.of(i, joint.inputs)
         return self._joints
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how to make a copy: memory of machine code is not copied."""
+        joints, first = self._joints, self._joints[0]
+        arguments = {
+            "t": first.asked.t,
+            "initial": [joint.asked.initial for joint in joints],
+            "rtol": first.asked.rtol,
+            "engine": first.engine,
+        }
+        return made_again, (
+            type(self),
+            [joint.given for joint in joints],
+            arguments,
+            self.to_array(),
+        )
+
     # ------------------------------------------------------------------ going back
     def snapshot(self) -> Snapshot:
         """Return the present state, to return to it with `restore`.
@@ -400,8 +417,9 @@ class _Apart:
 
     def take(self, copy: Any) -> None:
         """Return to what `copy` returned."""
-        for joint, (each, joint.more) in zip(self.joints, copy, strict=True):
+        for joint, (each, more) in zip(self.joints, copy, strict=True):
             joint.stepper.take(each)
+            joint.more = more
 
 
 class _Together:
@@ -447,7 +465,8 @@ class _Together:
                     self._full.append(self.joints[row])
                 except GMSError as error:
                     raise error.inside(f"joint {places[row]}") from None
-        return floats[:, self._force]
+        force: FloatArray = floats[:, self._force]
+        return force
 
     def keep(self) -> None:
         """Keep the present state for `back`."""
@@ -466,7 +485,8 @@ class _Together:
         self._words[...], full = copy
         for joint in self._full:
             joint.more = []
-        for joint, joint.more in full:
+        for joint, more in full:
+            joint.more = more
             self._full.append(joint)
 
 
