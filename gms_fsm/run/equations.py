@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
+from gms_fsm.charts.parameters import FloatArray, as_numbers, checked_array, checked_scalar
 from gms_fsm.errors import ChartError, ParameterError
 from gms_fsm.run._driven import Driven
 from gms_fsm.run.machines import IfElse
@@ -129,9 +129,9 @@ class FrictionEquations:
         ParameterError
             If y has another length, or before the first `settle`.
         """
-        program, full = self._driven.program, self._full(y, v)
+        program, (t, full) = self._driven.program, self._read(t, y, v)
         dy = [0.0] * len(full)
-        program.ieee["flow"](float(t), full, self._mode, self._held, program.p, dy)
+        program.ieee["flow"](t, full, self._mode, self._held, program.p, dy)
         return np.array([dy[k] for k in self._driven.own])
 
     def force(self, t: float, y: ArrayLike, v: float) -> float:
@@ -152,9 +152,9 @@ class FrictionEquations:
         ParameterError
             As in `derivatives`.
         """
-        program, full = self._driven.program, self._full(y, v)
+        program, (t, full) = self._driven.program, self._read(t, y, v)
         seen = [0.0] * program.layout.observed.size
-        program.ieee["observe"](float(t), full, self._mode, self._held, program.p, seen)
+        program.ieee["observe"](t, full, self._mode, self._held, program.p, seen)
         return seen[self._driven.forces[0]]
 
     def margins(self, t: float, y: ArrayLike, v: float) -> FloatArray:
@@ -200,12 +200,13 @@ class FrictionEquations:
         return tuple(u > self._above[r] for u, r in zip(found, self._active, strict=True))
 
     def _margins(self, t: float, y: ArrayLike, v: float) -> list[float]:
-        program, full = self._driven.program, self._full(y, v)
+        program, (t, full) = self._driven.program, self._read(t, y, v)
         out = [0.0] * len(self._watch)
-        program.ieee["margins"](float(t), full, self._mode, program.p, self._watch, out)
+        program.ieee["margins"](t, full, self._mode, program.p, self._watch, out)
         return [out[r] for r in self._active or ()]
 
-    def _full(self, y: ArrayLike, v: float) -> list[float]:
+    def _read(self, t: float, y: ArrayLike, v: float) -> tuple[float, list[float]]:
+        """Return the time and the program's state vector."""
         # NaN passes: a solver's trial step may overflow, and the solver then tries a smaller one.
         if self._active is None:
             raise ParameterError(
@@ -213,12 +214,12 @@ class FrictionEquations:
                 place="FrictionEquations",
                 advice="call y = friction.settle(t, friction.initial, v) at the start",
             )
-        state = np.asarray(y, dtype=np.float64)
+        t, v, state = _number("t", t), _number("v", v), as_numbers("y", y)
         if state.shape != (self.size,):
             raise ParameterError(
                 f"y has the shape {state.shape}", advice=f"it must be ({self.size},)"
             )
-        return self._driven.full(state.tolist(), (float(v),))
+        return t, self._driven.full(state.tolist(), (v,))
 
     # ------------------------------------------------------------------ at an event
     def settle(self, t: float, y: ArrayLike, v: float) -> FloatArray:
@@ -267,3 +268,12 @@ class FrictionEquations:
         program.ieee["arm"](t, full, mode, program.p, self._held, self._watch)
         self._active = [r for r, why in enumerate(self._watch) if why]
         return np.array([full[k] for k in driven.own])
+
+
+def _number(name: str, value: Any) -> float:
+    try:
+        if isinstance(value, str):  # float("0.1") is a number
+            raise TypeError
+        return float(value)
+    except (TypeError, ValueError):
+        raise ParameterError("it must be a number", place=name, value=value) from None
