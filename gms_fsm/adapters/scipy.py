@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import scipy.integrate
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 import integrators
 from gms_fsm.adapters._scipy_located import Located
@@ -29,7 +29,9 @@ __all__ = ["Carried", "Solution", "Stepped", "Switch", "solve_ivp"]
 
 Friction: TypeAlias = Model | Contact
 Given: TypeAlias = Friction | Sequence[Friction] | Carried | Stepped
-Velocity: TypeAlias = int | Sequence[int] | Callable[[FloatArray], ArrayLike]
+Velocity: TypeAlias = (
+    int | Sequence[int] | NDArray[np.integer[Any]] | Callable[[FloatArray], ArrayLike]
+)
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")  # of SciPy
 OURS = tuple(name for name, tableau in integrators.METHODS.items() if tableau.adaptive)
 
@@ -299,8 +301,9 @@ def _velocities(
             return [float(u) for u in np.atleast_1d(v)]
 
         return called
-    given = velocity if isinstance(velocity, Sequence) else [velocity]
-    if len(given) != m or isinstance(velocity, Sequence) != several:
+    places: Any = velocity.tolist() if isinstance(velocity, np.ndarray | np.integer) else velocity
+    given: Sequence[Any] = places if isinstance(places, Sequence) else [places]
+    if len(given) != m or isinstance(places, Sequence) != several:
         raise ParameterError(
             f"there {'is 1 friction' if m == 1 else f'are {m} frictions'}",
             place="velocity",

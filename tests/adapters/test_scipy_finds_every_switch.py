@@ -140,7 +140,9 @@ def test_several_frictions() -> None:
     by_function = solve_ivp(
         _coupled, (0.0, 30.0), [0.0] * 4, system.contacts, lambda y: y[[1, 3]], t_eval=[10.0, 30.0]
     )
-    stepped = solve_ivp(_coupled, (0.0, 30.0), [0.0] * 4, system.contacts, [1, 3], sample=5e-3)
+    stepped = solve_ivp(
+        _coupled, (0.0, 30.0), [0.0] * 4, system.contacts, np.array([1, 3]), sample=5e-3
+    )
     for found in (by_place, by_function, stepped):
         assert [(s.contact, s.element, s.edge) for s in found.switches] == log
         assert found.y[2, -1] == pytest.approx(trace.body("b").x[-1], abs=2e-5)
