@@ -15,13 +15,16 @@ from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import FloatArray, as_numbers, checked_array, checked_scalar
 from gms_fsm.errors import ChartError, ParameterError
+from gms_fsm.lowering.program import equations
 from gms_fsm.run._driven import Driven
 from gms_fsm.run.machines import IfElse
 from gms_fsm.run.stepping import Switch
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
-from integrators import MOST_SWITCHES
+from integrators import hybrid
 from integrators.crossings import watched
+from integrators.loop import EDGE, FIRED, MACHINE, MACHINE_LIVELOCK, PAUSED, run_to_event
+from integrators.steps import PAUSE, Motion
 
 __all__ = ["FrictionEquations"]
 
@@ -245,24 +248,26 @@ class FrictionEquations:
         t, v = checked_scalar("t", t, "finite"), checked_scalar("v", v, "finite")
         own = checked_array("y", y, self.size, "finite").tolist()
         driven, program = self._driven, self._driven.program
-        full, mode, taken = driven.full(own, (v,)), list(self._mode), list[Switch]()
-        edges = [-1] * len(mode)
-        for _ in range(MOST_SWITCHES):
-            self._switch.ask(t, full, mode, program.p, edges)
-            if max(edges) < 0:
-                break
-            for i, edge in enumerate(edges):
-                if edge >= 0:
-                    self._switch.act(edge, i, t, full, mode, program.p)
-                    taken.append(Switch(t, i, driven.edge(edge)))
-        else:
-            last = taken[-1]
-            raise ChartError(
-                f"edges are enabled without end, {last.edge!r} of element {last.element + 1} among "
-                "them",
-                place=f"t = {t!r} s",
-                advice="prove() finds such guards",
-            )
+        made = equations(program)
+        b = hybrid.buffers(
+            made, t, driven.full(own, (v,)), self._mode, t, driven.start.options, capacity=1
+        )
+        b.now.clock[PAUSE] = t
+        functions, taken = made.functions(located=True), list[Switch]()
+        motion = Motion(functions.flow, functions.margins, functions.p)
+        while (event := run_to_event(functions, self._switch, motion, b, 1)) != PAUSED:
+            if event == FIRED:
+                machine, edge = b.memory.counts[MACHINE], b.memory.counts[EDGE]
+                taken.append(Switch(t, machine, driven.edge(edge)))
+            elif event == MACHINE_LIVELOCK:
+                last = taken[-1]
+                raise ChartError(
+                    f"edges are enabled without end, {last.edge!r} of element {last.element + 1} "
+                    "among them",
+                    place=f"t = {t!r} s",
+                    advice="prove() finds such guards",
+                )
+        full, mode = b.now.y, b.now.mode
         self._mode, self.switches = mode, tuple(taken)
         self._watch = [0] * len(self._watch)
         program.ieee["arm"](t, full, mode, program.p, self._held, self._watch)
