@@ -11,3 +11,9 @@ if not importlib.util.find_spec("textual"):
 # The examples compile (extra: fast).
 if not importlib.util.find_spec("llvmlite"):
     collect_ignore += ["integrators/machine_code/objects.py"]
+# The examples of adapters use the library that they serve (extras of the same names).
+collect_ignore += [
+    f"gms_fsm/adapters/{name}.py"
+    for name in ("control", "pathsim")
+    if not importlib.util.find_spec(name)
+]

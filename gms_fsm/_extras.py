@@ -27,6 +27,8 @@ EXTRAS: Mapping[str, tuple[str, str]] = {
         "gms-fsm debug without --tui answers at a prompt, and gms-fsm replay makes a page",
     ),
     "jupyter": ("the widget needs", "plots.replay shows a run in a notebook too"),
+    "pathsim": ("PathSim blocks need", "FrictionState steps in any loop"),
+    "control": ("systems of python-control need", "FrictionState steps in any loop"),
     "check": ("checking a chart needs", "a chart runs without its proofs"),
 }
 

@@ -1,0 +1,1 @@
+"""Friction in other people's simulators; each module is named after the library it serves."""
