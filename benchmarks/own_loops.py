@@ -225,8 +225,8 @@ def page(rounds: int) -> str:
         [
             textwrap.fill(
                 "Pulled mass, 60 s, 72 edges: edges taken, how many of them are right before the "
-                "first wrong one, the largest error of the position, and the time of a step relative to "
-                "the naive loop:",
+                "first wrong one, the largest error of the position, and the time of a step "
+                "relative to the naive loop:",
                 WIDTH,
             ),
             "",

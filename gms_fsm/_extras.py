@@ -27,8 +27,10 @@ EXTRAS: Mapping[str, tuple[str, str]] = {
         "gms-fsm debug without --tui answers at a prompt, and gms-fsm replay makes a page",
     ),
     "jupyter": ("the widget needs", "plots.replay shows a run in a notebook too"),
-    "pathsim": ("PathSim blocks need", "FrictionState steps in any loop"),
-    "control": ("systems of python-control need", "FrictionState steps in any loop"),
+    "pathsim": ("the PathSim block needs", "FrictionState steps in any loop"),
+    "control": ("the python-control system needs", "FrictionState steps in any loop"),
+    "mujoco": ("joint friction in MuJoCo needs", "FrictionState steps in any loop"),
+    "gymnasium": ("the environment needs", "FrictionState steps in any loop"),
     "check": ("checking a chart needs", "a chart runs without its proofs"),
 }
 

@@ -123,14 +123,17 @@ def next_on_grid(control: Control, t: float) -> float:
     return t_new
 
 
-def limit_after(plan: Plan, clock: Vector, cursor: list[int]) -> float:
-    """Return the end of the next step at the latest: the next stop or knot."""
-    knots, t, limit = plan.knots, clock[T], clock[T_STOP]
+def knot_after(plan: Plan, clock: Vector, cursor: list[int]) -> float:
+    """Return the next knot; infinity if there is none."""
+    knots, t = plan.knots, clock[T]
     while cursor[NEXT_KNOT] < len(knots) and knots[cursor[NEXT_KNOT]] <= t:
         cursor[NEXT_KNOT] += 1
-    if cursor[NEXT_KNOT] < len(knots):
-        limit = min(limit, knots[cursor[NEXT_KNOT]])
-    return limit
+    return knots[cursor[NEXT_KNOT]] if cursor[NEXT_KNOT] < len(knots) else INFINITY
+
+
+def limit_after(plan: Plan, clock: Vector, cursor: list[int]) -> float:
+    """Return the end of the next step at the latest: the next stop or knot."""
+    return min(clock[T_STOP], knot_after(plan, clock, cursor))
 
 
 def advance(

@@ -23,7 +23,7 @@ from integrators.advance import (
     Output,
     Plan,
     advance,
-    limit_after,
+    knot_after,
     put_row,
     raise_floor,
 )
@@ -152,7 +152,8 @@ def run_to_event(
         ROWS (to be taken, all with the present mode; possibly none if the steps are used up),
         FIRING (before) and FIRED (after an edge), STOPPED (a crossing, either side of a jump),
         SLID (sliding started or ended), ADVANCE (a foreign solver must continue), PAUSED (settled
-        at the time ``clock[PAUSE]``), DONE; or the error TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK, RELATION_LIVELOCK, TOO_MANY_STEPS.
+        at the time ``clock[PAUSE]``), DONE; or the error TOO_SMALL, NOT_FINITE, MACHINE_LIVELOCK,
+        RELATION_LIVELOCK, TOO_MANY_STEPS.
     """
     plan, now, memory = b.plan, b.now, b.memory
     relations, sliding, scratch = b.relations, b.sliding, b.scratch
@@ -348,9 +349,9 @@ def _begin_arc(
             # Without location the solver knows nothing of switches: it keeps its step.
             if control.step <= 0.0 and (plan.located or clock[H] <= 0.0):
                 clock[ERROR_BEFORE] = 1.0
-                limit = limit_after(plan, clock, cursor)
+                knot = knot_after(plan, clock, cursor)
                 order = plan.method.error_order
-                clock[H] = starting_step(motion, order, control, now, limit, scratch)
+                clock[H] = starting_step(motion, order, control, now, knot, scratch)
     return ADVANCE if plan.foreign else NOTHING
 
 

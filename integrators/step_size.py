@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from integrators.steps import Motion, Now, Scratch, T, Vector
+from integrators.steps import T_STOP, Motion, Now, Scratch, T, Vector
 
 __all__ = [
     "Control",
@@ -204,7 +204,7 @@ def retry_factor(error: float, order: int) -> float:
 
 
 def starting_step(
-    motion: Motion, order: int, control: Control, now: Now, limit: float, scratch: Scratch
+    motion: Motion, order: int, control: Control, now: Now, knot: float, scratch: Scratch
 ) -> float:
     """Return the usual starting step, from the size of y, y' and y''.
 
@@ -219,9 +219,9 @@ def starting_step(
     control : Control
         Tolerances, the longest step, and the system's time scale.
     now : Now
-        Time, state and slope at the start.
-    limit : float
-        The next stop or knot. What comes after it has no influence.
+        Time, state and slope at the start, and the next stop.
+    knot : float
+        The next knot. What comes after it has no influence.
     scratch : Scratch
         Used for a trial state and slope.
 
@@ -231,8 +231,11 @@ def starting_step(
         A step, > 0.
     """
     t = now.clock[T]
-    room = limit - t
-    time_scale = control.time_scale if control.time_scale > 0.0 else room
+    room = knot - t
+    # If the system has a scale, the remaining time does not matter: the kernel cuts the step.
+    time_scale = control.time_scale
+    if not time_scale > 0.0:
+        time_scale = min(room, now.clock[T_STOP] - t)
     y, f = now.y, now.f
     y_try, f_try = scratch.y_new, scratch.f_new
     longest = control.max_step

@@ -1,1 +1,1 @@
-"""Friction in other people's simulators; each module is named after the library it serves."""
+"""Friction in the loops of other programs: SciPy, PathSim, python-control, MuJoCo, gymnasium."""

@@ -6,6 +6,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import ParameterError
 from gms_fsm.language import CONSTANTS, FUNCTIONS
@@ -57,7 +59,7 @@ def start_of(
     t = checked_scalar("t", t, "finite")
     now = {} if values is None else values
     signals = {
-        name: Corners([t, t + 1.0], [now.get(name, 0.0)] * 2, held=True)
+        name: Corners(np.array([t, t + 1.0]), np.full(2, now.get(name, 0.0)), held=True)
         for name in ("v", *_other_inputs(contact))
     }
     system = System(

@@ -1,19 +1,17 @@
-"""What carries out the steps of a `FrictionState`: machine code, or the same functions in Python."""
+"""What carries out the steps of a `FrictionState`: machine code, or the same in Python."""
 
 from __future__ import annotations
 
-import functools
 import importlib.util
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.lowering import _compiled as compiled
-from gms_fsm.lowering.program import Program, equations
+from gms_fsm.lowering.program import equations
 from gms_fsm.run.machines import IfElse
 from gms_fsm.run.start import Start
 from integrators import hybrid
@@ -110,17 +108,18 @@ class Plain:
 
     def copy(self) -> dict[str, list[Any]]:
         """Return the present state."""
-        found = state_of(self) | {name: getattr(self.sample, name) for name in FOUND}
-        return {name: list(place) for name, place in found.items()}
+        return {name: list(place) for name, place in self._all().items()}
 
     def take(self, copy: Mapping[str, list[Any]]) -> None:
         """Return to what `copy` returned."""
-        places = state_of(self) | {name: getattr(self.sample, name) for name in FOUND}
-        for name, place in places.items():
+        for name, place in self._all().items():
             place[:] = copy[name]
 
-
-FOUND = ("end", "counts", "force", "t", "machine", "edge")
+    def _all(self) -> dict[str, Any]:
+        """Return all lists that a copy contains."""
+        found = ("end", "counts", "force", "t", "machine", "edge")
+        sample = {f"sample {name}": getattr(self.sample, name) for name in found}
+        return {**state_of(self), **sample}
 
 
 def _buffers(start: Start) -> Buffers:
@@ -159,23 +158,26 @@ class Machine:
     ----------
     start : Start
         The system, with its inputs as corner tables.
-    words : ndarray of int, optional
-        The memory of the block; its own if omitted.
+    memory : (ndarray of int, ndarray of int), optional
+        For the block, and for the state that is kept; its own if omitted.
     """
 
-    def __init__(self, start: Start, words: NDArray[np.int64] | None = None) -> None:
+    def __init__(
+        self, start: Start, memory: tuple[NDArray[np.int64], NDArray[np.int64]] | None = None
+    ) -> None:
         from integrators.machine_code.layout import Block
 
         self.code = machine_code(start)
         arguments = _arguments(start)
-        self.block = Block(self.code.layout, arguments, words=words)
+        self.block = Block(self.code.layout, arguments, words=None if memory is None else memory[0])
         self.block.update(self.block.contents)  # numbers; there are no columns
         contents = self.block.contents
         self.buffers, self.sample = contents.buffers, contents.sample
         _, _, self.tables = contents.functions.p
         self._one, self._address = self.code.one, self.block.address
         self._words = self.block.words
-        self._kept = self._words.copy()
+        self._kept = np.empty_like(self._words) if memory is None else memory[1]
+        self.keep()
 
     def run(self) -> int:
         """Advance; see `integrators.stepping.step_to`."""
@@ -190,11 +192,11 @@ class Machine:
         """Return to the state that was kept last."""
         self._words[:] = self._kept
 
-    def copy(self) -> NDArray[np.int64]:
+    def copy(self) -> Any:
         """Return the present state."""
         return self._words.copy()
 
-    def take(self, copy: NDArray[np.int64]) -> None:
+    def take(self, copy: Any) -> None:
         """Return to what `copy` returned."""
         self._words[:] = copy
 

@@ -44,9 +44,11 @@ class SimulationError(GMSError, RuntimeError):
     ) -> None:
         super().__init__(reason, place=place, advice=advice)
         self.trace, self.t = trace, t
-        self.kept = ".trace"  # where the partial run is: this attribute, or a file
+        self.kept = ".trace"  # where the partial run is: this attribute, a file, or nowhere
 
     def __str__(self) -> str:
+        if not self.kept:
+            return self.happened
         return f"{self.happened}; the run so far is kept in {self.kept}"
 
     @property

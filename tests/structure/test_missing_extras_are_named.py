@@ -19,7 +19,7 @@ from gms_fsm._extras import EXTRAS, missing, require
 from gms_fsm.errors import MissingExtraError
 from tests.helpers import ROOT, stick_slip
 
-FOR_DEVELOPERS = {"all", "bench", "cluster", "dev", "docs", "foreign", "mutation", "test"}
+FOR_DEVELOPERS = {"all", "bench", "cluster", "dev", "docs", "foreign", "hosts", "mutation", "test"}
 
 
 def test_the_table_has_the_extras_that_users_can_install() -> None:

@@ -28,6 +28,8 @@ from gms_fsm import (
     Contact,
     Element,
     ElementMachines,
+    FrictionBank,
+    FrictionState,
     GMSError,
     GMSParameters,
     LuGre,
@@ -109,6 +111,10 @@ def _entries(tmp: Path) -> Iterator[Entry]:
         "Contact": {"name": "pad", "chart": CHART, "values": {"k": 1.0}, "v": "v", "n": 1}
         | {"inputs": {}, "period": None},
         "Element": {},
+        "FrictionBank": {"models": [MODEL], "t": 0.0, "initial": None, "rtol": 1e-6}
+        | {"engine": None},
+        "FrictionState": {"model_or_contact": MODEL, "t": 0.0, "initial": None, "rtol": 1e-6}
+        | {"engine": None},
         "ElementMachines": {"model": MODEL, "element": Element},
         "GMS": {"parameters": PARAMETERS, "law": "signed"},
         "GMSParameters": {"k": [2.0], "sigma": [0.1], "C": [0.1], "v_c": 1.0, "weights": None}
@@ -197,10 +203,14 @@ def _methods(tmp: Path) -> Iterator[Entry]:
         "Settings": Settings,
         "System": lambda: SYSTEM,
         "ElementMachines": lambda: ElementMachines(MODEL),
+        "FrictionBank": lambda: FrictionBank([MODEL]),
+        "FrictionState": lambda: FrictionState(MODEL),
         "Report": lambda: prove(CHART),
         "LiveChart": lambda: plots.LiveChart(_trace()),
     }
     right = RIGHT | {"path": tmp / "file.npz"}
+    right |= {f"FrictionState.{each}.v{k}": 0.1 for each in SAMPLES for k in (0, 1)}
+    right |= {f"FrictionBank.{each}.v{k}": [0.1] for each in SAMPLES for k in (0, 1)}
     for kind, make in objects.items():
         for name, member in inspect.getmembers(type(make()), callable):
             if name.startswith("_") or inspect.isclass(member):
@@ -218,6 +228,7 @@ def _methods(tmp: Path) -> Iterator[Entry]:
             yield Entry(f"{kind}.{name}", lambda make=make, name=name: getattr(make(), name), given)
 
 
+SAMPLES = ("advance", "advance_to", "peek")
 RIGHT: dict[str, Any] = {
     "name": "z",
     "t": 0.5,
@@ -246,6 +257,11 @@ RIGHT: dict[str, Any] = {
     "points": 5,
     "times": [0.5],
     "chart": MODEL.chart,
+    "FrictionBank.restore.snapshot": FrictionBank([MODEL]).snapshot(),
+    "FrictionBank.from_array.array": FrictionBank([MODEL]).to_array(),
+    "FrictionState.restore.snapshot": FrictionState(MODEL).snapshot(),
+    "FrictionState.from_array.array": FrictionState(MODEL).to_array(),
+    "dt": 0.1,
     "Session.break_on.kind": "tested",
     "Session.watch.expression": "z1",
     "Session.watch.text": "z1",

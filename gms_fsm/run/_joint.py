@@ -1,0 +1,398 @@
+"""One contact with its stepper: what `FrictionState` and `FrictionBank` have in common."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import sys
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gms_fsm._arguments import checked_kind
+from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
+from gms_fsm.errors import ParameterError
+from gms_fsm.lowering.scales import scales_of
+from gms_fsm.run._plausible import check_state
+from gms_fsm.run._steppable import start_of
+from gms_fsm.run._stepper import Machine, Plain, Stepper, fast, state_of
+from gms_fsm.run.settings import MOST_STEPS
+from gms_fsm.run.start import LATEST, Start
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.system import Contact
+from gms_fsm.traces.failures import (
+    LivelockError,
+    NotFiniteError,
+    SimulationError,
+    StepLimitError,
+    StepSizeError,
+)
+from gms_fsm.traces.rows import Rows
+from integrators import advance, hybrid, loop
+from integrators.stepping import FULL_LOG, MEAN, RESUMED, SWITCHES
+from integrators.steps import T
+
+__all__ = [
+    "Asked",
+    "Joint",
+    "Line",
+    "Switch",
+    "check_inputs",
+    "line_of",
+    "stepper_kind",
+    "too_late",
+]
+
+Line = tuple[float, float]  # an input at the start and at the end of a sample
+# What the loop keeps only between two events at one time.
+TEMPORARY = ("cursor", "edges", "due")
+MOST = sys.float_info.max  # stands for infinity in arrays
+CHANGE = 1e-4  # of the last velocity, for a derivative by differences
+FAILURES: Mapping[int, tuple[type[SimulationError], str]] = {
+    loop.MACHINE_LIVELOCK: (LivelockError, "it keeps switching without progress"),
+    loop.RELATION_LIVELOCK: (LivelockError, "a comparison keeps changing without progress"),
+    advance.TOO_SMALL: (StepSizeError, "the step size fell below the resolution of the clock"),
+    loop.TOO_MANY_STEPS: (StepLimitError, f"one sample needs more than {MOST_STEPS:,} steps"),
+    advance.NOT_FINITE: (NotFiniteError, "the flow is NaN or infinite"),
+}
+
+
+class Switch(NamedTuple):
+    """An edge that was taken."""
+
+    t: float  # s
+    element: int
+    edge: str
+
+
+class Asked(NamedTuple):
+    """The arguments of a friction, besides the model."""
+
+    t: float
+    initial: Mapping[str, Any] | None
+    rtol: float
+
+
+class Last(NamedTuple):
+    """A sample that has been completed."""
+
+    v0: float
+    v1: float
+    t: float  # at its end
+    inputs: Mapping[str, Line]
+
+
+class Joint:
+    """One contact, its stepper, and the time.
+
+    Parameters
+    ----------
+    given : Model or Contact
+        What steps.
+    asked : Asked
+        Its other arguments.
+    start : Start
+        The same, as a start.
+    stepper : Machine or Plain
+        Of that start.
+    """
+
+    def __init__(
+        self, given: Model | Contact, asked: Asked, start: Start, stepper: Stepper
+    ) -> None:
+        self.given, self.asked, self.start, self.stepper = given, asked, start, stepper
+        self.t = start.t_start
+        self.last: Last | None = None
+        self.more: list[Switch] = []  # that did not fit into the log
+        (self._bank,) = start.program.layout.banks
+        self._chart = start.system.contacts[0].chart
+        self.inputs = tuple(start.system.signals)[1:]
+        # Views: an item of a memoryview is written in half the time of one of an array.
+        sample = stepper.sample
+        self._end, self.force = _view(sample.end), _view(sample.force)
+        self._counts, self._v = _view(sample.counts), _view(sample.inputs[0])
+        # The entry of its default state sees the first velocity.
+        self.enters = bool(self._chart.assignments["entry", self._chart.default_state.name])
+
+    # ------------------------------------------------------------------ samples
+    def run(self, v0: float, v1: float, t: float, inputs: Mapping[str, Line]) -> float:
+        """Advance the stepper, but not the time of this object; return the force."""
+        if self.inputs:
+            self._give(inputs)
+        if self.enters:
+            self.enter(v0, inputs)
+        v, counts = self._v, self._counts
+        self._end[0], v[0], v[1] = t, v0, v1
+        counts[RESUMED] = 0
+        self.more = []
+        if code := self.stepper.run():
+            self.finish(code)
+        force: float = self.force[0]
+        return force
+
+    def finish(self, code: int) -> None:
+        """Complete a sample that ended early, or raise its error."""
+        counts = self._counts
+        while code:
+            if code != FULL_LOG:
+                raise self._failure(code)
+            self.more += self._logged()
+            counts[SWITCHES], counts[RESUMED] = 0, 1
+            code = self.stepper.run()
+
+    def commit(self, v0: float, v1: float, t: float, inputs: Mapping[str, Line]) -> float:
+        """Advance by a sample; if that fails everything is as before."""
+        self.stepper.keep()
+        try:
+            force = self.run(v0, v1, t, inputs)
+        except BaseException:
+            self.stepper.back()
+            raise
+        self.t, self.last = t, Last(v0, v1, t, inputs)
+        return force
+
+    def peek(self, v0: float, v1: float, t: float, inputs: Mapping[str, Line]) -> float:
+        """Return the force at the end of a sample, and stay."""
+        stepper, before, more = self.stepper, self.stepper.copy(), self.more
+        try:
+            return self.run(v0, v1, t, inputs)
+        finally:
+            stepper.take(before)
+            self.more = more
+
+    def _give(self, inputs: Mapping[str, Line]) -> None:
+        """Write the further inputs."""
+        for place, name in zip(self.stepper.sample.inputs[1:], self.inputs, strict=True):
+            place[0], place[1] = inputs[name]
+
+    def enter(self, v0: float, inputs: Mapping[str, Line]) -> None:
+        """Enter the default states with the first inputs, if that has not been done yet."""
+        b: Any = self.stepper.buffers
+        if b.memory.counts[loop.PHASE] == loop.START:
+            first = {name: line[0] for name, line in inputs.items()}
+            start = start_of(self.given, *self.asked, {**first, "v": v0})
+            b.now.y[:], b.memory.anchor[:] = start.y, start.y
+
+    def _logged(self) -> list[Switch]:
+        sample, edges = self.stepper.sample, self._chart.transitions
+        count = int(self._counts[SWITCHES])
+        log = zip(sample.t[:count], sample.machine[:count], sample.edge[:count], strict=True)
+        return [Switch(float(t), int(i), edges[int(edge)].name) for t, i, edge in log]
+
+    def _failure(self, code: int) -> SimulationError:
+        """Return the error for a sample that cannot be completed."""
+        b, start = self.stepper.buffers, self.start
+        t, modes = float(b.now.clock[T]), hybrid.modes_of(b)
+        where = np.array([t]), np.zeros(1, dtype=np.int64), np.array([b.now.y]), np.array([modes])
+        row = Rows(*where)
+        kind, reason = FAILURES[code]
+        element = f"element {int(b.memory.counts[loop.MACHINE]) + 1}"
+        error = kind(
+            reason,
+            start.trace(row, row, start.firings([])),
+            t=t,
+            place=element if code == loop.MACHINE_LIVELOCK else "",
+            advice=f"the friction is as it was before the call, at t = {self.t!r} s",
+        )
+        error.kept = ""  # a sample has no rows
+        return error
+
+    # ------------------------------------------------------------------ what it found
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The state of each element."""
+        return tuple(self._chart.states[int(i)].name for i in self.stepper.buffers.now.mode)
+
+    @property
+    def variables(self) -> dict[str, FloatArray]:
+        """The chart's variables, one value per element."""
+        places, y = self.start.program.layout.y, np.array(self.stepper.buffers.now.y)
+        return {name: y[list(places.all_of(self._bank.of(name)))] for name in self._bank.variables}
+
+    @property
+    def switches(self) -> tuple[Switch, ...]:
+        """The edges taken in the last sample."""
+        return (*self.more, *self._logged()) if self._counts[SWITCHES] or self.more else ()
+
+    @property
+    def mean_force(self) -> float:
+        """The mean of the force over the last sample."""
+        return self._again(0.0, mean=True)
+
+    @property
+    def dF_dv(self) -> float:
+        """The derivative of the last force with respect to the velocity there."""
+        last = self._sample()
+        change = CHANGE * max(abs(float(last.v0)), abs(float(last.v1)), self._speed)
+        return (self._again(change) - self._again(-change)) / (2.0 * change)
+
+    @functools.cached_property
+    def _speed(self) -> float:
+        """m/s: a small speed."""
+        scales = scales_of(self.start.system.contacts[0])
+        return scales.speed or scales.v or 1.0
+
+    def _sample(self) -> Last:
+        if self.last is None:
+            raise ParameterError("there is no last sample", advice="call advance first")
+        return self.last
+
+    def _again(self, change: float, *, mean: bool = False) -> float:
+        """Return the force, or its mean, had the last velocity been different."""
+        v0, v1, t, inputs = self._sample()
+        stepper, more = self.stepper, self.more
+        now = stepper.copy()
+        stepper.back()
+        length = t - float(stepper.buffers.now.clock[T])
+        mean = mean and length > 0.0
+        self._counts[MEAN] = int(mean)
+        try:
+            force = self.run(v0, v1 + change, t, inputs)
+            impulse = float(self.force[1])
+        finally:
+            stepper.take(now)
+            self.more = more
+        return impulse / length if mean else force
+
+    # ------------------------------------------------------------------ going back
+    def moved_to(self, t: float) -> None:
+        """Forget the last sample: the stepper has been given another state."""
+        self.t, self.last, self.more = t, None, []
+
+    @functools.cached_property
+    def identity(self) -> tuple[str, str]:
+        """What states can be exchanged with: the same numbers, and the same engine."""
+        program, options = self.start.program, self.start.options
+        what = program.source, program.p[:2], options.rtol, options.atol
+        return hashlib.sha256(repr(what).encode()).hexdigest(), type(self.stepper).__name__
+
+    def to_array(self) -> FloatArray:
+        """Return the present state as finite numbers."""
+        places = self._places().values()
+        flat = np.concatenate([np.asarray(place, dtype=np.float64).ravel() for place in places])
+        found: FloatArray = np.clip(flat, -MOST, MOST)
+        return found
+
+    @functools.cached_property
+    def sizes(self) -> list[int]:
+        """The lengths of the parts of an array."""
+        return [np.size(place) for place in self._places().values()]
+
+    def from_array(self, given: FloatArray) -> None:
+        """Return to what `to_array` returned; it has the right length."""
+        flat = np.where(np.abs(given) < MOST, given, np.copysign(np.inf, given))
+        places = self._places()
+        state: dict[str, NDArray[Any]] = {
+            name: np.asarray(place) for name, place in state_of(self.stepper).items()
+        }
+        parts = np.split(flat, np.cumsum(self.sizes)[:-1])
+        try:
+            for (name, place), part in zip(places.items(), parts, strict=True):
+                kind = np.asarray(place).dtype
+                with np.errstate(invalid="ignore"):
+                    state[name] = part.astype(kind)
+                if not np.array_equal(state[name], part):
+                    raise ValueError(f"{name}: not of type {kind}")
+            check_state(self.start, self.stepper.buffers, state)
+        except ValueError as error:
+            raise ParameterError(
+                f"it is no state of this friction ({error})",
+                place="array",
+                advice="give what to_array returned, unchanged",
+            ) from None
+        for name, place in places.items():
+            place[:] = state[name] if isinstance(place, np.ndarray) else state[name].tolist()
+        self._counts[SWITCHES] = 0
+        self.moved_to(float(self.stepper.buffers.now.clock[T]))
+
+    def _places(self) -> dict[str, Any]:
+        """Return the arrays that make up the state between two samples."""
+        return {n: place for n, place in state_of(self.stepper).items() if n not in TEMPORARY}
+
+
+def _view(place: Any) -> Any:
+    return memoryview(place) if isinstance(place, np.ndarray) else place  # type: ignore[arg-type]
+
+
+# --------------------------------------------------------------------------- arguments
+def stepper_kind(engine: object) -> type[Machine] | type[Plain]:
+    """Return what carries out the steps of an engine; None is machine code, where it can be made.
+
+    Raises
+    ------
+    ParameterError, MissingExtraError
+        If it is no engine, or llvmlite is missing.
+    """
+    if engine is None:
+        return Machine if fast() else Plain
+    if not isinstance(engine, str) or engine not in ("compiled", "ifelse"):
+        raise ParameterError("it must be 'compiled' or 'ifelse'", place="engine", value=engine)
+    return Machine if engine == "compiled" else Plain
+
+
+def too_late(name: str, value: object) -> ParameterError:
+    """Return the error for a time that the clock cannot resolve."""
+    return ParameterError(
+        "it is too large", place=name, value=value, advice=f"at most {LATEST:g} s"
+    )
+
+
+def later(t: Any, now: float) -> float:
+    """Return a time if it is not before the present one."""
+    time = checked_scalar("t", t, "finite")
+    if time < now:
+        raise ParameterError(
+            f"it is before the present time {now!r} s",
+            place="t",
+            value=time,
+            advice="restore a snapshot to go back",
+        )
+    return time
+
+
+def line_of(name: str, given: Any) -> tuple[Any, Any]:
+    """Return an input at the start and at the end of a sample."""
+    if isinstance(given, tuple | list) and len(given) == 2:
+        return given[0], given[1]
+    raise ParameterError(
+        "it must be a pair, its value at the start and at the end of the sample",
+        place=name,
+        value=given,
+    )
+
+
+def check_inputs(given: Mapping[str, object], known: Iterable[str]) -> None:
+    """Refuse inputs unless they are exactly the known ones."""
+    names = sorted({*known})
+    if sorted(given) != names:
+        raise ParameterError(
+            f"the further inputs given are {', '.join(sorted(given)) or 'none'}",
+            advice=f"give {', '.join(f'{name}=(start, end)' for name in names)}"
+            if names
+            else "this friction has no inputs but its velocity",
+        )
+
+
+def content_of(snapshot: object, kind: type[Any], identity: tuple[str, str]) -> Any:
+    """Return the content of a snapshot if it is of the same friction."""
+    checked: Any = checked_kind("snapshot", snapshot, kind, "what snapshot() returned")
+    if checked.of != identity:
+        reason = "it is of a friction with another engine"
+        if checked.of[0] != identity[0]:
+            reason = "it is of another model, or of one with other numbers"
+        raise ParameterError(
+            reason, place="snapshot", advice="take it from a friction made in the same way"
+        )
+    return checked.content
+
+
+def numbers_of(array: ArrayLike, length: int) -> FloatArray:
+    """Return an array of a given length."""
+    given = checked_array("array", array, None, "finite")
+    if given.size != length:
+        raise ParameterError(
+            f"it has {given.size} numbers", place="array", advice=f"it must have {length}"
+        )
+    return given

@@ -1,0 +1,83 @@
+"""Stepping through a record gives the bits of `simulate` over it: forces, and switch times.
+
+Also after looking ahead and going back. `python -m tests.run.test_stepping_equals_simulate SEED
+COUNT` repeats a case, or tries others.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+from gms_fsm import FrictionState, Prescribed, simulate
+from gms_fsm.errors import GMSError
+from tests.helpers import FASTEST
+from tests.run.stepping_cases import friction, record
+
+CASES = 200
+ENGINES = ("compiled", "ifelse") if FASTEST == "compiled" else ("ifelse",)
+
+
+def differences(seed: int, index: int) -> tuple[str, int]:
+    """Return what differs in one random case, and the number of switches."""
+    rng = np.random.default_rng([seed, index])
+    model, speed = friction(rng)
+    t, v = record(rng, speed, rows=150)
+    try:
+        trace = simulate(model, Prescribed((t, v)), t[-1], t_start=t[0], engine=FASTEST, t_eval=t)
+    except GMSError as error:
+        trace, failed = None, type(error)
+    for engine in ENGINES:
+        friction_state = FrictionState(model, t=t[0], engine=engine)
+        forces, log = [friction_state.peek(v[0], v[0], 0.0)], []
+        try:
+            for j in range(1, len(t)):
+                aside = float(speed * rng.normal())
+                if rng.random() < 0.1:
+                    before = friction_state.snapshot()
+                    friction_state.advance(v[j - 1], aside, t[j] - t[j - 1])
+                    friction_state.restore(before)
+                if rng.random() < 0.1:
+                    friction_state.peek(v[j - 1], aside, t[j] - t[j - 1])
+                if rng.random() < 0.1:
+                    friction_state.from_array(friction_state.to_array())
+                forces.append(friction_state.advance_to(v[j - 1], v[j], t[j]))
+                log += friction_state.switches
+        except GMSError as error:
+            if trace is not None or type(error) is not failed:
+                return f"{model.title}, {engine}: {error}", 0
+            continue
+        if trace is None:
+            return f"{model.title}, {engine}: only simulate fails", 0
+        wanted = [(float(r.t), int(r.element), str(r.edge)) for r in trace.transitions]
+        if [tuple(each) for each in log] != wanted:
+            return f"{model.title}, {engine}: {len(log)} switches, not {len(wanted)}, or others", 0
+        wrong = np.flatnonzero(np.array(forces) != trace.F)
+        if wrong.size:
+            return f"{model.title}, {engine}: the force at sample {wrong[0]}", 0
+    return "", 0 if trace is None else len(trace.transitions)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("part", range(4))
+def test_random_records(part: int) -> None:
+    found = {k: differences(1, k) for k in range(part, CASES, 4)}
+    wrong = {k: text for k, (text, _) in found.items() if text}
+    assert not wrong, f"python -m tests.run.test_stepping_equals_simulate 1 {CASES}: {wrong}"
+    assert sum(count for _, count in found.values()) > 500
+
+
+def main() -> None:
+    seed, count = map(int, sys.argv[1:])
+    found = [differences(seed, k) for k in range(count)]
+    for k, (text, _) in enumerate(found):
+        if text:
+            print(k, text)
+    different = sum(bool(text) for text, _ in found)
+    print(f"{different} of {count} differ; {sum(n for _, n in found)} switches")
+
+
+if __name__ == "__main__":
+    main()
