@@ -77,7 +77,7 @@ def friction_system(
     return control.nlsys(
         memory.update,
         memory.output,
-        inputs=list(friction.inputs),
+        inputs=["v", *friction.inputs],
         outputs=["F"],
         states=memory.size,
         dt=dt,
@@ -95,8 +95,8 @@ class _Memory:
     def __init__(self, friction: FrictionState, dt: float) -> None:
         self._friction, self._dt = friction, dt
         self._start = friction.snapshot()
-        self._more = friction.inputs[1:]
-        self._first = 1 + len(friction.inputs)  # number of x that belongs to the friction
+        self._more = friction.inputs
+        self._first = 2 + len(self._more)  # number of x that belongs to the friction
         self.size = self._first + friction.to_array().size
         self._held: FloatArray = np.zeros(self.size)
 

@@ -92,11 +92,11 @@ def _block_class() -> Any:
         def __init__(self, begin: Any, period: float) -> None:
             self._begin = begin
             self.friction: FrictionState = begin()
-            names = self.friction.inputs
+            self._more = self.friction.inputs
+            names = "v", *self._more
             self.input_port_labels = {name: port for port, name in enumerate(names)}
             self.output_port_labels = {"F": 0}
             super().__init__()
-            self._more = names[1:]
             self._last: list[float] | None = None  # the inputs at the last sample
             self._now = 0.0, [0.0] * len(names)
             self.switches: list[Switch] = []
