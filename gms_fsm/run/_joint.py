@@ -261,12 +261,17 @@ class Joint:
         """Forget the last sample: the stepper has been given another state."""
         self.t, self.last, self.more = t, None, []
 
+    @property
+    def engine(self) -> str:
+        """The name of its engine."""
+        return "compiled" if isinstance(self.stepper, Machine) else "ifelse"
+
     @functools.cached_property
     def identity(self) -> tuple[str, str]:
         """What states can be exchanged with: the same numbers, and the same engine."""
         program, options = self.start.program, self.start.options
         what = program.source, program.p[:2], options.rtol, options.atol
-        return hashlib.sha256(repr(what).encode()).hexdigest(), type(self.stepper).__name__
+        return hashlib.sha256(repr(what).encode()).hexdigest(), self.engine
 
     def to_array(self) -> FloatArray:
         """Return the present state as finite numbers."""
@@ -314,6 +319,13 @@ class Joint:
 
 def _view(place: Any) -> Any:
     return memoryview(place) if isinstance(place, np.ndarray) else place  # type: ignore[arg-type]
+
+
+def made_again(kind: Any, given: Any, arguments: Mapping[str, Any], array: FloatArray) -> Any:
+    """Return a copy of a `FrictionState` or a `FrictionBank`, also in another process."""
+    new = kind(given, **arguments)
+    new.from_array(array)
+    return new
 
 
 # --------------------------------------------------------------------------- arguments

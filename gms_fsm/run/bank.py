@@ -21,6 +21,7 @@ from gms_fsm.run._joint import (
     content_of,
     later,
     line_of,
+    made_again,
     numbers_of,
     stepper_kind,
     too_late,
@@ -274,6 +275,22 @@ class FrictionBank:
             joint.t = self._t
             joint.last = None if self._last is None else self._last.of(i, joint.inputs)
         return self._joints
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how to make a copy: memory of machine code is not copied."""
+        joints, first = self._joints, self._joints[0]
+        arguments = {
+            "t": first.asked.t,
+            "initial": [joint.asked.initial for joint in joints],
+            "rtol": first.asked.rtol,
+            "engine": first.engine,
+        }
+        return made_again, (
+            type(self),
+            [joint.given for joint in joints],
+            arguments,
+            self.to_array(),
+        )
 
     # ------------------------------------------------------------------ going back
     def snapshot(self) -> Snapshot:

@@ -19,6 +19,7 @@ from gms_fsm.run._joint import (
     content_of,
     later,
     line_of,
+    made_again,
     numbers_of,
     stepper_kind,
     too_late,
@@ -225,6 +226,12 @@ class FrictionState:
         """
         return self._joint.dF_dv
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how to make a copy: memory of machine code is not copied."""
+        joint = self._joint
+        arguments = {**joint.asked._asdict(), "engine": joint.engine}
+        return made_again, (type(self), self.model, arguments, self.to_array())
+
     # ------------------------------------------------------------------ going back
     def snapshot(self) -> Snapshot:
         """Return the present state, to return to it with `restore`.
@@ -282,12 +289,10 @@ class FrictionState:
 
 
 def _checked(v0: Any, v1: Any, dt: Any) -> tuple[float, float, float]:
-    """Return the arguments of a sample, or refuse them."""
-    try:
-        if isfinite(v0) and isfinite(v1) and 0.0 <= dt <= LATEST and type(v0) is not bool:
-            return v0, v1, dt
-    except (TypeError, ValueError):
-        pass
+    """Return the arguments of a sample as floats, or refuse them."""
+    usual = isinstance(v0, float) and isinstance(v1, float) and isinstance(dt, float)
+    if usual and isfinite(v0) and isfinite(v1) and 0.0 <= dt <= LATEST:
+        return v0, v1, dt
     v0, v1 = checked_scalar("v0", v0, "finite"), checked_scalar("v1", v1, "finite")
     dt = checked_scalar("dt", dt, ">= 0")
     if dt > LATEST:

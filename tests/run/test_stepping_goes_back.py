@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -102,3 +107,20 @@ def test_a_bank() -> None:
     for back in (lambda: frictions.restore(before), lambda: frictions.from_array(array)):
         back()
         assert [frictions.advance(v[j - 1], v[j], DT).tolist() for j in range(60, 200)] == first
+
+
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda given: pickle.loads(pickle.dumps(given))])
+def test_copies_go_their_own_ways(again: Callable[[Any], Any]) -> None:
+    friction = FrictionState(stick_slip("signed"), t=1.0)
+    moved(friction, 1, 60)
+    other = again(friction)
+    first = moved(friction, 60, 200)
+    assert other.t < friction.t
+    assert moved(other, 60, 200) == first
+    bank = FrictionBank([stick_slip("signed")] * 2, initial=[{}, {"x": 1.0}])
+    bank.advance([0.0, 0.1], [0.3, 0.2], 2.0)
+    other = again(bank)
+    for each in (bank, other):
+        assert each.advance([0.3, 0.2], [0.0, 0.0], 0.5).tolist() == pytest.approx(
+            bank.peek([0.0, 0.0], [0.0, 0.0], 0.0).tolist(), abs=0
+        )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -85,6 +86,11 @@ def test_a_state(name: str) -> None:
     assert (friction.t, friction.states, friction.switches) == before[1:]
     twin = started()
     assert friction.advance(0.1, -0.1, 1.0) == twin.advance(0.1, -0.1, 1.0)
+
+
+@pytest.mark.parametrize("kind", [int, np.float32, np.float64, np.array, Fraction])
+def test_other_kinds_of_numbers(kind: Callable[[Any], Any]) -> None:
+    assert started().advance(kind(1), kind(0), kind(2)) == started().advance(1.0, 0.0, 2.0)
 
 
 BANKS: dict[str, tuple[Callable[[FrictionBank], Any], str]] = {
