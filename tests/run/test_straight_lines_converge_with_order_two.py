@@ -14,16 +14,16 @@ T_END = 20.0  # s
 ENDS = np.arange(1.0, 21.0)  # s
 
 
-@pytest.mark.parametrize("engine", [FASTEST])
-def test_order_of_forces_and_switch_times(engine: str) -> None:
+@pytest.mark.slow
+def test_order_of_forces_and_switch_times() -> None:
     model, _ = pulled_mass()
     rig = Prescribed("0.1*sin(0.63*t)")
-    exact = simulate(model, rig, T_END, t_eval=ENDS, engine=engine, rtol=1e-12, atol=1e-15)
+    exact = simulate(model, rig, T_END, t_eval=ENDS, engine=FASTEST, rtol=1e-12, atol=1e-15)
     log = [(int(each.element), str(each.edge)) for each in exact.transitions]
     assert len(log) == 32
     per_second, wrong, late = [8, 16, 32, 64, 128, 256, 512], [], []
     for n in per_second:
-        friction = FrictionState(model, rtol=1e-10, engine=engine)
+        friction = FrictionState(model, rtol=1e-10, engine=FASTEST)
         forces, switches, v0 = [], [], 0.0
         for step in range(1, n * 20 + 1):
             v1 = 0.1 * sin(0.63 * step / n)
