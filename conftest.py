@@ -11,9 +11,10 @@ if not importlib.util.find_spec("textual"):
 # The examples compile (extra: fast).
 if not importlib.util.find_spec("llvmlite"):
     collect_ignore += ["integrators/machine_code/objects.py"]
-# The examples of adapters use the library that they serve (extras of the same names).
+# Adapters' examples and whole runs use the library that is served (extras of the same names).
 collect_ignore += [
-    f"gms_fsm/adapters/{name}.py"
+    path
     for name in ("control", "pathsim")
+    for path in (f"gms_fsm/adapters/{name}.py", f"tests/foreign/check_{name}.py")
     if not importlib.util.find_spec(name)
 ]

@@ -29,7 +29,8 @@ def friction_block(
 
     The velocity is sampled at multiples of the period, and taken as a straight line in between,
     along which every switch is located. Between two samples the output is the force at the present
-    velocity, not a held one: the stages of PathSim's solver see a continuous force.
+    velocity, not a held one: the stages of PathSim's solver see a continuous force. A velocity that
+    jumps (an impact, an event of yours) is a straight line over that sample.
 
     Parameters
     ----------
