@@ -11,3 +11,10 @@ if not importlib.util.find_spec("textual"):
 # The examples compile (extra: fast).
 if not importlib.util.find_spec("llvmlite"):
     collect_ignore += ["integrators/machine_code/objects.py"]
+# Adapters' examples and whole runs use the library that is served (extras of the same names).
+collect_ignore += [
+    path
+    for name in ("control", "pathsim")
+    for path in (f"gms_fsm/adapters/{name}.py", f"tests/foreign/check_{name}.py")
+    if not importlib.util.find_spec(name)
+]
