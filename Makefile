@@ -11,7 +11,8 @@
 #   make regressions  speed compared with an older commit, in interleaved rounds; OLD=main
 #   make soak    stress tests: fuzzing, kills, a million transitions, 2,000 runs checked against a
 #                reference, 500 systems in all engines; SOAK_MINUTES=10 for each fuzzer
-#   make foreign the widget, driven in JupyterLab and marimo by their own user interfaces, in Chromium
+#   make foreign the widget, driven in JupyterLab and marimo by their own user interfaces, in Chromium,
+#                and whole runs of friction in other simulators
 #   make gallery the pictures in docs/images, shown in docs/gallery.md, and the pages in docs/zoo
 #   make docs    the documentation -> folder site/, which can be opened from disk
 #   make wheel   a wheel -> folder dist/, installed and tested outside the checkout
@@ -112,6 +113,7 @@ soak: $(VENV)/dev.stamp
 	$(RUN)/python -m tests.soak --minutes $(SOAK_MINUTES)
 
 foreign: $(VENV)/foreign.stamp
+	$(RUN)/python -m pytest tests/foreign/check_*.py
 	$(RUN)/python -m tests.foreign
 
 gallery: $(VENV)/all.stamp

@@ -11,7 +11,10 @@ if not importlib.util.find_spec("textual"):
 # The examples compile (extra: fast).
 if not importlib.util.find_spec("llvmlite"):
     collect_ignore += ["integrators/machine_code/objects.py"]
-# These examples run in other programs (extras: gymnasium, mujoco).
-for host in ("gymnasium", "mujoco"):
-    if not importlib.util.find_spec(host):
-        collect_ignore += [f"gms_fsm/adapters/{host}.py"]
+# Adapters' examples and whole runs use the library that is served (extras of the same names).
+collect_ignore += [
+    path
+    for name in ("control", "gymnasium", "mujoco", "pathsim")
+    for path in (f"gms_fsm/adapters/{name}.py", f"tests/foreign/check_{name}.py")
+    if not importlib.util.find_spec(name)
+]

@@ -550,7 +550,7 @@ def documents(rounds: int) -> dict[str, str]:
             WIDTH,
         ),
         "",
-        *_markdown(head, table),
+        *markdown(head, table),
         "",
         textwrap.fill(
             f"{count:,} pulled masses (k ± 20 %): {rate:,.0f} per second and core, {wrong} wrong "
@@ -562,7 +562,7 @@ def documents(rounds: int) -> dict[str, str]:
         ),
     ]
     both = [PROBLEMS[name] for name in ("pulled", "open")]
-    numerics = _markdown(
+    numerics = markdown(
         ("error of", *(cell for one in both for cell in (one.title, "times"))),
         [
             (name, *(cell for one in ("pulled", "open") for cell in _accuracy(rows[one].get(name))))
@@ -583,19 +583,25 @@ def _accuracy(score: Score | None) -> tuple[str, str]:
     return ("", "") if score is None else (score.error, score.late)
 
 
-def _markdown(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
+def markdown(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
+    """Return the lines of a table for a document."""
     return Table("", head, rows).text(markdown=True).splitlines()[2:]
 
 
 def write(rounds: int) -> None:
     """Replace what is between the marks in the documents."""
     for name, text in documents(rounds).items():
-        path = ROOT / name
-        before, begin, rest = path.read_text(encoding="utf-8").partition(BEGIN)
-        mark, _, rest = rest.partition("\n")
-        _, end, after = rest.partition(END)
-        path.write_text(f"{before}{begin}{mark}\n\n{text}\n\n{end}{after}", encoding="utf-8")
-        print(f"{name} has new tables")
+        replace(name, text)
+
+
+def replace(name: str, text: str) -> None:
+    """Replace what is between the marks in a document."""
+    path = ROOT / name
+    before, begin, rest = path.read_text(encoding="utf-8").partition(BEGIN)
+    mark, _, rest = rest.partition("\n")
+    _, end, after = rest.partition(END)
+    path.write_text(f"{before}{begin}{mark}\n\n{text}\n\n{end}{after}", encoding="utf-8")
+    print(f"{name} has new tables")
 
 
 def machine() -> str:

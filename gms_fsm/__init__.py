@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from gms_fsm.phenomena.measure import PhenomenaTable as PhenomenaTable
     from gms_fsm.phenomena.measure import measure_phenomena as measure_phenomena
     from gms_fsm.run.bank import FrictionBank as FrictionBank
+    from gms_fsm.run.equations import FrictionEquations as FrictionEquations
     from gms_fsm.run.machines import Element as Element
     from gms_fsm.run.machines import ElementMachines as ElementMachines
     from gms_fsm.run.settings import Settings as Settings
@@ -87,6 +88,7 @@ _HOMES = {
     "inspection.session": "Session",
     "phenomena.measure": "Bench PhenomenaTable measure_phenomena",
     "run.bank": "FrictionBank",
+    "run.equations": "FrictionEquations",
     "run.machines": "Element ElementMachines",
     "run.settings": "Settings",
     "run.simulate": "simulate",

@@ -17,7 +17,7 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.signals import Corners
 from gms_fsm.systems.system import Body, Contact, System
 
-__all__ = ["start_of"]
+__all__ = ["alone", "other_inputs", "start_of"]
 
 WORD = re.compile(r"(?<![\w.])[A-Za-z_]\w*")  # not the exponent of a number
 GIVEN = ("t", "x", "v")  # what a contact knows by itself: x is the integral of v
@@ -55,12 +55,12 @@ def start_of(
     ParameterError
         If it cannot be stepped, or an argument violates its rule.
     """
-    contact = _alone(given)
+    contact = alone(given)
     t = checked_scalar("t", t, "finite")
     now = {} if values is None else values
     signals = {
         name: Corners(np.array([t, t + 1.0]), np.full(2, now.get(name, 0.0)), held=True)
-        for name in ("v", *_other_inputs(contact))
+        for name in ("v", *other_inputs(contact))
     }
     system = System(
         "prescribed velocity",
@@ -72,7 +72,7 @@ def start_of(
     return Start.of(system, None, t + 1.0, settings, t_start=t, initial=initial)
 
 
-def _alone(given: Model | Contact) -> Contact:
+def alone(given: Model | Contact) -> Contact:
     """Return a contact that needs no bodies but its own, or refuse."""
     if not hasattr(given, "chart"):
         raise ParameterError(
@@ -114,7 +114,7 @@ def _alone(given: Model | Contact) -> Contact:
     return Contact(given.name, chart, given.values, n=given.n, inputs=inputs)
 
 
-def _other_inputs(contact: Contact) -> list[str]:
+def other_inputs(contact: Contact) -> list[str]:
     """Return what the texts of a contact name, except what it knows by itself."""
     texts = [contact.inputs.get(name, name) for name in contact.chart.inputs if name != "s"]
     found = dict.fromkeys(name for text in texts for name in WORD.findall(str(text)))

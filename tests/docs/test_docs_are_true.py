@@ -18,7 +18,7 @@ from tests.page_blocks import ROOT, Page, agrees, blocks_of
 
 pytestmark = pytest.mark.slow
 
-EXTRA = "anywidget llvmlite matplotlib pandas pygraphviz pyarrow uplot xarray z3"
+EXTRA = "anywidget control llvmlite matplotlib pandas pathsim pygraphviz pyarrow uplot xarray z3"
 for module in EXTRA.split():
     pytest.importorskip(module, reason="the pages use all extras")
 

@@ -71,6 +71,26 @@ def test_pages_have_a_place_for_the_tables(page: str) -> None:
     assert between.count("| C loop, hand-written for this model ") == 1
 
 
+@pytest.mark.slow
+def test_the_page_of_loops_has_the_tables_measured() -> None:
+    text = (ROOT / "docs/howto/own-loops.md").read_text(encoding="utf-8")
+    place = "<!-- measured table: begin; made by `python benchmarks/own_loops.py --write` -->\n"
+    assert text.count(place) == text.count("<!-- measured table: end -->") == 1
+    rows = re.findall(r"^\| (.*?) +\| +(\d+) \| +(\d+) \| .* mm \|", text, re.MULTILINE)
+    code = (
+        "import json; from own_loops import LOOPS; logs = {name: [] for name in LOOPS}; "
+        "[loop(1e-3, logs[name]) for name, loop in LOOPS.items()]; print(json.dumps(logs))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=FOLDER, capture_output=True, text=True, check=True
+    )
+    logs = json.loads(done.stdout.splitlines()[-1])
+    assert [(name, int(count)) for name, count, _ in rows] == [
+        (name, len(log)) for name, log in logs.items()
+    ]
+    assert [int(right) == 72 for _, _, right in rows] == [False, False, True, True]
+
+
 def test_the_regressions_are_those_of_all_cases() -> None:
     code = "import regressions.runs as r; print(len(r.Runs.params[0]))"
     done = subprocess.run(

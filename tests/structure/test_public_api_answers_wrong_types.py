@@ -29,6 +29,7 @@ from gms_fsm import (
     Element,
     ElementMachines,
     FrictionBank,
+    FrictionEquations,
     FrictionState,
     GMSError,
     GMSParameters,
@@ -113,6 +114,7 @@ def _entries(tmp: Path) -> Iterator[Entry]:
         "Element": {},
         "FrictionBank": {"models": [MODEL], "t": 0.0, "initial": None, "rtol": 1e-6}
         | {"engine": None},
+        "FrictionEquations": {"model_or_contact": MODEL, "t": 0.0, "initial": None},
         "FrictionState": {"model_or_contact": MODEL, "t": 0.0, "initial": None, "rtol": 1e-6}
         | {"engine": None},
         "ElementMachines": {"model": MODEL, "element": Element},
@@ -204,6 +206,7 @@ def _methods(tmp: Path) -> Iterator[Entry]:
         "System": lambda: SYSTEM,
         "ElementMachines": lambda: ElementMachines(MODEL),
         "FrictionBank": lambda: FrictionBank([MODEL]),
+        "FrictionEquations": _settled,
         "FrictionState": lambda: FrictionState(MODEL),
         "Report": lambda: prove(CHART),
         "LiveChart": lambda: plots.LiveChart(_trace()),
@@ -226,6 +229,12 @@ def _methods(tmp: Path) -> Iterator[Entry]:
                 if each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)
             }
             yield Entry(f"{kind}.{name}", lambda make=make, name=name: getattr(make(), name), given)
+
+
+def _settled() -> FrictionEquations:
+    friction = FrictionEquations(MODEL)
+    friction.settle(0.0, friction.initial, 0.5)
+    return friction
 
 
 SAMPLES = ("advance", "advance_to", "peek")
@@ -261,6 +270,7 @@ RIGHT: dict[str, Any] = {
     "FrictionBank.from_array.array": FrictionBank([MODEL]).to_array(),
     "FrictionState.restore.snapshot": FrictionState(MODEL).snapshot(),
     "FrictionState.from_array.array": FrictionState(MODEL).to_array(),
+    "y": FrictionEquations(MODEL).initial,
     "dt": 0.1,
     "Session.break_on.kind": "tested",
     "Session.watch.expression": "z1",

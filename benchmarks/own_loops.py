@@ -1,0 +1,292 @@
+"""What a loop of one's own loses if friction steps in it naively, and what each step costs.
+
+The pulled mass and the servo of `cases.py`, in fixed-step loops as users write them, with friction
+in three ways: guards asked once a sample; switches located while the velocity is held; switches
+located along the straight line from one velocity to the next. Times are medians over rounds in
+which every loop runs, relative to the naive loop of the same round.
+
+    python benchmarks/own_loops.py [--rounds 9]
+    python benchmarks/own_loops.py --write        the tables in docs/howto/own-loops.md
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import textwrap
+import time
+from collections.abc import Callable
+from math import copysign, exp, sin
+from typing import Any, TypeAlias
+
+import numpy as np
+from cases import model_and_rig, servo
+from compare import WIDTH, machine, markdown, replace
+from rivals import EDGES, PULLED_MASS, Array
+
+from gms_fsm import GMS, FrictionState, Prescribed, simulate
+
+PAGE = "docs/howto/own-loops.md"
+T_END, M, K, V = 60.0, 1.0, 2.0, 0.1  # pulled mass: s, kg, N/m, m/s
+Log: TypeAlias = list[tuple[int, str]]
+
+
+class Naive:
+    """Friction as it is often written: guards once a sample, then an Euler step.
+
+    Parameters
+    ----------
+    model : GMS
+        With the signed law.
+    """
+
+    def __init__(self, model: GMS) -> None:
+        p = model.parameters
+        self.numbers = list(
+            zip(p.k.tolist(), p.sigma.tolist(), p.C.tolist(), p.weights.tolist(), strict=True)
+        )
+        curve = p.stribeck
+        self.F_c, self.F_s, self.v_s = curve.F_c, curve.F_s, curve.v_s
+        self.v_c, self.sigma_2 = p.v_c, p.sigma_2
+        self.z = [0.0] * len(self.numbers)
+        self.slips = [False] * len(self.numbers)
+        self.log: Log = []
+
+    def step(self, v: float, dt: float) -> float:
+        """Return the force at v, and advance by dt."""
+        strength = self.F_c + (self.F_s - self.F_c) * exp(-((v / self.v_s) ** 2))
+        F = self.sigma_2 * v
+        for i, (k, sigma, C, w) in enumerate(self.numbers):
+            z, s = self.z[i], w * strength
+            if self.slips[i]:
+                if abs(v) <= self.v_c and abs(z) < s:
+                    self._take(i, 2)
+            elif z >= s and v > self.v_c:
+                self._take(i, 0)
+            elif z <= -s and v < -self.v_c:
+                self._take(i, 1)
+            dz = C * (copysign(1.0, v) * (v != 0.0) - z / s) if self.slips[i] else v
+            F += k * z + sigma * dz
+            self.z[i] = z + dt * dz
+        return F
+
+    def _take(self, i: int, edge: int) -> None:
+        self.slips[i] = not self.slips[i]
+        self.log.append((i, EDGES[edge]))
+
+
+# --------------------------------------------------------------------------- the pulled mass
+def naive(dt: float, log: Log | None) -> Array:
+    """Return x at every sample: one call a sample, with the velocity only."""
+    model, _ = model_and_rig(PULLED_MASS)
+    friction, x, v, xs = Naive(model), 0.0, 0.0, [0.0]
+    for step in range(round(T_END / dt)):
+        v += dt * (K * (V * step * dt - x) - friction.step(v, dt)) / M
+        x += dt * v
+        xs.append(x)
+    if log is not None:
+        log += friction.log
+    return np.array(xs)
+
+
+def held(dt: float, log: Log | None) -> Array:
+    """Return x at every sample: switches are located, but the velocity is held in a sample."""
+    model, _ = model_and_rig(PULLED_MASS)
+    friction, x, v, xs = FrictionState(model), 0.0, 0.0, [0.0]
+    for step in range(round(T_END / dt)):
+        F = friction.advance(v, v, dt)
+        _keep(friction, log)
+        v += dt * (K * (V * step * dt - x) - F) / M
+        x += dt * v
+        xs.append(x)
+    return np.array(xs)
+
+
+def straight(dt: float, log: Log | None) -> Array:
+    """Return x at every sample: the last force gives the next velocity."""
+    model, _ = model_and_rig(PULLED_MASS)
+    friction, x, v, F, xs = FrictionState(model), 0.0, 0.0, 0.0, [0.0]
+    for step in range(round(T_END / dt)):
+        v_next = v + dt * (K * (V * step * dt - x) - F) / M
+        F = friction.advance(v, v_next, dt)
+        _keep(friction, log)
+        x += dt * (v + v_next) / 2
+        v = v_next
+        xs.append(x)
+    return np.array(xs)
+
+
+def heun(dt: float, log: Log | None) -> Array:
+    """Return x at every sample: the force at the end is peeked at, then the step is done."""
+    model, _ = model_and_rig(PULLED_MASS)
+    friction, x, v, F, xs = FrictionState(model), 0.0, 0.0, 0.0, [0.0]
+    for step in range(round(T_END / dt)):
+        a = (K * (V * step * dt - x) - F) / M
+        tried = v + dt * a
+        F_tried = friction.peek(v, tried, dt)
+        x_tried = x + dt * (v + tried) / 2
+        a_tried = (K * (V * (step + 1) * dt - x_tried) - F_tried) / M
+        v_next = v + dt * (a + a_tried) / 2
+        F = friction.advance(v, v_next, dt)
+        _keep(friction, log)
+        x += dt * (v + v_next) / 2
+        v = v_next
+        xs.append(x)
+    return np.array(xs)
+
+
+def _keep(friction: FrictionState, log: Log | None) -> None:
+    if log is not None:
+        log += [(each.element, each.edge) for each in friction.switches]
+
+
+LOOPS: dict[str, Callable[[float, Log | None], Array]] = {
+    "guards once a sample (naive)": naive,
+    "switches located, v held": held,
+    "straight line v0 → v1": straight,
+    "straight line, Heun with `peek`": heun,
+}
+
+
+def pulled_mass(rounds: int) -> tuple[list[tuple[str, ...]], float]:
+    """Return the rows of the table of the pulled mass, and the time of a naive step, µs."""
+    model, rig = model_and_rig(PULLED_MASS)
+    t = np.linspace(0.0, T_END, 6001)
+    exact = simulate(model, rig, T_END, engine="compiled", rtol=1e-10, atol=1e-13, t_eval=t)
+    true = [(int(each.element), str(each.edge)) for each in exact.transitions]
+    rows = {name: [name] for name in LOOPS}
+    for dt in (1e-3, 1e-4):
+        for name, loop in LOOPS.items():
+            log: Log = []
+            x = loop(dt, log)[:: round(0.01 / dt)]
+            same = next(
+                (i for i, pair in enumerate(zip(log, true, strict=False)) if pair[0] != pair[1]),
+                min(len(log), len(true)),
+            )
+            error = float(np.abs(x - exact.x).max())
+            rows[name] += [f"{len(log)}", f"{same}", f"{1e3 * error:.3g} mm"]
+    seconds: dict[str, list[float]] = {name: [] for name in LOOPS}
+    for _ in range(rounds):
+        for name, loop in LOOPS.items():
+            begin = time.perf_counter()
+            loop(1e-3, None)
+            seconds[name].append(time.perf_counter() - begin)
+    first = seconds[next(iter(LOOPS))]
+    step = 1e6 * statistics.median(first) * 1e-3 / T_END
+    for name, mine in seconds.items():
+        ratio = statistics.median(a / b for a, b in zip(mine, first, strict=True))
+        rows[name] += [f"{ratio:.2f}"]
+    return [tuple(row) for row in rows.values()], step
+
+
+# --------------------------------------------------------------------------- the servo
+def servo_loop(dt: float, way: str) -> float:
+    """Return where the load is at the end, m."""
+    (system,) = servo()
+    n, model = system.numbers, system.contacts[0].model
+    friction: Any = Naive(model) if way == "naive" else FrictionState(model)
+    m_m, m_l, k_s, d_s = (n[name] for name in ("m_m", "m_l", "k_s", "d_s"))
+    x_m = v_m = x_l = v_l = integral = e_before = u = F = 0.0
+    for step in range(round(0.2 / dt)):
+        if step % round(1e-3 / dt) == 0:
+            e = n["ref"] - x_m
+            u = n["k_p"] * e + integral + n["k_d"] * (e - e_before) / 1e-3
+            integral += n["k_i"] * 1e-3 * e
+            e_before = e
+        shaft = k_s * (x_m - x_l) + d_s * (v_m - v_l)
+        v_m += dt * (u - shaft) / m_m
+        x_m += dt * v_m
+        if way == "naive":
+            F = friction.step(v_l, dt)
+        elif way == "held":
+            F = friction.advance(v_l, v_l, dt)
+        v = v_l + dt * (shaft - F) / m_l
+        if way == "straight":
+            F = friction.advance(v_l, v, dt)
+        v_l = v
+        x_l += dt * v_l
+    return x_l
+
+
+def servos() -> list[tuple[str, ...]]:
+    """Return the rows of the table of the servo."""
+    steps = (1e-4, 2e-5, 5e-6)
+    ways = dict(zip(("naive", "held", "straight"), LOOPS, strict=False))
+    return [
+        (name, *(f"{1e3 * servo_loop(dt, way):.4f} mm" for dt in steps))
+        for way, name in ways.items()
+    ]
+
+
+# --------------------------------------------------------------------------- against the clock
+def jitter(seconds: float) -> str:
+    """Return how late the samples of a 1 kHz loop are, and what ignoring that costs."""
+    model, _ = model_and_rig(PULLED_MASS)
+    real, wished = FrictionState(model), FrictionState(model)
+    late, took, wrong = [], [], 0.0
+    begin, v0 = time.perf_counter(), 0.0
+    for tick in range(1, round(1e3 * seconds) + 1):
+        time.sleep(max(0.0, begin + 1e-3 * tick - time.perf_counter()))
+        t = time.perf_counter() - begin
+        v1 = 0.1 * sin(20.0 * t)
+        F = real.advance_to(v0, v1, t)
+        took.append(time.perf_counter() - begin - t)
+        wrong = max(wrong, abs(F - wished.advance(v0, v1, 1e-3)))
+        late.append(t - 1e-3 * tick)
+        v0 = v1
+    end = real.advance_to(v0, v0, real.t)
+    times = np.array(late) + 1e-3 * np.arange(1, len(late) + 1)
+    samples = Prescribed((np.r_[0.0, times], np.r_[0.0, 0.1 * np.sin(20.0 * times)]))
+    assert end == simulate(model, samples, times[-1], engine="compiled").F[-1]
+    median, most, slow = 1e6 * np.median(late), 1e6 * np.quantile(late, 0.99), 1e6 * max(late)
+    return (
+        f"A loop of 1 kHz against the clock, {seconds:.0f} s: samples {median:.0f} µs late in the "
+        f"median, {most:.0f} µs for 99 %, {slow:,.0f} µs at most; `advance_to` takes "
+        f"{1e6 * np.median(took):.1f} µs in the median. With the times measured, the force is that "
+        f"of `simulate` on the same samples, to the bit; with a dt of 1 ms instead, it is wrong by "
+        f"up to {wrong:.2g} N."
+    )
+
+
+def page(rounds: int) -> str:
+    """Return what the page says, measured here."""
+    rows, step = pulled_mass(rounds)
+    head = ("", "1 kHz: edges", "right", "error", "10 kHz: edges", "right", "error", "time")
+    end = ("", "100 µs", "20 µs", "5 µs")
+    return "\n".join(
+        [
+            textwrap.fill(
+                "Pulled mass, 60 s, 72 edges: edges taken, how many of them are right before the "
+                "first wrong one, the largest error of the position, and the time of a step "
+                f"relative to the naive loop ({step:.1f} µs, in plain Python):",
+                WIDTH,
+            ),
+            "",
+            *markdown(head, rows),
+            "",
+            "Servo, where the load stops; 1.3299 mm is right:",
+            "",
+            *markdown(end, servos()),
+            "",
+            textwrap.fill(jitter(10.0), WIDTH),
+            "",
+            textwrap.fill(f"{machine()}; medians of interleaved rounds.", WIDTH),
+        ]
+    )
+
+
+def main() -> None:
+    """Print the tables, or write them into the page."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--rounds", type=int, default=9)
+    parser.add_argument("--write", action="store_true", help=f"replace the tables in {PAGE}")
+    options = parser.parse_args()
+    text = page(options.rounds)
+    if options.write:
+        replace(PAGE, text)
+    else:
+        print(text)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,168 @@
+"""`adapters.scipy.solve_ivp` finds the switches of `simulate`, with SciPy's methods and by samples.
+
+Errors are those of the switch times against runs of `simulate` with a tight tolerance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.integrate
+
+from gms_fsm import (
+    GMS,
+    Body,
+    Chart,
+    ChartModel,
+    Contact,
+    GMSParameters,
+    PulledSlider,
+    Slider,
+    State,
+    Stribeck,
+    System,
+    Trace,
+    simulate,
+)
+from gms_fsm.adapters.scipy import Solution, solve_ivp
+from tests.helpers import FASTEST, pulled_mass
+
+K = np.array([40.0, 30.0, 20.0, 10.0])
+
+
+def _pulled(mass: float, stiffness: float, speed: float) -> Callable[..., list[float]]:
+    def rates(t: float, y: Any, F: float) -> list[float]:
+        x, v = y
+        return [v, (stiffness * (speed * t - x) - F) / mass]
+
+    return rates
+
+
+def _late(solution: Solution, trace: Trace) -> float:
+    """Return the largest error of a switch time, after comparing the sequences."""
+    log = trace.transitions
+    assert solution.success, solution.message
+    assert [(s.element, s.edge) for s in solution.switches] == [
+        (int(row.element), str(row.edge)) for row in log
+    ]
+    return float(np.max(np.abs(np.array([s.t for s in solution.switches]) - log.t)))
+
+
+@pytest.fixture(scope="module")
+def reference() -> Trace:
+    trace = simulate(*pulled_mass(), 60.0, engine=FASTEST, rtol=1e-9)
+    assert len(trace.transitions) == 72
+    return trace
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("method", "error"),
+    [
+        ("RK45", 5e-5),
+        ("Radau", 1e-6),
+        ("LSODA", 5e-4),
+        (scipy.integrate.DOP853, 5e-6),
+        ("dp45", 5e-6),
+    ],
+)
+def test_located(reference: Trace, method: Any, error: float) -> None:
+    model, _ = pulled_mass()
+    found = solve_ivp(_pulled(1.0, 2.0, 0.1), (0.0, 60.0), [0.0, 0.0], model, 1, method=method)
+    assert _late(found, reference) < error
+    assert found.y[0, -1] == pytest.approx(reference.x[-1], abs=2e-5)
+    assert found.F[-1] == pytest.approx(reference.F[-1], abs=2e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("sample", "error"), [(1e-2, 1e-2), (2e-3, 4e-4)])
+def test_straight_lines_between_samples(reference: Trace, sample: float, error: float) -> None:
+    model, _ = pulled_mass()
+    found = solve_ivp(_pulled(1.0, 2.0, 0.1), (0.0, 60.0), [0.0, 0.0], model, 1, sample=sample)
+    assert _late(found, reference) < error
+    assert len(found.t) == round(60.0 / sample) + 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("length", [1e-6, 1e3])
+def test_other_scales(length: float) -> None:
+    model = GMS(
+        GMSParameters(
+            K / length,
+            np.array([0.4, 0.3, 0.2, 0.1]) / length,
+            [0.02 * length] * 4,
+            sigma_2=0.4 / length,
+            stribeck=Stribeck(F_c=1.0, F_s=1.5, v_s=0.05 * length),
+            v_c=1e-6 * length,
+            weights=length / (4 * K),
+        ),
+        law="signed",
+    )
+    rig = 1.0 / length, 2.0 / length, 0.1 * length
+    trace = simulate(model, PulledSlider(*rig), 60.0, engine=FASTEST, rtol=1e-9)
+    assert len(trace.transitions) == 72
+    for method, error in (("RK45", 5e-5), ("Radau", 1e-6)):
+        found = solve_ivp(_pulled(*rig), (0.0, 60.0), [0.0, 0.0], model, 1, method=method)
+        assert _late(found, trace) < error
+
+
+def test_other_parameters() -> None:
+    model = GMS(GMSParameters.paper("stick-slip"), law="published")
+    trace = simulate(model, PulledSlider(2.0, 3.0, 0.3), 20.0, rtol=1e-9)
+    assert len(trace.transitions) == 4
+    found = solve_ivp(_pulled(2.0, 3.0, 0.3), (0.0, 20.0), [0.0, 0.0], model, 1)
+    assert _late(found, trace) < 1e-4
+
+
+def _coupled(t: float, y: Any, F: Any) -> list[float]:
+    x, v, x_b, v_b = y
+    spring = 3.0 * (x - x_b)
+    return [v, 2.0 * (0.1 * t - x) - spring - F[0], v_b, spring - F[1]]
+
+
+@pytest.mark.slow
+def test_several_frictions() -> None:
+    model, _ = pulled_mass()
+    system = System(
+        "two masses",
+        bodies=(
+            Body("a", inertia=1.0, force="2*(0.1*t - x_a) - 3*(x_a - x_b)", x="x_a", v="v_a"),
+            Body("b", inertia=1.0, force="3*(x_a - x_b)", x="x_b", v="v_b"),
+        ),
+        contacts=(Contact("front", model, v="v_a"), Contact("back", model, v="v_b")),
+    )
+    trace = simulate(system, 30.0, rtol=1e-9, engine=FASTEST)
+    log = [(str(r.contact), int(r.element), str(r.edge)) for r in trace.transitions]
+    by_place = solve_ivp(_coupled, (0.0, 30.0), [0.0] * 4, system.contacts, [1, 3])
+    by_function = solve_ivp(
+        _coupled, (0.0, 30.0), [0.0] * 4, system.contacts, lambda y: y[[1, 3]], t_eval=[10.0, 30.0]
+    )
+    stepped = solve_ivp(
+        _coupled, (0.0, 30.0), [0.0] * 4, system.contacts, np.array([1, 3]), sample=5e-3
+    )
+    for found in (by_place, by_function, stepped):
+        assert [(s.contact, s.element, s.edge) for s in found.switches] == log
+        assert found.y[2, -1] == pytest.approx(trace.body("b").x[-1], abs=2e-5)
+        assert found.F.shape == (2, len(found.t))
+    assert by_function.t.tolist() == [10.0, 30.0]
+
+
+@pytest.mark.parametrize("velocity", [1, lambda y: y[1]])
+def test_motion_along_a_jump_of_the_force(velocity: Any) -> None:
+    """Coulomb friction by sgn(v): where it holds the mass, the motion slides along v = 0."""
+    chart = Chart(
+        "Coulomb", parameters=("F_c",), states=(State("on"),), outputs={"F": "F_c*sgn(v)"}
+    )
+    model = ChartModel(chart, {"F_c": 1.0})
+    trace = simulate(model, Slider(1.0, "1.5*sin(t)"), 7.0, rtol=1e-9, atol=1e-12)
+
+    def rates(t: float, y: Any, F: float) -> list[float]:
+        return [y[1], 1.5 * np.sin(t) - F]
+
+    found = solve_ivp(rates, (0.0, 7.0), [0.0, 0.0], model, velocity, atol=1e-9, t_eval=[0.3, 7.0])
+    assert found.success
+    assert found.F[0] == pytest.approx(1.5 * np.sin(0.3), abs=1e-9)  # held: not yet moving
+    assert found.y[:, -1] == pytest.approx([trace.x[-1], trace.v[-1]], abs=1e-6)

@@ -1,0 +1,81 @@
+"""A wrong argument of `adapters.scipy.solve_ivp` is one error; a failed run keeps its rows."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from gms_fsm import ChartModel, Contact, ParameterError
+from gms_fsm.adapters.scipy import solve_ivp
+from gms_fsm.charts import CHARTS
+from gms_fsm.charts.registry import entry
+from tests.helpers import pulled_mass
+
+MODEL, _ = pulled_mass()
+
+
+def _mass(t: float, y: Any, F: float) -> list[float]:
+    return [y[1], 2.0 * (0.1 * t - y[0]) - F]
+
+
+STICTION = Contact("pad", CHARTS["stiction"], entry("stiction").demonstration.values)
+RIGHT: dict[str, Any] = {
+    "fun": _mass,
+    "t_span": (0.0, 1.0),
+    "y0": [0.0, 0.0],
+    "friction": MODEL,
+    "velocity": 1,
+}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"fun": 3}, "fun is 3; it must be a function"),
+        ({"fun": lambda t, y, F: [0.0]}, r"fun returns the shape \(1,\), but y0 has 2 components"),
+        ({"t_span": (1.0, 1.0)}, "the end must be later"),
+        ({"t_span": (0.0, math.nan)}, "t_span"),
+        ({"y0": [0.0, math.nan]}, "y0"),
+        ({"friction": 3}, "it must be a model or a contact"),
+        ({"friction": []}, "friction: it is empty"),
+        ({"friction": STICTION}, "the force of a lock depends on the masses"),
+        ({"velocity": 2}, "velocity has 2, which is no component of y0; they are 0 to 1"),
+        ({"velocity": [1]}, "there is 1 friction"),
+        ({"velocity": lambda y: y}, r"velocity\(y\) has the shape \(2,\)"),
+        ({"velocity": lambda y: math.nan}, r"velocity\(y0\) is \[nan\]; it must be finite"),
+        ({"method": "euler"}, "method is 'euler'; it is no method"),
+        ({"rtol": -1.0}, "rtol"),
+        ({"atol": [1e-6]}, "atol"),
+        ({"max_step": 0.0}, "max_step"),
+        ({"max_steps": 0}, "max_steps"),
+        ({"t_eval": [0.5, 2.0]}, "its times must increase and lie within t_span"),
+        ({"initial": {"v": 1.0}}, "the caller's equations give the velocity"),
+        ({"initial": {"q": 1.0}}, "initial has the key 'q'"),
+        ({"sample": 0.0}, "sample"),
+        ({"sample": 1e-9}, "there would be 1e.09 samples"),
+        ({"sample": 0.1, "method": "dp45"}, "sample=... takes the methods of SciPy only"),
+        ({"sample": 0.1, "t_eval": [0.5]}, "the rows are the samples"),
+    ],
+)
+def test_one_clear_error(wrong: dict[str, Any], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        solve_ivp(**{**RIGHT, **wrong})
+
+
+def test_a_chart_without_scales_needs_a_tolerance() -> None:
+    dahl = entry("dahl")
+    model = ChartModel(dahl.chart(), dahl.demonstration.values)
+    with pytest.raises(ParameterError, match="atol=1e-9"):
+        solve_ivp(**{**RIGHT, "friction": model})
+    assert solve_ivp(**{**RIGHT, "friction": model}, atol=1e-9).success
+
+
+@pytest.mark.parametrize("options", [{}, {"sample": 0.01}])
+def test_a_failed_run_keeps_its_rows(options: dict[str, Any]) -> None:
+    found = solve_ivp(**{**RIGHT, "t_span": (0.0, 60.0)}, max_steps=5, **options)
+    assert not found.success
+    assert "max" in found.message
+    assert 0.0 < found.t[-1] < 60.0
+    assert found.y.shape == (2, len(found.t))
