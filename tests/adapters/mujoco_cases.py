@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import mujoco
-import numpy as np
 
 from gms_fsm import GMS, GMSParameters, Stribeck
 
@@ -30,21 +29,6 @@ ARM = """
   <body><joint name="ball" type="ball"/><geom size=".05" mass="1"/></body></worldbody>
 </mujoco>
 """
-
-
-def pulled() -> GMS:
-    """Return the friction of scenarios/pulled_mass.toml."""
-    k = np.array([40.0, 30.0, 20.0, 10.0])
-    parameters = GMSParameters(
-        k,
-        sigma=[0.4, 0.3, 0.2, 0.1],
-        C=[0.02] * 4,
-        sigma_2=0.4,
-        stribeck=Stribeck(1.0, 1.5, 0.05),
-        v_c=1e-6,
-        weights=1.0 / (4.0 * k),
-    )
-    return GMS(parameters, law="signed")
 
 
 def bearing() -> GMS:

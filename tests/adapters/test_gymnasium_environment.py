@@ -1,0 +1,113 @@
+"""Claim: the positioning task keeps gymnasium's rules, and its friction is a stepping friction."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gms_fsm import Slider, simulate
+from gms_fsm.errors import ParameterError
+from tests.helpers import pulled_mass
+
+gymnasium = pytest.importorskip("gymnasium", reason="the environment is extra gymnasium")
+from gymnasium.utils.env_checker import check_env  # noqa: E402
+
+from gms_fsm.adapters.gymnasium import FrictionPositioning  # noqa: E402
+
+SIZES: dict[str, Any] = {"mass": 1.0, "force": 5.0, "travel": 1.0}
+
+
+def made(**changed: Any) -> FrictionPositioning:
+    return FrictionPositioning(pulled_mass()[0], **SIZES | changed)
+
+
+def test_the_checker_of_gymnasium_accepts_it() -> None:
+    with warnings.catch_warnings():
+        # Rendering is checked for environments made by name only.
+        warnings.filterwarnings("ignore", message=".*alternative render modes")
+        check_env(made())
+
+
+def test_it_moves_as_simulate_says() -> None:
+    env, force = made(substeps=40), 2.0
+    env.reset(options={"target": 0.9})
+    exact = simulate(
+        pulled_mass()[0], Slider(1.0, force), 1.0, rtol=1e-10, t_eval=np.linspace(0.0, 1.0, 101)
+    )
+    switches: list[Any] = []
+    for x, v in zip(exact.x[1:], exact.v[1:], strict=True):
+        observation, *_, info = env.step(np.array([force / 5.0]))
+        switches += info["switches"]
+        assert info["x"] == pytest.approx(x, abs=1e-5)
+        assert observation == pytest.approx([0.9 - x, v], abs=1e-5)
+    assert [each.edge for each in switches] == list(exact.transitions.edge)
+    assert [each.t for each in switches] == pytest.approx(list(exact.transitions.t), abs=1e-5)
+    assert len(switches) == 4
+
+
+def test_a_seed_gives_the_same_episode() -> None:
+    def episode(env: FrictionPositioning, seed: int) -> list[Any]:
+        rows = [env.reset(seed=seed)[0].tolist()]
+        for action in np.random.default_rng(5).uniform(-1.0, 1.0, 200):
+            observation, reward, *_ = env.step(np.array([action]))
+            rows.append([*observation, reward])
+        return rows
+
+    env = made()
+    assert episode(env, 3) == episode(env, 3) == episode(made(), 3)
+    assert episode(env, 3)[0] != episode(env, 4)[0]
+
+
+def test_an_episode_ends_outside_or_in_time() -> None:
+    env = made(duration=0.05)
+    env.reset()
+    ends = [env.step(np.zeros(1))[2:4] for _ in range(5)]
+    assert ends == [(False, False)] * 4 + [(False, True)]
+    env = made(travel=0.1)
+    env.reset()
+    ended = False
+    while not ended:
+        observation, _, ended, truncated, info = env.step(np.ones(1))
+        assert not truncated
+        assert env.observation_space.contains(observation)
+    assert info["x"] > 0.1
+
+
+def test_the_reward_is_what_is_documented() -> None:
+    env = made()
+    env.reset(options={"target": 0.25})
+    observation, reward, *_ = env.step(np.array([-3.0]))  # clipped to -1
+    assert reward == -abs(observation[0]) / 1.0 - 0.01
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"mass": 0.0}, "mass is 0.0; it must be > 0"),
+        ({"force": -1.0}, "force"),
+        ({"travel": np.nan}, "travel"),
+        ({"period": 0.0}, "period"),
+        ({"substeps": 0}, "substeps is 0"),
+        ({"duration": 0.0}, "duration"),
+    ],
+)
+def test_wrong_sizes_are_named(changed: dict[str, Any], words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        made(**changed)
+
+
+def test_wrong_actions_and_targets_change_nothing() -> None:
+    env = made()
+    before = env.reset(seed=1)[0].tolist()
+    for action in (np.array([np.nan]), np.zeros(2)):
+        with pytest.raises(ParameterError, match="action"):
+            env.step(action)
+    with pytest.raises(ParameterError, match=r"target is 2\.0; it is outside the travel"):
+        env.reset(options={"target": 2.0})
+    other = made()
+    other.reset(seed=1)
+    assert before[1] == 0.0
+    assert env.step(np.ones(1))[0].tolist() == other.step(np.ones(1))[0].tolist()

@@ -1,0 +1,198 @@
+"""Claim: friction in MuJoCo's joints is that of the same velocities, and leaves nothing behind."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gms_fsm import FrictionState
+from gms_fsm.charts.registry import entry
+from gms_fsm.errors import ParameterError
+from gms_fsm.systems.models import demonstration
+from tests.adapters.loops import loaded_pad
+from tests.helpers import pulled_mass
+
+mujoco = pytest.importorskip("mujoco", reason="joint friction is extra mujoco")
+from gms_fsm.adapters.mujoco import JointFriction  # noqa: E402
+from tests.adapters.mujoco_cases import ARM, SLIDE, bearing, loaded  # noqa: E402
+
+INTEGRATORS = ["Euler", "implicitfast", "RK4"]
+STEPS = 4000
+
+
+def pulled(integrator: str = "Euler") -> tuple[Any, Any]:
+    """Return a slide that is pulled by a growing force, and slips at 0.7 s."""
+    model, data = loaded(SLIDE.format(integrator=integrator))
+    data.qfrc_applied[0] = 1.6
+    return model, data
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_it_is_a_stepping_friction_on_the_velocities_of_the_steps(integrator: str) -> None:
+    friction, _ = pulled_mass()
+    model, data = pulled(integrator)
+    t, v = [data.time], [data.qvel[0]]
+    with JointFriction(model, data, {"rail": friction}) as joints:
+        for _ in range(STEPS):
+            mujoco.mj_step(model, data)
+            t.append(data.time)
+            v.append(data.qvel[0])
+    alone, log = FrictionState(friction), []
+    for step in range(STEPS):
+        alone.advance_to(v[step], v[step + 1], t[step + 1])
+        log += [tuple(switch) for switch in alone.switches]
+    assert [(each.t, each.element, each.edge) for each in joints.switches] == log
+    assert {each.joint for each in joints.switches} == {"rail"}
+    assert len(log) >= 4
+    assert joints.states == {"rail": alone.states}
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_looking_changes_nothing(integrator: str) -> None:
+    friction, _ = pulled_mass()
+    found = []
+    for looks in (False, True):
+        model, data = pulled(integrator)
+        with JointFriction(model, data, {"rail": friction}) as joints:
+            for _ in range(STEPS):
+                mujoco.mj_step(model, data)
+                if looks:
+                    assert joints.states
+                    mujoco.mj_forward(model, data)
+        found.append((data.qpos[0], joints.switches))
+    assert found[0] == found[1]
+
+
+def test_the_force_is_what_mujoco_is_given() -> None:
+    model, data = pulled()
+    with JointFriction(model, data, {"rail": pulled_mass()[0]}) as joints:
+        mujoco.mj_step(model, data, 100)
+        mujoco.mj_forward(model, data)
+        spring = -2.0 * data.qpos[0]
+        assert data.qfrc_passive[0] == pytest.approx(spring - joints.forces["rail"])
+        assert joints.forces["rail"] > 0.1
+
+
+def test_a_reset_begins_again() -> None:
+    model, data = pulled()
+    with JointFriction(model, data, {"rail": pulled_mass()[0]}) as joints:
+        runs = []
+        for _ in range(2):
+            mujoco.mj_resetData(model, data)
+            data.qfrc_applied[0] = 1.6
+            mujoco.mj_step(model, data, STEPS)
+            runs.append((data.qpos[0], joints.switches))
+    assert runs[0] == runs[1]
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_a_snapshot_with_the_state_of_mujoco(integrator: str) -> None:
+    model, data = pulled(integrator)
+    kind = mujoco.mjtState.mjSTATE_INTEGRATION
+    with JointFriction(model, data, {"rail": pulled_mass()[0]}) as joints:
+        mujoco.mj_step(model, data, 800)
+        state, before = np.empty(mujoco.mj_stateSize(model, kind)), joints.snapshot()
+        mujoco.mj_getState(model, data, state, kind)
+        runs = []
+        for _ in range(2):
+            mujoco.mj_setState(model, data, state, kind)
+            joints.restore(before)
+            mujoco.mj_step(model, data, STEPS)
+            runs.append((data.qpos[0], joints.switches))
+    assert runs[0] == runs[1]
+
+
+def test_a_velocity_set_before_the_first_step_is_not_a_ramp() -> None:
+    model, data = loaded(SLIDE.format(integrator="Euler"))
+    with JointFriction(model, data, {"rail": pulled_mass()[0]}) as joints:
+        data.qvel[0] = 0.5
+        mujoco.mj_forward(model, data)
+        assert joints.forces["rail"] == FrictionState(pulled_mass()[0]).peek(0.5, 0.5, 0.0)
+
+
+def test_frictionloss_and_callback_return() -> None:
+    model, data = loaded(ARM)
+    calls: list[float] = []
+
+    def own(_: Any, data: Any) -> None:
+        calls.append(data.time)
+
+    before = model.dof_frictionloss.tolist()
+    mujoco.set_mjcb_passive(own)
+    try:
+        joints = JointFriction(model, data, {"elbow": bearing(), "shoulder": bearing()})
+        assert model.dof_frictionloss.tolist() == before
+        with joints:
+            assert model.dof_frictionloss.tolist() == [0.0] * 5
+            mujoco.mj_step(model, data)
+        assert calls == [0.0]
+        assert model.dof_frictionloss.tolist() == before
+        with pytest.raises(ZeroDivisionError), joints:
+            _ = 1 / 0
+        assert mujoco.get_mjcb_passive() is own
+        assert model.dof_frictionloss.tolist() == before
+    finally:
+        mujoco.set_mjcb_passive(None)
+
+
+def test_other_data_have_no_friction() -> None:
+    model, data = pulled()
+    other = mujoco.MjData(model)
+    other.qfrc_applied[0] = 1.6
+    with JointFriction(model, data, {"rail": pulled_mass()[0]}) as joints:
+        mujoco.mj_step(model, other, 100)
+        assert joints.switches == ()
+    assert other.qvel[0] > 0.15  # 1.6 N on 1 kg for 0.1 s
+
+
+def test_joints_are_told_apart() -> None:
+    model, data = loaded(ARM)
+    data.qfrc_applied[:2] = 0.9, 0.2
+    with JointFriction(model, data, {"elbow": bearing(), "shoulder": bearing()}) as joints:
+        mujoco.mj_step(model, data, 20_000)  # until they are at rest
+    assert {each.joint for each in joints.switches} == {"shoulder"}
+    assert joints.forces == pytest.approx({"shoulder": 0.9, "elbow": 0.2}, abs=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("frictions", "words"),
+    [
+        ({"wrist": bearing()}, "'wrist'; there is no such joint; joints: shoulder, elbow, ball"),
+        ({"ball": bearing()}, "'ball'; this joint has more than one degree of freedom"),
+        ({0: bearing()}, "no such joint"),
+        ({}, "frictions: it is empty"),
+        ([bearing()], "it must be a mapping"),
+        ({"elbow": 1.5}, "joint 'elbow': "),
+    ],
+)
+def test_wrong_joints_are_named(frictions: Any, words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        JointFriction(*loaded(ARM), frictions)
+
+
+def test_wrong_models_and_data_are_named() -> None:
+    model, data = loaded(ARM)
+    with pytest.raises(ParameterError, match=r"it must be a mujoco\.MjModel"):
+        JointFriction(data, data, {"elbow": bearing()})
+    with pytest.raises(ParameterError, match=r"it must be a mujoco\.MjData"):
+        JointFriction(model, model, {"elbow": bearing()})
+    with pytest.raises(ParameterError, match="data: it is of another model"):
+        JointFriction(model, loaded(ARM)[1], {"elbow": bearing()})
+
+
+def test_a_block_cannot_run_twice_at_once() -> None:
+    model, data = loaded(ARM)
+    joints = JointFriction(model, data, {"elbow": bearing()})
+    with joints, pytest.raises(ParameterError, match="its block is running"), joints:
+        pass
+    assert mujoco.get_mjcb_passive() is None
+    assert model.dof_frictionloss[1] == 0.7
+
+
+def test_friction_that_cannot_be_given_by_a_velocity_names_its_joint() -> None:
+    with pytest.raises(ParameterError, match=r"joint 'elbow': .*lock"):
+        JointFriction(*loaded(ARM), {"elbow": demonstration(entry("stiction"))})
+    with pytest.raises(ParameterError, match="joint 'elbow': it needs the inputs load"):
+        JointFriction(*loaded(ARM), {"elbow": loaded_pad()})
