@@ -116,7 +116,7 @@ foreign: $(VENV)/foreign.stamp
 	$(RUN)/python -m pytest tests/foreign/check_*.py
 	$(RUN)/python -m tests.foreign
 
-gallery: $(VENV)/all.stamp
+gallery: $(VENV)/dev.stamp
 	$(RUN)/python docs/make_pictures.py
 	$(RUN)/python docs/make_screens.py
 	$(RUN)/python docs/make_zoo.py

@@ -294,6 +294,7 @@ def draw_howto() -> None:
     plots.render(plots.statechart(bilinear), FOLDER / "howto_bilinear.png")
     figures.save(loops_figure(bilinear), FOLDER / "howto_bilinear_loop.png")
     figures.save(desk_figure(), FOLDER / "howto_desk_experiment.png")
+    figures.save(mujoco_figure(), FOLDER / "howto_mujoco.png")
 
 
 def tutorial_chart() -> Chart:
@@ -307,14 +308,38 @@ def tutorial_chart() -> Chart:
 
 
 def desk_figure() -> Figure:
-    """Return the figure of docs/howto/desk-experiment.md, whose code it runs."""
-    page = (Path(__file__).parent / "howto" / "desk-experiment.md").read_text(encoding="utf-8")
+    """Return the figure of docs/howto/desk-experiment.md."""
+    figure: Figure = names_of("desk-experiment.md")["figure"]
+    return figure
+
+
+def names_of(page: str) -> dict[str, Any]:
+    """Run the code of a page in docs/howto, and return its names."""
+    text = (Path(__file__).parent / "howto" / page).read_text(encoding="utf-8")
     names: dict[str, Any] = {}
     with TemporaryDirectory() as folder, chdir(folder), redirect_stdout(StringIO()):
-        for kind, text in cells_of(page):
+        for kind, code in cells_of(text):
             if kind == "code":
-                exec(text, names)
-    figure: Figure = names["figure"]
+                exec(code, names)
+    return names
+
+
+def mujoco_figure() -> Figure:
+    """Draw the hinge of docs/howto/own-loops-mujoco.md: hysteresis, and a minute under load."""
+    names = names_of("own-loops-mujoco.md")
+    with rc_context(RC):
+        figure = Figure(figsize=(7.2, 3.2), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        looks = (":", "--", "-")
+        for (amplitude, (M, q)), look in zip(names["loops"].items(), looks, strict=True):
+            left.plot(1e3 * q, M, look, color=INK, label=f"{amplitude} Nm")
+        left.set(xlabel="angle [mrad]", ylabel="torque [Nm]", title="Below break-away (1.5 Nm)")
+        left.legend(loc="upper left")
+        t = 1e-3 * np.arange(1, len(names["held"]) + 1)
+        right.plot(t, names["native"], "--", color=TEXT_GREY, label="frictionloss of MuJoCo")
+        right.plot(t, names["held"], color=INK, label="four elements")
+        right.set(xlabel="t [s]", ylabel="angle [rad]", title="Under 1 Nm")
+        right.legend(loc="upper left")
     return figure
 
 

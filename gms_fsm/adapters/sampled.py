@@ -53,7 +53,7 @@ class SampledRun:
 
 
 def run_sampled(
-    step: Callable[[int, float], object], period: float, ticks: int, *, spin: float = 5e-4
+    step: Callable[[int, float], object], period: float, ticks: int, *, spin: float = 2e-4
 ) -> SampledRun:
     """Call a step at a period, in real time.
 
