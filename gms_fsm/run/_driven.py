@@ -87,7 +87,8 @@ class Driven:
                         advice="leave it out",
                     )
         system = System("friction", bodies=tuple(bodies), contacts=tuple(contacts))
-        start = Start.of(system, None, t + 1.0, Settings(), t_start=t, initial=initial)
+        settings = Settings(output="end")
+        start = Start.of(system, None, t + 1.0, settings, t_start=t, initial=initial)
         layout = start.program.layout
         velocities = tuple(layout.y.index(body.v) for body in bodies)
         return cls(

@@ -15,7 +15,7 @@ from gms_fsm._arguments import checked_kind
 from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError
 from gms_fsm.lowering.scales import scales_of
-from gms_fsm.run._plausible import check_state
+from gms_fsm.run._plausible import bounds_of
 from gms_fsm.run._steppable import start_of
 from gms_fsm.run._stepper import Machine, Plain, Stepper, fast, state_of
 from gms_fsm.run.settings import MOST_STEPS
@@ -73,6 +73,15 @@ class Asked(NamedTuple):
     t: float
     initial: Mapping[str, Any] | None
     rtol: float
+
+
+class Part(NamedTuple):
+    """A part of the state, and where it is in an array."""
+
+    name: str
+    place: Any
+    kind: np.dtype[Any]
+    where: slice
 
 
 class Last(NamedTuple):
@@ -275,46 +284,71 @@ class Joint:
 
     def to_array(self) -> FloatArray:
         """Return the present state as finite numbers."""
-        places = self._places().values()
-        flat = np.concatenate([np.asarray(place, dtype=np.float64).ravel() for place in places])
+        flat = np.empty(self.length)
+        for part in self._parts:
+            flat[part.where] = part.place
         found: FloatArray = np.clip(flat, -MOST, MOST)
         return found
 
-    @functools.cached_property
-    def sizes(self) -> list[int]:
-        """The lengths of the parts of an array."""
-        return [np.size(place) for place in self._places().values()]
+    @property
+    def length(self) -> int:
+        """Of an array."""
+        stop: int = self._parts[-1].where.stop
+        return stop
 
     def from_array(self, given: FloatArray) -> None:
         """Return to what `to_array` returned; it has the right length."""
+        least, most, whole = self._limits
         flat = np.where(np.abs(given) < MOST, given, np.copysign(np.inf, given))
-        places = self._places()
-        state: dict[str, NDArray[Any]] = {
-            name: np.asarray(place) for name, place in state_of(self.stepper).items()
-        }
-        parts = np.split(flat, np.cumsum(self.sizes)[:-1])
-        try:
-            for (name, place), part in zip(places.items(), parts, strict=True):
-                kind = np.asarray(place).dtype
-                with np.errstate(invalid="ignore"):
-                    state[name] = part.astype(kind)
-                if not np.array_equal(state[name], part):
-                    raise ValueError(f"{name}: not of type {kind}")
-            check_state(self.start, self.stepper.buffers, state)
-        except ValueError as error:
+        wrong = (flat < least) | (flat > most) | (whole & (flat != np.rint(flat)))
+        phase = flat[self._phase]
+        if wrong.any() or phase not in (loop.START, loop.SETTLED, loop.ARC):
+            at = int(np.argmax(wrong)) if wrong.any() else self._phase
+            name = next(part.name for part in self._parts if at < part.where.stop)
             raise ParameterError(
-                f"it is no state of this friction ({error})",
+                f"it is no state of this friction ({name}: {float(flat[at])!r})",
                 place="array",
                 advice="give what to_array returned, unchanged",
-            ) from None
-        for name, place in places.items():
-            place[:] = state[name] if isinstance(place, np.ndarray) else state[name].tolist()
+            )
+        for part in self._parts:
+            values = flat[part.where]
+            if isinstance(part.place, np.ndarray):
+                part.place[:] = values
+            else:
+                part.place[:] = values.astype(part.kind).tolist()
         self._counts[SWITCHES] = 0
         self.moved_to(float(self.stepper.buffers.now.clock[T]))
 
-    def _places(self) -> dict[str, Any]:
-        """Return the arrays that make up the state between two samples."""
-        return {n: place for n, place in state_of(self.stepper).items() if n not in TEMPORARY}
+    @functools.cached_property
+    def _parts(self) -> list[Part]:
+        """The arrays that make up the state between two samples."""
+        parts, start = [], 0
+        for name, place in state_of(self.stepper).items():
+            if name not in TEMPORARY and len(place) > 0:
+                where = slice(start, start + len(place))
+                parts.append(Part(name, place, np.asarray(place).dtype, where))
+                start = where.stop
+        return parts
+
+    @functools.cached_property
+    def _phase(self) -> int:
+        """The place of the loop's phase in an array."""
+        start: int = next(part.where.start for part in self._parts if part.name == "counts")
+        return start + loop.PHASE
+
+    @functools.cached_property
+    def _limits(self) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+        """The least and largest values in an array, and which are integers."""
+        least, most = np.full(self.length, -np.inf), np.full(self.length, np.inf)
+        whole = np.zeros(self.length, dtype=np.bool_)
+        bounds = bounds_of(self.start, self.stepper.buffers)
+        for part in self._parts:
+            whole[part.where] = part.kind.kind != "f"
+            if part.name in bounds:
+                least[part.where], most[part.where] = bounds[part.name]
+        most[whole] = np.minimum(most[whole], 2.0**53)
+        least[whole] = np.maximum(least[whole], -(2.0**53))
+        return least, most, whole
 
 
 def _view(place: Any) -> Any:

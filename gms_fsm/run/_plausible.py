@@ -13,7 +13,7 @@ from integrators import FOR_A_GUARD, FOR_A_SIGN, WAITING, hybrid, loop
 from integrators.advance import NEXT_KNOT, NEXT_TIME
 from integrators.steps import T
 
-__all__ = ["check_ranges", "check_state", "last_edges", "last_states"]
+__all__ = ["bounds_of", "check_ranges", "check_state", "last_edges", "last_states"]
 
 
 def last_states(start: Start) -> NDArray[np.int64]:
@@ -33,10 +33,11 @@ def _charts(start: Start) -> list[Any]:
     return [contacts[b.name].chart for b in start.program.layout.banks for _ in range(b.n)]
 
 
-def check_state(
-    start: Start, b: hybrid.Buffers, state: Mapping[str, Any], t_end: float = np.inf
-) -> None:
-    """Raise a ValueError unless a run like this one can have reached such a state.
+Bounds = tuple[Any, Any]  # the least and the largest value, numbers or arrays
+
+
+def bounds_of(start: Start, b: hybrid.Buffers, t_end: float = np.inf) -> dict[str, Bounds]:
+    """Return between which values the state of a run is.
 
     Parameters
     ----------
@@ -44,46 +45,75 @@ def check_state(
         The run.
     b : Buffers
         Its buffers.
-    state : mapping of str to ndarray
-        As `integrators.hybrid.state_of`.
     t_end : float
         s: the end of the run.
+
+    Returns
+    -------
+    dict
+        By name, as `integrators.hybrid.state_of`; without what may have any value.
+    """
+    _, last_edge = last_edges(start)
+    n, relations = len(b.now.mode), len(b.relations.watch)
+    clock = np.full((2, len(b.now.clock)), [[-np.inf], [np.inf]])
+    clock[:, T] = start.t_start, t_end
+    counts = np.full((2, loop.PLACES), [[-np.inf], [np.inf]])
+    for place, least, most in (
+        (loop.HOLD, 0, sum({*start.program.discrete})),
+        (loop.PHASE, loop.START, loop.END),
+        (loop.MACHINE, -1, n - 1),
+        (loop.EDGE, 0, max(0, last_edge.max())),
+        (loop.JUMP, 0, len(b.plan.jumps)),
+        (loop.ACTIVE, 0, relations),
+    ):
+        counts[:, place] = least, most
+    cursor = np.full((2, len(b.out.cursor)), [[-np.inf], [np.inf]])
+    cursor[:, NEXT_TIME] = 0, len(b.out.times)
+    cursor[:, NEXT_KNOT] = 0, len(b.plan.knots)
+    most_surfaces = np.full(len(b.sliding.which), max(0, start.program.layout.surfaces - 1))
+    most_surfaces[-1] = len(b.sliding.sigma)
+    return {
+        "clock": (clock[0], clock[1]),
+        "mode": (0, last_states(start)),
+        "edges": (-1, last_edge),
+        "room": (0, relations - 1),
+        "watch": (0, FOR_A_SIGN | FOR_A_GUARD | WAITING),
+        "truth": (0, 1),
+        "due": (0, 1),
+        "counts": (counts[0], counts[1]),
+        "cursor": (cursor[0], cursor[1]),
+        "which": (0, most_surfaces),
+        "slid": (0, 1),
+        "arrived": (0, 1),
+    }
+
+
+def check_state(start: Start, b: hybrid.Buffers, state: Mapping[str, Any], t_end: float) -> None:
+    """Raise a ValueError unless a run like this one can have reached such a state.
+
+    Parameters
+    ----------
+    start, b, t_end
+        As for `bounds_of`.
+    state : mapping of str to ndarray
+        As `integrators.hybrid.state_of`.
 
     Raises
     ------
     ValueError
         Naming what is not plausible.
     """
+    check_ranges({name: (state[name], *u) for name, u in bounds_of(start, b, t_end).items()})
     first_edge, last_edge = last_edges(start)
-    n, counts = len(b.now.mode), state["counts"]
-    machine = 0 if counts[loop.PHASE] == loop.FIRE else -1
-    enabled = np.asarray(state["edges"]) >= 0
-    fired = 0, max(0, last_edge.max())
-    if machine == 0 and 0 <= counts[loop.MACHINE] < n:
-        fired = first_edge[counts[loop.MACHINE]], last_edge[counts[loop.MACHINE]]
-    check_ranges(
-        {
-            "time": (state["clock"][T], start.t_start, t_end),
-            "mode": (state["mode"], 0, last_states(start)),
-            "edges": (state["edges"], -1, last_edge),
-            "enabled edges": (state["edges"][enabled], first_edge[enabled], last_edge[enabled]),
-            "room": (state["room"], 0, len(b.relations.watch) - 1),
-            "watch": (state["watch"], 0, FOR_A_SIGN | FOR_A_GUARD | WAITING),
-            "due": (state["due"], 0, 1),
-            "held": (counts[loop.HOLD], 0, sum({*start.program.discrete})),
-            "phase": (counts[loop.PHASE], loop.START, loop.END),
-            "machine": (counts[loop.MACHINE], machine, n - 1),
-            "edge": (counts[loop.EDGE], *fired),
-            "jump": (counts[loop.JUMP], 0, len(b.plan.jumps)),
-            "active relations": (counts[loop.ACTIVE], 0, len(b.relations.watch)),
-            "wanted time": (state["cursor"][NEXT_TIME], 0, len(b.out.times)),
-            "knot": (state["cursor"][NEXT_KNOT], 0, len(b.plan.knots)),
-            "surfaces": (state["which"][:-1], 0, max(0, start.program.layout.surfaces - 1)),
-            "surfaces slid on": (state["which"][-1], 0, len(b.sliding.sigma)),
-            "slid": (state["slid"], 0, 1),
-            "arrived": (state["arrived"], 0, 1),
-        }
-    )
+    counts, enabled = state["counts"], np.asarray(state["edges"]) >= 0
+    edges = state["edges"][enabled], first_edge[enabled], last_edge[enabled]
+    more: dict[str, tuple[Any, Any, Any]] = {"enabled edges": edges}
+    if counts[loop.PHASE] == loop.FIRE:
+        machine = counts[loop.MACHINE]
+        more["machine"] = machine, 0, len(b.now.mode) - 1
+        if machine >= 0:
+            more["edge"] = counts[loop.EDGE], first_edge[machine], last_edge[machine]
+    check_ranges(more)
 
 
 def check_ranges(ranges: Mapping[str, tuple[Any, Any, Any]]) -> None:

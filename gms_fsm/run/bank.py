@@ -349,7 +349,7 @@ class FrictionBank:
         ParameterError
             If it cannot be such an array; the state stays as it was.
         """
-        sizes = [sum(joint.sizes) for joint in self._joints]
+        sizes = [joint.length for joint in self._joints]
         given, before = numbers_of(array, sum(sizes)), self.snapshot()
         try:
             for joint, part in zip(

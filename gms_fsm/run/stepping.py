@@ -285,7 +285,7 @@ class FrictionState:
             If it cannot be such an array; the state stays as it was.
         """
         joint = self._joint
-        joint.from_array(numbers_of(array, sum(joint.sizes)))
+        joint.from_array(numbers_of(array, joint.length))
 
 
 def _checked(v0: Any, v1: Any, dt: Any) -> tuple[float, float, float]:
