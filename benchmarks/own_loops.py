@@ -12,10 +12,12 @@ which every loop runs, relative to the naive loop of the same round.
 from __future__ import annotations
 
 import argparse
+import itertools
 import statistics
 import textwrap
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from math import copysign, exp, sin
 from typing import Any, TypeAlias
 
@@ -148,23 +150,30 @@ LOOPS: dict[str, Callable[[float, Log | None], Array]] = {
 }
 
 
-def pulled_mass(rounds: int) -> tuple[list[tuple[str, ...]], float]:
-    """Return the rows of the table of the pulled mass, and the time of a naive step, µs."""
+def reference() -> tuple[Array, Log]:
+    """Return the exact x every 10 ms, and the edges."""
     model, rig = model_and_rig(PULLED_MASS)
     t = np.linspace(0.0, T_END, 6001)
     exact = simulate(model, rig, T_END, engine="compiled", rtol=1e-10, atol=1e-13, t_eval=t)
-    true = [(int(each.element), str(each.edge)) for each in exact.transitions]
+    return exact.x, [(int(each.element), str(each.edge)) for each in exact.transitions]
+
+
+def judged(x: Array, log: Log, exact: Array, true: Log) -> list[str]:
+    """Return the number of edges, how many are right before the first wrong one, the error of x."""
+    pairs = zip(log, true, strict=False)
+    same = next((i for i, pair in enumerate(pairs) if pair[0] != pair[1]), min(len(log), len(true)))
+    return [f"{len(log)}", f"{same}", f"{1e3 * float(np.abs(x - exact).max()):.3g} mm"]
+
+
+def pulled_mass(rounds: int) -> tuple[list[tuple[str, ...]], float]:
+    """Return the rows of the table of the pulled mass, and the time of a naive step, µs."""
+    exact, true = reference()
     rows = {name: [name] for name in LOOPS}
     for dt in (1e-3, 1e-4):
         for name, loop in LOOPS.items():
             log: Log = []
             x = loop(dt, log)[:: round(0.01 / dt)]
-            same = next(
-                (i for i, pair in enumerate(zip(log, true, strict=False)) if pair[0] != pair[1]),
-                min(len(log), len(true)),
-            )
-            error = float(np.abs(x - exact.x).max())
-            rows[name] += [f"{len(log)}", f"{same}", f"{1e3 * error:.3g} mm"]
+            rows[name] += judged(x, log, exact, true)
     seconds: dict[str, list[float]] = {name: [] for name in LOOPS}
     for _ in range(rounds):
         for name, loop in LOOPS.items():
@@ -177,6 +186,128 @@ def pulled_mass(rounds: int) -> tuple[list[tuple[str, ...]], float]:
         ratio = statistics.median(a / b for a, b in zip(mine, first, strict=True))
         rows[name] += [f"{ratio:.2f}"]
     return [tuple(row) for row in rows.values()], step
+
+
+# --------------------------------------------------------------------------- in hosts
+def in_scipy(dt: float) -> tuple[Array, Log]:
+    """Return x at every sample: SciPy's solver within each one, RK45."""
+    from gms_fsm.adapters.scipy import solve_ivp
+
+    model, _ = model_and_rig(PULLED_MASS)
+
+    def mass(t: float, y: Array, F: float) -> list[float]:
+        return [y[1], (K * (V * t - y[0]) - F) / M]
+
+    found = solve_ivp(mass, (0.0, T_END), [0.0, 0.0], model, velocity=1, sample=dt)
+    return found.y[0], [(each.element, each.edge) for each in found.switches]
+
+
+def in_pathsim(dt: float) -> tuple[Array, Log]:
+    """Return x at every sample: PathSim with RK4."""
+    from pathsim import Connection, Simulation
+    from pathsim.blocks import Function, Integrator, Scope, Source
+    from pathsim.solvers import RK4
+
+    from gms_fsm.adapters.pathsim import friction_block
+
+    model, _ = model_and_rig(PULLED_MASS)
+    pull = Source(lambda t: K * V * t)
+    mass = Function(lambda load, x, F: (load - K * x - F) / M)
+    x, v, pad, scope = Integrator(), Integrator(), friction_block(model, dt), Scope()
+    wires = [
+        Connection(pull, mass[0]),
+        Connection(x, mass[1], scope),
+        Connection(pad, mass[2]),
+        Connection(mass, v),
+        Connection(v, x, pad),
+    ]
+    Simulation([pull, mass, x, v, pad, scope], wires, dt=dt, log=False, Solver=RK4).run(T_END)
+    t, (found,) = scope.read()
+    samples = np.interp(np.arange(round(T_END / dt) + 1) * dt, t, found)
+    return samples, [(each.element, each.edge) for each in pad.switches]
+
+
+def in_control(dt: float) -> tuple[Array, Log]:
+    """Return x at every sample: python-control, with a plant discretized exactly."""
+    import control
+
+    from gms_fsm.adapters.control import friction_system
+
+    model, _ = model_and_rig(PULLED_MASS)
+    A, B = [[0.0, 1.0], [-K / M, 0.0]], [[0.0, 0.0], [K / M, -1.0 / M]]
+    plant = control.c2d(control.ss(A, B, np.eye(2), np.zeros((2, 2))), dt)
+    plant = control.ss(plant, name="mass", inputs=["end", "F"], outputs=["x", "v"])
+    loop = control.interconnect(
+        [plant, friction_system(model, dt)],
+        connections=[["mass.F", "friction.F"], ["friction.v", "mass.v"]],
+        inplist=["mass.end"],
+        outlist=["mass.x", "mass.v"],
+    )
+    t = dt * np.arange(round(T_END / dt) + 1)
+    x, v = control.input_output_response(loop, t, V * t).outputs
+    friction, log = FrictionState(model), []
+    for v0, v1 in itertools.pairwise(v):  # the system keeps no list of its edges
+        friction.advance(v0, v1, dt)
+        log += [(each.element, each.edge) for each in friction.switches]
+    return x, log
+
+
+def in_mujoco(dt: float, integrator: str, friction: bool) -> tuple[Array, Log]:
+    """Return x at every sample: a slide of MuJoCo, pulled by the loop."""
+    import mujoco
+
+    from gms_fsm.adapters.mujoco import JointFriction
+
+    model, _ = model_and_rig(PULLED_MASS)
+    rail = mujoco.MjModel.from_xml_string(RAIL.format(dt=dt, integrator=integrator, M=M, K=K))
+    data, xs = mujoco.MjData(rail), [0.0]
+    joints = JointFriction(rail, data, {"rail": model}) if friction else None
+    with joints or nullcontext():
+        for _ in range(round(T_END / dt)):
+            data.qfrc_applied[0] = K * V * data.time
+            mujoco.mj_step(rail, data)
+            xs.append(data.qpos[0])
+    log = [] if joints is None else [(each.element, each.edge) for each in joints.switches]
+    return np.array(xs), log
+
+
+RAIL = """
+<mujoco>
+  <option timestep="{dt}" gravity="0 0 0" integrator="{integrator}"/>
+  <worldbody><body>
+    <joint name="rail" type="slide" axis="1 0 0" stiffness="{K}"/>
+    <geom size=".1" mass="{M}" contype="0" conaffinity="0"/>
+  </body></worldbody>
+</mujoco>
+"""
+HOSTS: dict[str, Callable[[float], tuple[Array, Log]]] = {
+    "SciPy, RK45 within samples": in_scipy,
+    "PathSim, RK4": in_pathsim,
+    "python-control": in_control,
+    "MuJoCo, Euler": lambda dt: in_mujoco(dt, "Euler", True),
+    "MuJoCo, RK4": lambda dt: in_mujoco(dt, "RK4", True),
+    "MuJoCo, Euler, without friction": lambda dt: in_mujoco(dt, "Euler", False),
+}
+
+
+def hosts(rounds: int) -> list[tuple[str, ...]]:
+    """Return the rows of the table of the hosts, at 1 kHz."""
+    exact, true = reference()
+    rows: dict[str, list[str]] = {name: [name] for name in HOSTS}
+    ratios: dict[str, list[float]] = {name: [] for name in HOSTS}
+    for turn in range(rounds):
+        begin = time.perf_counter()
+        naive(1e-3, None)
+        first = time.perf_counter() - begin
+        for name, host in HOSTS.items():
+            begin = time.perf_counter()
+            x, log = host(1e-3)
+            ratios[name].append((time.perf_counter() - begin) / first)
+            if turn == 0:
+                rows[name] += judged(x[::10], log, exact, true) if log else ["", "", ""]
+    for name, mine in ratios.items():
+        rows[name] += [f"{statistics.median(mine):.3g}"]
+    return [tuple(row) for row in rows.values()]
 
 
 # --------------------------------------------------------------------------- the servo
@@ -263,6 +394,10 @@ def page(rounds: int) -> str:
             ),
             "",
             *markdown(head, rows),
+            "",
+            "The same at 1 kHz in other programs, time relative to the naive loop, too:",
+            "",
+            *markdown(("", "edges", "right", "error", "time"), hosts(max(1, rounds // 3))),
             "",
             "Servo, where the load stops; 1.3299 mm is right:",
             "",

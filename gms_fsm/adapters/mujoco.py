@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from types import TracebackType
 from typing import Any, NamedTuple, Self, TypeAlias
@@ -9,7 +10,8 @@ from typing import Any, NamedTuple, Self, TypeAlias
 from gms_fsm._arguments import checked_kind
 from gms_fsm._extras import require
 from gms_fsm.errors import GMSError, ParameterError
-from gms_fsm.run.stepping import FrictionState
+from gms_fsm.run._joint import content_of
+from gms_fsm.run.stepping import FrictionState, Snapshot
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 
@@ -239,32 +241,40 @@ class JointFriction:
         return tuple(sorted(self._switches, key=lambda switch: switch.t))
 
     # ------------------------------------------------------------------ going back
-    def snapshot(self) -> tuple[Any, ...]:
+    @functools.cached_property
+    def _identity(self) -> tuple[str, str]:
+        """What snapshots can be exchanged with."""
+        stamps, engines = zip(*(each.snapshot().of for each in self._steppers), strict=True)
+        return repr(("joints", *zip(self._frictions, stamps, strict=True))), engines[0]
+
+    def snapshot(self) -> Snapshot:
         """Return the present state of friction, to return to it with `restore`.
 
         Returns
         -------
-        tuple
-            For this object only. The state of MuJoCo is not in it.
+        Snapshot
+            For the same joints with the same frictions. The state of MuJoCo is not in it.
         """
         self._catch_up()
-        return (
-            self._t,
-            list(self._v),
-            [stepper.snapshot() for stepper in self._steppers],
-            list(self._switches),
-            list(self._forces),
-        )
+        parts = [stepper.snapshot() for stepper in self._steppers]
+        content = list(self._v), parts, list(self._switches), list(self._forces)
+        return Snapshot(self._t, self._identity, content)
 
-    def restore(self, snapshot: tuple[Any, ...]) -> None:
+    def restore(self, snapshot: Snapshot) -> None:
         """Return to a snapshot; call ``mj_setState`` for the state of MuJoCo.
 
         Parameters
         ----------
-        snapshot : tuple
+        snapshot : Snapshot
             What `snapshot` returned.
+
+        Raises
+        ------
+        ParameterError
+            If it is of other joints or frictions; the state stays as it was.
         """
-        t, v, parts, switches, forces = snapshot
+        v, parts, switches, forces = content_of(snapshot, Snapshot, self._identity)
+        t = snapshot.t
         for stepper, part in zip(self._steppers, parts, strict=True):
             stepper.restore(part)
         self._t, self._v, self._seen = t, list(v), (t, list(v))

@@ -231,6 +231,10 @@ class FrictionBank:
 
     def _row(self, name: str, given: ArrayLike) -> FloatArray:
         """Return a copy with one finite number per joint."""
+        if type(given) is np.ndarray and given.dtype == np.float64 and given.shape == (len(self),):
+            copy: FloatArray = given.copy()
+            if np.isfinite(copy).all():
+                return copy
         made = checked_array(name, given, None, "finite")
         if made.size != len(self):
             raise ParameterError(

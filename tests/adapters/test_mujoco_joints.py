@@ -196,3 +196,14 @@ def test_friction_that_cannot_be_given_by_a_velocity_names_its_joint() -> None:
         JointFriction(*loaded(ARM), {"elbow": demonstration(entry("stiction"))})
     with pytest.raises(ParameterError, match="joint 'elbow': it needs the inputs load"):
         JointFriction(*loaded(ARM), {"elbow": loaded_pad()})
+
+
+def test_only_its_own_snapshots() -> None:
+    model, data = loaded(ARM)
+    joints = JointFriction(model, data, {"elbow": bearing()})
+    other = JointFriction(model, data, {"elbow": bearing(), "shoulder": bearing()})
+    for wrong in (other.snapshot(), FrictionState(bearing()).snapshot()):
+        with pytest.raises(ParameterError, match="snapshot: it is of another model"):
+            joints.restore(wrong)
+    with pytest.raises(ParameterError, match=r"snapshot is \[\]; it must be what snapshot"):
+        joints.restore([])
