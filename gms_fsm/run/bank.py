@@ -202,7 +202,7 @@ class FrictionBank:
             force = self._step(sample)
         except BaseException:
             for group in self._groups:
-                group.back()
+                group.undo()
             raise
         self._t, self._last = sample.t, sample
         return force
@@ -270,7 +270,9 @@ class FrictionBank:
         return np.array([joint.dF_dv for joint in self._informed()])
 
     def _informed(self) -> list[Joint]:
-        """Return the joints; each knows the last sample."""
+        """Return the joints; each knows the last sample, and the state before it."""
+        for group in self._groups:
+            group.inform()
         for i, joint in enumerate(self._joints):
             joint.t = self._t
             joint.last = None if self._last is None else self._last.of(i, joint.inputs)
@@ -389,6 +391,7 @@ class _Apart:
 
     def __init__(self, places: list[int], joints: list[Joint]) -> None:
         self.places, self.joints = places, joints
+        self._more: list[list[Switch]] = []
 
     def step(self, sample: _Sample) -> list[float]:
         """Advance, and return the forces."""
@@ -402,14 +405,19 @@ class _Apart:
         return found
 
     def keep(self) -> None:
-        """Keep the present state for `back`."""
+        """Keep the present state for `undo`."""
+        self._more = [joint.more for joint in self.joints]
         for joint in self.joints:
             joint.stepper.keep()
 
-    def back(self) -> None:
-        """Return to the state that was kept last."""
-        for joint in self.joints:
-            joint.stepper.back()
+    def undo(self) -> None:
+        """Return to the state that was kept last, and keep again what was kept before it."""
+        for joint, more in zip(self.joints, self._more, strict=True):
+            joint.stepper.undo()
+            joint.more = more
+
+    def inform(self) -> None:
+        """Give each joint the state that was kept: it has it."""
 
     def copy(self) -> Any:
         """Return the present state."""
@@ -427,7 +435,7 @@ class _Together:
 
     def __init__(self, places: list[int], joints: list[Joint], memory: NDArray[np.int64]) -> None:
         self.places, self.joints = places, joints
-        self._words, self._kept = memory
+        self._words, self._kept, self._before = memory
         self._floats = self._words.view(np.float64)
         first: Any = joints[0].stepper
         self._each, self._address = first.code.each, first.block.address
@@ -441,7 +449,8 @@ class _Together:
         self._lines = [place(line) for line in sample.inputs]
         self._names = ("v", *joints[0].inputs)
         self._entering = joints[0].enters
-        self._full: list[Joint] = []  # those with switches that did not fit into the log
+        self._full: list[int] = []  # rows of those with switches that did not fit into the log
+        self._more: list[tuple[int, list[Switch]]] = []  # theirs, of the kept state
 
     def step(self, sample: _Sample) -> FloatArray:
         """Advance, and return the forces."""
@@ -455,39 +464,54 @@ class _Together:
         if self._entering:
             for i, joint in zip(places, self.joints, strict=True):
                 joint.enter(float(sample.v0[i]), sample.of(i, joint.inputs).inputs)
-        for joint in self._full:
-            joint.more = []
-        self._full = []
+        self._forget()
         if self._each(self._address, len(places)):
             for row in np.flatnonzero(words[:, self._counts + CODE]).tolist():
                 try:
                     self.joints[row].finish(int(words[row, self._counts + CODE]))
-                    self._full.append(self.joints[row])
+                    self._full.append(row)
                 except GMSError as error:
                     raise error.inside(f"joint {places[row]}") from None
         force: FloatArray = floats[:, self._force]
         return force
 
     def keep(self) -> None:
-        """Keep the present state for `back`."""
+        """Keep the present state for `undo`."""
+        self._before, self._kept = self._kept, self._before
         self._kept[...] = self._words
+        self._more = self._not_logged()
 
-    def back(self) -> None:
-        """Return to the state that was kept last."""
-        self._words[...] = self._kept
+    def undo(self) -> None:
+        """Return to the state that was kept last, and keep again what was kept before it."""
+        self.take((self._kept, self._more))
+        self._before, self._kept = self._kept, self._before
+
+    def inform(self) -> None:
+        """Give each joint the state that was kept."""
+        for joint, kept in zip(self.joints, self._kept, strict=True):
+            stepper: Any = joint.stepper
+            stepper.kept = kept
 
     def copy(self) -> Any:
         """Return the present state."""
-        return self._words.copy(), [(joint, joint.more) for joint in self._full]
+        return self._words.copy(), self._not_logged()
 
     def take(self, copy: Any) -> None:
-        """Return to what `copy` returned."""
+        """Return to what `copy` returned, here or in a bank of the same models."""
         self._words[...], full = copy
-        for joint in self._full:
-            joint.more = []
-        for joint, more in full:
-            joint.more = more
-            self._full.append(joint)
+        self._forget()
+        for row, more in full:
+            self.joints[row].more = more
+            self._full.append(row)
+
+    def _not_logged(self) -> list[tuple[int, list[Switch]]]:
+        """Return the switches that did not fit into the log."""
+        return [(row, self.joints[row].more) for row in self._full]
+
+    def _forget(self) -> None:
+        for row in self._full:
+            self.joints[row].more = []
+        self._full = []
 
 
 def _alike(starts: Sequence[Start]) -> list[list[int]]:
@@ -499,5 +523,5 @@ def _alike(starts: Sequence[Start]) -> list[list[int]]:
 
 
 def _memory(start: Start, count: int) -> NDArray[np.int64]:
-    """Return memory for blocks, and for what is kept of them."""
-    return np.zeros((2, count, machine_code(start).layout.words), dtype=np.int64)
+    """Return memory for blocks, for what is kept of them, and for what was kept before."""
+    return np.zeros((3, count, machine_code(start).layout.words), dtype=np.int64)

@@ -10,7 +10,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import Chart, ChartModel, Contact, FrictionBank, FrictionState, LuGre, State, Stribeck
+from gms_fsm import (
+    GMS,
+    Chart,
+    ChartModel,
+    Contact,
+    FrictionBank,
+    FrictionState,
+    GMSParameters,
+    LuGre,
+    State,
+    Stribeck,
+)
 from gms_fsm.charts import CHARTS
 from gms_fsm.errors import ParameterError
 from gms_fsm.traces.failures import SimulationError
@@ -182,3 +193,32 @@ def test_a_joint_of_a_bank_that_fails() -> None:
         bank.advance([0.1, 0.01, 1.0], [0.1, 0.01, 9.0], 5.0)
     np.testing.assert_array_equal(bank.to_array(), before)
     assert bank.t == 0.0
+
+
+@pytest.mark.parametrize("engine", ["ifelse", None])
+def test_what_the_last_sample_found_survives_a_failure(engine: str | None) -> None:
+    k = np.linspace(40.0, 10.0, 100)  # more elements than the log of a sample has places
+    stribeck = Stribeck(1.0, 1.5, 0.05)
+    shares = np.full(100, 0.01)
+    parameters = GMSParameters.from_shares(shares, k, C=1.0, stribeck=stribeck, v_c=1e-6)
+    model = GMS(parameters, law="signed")
+
+    def found(each: Any) -> Any:
+        return each.switches, np.asarray(each.mean_force).tolist(), np.asarray(each.dF_dv).tolist()
+
+    one = FrictionState(model, engine=engine)
+    one.advance(0.0, 0.5, 10.0)
+    before = found(one)
+    assert len(one.switches) == 100
+    with pytest.raises(SimulationError):
+        one.advance(1e308, -1e308, 0.1)
+    assert found(one) == before
+
+    bank = FrictionBank([model, model, GIVEN], engine=engine)
+    bank.advance([0.0] * 3, [0.5] * 3, 10.0)
+    before = found(bank)
+    with pytest.raises(SimulationError, match="joint 1"):
+        bank.advance([0.5, 1e308, 0.5], [0.5, -1e308, 0.5], 0.1)
+    assert found(bank) == before
+    bank.advance([0.5] * 3, [-0.5] * 3, 1.0)
+    assert found(bank) != before
