@@ -348,6 +348,8 @@ class Joint:
             whole[part.where] = part.kind.kind != "f"
             if part.name in bounds:
                 least[part.where], most[part.where] = bounds[part.name]
+            if part.name == "clock":  # it may be of a friction that began earlier
+                least[part.where.start + T], most[part.where.start + T] = -LATEST, LATEST
         most[whole] = np.minimum(most[whole], 2.0**53)
         least[whole] = np.maximum(least[whole], -(2.0**53))
         return least, most, whole

@@ -111,7 +111,7 @@ class FrictionBank:
                 _Apart(places, mine) if memory is None else _Together(places, mine, memory)
             )
         self._joints = [joints[i] for i in range(len(given))]
-        self._inputs = {name for joint in self._joints for name in joint.inputs}
+        self._inputs = sorted({name for joint in self._joints for name in joint.inputs})
         self._t = starts[0].t_start
         self._last: _Sample | None = None
 
@@ -120,6 +120,11 @@ class FrictionBank:
 
     def __repr__(self) -> str:
         return f"<FrictionBank of {len(self)} joints at t = {self._t!r} s>"
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """What contacts need to be given besides their velocities."""
+        return tuple(self._inputs)
 
     # ------------------------------------------------------------------ steps
     def advance(

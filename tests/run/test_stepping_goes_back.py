@@ -72,6 +72,14 @@ def test_an_array_serves_the_other_engine() -> None:
     assert moved(one, 60, 200) == moved(other, 60, 200)
 
 
+def test_an_array_serves_a_friction_that_began_later() -> None:
+    one, other = FrictionState(stick_slip("signed")), FrictionState(stick_slip("signed"), t=50.0)
+    moved(one, 1, 60)
+    other.from_array(one.to_array())
+    assert other.t == one.t
+    assert moved(one, 60, 200) == moved(other, 60, 200)
+
+
 @pytest.mark.parametrize("seed", range(10))
 def test_an_array_with_one_number_changed_is_refused_or_runs(seed: int) -> None:
     """Whatever a host does to the numbers, machine code never uses them as wrong addresses."""

@@ -31,6 +31,7 @@ GIVEN = stick_slip("signed")
 OTHER = LuGre(sigma_0=100.0, sigma_1=1.0, sigma_2=0.0, stribeck=Stribeck(1.0, 1.5, 0.01))
 
 
+LOADED = Chart("loaded", inputs=("v", "N"), states=(State("only", outputs={"F": "N * v"}),))
 STICTION = {"F_c": 1.0, "F_s": 2.0, "b": 0.0}
 PLANAR = {"F_c": 1.0, "F_s": 2.0, "v_c": 1e-3}
 POLE = Chart(
@@ -135,6 +136,12 @@ MADE: dict[str, tuple[Callable[[], Any], str]] = {
     "no model": (
         lambda: FrictionState(3),
         "model_or_contact is 3; it must be a model or a contact",
+    ),
+    "a class": (lambda: FrictionState(GMS), "must be a model or a contact, for example GMS("),
+    "a late start": (lambda: FrictionState(GIVEN, t=1e9), "t is 1000000000.0; the clock would be"),
+    "an input with the name of an argument": (
+        lambda: FrictionState(Contact("pad", LOADED, inputs={"N": "2 * dt"})),
+        "contact 'pad': its texts name 'dt', which is an argument of advance; give it another name",
     ),
     "an engine": (lambda: FrictionState(GIVEN, engine="machines"), "engine is 'machines'; it must"),
     "a tolerance": (lambda: FrictionState(GIVEN, rtol=-1.0), "rtol is -1.0; it must be > 0"),
