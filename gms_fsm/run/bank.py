@@ -173,6 +173,11 @@ class FrictionBank:
         -------
         ndarray, shape (m,)
             N: the forces at the end.
+
+        Raises
+        ------
+        ParameterError, SimulationError
+            As in `advance`, or if t is before the present time.
         """
         return self._commit(self._checked(v0, v1, later(t, self._t), inputs))
 
@@ -190,6 +195,11 @@ class FrictionBank:
         -------
         ndarray, shape (m,)
             N: the forces at the end.
+
+        Raises
+        ------
+        ParameterError, SimulationError
+            As in `advance`.
         """
         end = self._t + checked_scalar("dt", dt, ">= 0")
         sample = self._checked(v0, v1, end, inputs)
