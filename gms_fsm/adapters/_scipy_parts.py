@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.errors import ParameterError
+from gms_fsm.errors import ParameterError, shown
 from gms_fsm.run._driven import Driven
 from gms_fsm.run.bank import FrictionBank
 from gms_fsm.run.stepping import FrictionState, Snapshot
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 
-__all__ = ["Caller", "Carried", "Solution", "Stepped", "Switch"]
+__all__ = ["Caller", "Carried", "Solution", "Stepped", "Switch", "numbers"]
 
 
 class Switch(NamedTuple):
@@ -151,6 +151,16 @@ class Solution:
     message: str
 
 
+def numbers(name: str, given: ArrayLike) -> FloatArray:
+    """Return what a caller's function returned as an array."""
+    try:
+        return np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ParameterError(
+            f"{name} returns {shown(given)}, which is no list of numbers"
+        ) from None
+
+
 class Caller:
     """The caller's functions, checked and counted.
 
@@ -189,7 +199,7 @@ class Caller:
         """Return dy/dt with the forces of the frictions."""
         self.nfev += 1
         force = np.array(forces) if self.several else forces[0]
-        dy = np.asarray(self.fun(t, y, force), dtype=np.float64)
+        dy = numbers("fun", self.fun(t, y, force))
         if dy.shape != (self.n,):
             raise ParameterError(
                 f"fun returns the shape {dy.shape}, but y0 has {self.n} components"

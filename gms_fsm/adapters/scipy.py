@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import integrators
 from gms_fsm.adapters._scipy_located import Located
-from gms_fsm.adapters._scipy_parts import Caller, Carried, Solution, Stepped, Switch
+from gms_fsm.adapters._scipy_parts import Caller, Carried, Solution, Stepped, Switch, numbers
 from gms_fsm.adapters._scipy_sampled import Solver, sampled, samples
 from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError, shown
@@ -191,7 +191,20 @@ def _stepped(given: Given, start: float, initial: Mapping[str, Any] | None, rtol
         stepper = FrictionBank(frictions, t=start, initial=initial, rtol=rtol)
     else:
         stepper = FrictionState(frictions[0], t=start, initial=initial, rtol=rtol)
-    return Stepped(stepper, stepper.snapshot(), tuple(frictions))
+    if stepper.inputs:
+        raise ParameterError(
+            f"its texts name {', '.join(map(repr, stepper.inputs))}, which nobody gives here",
+            place="friction",
+            advice="give the contact formulas in t (inputs=...), or use FrictionState yourself",
+        )
+    made = Stepped(stepper, stepper.snapshot(), tuple(frictions))
+    if len({*made.names}) < len(frictions):
+        raise ParameterError(
+            f"they are called {', '.join(map(repr, made.names))}",
+            place="friction",
+            advice="every name must be unique",
+        )
+    return made
 
 
 def _listed(given: Friction | Sequence[Friction]) -> list[Friction]:
@@ -292,7 +305,7 @@ def _velocities(
     if callable(velocity):
 
         def called(y: FloatArray) -> list[float]:
-            v = np.asarray(velocity(y), dtype=np.float64)
+            v = numbers("velocity", velocity(y))
             if v.shape != ((m,) if several else ()):
                 raise ParameterError(
                     f"velocity(y) has the shape {v.shape}",

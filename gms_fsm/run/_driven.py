@@ -13,7 +13,7 @@ from typing import Any
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.language import names_in
 from gms_fsm.lowering.program import Program
-from gms_fsm.run._steppable import alone, other_inputs
+from gms_fsm.run._steppable import alone, begin, other_inputs
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.start import Start
 from gms_fsm.systems.models import Model
@@ -88,7 +88,8 @@ class Driven:
                     )
         system = System("friction", bodies=tuple(bodies), contacts=tuple(contacts))
         settings = Settings(output="end")
-        start = Start.of(system, None, t + 1.0, settings, t_start=t, initial=initial)
+        t, end = begin(t)
+        start = Start.of(system, None, end, settings, t_start=t, initial=initial)
         layout = start.program.layout
         velocities = tuple(layout.y.index(body.v) for body in bodies)
         return cls(

@@ -153,11 +153,13 @@ class Joint:
 
     def commit(self, v0: float, v1: float, t: float, inputs: Mapping[str, Line]) -> float:
         """Advance by a sample; if that fails everything is as before."""
+        more = self.more
         self.stepper.keep()
         try:
             force = self.run(v0, v1, t, inputs)
         except BaseException:
-            self.stepper.back()
+            self.stepper.undo()
+            self.more = more
             raise
         self.t, self.last = t, Last(v0, v1, t, inputs)
         return force
@@ -269,6 +271,7 @@ class Joint:
     def moved_to(self, t: float) -> None:
         """Forget the last sample: the stepper has been given another state."""
         self.t, self.last, self.more = t, None, []
+        self._counts[SWITCHES] = 0
 
     @property
     def engine(self) -> str:
@@ -316,7 +319,6 @@ class Joint:
                 part.place[:] = values
             else:
                 part.place[:] = values.astype(part.kind).tolist()
-        self._counts[SWITCHES] = 0
         self.moved_to(float(self.stepper.buffers.now.clock[T]))
 
     @functools.cached_property
@@ -346,6 +348,8 @@ class Joint:
             whole[part.where] = part.kind.kind != "f"
             if part.name in bounds:
                 least[part.where], most[part.where] = bounds[part.name]
+            if part.name == "clock":  # it may be of a friction that began earlier
+                least[part.where.start + T], most[part.where.start + T] = -LATEST, LATEST
         most[whole] = np.minimum(most[whole], 2.0**53)
         least[whole] = np.maximum(least[whole], -(2.0**53))
         return least, most, whole

@@ -8,19 +8,21 @@ from typing import Any
 
 import numpy as np
 
+from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import ParameterError
 from gms_fsm.language import CONSTANTS, FUNCTIONS
 from gms_fsm.run.settings import Settings
-from gms_fsm.run.start import Start
+from gms_fsm.run.start import LATEST, Start
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.signals import Corners
 from gms_fsm.systems.system import Body, Contact, System
 
-__all__ = ["alone", "other_inputs", "start_of"]
+__all__ = ["alone", "begin", "other_inputs", "start_of"]
 
 WORD = re.compile(r"(?<![\w.])[A-Za-z_]\w*")  # not the exponent of a number
 GIVEN = ("t", "x", "v")  # what a contact knows by itself: x is the integral of v
+ARGUMENTS = ("self", "v0", "v1", "dt")  # of `FrictionState.advance`
 
 
 def start_of(
@@ -56,11 +58,18 @@ def start_of(
         If it cannot be stepped, or an argument violates its rule.
     """
     contact = alone(given)
-    t = checked_scalar("t", t, "finite")
+    t, end = begin(t)
+    others = other_inputs(contact)
+    if taken := [name for name in others if name in ARGUMENTS]:
+        raise ParameterError(
+            f"its texts name {taken[0]!r}, which is an argument of advance",
+            place=f"contact {contact.name!r}",
+            advice="give it another name",
+        )
     now = {} if values is None else values
     signals = {
-        name: Corners(np.array([t, t + 1.0]), np.full(2, now.get(name, 0.0)), held=True)
-        for name in ("v", *other_inputs(contact))
+        name: Corners(np.array([t, end]), np.full(2, now.get(name, 0.0)), held=True)
+        for name in ("v", *others)
     }
     system = System(
         "prescribed velocity",
@@ -69,12 +78,25 @@ def start_of(
         signals=signals,
     )
     settings = Settings(rtol=rtol, engine="ifelse", output="end")
-    return Start.of(system, None, t + 1.0, settings, t_start=t, initial=initial)
+    return Start.of(system, None, end, settings, t_start=t, initial=initial)
+
+
+def begin(t: object) -> tuple[float, float]:
+    """Return the time at which a friction begins, and some later time."""
+    start = checked_scalar("t", t, "finite")
+    if not -LATEST <= start < LATEST:
+        raise ParameterError(
+            "the clock would be too coarse",
+            place="t",
+            value=start,
+            advice=f"at least {-LATEST:g} s, and less than {LATEST:g} s",
+        )
+    return start, min(start + 1.0, LATEST)
 
 
 def alone(given: Model | Contact) -> Contact:
     """Return a contact that needs no bodies but its own, or refuse."""
-    if not hasattr(given, "chart"):
+    if not isinstance(getattr(given, "chart", None), Chart):
         raise ParameterError(
             "it must be a model or a contact, for example GMS(parameters, law='signed')",
             place="model_or_contact",

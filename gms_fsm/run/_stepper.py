@@ -43,6 +43,9 @@ class Stepper(Protocol):
     def back(self) -> None:
         """Return to the state that was kept last."""
 
+    def undo(self) -> None:
+        """Return to the state that was kept last, and keep again what was kept before it."""
+
     def copy(self) -> Any:
         """Return the present state."""
 
@@ -92,7 +95,7 @@ class Plain:
         self.buffers = _buffers(start)
         self.sample = _sample(start)
         _, _, self.tables = self.functions.p
-        self._kept = self.copy()
+        self._kept = self._before = self.copy()
 
     def run(self) -> int:
         """Advance; see `integrators.stepping.step_to`."""
@@ -100,11 +103,16 @@ class Plain:
 
     def keep(self) -> None:
         """Keep the present state for `back`."""
-        self._kept = self.copy()
+        self._before, self._kept = self._kept, self.copy()
 
     def back(self) -> None:
         """Return to the state that was kept last."""
         self.take(self._kept)
+
+    def undo(self) -> None:
+        """Return to the state that was kept last, and keep again what was kept before it."""
+        self.back()
+        self._kept = self._before
 
     def copy(self) -> dict[str, list[Any]]:
         """Return the present state."""
@@ -160,6 +168,11 @@ class Machine:
         The system, with its inputs as corner tables.
     memory : (ndarray of int, ndarray of int), optional
         For the block, and for the state that is kept; its own if omitted.
+
+    Attributes
+    ----------
+    kept : ndarray of int
+        The state that was kept last.
     """
 
     def __init__(
@@ -176,8 +189,9 @@ class Machine:
         _, _, self.tables = contents.functions.p
         self._one, self._address = self.code.one, self.block.address
         self._words = self.block.words
-        self._kept = np.empty_like(self._words) if memory is None else memory[1]
-        self.keep()
+        self.kept = np.empty_like(self._words) if memory is None else memory[1]
+        self._before = np.empty_like(self._words)
+        self.kept[:] = self._words
 
     def run(self) -> int:
         """Advance; see `integrators.stepping.step_to`."""
@@ -186,11 +200,17 @@ class Machine:
 
     def keep(self) -> None:
         """Keep the present state for `back`."""
-        self._kept[:] = self._words
+        self._before, self.kept = self.kept, self._before
+        self.kept[:] = self._words
 
     def back(self) -> None:
         """Return to the state that was kept last."""
-        self._words[:] = self._kept
+        self._words[:] = self.kept
+
+    def undo(self) -> None:
+        """Return to the state that was kept last, and keep again what was kept before it."""
+        self.back()
+        self._before, self.kept = self.kept, self._before
 
     def copy(self) -> Any:
         """Return the present state."""

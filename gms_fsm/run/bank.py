@@ -111,7 +111,7 @@ class FrictionBank:
                 _Apart(places, mine) if memory is None else _Together(places, mine, memory)
             )
         self._joints = [joints[i] for i in range(len(given))]
-        self._inputs = {name for joint in self._joints for name in joint.inputs}
+        self._inputs = sorted({name for joint in self._joints for name in joint.inputs})
         self._t = starts[0].t_start
         self._last: _Sample | None = None
 
@@ -120,6 +120,11 @@ class FrictionBank:
 
     def __repr__(self) -> str:
         return f"<FrictionBank of {len(self)} joints at t = {self._t!r} s>"
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """What contacts need to be given besides their velocities."""
+        return tuple(self._inputs)
 
     # ------------------------------------------------------------------ steps
     def advance(
@@ -168,6 +173,11 @@ class FrictionBank:
         -------
         ndarray, shape (m,)
             N: the forces at the end.
+
+        Raises
+        ------
+        ParameterError, SimulationError
+            As in `advance`, or if t is before the present time.
         """
         return self._commit(self._checked(v0, v1, later(t, self._t), inputs))
 
@@ -185,6 +195,11 @@ class FrictionBank:
         -------
         ndarray, shape (m,)
             N: the forces at the end.
+
+        Raises
+        ------
+        ParameterError, SimulationError
+            As in `advance`.
         """
         end = self._t + checked_scalar("dt", dt, ">= 0")
         sample = self._checked(v0, v1, end, inputs)
@@ -202,7 +217,7 @@ class FrictionBank:
             force = self._step(sample)
         except BaseException:
             for group in self._groups:
-                group.back()
+                group.undo()
             raise
         self._t, self._last = sample.t, sample
         return force
@@ -274,7 +289,9 @@ class FrictionBank:
         return np.array([joint.dF_dv for joint in self._informed()])
 
     def _informed(self) -> list[Joint]:
-        """Return the joints; each knows the last sample."""
+        """Return the joints; each knows the last sample, and the state before it."""
+        for group in self._groups:
+            group.inform()
         for i, joint in enumerate(self._joints):
             joint.t = self._t
             joint.last = None if self._last is None else self._last.of(i, joint.inputs)
@@ -393,6 +410,7 @@ class _Apart:
 
     def __init__(self, places: list[int], joints: list[Joint]) -> None:
         self.places, self.joints = places, joints
+        self._more: list[list[Switch]] = []
 
     def step(self, sample: _Sample) -> list[float]:
         """Advance, and return the forces."""
@@ -406,14 +424,19 @@ class _Apart:
         return found
 
     def keep(self) -> None:
-        """Keep the present state for `back`."""
+        """Keep the present state for `undo`."""
+        self._more = [joint.more for joint in self.joints]
         for joint in self.joints:
             joint.stepper.keep()
 
-    def back(self) -> None:
-        """Return to the state that was kept last."""
-        for joint in self.joints:
-            joint.stepper.back()
+    def undo(self) -> None:
+        """Return to the state that was kept last, and keep again what was kept before it."""
+        for joint, more in zip(self.joints, self._more, strict=True):
+            joint.stepper.undo()
+            joint.more = more
+
+    def inform(self) -> None:
+        """Give each joint the state that was kept: it has it."""
 
     def copy(self) -> Any:
         """Return the present state."""
@@ -431,7 +454,7 @@ class _Together:
 
     def __init__(self, places: list[int], joints: list[Joint], memory: NDArray[np.int64]) -> None:
         self.places, self.joints = places, joints
-        self._words, self._kept = memory
+        self._words, self._kept, self._before = memory
         self._floats = self._words.view(np.float64)
         first: Any = joints[0].stepper
         self._each, self._address = first.code.each, first.block.address
@@ -445,7 +468,8 @@ class _Together:
         self._lines = [place(line) for line in sample.inputs]
         self._names = ("v", *joints[0].inputs)
         self._entering = joints[0].enters
-        self._full: list[Joint] = []  # those with switches that did not fit into the log
+        self._full: list[int] = []  # rows of those with switches that did not fit into the log
+        self._more: list[tuple[int, list[Switch]]] = []  # theirs, of the kept state
 
     def step(self, sample: _Sample) -> FloatArray:
         """Advance, and return the forces."""
@@ -459,39 +483,54 @@ class _Together:
         if self._entering:
             for i, joint in zip(places, self.joints, strict=True):
                 joint.enter(float(sample.v0[i]), sample.of(i, joint.inputs).inputs)
-        for joint in self._full:
-            joint.more = []
-        self._full = []
+        self._forget()
         if self._each(self._address, len(places)):
             for row in np.flatnonzero(words[:, self._counts + CODE]).tolist():
                 try:
                     self.joints[row].finish(int(words[row, self._counts + CODE]))
-                    self._full.append(self.joints[row])
+                    self._full.append(row)
                 except GMSError as error:
                     raise error.inside(f"joint {places[row]}") from None
         force: FloatArray = floats[:, self._force]
         return force
 
     def keep(self) -> None:
-        """Keep the present state for `back`."""
+        """Keep the present state for `undo`."""
+        self._before, self._kept = self._kept, self._before
         self._kept[...] = self._words
+        self._more = self._not_logged()
 
-    def back(self) -> None:
-        """Return to the state that was kept last."""
-        self._words[...] = self._kept
+    def undo(self) -> None:
+        """Return to the state that was kept last, and keep again what was kept before it."""
+        self.take((self._kept, self._more))
+        self._before, self._kept = self._kept, self._before
+
+    def inform(self) -> None:
+        """Give each joint the state that was kept."""
+        for joint, kept in zip(self.joints, self._kept, strict=True):
+            stepper: Any = joint.stepper
+            stepper.kept = kept
 
     def copy(self) -> Any:
         """Return the present state."""
-        return self._words.copy(), [(joint, joint.more) for joint in self._full]
+        return self._words.copy(), self._not_logged()
 
     def take(self, copy: Any) -> None:
-        """Return to what `copy` returned."""
+        """Return to what `copy` returned, here or in a bank of the same models."""
         self._words[...], full = copy
-        for joint in self._full:
-            joint.more = []
-        for joint, more in full:
-            joint.more = more
-            self._full.append(joint)
+        self._forget()
+        for row, more in full:
+            self.joints[row].more = more
+            self._full.append(row)
+
+    def _not_logged(self) -> list[tuple[int, list[Switch]]]:
+        """Return the switches that did not fit into the log."""
+        return [(row, self.joints[row].more) for row in self._full]
+
+    def _forget(self) -> None:
+        for row in self._full:
+            self.joints[row].more = []
+        self._full = []
 
 
 def _alike(starts: Sequence[Start]) -> list[list[int]]:
@@ -503,5 +542,5 @@ def _alike(starts: Sequence[Start]) -> list[list[int]]:
 
 
 def _memory(start: Start, count: int) -> NDArray[np.int64]:
-    """Return memory for blocks, and for what is kept of them."""
-    return np.zeros((2, count, machine_code(start).layout.words), dtype=np.int64)
+    """Return memory for blocks, for what is kept of them, and for what was kept before."""
+    return np.zeros((3, count, machine_code(start).layout.words), dtype=np.int64)

@@ -90,9 +90,7 @@ class FrictionEquations:
         t: float = 0.0,
         initial: Mapping[str, Any] | None = None,
     ) -> None:
-        self._driven = driven = Driven.of(
-            [model_or_contact], checked_scalar("t", t, "finite"), initial, several=False
-        )
+        self._driven = driven = Driven.of([model_or_contact], t, initial, several=False)
         program = driven.program
         self.size = len(driven.own)
         self.initial: FloatArray = np.array(driven.initial)
@@ -269,7 +267,7 @@ class FrictionEquations:
                 )
         full, mode = b.now.y, b.now.mode
         self._mode, self.switches = mode, tuple(taken)
-        self._watch = [0] * len(self._watch)
+        self._held, self._watch = [0.0] * program.held, [0] * len(self._watch)  # copies share none
         program.ieee["arm"](t, full, mode, program.p, self._held, self._watch)
         self._active = [r for r, why in enumerate(self._watch) if why]
         return np.array([full[k] for k in driven.own])

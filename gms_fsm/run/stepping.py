@@ -155,6 +155,11 @@ class FrictionState:
         -------
         float
             N: the force at the end.
+
+        Raises
+        ------
+        ParameterError, SimulationError
+            As in `advance`, or if t is before the present time.
         """
         t = later(t, self._joint.t)
         v0, v1, _ = _checked(v0, v1, 0.0)
@@ -172,6 +177,11 @@ class FrictionState:
         -------
         float
             N: the force at the end.
+
+        Raises
+        ------
+        ParameterError, SimulationError
+            As in `advance`.
         """
         joint = self._joint
         v0, v1, dt = _checked(v0, v1, dt)

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from gms_fsm import ChartModel, Contact, ParameterError
+from gms_fsm import Chart, ChartModel, Contact, ParameterError, State
 from gms_fsm.adapters.scipy import solve_ivp
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.registry import entry
@@ -21,6 +21,12 @@ def _mass(t: float, y: Any, F: float) -> list[float]:
 
 
 STICTION = Contact("pad", CHARTS["stiction"], entry("stiction").demonstration.values)
+NAMED = Contact("pad", MODEL)
+LOADED = Contact(
+    "pad",
+    Chart("loaded", inputs=("v", "N"), states=(State("only", outputs={"F": "N * v"}),)),
+    inputs={"N": "load"},
+)
 RIGHT: dict[str, Any] = {
     "fun": _mass,
     "t_span": (0.0, 1.0),
@@ -35,6 +41,8 @@ RIGHT: dict[str, Any] = {
     [
         ({"fun": 3}, "fun is 3; it must be a function"),
         ({"fun": lambda t, y, F: [0.0]}, r"fun returns the shape \(1,\), but y0 has 2 components"),
+        ({"fun": lambda t, y, F: "ab"}, "fun returns 'ab', which is no list of numbers"),
+        ({"velocity": lambda y: "ab"}, "velocity returns 'ab', which is no list of numbers"),
         ({"t_span": (1.0, 1.0)}, "the end must be later"),
         ({"t_span": (0.0, math.nan)}, "t_span"),
         ({"y0": [0.0, math.nan]}, "y0"),
@@ -56,6 +64,11 @@ RIGHT: dict[str, Any] = {
         ({"sample": 0.0}, "sample"),
         ({"sample": 1e-9}, "there would be 1e.09 samples"),
         ({"sample": 0.1, "method": "dp45"}, "sample=... takes the methods of SciPy only"),
+        ({"sample": 0.1, "friction": LOADED}, "its texts name 'load', which nobody gives here"),
+        (
+            {"sample": 0.1, "friction": [NAMED, NAMED], "velocity": [1, 1]},
+            "they are called 'pad', 'pad'; every name must be unique",
+        ),
         ({"sample": 0.1, "t_eval": [0.5]}, "the rows are the samples"),
     ],
 )

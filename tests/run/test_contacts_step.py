@@ -45,6 +45,7 @@ def test_banks_give_each_joint_its_inputs() -> None:
     bank = FrictionBank([contact("N_0"), stick_slip("signed"), contact("2 * N_0")])
     one, other = FrictionState(contact("N_0")), FrictionState(contact("2 * N_0"))
     plain = FrictionState(stick_slip("signed"))
+    assert bank.inputs == one.inputs == ("N_0",)
     for j in range(1, len(T)):
         pair = np.full(3, V[j - 1]), np.full(3, V[j])
         forces = bank.advance(*pair, 0.01, N_0=(N[j - 1], [N[j], 1.0, 0.5 * N[j]]))

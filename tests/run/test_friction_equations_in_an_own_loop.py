@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from typing import Any
 
@@ -22,7 +23,7 @@ from gms_fsm import (
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.registry import entry
 from gms_fsm.errors import ChartError
-from tests.helpers import FASTEST, pulled_mass
+from tests.helpers import FASTEST, pulled_mass, stick_slip
 
 
 def _own_loop(friction: FrictionEquations, t_end: float, method: Any) -> list[Any]:
@@ -175,3 +176,14 @@ def test_a_contact_with_formulas_of_time() -> None:
     friction = FrictionEquations(Contact("pad", READS_N, inputs={"N": "10 + t"}))
     y = friction.settle(0.0, friction.initial, 0.5)
     assert friction.force(2.0, y, 0.5) == 6.0
+
+
+def test_copies_go_their_own_ways() -> None:
+    friction = FrictionEquations(stick_slip("signed"))
+    y = friction.settle(0.0, friction.initial, 0.5)
+    y[1:] = 0.5  # beyond the thresholds
+    y = friction.settle(0.0, y, 0.5)
+    before = friction.force(0.0, y, 0.5), friction.derivatives(0.0, y, 0.5).tolist()
+    other = copy.copy(friction)
+    other.settle(0.0, y, -0.5)
+    assert (friction.force(0.0, y, 0.5), friction.derivatives(0.0, y, 0.5).tolist()) == before

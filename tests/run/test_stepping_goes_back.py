@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import FrictionBank, FrictionState
+from gms_fsm import GMS, FrictionBank, FrictionState, GMSParameters, Stribeck
 from gms_fsm.errors import ParameterError
 from tests.helpers import FASTEST, stick_slip
 from tests.run.stepping_cases import bank
@@ -72,6 +72,14 @@ def test_an_array_serves_the_other_engine() -> None:
     assert moved(one, 60, 200) == moved(other, 60, 200)
 
 
+def test_an_array_serves_a_friction_that_began_later() -> None:
+    one, other = FrictionState(stick_slip("signed")), FrictionState(stick_slip("signed"), t=50.0)
+    moved(one, 1, 60)
+    other.from_array(one.to_array())
+    assert other.t == one.t
+    assert moved(one, 60, 200) == moved(other, 60, 200)
+
+
 @pytest.mark.parametrize("seed", range(10))
 def test_an_array_with_one_number_changed_is_refused_or_runs(seed: int) -> None:
     """Whatever a host does to the numbers, machine code never uses them as wrong addresses."""
@@ -124,3 +132,36 @@ def test_copies_go_their_own_ways(again: Callable[[Any], Any]) -> None:
         assert each.advance([0.3, 0.2], [0.0, 0.0], 0.5).tolist() == pytest.approx(
             bank.peek([0.0, 0.0], [0.0, 0.0], 0.0).tolist(), abs=0
         )
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_going_back_forgets_the_last_sample(engine: str) -> None:
+    friction = FrictionState(stick_slip("signed"), engine=engine)
+    friction.advance(0.0, 0.5, 5.0)
+    assert friction.switches
+    for back in (
+        lambda: friction.restore(friction.snapshot()),
+        lambda: friction.from_array(friction.to_array()),
+    ):
+        friction.advance(0.5, -0.5, 5.0)
+        assert friction.switches
+        back()
+        assert friction.switches == ()
+        with pytest.raises(ParameterError, match="no last sample"):
+            _ = friction.mean_force
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_banks_that_share_a_snapshot_keep_their_own_switches(engine: str) -> None:
+    n = 100  # more elements than the log of a sample has places
+    parameters = GMSParameters.from_shares(
+        np.full(n, 1 / n), np.linspace(40, 10, n), C=1.0, stribeck=Stribeck(1.0, 1.5, 0.05),
+        v_c=1e-6,
+    )  # fmt: skip
+    one, other = (FrictionBank([GMS(parameters, law="signed")] * 2, engine=engine) for _ in "ab")
+    one.advance([0.0, 0.0], [0.5, 0.5], 10.0)
+    assert [len(each) for each in one.switches] == [n, n]
+    other.restore(one.snapshot())
+    other.advance([0.5, 0.5], [0.5, 0.5], 0.1)
+    assert [len(each) for each in one.switches] == [n, n]
+    assert other.switches == ((), ())

@@ -10,7 +10,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import Chart, ChartModel, Contact, FrictionBank, FrictionState, LuGre, State, Stribeck
+from gms_fsm import (
+    GMS,
+    Chart,
+    ChartModel,
+    Contact,
+    FrictionBank,
+    FrictionState,
+    GMSParameters,
+    LuGre,
+    State,
+    Stribeck,
+)
 from gms_fsm.charts import CHARTS
 from gms_fsm.errors import ParameterError
 from gms_fsm.traces.failures import SimulationError
@@ -20,6 +31,7 @@ GIVEN = stick_slip("signed")
 OTHER = LuGre(sigma_0=100.0, sigma_1=1.0, sigma_2=0.0, stribeck=Stribeck(1.0, 1.5, 0.01))
 
 
+LOADED = Chart("loaded", inputs=("v", "N"), states=(State("only", outputs={"F": "N * v"}),))
 STICTION = {"F_c": 1.0, "F_s": 2.0, "b": 0.0}
 PLANAR = {"F_c": 1.0, "F_s": 2.0, "v_c": 1e-3}
 POLE = Chart(
@@ -125,6 +137,12 @@ MADE: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: FrictionState(3),
         "model_or_contact is 3; it must be a model or a contact",
     ),
+    "a class": (lambda: FrictionState(GMS), "must be a model or a contact, for example GMS("),
+    "a late start": (lambda: FrictionState(GIVEN, t=1e9), "t is 1000000000.0; the clock would be"),
+    "an input with the name of an argument": (
+        lambda: FrictionState(Contact("pad", LOADED, inputs={"N": "2 * dt"})),
+        "contact 'pad': its texts name 'dt', which is an argument of advance; give it another name",
+    ),
     "an engine": (lambda: FrictionState(GIVEN, engine="machines"), "engine is 'machines'; it must"),
     "a tolerance": (lambda: FrictionState(GIVEN, rtol=-1.0), "rtol is -1.0; it must be > 0"),
     "an initial velocity": (
@@ -182,3 +200,32 @@ def test_a_joint_of_a_bank_that_fails() -> None:
         bank.advance([0.1, 0.01, 1.0], [0.1, 0.01, 9.0], 5.0)
     np.testing.assert_array_equal(bank.to_array(), before)
     assert bank.t == 0.0
+
+
+@pytest.mark.parametrize("engine", ["ifelse", None])
+def test_what_the_last_sample_found_survives_a_failure(engine: str | None) -> None:
+    k = np.linspace(40.0, 10.0, 100)  # more elements than the log of a sample has places
+    stribeck = Stribeck(1.0, 1.5, 0.05)
+    shares = np.full(100, 0.01)
+    parameters = GMSParameters.from_shares(shares, k, C=1.0, stribeck=stribeck, v_c=1e-6)
+    model = GMS(parameters, law="signed")
+
+    def found(each: Any) -> Any:
+        return each.switches, np.asarray(each.mean_force).tolist(), np.asarray(each.dF_dv).tolist()
+
+    one = FrictionState(model, engine=engine)
+    one.advance(0.0, 0.5, 10.0)
+    before = found(one)
+    assert len(one.switches) == 100
+    with pytest.raises(SimulationError):
+        one.advance(1e308, -1e308, 0.1)
+    assert found(one) == before
+
+    bank = FrictionBank([model, model, GIVEN], engine=engine)
+    bank.advance([0.0] * 3, [0.5] * 3, 10.0)
+    before = found(bank)
+    with pytest.raises(SimulationError, match="joint 1"):
+        bank.advance([0.5, 1e308, 0.5], [0.5, -1e308, 0.5], 0.1)
+    assert found(bank) == before
+    bank.advance([0.5] * 3, [-0.5] * 3, 1.0)
+    assert found(bank) != before
