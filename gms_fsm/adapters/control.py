@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import functools
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -48,8 +49,8 @@ def friction_system(
     -------
     control.NonlinearIOSystem
         All memory of the friction is in its state x, as python-control wants it. x = 0, the default
-        of `control.input_output_response`, is the friction before its first sample; any other
-        x must be one that the system returned. It is no state to linearize about.
+        of `control.input_output_response`, is the friction before its first sample, at any time;
+        any other x must be one that the system returned. It is no state to linearize about.
 
     Raises
     ------
@@ -72,8 +73,10 @@ def friction_system(
     if isinstance(dt, bool):  # python-control's mark for an unknown sample time
         raise ParameterError("the friction needs a sample time", place="dt", value=dt)
     dt = checked_scalar("dt", dt, "> 0")
-    friction = FrictionState(model_or_contact, initial=initial, rtol=rtol, engine=engine)
-    memory = _Memory(friction, dt)
+    begin = functools.partial(
+        FrictionState, model_or_contact, initial=initial, rtol=rtol, engine=engine
+    )
+    friction, memory = begin(), _Memory(begin, dt)
     return control.nlsys(
         memory.update,
         memory.output,
@@ -92,34 +95,34 @@ class _Memory:
     which comes back unchanged need not be read again.
     """
 
-    def __init__(self, friction: FrictionState, dt: float) -> None:
-        self._friction, self._dt = friction, dt
-        self._start = friction.snapshot()
+    def __init__(self, begin: Callable[..., FrictionState], dt: float) -> None:
+        self._begin, self._dt = begin, dt
+        self._friction = friction = begin()
         self._more = friction.inputs
         self._first = 2 + len(self._more)  # number of x that belongs to the friction
         self.size = self._first + friction.to_array().size
         self._held: FloatArray = np.zeros(self.size)
 
-    def update(self, _t: float, x: FloatArray, u: FloatArray, _params: Any) -> FloatArray:
+    def update(self, t: float, x: FloatArray, u: FloatArray, _params: Any) -> FloatArray:
         """Return the next x."""
-        before, dt = self._go_to(x, u)
+        before, dt = self._go_to(t, x, u)
         self._friction.advance(before[0], u[0], dt, **self._lines(before, u))
         self._held = np.concatenate([[1.0], u, self._friction.to_array()])
         return self._held.copy()
 
-    def output(self, _t: float, x: FloatArray, u: FloatArray, _params: Any) -> float:
+    def output(self, t: float, x: FloatArray, u: FloatArray, _params: Any) -> float:
         """Return the force."""
-        before, dt = self._go_to(x, u)
+        before, dt = self._go_to(t, x, u)
         return self._friction.peek(before[0], u[0], dt, **self._lines(before, u))
 
-    def _go_to(self, x: FloatArray, u: FloatArray) -> tuple[FloatArray, float]:
+    def _go_to(self, t: float, x: FloatArray, u: FloatArray) -> tuple[FloatArray, float]:
         """Bring the friction to x, and return the inputs there and the time since."""
-        if not np.array_equal(x, self._held):
-            if x.any():
-                self._friction.from_array(x[self._first :])
-            else:
-                self._friction.restore(self._start)
-            self._held = x.copy()
+        same = np.array_equal(x, self._held)
+        if not x.any() and not (same and self._friction.t == t):
+            self._friction = self._begin(t=t)
+        elif not same:
+            self._friction.from_array(x[self._first :])
+        self._held = self._held if same else x.copy()
         return (x[1 : self._first], self._dt) if x[0] else (u, 0.0)
 
     def _lines(self, before: FloatArray, now: FloatArray) -> dict[str, tuple[float, float]]:

@@ -131,7 +131,7 @@ class Joint:
         if self.inputs:
             self._give(inputs)
         if self.enters:
-            self.enter(v0, inputs)
+            self.enter(v0 if t > self.t else v1, inputs)
         v, counts = self._v, self._counts
         self._end[0], v[0], v[1] = t, v0, v1
         counts[RESUMED] = 0
@@ -153,15 +153,15 @@ class Joint:
 
     def commit(self, v0: float, v1: float, t: float, inputs: Mapping[str, Line]) -> float:
         """Advance by a sample; if that fails everything is as before."""
-        more = self.more
+        more, now, last = self.more, self.t, self.last
         self.stepper.keep()
         try:
             force = self.run(v0, v1, t, inputs)
-        except BaseException:
+            self.t, self.last = t, Last(v0, v1, t, inputs)
+        except BaseException:  # Ctrl-C, too
             self.stepper.undo()
-            self.more = more
+            self.more, self.t, self.last = more, now, last
             raise
-        self.t, self.last = t, Last(v0, v1, t, inputs)
         return force
 
     def peek(self, v0: float, v1: float, t: float, inputs: Mapping[str, Line]) -> float:
@@ -282,7 +282,9 @@ class Joint:
     def identity(self) -> tuple[str, str]:
         """What states can be exchanged with: the same numbers, and the same engine."""
         program, options = self.start.program, self.start.options
-        what = program.source, program.p[:2], options.rtol, options.atol
+        what: tuple[Any, ...] = program.source, program.p[:2], options.rtol, options.atol
+        if self.enters:  # what is entered depends on the initial values, too
+            what = *what, self.start.y, self.start.mode
         return hashlib.sha256(repr(what).encode()).hexdigest(), self.engine
 
     def to_array(self) -> FloatArray:
@@ -303,6 +305,17 @@ class Joint:
         """Return to what `to_array` returned; it has the right length."""
         least, most, whole = self._limits
         flat = np.where(np.abs(given) < MOST, given, np.copysign(np.inf, given))
+        y = next(part for part in self._parts if part.name == "y")
+        if (
+            self.enters
+            and flat[self._phase] == loop.START
+            and self.start.y != flat[y.where].tolist()
+        ):
+            raise ParameterError(
+                "it is of a friction that begins with other initial values",
+                place="array",
+                advice="make this one with the same ones",
+            )
         wrong = (flat < least) | (flat > most) | (whole & (flat != np.rint(flat)))
         phase = flat[self._phase]
         if wrong.any() or phase not in (loop.START, loop.SETTLED, loop.ARC):
@@ -346,6 +359,8 @@ class Joint:
         bounds = bounds_of(self.start, self.stepper.buffers)
         for part in self._parts:
             whole[part.where] = part.kind.kind != "f"
+            if part.name == "floor":  # tolerances only grow
+                least[part.where] = part.place
             if part.name in bounds:
                 least[part.where], most[part.where] = bounds[part.name]
             if part.name == "clock":  # it may be of a friction that began earlier
@@ -389,6 +404,16 @@ def too_late(name: str, value: object) -> ParameterError:
     )
 
 
+def too_short(dt: float, t: float) -> ParameterError:
+    """Return the error for a sample that the clock cannot resolve."""
+    return ParameterError(
+        f"it is below the resolution of the clock at t = {t!r} s",
+        place="dt",
+        value=dt,
+        advice="start at a smaller t=...",
+    )
+
+
 def later(t: Any, now: float) -> float:
     """Return a time if it is not before the present one."""
     time = checked_scalar("t", t, "finite")
@@ -404,7 +429,8 @@ def later(t: Any, now: float) -> float:
 
 def line_of(name: str, given: Any) -> tuple[Any, Any]:
     """Return an input at the start and at the end of a sample."""
-    if isinstance(given, tuple | list) and len(given) == 2:
+    flat = isinstance(given, np.ndarray) and given.ndim == 0
+    if isinstance(given, tuple | list | np.ndarray) and not flat and len(given) == 2:
         return given[0], given[1]
     raise ParameterError(
         "it must be a pair, its value at the start and at the end of the sample",

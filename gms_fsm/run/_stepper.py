@@ -241,14 +241,15 @@ def machine_code(start: Start) -> MachineCode:
 
     program = start.program
     key = id(program.functions)
-    if key not in _known:
+    made = _known.get(key, (None, None))[0]
+    if made is None:
         if len(_known) >= compiled.MOST_ENGINES:
             _known.clear()
         made = machine.stepper(
             compiled.text_of(program), _arguments(start), compiled.store(), compiled.notify
         )
         _known[key] = made, program.functions  # kept, so that their `id` stays theirs
-    return _known[key][0]
+    return made
 
 
 def _arguments(start: Start) -> Any:

@@ -25,6 +25,7 @@ from gms_fsm.run._joint import (
     numbers_of,
     stepper_kind,
     too_late,
+    too_short,
 )
 from gms_fsm.run._steppable import start_of
 from gms_fsm.run._stepper import Machine, Plain, Stepper, machine_code
@@ -150,11 +151,15 @@ class FrictionBank:
         Raises
         ------
         ParameterError
-            If a number is not finite, an array has another length, or an input is missing.
+            If a number is not finite, an array has another length, an input is missing, or the
+            clock does not resolve dt.
         SimulationError
             If a joint cannot continue. In both cases all joints are as they were before.
         """
-        end = self._t + checked_scalar("dt", dt, ">= 0")
+        time = checked_scalar("dt", dt, ">= 0")
+        end = self._t + time
+        if end == self._t and time > 0.0:
+            raise too_short(time, end)
         return self._commit(self._checked(v0, v1, end, inputs))
 
     def advance_to(
@@ -213,13 +218,15 @@ class FrictionBank:
     def _commit(self, sample: _Sample) -> FloatArray:
         for group in self._groups:
             group.keep()
+        now, last = self._t, self._last
         try:
             force = self._step(sample)
-        except BaseException:
+            self._t, self._last = sample.t, sample
+        except BaseException:  # Ctrl-C, too
             for group in self._groups:
                 group.undo()
+            self._t, self._last = now, last
             raise
-        self._t, self._last = sample.t, sample
         return force
 
     def _step(self, sample: _Sample) -> FloatArray:
@@ -535,9 +542,10 @@ class _Together:
 
 def _alike(starts: Sequence[Start]) -> list[list[int]]:
     """Return the places of starts that share their machine code."""
+    codes = [machine_code(start) for start in starts]  # all in memory: their `id` differ
     groups: dict[int, list[int]] = {}
-    for i, start in enumerate(starts):
-        groups.setdefault(id(machine_code(start)), []).append(i)
+    for i, code in enumerate(codes):
+        groups.setdefault(id(code), []).append(i)
     return list(groups.values())
 
 

@@ -7,6 +7,7 @@ integrates `FrictionEquations.derivatives` beside its own equations, stops where
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -23,7 +24,7 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 from integrators import hybrid
 from integrators.crossings import watched
-from integrators.loop import EDGE, FIRED, MACHINE, MACHINE_LIVELOCK, PAUSED, run_to_event
+from integrators.loop import EDGE, FIRED, FIRING, MACHINE, PAUSED, run_to_event
 from integrators.steps import PAUSE, Motion
 
 __all__ = ["FrictionEquations"]
@@ -241,7 +242,7 @@ class FrictionEquations:
         ParameterError
             If a number is not finite or y has another length; nothing has changed then.
         ChartError
-            If edges are enabled without end; nothing has changed then.
+            If edges are enabled without end, or assign NaN; nothing has changed then.
         """
         t, v = checked_scalar("t", t, "finite"), checked_scalar("v", v, "finite")
         own = checked_array("y", y, self.size, "finite").tolist()
@@ -257,7 +258,7 @@ class FrictionEquations:
             if event == FIRED:
                 machine, edge = b.memory.counts[MACHINE], b.memory.counts[EDGE]
                 taken.append(Switch(t, machine, driven.edge(edge)))
-            elif event == MACHINE_LIVELOCK:
+            elif event != FIRING:
                 last = taken[-1]
                 raise ChartError(
                     f"edges are enabled without end, {last.edge!r} of element {last.element + 1} "
@@ -266,6 +267,12 @@ class FrictionEquations:
                     advice="prove() finds such guards",
                 )
         full, mode = b.now.y, b.now.mode
+        if not all(map(math.isfinite, full)):
+            raise ChartError(
+                f"an edge assigns NaN or infinity: y is {[full[k] for k in driven.own]}",
+                place=f"t = {t!r} s",
+                advice=f"look at the actions of {', '.join({each.edge for each in taken})}",
+            )
         self._mode, self.switches = mode, tuple(taken)
         self._held, self._watch = [0.0] * program.held, [0] * len(self._watch)  # copies share none
         program.ieee["arm"](t, full, mode, program.p, self._held, self._watch)

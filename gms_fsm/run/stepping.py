@@ -23,6 +23,7 @@ from gms_fsm.run._joint import (
     numbers_of,
     stepper_kind,
     too_late,
+    too_short,
 )
 from gms_fsm.run._steppable import start_of
 from gms_fsm.run.start import LATEST
@@ -131,7 +132,7 @@ class FrictionState:
         Raises
         ------
         ParameterError
-            If a number is not finite, or an input is missing.
+            If a number is not finite, an input is missing, or the clock does not resolve dt.
         SimulationError
             If it cannot continue. In both cases the friction is as it was before.
         """
@@ -139,7 +140,10 @@ class FrictionState:
         v0, v1, dt = _checked(v0, v1, dt)
         if inputs or joint.inputs:
             inputs = self._lines(inputs)
-        return joint.commit(v0, v1, _sum(joint.t, dt), inputs)
+        end = _sum(joint.t, dt)
+        if end == joint.t and dt > 0.0:
+            raise too_short(dt, end)
+        return joint.commit(v0, v1, end, inputs)
 
     def advance_to(self, v0: float, v1: float, t: float, **inputs: Line) -> float:
         """Advance to a time; see `advance`.

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import Contact, FrictionState, Prescribed, simulate
+from gms_fsm import Chart, Contact, FrictionState, Prescribed, State, simulate
 from gms_fsm.adapters.control import friction_system
 from gms_fsm.charts import CHARTS
 from gms_fsm.errors import ParameterError
@@ -119,3 +119,20 @@ def test_a_state_that_was_not_returned_is_refused_and_does_no_harm() -> None:
     with pytest.raises(ParameterError, match="v1"):
         control.input_output_response(system, T, np.where(T < 1.0, V, np.nan))
     assert force(system).tolist() == whole.tolist()
+
+
+def test_it_begins_at_the_time_of_the_first_sample() -> None:
+    """Texts over t see the right time, and each response starts afresh."""
+    system = friction_system(loaded_by_time(), 0.01)
+    for begin in (5.0, 0.0, 5.0):
+        t = begin + 0.01 * np.arange(100)
+        found = control.input_output_response(system, t, np.full(100, 0.1)).outputs
+        friction = FrictionState(loaded_by_time(), t=begin)
+        F = [friction.peek(0.1, 0.1, 0.0), *(friction.advance(0.1, 0.1, 0.01) for _ in t[1:])]
+        assert found == pytest.approx(F, rel=1e-12)
+
+
+def loaded_by_time() -> Contact:
+    state = State("only", flow={"z": "v"}, outputs={"F": "k * z * N"})
+    chart = Chart("loaded", inputs=("v", "N"), variables=("z",), parameters=("k",), states=(state,))
+    return Contact("pad", chart, {"k": 1.0}, inputs={"N": "t"})

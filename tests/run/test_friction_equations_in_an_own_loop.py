@@ -187,3 +187,18 @@ def test_copies_go_their_own_ways() -> None:
     other = copy.copy(friction)
     other.settle(0.0, y, -0.5)
     assert (friction.force(0.0, y, 0.5), friction.derivatives(0.0, y, 0.5).tolist()) == before
+
+
+def test_an_action_that_gives_nan_is_an_error() -> None:
+    chart = Chart(
+        "log", inputs=("v",), variables=("z",), parameters=("k",),
+        states=(State("a", flow={"z": "v"}), State("b", flow={"z": "v"})),
+        transitions=(Transition("over", "a", "b", guard="z > 0.3", actions={"z": "log(-z)"}),),
+        outputs={"F": "k * z"},
+    )  # fmt: skip
+    friction = FrictionEquations(ChartModel(chart, {"k": 1.0}))
+    y = friction.settle(0.0, friction.initial, 0.1)
+    y[-1] = 0.5
+    with pytest.raises(ChartError, match=r"an edge assigns NaN or infinity.*the actions of over"):
+        friction.settle(0.0, y, 0.1)
+    assert friction.states == ("a",)

@@ -229,3 +229,30 @@ def test_what_the_last_sample_found_survives_a_failure(engine: str | None) -> No
     assert found(bank) == before
     bank.advance([0.5] * 3, [-0.5] * 3, 1.0)
     assert found(bank) != before
+
+
+def test_a_sample_that_the_clock_does_not_resolve() -> None:
+    friction = FrictionState(GIVEN, t=1e8)
+    with pytest.raises(ParameterError, match="below the resolution of the clock at t = 100000000"):
+        friction.advance(0.1, 0.1, 1e-9)
+    with pytest.raises(ParameterError, match="below the resolution of the clock"):
+        FrictionBank([GIVEN], t=1e8).advance([0.1], [0.1], 1e-9)
+    assert friction.peek(0.1, 0.1, 1e-9) == friction.peek(0.1, 0.1, 0.0)  # stages may be close
+
+
+ENTERED = Chart(
+    "entered", inputs=("v",), variables=("z",), parameters=("k",),
+    states=(State("only", entry={"z": "z + v"}, flow={"z": "v"}, outputs={"F": "k * z"}),),
+)  # fmt: skip
+
+
+def test_a_state_from_other_initial_values_before_its_entry() -> None:
+    model = ChartModel(ENTERED, {"k": 3.0})
+    friction, other = FrictionState(model), FrictionState(model, initial={"z": [0.05]})
+    with pytest.raises(ParameterError, match="array: it is of a friction that begins with other"):
+        friction.from_array(other.to_array())
+    with pytest.raises(ParameterError, match="snapshot: it is of another model"):
+        friction.restore(other.snapshot())
+    assert friction.advance(0.5, 0.5, 0.01) == pytest.approx(3 * (0.5 + 0.005), rel=1e-12)
+    other = FrictionState(model)
+    assert other.peek(0.1, 0.5, 0.0) == other.peek(0.5, 0.5, 0.0) == 1.5
