@@ -604,15 +604,15 @@ def replace(name: str, text: str) -> None:
     print(f"{name} has new tables")
 
 
-def machine() -> str:
-    """Return date, processor and versions in one line."""
+def machine(*others: str) -> str:
+    """Return date, processor and versions in one line; others are further packages."""
     cpu = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
         names = [line for line in info.read_text().splitlines() if line.startswith("model name")]
         cpu = names[0].split(":")[1].strip() if names else cpu
     packages = [f"{name} {version(name)}" for name in ("numpy", "scipy")]
-    for name in ("llvmlite", "numba", "scikit-sundae", "pathsim"):
+    for name in others or ("llvmlite", "numba", "scikit-sundae", "pathsim"):
         try:
             packages.append(f"{name} {version(name)}")
         except ModuleNotFoundError:
