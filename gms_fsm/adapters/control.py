@@ -99,31 +99,31 @@ class _Memory:
         self._begin, self._dt = begin, dt
         self._friction = friction = begin()
         self._more = friction.inputs
-        self._first = 2 + len(self._more)  # number of x that belongs to the friction
-        self.size = self._first + friction.to_array().size
+        self._own = 2 + len(self._more)  # number of x that belongs to the friction
+        self.size = self._own + friction.to_array().size
         self._held: FloatArray = np.zeros(self.size)
 
-    def update(self, t: float, x: FloatArray, u: FloatArray, _params: Any) -> FloatArray:
+    def update(self, t: float, state: FloatArray, u: FloatArray, _params: Any) -> FloatArray:
         """Return the next x."""
-        before, dt = self._go_to(t, x, u)
+        before, dt = self._go_to(t, state, u)
         self._friction.advance(before[0], u[0], dt, **self._lines(before, u))
         self._held = np.concatenate([[1.0], u, self._friction.to_array()])
         return self._held.copy()
 
-    def output(self, t: float, x: FloatArray, u: FloatArray, _params: Any) -> float:
+    def output(self, t: float, state: FloatArray, u: FloatArray, _params: Any) -> float:
         """Return the force."""
-        before, dt = self._go_to(t, x, u)
+        before, dt = self._go_to(t, state, u)
         return self._friction.peek(before[0], u[0], dt, **self._lines(before, u))
 
-    def _go_to(self, t: float, x: FloatArray, u: FloatArray) -> tuple[FloatArray, float]:
+    def _go_to(self, t: float, state: FloatArray, u: FloatArray) -> tuple[FloatArray, float]:
         """Bring the friction to x, and return the inputs there and the time since."""
-        same = np.array_equal(x, self._held)
-        if not x.any() and not (same and self._friction.t == t):
+        same = np.array_equal(state, self._held)
+        if not state.any() and not (same and self._friction.t == t):
             self._friction = self._begin(t=t)
         elif not same:
-            self._friction.from_array(x[self._first :])
-        self._held = self._held if same else x.copy()
-        return (x[1 : self._first], self._dt) if x[0] else (u, 0.0)
+            self._friction.from_array(state[self._own :])
+        self._held = self._held if same else state.copy()
+        return (state[1 : self._own], self._dt) if state[0] else (u, 0.0)
 
     def _lines(self, before: FloatArray, now: FloatArray) -> dict[str, tuple[float, float]]:
         ends = zip(before[1:].tolist(), now[1:].tolist(), strict=True)

@@ -196,9 +196,9 @@ class JointFriction:
         t = self.data.time
         if t < self._t:
             self._start_over(t)
-        v, seen = self._velocities(), self._seen
-        if t > self._t + self.model.opt.timestep and self._t < seen[0] < t:
-            self._commit(*seen)
+        v, latest = self._velocities(), self._seen
+        if t > self._t + self.model.opt.timestep and self._t < latest[0] < t:
+            self._commit(*latest)
         if t == self._t:  # a velocity may be set before the first step, or by an impact
             self._v = v
         self._seen = t, v
