@@ -222,7 +222,7 @@ class JointFriction:
     # ------------------------------------------------------------------ what it found
     @property
     def forces(self) -> dict[str, float]:
-        """N or Nm: the force on each joint that MuJoCo was given last; positive against v > 0."""
+        """The force on each joint that MuJoCo was given last, N or Nm; positive against v > 0."""
         return dict(zip(self._frictions, self._forces, strict=True))
 
     @property

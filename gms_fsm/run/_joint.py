@@ -241,7 +241,7 @@ class Joint:
 
     @functools.cached_property
     def _speed(self) -> float:
-        """m/s: a small speed."""
+        """A small speed, m/s."""
         scales = scales_of(self.start.system.contacts[0])
         return scales.speed or scales.v or 1.0
 

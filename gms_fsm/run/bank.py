@@ -267,7 +267,7 @@ class FrictionBank:
     # ------------------------------------------------------------------ what it found
     @property
     def t(self) -> float:
-        """s: the present time."""
+        """The present time, s."""
         return self._t
 
     @property
@@ -287,12 +287,12 @@ class FrictionBank:
 
     @property
     def mean_force(self) -> FloatArray:
-        """N: of each joint the mean of its force over the last sample, shape (m,)."""
+        """Of each joint the mean of its force over the last sample, N, shape (m,)."""
         return np.array([joint.mean_force for joint in self._informed()])
 
     @property
     def dF_dv(self) -> FloatArray:
-        """Ns/m: how each force depends on its velocity at the end of the last sample, (m,)."""
+        """How each force depends on its velocity at the last end, Ns/m, shape (m,)."""
         return np.array([joint.dF_dv for joint in self._informed()])
 
     def _informed(self) -> list[Joint]:

@@ -204,7 +204,7 @@ class FrictionState:
     # ------------------------------------------------------------------ what it found
     @property
     def t(self) -> float:
-        """s: the present time."""
+        """The present time, s."""
         return self._joint.t
 
     @property
@@ -224,7 +224,7 @@ class FrictionState:
 
     @property
     def mean_force(self) -> float:
-        """N: the mean of the force over the last sample, by Simpson's rule between switches.
+        """The mean of the force over the last sample, N, by Simpson's rule between switches.
 
         It is computed when asked for. A host that applies this force throughout the sample
         exchanges the right impulse.
@@ -233,7 +233,7 @@ class FrictionState:
 
     @property
     def dF_dv(self) -> float:
-        """Ns/m: how the force at the end of the last sample depends on the velocity there.
+        """How the force at the end of the last sample depends on the velocity there, Ns/m.
 
         For hosts that solve for the velocity. It is computed when asked for, from samples with
         slightly other velocities at the end; deflections and switches within the sample follow.
