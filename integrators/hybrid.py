@@ -319,7 +319,8 @@ def events(equations: Equations, switch: Switch, b: Buffers, options: Options) -
         try:
             event = loop.run_to_event(functions, switch, motion, b, options.rows_at_once)
             if solver is not None and event == loop.ADVANCE:
-                solver.advance(options.rows_at_once if options.located else 1)
+                left = b.plan.max_steps - cursor[kernel.STEPS]
+                solver.advance(min(options.rows_at_once if options.located else 1, left))
         except Exception:
             if cursor[kernel.ROW]:
                 yield take_rows(b)

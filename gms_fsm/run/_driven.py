@@ -36,12 +36,15 @@ class Driven:
         The other places: the frictions' own state.
     forces : tuple of int
         For each friction the place of its force among the observed values.
+    made_of : tuple
+        The arguments of `of`.
     """
 
     start: Start
     velocities: tuple[int, ...]
     own: tuple[int, ...]
     forces: tuple[int, ...]
+    made_of: tuple[Any, ...]
 
     @classmethod
     def of(
@@ -97,7 +100,12 @@ class Driven:
             velocities,
             tuple(k for k in range(layout.y.size) if k not in velocities),
             tuple(layout.observed.index(bank.of("F")) for bank in layout.banks),
+            (tuple(frictions), t, initial, several),
         )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how to make it again: generated functions cannot be pickled."""
+        return _again, self.made_of
 
     @property
     def program(self) -> Program:
@@ -155,6 +163,11 @@ class Driven:
     def edge(self, edge: int) -> str:
         """Return the name of an edge."""
         return self.program.layout.edges[edge][0]
+
+
+def _again(*made_of: Any) -> Driven:
+    *arguments, several = made_of
+    return Driven.of(*arguments, several=several)
 
 
 def _contact(given: Model | Contact, number: int, several: bool) -> Contact:

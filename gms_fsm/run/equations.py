@@ -96,7 +96,6 @@ class FrictionEquations:
         self.size = len(driven.own)
         self.initial: FloatArray = np.array(driven.initial)
         self.switches: tuple[Switch, ...] = ()
-        self._switch = IfElse(program)
         self._mode = list(driven.start.mode)
         self._held = [0.0] * program.held
         self._watch = [0] * len(program.strict)
@@ -252,9 +251,10 @@ class FrictionEquations:
             made, t, driven.full(own, (v,)), self._mode, t, driven.start.options, capacity=1
         )
         b.now.clock[PAUSE] = t
-        functions, taken = made.functions(located=True), list[Switch]()
+        functions, switch = made.functions(located=True), IfElse(program)
+        taken: list[Switch] = []
         motion = Motion(functions.flow, functions.margins, functions.p)
-        while (event := run_to_event(functions, self._switch, motion, b, 1)) != PAUSED:
+        while (event := run_to_event(functions, switch, motion, b, 1)) != PAUSED:
             if event == FIRED:
                 machine, edge = b.memory.counts[MACHINE], b.memory.counts[EDGE]
                 taken.append(Switch(t, machine, driven.edge(edge)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from typing import Any
 
 import pytest
@@ -92,3 +93,7 @@ def test_a_failed_run_keeps_its_rows(options: dict[str, Any]) -> None:
     assert "max" in found.message
     assert 0.0 < found.t[-1] < 60.0
     assert found.y.shape == (2, len(found.t))
+    assert len(found.t) <= 6  # also on a long arc without switches
+    again = pickle.loads(pickle.dumps(found))
+    assert again.message == found.message
+    assert again.friction.states == found.friction.states

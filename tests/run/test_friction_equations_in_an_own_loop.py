@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import copy
 import math
+import pickle
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -202,3 +204,16 @@ def test_an_action_that_gives_nan_is_an_error() -> None:
     with pytest.raises(ChartError, match=r"an edge assigns NaN or infinity.*the actions of over"):
         friction.settle(0.0, y, 0.1)
     assert friction.states == ("a",)
+
+
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda given: pickle.loads(pickle.dumps(given))])
+def test_copies_go_on_from_the_same_state(again: Callable[[Any], Any]) -> None:
+    friction = FrictionEquations(stick_slip("signed"), initial={"x": 1.0})
+    y = friction.settle(0.0, friction.initial, 0.1)
+    y[1:] = 2.0  # m, beyond the thresholds
+    friction.settle(0.0, y, 0.1)
+    other = again(friction)
+    assert (other.states, other.switches) == (friction.states, friction.switches)
+    assert other.initial[0] == 1.0
+    assert other.truth(0.1, y, 0.1) == friction.truth(0.1, y, 0.1)
+    assert other.derivatives(0.1, y, 0.1).tolist() == friction.derivatives(0.1, y, 0.1).tolist()
