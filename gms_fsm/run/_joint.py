@@ -37,12 +37,18 @@ from integrators.steps import T
 __all__ = [
     "Asked",
     "Joint",
+    "Last",
     "Line",
     "Switch",
     "check_inputs",
+    "content_of",
+    "later",
     "line_of",
+    "made_again",
+    "numbers_of",
     "stepper_kind",
     "too_late",
+    "too_short",
 ]
 
 Line = tuple[float, float]  # an input at the start and at the end of a sample
@@ -85,11 +91,11 @@ class Part(NamedTuple):
 
 
 class Last(NamedTuple):
-    """A sample that has been completed."""
+    """A sample of one joint."""
 
-    v0: float
+    v0: float  # m/s
     v1: float
-    t: float  # at its end
+    t: float  # s, at its end
     inputs: Mapping[str, Line]
 
 
@@ -131,7 +137,7 @@ class Joint:
         if self.inputs:
             self._give(inputs)
         if self.enters:
-            self.enter(v0 if t > self.t else v1, inputs)
+            self.enter(Last(v0, v1, t, inputs))
         v, counts = self._v, self._counts
         self._end[0], v[0], v[1] = t, v0, v1
         counts[RESUMED] = 0
@@ -178,12 +184,15 @@ class Joint:
         for place, name in zip(self.stepper.sample.inputs[1:], self.inputs, strict=True):
             place[0], place[1] = inputs[name]
 
-    def enter(self, v0: float, inputs: Mapping[str, Line]) -> None:
+    def enter(self, sample: Last) -> None:
         """Enter the default states with the first inputs, if that has not been done yet."""
         b: Any = self.stepper.buffers
         if b.memory.counts[loop.PHASE] == loop.START:
-            first = {name: line[0] for name, line in inputs.items()}
-            start = start_of(self.given, *self.asked, {**first, "v": v0})
+            lines = {**sample.inputs, "v": (sample.v0, sample.v1)}
+            # Of a sample without length only its end matters.
+            first = 0 if sample.t > b.now.clock[T] else 1
+            values = {name: line[first] for name, line in lines.items()}
+            start = start_of(self.given, *self.asked, values)
             b.now.y[:], b.memory.anchor[:] = start.y, start.y
 
     def _logged(self) -> list[Switch]:

@@ -249,7 +249,7 @@ class FrictionBank:
                 for u in line_of(name, given)
             )
             lines[name] = start, end
-        return _Sample(t, self._row("v0", v0), self._row("v1", v1), lines)
+        return _Sample(self._t, t, self._row("v0", v0), self._row("v1", v1), lines)
 
     def _row(self, name: str, given: ArrayLike) -> FloatArray:
         """Return a copy with one finite number per joint."""
@@ -400,8 +400,9 @@ class FrictionBank:
 class _Sample(NamedTuple):
     """A sample of all joints, one entry per joint."""
 
-    t: float  # at its end
-    v0: FloatArray
+    begin: float  # s
+    t: float  # s, at its end
+    v0: FloatArray  # m/s, shape (m,)
     v1: FloatArray
     inputs: Mapping[str, tuple[FloatArray, FloatArray]]
 
@@ -423,9 +424,9 @@ class _Apart:
         """Advance, and return the forces."""
         found = []
         for i, joint in zip(self.places, self.joints, strict=True):
-            v0, v1, t, inputs = sample.of(i, joint.inputs)
+            joint.t = sample.begin
             try:
-                found.append(joint.run(v0, v1, t, inputs))
+                found.append(joint.run(*sample.of(i, joint.inputs)))
             except GMSError as error:
                 raise error.inside(f"joint {i}") from None
         return found
@@ -489,10 +490,11 @@ class _Together:
         words[:, self._counts + RESUMED] = 0
         if self._entering:
             for i, joint in zip(places, self.joints, strict=True):
-                joint.enter(float(sample.v0[i]), sample.of(i, joint.inputs).inputs)
+                joint.enter(sample.of(i, joint.inputs))
         self._forget()
         if self._each(self._address, len(places)):
             for row in np.flatnonzero(words[:, self._counts + CODE]).tolist():
+                self.joints[row].t = sample.begin
                 try:
                     self.joints[row].finish(int(words[row, self._counts + CODE]))
                     self._full.append(row)

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from gms_fsm import GMS, FrictionState, GMSParameters, Stribeck
+from gms_fsm import GMS, Chart, ChartModel, FrictionState, GMSParameters, State, Stribeck
 from gms_fsm.errors import ParameterError
 from tests.helpers import FASTEST
 
@@ -85,3 +85,17 @@ def test_before_the_first_sample() -> None:
     assert friction.switches == ()
     friction.advance(0.0, 0.1, 0.0)
     assert friction.mean_force == friction.peek(0.1, 0.1, 0.0)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_first_sample_of_a_chart_with_an_entry(engine: str) -> None:
+    """The entry sees the first velocity, also when the sample is repeated for its mean."""
+    chart = Chart(
+        "entered", inputs=("v",), variables=("z",), parameters=("k",),
+        states=(State("only", entry={"z": "z + v"}, flow={"z": "v"}, outputs={"F": "k * z"}),),
+    )  # fmt: skip
+    friction = FrictionState(ChartModel(chart, {"k": 3.0}), engine=engine)
+    friction.advance(0.5, 0.1, 0.02)
+    mean = 3.0 * (0.5 + 0.02 * (0.5 / 3 + 0.1 / 6))
+    assert friction.mean_force == pytest.approx(mean, rel=1e-12)
+    assert friction.dF_dv == pytest.approx(3.0 * 0.02 / 2, rel=1e-6)

@@ -200,6 +200,9 @@ def test_a_joint_of_a_bank_that_fails() -> None:
         bank.advance([0.1, 0.01, 1.0], [0.1, 0.01, 9.0], 5.0)
     np.testing.assert_array_equal(bank.to_array(), before)
     assert bank.t == 0.0
+    bank.advance([0.1, 0.01, 0.01], [0.1, 0.01, 0.01], 1.0)
+    with pytest.raises(SimulationError, match=r"as it was before the call, at t = 1\.0 s"):
+        bank.advance([0.1, 0.01, 1.0], [0.1, 0.01, 9.0], 5.0)
 
 
 @pytest.mark.parametrize("engine", ["ifelse", None])
@@ -256,3 +259,5 @@ def test_a_state_from_other_initial_values_before_its_entry() -> None:
     assert friction.advance(0.5, 0.5, 0.01) == pytest.approx(3 * (0.5 + 0.005), rel=1e-12)
     other = FrictionState(model)
     assert other.peek(0.1, 0.5, 0.0) == other.peek(0.5, 0.5, 0.0) == 1.5
+    for engine in ("ifelse", None):
+        assert FrictionBank([model], engine=engine).peek([0.1], [0.5], 0.0).tolist() == [1.5]
