@@ -35,8 +35,8 @@ class Located:
         self._rates = [0.0] * program.layout.y.size
         self._seen = [0.0] * program.layout.observed.size
         self._gradient = [0.0] * (program.layout.y.size + 1)
-        self._act = IfElse(program).act
-        self.tick = IfElse(program).tick
+        switch = IfElse(program)
+        self._act, self.tick = switch.act, switch.tick
 
     def _full(self, y: Sequence[float]) -> list[float]:
         return self.driven.full(y[self._own], self.caller.velocities(np.array(y[self._host])))
