@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from gms_fsm.errors import SignalError as SignalError
     from gms_fsm.errors import TraceFileError as TraceFileError
     from gms_fsm.errors import UnitError as UnitError
+    from gms_fsm.exporters import export as export
     from gms_fsm.inspection.prove import Finding as Finding
     from gms_fsm.inspection.prove import Report as Report
     from gms_fsm.inspection.prove import prove as prove
@@ -84,6 +85,7 @@ _HOMES = {
     "charts.stribeck": "Stribeck",
     "errors": "ChartError CheckpointError ExpressionError GMSError MissingExtraError OutputError "
     "ParameterError RecordError ScenarioError SessionError SignalError TraceFileError UnitError",
+    "exporters": "export",
     "inspection.prove": "Finding Report prove",
     "inspection.session": "Session",
     "phenomena.measure": "Bench PhenomenaTable measure_phenomena",

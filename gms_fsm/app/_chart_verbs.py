@@ -23,6 +23,7 @@ __all__ = [
     "check_command",
     "code_command",
     "handout_command",
+    "no_contact",
 ]
 
 
@@ -85,7 +86,7 @@ def chart_command(
     import plots
 
     own = own_file(name, law)
-    _no_contact(contact, own)
+    no_contact(contact, own)
     chart = chosen("chart", name, law)[1] if own is None else own.only_chart(contact)
     graph = plots.statechart(
         chart,
@@ -117,7 +118,7 @@ def handout_command(
     from gms_fsm.systems.models import demonstration
 
     own = own_file(name, law)
-    _no_contact(contact, own)
+    no_contact(contact, own)
     if own is None:
         model: Model = demonstration(chosen("handout", name, law)[0], law)
     else:
@@ -158,7 +159,7 @@ def check_command(
         typer.echo(checkable())
         return
     own = own_file(name, law)
-    _no_contact(contact, own)
+    no_contact(contact, own)
     charts = {"": chosen("check", name, law)[1]} if own is None else own.charts(contact)
     folder = None if output is None else output_folder(output)
     reports = {each: prove(chart, domain or domain_of(chart)) for each, chart in charts.items()}
@@ -173,8 +174,21 @@ def check_command(
         raise typer.Exit(1)
 
 
-def _no_contact(contact: str, own: object) -> None:
-    """Refuse a contact of an included chart."""
+def no_contact(contact: str, own: object) -> None:
+    """Refuse a contact of an included chart.
+
+    Parameters
+    ----------
+    contact : str
+        Value of ``--contact``.
+    own : OwnFile or None
+        None for an included chart.
+
+    Raises
+    ------
+    ParameterError
+        If both are given.
+    """
     if contact and own is None:
         raise ParameterError(
             "an included chart has no contacts",

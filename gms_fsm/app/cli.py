@@ -1,7 +1,7 @@
 """The command line. A user's mistake is answered by one message and exit code 2.
 
-The verbs are in ``_run_verbs``, ``_chart_verbs`` and ``_trace_verbs``. Each imports what it needs
-when it runs, so that help, completion and error messages appear at once.
+The verbs are in ``_run_verbs``, ``_chart_verbs``, ``_export_verb`` and ``_trace_verbs``. Each
+imports what it needs when it runs, so that help, completion and error messages appear at once.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from gms_fsm.app._chart_verbs import (
     handout_command,
 )
 from gms_fsm.app._console import error_line, note
+from gms_fsm.app._export_verb import export_command
 from gms_fsm.app._run_verbs import (
     debug_command,
     lesson_command,
@@ -125,6 +126,7 @@ app.command("replay", cls=_Drawing)(replay_command)
 app.command("debug")(debug_command)
 app.command("lesson")(lesson_command)
 app.command("code")(code_command)
+app.command("export")(export_command)
 
 
 def main() -> None:

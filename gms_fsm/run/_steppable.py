@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -15,10 +16,10 @@ from gms_fsm.language import CONSTANTS, FUNCTIONS
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.start import LATEST, Start
 from gms_fsm.systems.models import Model
-from gms_fsm.systems.signals import Corners
+from gms_fsm.systems.signals import Corners, Function
 from gms_fsm.systems.system import Body, Contact, System
 
-__all__ = ["alone", "begin", "other_inputs", "start_of"]
+__all__ = ["alone", "begin", "other_inputs", "start_of", "start_of_system"]
 
 WORD = re.compile(r"(?<![\w.])[A-Za-z_]\w*")  # not the exponent of a number
 GIVEN = ("t", "x", "v")  # what a contact knows by itself: x is the integral of v
@@ -79,6 +80,55 @@ def start_of(
     )
     settings = Settings(rtol=rtol, engine="ifelse", output="end")
     return Start.of(system, None, end, settings, t_start=t, initial=initial)
+
+
+def start_of_system(
+    system: System, t: float, initial: Mapping[str, Any] | None, settings: Settings
+) -> Start:
+    """Return a system whose records are straight lines, which somebody else's loop gives.
+
+    Parameters
+    ----------
+    system : System
+        What steps.
+    t : float
+        s.
+    initial : mapping, optional
+        As for `gms_fsm.simulate`.
+    settings : Settings
+        Method and tolerances.
+
+    Returns
+    -------
+    Start
+        With each record replaced by its value at t.
+
+    Raises
+    ------
+    ParameterError
+        If a signal is a Python function, or the settings are those of SciPy or without location.
+    """
+    t, end = begin(t)
+    signals = dict(system.signals)
+    for name, signal in system.signals.items():
+        if isinstance(signal, Function):
+            raise ParameterError(
+                "it is a Python function, which cannot be handed over",
+                place=f"signal {name!r}",
+                advice="give it as an expression in t, or as a record",
+            )
+        if isinstance(signal, Corners):
+            value = float(np.interp(t, signal.times, signal.values))
+            signals[name] = Corners(np.array([t, end]), np.full(2, value), held=True)
+    if not isinstance(settings.method, str) or settings.events == "step":
+        raise ParameterError(
+            "only the methods of gms-fsm that locate switches can be handed over",
+            place="settings",
+            advice='leave method and events out, or choose method="dp45"',
+        )
+    chosen = dataclasses.replace(settings, engine="ifelse", output="end", t_eval=None)
+    moved = dataclasses.replace(system, signals=signals)
+    return Start.of(moved, None, end, chosen, t_start=t, initial=initial)
 
 
 def begin(t: object) -> tuple[float, float]:

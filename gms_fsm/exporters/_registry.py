@@ -1,0 +1,154 @@
+"""The table of export formats, and the one function that writes any of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+from gms_fsm._arguments import checked_path
+from gms_fsm._files import output_folder, write_together
+from gms_fsm.charts.chart import Chart
+from gms_fsm.errors import ParameterError
+from gms_fsm.exporters._names import identifier
+from gms_fsm.exporters._subject import Subject
+from gms_fsm.run.settings import Settings
+from gms_fsm.systems.models import Model
+from gms_fsm.systems.system import Contact, System
+
+__all__ = ["EXPORTERS", "Exporter", "export", "register"]
+
+Files = Mapping[str, str | bytes]  # contents by file name
+
+
+@dataclass(frozen=True)
+class Exporter:
+    """A format.
+
+    Parameters
+    ----------
+    name : str
+        Of the format, for example ``"c99"``.
+    title : str
+        What is written, for lists: ``"C99 with located switches"``.
+    write : callable
+        Takes a `Subject` and returns the contents of the files by name, README included. It
+        refuses what the format cannot express with a `ParameterError`, and writes nothing.
+    words : iterable of str
+        Words of the language, which no exported name may be.
+    """
+
+    name: str
+    title: str
+    write: Callable[[Subject], Files]
+    words: Iterable[str] = ()
+
+
+EXPORTERS: dict[str, Exporter] = {}
+
+
+def register(new: Exporter) -> None:
+    """Add a format.
+
+    Parameters
+    ----------
+    new : Exporter
+        The format.
+
+    Raises
+    ------
+    ParameterError
+        If there is already a format of that name.
+
+    Examples
+    --------
+    >>> from gms_fsm.exporters import EXPORTERS, Exporter, register
+    >>> register(Exporter("names", "a list of states", lambda subject: {"README.md": "..."}))
+    >>> "names" in EXPORTERS
+    True
+    >>> del EXPORTERS["names"]
+    """
+    if new.name in EXPORTERS:
+        raise ParameterError(f"there is already a format {new.name!r}", place="register")
+    EXPORTERS[new.name] = new
+
+
+def export(
+    system: System | Model | Contact | Chart,
+    format: str,  # noqa: A002 (as the command line calls it)
+    folder: str | Path,
+    *,
+    name: str = "",
+    initial: Mapping[str, Any] | None = None,
+    t_start: float = 0.0,
+    settings: Settings | None = None,
+) -> tuple[Path, ...]:
+    """Write friction for another program.
+
+    Everything is computed before the first file is written.
+
+    Parameters
+    ----------
+    system : System, Model, Contact or Chart
+        What is handed over. A model or a contact is one friction whose velocity is an input. The
+        inputs of a system are those of its signals that are records. A chart alone has no numbers:
+        only formats for charts take it.
+    format : str
+        A key of `EXPORTERS`.
+    folder : str or Path
+        Where the files are written; created if missing.
+    name : str, optional
+        Of the files and of what is defined in them; from the name of the system or chart if
+        omitted.
+    initial : mapping, optional
+        As for `gms_fsm.simulate`.
+    t_start : float
+        s: when it starts.
+    settings : Settings, optional
+        Method and tolerances, for the formats that integrate.
+
+    Returns
+    -------
+    tuple of Path
+        The files.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such format, or the format cannot express something; which is named.
+    OutputError
+        If the folder cannot be written, or a file is there that gms-fsm did not write.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from gms_fsm import GMS, GMSParameters, export
+    >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     files = export(model, "c99", folder, name="gms")
+    >>> "gms.h" in [file.name for file in files]
+    True
+    """
+    if not isinstance(format, str) or format not in EXPORTERS:
+        raise ParameterError(
+            "there is no such format",
+            place="format",
+            value=format,
+            advice=f"there are {', '.join(EXPORTERS)}",
+        )
+    where = checked_path("folder", folder)
+    exporter = EXPORTERS[format]
+    subject = Subject.of(
+        system, format, name=name, initial=initial, t_start=t_start, settings=settings
+    )
+    identifier(subject.name, exporter.words, f"name {subject.name!r}")
+    files = exporter.write(subject)
+    output_folder(where, files)
+    write_together({where / each: _writer(content) for each, content in files.items()})
+    return tuple(where / each for each in files)
+
+
+def _writer(content: str | bytes) -> Callable[[IO[bytes]], object]:
+    data = content.encode() if isinstance(content, str) else content
+    return lambda file: file.write(data)
