@@ -235,7 +235,7 @@ class Element:
     reference : str
         Where the equations are published.
     taken : frozenset of str
-        The names used, in lower case.
+        The names used and the words of the language, in lower case.
     """
 
     title: str
@@ -294,7 +294,8 @@ class Element:
         read = assembled(subject.start.system)
         (bank,) = read.banks
         _refuse_feedback(bank, f"chart {contact.chart.name!r}", subject.format)
-        return _Reader(subject, read, bank, _names(read, bank, words, cases), time).element()
+        every = frozenset(words)
+        return _Reader(subject, read, bank, _names(read, bank, every, cases), time, every).element()
 
     # ------------------------------------------------------------------ what is read
     def needed(self, names: Iterable[str], *, per_element: bool) -> tuple[Let, ...]:
@@ -428,8 +429,15 @@ class _Reader:
     """Translates the plan of a contact into short names."""
 
     def __init__(
-        self, subject: Subject, read: Assembly, bank: Bank, names: Mapping[str, str], time: bool
+        self,
+        subject: Subject,
+        read: Assembly,
+        bank: Bank,
+        names: Mapping[str, str],
+        time: bool,
+        words: frozenset[str],
     ) -> None:
+        self.words = words
         self.subject, self.read, self.bank, self.time = subject, read, bank, time
         self.plan: Plan = plan_of(read)
         self.names = {**names}
@@ -579,6 +587,7 @@ class _Reader:
             taken=frozenset(
                 {each.lower() for each in self.names.values()}
                 | {state.name.lower() for state in states}
+                | {word.lower() for word in self.words}
             ),
         )
 

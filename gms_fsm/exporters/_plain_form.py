@@ -91,13 +91,15 @@ class Plain:
         return frozenset[str]().union(*map(names_in, self.trees))
 
 
-def plain_form(element: Element) -> Plain:
+def plain_form(element: Element, dt: str = "dt") -> Plain:
     """Return the plain form of a friction.
 
     Parameters
     ----------
     element : Element
         The friction.
+    dt : str
+        What the step is called, unless the friction uses that name.
 
     Returns
     -------
@@ -113,7 +115,7 @@ def plain_form(element: Element) -> Plain:
     >>> [each.name for each in form.shared], [each.name for each in form.updates]
     (['stribeck'], ['z'])
     """
-    dt, part = element.free("dt"), element.free("F_i")
+    dt, part = element.free(dt), element.free("F_i")
     states = element.states
     guard_reads = [each.guard_names for each in states]
     flow_reads = [each.flow_names for each in states]
