@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -45,7 +45,7 @@ MODEL = {  # what a model adds to its chart: name here, and its description
 
 @dataclass(frozen=True)
 class Constant:
-    """A number, or one for each element.
+    """A number, or one for each of several elements.
 
     Parameters
     ----------
@@ -313,9 +313,7 @@ class Element:
         tuple of Let
             In the order of computation.
         """
-        return tuple(
-            each for each in _needed(self.lets, names) if each.per_element == per_element
-        )
+        return tuple(each for each in _needed(self.lets, names) if each.per_element == per_element)
 
     @property
     def own(self) -> frozenset[str]:
@@ -377,9 +375,7 @@ def _refuse_feedback(bank: Bank, place: str, form: str) -> None:
             )
 
 
-def _names(
-    read: Assembly, bank: Bank, words: Iterable[str], cases: bool
-) -> Mapping[str, str]:
+def _names(read: Assembly, bank: Bank, words: Iterable[str], cases: bool) -> Mapping[str, str]:
     """Return the short name of every name in the trees; those of the chart stay."""
     c, chart, place = bank.name, bank.chart, f"chart {bank.chart.name!r}"
     kinds: dict[str, tuple[str, str]] = {}  # name in the trees: kind, short name
@@ -535,17 +531,18 @@ class _Reader:
                 inside = each.name.removeprefix(f"{self.bank.name}.")
                 about = _about(MODEL[inside][1]) if inside in MODEL else self.about(short)
                 value = self.expression(each.tree, self.plan.definitions[each.name])
-                yield Let(
-                    short, value, each.bank is not None, each.name in self.moved, about
-                )
+                yield Let(short, value, each.bank is not None, each.name in self.moved, about)
 
     def constants(self) -> Iterator[Constant]:
         every: dict[str, float | tuple[float, ...]] = {**self.read.shared}
-        every |= {name: tuple(map(float, values)) for name, (_, values) in self.read.own.items()}
+        for name, (_, values) in self.read.own.items():
+            every[name] = tuple(map(float, values)) if self.bank.n > 1 else float(values[0])
         for name, value in every.items():
             if name in self.names:
                 inside = name.removeprefix(f"{self.bank.name}.")
-                about = _about(MODEL[inside][1]) if inside in MODEL else self.about(self.names[name])
+                about = (
+                    _about(MODEL[inside][1]) if inside in MODEL else self.about(self.names[name])
+                )
                 yield Constant(self.names[name], value, about)
 
     def element(self) -> Element:
@@ -559,8 +556,7 @@ class _Reader:
         used += total.names
         read = _needed(lets, used)
         used += [name for each in read for name in each.value.names]
-        signals = [name for name in self.read.system.signals]
-        inputs = [(name, self.about(name)) for name in signals]
+        inputs = [(name, self.about(name)) for name in self.read.system.signals]
         if self.time and "t" in used:
             inputs.append(("t", "s: time"))
         held, corners = self.plan.held, [self.tree(r.left) for r in self.outer()]

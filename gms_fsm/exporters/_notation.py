@@ -186,7 +186,7 @@ class _Speller:
         left, right = (part.at(_SUM) for part in parts)
         return _Printed(f"{left} {node.op} {right}", _RELATION)
 
-    def in_state(self, element: int, state: str) -> _Printed:
+    def in_state(self, _element: int, _state: str) -> _Printed:
         raise TypeError("a guard depends on values, not on states")
 
     def negation(self, _: Not, parts: Iterator[_Printed]) -> _Printed:

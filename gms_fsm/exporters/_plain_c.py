@@ -18,14 +18,16 @@ from gms_fsm.exporters._plain_form import (
     plain_form,
 )
 from gms_fsm.exporters._subject import Subject
-from gms_fsm.language import FUNCTIONS
+from gms_fsm.language import FUNCTIONS, Name, Node
 
 __all__ = ["C_WORDS", "plain_c", "plain_c_notes"]
 
 # Keywords of C99 (6.4.1) and C11 to C23, of C++ where a header may be included, and names of
 # math.h that compilers know by themselves.
 C_WORDS = frozenset(
-    """
+    re.findall(
+        r"\w+",
+        """
     auto break case char const continue default do double else enum extern float for goto if inline
     int long register restrict return short signed sizeof static struct switch typedef union
     unsigned void volatile while _Bool _Complex _Imaginary _Alignas _Alignof _Atomic _Generic
@@ -36,7 +38,8 @@ C_WORDS = frozenset(
     mutable namespace new noexcept not not_eq operator or or_eq private protected public
     reinterpret_cast requires static_cast template this throw try typeid typename using virtual
     wchar_t xor xor_eq main
-    """.split()
+    """,
+    )
 )
 LIBRARY = {name: f"{name}({{0}})" for name in FUNCTIONS if name not in ("sgn", "min", "max")}
 HELPERS = {
@@ -121,15 +124,20 @@ class _Printer:
         self.form: Plain = plain_form(self.element)
         self.name, self.big = f"{subject.name}_plain", subject.name.upper()
         self.real = f"{self.big}_REAL"
-        helpers = {name: f"{self.name}_{name}({{0}}{', {1}' * (name != 'sgn')})" for name in HELPERS}
+        helpers = {
+            name: f"{self.name}_{name}({{0}}{', {1}' * (name != 'sgn')})" for name in HELPERS
+        }
         self.notation = Notation(
             " && ", " || ", "!", "1", {**LIBRARY, "abs": "fabs({0})", **helpers}, "pow({0}, {1})"
         )
         # The machine's own names give way to those of the chart.
-        self.i, self.me = self.element.free("i"), self.element.free("friction")
+        self.me = self.element.free("friction")
+        # One element needs no arrays and no loop.
+        self.i = self.element.free("i") if self.element.n > 1 else ""
+        self.at = f"[{self.i}]" if self.i else ""
         element = self.element
         numbers = {c.name for c in element.constants if isinstance(c.value, tuple)}
-        self.texts = {name: f"{name}[{self.i}]" for name in numbers}
+        self.texts = {name: f"{name}{self.at}" for name in numbers}
         if element.position:
             self.texts[element.position] = f"{self.me}->{element.position}"
 
@@ -141,12 +149,13 @@ class _Printer:
         element, guard = self.element, f"{self.name.upper()}_H"
         several = len(element.states) > 1
         names = [self.state(index) for index in range(len(element.states))]
-        fields = [f"    {self.real} {each.name}[{element.n}];{_note(each.about)}"
+        size = f"[{element.n}]" if self.i else ""
+        fields = [f"    {self.real} {each.name}{size};{_note(each.about)}"
                   for each in element.variables]  # fmt: skip
         if element.position:
             fields.append(f"    {self.real} {element.position};  /* m: position */")
         if several:
-            fields.append(f"    enum {self.name}_state state[{element.n}];")
+            fields.append(f"    enum {self.name}_state state{size};")
         lines = [
             f"/* {_plain_text(element.title)}: the plain form, once a step. */",
             f"#ifndef {guard}",
@@ -202,31 +211,36 @@ class _Printer:
         element, lines = self.element, list[str]()
         for each in element.variables:
             for i, value in enumerate(each.start):
-                lines.append(f"    {self.me}->{each.name}[{i}] = {self.notation.number(value)};")
+                at = f"[{i}]" if self.i else ""
+                lines.append(f"    {self.me}->{each.name}{at} = {self.notation.number(value)};")
         if element.position:
             start = self.notation.number(element.position_start)
             lines.append(f"    {self.me}->{element.position} = {start};")
         if len(element.states) > 1:
             for i, index in enumerate(element.start):
-                lines.append(f"    {self.me}->state[{i}] = {self.state(index)};")
+                at = f"[{i}]" if self.i else ""
+                lines.append(f"    {self.me}->state{at} = {self.state(index)};")
         lines = lines or [f"    {self.me}->unused = 0;"]
         return [f"void {self.name}_start({self.name} *{self.me})", "{", *lines, "}"]
 
     def step(self) -> list[str]:
         element, form, real = self.element, self.form, self.real
         elements = [*self.statements(form.guards), *self.statements(form.flows)]
-        loads = [f"{real} {each.name} = {self.me}->{each.name}[{self.i}];"
+        loads = [f"{real} {each.name} = {self.me}->{each.name}{self.at};"
                  for each in element.variables]  # fmt: skip
         stores = [
-            f"{self.me}->{each.name}[{self.i}] = {self.spell(each.tree)};" for each in form.updates
+            f"{self.me}->{each.name}{self.at} = {self.spell(each.tree)};" for each in form.updates
         ]
         inner = [*loads, *elements, f"{form.force} += {form.part};", *stores]
         body = [*map(self.constant, element.constants)]
         body += [f"{real} {form.force} = 0.0;", "", *self.statements(form.shared)]
-        body += [f"for (int {self.i} = 0; {self.i} < {element.n}; {self.i}++) {{"]
-        body += [*_indented(inner), "}"]
+        if self.i:
+            body += [f"for (int {self.i} = 0; {self.i} < {element.n}; {self.i}++) {{"]
+            body += [*_indented(inner), "}"]
+        else:
+            body += inner
         total = element.total.tree
-        body += [f"{form.force} = {self.spell(total)};"] if total != _sum(form) else []
+        body += [f"{form.force} = {self.spell(total)};"] if total != Name(form.force) else []
         if element.position:
             place = f"{self.me}->{element.position}"
             velocity = element.inputs[0][0]
@@ -250,8 +264,8 @@ class _Printer:
         return f"static const {self.real} {text};{_note(constant.about)}"
 
     # ------------------------------------------------------------------ statements
-    def spell(self, tree: object) -> str:
-        return self.notation.spell(tree, self.texts)  # type: ignore[arg-type]
+    def spell(self, tree: Node) -> str:
+        return self.notation.spell(tree, self.texts)
 
     def statements(self, found: Sequence[Statement]) -> list[str]:
         return [line for each in found for line in self.statement(each)]
@@ -265,7 +279,7 @@ class _Printer:
                 if names:
                     yield f"{self.real} {', '.join(names)};"
             case Enter(state):
-                yield f"{self.me}->state[{self.i}] = {self.state(state)};"
+                yield f"{self.me}->state{self.at} = {self.state(state)};"
             case Guards(edges):
                 word = "if"
                 for edge, taken in edges:
@@ -283,7 +297,7 @@ class _Printer:
         if len(branches) == 1:
             yield from self.statements(branches[0])
             return
-        yield f"switch ({self.me}->state[{self.i}]) {{"
+        yield f"switch ({self.me}->state{self.at}) {{"
         for index, branch in enumerate(branches):
             last = index == len(branches) - 1
             scope = any(isinstance(each, Set) and each.new for each in branch)
@@ -294,12 +308,6 @@ class _Printer:
             if scope:
                 yield "}"
         yield "}"
-
-
-def _sum(form: Plain) -> object:
-    from gms_fsm.language import Name
-
-    return Name(form.force)
 
 
 def _indented(lines: Iterable[str]) -> list[str]:

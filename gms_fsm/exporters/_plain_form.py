@@ -125,9 +125,7 @@ def plain_form(element: Element, dt: str = "dt") -> Plain:
     before, inside = _placed(element, guard_reads)
     guards += before
     branches = tuple(
-        (*first, Guards(tuple((edge, _taken(edge)) for edge in state.edges)))
-        if state.edges
-        else ()
+        (*first, Guards(tuple((edge, _taken(edge)) for edge in state.edges))) if state.edges else ()
         for state, first in zip(states, inside, strict=True)
     )
     guards += [ByState(branches)] if any(branches) else []

@@ -29,7 +29,9 @@ __all__ = ["WORDS", "structured_text"]
 # blocks. The letters of instruction lists and of action qualifiers (S, R, N ...) are names in
 # structured text.
 WORDS = frozenset(
-    """
+    re.findall(
+        r"\w+",
+        """
     ABS ABSTRACT ACOS ACTION ADD AND ANY ANY_BIT ANY_DATE ANY_DERIVED ANY_ELEMENTARY ANY_INT
     ANY_MAGNITUDE ANY_NUM ANY_REAL ANY_STRING ARRAY ASIN AT ATAN ATAN2 BOOL BY BYTE CASE CHAR CLASS
     CONCAT CONFIGURATION CONSTANT CONTINUE COS CTD CTU CTUD DATE DATE_AND_TIME DELETE DINT DIV DO DT
@@ -46,7 +48,8 @@ WORDS = frozenset(
     TOD TOF TON TP TRANSITION TRUE TRUNC TYPE UDINT UINT ULINT UNION UNTIL USING USINT VAR
     VAR_ACCESS VAR_CONFIG VAR_EXTERNAL VAR_GLOBAL VAR_INPUT VAR_IN_OUT VAR_OUTPUT VAR_TEMP WCHAR
     WHILE WITH WORD WSTRING XOR
-    """.split()
+    """,
+    )
 )
 FUNCTIONS = {
     "abs": "ABS({0})",
@@ -121,6 +124,7 @@ class _Printer:
         identifier(name.upper(), WORDS, f"name {name!r}")
         self.name, self.element = name, Element.of(subject, WORDS, cases=False)
         element = self.element
+        self.force = element.free("force")  # F would be the same as a chart's f
         self.form: Plain = plain_form(element, "cycle")
         self.notation = Notation(
             " AND ",
@@ -132,10 +136,16 @@ class _Printer:
         )
         for tree in self.form.trees:
             self.notation.check(tree, f"chart {subject.title!r}", "structured text")
-        self.i = element.free("i")
-        self.now = {each.name: element.free(f"{each.name}_i") for each in element.variables}
+        # One element needs no arrays and no loop.
+        self.i = element.free("i") if element.n > 1 else ""
+        self.at = f"[{self.i}]" if self.i else ""
+        self.now = {
+            each.name: element.free(f"{each.name}_i") if self.i else each.name
+            for each in element.variables
+        }
         numbers = {c.name for c in element.constants if isinstance(c.value, tuple)}
-        self.texts = {each: f"{each}[{self.i}]" for each in numbers} | self.now
+        self.texts = {each: f"{each}{self.at}" for each in numbers} | self.now
+        self.texts[self.form.force] = self.force
         self.states = [element.free(f"STATE_{each.name.upper()}") for each in element.states]
         names = [*self.names(), *(each for each, _ in element.inputs)]
         for each in names:
@@ -160,7 +170,7 @@ class _Printer:
             f"(* {_plain_text(element.title)}: the plain form, to be called once a cycle. *)",
             f"FUNCTION_BLOCK {name}",
             *_block("VAR_INPUT", (f"{each} : LREAL;{_note(about)}" for each, about in inputs)),
-            *_block("VAR_OUTPUT", [f"{self.form.force} : LREAL;  (* N: friction force *)"]),
+            *_block("VAR_OUTPUT", [f"{self.force} : LREAL;  (* N: friction force *)"]),
             *_block("VAR CONSTANT", self.constants()),
             *_block("VAR", self.memory()),
             *_block("VAR", self.locals()),
@@ -186,6 +196,8 @@ class _Printer:
     def array(self, kind: str, values: Sequence[float | int]) -> str:
         number = self.notation.number
         texts = [number(each) if isinstance(each, float) else str(each) for each in values]
+        if len(values) == 1:
+            return f"{kind} := {texts[0]}"
         return f"ARRAY [1..{len(values)}] OF {kind} := [{', '.join(texts)}]"
 
     def memory(self) -> Iterator[str]:
@@ -201,8 +213,9 @@ class _Printer:
 
     def locals(self) -> Iterator[str]:
         """Declare what is computed in every call."""
-        yield f"{self.i} : INT;"
-        found = dict.fromkeys(self.now.values())
+        if self.i:
+            yield f"{self.i} : INT;"
+        found = dict.fromkeys(self.now.values() if self.i else ())
         for each in (*self.form.shared, *self.form.guards, *self.form.flows):
             found |= dict.fromkeys(_assigned(each))
         for name in found:
@@ -210,14 +223,18 @@ class _Printer:
 
     def body(self) -> list[str]:
         element, form = self.element, self.form
-        loads = [f"{self.now[each.name]} := {each.name}[{self.i}];" for each in element.variables]
-        stores = [f"{each.name}[{self.i}] := {self.spell(each.tree)};" for each in form.updates]
-        inner = [*loads, *self.statements(form.guards), *self.statements(form.flows)]
-        inner += [f"{form.force} := {form.force} + {form.part};", *stores]
-        lines = [f"{form.force} := 0.0;", *self.statements(form.shared)]
-        lines += [f"FOR {self.i} := 1 TO {element.n} DO", *_indented(inner), "END_FOR;"]
+        inner = [*self.statements(form.guards), *self.statements(form.flows)]
+        inner.append(f"{self.force} := {self.force} + {form.part};")
+        inner += [f"{each.name}{self.at} := {self.spell(each.tree)};" for each in form.updates]
+        lines = [f"{self.force} := 0.0;", *self.statements(form.shared)]
+        if self.i:
+            loads = [f"{now} := {name}[{self.i}];" for name, now in self.now.items()]
+            inner = _indented([*loads, *inner])
+            lines += [f"FOR {self.i} := 1 TO {element.n} DO", *inner, "END_FOR;"]
+        else:
+            lines += inner
         if element.total.tree != Name(form.force):
-            lines.append(f"{form.force} := {self.spell(element.total.tree)};")
+            lines.append(f"{self.force} := {self.spell(element.total.tree)};")
         if element.position:
             x, (v, _) = element.position, element.inputs[0]
             lines.append(f"{x} := {x} + {form.dt} * {v};")
@@ -236,7 +253,7 @@ class _Printer:
                 yield f"{self.texts.get(name, name)} := {self.spell(tree)};{_note(note)}"
             case Enter(state):
                 if len(self.element.states) > 1:
-                    yield f"state[{self.i}] := {self.states[state]};"
+                    yield f"state{self.at} := {self.states[state]};"
             case Guards(edges):
                 word = "IF"
                 for edge, taken in edges:
@@ -254,7 +271,7 @@ class _Printer:
         word, last = "IF", len(branches) - 1
         for index, branch in enumerate(branches):
             name = self.states[index]
-            test = f"{word} state[{self.i}] = {name} THEN"
+            test = f"{word} state{self.at} = {name} THEN"
             yield f"ELSE{_note(name)}" if index == last else test
             yield from _indented(self.statements(branch) or [";"])
             word = "ELSIF"
@@ -282,7 +299,7 @@ a task with a fixed interval:
 
     VAR friction : {name}; END_VAR
     friction(v := velocity{inputs}, {self.form.dt} := 0.001);
-    force := friction.{self.form.force};
+    force := friction.{self.force};
 
 ## What it computes
 
@@ -346,4 +363,6 @@ def _plain_text(text: str) -> str:
     return re.sub(r"\s+", " ", text.replace("*)", "* )").replace("(*", "( *"))
 
 
-register(Exporter("st", "IEC 61131-3 structured text, the plain form", structured_text, _Words(WORDS)))
+register(
+    Exporter("st", "IEC 61131-3 structured text, the plain form", structured_text, _Words(WORDS))
+)

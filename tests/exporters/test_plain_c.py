@@ -33,7 +33,9 @@ def compiled(
         (folder / name).write_text(text, encoding="utf-8")
     source, library = folder / f"{subject.name}_plain.c", folder / f"{subject.name}.so"
     command = [compiler or COMPILERS[0], *STRICT, *more, "-shared", "-fPIC", str(source), "-lm"]
-    done = subprocess.run([*command, "-o", str(library)], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [*command, "-o", str(library)], capture_output=True, text=True, check=False
+    )
     assert not done.returncode, done.stderr
     loaded = ctypes.CDLL(str(library))
     step, memory = loaded[f"{subject.name}_plain_step"], ctypes.create_string_buffer(65536)
@@ -54,7 +56,9 @@ def test_the_bits_of_the_engine(name: str, tmp_path: Path) -> None:
         last = np.append(np.diff(trace.t) > 0.0, True)  # of the rows at one time: after switching
         t, v, F = trace.t[last], trace.v[last], trace.F[last]
         for compiler in COMPILERS:
-            step = compiled(tmp_path, Subject.of(given.model, "c99", name=f"f{seed}{compiler}"), compiler)
+            step = compiled(
+                tmp_path, Subject.of(given.model, "c99", name=f"f{seed}{compiler}"), compiler
+            )
             found = [step(v[k], t[k + 1] - t[k]) for k in range(len(t) - 1)]
             assert found == F[:-1].tolist(), f"repeat with case({name!r}, {seed})"
     assert switches or name == "lugre"
@@ -70,7 +74,9 @@ def test_further_inputs_position_and_time(tmp_path: Path) -> None:
         parameters=("mu",),
         states=(State("a", flow={"z": "v - z * abs(v) / (mu * max(N, 1))"}), State("b")),
         transitions=(
-            Transition("go", "a", "b", guard="x > 0.5 and (t > 1 or not N < 1)", actions={"z": "z / 2"}),
+            Transition(
+                "go", "a", "b", guard="x > 0.5 and (t > 1 or not N < 1)", actions={"z": "z / 2"}
+            ),
             Transition("back", "b", "a", guard="age > 0.2 and sgn(v) < 0"),
         ),
         outputs={"F": "N * z + min(x, t)**2.5"},
@@ -140,9 +146,9 @@ def test_names_of_the_printer_give_way() -> None:
         outputs={"F": "z"},
     )
     stribeck = GMSParameters.paper("stick-slip").stribeck
-    model = ChartModel(chart, dict.fromkeys(names, 1.0), stribeck=stribeck)
+    model = ChartModel(chart, dict.fromkeys(names, 1.0), n=2, stribeck=stribeck)
     text = plain_c(Subject.of(model, "c99", name="n"))["n_plain.c"]
-    assert "for (int i2 = 0; i2 < 1; i2++)" in text
+    assert "for (int i2 = 0; i2 < 2; i2++)" in text
     assert "const N_REAL model_stribeck = model_F_c + (F_s - model_F_c)" in text
 
 
