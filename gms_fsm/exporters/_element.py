@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -315,6 +315,36 @@ class Element:
         """
         return tuple(each for each in _needed(self.lets, names) if each.per_element == per_element)
 
+    def placed(
+        self, reads: Sequence[frozenset[str]], *, moves: bool = False
+    ) -> tuple[list[Let], list[list[Let]]]:
+        """Return which quantities of an element are computed before a choice, and in its branches.
+
+        What only one branch reads is computed there.
+
+        Parameters
+        ----------
+        reads : sequence of frozenset of str
+            What each branch reads.
+        moves : bool
+            Only those that are computed from variables.
+
+        Returns
+        -------
+        (list of Let, list of list of Let)
+            Before the choice; and for each branch.
+        """
+        wanted = [
+            [e for e in self.needed(names, per_element=True) if e.moves or not moves]
+            for names in reads
+        ]
+        every = [each for row in wanted for each in row]
+        several = {each.name for each in every if sum(each in row for row in wanted) > 1}
+        if len(wanted) == 1:
+            several = {each.name for each in every}
+        before = [each for each in self.lets if each.name in several]
+        return before, [[each for each in row if each.name not in several] for row in wanted]
+
     @property
     def own(self) -> frozenset[str]:
         """Names with one value per element: variables, rates, numbers and lets."""
@@ -408,8 +438,10 @@ def _names(read: Assembly, bank: Bank, words: Iterable[str], cases: bool) -> Map
                 advice="rename one of them",
             )
         owner[same] = f"{kind} {name!r}"
-    for state in (*chart.states, *chart.transitions):
-        identifier(state.name, (), f"{place}, {type(state).__name__.lower()} {state.name!r}")
+    for state in chart.states:
+        identifier(state.name, (), f"{place}, state {state.name!r}")
+    for edge in chart.transitions:
+        identifier(edge.name, (), f"{place}, edge {edge.name!r}")
     names = {inside: name for inside, (_, name) in kinds.items()}
     taken = {name.lower() for name in names.values()} | {"t", "x", "s", SUM.lower()}
     taken |= {word.lower() for word in given}

@@ -6,7 +6,7 @@ printers of languages write down in this order.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -122,20 +122,20 @@ def plain_form(element: Element, dt: str = "dt") -> Plain:
     every = frozenset[str]().union(*guard_reads, *flow_reads, element.total.names)
     steady = [each for each in element.needed(every, per_element=True) if not each.moves]
     guards: list[Statement] = [_let(each) for each in steady]
-    before, inside = _placed(element, guard_reads)
-    guards += before
+    first, inside = element.placed(guard_reads, moves=True)
+    guards += map(_let, first)
     branches = tuple(
         (*first, Guards(tuple((edge, _taken(edge)) for edge in state.edges))) if state.edges else ()
         for state, first in zip(states, inside, strict=True)
     )
     guards += [ByState(branches)] if any(branches) else []
-    before, inside = _placed(element, flow_reads)
+    first, inside = element.placed(flow_reads, moves=True)
     same = len({state.force.tree for state in states}) == 1
     rates = tuple(each.rate for each in element.variables)
-    flows: list[Statement] = [*before, Declare(rates if same else (*rates, part))]
+    flows: list[Statement] = [*map(_let, first), Declare(rates if same else (*rates, part))]
     rows = []
-    for state, first in zip(states, inside, strict=True):
-        row = [*first]
+    for state, lets in zip(states, inside, strict=True):
+        row = [_let(each) for each in lets]
         row += [Set(each.rate, state.rates[each.name].tree) for each in element.variables]
         row += [] if same else [Set(part, state.force.tree)]
         rows.append(tuple(row))
@@ -145,7 +145,6 @@ def plain_form(element: Element, dt: str = "dt") -> Plain:
         Set(each.name, _after(each.name, dt, Name(each.rate))) for each in element.variables
     )
     shared = tuple(_let(each) for each in element.needed(every, per_element=False))
-    lets = (*element.needed(every, per_element=True), *element.needed(every, per_element=False))
     return Plain(
         element=element,
         dt=dt,
@@ -155,7 +154,7 @@ def plain_form(element: Element, dt: str = "dt") -> Plain:
         guards=tuple(guards),
         flows=tuple(flows),
         updates=updates,
-        trees=tuple(_trees(element, lets)),
+        trees=tuple(_trees(element)),
     )
 
 
@@ -172,32 +171,10 @@ def _taken(edge: Leaving) -> tuple[Statement, ...]:
     return (*(Set(name, tree) for name, tree in edge.steps), Enter(edge.target))
 
 
-def _placed(
-    element: Element, reads: Sequence[frozenset[str]]
-) -> tuple[list[Statement], list[list[Statement]]]:
-    """Return what is computed from variables: before a choice, and in each of its branches.
-
-    What only one branch reads is computed there.
-    """
-    wanted = [
-        [each for each in element.needed(names, per_element=True) if each.moves] for names in reads
-    ]
-    often = [each for row in wanted for each in row]
-    several = {each.name for each in often if sum(each in row for row in wanted) > 1}
-    if len(wanted) == 1:
-        several = {each.name for each in often}
-    before: list[Statement] = [_let(each) for each in element.lets if each.name in several]
-    inside: list[list[Statement]] = [
-        [_let(each) for each in row if each.name not in several] for row in wanted
-    ]
-    return before, inside
-
-
-def _trees(element: Element, lets: Iterable[Let]) -> Iterable[Node]:
+def _trees(element: Element) -> Iterable[Node]:
     """Return all that is computed."""
     yield element.total.tree
-    for let in lets:
-        yield let.value.tree
+    yield from (each.value.tree for each in element.lets)
     for state in element.states:
         yield from (each.tree for each in (*state.rates.values(), state.force))
         for edge in state.edges:
