@@ -124,11 +124,11 @@ def plain_form(element: Element, dt: str = "dt") -> Plain:
     guards: list[Statement] = [_let(each) for each in steady]
     first, inside = element.placed(guard_reads, moves=True)
     guards += map(_let, first)
-    branches = tuple(
-        (*first, Guards(tuple((edge, _taken(edge)) for edge in state.edges))) if state.edges else ()
-        for state, first in zip(states, inside, strict=True)
-    )
-    guards += [ByState(branches)] if any(branches) else []
+    branches: list[tuple[Statement, ...]] = []
+    for state, lets in zip(states, inside, strict=True):
+        chain = Guards(tuple((edge, _taken(edge)) for edge in state.edges))
+        branches.append((*map(_let, lets), chain) if state.edges else ())
+    guards += [ByState(tuple(branches))] if any(branches) else []
     first, inside = element.placed(flow_reads, moves=True)
     same = len({state.force.tree for state in states}) == 1
     rates = tuple(each.rate for each in element.variables)
