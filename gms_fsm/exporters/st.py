@@ -19,6 +19,7 @@ from gms_fsm.exporters._plain_form import (
     Statement,
     plain_form,
 )
+from gms_fsm.exporters._readme import about_friction
 from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.language import Name, Node
@@ -281,11 +282,6 @@ class _Printer:
     def readme(self) -> str:
         name, element = self.name, self.element
         inputs = "".join(f", {each} := ..." for each, _ in element.inputs[1:])
-        about = "".join(f"- {each}: {text}\n" for each, text in element.inputs if text)
-        numbers = "".join(
-            f"- {each.name} = {_shown(each)}{f' ({each.about})' if each.about else ''}\n"
-            for each in element.constants
-        )
         sgn = f" and the function {name}_sgn" if f"{name}_sgn(" in self.text() else ""
         return f"""\
 # {element.title} as structured text (IEC 61131-3)
@@ -303,33 +299,17 @@ a task with a fixed interval:
 
 ## What it computes
 
-{element.title}, {element.n} element{"s" if element.n > 1 else ""}{_reference(element)}
+{about_friction(element)}
 Each call looks at every guard once, gives the force, and takes one explicit Euler step of length
-{self.form.dt} with this velocity. These are the numbers of
+{self.form.dt} [s] with this velocity. These are the numbers of
 simulate(model, Prescribed(record), t_end, method="euler", step=..., events="step").
 
-Inputs:
-
-{about}- {self.form.dt}: s: time since the last call
-
-Numbers:
-
-{numbers}
 ## What it does not do
 
 Switches are seen at the next call, not where they happen, so the result is of first order in the
 cycle time. A velocity that passes through a narrow guard between two calls is not noticed.
 AND and OR may evaluate both sides.
 """
-
-
-def _reference(element: Element) -> str:
-    return f", {element.reference}.\n" if element.reference else ".\n"
-
-
-def _shown(constant: Constant) -> str:
-    value = constant.value
-    return ", ".join(map(repr, value)) if isinstance(value, tuple) else repr(value)
 
 
 def _assigned(statement: Statement) -> Iterator[str]:
