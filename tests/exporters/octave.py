@@ -60,3 +60,15 @@ def ran_in_octave(
     count = int(found[0])
     log = found[1 + count :].reshape(-1, 3)
     return found[1 : 1 + count], [(t, int(i), int(edge)) for t, i, edge in log]
+
+
+def lines_of(t: np.ndarray, v: np.ndarray, sample: float) -> np.ndarray:
+    """Return a record as calls: v0, v1, dt between samples and corners; two at one time: a jump."""
+    parts = []
+    for k in range(len(t) - 1):
+        if t[k + 1] > t[k]:
+            count = int(np.ceil((t[k + 1] - t[k]) / sample))
+            times = np.linspace(t[k], t[k + 1], count + 1)
+            values = np.linspace(v[k], v[k + 1], count + 1)
+            parts.append(np.column_stack([values[:-1], values[1:], np.diff(times)]))
+    return np.vstack(parts)

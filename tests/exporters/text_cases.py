@@ -59,7 +59,10 @@ def _gms(n: int, law: Any, rng: np.random.Generator) -> GMS:
 def _varied(name: str, rng: np.random.Generator) -> ChartModel:
     """Return a chart with the numbers of its demonstration, each changed by up to a tenth."""
     model = demonstration(entry(name))
-    values = {key: np.multiply(value, rng.uniform(0.9, 1.1)) for key, value in model.values.items()}
+    values = {
+        key: np.multiply(value, rng.uniform(0.9, 1.1, np.shape(value)))
+        for key, value in model.values.items()
+    }
     return ChartModel(
         model.chart,
         values,
