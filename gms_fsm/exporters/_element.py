@@ -354,6 +354,30 @@ class Element:
             found |= {each.name, each.rate}
         return frozenset(found)
 
+    def check_name(self, name: str, *, cases: bool = True) -> None:
+        """Refuse a name of what is defined, if the friction has a quantity of that name.
+
+        Parameters
+        ----------
+        name : str
+            Of the files.
+        cases : bool
+            Whether the language tells k from K.
+
+        Raises
+        ------
+        ParameterError
+            Naming it.
+        """
+        found = [each for each, _ in self.inputs] + [self.position]
+        found += [each.name for each in (*self.constants, *self.lets, *self.variables)]
+        if name in found or (not cases and name.lower() in [each.lower() for each in found]):
+            raise ParameterError(
+                "a quantity of the friction has this name",
+                place=f"name {name!r}",
+                advice='give another one, for example name="friction" (--name friction)',
+            )
+
     def free(self, name: str) -> str:
         """Return a name for what a format needs besides; it gives way to those in use.
 

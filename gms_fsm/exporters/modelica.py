@@ -95,8 +95,10 @@ class _Printer:
     def __init__(self, subject: Subject) -> None:
         self.name = identifier(subject.name, WORDS, f"name {subject.name!r}")
         self.element = element = Element.of(subject, WORDS, time=False)
-        self.kind, self.one = element.free("Element"), element.free("element")
-        self.part, self.i = element.free("F_i"), element.free("i")
+        element.check_name(self.name)
+        # A class of its own: Rumoca 0.10 counts equations of arrays of nested classes twice.
+        self.kind, self.one = f"{self.name}_element", element.free("element")
+        self.part = element.free("F_i")
         self.starts = {e.name: element.free(f"{e.name}_start") for e in element.variables}
         used = [state.flow_names | state.guard_names for state in element.states]
         every = frozenset[str]().union(*used)
@@ -128,7 +130,7 @@ class _Printer:
     def text(self) -> str:
         element = self.element
         constants = [self.constant(each) for each in element.constants]
-        lines = [f"model {self.name} {_string(element.title)}", *_indented(self.one_element())]
+        lines = [*self.one_element(), "", f"model {self.name} {_string(element.title)}"]
         lines += _indented(
             [f"input Real {name}{_comment(about)};" for name, about in element.inputs]
         )
@@ -163,7 +165,7 @@ class _Printer:
     def given(self) -> str:
         """Return the numbers that elements are given."""
         several = self.element.n > 1
-        found = []
+        found = [f"{'each ' * several}{name} = {name}" for name in self.passed()]
         for each in self.element.constants:
             if each.name in self.inside:
                 word = "each " if several and not isinstance(each.value, tuple) else ""
@@ -183,18 +185,12 @@ class _Printer:
         lines = [f"{each.name} = {self.spell(each.value.tree)};" for each in self.shared_lets]
         if element.position:
             lines.append(f"der({element.position}) = {element.inputs[0][0]};")
-        at = f"[{self.i}]" if element.n > 1 else ""
-        wired = [f"{self.one}{at}.{name} = {name};" for name in self.passed()]
-        if at and wired:
-            lines += [f"for {self.i} in 1:{element.n} loop", *_indented(wired), "end for;"]
-        else:
-            lines += wired
         return [*lines, f"F = {NOTATION.spell(element.total.tree, self.total)};"]
 
     # ------------------------------------------------------------------ one element
     def one_element(self) -> list[str]:
         element = self.element
-        lines = [f'model {self.kind} "One element"']
+        lines = [f'model {self.kind} "One element of {self.name}"']
         inner = [f"input Real {name};" for name in self.passed()]
         inner.append(f'output Real {self.part} "N: force of the element";')
         inner += [
@@ -271,7 +267,7 @@ class _Printer:
         return f"""\
 # {self.element.title} as a Modelica model
 
-- {name}.mo: the model `{name}`, without any library
+- {name}.mo: the model `{name}`, and `{self.kind}`, of which it is made; no library is needed
 
 ## How to run it
 

@@ -125,6 +125,7 @@ class _Printer:
         identifier(name.upper(), WORDS, f"name {name!r}")
         self.name, self.element = name, Element.of(subject, WORDS, cases=False)
         element = self.element
+        element.check_name(name, cases=False)
         self.force = element.free("force")  # F would be the same as a chart's f
         self.form: Plain = plain_form(element, "cycle")
         self.notation = Notation(
