@@ -1,0 +1,97 @@
+"""Exported C programs: compiled, run on records, and compared with the engine."""
+
+from __future__ import annotations
+
+import io
+import shutil
+import subprocess
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gms_fsm import GMSError, Model, Prescribed, System, Trace, export, simulate
+from gms_fsm.exporters import Subject
+from gms_fsm.exporters._c import engine_of
+from gms_fsm.systems.signals import Corners
+
+FLAGS = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
+COMPILERS = [each for each in ("gcc", "clang") if shutil.which(each)]
+
+
+@dataclass(frozen=True)
+class Output:
+    """What a program wrote: columns by name, switches as texts, and its complaint."""
+
+    columns: Mapping[str, np.ndarray]
+    switches: list[list[str]]
+    message: str
+
+
+def built(folder: Path, name: str, compiler: str = "cc", *flags: str) -> Path:
+    """Compile an exported program; every warning is an error."""
+    made = folder / f"{name}-{compiler}{''.join(flags)}"
+    command = [compiler, *FLAGS, *flags, f"{name}.c", f"{name}_main.c", "-o", made.name, "-lm"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return made
+
+
+def run(program: Path, t: np.ndarray, **inputs: np.ndarray) -> Output:
+    """Run a program on a record."""
+    rows = zip(t.tolist(), *(each.tolist() for each in inputs.values()), strict=True)
+    record = "\n".join([",".join(("t", *inputs)), *(",".join(map(repr, row)) for row in rows), ""])
+    log = program.with_suffix(".log")
+    done = subprocess.run(
+        [str(program), str(log)], input=record, capture_output=True, text=True, check=False
+    )
+    head, *_ = done.stdout.splitlines()
+    table = np.loadtxt(io.StringIO(done.stdout), delimiter=",", skiprows=1, ndmin=2)
+    columns = dict(zip(head.split(","), table.T, strict=True))
+    switches = [line.split(",") for line in log.read_text().splitlines()]
+    return Output(columns, switches, done.stderr)
+
+
+def same_bits(
+    given: Model | System, folder: Path, t: np.ndarray, compilers: list[str], **inputs: np.ndarray
+) -> int:
+    """Assert that a program computes what the engine does; return the number of switches."""
+    # What ticks at the very end of a run does not tick in it, but it does in a call.
+    wanted, options = t[:-1], {"t_eval": t[:-1], "output": "t_eval"}
+    trace: Trace | None
+    if isinstance(given, System):
+        records = {name: Corners(t, each, held=False) for name, each in inputs.items()}
+        given = replace(given, signals={**given.signals, **records})
+    try:
+        if isinstance(given, System):
+            trace = simulate(given, t[-1], **options)
+        else:
+            trace = simulate(given, Prescribed((t, inputs["v"])), t[-1], **options)
+    except GMSError:
+        trace = None
+    export(given, "c99", folder, name="it")
+    made = engine_of(Subject.of(given, "c99", name="it"))
+    for compiler in compilers:
+        found = run(built(folder, "it", compiler), t, **inputs)
+        if trace is None:
+            assert found.message
+            continue
+        assert not found.message
+        places: Mapping[str, Any] = {"y": trace.rows.y, "mode": trace.rows.mode}
+        for each in made.outputs:
+            for k in range(each.length or 1):
+                name = each.name if each.length is None else f"{each.name}[{k + 1}]"
+                ours = found.columns[name][: wanted.size]
+                if each.place in places:
+                    assert np.array_equal(ours, places[each.place][:, each.index + k]), name
+                elif each.label.endswith(".F"):
+                    force = trace.contact(each.label[:-2]).F
+                    assert np.array_equal(ours, force), name
+        log = trace.firings
+        switched = [each for each in found.switches if float(each[0]) <= wanted[-1]]
+        assert [float(each[0]) for each in switched] == log.t.tolist()
+        assert [int(each[1]) - 1 for each in switched] == log.machine.tolist()
+        assert [each[2] for each in switched] == [made.edges[k] for k in log.edge.tolist()]
+    return 0 if trace is None else len(trace.firings.t)
