@@ -8,6 +8,8 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from string import Template
 
 import numpy as np
 
@@ -31,7 +33,7 @@ from integrators.machine_code.tree import Local
 from integrators.machine_code.values import Number
 from integrators.stepping import FULL_LOG, RESUMED, SWITCHES, step_to
 
-__all__ = ["WORDS", "Engine", "engine_of"]
+__all__ = ["WORDS", "Engine", "engine_of", "filled"]
 
 KEYWORDS = """
     auto bool break case char complex const continue default do double else enum extern false float
@@ -39,6 +41,7 @@ KEYWORDS = """
     switch true typedef union unsigned void volatile while
 """
 FIELDS = "t switches logged word"  # of the struct
+TEMPLATES = Path(__file__).parent / "_templates"
 WORDS = frozenset(f"{KEYWORDS} {FIELDS} INFINITY NAN NULL".split())
 BAD_ARGUMENT = -1
 
@@ -145,11 +148,9 @@ class _Text:
         self.arguments = arguments_of(start)
         self.layout = Layout(self.arguments, is_known)
 
-    # ------------------------------------------------------------------ header
     def header(self) -> str:
         """Return the header."""
         name, made = self.name, self.made
-        guard = f"{name.upper()}_H"
         fields = [
             _field(each, "int64_t" if each.place == "mode" else "double") for each in made.outputs
         ]
@@ -160,217 +161,84 @@ class _Text:
         ]
         edges = [f"    {name}_edge_{each} = {k}," for k, each in enumerate(made.edges)]
         states = [f"    {name}_state_{each} = {k}," for each, k in made.states.items()]
-        inputs = ", ".join(made.inputs) or "none"
-        both = "".join(f" {each}0, {each}1:" for each in made.inputs)
-        return f"""\
-/* {_safe(self.title)}.
- *
- * Written by gms-fsm {__version__}. Compile {name}.c with -ffp-contract=off, and not with
- * -ffast-math: then the results are those of gms-fsm to the last bit.
- *
- * Everything is in SI units. Inputs: {inputs}. Switches are located inside the calls.
- * There is no heap and there are no globals: everything is in {name}_state, which may be copied.
- */
-#ifndef {guard}
-#define {guard}
-
-#include <stdbool.h>
-#include <stdint.h>
-
-#ifdef __cplusplus
-extern "C" {{
-#endif
-
-typedef union {{ double f; int64_t i; bool b[8]; }} {name}_word;
-
-typedef struct {{
-    double t; /* s, the present time */
-{chr(10).join(fields)}
-    int64_t switches; /* since {name}_init */
-    int64_t logged;   /* switches in the log: those of the last call, or the last of them if there
-                         were {MOST_SWITCHES} or more */
-    {name}_word word[{self.layout.words}]; /* private */
-}} {name}_state;
-
-/* What the functions return. */
-enum {{
-    {name}_OK = 0,
-    {name}_BAD_ARGUMENT = {BAD_ARGUMENT},
-{_closed(codes)}
-}};
-
-/* Names of the parameters; of one per element, add the number of the element, from 0. */
-enum {{
-{_closed(places)}
-}};
-
-/* States of the elements. */
-enum {{
-{_closed(states)}
-}};
-{_enum("Edges.", edges)}
-/* Begin at t = {self.start.t_start!r} s. */
-void {name}_init({name}_state *s);
-
-/* Advance by dt >= 0. During the call each input runs on a straight line:{both}
- * its value at the start and at the end. With dt = 0 the outputs are those at the end.
- * Returns {name}_OK. After {name}_BAD_ARGUMENT nothing has changed; after any other
- * error the state is unusable: keep a copy of the struct if you want to go back. */
-int {name}_advance({name}_state *s, {made.lines}double dt);
-
-/* The same, to the time t. */
-int {name}_advance_to({name}_state *s, {made.lines}double t);
-
-/* A parameter, by its name above. The tolerances stay those of the exported numbers. */
-double {name}_get(const {name}_state *s, int parameter);
-int {name}_set({name}_state *s, int parameter, double value);
-
-/* The k-th switch in the log, 0 <= k < logged: its time, element (over all contacts), edge. */
-void {name}_switch(const {name}_state *s, int64_t k, double *t, int64_t *element, int64_t *edge);
-
-const char *{name}_edge(int64_t edge);
-const char *{name}_message(int code);
-
-#ifdef __cplusplus
-}}
-#endif
-
-#endif
-"""
+        return filled(
+            "engine.h",
+            name=name,
+            guard=f"{name.upper()}_H",
+            title=_safe(self.title),
+            version=__version__,
+            inputs=", ".join(made.inputs) or "none",
+            fields="\n".join(fields),
+            log_length=MOST_SWITCHES,
+            words=self.layout.words,
+            bad_argument=BAD_ARGUMENT,
+            codes=_closed(codes),
+            parameters=_closed(places),
+            states=_closed(states),
+            edges=f"\n/* Edges. */\nenum {{\n{_closed(edges)}\n}};\n" if edges else "",
+            t_start=repr(self.start.t_start),
+            both="".join(f" {each}0, {each}1:" for each in made.inputs),
+            lines=made.lines,
+        )
 
     # ------------------------------------------------------------------ source
     def source(self) -> str:
         """Return the source."""
-        name, made = self.name, self.made
+        name, made, place = self.name, self.made, self.layout.offset
+        counts, curves = place("sample.counts"), self._curves()
+        given = [
+            f"    w[{place('sample.inputs') + 2 * k + j}].f = {each}{j};"
+            for k, each in enumerate(made.inputs)
+            for j in (0, 1)
+        ]
+        spans = [
+            f"(parameter >= {first} && parameter < {first + length})"
+            for first, length in self._spans()
+        ]
+        messages = [
+            f'    case {name}_{kind}: return "{_REASONS[code]}";' for code, kind in _codes()
+        ]
+        edges = [f'    case {name}_edge_{each}: return "{each}";' for each in made.edges]
+        return filled(
+            "engine.c",
+            name=name,
+            title=_safe(self.title),
+            version=__version__,
+            engine=self._translated(bool(curves)),
+            clock=place("buffers.now.clock"),
+            shown=self._shown(),
+            image=self._image(),
+            lines=made.lines,
+            names="".join(f"{each}0, {each}1, " for each in made.inputs),
+            unless_numbers="".join(
+                f"!is_number({each}{k}) || " for each in made.inputs for k in (0, 1)
+            ),
+            latest=repr(LATEST),
+            end=place("sample.end"),
+            given="\n".join(given),
+            resumed=counts + RESUMED,
+            switches=counts + SWITCHES,
+            full_log=FULL_LOG,
+            spans=" || ".join(spans),
+            curves=curves,
+            log_t=place("sample.t"),
+            log_element=place("sample.machine"),
+            log_edge=place("sample.edge"),
+            edge_names="\n".join(edges),
+            messages="\n".join(messages),
+        )
+
+    def _translated(self, curves: bool) -> str:
+        """Return the functions of the integrator and of the system."""
         translator = Translator(INLINE)
         translator.entry("step", step_to, list(self.layout.value.fields.values()))
-        curves = self._curves()
         if curves:
             for each, function, count in (("dip", dip_of, 2), ("flat", flat_of, 4)):
                 numbers = [Number(Local("f", letter)) for letter in "abcd"[:count]]
                 translator.entry(each, function, numbers)
         public = ("init", "advance", "advance_to", "get", "set", "switch", "edge", "message")
-        taken = [f"{name}_{each}" for each in (*public, "state", "word")] + ["show", "is_number"]
-        text = c99_text(translator.module, taken, hidden=True)
-        place = self.layout.offset
-        given = " || ".join(f"!is_number({each}{k})" for each in made.inputs for k in (0, 1))
-        lines = "\n".join(
-            f"    w[{place('sample.inputs') + 2 * k + j}].f = {each}{j};"
-            for k, each in enumerate(made.inputs)
-            for j in (0, 1)
-        )
-        names = "".join(f"{each}0, {each}1, " for each in made.inputs)
-        counts = place("sample.counts")
-        messages = [
-            f'    case {name}_{kind}: return "{reason}";'
-            for kind, reason in ((kind, _REASONS[code]) for code, kind in _codes())
-        ]
-        edges = [f'    case {name}_edge_{each}: return "{each}";' for each in made.edges]
-        spans = " || ".join(
-            f"(parameter >= {first} && parameter < {first + length})"
-            for first, length in self._spans()
-        )
-        return f"""\
-/* {_safe(self.title)}; see {name}.h. Written by gms-fsm {__version__}. */
-#include "{name}.h"
-
-#include <string.h>
-{text}
-static bool is_number(double u)
-{{
-    return u - u == 0.0;
-}}
-
-/* Copy what is public. */
-static void show({name}_state *s)
-{{
-    const {name}_word *w = s->word;
-    s->t = w[{place("buffers.now.clock")}].f;
-{self._shown()}
-}}
-
-void {name}_init({name}_state *s)
-{{
-    {name}_word *w = s->word;
-    memset(s, 0, sizeof *s);
-{self._image()}
-    show(s);
-}}
-
-int {name}_advance({name}_state *s, {made.lines}double dt)
-{{
-    if (!(dt >= 0.0) || (dt > 0.0 && s->t + dt == s->t))
-        return {name}_BAD_ARGUMENT;
-    return {name}_advance_to(s, {names}s->t + dt);
-}}
-
-int {name}_advance_to({name}_state *s, {made.lines}double t)
-{{
-    {name}_word *w = s->word;
-    int64_t code;
-    if ({given + " || " if given else ""}!(t >= s->t && t <= {LATEST!r}))
-        return {name}_BAD_ARGUMENT;
-    w[{place("sample.end")}].f = t;
-{lines}
-    w[{counts + RESUMED}].i = 0;
-    code = step((char *)w);
-    s->switches += w[{counts + SWITCHES}].i;
-    while (code == {FULL_LOG}) {{
-        w[{counts + SWITCHES}].i = 0;
-        w[{counts + RESUMED}].i = 1;
-        code = step((char *)w);
-        s->switches += w[{counts + SWITCHES}].i;
-    }}
-    s->logged = w[{counts + SWITCHES}].i;
-    show(s);
-    return (int)code;
-}}
-
-static bool is_parameter(int parameter)
-{{
-    return {spans};
-}}
-
-double {name}_get(const {name}_state *s, int parameter)
-{{
-    return is_parameter(parameter) ? s->word[parameter].f : NAN;
-}}
-
-int {name}_set({name}_state *s, int parameter, double value)
-{{
-    {name}_word *w = s->word;
-    if (!is_parameter(parameter) || !is_number(value))
-        return {name}_BAD_ARGUMENT;
-    w[parameter].f = value;
-{curves}    return {name}_OK;
-}}
-
-void {name}_switch(const {name}_state *s, int64_t k, double *t, int64_t *element, int64_t *edge)
-{{
-    const {name}_word *w = s->word;
-    *t = w[{place("sample.t")} + k].f;
-    *element = w[{place("sample.machine")} + k].i;
-    *edge = w[{place("sample.edge")} + k].i;
-}}
-
-const char *{name}_edge(int64_t edge)
-{{
-    switch (edge) {{
-{chr(10).join(edges)}
-    default: return "";
-    }}
-}}
-
-const char *{name}_message(int code)
-{{
-    switch (code) {{
-    case {name}_OK: return "no error";
-    case {name}_BAD_ARGUMENT: return "an argument is not finite, or time goes backward";
-{chr(10).join(messages)}
-    default: return "unknown error";
-    }}
-}}
-"""
+        own = [f"{self.name}_{each}" for each in (*public, "state", "word")]
+        return c99_text(translator.module, [*own, "show", "is_number", "is_parameter"], hidden=True)
 
     def _word(self, each: Quantity) -> int:
         """Return the first word of a quantity."""
@@ -459,6 +327,25 @@ def _codes() -> list[tuple[int, str]]:
     return found
 
 
+def filled(template: str, **holes: object) -> str:
+    """Return a template of this folder with its holes filled.
+
+    Parameters
+    ----------
+    template : str
+        File name in ``_templates``.
+    **holes : object
+        By name.
+
+    Returns
+    -------
+    str
+        The text.
+    """
+    text = (TEMPLATES / template).read_text(encoding="utf-8")
+    return Template(text).substitute(holes)
+
+
 def _field(each: Quantity, kind: str) -> str:
     length = "" if each.length is None else f"[{each.length}]"
     return f"    {kind} {each.name}{length};{_comment(each)}"
@@ -479,12 +366,6 @@ def _closed(lines: Sequence[str]) -> str:
     *before, last = lines
     code, mark, comment = last.partition(" /*")
     return "\n".join([*before, code.rstrip(",") + mark + comment])
-
-
-def _enum(title: str, lines: Sequence[str]) -> str:
-    if not lines:
-        return ""
-    return f"\n/* {title} */\nenum {{\n{_closed(lines)}\n}};\n"
 
 
 def _number(value: float) -> str:

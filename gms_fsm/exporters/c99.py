@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from gms_fsm.exporters._c import WORDS, Engine, engine_of
+from gms_fsm.exporters._c import WORDS, Engine, engine_of, filled
 from gms_fsm.exporters._registry import Exporter, register
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.lowering.scales import scales_of
@@ -62,67 +62,16 @@ def _main(made: Engine) -> str:
         f"        if (row == 2)\n            u{k} = w{k};\n"
         for k in names
     )
-    return f"""\
-/* Runs {name}.c on a record. It reads rows {",".join(("t", *made.inputs))} from the standard input,
- * whose first line names the columns, and writes the outputs. With a file name as argument it also
- * writes each switch to that file: time, element (from 1), edge. Written by gms-fsm. */
-#include "{name}.h"
-
-#include <stdio.h>
-#include <stdlib.h>
-
-enum {{ LONGEST = 4096 }};
-
-static void write_row(const {name}_state *s)
-{{
-    printf("%.17g", s->t);
-{chr(10).join(rows)}
-    printf("\\n");
-}}
-
-static void write_switches(const {name}_state *s, FILE *file)
-{{
-    double t;
-    int64_t element, edge;
-    for (int64_t k = 0; k < s->logged; k++) {{
-        {name}_switch(s, k, &t, &element, &edge);
-        fprintf(file, "%.17g,%d,%s\\n", t, (int)element + 1, {name}_edge(edge));
-    }}
-}}
-
-int main(int argc, char **argv)
-{{
-    static char line[LONGEST];
-    FILE *switches = argc > 1 ? fopen(argv[1], "w") : NULL;
-    {name}_state s;
-    int code = {name}_OK;
-    long row = 0;
-{before}    if (argc > 1 && !switches) {{
-        fprintf(stderr, "cannot write %s\\n", argv[1]);
-        return 1;
-    }}
-    {name}_init(&s);
-    printf("t,{",".join(heads)}\\n");
-    while (code == {name}_OK && fgets(line, LONGEST, stdin)) {{
-        char *end = line;
-        double t;
-        if (row++ == 0)
-            continue;
-        t = strtod(line, &end);
-{read}        code = {name}_advance_to(&s, {pairs}t);
-        if (code == {name}_OK)
-            write_row(&s);
-        if (switches)
-            write_switches(&s, switches);
-    }}
-    if (switches)
-        fclose(switches);
-    if (code == {name}_OK)
-        return 0;
-    fprintf(stderr, "row %ld: %s\\n", row, {name}_message(code));
-    return 1;
-}}
-"""
+    return filled(
+        "main.c",
+        name=name,
+        columns=",".join(("t", *made.inputs)),
+        heads=",".join(heads),
+        rows="\n".join(rows),
+        before=before,
+        read=read,
+        pairs=pairs,
+    )
 
 
 def _record(subject: Subject) -> str:
@@ -158,32 +107,16 @@ def _readme(subject: Subject, made: Engine) -> str:
         for each in made.parameters
     )
     settings = subject.settings
-    return f"""\
-# {subject.title} in C99
-
-`{name}.h` and `{name}.c` are the engine of gms-fsm, translated: adaptive steps, switches located
-inside each call, the same results to the last bit. No heap, no globals; everything is in one struct
-of type `{name}_state`.
-
-    {name}_state s;
-    {name}_init(&s);
-    {name}_advance(&s, {"".join(f"{each}0, {each}1, " for each in made.inputs)}dt);
-
-Inputs: {inputs}. During a call each input runs on a straight line. Outputs are fields of the
-struct; the header says what they are. All numbers are in SI units.
-
-Run it on the record beside it:
-
-    cc -std=c99 -O2 -ffp-contract=off {name}.c {name}_main.c -o {name} -lm
-    ./{name} {name}_switches.csv < {name}_record.csv > {name}_trace.csv
-
-`-ffp-contract=off` keeps the bits; `-ffast-math` must not be used. Method {settings.method_name},
-relative tolerance {settings.rtol!r}.
-
-Numbers, which `{name}_set` changes (their rules are not checked there):
-
-{numbers}
-"""
+    return filled(
+        "c99.md",
+        name=name,
+        title=subject.title,
+        arguments="".join(f"{each}0, {each}1, " for each in made.inputs),
+        inputs=inputs,
+        method=settings.method_name,
+        rtol=repr(settings.rtol),
+        numbers=numbers,
+    )
 
 
 register(Exporter("c99", "C99 with located switches, and the plain form", c99, WORDS))
