@@ -10,7 +10,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from gms_fsm.exporters._element import Element, Leaving, Let
+from gms_fsm.exporters._element import Element
+from gms_fsm.exporters._element_parts import Leaving, Let
 from gms_fsm.language import Binary, Name, Node, Value, names_in
 
 __all__ = ["ByState", "Declare", "Enter", "Guards", "Plain", "Set", "Statement", "plain_form"]

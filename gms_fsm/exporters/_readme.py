@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from gms_fsm.exporters._element import Constant, Element
+from gms_fsm.exporters._element import Element
+from gms_fsm.exporters._element_parts import Constant
 
 __all__ = ["about_friction"]
 

@@ -6,7 +6,8 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from gms_fsm.errors import ParameterError
-from gms_fsm.exporters._element import Element, Expression, Let, State
+from gms_fsm.exporters._element import Element
+from gms_fsm.exporters._element_parts import Expression, Let, State
 from gms_fsm.exporters._notation import Notation
 from gms_fsm.exporters._readme import about_friction
 from gms_fsm.exporters._registry import Exporter, register

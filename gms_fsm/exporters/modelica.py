@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 
-from gms_fsm.exporters._element import Constant, Element, Leaving
+from gms_fsm.exporters._element import Element
+from gms_fsm.exporters._element_parts import Constant, Leaving
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._notation import Notation
 from gms_fsm.exporters._readme import about_friction

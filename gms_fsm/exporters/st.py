@@ -6,7 +6,8 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from gms_fsm.errors import ParameterError
-from gms_fsm.exporters._element import Constant, Element
+from gms_fsm.exporters._element import Element
+from gms_fsm.exporters._element_parts import Constant
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._notation import Notation
 from gms_fsm.exporters._plain_form import (
@@ -149,7 +150,7 @@ class _Printer:
         self.texts = {each: f"{each}{self.at}" for each in numbers} | self.now
         self.texts[self.form.force] = self.force
         self.states = [element.free(f"STATE_{each.name.upper()}") for each in element.states]
-        names = [*self.names(), *(each for each, _ in element.inputs)]
+        names = [*element.names, *(each for each, _ in element.inputs)]
         for each in names:
             if "__" in each or each.endswith("_"):
                 raise ParameterError(
@@ -157,11 +158,6 @@ class _Printer:
                     place=f"chart {subject.title!r}, name {each!r}",
                     advice="give it another name",
                 )
-
-    def names(self) -> list[str]:
-        """Return the names of the chart that stand in the text."""
-        element = self.element
-        return [each.name for each in (*element.constants, *element.lets, *element.variables)]
 
     # ------------------------------------------------------------------ the text
     def text(self) -> str:
