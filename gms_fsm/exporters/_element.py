@@ -143,7 +143,7 @@ class Element:
         contact = subject.contact  # refuses a system, a chart without numbers, locks
         read = assembled(subject.start.system)
         (bank,) = read.banks
-        _refuse_feedback(bank, f"chart {contact.chart.name!r}", subject.format)
+        _refuse_feedback(bank, f"chart {contact.chart.name!r}")
         every = frozenset(words)
         return _Reader(subject, read, bank, _names(read, bank, every, cases), time, every).element()
 
@@ -271,17 +271,17 @@ def _numbered(name: str) -> Iterator[str]:
 
 
 # --------------------------------------------------------------------------- refusals and names
-def _refuse_feedback(bank: Bank, place: str, form: str) -> None:
+def _refuse_feedback(bank: Bank, place: str) -> None:
     """Refuse guards and assignments that read the contact's force or acceleration."""
     late = {*bank.forces, *bank.rates}
     for edge in bank.edges:
         trees = [edge.guard, *(tree for _, tree in edge.steps)]
         for name in sorted(late & frozenset[str]().union(*map(names_in, trees))):
             raise ParameterError(
-                f"format {form!r} has no guards or assignments that read "
-                f"{name.rsplit('.', 1)[-1].split()[-1]!r}",
+                f"it reads {name.rsplit('.', 1)[-1].split()[-1]!r} of the contact, which a text of "
+                "one friction knows only after its guards",
                 place=f"{place}, edge {edge.name!r}",
-                advice="write the guard over variables and v, or choose the format 'c99'",
+                advice="write it over variables and v, or hand over the engine (format 'c99')",
             )
 
 

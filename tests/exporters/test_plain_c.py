@@ -74,8 +74,8 @@ def test_no_memory_but_the_struct() -> None:
     ("parameter", "guard", "wrong"),
     [
         ("double", "z > 1", "parameter 'double'"),
-        ("k", "F > 1", "edge 'go': format 'c99' has no guards or assignments that read 'F'"),
-        ("k", "a > 1", "edge 'go': format 'c99' has no guards or assignments that read 'a'"),
+        ("k", "F > 1", "edge 'go': it reads 'F' of the contact"),
+        ("k", "a > 1", "edge 'go': it reads 'a' of the contact"),
         ("stärke", "z > 1", "parameter 'stärke'"),
     ],
 )

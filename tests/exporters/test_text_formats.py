@@ -84,7 +84,7 @@ def test_words_of_a_language_are_refused(form: str, name: str, tmp_path: Path) -
 @pytest.mark.parametrize("name", ["F", "a"])
 def test_guards_over_the_force_are_refused(form: str, name: str, tmp_path: Path) -> None:
     model = one_state(transitions=(Transition("go", "a", "b", guard=f"{name} > 1"),))
-    wrong = f"edge 'go': format '{form}' has no guards or assignments that read '{name}'"
+    wrong = f"edge 'go': it reads '{name}' of the contact"
     with pytest.raises(ParameterError, match=re.escape(wrong)):
         export(model, form, tmp_path / "out")
 
