@@ -17,7 +17,9 @@ def test_the_bits_of_the_engine(compiler: str, ran: Callable[..., None], tmp_pat
     switches = steps = 0
     for name in NAMES:
         for seed in range(3):
-            counts = compared(name, seed, compiler, tmp_path)
+            folder = tmp_path / f"{name}{seed}"
+            folder.mkdir()
+            counts = compared(name, seed, compiler, folder)
             switches, steps = switches + counts[0], steps + counts[1]
     assert switches
     told = subprocess.run([compiler, "-dumpversion"], capture_output=True, text=True, check=True)
