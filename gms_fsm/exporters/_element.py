@@ -196,15 +196,6 @@ class Element:
         return before, [[each for each in row if each.name not in several] for row in wanted]
 
     @property
-    def own(self) -> frozenset[str]:
-        """Names with one value per element: variables, rates, numbers and lets."""
-        found = {each.name for each in self.constants if isinstance(each.value, tuple)}
-        found |= {each.name for each in self.lets if each.per_element}
-        for each in self.variables:
-            found |= {each.name, each.rate}
-        return frozenset(found)
-
-    @property
     def names(self) -> list[str]:
         """Names of its numbers, of what is computed, and of its variables."""
         found = [each.name for each in self.constants]

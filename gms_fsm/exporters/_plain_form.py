@@ -12,7 +12,7 @@ from typing import TypeAlias
 
 from gms_fsm.exporters._element import Element
 from gms_fsm.exporters._element_parts import Leaving, Let
-from gms_fsm.language import Binary, Name, Node, Value, names_in
+from gms_fsm.language import Binary, Name, Node, Value
 
 __all__ = ["ByState", "Declare", "Enter", "Guards", "Plain", "Set", "Statement", "plain_form"]
 
@@ -74,6 +74,8 @@ class Plain:
         For each element, in this order.
     updates : tuple of Set
         Each variable after the step.
+    trees : tuple of Node
+        All that is computed.
     """
 
     element: Element
@@ -85,11 +87,6 @@ class Plain:
     flows: tuple[Statement, ...]
     updates: tuple[Set, ...]
     trees: tuple[Node, ...] = field(repr=False)
-
-    @property
-    def reads(self) -> frozenset[str]:
-        """Every name that is read."""
-        return frozenset[str]().union(*map(names_in, self.trees))
 
 
 def plain_form(element: Element, dt: str = "dt") -> Plain:

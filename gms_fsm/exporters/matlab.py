@@ -513,7 +513,7 @@ In MATLAB or Octave, in this folder:
     s.edges(s.log(:, 3))                   % names of the edges
 
 or in a shell: `octave-cli --eval "s = {name}(); [s, F] = {name}(s, 0, 0.1, 0.01{further})"`.
-`help {name}` prints its arguments.
+`help {name}` prints its arguments. GNU Octave 7.3 has run it; MATLAB itself has not.
 
 ## What it computes
 

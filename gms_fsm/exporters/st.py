@@ -150,7 +150,7 @@ class _Printer:
         self.texts = {each: f"{each}{self.at}" for each in numbers} | self.now
         self.texts[self.form.force] = self.force
         self.states = [element.free(f"STATE_{each.name.upper()}") for each in element.states]
-        names = [*element.names, *(each for each, _ in element.inputs)]
+        names = [*element.names, *self.states, *(each for each, _ in element.inputs), name]
         for each in names:
             if "__" in each or each.endswith("_"):
                 raise ParameterError(
@@ -293,6 +293,9 @@ a task with a fixed interval:
     VAR friction : {name}; END_VAR
     friction(v := velocity{inputs}, {self.form.dt} := 0.001);
     force := friction.{self.force};
+
+The compiler matiec 0.1 (`iec2c`) has translated it, and the result has run; blark has parsed it.
+No PLC has run it.
 
 ## What it computes
 

@@ -18,6 +18,7 @@ model Test
   friction given;
 equation
   given.v = {velocity};
+  {more}
 end Test;
 """
 
@@ -50,9 +51,9 @@ def compared(name: str, seed: int) -> tuple[int, float]:
     return len(wanted), float(apart.max() / np.abs(trace.F).max())
 
 
-def ran_in_rumoca(model: Any, velocity: str) -> Any:
-    """Return Rumoca's result for a friction with a velocity over t."""
+def ran_in_rumoca(model: Any, velocity: str, more: str = "") -> Any:
+    """Return Rumoca's result for a friction with a velocity over t, and one more equation."""
     text = modelica(Subject.of(model, "modelica", name="friction"))["friction.mo"]
-    text += TEST.format(velocity=velocity.replace("*t)", "*time)"))
+    text += TEST.format(velocity=velocity, more=f"{more};" * bool(more)).replace("*t)", "*time)")
     config = rumoca.SimConfig(solver="auto", rtol=1e-9, atol=1e-14)
     return rumoca.Session().loads(text, model="Test").simulate((0.0, T_END), dt=0.01, config=config)

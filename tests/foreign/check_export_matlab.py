@@ -11,7 +11,7 @@ import pytest
 
 from gms_fsm import FrictionState
 from tests.exporters.octave import OCTAVE, lines_of, ran_in_octave
-from tests.exporters.text_cases import NAMES, Case, case
+from tests.exporters.text_cases import NAMES, Case, case, loaded
 
 RTOL = 1e-10
 STEP = 1e-4  # s, of Runge-Kutta
@@ -73,3 +73,26 @@ def test_a_record_that_jumps(octave: str, ran: Callable[..., None], tmp_path: Pa
     assert worst < 1e-9
     result = f"all {switches} switches; F at most {worst:.1g} of its largest value apart"
     ran("matlab", octave, "records that jump", result)
+
+
+def test_further_inputs_position_time_and_actions(
+    octave: str, ran: Callable[..., None], tmp_path: Path
+) -> None:
+    t = np.linspace(0.0, 3.0, 151)
+    v, load = np.cos(3.0 * t), 0.2 + 0.5 * np.sin(2.0 * t)
+    lines = np.column_stack([v[:-1], v[1:], np.diff(t), load[:-1], load[1:]])
+    forces, log = ran_in_octave(tmp_path, loaded(), lines, 1e-3)
+    friction, exact, switches = FrictionState(loaded(), rtol=RTOL), [], []
+    for v0, v1, dt, *ends in lines.tolist():
+        exact.append(friction.advance(v0, v1, dt, load=(ends[0], ends[1])))
+        switches += [(each.t, each.edge) for each in friction.switches]
+    assert [("go", "back")[edge - 1] for *_, edge in log] == [edge for _, edge in switches]
+    assert [time for time, *_ in log] == pytest.approx([time for time, _ in switches], abs=1e-12)
+    worst = float(np.abs(forces - exact).max() / np.abs(exact).max())
+    assert worst < 1e-9
+    ran(
+        "matlab",
+        octave,
+        "a chart with x, t, a further input and actions",
+        f"all {len(log)} switches; F at most {worst:.1g} of its largest value apart",
+    )
