@@ -18,3 +18,14 @@ collect_ignore += [
     for path in (f"gms_fsm/adapters/{name}.py", f"tests/foreign/check_{name}.py")
     if not importlib.util.find_spec(name)
 ]
+
+# FMPy drives exported FMUs (extra: foreign).
+if not importlib.util.find_spec("fmpy"):
+    collect_ignore += [
+        f"tests/{name}.py"
+        for name in (
+            "exporters/fmus",
+            "exporters/test_fmus_run_in_fmpy",
+            "foreign/check_export_fmu",
+        )
+    ]

@@ -58,28 +58,31 @@ class Exchange(NamedTuple):
     before: Vector  # scratch space: the state before `settle`
     signs: Vector  # scratch space: held signs
     offset: Vector  # of each clock its first tick after the start, s
-    clocks: Clocks
 
 
-def restart(b: Buffers, x: Exchange) -> None:
+def restart(b: Buffers, clocks: Clocks, x: Exchange) -> None:
     """Begin at the time that is in the buffers now, which had another one.
 
     Parameters
     ----------
     b : Buffers
         Before the first call of `settle`.
+    clocks : Clocks
+        Set to the new start.
     x : Exchange
-        Its clocks are set.
+        With the offsets of the clocks.
     """
     clock, plan = b.now.clock, b.plan
     for i in range(len(x.offset)):
-        x.clocks.start[i] = clock[T] + x.offset[i]
-        x.clocks.made[i] = 0
+        clocks.start[i] = clock[T] + x.offset[i]
+        clocks.made[i] = 0
     for _k in range(len(plan.jumps)):
-        next_tick(plan, x.clocks)
+        next_tick(plan, clocks)
 
 
-def settle(functions: Functions, machines: Machines, b: Buffers, x: Exchange) -> int:
+def settle(
+    functions: Functions, machines: Machines, b: Buffers, clocks: Clocks, x: Exchange
+) -> int:
     """Take all enabled edges at an event, until none is; then freeze states and signs.
 
     Parameters
@@ -88,6 +91,8 @@ def settle(functions: Functions, machines: Machines, b: Buffers, x: Exchange) ->
         The system.
     b : Buffers
         Their plan has a foreign solver and no end; time and state are those of the event.
+    clocks : Clocks
+        What ticks, as in `integrators.stepping`.
     x : Exchange
         Its counts, and the time of the next tick, are filled.
 
@@ -103,16 +108,18 @@ def settle(functions: Functions, machines: Machines, b: Buffers, x: Exchange) ->
     clock[LATEST] = abs(clock[T])
     due = False
     if counts[PHASE] == ARC:  # what crossed is counted, as after a step of ours
-        due = len(plan.jumps) > 0 and _is_due(plan.jumps[counts[JUMP]], clock[T])
+        if len(plan.jumps) > 0:
+            tick = plan.jumps[counts[JUMP]]
+            due = tick - clock[T] <= SOON * abs(tick)
         if due:  # what crossed comes first
             clock[T] = plan.before_jumps[counts[JUMP]]
         counts[STATUS] = CROSSED
         counts[PHASE] = AFTER
-    error = _quiet(functions, machines, b, x)
+    error = _quiet(functions, machines, b, clocks, x)
     if due and error == 0:
         counts[STATUS] = REACHED
         counts[PHASE] = AFTER
-        error = _quiet(functions, machines, b, x)
+        error = _quiet(functions, machines, b, clocks, x)
     x.next[0] = plan.jumps[counts[JUMP]] if len(plan.jumps) > 0 else INFINITY
     x.counts[MOVED] = 0
     for j in range(len(now.y)):
@@ -121,12 +128,9 @@ def settle(functions: Functions, machines: Machines, b: Buffers, x: Exchange) ->
     return error
 
 
-def _is_due(tick: float, t: float) -> bool:
-    """Return whether a tick is now: the caller may have reached it only up to rounding."""
-    return tick - t <= SOON * abs(tick)
-
-
-def _quiet(functions: Functions, machines: Machines, b: Buffers, x: Exchange) -> int:
+def _quiet(
+    functions: Functions, machines: Machines, b: Buffers, clocks: Clocks, x: Exchange
+) -> int:
     """Run the loop until a solver would have to go on."""
     counts, plan, clock = b.memory.counts, b.plan, b.now.clock
     motion = Motion(flow_on, margins_on, Held(functions, b.now.held, b.sliding))
@@ -134,7 +138,7 @@ def _quiet(functions: Functions, machines: Machines, b: Buffers, x: Exchange) ->
     while event != ADVANCE:
         event = run_to_event(functions, machines, motion, b, 1)
         if len(plan.jumps) > 0 and plan.jumps[1] <= clock[T]:
-            next_tick(plan, x.clocks)
+            next_tick(plan, clocks)
             counts[JUMP] = 0
         if event == FIRED:
             x.counts[SWITCHES] += 1

@@ -26,14 +26,14 @@ from integrators.machine_code.c99 import c99_text
 from integrators.machine_code.layout import Layout
 from integrators.machine_code.translate import Translator
 from integrators.machine_code.tree import Local
-from integrators.machine_code.values import Number
+from integrators.machine_code.values import Number, Record, Value
 
-__all__ = ["Model"]
+__all__ = ["Both", "Model", "both_of"]
 
 ENTRIES: Mapping[str, tuple[Any, str]] = {
     "step": (stepping.step_to, "functions machines buffers sample"),
-    "restart": (exchange.restart, "buffers exchange"),
-    "settle": (exchange.settle, "functions machines buffers exchange"),
+    "restart": (exchange.restart, "buffers sample.clocks exchange"),
+    "settle": (exchange.settle, "functions machines buffers sample.clocks exchange"),
     "slope": (exchange.slope, "functions buffers exchange"),
     "indicate": (exchange.indicate, "functions buffers exchange"),
     "changed": (exchange.changed, "functions buffers exchange"),
@@ -68,7 +68,7 @@ class Model:
 
     def __init__(self, subject: Subject, variables: Sequence[Variable], *, exchange: bool) -> None:
         self.subject, self.variables, self.exchange = subject, variables, exchange
-        self.arguments = _arguments(subject)
+        self.arguments = both_of(subject)
         self.layout = Layout(self.arguments, is_known)
 
     @property
@@ -107,7 +107,9 @@ class Model:
         name, translator = self.subject.name, Translator(INLINE)
         fields, curves = self.layout.value.fields, curves_of(self.subject.start, self.layout)
         for each, (function, names) in ENTRIES.items():
-            translator.entry(f"fmu_{each}", function, [fields[field] for field in names.split()])
+            translator.entry(
+                f"fmu_{each}", function, [_part(fields, field) for field in names.split()]
+            )
         if curves:
             for each, function, count in (("dip", dip_of, 2), ("flat", flat_of, 4)):
                 numbers = [Number(Local("f", letter)) for letter in "abcd"[:count]]
@@ -180,8 +182,29 @@ class Model:
         }
 
 
-def _arguments(subject: Subject) -> Both:
-    """Return the arguments of all entries, made of lists."""
+def _part(fields: Mapping[str, Value], name: str) -> Value:
+    """Return a field, or a field of it."""
+    first, _, rest = name.partition(".")
+    found = fields[first]
+    if not rest:
+        return found
+    assert isinstance(found, Record)
+    return _part(found.fields, rest)
+
+
+def both_of(subject: Subject) -> Both:
+    """Return the arguments of all entries, made of lists.
+
+    Parameters
+    ----------
+    subject : Subject
+        A friction or a system.
+
+    Returns
+    -------
+    Both
+        At the start, for Co-Simulation.
+    """
     start, alone = subject.start, not isinstance(subject.given, System)
     functions, machines, buffers, sample = arguments_of(start)
     size, relations = len(buffers.now.y), len(buffers.relations.watch)
@@ -198,6 +221,5 @@ def _arguments(subject: Subject) -> Both:
         before=[0.0] * size,
         signs=[0.0] * len(buffers.now.held),
         offset=[offset for _, _, offset in clocks_of(start.system)],
-        clocks=sample.clocks,
     )
     return Both(functions, machines, buffers, sample, made)

@@ -127,8 +127,8 @@ def variables_of(subject: Subject, *, exchange: bool) -> tuple[Variable, ...]:
             meaning="edges taken since the start",
         )
     )
-    for each in parameters_of(start, alone, ()):
-        found += _parameter(each, alone)
+    for quantity in parameters_of(start, alone, ()):
+        found += _parameter(quantity, alone)
     if exchange:
         found += [
             Variable(each.name, "INDICATOR", k, meaning=each.meaning)
