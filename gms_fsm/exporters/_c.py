@@ -18,6 +18,7 @@ from gms_fsm._version import __version__
 from gms_fsm.charts.stribeck import GAUSSIAN, dip_of, flat_of
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import identifier
+from gms_fsm.exporters._plain_c import C_WORDS
 from gms_fsm.exporters._quantities import Quantity, outputs_of, parameters_of
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.language import names_in, spell
@@ -46,14 +47,9 @@ __all__ = [
 ]
 __all__ += ["image_of", "number", "safe"]
 
-KEYWORDS = """
-    auto bool break case char complex const continue default do double else enum extern false float
-    for goto if imaginary inline int long register restrict return short signed sizeof static struct
-    switch true typedef union unsigned void volatile while
-"""
-FIELDS = "t switches logged word"  # of the struct
+FIELDS = ("t", "switches", "logged", "word")  # of the struct
 TEMPLATES = Path(__file__).parent / "_templates"
-WORDS = frozenset(f"{KEYWORDS} {FIELDS} INFINITY NAN NULL".split())
+WORDS = C_WORDS | {*FIELDS, "INFINITY", "NAN", "NULL"}
 BAD_ARGUMENT = -1
 
 
@@ -73,8 +69,8 @@ class Engine:
         Fields of the struct, and enumerators for ``name_get`` and ``name_set``.
     states : mapping of str to int
         Names of the states; with several contacts these begin with the contact's.
-    edges : tuple of str
-        By the numbers in the log.
+    edges : mapping of str to str
+        Names of the edges; those of the enumerators, which tell several sources apart, come first.
     """
 
     name: str
@@ -84,7 +80,7 @@ class Engine:
     outputs: tuple[Quantity, ...]
     parameters: tuple[Quantity, ...]
     states: Mapping[str, int]
-    edges: tuple[str, ...]
+    edges: Mapping[str, str]
 
     @functools.cached_property
     def lines(self) -> str:
@@ -115,16 +111,18 @@ def engine_of(subject: Subject) -> Engine:
     for each in subject.inputs:
         identifier(each, WORDS, f"input {each!r}")
     states: dict[str, int] = {}
-    edges: list[str] = []
+    edges: dict[str, str] = {}
     for bank in start.program.layout.banks:
         chart = start.system.contact(bank.name).chart
         owner = "" if alone else f"{bank.name}_"
         states |= {f"{owner}{each.name}": k for k, each in enumerate(chart.states)}
-        edges += [f"{owner}{each.name}" for each in chart.transitions]
+        for edge in chart.transitions:  # one for each source
+            source = f"_from_{edge.source}" if len(edge.sources) > 1 else ""
+            edges[f"{owner}{edge.name}{source}"] = f"{owner}{edge.name}"
     for each in (*states, *edges):
         identifier(each, (), f"state or edge {each!r}")
     outputs, parameters = outputs_of(start, alone, WORDS), parameters_of(start, alone, WORDS)
-    made = Engine(subject.name, "", "", subject.inputs, outputs, parameters, states, tuple(edges))
+    made = Engine(subject.name, "", "", subject.inputs, outputs, parameters, states, edges)
     text = _Text(made, start, subject.title)
     return replace(made, header=text.header(), source=text.source())
 
@@ -220,7 +218,9 @@ class _Text:
         messages = [
             f'    case {name}_{kind}: return "{_REASONS[code]}";' for code, kind in _codes()
         ]
-        edges = [f'    case {name}_edge_{each}: return "{each}";' for each in made.edges]
+        edges = [
+            f'    case {name}_edge_{each}: return "{text}";' for each, text in made.edges.items()
+        ]
         return filled(
             "engine.c",
             name=name,
