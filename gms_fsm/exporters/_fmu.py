@@ -46,10 +46,12 @@ HELD = {
     "are held.",
 }
 EPOCH = (1980, 1, 1, 0, 0, 0)  # of all files: the same model gives the same bytes
-NO_EXCHANGE = (
-    "There is no Model Exchange: a chart reads how fast an input changes, which an importer does "
-    "not tell there.\n"
-)
+NO_EXCHANGE = """\
+## Model Exchange
+
+There is none: a chart reads how fast an input changes, which an importer does not tell there.
+
+"""
 LICENCE = """\
 The C text is a part of gms-fsm; what it describes is yours.
 
@@ -309,7 +311,7 @@ def _readme(subject: Subject, described: Described, version: int, why: str) -> s
         binary=f"There is no binary in it: {why}. Compile the sources."
         if why
         else f"The binary is for {folder}; for other machines compile the sources.",
-        exchange="" if described.exchange else NO_EXCHANGE,
+        exchange=filled("fmu_exchange.md") if described.exchange else NO_EXCHANGE,
         flags=" ".join(FLAGS),
         sources=" ".join(described.sources),
         ending=ending or ".so",

@@ -7,6 +7,7 @@ sequence of switches is.
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -21,7 +22,8 @@ from fmpy.validation import validate_fmu
 
 from gms_fsm import Body, Contact, FrictionState, Prescribed, System, simulate
 from gms_fsm.charts.karnopp import KARNOPP
-from gms_fsm.systems.models import ChartModel
+from gms_fsm.charts.registry import registered
+from gms_fsm.systems.models import ChartModel, demonstration
 from tests.exporters.c_cases import CASES, case
 from tests.exporters.fmus import (
     END,
@@ -203,7 +205,56 @@ def test_whole_systems(name: str, form: str, tmp_path: Path, ran: Ran) -> None:
     ran(form, FMPY, f"{name}, Co-Simulation", f"all switches, {seen} within {apart:.0e} m")
 
 
+# What the engine refuses with such a force, or what is not a friction of one velocity.
+NOT_HERE = {"planar-coulomb", "bouc-wen", "rate-state-ageing", "rate-state-slip"}
+CHARTS = [name for name in registered() if name not in NOT_HERE and not name.startswith("broken:")]
+
+
+@pytest.mark.parametrize("name", CHARTS)
+def test_every_built_in_chart_on_a_mass(name: str, tmp_path: Path, ran: Ran) -> None:
+    entry = registered()[name]
+    system = System(
+        "mass",
+        bodies=(Body("mass", inertia="1.0", force="3 * sin(1.5 * t) * min(t, 1)", x="x", v="v"),),
+        contacts=(Contact("it", demonstration(entry, next(iter(entry.laws), "")), v="v"),),
+    )
+    t = np.linspace(0.0, 10.0, 641)
+    trace = simulate(system, 10.0, t_eval=t, rtol=1e-9)
+    result = simulated(
+        written(system, "fmu3", tmp_path, name="it"), "ModelExchange", 10.0, output_interval=1 / 64,
+        relative_tolerance=1e-9, output=["x", "switches"], record_events=False,
+    )  # fmt: skip
+    apart = np.abs(np.interp(t, result["time"], result["x"]) - trace.x).max()
+    assert apart < 2e-5
+    if name != "elasto-plastic":  # it rests on a threshold: there the noise of a method switches it
+        assert result["switches"][-1] == len(trace.transitions)
+    what = f"{len(CHARTS)} built-in charts on a mass, Model Exchange, CVode"
+    ran("fmu3", FMPY, what, "x within 2e-5 m, and all switches but those of one chart")
+
+
 # --------------------------------------------------------------------------- instances, sources
+@pytest.mark.parametrize("form", FORMATS)
+def test_all_functions_are_there_and_nothing_is_global(form: str, tmp_path: Path, ran: Ran) -> None:
+    header = Path(fmpy.__file__).parent / "c-code" / f"fmi{form[-1]}Functions.h"
+    wanted = {*re.findall(rf"FullName\((fmi{form[-1]}\w+)\)", header.read_text())} - {"name"}
+    folder = Path(fmpy.extract(str(written(PAPER, form, tmp_path, name="gms"))))
+    (library,) = (folder / "binaries").rglob("gms.so")
+    lines = subprocess.run(
+        ["nm", "-D", "--defined-only", str(library)], capture_output=True, text=True, check=True
+    ).stdout.splitlines()
+    assert {line.split()[-1] for line in lines} == wanted
+    for source in (folder / "sources").glob("*.c"):
+        subprocess.run(
+            ["cc", "-std=c99", "-fPIC", "-c", source.name], cwd=source.parent, check=True
+        )
+        command = ["nm", source.with_suffix(".o").name]
+        table = subprocess.run(
+            command, cwd=source.parent, capture_output=True, text=True, check=True
+        )
+        assert not re.search(r" [bBcCdD] ", table.stdout.replace(" d .", "")), table.stdout
+    ran(form, "nm", "functions of the standard, globals", f"{len(wanted)} functions, no globals")
+
+
 @pytest.mark.parametrize("form", FORMATS)
 def test_instances_are_independent_and_their_states_can_be_kept(
     form: str, tmp_path: Path, ran: Ran
@@ -259,6 +310,32 @@ def test_another_start_and_other_numbers(form: str, tmp_path: Path, ran: Ran) ->
     ours = other.run(np.arange(1000) * h, ["F"], v=v[:1000])[:, 0]
     np.testing.assert_array_equal(ours, theirs)
     ran(form, FMPY, "another start time; parameters and initial values set", "equal bits")
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_wrong_calls_are_errors_with_a_message(
+    form: str, tmp_path: Path, ran: Ran, capfd: pytest.CaptureFixture[str]
+) -> None:
+    slave = Slave(written(PAPER, form, tmp_path, name="gms"))
+    t, v = paper_record()
+    slave.run(t[:100], ["F"], v=v[:100])
+    kept = [slave.get(name) for name in ("x", "z[1]", "F")]
+
+    def fails(message: str, call: Callable[[], Any]) -> None:
+        with pytest.raises(Exception, match="failed with status 3"):
+            call()
+        assert message in capfd.readouterr().out
+
+    fails("can be set only before the start", lambda: slave.put("k[1]", 2.0))
+    fails("cannot be set", lambda: slave.put("F", 2.0))
+    fails("cannot be nan", lambda: slave.put("v", float("nan")))
+    fails("it must be positive", lambda: slave.fmu.doStep(float(t[99]), 0.0))
+    fails("but the time is 0.98999999999999999", lambda: slave.fmu.doStep(0.0, 0.01))
+    fails("is an integer", lambda: slave.get("switches"))
+    slave.fmu.terminate()
+    fails("after an error", lambda: slave.fmu.doStep(float(t[99]), 0.01))
+    assert [slave.get(name) for name in ("x", "z[1]", "F")] == kept
+    ran(form, FMPY, "wrong calls", "errors with a message, nothing changed")
 
 
 @pytest.mark.parametrize("form", FORMATS)

@@ -271,11 +271,7 @@ EXPORT fmi2Status FMI2(fmi2DeSerializeFMUstate)(C, const fmi2Byte bytes[], size_
 }
 
 /* ---------------------------------------------------------------- Model Exchange */
-EXPORT fmi2Status FMI2(fmi2EnterEventMode)(C)
-{
-    ((instance *)c)->now.mode = EVENTS;
-    return fmi2OK;
-}
+EXPORT fmi2Status FMI2(fmi2EnterEventMode)(C) { return status(enter(c, EVENTS, true)); }
 
 EXPORT fmi2Status FMI2(fmi2NewDiscreteStates)(C, fmi2EventInfo *info)
 {
@@ -292,11 +288,7 @@ EXPORT fmi2Status FMI2(fmi2NewDiscreteStates)(C, fmi2EventInfo *info)
     return fmi2OK;
 }
 
-EXPORT fmi2Status FMI2(fmi2EnterContinuousTimeMode)(C)
-{
-    ((instance *)c)->now.mode = CONTINUOUS;
-    return fmi2OK;
-}
+EXPORT fmi2Status FMI2(fmi2EnterContinuousTimeMode)(C) { return status(enter(c, CONTINUOUS, true)); }
 
 EXPORT fmi2Status FMI2(fmi2CompletedIntegratorStep)(C, fmi2Boolean final, fmi2Boolean *event,
                                                     fmi2Boolean *terminate)
@@ -309,8 +301,7 @@ EXPORT fmi2Status FMI2(fmi2CompletedIntegratorStep)(C, fmi2Boolean final, fmi2Bo
 
 EXPORT fmi2Status FMI2(fmi2SetTime)(C, fmi2Real t)
 {
-    go_to(c, t);
-    return fmi2OK;
+    return status(set_time(c, t));
 }
 
 EXPORT fmi2Status FMI2(fmi2SetContinuousStates)(C, const fmi2Real x[], size_t n)

@@ -457,14 +457,7 @@ EXPORT fmi3Status FMI3(fmi3ActivateModelPartition)(C, fmi3ValueReference clock, 
 }
 
 /* ---------------------------------------------------------------- Model Exchange */
-EXPORT fmi3Status FMI3(fmi3EnterEventMode)(C)
-{
-    instance *it = c;
-    if (!it->now.exchange)
-        return unsupported(c, "fmi3EnterEventMode for Co-Simulation");
-    it->now.mode = EVENTS;
-    return fmi3OK;
-}
+EXPORT fmi3Status FMI3(fmi3EnterEventMode)(C) { return status(enter(c, EVENTS, true)); }
 
 EXPORT fmi3Status FMI3(fmi3EvaluateDiscreteStates)(C)
 {
@@ -490,8 +483,7 @@ EXPORT fmi3Status FMI3(fmi3UpdateDiscreteStates)(C, fmi3Boolean *again, fmi3Bool
 
 EXPORT fmi3Status FMI3(fmi3EnterContinuousTimeMode)(C)
 {
-    ((instance *)c)->now.mode = CONTINUOUS;
-    return fmi3OK;
+    return status(enter(c, CONTINUOUS, true));
 }
 
 EXPORT fmi3Status FMI3(fmi3CompletedIntegratorStep)(C, fmi3Boolean final, fmi3Boolean *event,
@@ -505,8 +497,7 @@ EXPORT fmi3Status FMI3(fmi3CompletedIntegratorStep)(C, fmi3Boolean final, fmi3Bo
 
 EXPORT fmi3Status FMI3(fmi3SetTime)(C, fmi3Float64 t)
 {
-    go_to(c, t);
-    return fmi3OK;
+    return status(set_time(c, t));
 }
 
 EXPORT fmi3Status FMI3(fmi3SetContinuousStates)(C, const fmi3Float64 x[], size_t n)
@@ -549,11 +540,7 @@ EXPORT fmi3Status FMI3(fmi3GetNumberOfContinuousStates)(C, size_t *n)
 }
 
 /* ---------------------------------------------------------------- Co-Simulation */
-EXPORT fmi3Status FMI3(fmi3EnterStepMode)(C)
-{
-    ((instance *)c)->now.mode = STEPPING;
-    return fmi3OK;
-}
+EXPORT fmi3Status FMI3(fmi3EnterStepMode)(C) { return status(enter(c, STEPPING, false)); }
 
 EXPORT fmi3Status FMI3(fmi3GetOutputDerivatives)(C, REFERENCES, const fmi3Int32 orders[],
                                                  fmi3Float64 values[], size_t count)

@@ -199,6 +199,25 @@ static bool set_count(instance *it, uint32_t reference, int64_t value)
 }
 
 /* ---------------------------------------------------------------- running */
+static bool enter(instance *it, enum mode mode, bool exchange)
+{
+    enum mode from = it->now.mode;
+    if (it->now.exchange != exchange)
+        return failed(it, "this is not a function of %s", exchange ? "Co-Simulation" : "Model Exchange");
+    if (from != EVENTS && from != CONTINUOUS && from != STEPPING)
+        return failed(it, "not before the initialization has ended, nor after an error");
+    it->now.mode = mode;
+    return true;
+}
+
+static bool set_time(instance *it, double t)
+{
+    if (!it->now.exchange || !isfinite(t))
+        return failed(it, "the time cannot be set to %g s here", t);
+    go_to(it, t);
+    return true;
+}
+
 static bool stopped(instance *it, int64_t code)
 {
     it->now.mode = FAILED;
@@ -228,6 +247,7 @@ static bool step(instance *it, double t, double h)
         block[SAMPLE_INPUTS + 2 * k].f = it->now.input[k];
         block[SAMPLE_INPUTS + 2 * k + 1].f = end;
         it->now.input[k] = end;
+        it->now.rate[k] = 0.0;
         it->now.ends[k] = false;
     }
     block[SAMPLE_RESUMED].i = 0;
@@ -248,6 +268,8 @@ static bool step(instance *it, double t, double h)
 
 static bool set_states(instance *it, const double *x, size_t count)
 {
+    if (!it->now.exchange)
+        return failed(it, "in Co-Simulation the FMU integrates its states");
     if (count != STATES)
         return failed(it, "there are %d continuous states, not %d", STATES, (int)count);
     for (int k = 0; k < STATES; k++)
