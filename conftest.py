@@ -25,6 +25,11 @@ collect_ignore += [
         "rumoca": ["tests/exporters/rumoca_runs.py", "tests/foreign/check_export_modelica.py"],
         "pymoca": ["tests/foreign/check_export_modelica.py"],
         "blark": ["tests/foreign/check_export_st.py"],
+        "fmpy": [
+            "tests/exporters/fmus.py",
+            "tests/exporters/test_fmus_run_in_fmpy.py",
+            "tests/foreign/check_export_fmu.py",
+        ],
     }.items()
     if not importlib.util.find_spec(name)
     for path in paths
