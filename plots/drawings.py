@@ -121,11 +121,11 @@ class PlantUMLText(str):
 
 
 class TikzText(str):
-    """A TikZ picture as text.
+    r"""A TikZ picture as text.
 
     Examples
     --------
-    >>> TikzText("\\\\begin{tikzpicture}")
+    >>> TikzText(r"\begin{tikzpicture}")
     <TikZ text of 19 characters>
     """
 

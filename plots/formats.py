@@ -274,9 +274,8 @@ def listed(*subjects: Subject) -> str:
     --------
     >>> listed("figure")
     '.png, .svg, .pdf or .pgf'
-    >>> listed("graph", "chart")
-    '.svg, .png, .pdf for a picture or .dot, .gv for DOT text or .mmd for Mermaid text or .puml for \
-PlantUML text or .tikz for TikZ text'
+    >>> listed("chart")
+    '.mmd for Mermaid text or .puml for PlantUML text or .tikz for TikZ text'
     """
     kinds: dict[str, list[str]] = {}
     for each in of(*subjects):

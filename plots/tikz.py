@@ -70,7 +70,9 @@ def tikz(chart: Chart) -> str:
     checked_kind("chart", chart, Chart, "a Chart, of a model its .chart")
     write, names = Writer(chart, "stateflow"), [state.name for state in chart.states]
     contents = {
-        state.name: [f"{kind}: {text}" for kind, texts in state_texts(write, state) for text in texts]
+        state.name: [
+            f"{kind}: {text}" for kind, texts in state_texts(write, state) for text in texts
+        ]
         for state in chart.states
     }
     labels = _labels(chart, write)

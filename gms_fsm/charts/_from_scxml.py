@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -66,7 +67,7 @@ def load(path: Path, texts: Mapping[str, Any]) -> Chart:
     rows = [row for state in states for row in _rows(state, here)]
     rows = _named(_ordered(rows, here))
     edges = _edges(rows)
-    found = _own_texts(root, here)
+    found = _own_texts(root)
     found["guards"] = {
         row.name: row.guard if row.guard is not None else _read_back(row.cond)
         for row in rows
@@ -93,7 +94,7 @@ def load(path: Path, texts: Mapping[str, Any]) -> Chart:
 class _Plain(ET.TreeBuilder):
     """Refuses definitions of entities, which can make a small file huge."""
 
-    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+    def doctype(self, name: str, *_: str | None) -> None:
         """Refuse it."""
         raise ChartError(
             f"it has a document type definition ({name})", advice="leave <!DOCTYPE ...> out"
@@ -113,9 +114,7 @@ def _root(path: Path, here: str) -> ET.Element:
     except ChartError as error:
         raise error.replaced(place=here) from None
     if _tag(root) != "scxml":
-        raise ChartError(
-            f"its root is <{_tag(root)}>, not <scxml xmlns={SCXML!r}>", place=here
-        )
+        raise ChartError(f"its root is <{_tag(root)}>, not <scxml xmlns={SCXML!r}>", place=here)
     return root
 
 
@@ -246,7 +245,7 @@ def _ordered(rows: list[Row], here: str) -> list[Row]:
     """Return the rows in the chart's own order, if the document keeps it."""
     if any(row.order is None for row in rows):
         return rows
-    for before, after in zip(rows, rows[1:], strict=False):
+    for before, after in itertools.pairwise(rows):
         if before.source == after.source and before.order >= after.order:  # type: ignore[operator]
             raise ChartError(
                 f"{after.name!r} stands after {before.name!r}, but gms:order says otherwise",
@@ -308,7 +307,7 @@ def _pairs(parent: ET.Element, tag: str) -> dict[str, str]:
     }
 
 
-def _own_texts(root: ET.Element, here: str) -> dict[str, Any]:
+def _own_texts(root: ET.Element) -> dict[str, Any]:
     """Return what a document of ours says of the whole chart."""
     own = root.find(f"{{{OURS}}}chart")
     if own is None:
@@ -329,9 +328,7 @@ def _own_texts(root: ET.Element, here: str) -> dict[str, Any]:
         "inputs": quantities["input"],
         "velocities": quantities["velocity"],
         "variables": quantities["variable"],
-        "parameters": [
-            each["name"] if [*each] == ["name"] else each for each in parameters
-        ],
+        "parameters": [each["name"] if [*each] == ["name"] else each for each in parameters],
         "let": _pairs(own, "let"),
         "outputs": _pairs(own, "force"),
         "contact_outputs": _pairs(own, "total"),

@@ -144,7 +144,7 @@ def _edge(trigger: str, event: Any) -> Edge:
             place=place,
             advice="give each edge a trigger of its own, which is its name in the chart",
         )
-    return Edge(trigger, sources, *targets, place)
+    return Edge(trigger, sources, targets.pop(), place)
 
 
 def _no_callbacks(given: list[Any], kind: str, place: str, advice: str) -> None:

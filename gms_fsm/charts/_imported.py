@@ -156,7 +156,9 @@ def built(states: list[str], edges: list[Edge], given: Texts, here: str) -> Char
             for name in states
         ),
         tuple(
-            Transition(edge.name, edge.sources, edge.target, guards[edge.name], actions.get(edge.name))
+            Transition(
+                edge.name, edge.sources, edge.target, guards[edge.name], actions.get(edge.name)
+            )
             for edge in edges
         ),
         given.outputs,

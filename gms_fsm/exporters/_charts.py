@@ -73,8 +73,8 @@ def check_moved_from_outside(chart: Chart, known: Iterable[str], title: str) -> 
                     advice="export a whole system, for example as c99",
                 )
             texts.append((place, tree, set()))
-    for place, tree, allowed in texts:
-        for name in sorted((names_in(tree) & late) - allowed):
+    for place, text, allowed in texts:
+        for name in sorted((names_in(text) & late) - allowed):
             what = "an acceleration" if name in chart.rate_names else "a force of the contact"
             raise ParameterError(
                 f"it reads {name!r}, {what}, which {title} does not have",
@@ -111,13 +111,13 @@ def slow_velocity(contact: Contact) -> str:
 
 def _is_slow(contact: Contact, velocity: str) -> bool:
     body = Body("body", velocity="v")
-    system = System("prescribed velocity", bodies=(body,), contacts=(contact,), signals={"v": velocity})
+    system = System(
+        "prescribed velocity", bodies=(body,), contacts=(contact,), signals={"v": velocity}
+    )
     times = np.linspace(0.0, PERIOD / 4.0, 500)
     forces = []
     for step in (STEP, STEP / 2.0):
-        settings = Settings(
-            method="euler", step=step, events="step", engine="ifelse", t_eval=times
-        )
+        settings = Settings(method="euler", step=step, events="step", engine="ifelse", t_eval=times)
         try:
             forces.append(simulate(system, PERIOD / 4.0, settings=settings).F)
         except GMSError:  # not finite, or switching without end

@@ -28,12 +28,13 @@ from gms_fsm.systems.system import Contact
 
 __all__: list[str] = []
 
-WORDS = frozenset(
-    "await break case catch class const continue debugger default delete do else enum export "
-    "extends false finally for function if implements import in instanceof interface let new null "
-    "package private protected public return static super switch this throw true try typeof "
-    "undefined var void while with yield Infinity NaN Math In".split()
-)
+ECMASCRIPT_WORDS = """
+await break case catch class const continue debugger default delete do else enum export extends
+false finally for function if implements import in instanceof interface let new null package private
+protected public return static super switch this throw true try typeof undefined var void while with
+yield Infinity NaN Math In
+"""
+WORDS = frozenset(ECMASCRIPT_WORDS.split())
 # What the package python-statemachine keeps for itself: there a condition cannot read these.
 KEPT = ("event_data", "machine", "event", "model", "transition", "state", "source", "target")
 Pairs = Mapping[str, str]
@@ -127,8 +128,8 @@ def _own_parts(root: ET.Element, chart: Chart) -> None:
     for each in chart.parameters:
         plain = vars(Parameter(each.name))
         told = {key: value for key, value in vars(each).items() if value != plain[key]}
-        text = {key: str(value).lower() if value is False else value for key, value in told.items()}
-        ET.SubElement(own, "gms:parameter", {"name": each.name, **text})
+        fields = {key: "false" if value is False else str(value) for key, value in told.items()}
+        ET.SubElement(own, "gms:parameter", {"name": each.name, **fields})
     for tag, texts in (
         ("let", chart.let),
         ("force", chart.outputs),

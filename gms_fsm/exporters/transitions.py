@@ -117,7 +117,7 @@ def _filled(texts: Mapping[str, Mapping[str, str]]) -> dict[str, dict[str, str]]
     return {name: dict(each) for name, each in texts.items() if each}
 
 
-def _numbers(chart: Chart, contact: Contact | None) -> dict[str, Any]:
+def _numbers(contact: Contact | None) -> dict[str, Any]:
     """Return the numbers of the elements, and of what they share."""
     if contact is None:
         return {"VALUES": None, "WEIGHTS": None}
@@ -146,7 +146,7 @@ def _program(chart: Chart, contact: Contact | None) -> Iterator[str]:
         yield f"# The numbers of each element: fill them in, for example ({asked!r},)"
     else:
         yield "# The numbers of each element, and of what they share."
-    for name, value in _numbers(chart, contact).items():
+    for name, value in _numbers(contact).items():
         yield _assigned(name, value)
     yield from ("", "")
     yield from _element(chart, contact)

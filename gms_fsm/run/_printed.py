@@ -81,11 +81,11 @@ def _components(start: Start) -> list[tuple[str, int, int]]:
     return [each for _, each in sorted(found.items())]
 
 
-HEAD = '''\
+HEAD = """\
 # A demonstration: python THIS_FILE.py [end in s [number of steps]]. The guards are evaluated once a
 # step, at most one edge is taken for each element, and the flow is integrated by Euler's method;
 # gms-fsm itself locates the switches.
-'''
+"""
 LOOP = '''\
 def _run(t_end, steps):
     """Return the switches, the last time, the last state, and how large its numbers became."""
@@ -169,7 +169,7 @@ def _main():
         if not _agree(before, found):
             said = "; half as many steps give another result: take more steps, or an earlier end"
     if found is None:
-        sys.exit(f"{steps} steps to t = {t_end!r} s: not finite; take more steps, or an earlier end")
+        sys.exit(f"not finite: take more than {steps} steps to t = {t_end!r} s, or an earlier end")
     switches, t, y, size = found
     for at, i, edge in switches:
         name, target = given["edges"][edge]

@@ -13,6 +13,7 @@ from gms_fsm.charts import CHARTS
 from gms_fsm.errors import OutputError
 from tests.random_charts import charts
 
+
 @pytest.mark.slow
 @given(chart=charts())
 @settings(max_examples=60, deadline=None)

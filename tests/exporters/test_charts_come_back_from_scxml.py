@@ -110,7 +110,7 @@ def test_texts_beside_go_before_those_of_the_document(tmp_path: Path) -> None:
 
 def test_one_event_for_one_edge_that_leaves_several_states(tmp_path: Path) -> None:
     text = FOREIGN.replace(
-        "<transition target=\"slip\"/>", '<transition event="stop" cond="v &lt; 9" target="stick"/>'
+        '<transition target="slip"/>', '<transition event="stop" cond="v &lt; 9" target="stick"/>'
     ).replace("</onentry>", '</onentry><transition event="stop" cond="v &lt; 9" target="stick"/>')
     chart = read(text, tmp_path)
     found = {edge.name: edge.sources for edge in chart.transitions}
@@ -130,7 +130,11 @@ def changed(folder: Path, old: str, new: str) -> Path:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('cond="v &lt; 0.0"', 'cond="v &lt; 1.0"', "transition arrest_forward: cond is 'v < 1.0', but"),
+        (
+            'cond="v &lt; 0.0"',
+            'cond="v &lt; 1.0"',
+            "transition arrest_forward: cond is 'v < 1.0', but",
+        ),
         ('cond="v &lt; 0.0" ', "", "cond is None, but gms:guard beside it means 'v < 0.0'"),
         ('expr="-(F_c', 'expr="(F_c', "transition arrest_backward: expr of 'z' is"),
         ('expr="f / (1', 'expr="f / (2', "state 'stick', onentry: expr of 'f' is"),

@@ -106,7 +106,9 @@ def test_states_of_an_enumeration_and_wildcards() -> None:
         slip = 2
 
     machine = Machine(
-        states=Own, initial=Own.stick, transitions=[["slips", "*", Own.slip], ["sticks", Own.slip, Own.stick]]
+        states=Own,
+        initial=Own.stick,
+        transitions=[["slips", "*", Own.slip], ["sticks", Own.slip, Own.stick]],
     )
     chart = Chart.from_transitions(machine, **TEXTS)
     assert chart.transitions[0].sources == ("stick", "slip")
@@ -141,7 +143,10 @@ class Watching:
     ("machine", "said"),
     [
         ("a machine", "machine is 'a machine'; it must be a transitions.Machine"),
-        (HierarchicalMachine(states=["a"], initial="a"), "a HierarchicalMachine has no counterpart"),
+        (
+            HierarchicalMachine(states=["a"], initial="a"),
+            "a HierarchicalMachine has no counterpart",
+        ),
         (AsyncMachine(states=["a"], initial="a"), "an? AsyncMachine has no counterpart"),
         (small(queued=True), "queued=True has no counterpart"),
         (small(before_state_change=print), "its callback before_state_change 'print'"),

@@ -57,7 +57,9 @@ def log_of(trace: Any) -> list[Any]:
 @pytest.mark.parametrize(
     "name",
     [
-        name if name in ("gms-signed", "seven-parameter") else pytest.param(name, marks=pytest.mark.slow)
+        name
+        if name in ("gms-signed", "seven-parameter")
+        else pytest.param(name, marks=pytest.mark.slow)
         for name in MODELS
     ],
 )
@@ -174,9 +176,7 @@ def test_a_chart_without_numbers_asks_for_them(tmp_path: Path) -> None:
     assert "no numbers: fill in VALUES, one mapping for each element" in done.stderr
     file = imported(path)
     values = [{"k": 1.0, "sigma": 0.0, "C": 0.1, "v_c": 1e-6}]
-    rows = list(
-        file.run(lambda t: {"v": 1.0, "s": 0.5}, 1.0, 0.01, values=values)
-    )
+    rows = list(file.run(lambda t: {"v": 1.0, "s": 0.5}, 1.0, 0.01, values=values))
     assert rows[-1][3] == ["slip"]
 
 
@@ -210,9 +210,7 @@ def chart(**parts: Any) -> Chart:
             "edge 'go': action 'v': it sets the velocity",
         ),
         (
-            chart(
-                variables=("z",), transitions=(Transition("go", "a", "b", "v < 1", {"z": "F"}),)
-            ),
+            chart(variables=("z",), transitions=(Transition("go", "a", "b", "v < 1", {"z": "F"}),)),
             "edge 'go': action 'z': it reads 'F', a force",
         ),
         (
