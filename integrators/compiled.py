@@ -48,6 +48,7 @@ from integrators.stepping import Sample
 from integrators.steps import Coefficients
 
 __all__ = [
+    "INLINE",
     "Engine",
     "Run",
     "Step",
@@ -57,6 +58,7 @@ __all__ = [
     "edition",
     "engine",
     "example",
+    "is_known",
     "observer",
     "stepper",
 ]
@@ -278,7 +280,19 @@ class Engine:
         return result
 
 
-def _is_known(part: Any) -> bool:
+def is_known(part: Any) -> bool:
+    """Return whether a part of some arguments takes no room in a block.
+
+    Parameters
+    ----------
+    part : object
+        A function, a named tuple, a list ...
+
+    Returns
+    -------
+    bool
+        True for functions and the coefficients of a method, which are known while translating.
+    """
     return callable(part) or isinstance(part, Coefficients)
 
 
@@ -292,7 +306,7 @@ def _made(
     notify: Callable[[str], None],
 ) -> Engine:
     """Return an engine from the store, or compile it."""
-    layout = Layout(arguments, _is_known, inside=_longest(arguments) <= LONGEST_INSIDE)
+    layout = Layout(arguments, is_known, inside=_longest(arguments) <= LONGEST_INSIDE)
     library = _library(text, function, arguments, layout, extra, store, notify)
     return Engine(layout, library, calls, len(extra))
 
@@ -310,7 +324,7 @@ def _library(
 ) -> Library:
     """Return machine code from the store, or compile it."""
     # Which of the functions in the text are called, and the coefficients.
-    fixed = [getattr(part, "__name__", part) for part in _parts(arguments) if _is_known(part)]
+    fixed = [getattr(part, "__name__", part) for part in _parts(arguments) if is_known(part)]
     what = edition(), function.__name__, text, layout.key(), fixed, target_name()
     name = f"{function.__name__}-{hashlib.sha256(repr(what).encode()).hexdigest()[:24]}"
     content = None if store is None else store.get(name)
@@ -332,7 +346,7 @@ def _library(
 
 def _parts(record: Any) -> list[Any]:
     """Return the parts of named tuples that are no named tuples, except known ones."""
-    if isinstance(record, tuple) and not _is_known(record):
+    if isinstance(record, tuple) and not is_known(record):
         return [part for each in record for part in _parts(each)]
     return [record]
 
@@ -421,7 +435,7 @@ def stepper(
         ``one(address)`` returns what `step_to` returns; ``each(address, count)`` calls it for many
         blocks, one after the other in memory, and returns the sum of what it returns.
     """
-    layout = Layout(arguments, _is_known)
+    layout = Layout(arguments, is_known)
     step_to = stepping.step_to
     return Stepper(layout, _library(text, step_to, arguments, layout, (), store, notify, each=True))
 

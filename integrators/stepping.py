@@ -6,15 +6,17 @@ restarted. So the results are those of a run over the same samples as a record, 
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
-from integrators.advance import NEXT_KNOT, STEPS
+from integrators.advance import NEXT_KNOT, STEPS, Plan
 from integrators.loop import (
     ARC,
     ASK,
     EDGE,
     FIRED,
     FIRING,
+    JUMP,
     MACHINE,
     PAUSED,
     PHASE,
@@ -28,9 +30,20 @@ from integrators.loop import (
     run_to_event,
 )
 from integrators.sliding import Functions, Held, flow_on, look, margins_on
+from integrators.step_size import INFINITY
 from integrators.steps import LATEST, PAUSE, Motion, T, Vector
 
-__all__ = ["CODE", "FULL_LOG", "MEAN", "RESUMED", "SWITCHES", "Sample", "step_to"]
+__all__ = [
+    "CODE",
+    "FULL_LOG",
+    "MEAN",
+    "RESUMED",
+    "SWITCHES",
+    "Clocks",
+    "Sample",
+    "next_tick",
+    "step_to",
+]
 
 FULL_LOG = 21  # the log is full: empty it, and call again
 # Indices into Sample.counts: switches in the log; whether this call continues one that returned
@@ -38,11 +51,19 @@ FULL_LOG = 21  # the log is full: empty it, and call again
 SWITCHES, RESUMED, MEAN, CODE = range(4)
 
 
+class Clocks(NamedTuple):
+    """What ticks: samplers, then discrete machines, each with its bit."""
+
+    start: Vector  # of each its first tick
+    period: Vector
+    made: list[int]  # ticks in the plan, or past
+
+
 class Sample(NamedTuple):
     """What a call is given, and what it finds."""
 
     end: Vector  # [time]
-    inputs: list[Vector]  # of each input its value at the start and at the end
+    inputs: list[Vector]  # of each input its value at the start and at the end; never empty
     counts: list[int]  # see the indices above
     wanted: list[int]  # [place of the force among the observed values]
     force: Vector  # [at the end, integral over the sample]
@@ -53,6 +74,7 @@ class Sample(NamedTuple):
     before: Vector  # scratch space: the state at the start of a step
     middle: Vector  # ... and in its middle
     slope: Vector
+    clocks: Clocks
 
 
 def step_to(functions: Functions, machines: Machines, b: Buffers, sample: Sample) -> int:
@@ -85,6 +107,9 @@ def step_to(functions: Functions, machines: Machines, b: Buffers, sample: Sample
         for j in range(len(now.y)):
             sample.before[j] = now.y[j]
         event = run_to_event(functions, machines, motion, b, 1)
+        if len(b.plan.jumps) > 0 and b.plan.jumps[1] <= clock[T]:
+            next_tick(b.plan, sample.clocks)
+            counts[JUMP] = 0
         if done[MEAN] > 0 and clock[T] > t:
             impulse = _impulse(machines, motion, b, sample, t)
             sample.force[1] += impulse
@@ -105,12 +130,39 @@ def step_to(functions: Functions, machines: Machines, b: Buffers, sample: Sample
     return 0
 
 
+def next_tick(plan: Plan, clocks: Clocks) -> None:
+    """Put a further tick into the plan, which has two: the last one, and the next one.
+
+    Parameters
+    ----------
+    plan : Plan
+        Its jumps are these ticks.
+    clocks : Clocks
+        What ticks, at least one.
+    """
+    plan.jumps[0] = plan.jumps[1]
+    plan.ticks[0] = plan.ticks[1]
+    t = INFINITY
+    for i in range(len(clocks.period)):
+        t = min(t, clocks.start[i] + clocks.made[i] * clocks.period[i])
+    bits = 0
+    for i in range(len(clocks.period)):
+        if clocks.start[i] + clocks.made[i] * clocks.period[i] <= t:
+            bits |= 1 << i
+            clocks.made[i] += 1
+    plan.jumps[1] = t
+    plan.ticks[1] = bits
+    # A step that ends on a jump would see the value after it: stop one clock tick before.
+    plan.before_jumps[0] = plan.before_jumps[1]
+    plan.before_jumps[1] = math.nextafter(t, -INFINITY)
+
+
 def _begin(functions: Functions, b: Buffers, sample: Sample) -> None:
     """Write the straight lines; where an input jumps, guards are asked again."""
     clock, counts, end = b.now.clock, b.memory.counts, sample.end[0]
     _shared, _own, tables = functions.p
     first = 1 if clock[T] >= end else 0  # of a sample without length only its end matters
-    for k in range(len(sample.inputs)):
+    for k in range(len(tables) // 2):
         times, values, given = tables[2 * k], tables[2 * k + 1], sample.inputs[k]
         if values[1] != given[first] and counts[PHASE] != START:
             counts[PHASE] = ASK

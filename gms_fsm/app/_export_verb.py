@@ -89,5 +89,5 @@ def _given(
         return own.system, own.path.stem, {}
     run = load_scenario(own.path).arguments
     used = {each: run[each] for each in SETTINGS if each in run}
-    more = {"settings": Settings(**used), "t_start": run["t_start"], "initial": run["initial"]}
+    more = {"settings": Settings(**used), "t_start": run["t_start"], "initial": run.get("initial")}
     return own.system, own.path.stem, more

@@ -23,10 +23,12 @@ from numpy.typing import ArrayLike
 from gms_fsm.charts.parameters import STRIBECK, FloatArray, checked_values
 from gms_fsm.language import Value, parse_value, values_of
 
-__all__ = ["Stribeck", "stribeck_text"]
+__all__ = ["Stribeck", "dip_of", "flat_of", "stribeck_text"]
 
 DIP_WIDTH = 6.1  # in v_s: beyond this exp(-(v/v_s)**2) is below 1e-16 and the curve is flat
 GAUSSIAN = 2.0  # the exponent of eq. (2)
+FINEST = 2.0**55  # its inverse is a quarter of the last bit of 1
+INFINITY = math.inf
 
 
 def stribeck_text(
@@ -139,22 +141,72 @@ class Stribeck:
     @property
     def dip(self) -> float:
         """Speed [m/s] beyond which the curve is flat; integrators stop at +dip and -dip."""
-        return float(DIP_WIDTH ** (GAUSSIAN / self.delta) * self.v_s)
+        return dip_of(self.v_s, self.delta)
 
     @property
     def flat(self) -> float:
-        """Speed [m/s] beyond which the curve is F_c to the last bit.
-
-        There the rest is less than a quarter of the distance from F_c to the next number.
-        """
-        share = (self.F_s - self.F_c) / self.F_c * 2.0**55
-        if not share < math.inf:
-            return math.inf
-        return float(math.log(max(share, 1.0)) ** (1.0 / self.delta) * self.v_s * (1.0 + 1e-9))
+        """Speed [m/s] beyond which the curve is F_c to the last bit."""
+        return flat_of(self.F_c, self.F_s, self.v_s, self.delta)
 
     def __call__(self, v: ArrayLike) -> FloatArray:
         """Return s(v) [N] for velocities v [m/s] of any shape, computed exactly as in a run."""
         return values_of(_tree(self.text), {"v": np.asarray(v, dtype=np.float64), **self.numbers})
+
+
+# These two are functions of numbers, so that exports can translate them.
+def dip_of(v_s: float, delta: float) -> float:
+    """Return the speed beyond which a curve is flat, `Stribeck.dip`.
+
+    Parameters
+    ----------
+    v_s : float
+        Stribeck velocity, m/s.
+    delta : float
+        Exponent.
+
+    Returns
+    -------
+    float
+        m/s.
+
+    Examples
+    --------
+    >>> round(dip_of(1e-3, 2.0), 6)
+    0.0061
+    """
+    width: float = DIP_WIDTH ** (GAUSSIAN / delta)
+    return width * v_s
+
+
+def flat_of(F_c: float, F_s: float, v_s: float, delta: float) -> float:
+    """Return the speed beyond which a curve is F_c to the last bit, `Stribeck.flat`.
+
+    There the rest is less than a quarter of the distance from F_c to the next number.
+
+    Parameters
+    ----------
+    F_c, F_s : float
+        Coulomb friction and stiction, N.
+    v_s : float
+        Stribeck velocity, m/s.
+    delta : float
+        Exponent.
+
+    Returns
+    -------
+    float
+        m/s.
+
+    Examples
+    --------
+    >>> round(flat_of(0.4, 1.5, 1e-3, 2.0), 6)
+    0.006256
+    """
+    share = (F_s - F_c) / F_c * FINEST
+    if not share < INFINITY:
+        return INFINITY
+    width: float = math.log(max(share, 1.0)) ** (1.0 / delta)
+    return width * v_s * (1.0 + 1e-9)
 
 
 @functools.cache

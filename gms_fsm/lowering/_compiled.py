@@ -103,9 +103,15 @@ def engine(program: Program, run: Run) -> Engine:
     -------
     Engine
         To be called with a block.
+
+    Raises
+    ------
+    MissingExtraError
+        If llvmlite is not installed.
     """
     from integrators import compiled
 
+    check_llvmlite()
     with _lock:
         return compiled.engine(text_of(program), run, _calls(program), store(), notify)
 
@@ -145,13 +151,7 @@ def functions(program: Program) -> Mapping[str, Any]:
     -------
     mapping of str to callable
         By name. Signals that are Python functions have been replaced by their numbers.
-
-    Raises
-    ------
-    MissingExtraError
-        If llvmlite is not installed.
     """
-    check_llvmlite()
     return _loaded(program.source, tuple(program.callables))
 
 
@@ -283,6 +283,7 @@ _observers: dict[int, Prepared] = {}
 def _observer(program: Program) -> Prepared:
     from integrators import compiled
 
+    check_llvmlite()
     layout, key = program.layout, id(program.functions)
     with _lock:
         if key in _observers:

@@ -13,16 +13,26 @@ from numpy.typing import NDArray
 from gms_fsm.lowering import _compiled as compiled
 from gms_fsm.lowering.program import equations
 from gms_fsm.run.machines import IfElse
-from gms_fsm.run.start import Start
+from gms_fsm.run.start import Start, clocks_of
+from gms_fsm.systems.signals import Corners
 from integrators import hybrid
 from integrators.loop import Buffers, Machines
 from integrators.sliding import Functions
-from integrators.stepping import Sample, step_to
+from integrators.stepping import Clocks, Sample, next_tick, step_to
 
 if TYPE_CHECKING:
     from integrators.compiled import Stepper as MachineCode
 
-__all__ = ["Machine", "Plain", "Stepper", "fast", "machine_code", "state_of"]
+__all__ = [
+    "Machine",
+    "Plain",
+    "Stepper",
+    "arguments_of",
+    "fast",
+    "machine_code",
+    "prepared",
+    "state_of",
+]
 
 MOST_SWITCHES = 64  # in the log of a sample; when it is full, it is emptied and the sample goes on
 
@@ -92,8 +102,7 @@ class Plain:
         self.functions = made.functions(located=True)
         observe = program.ieee["observe"]
         self.machines = Machines(switch.ask, switch.act, switch.tick, observe)
-        self.buffers = _buffers(start)
-        self.sample = _sample(start)
+        self.buffers, self.sample = prepared(start)
         _, _, self.tables = self.functions.p
         self._kept = self._before = self.copy()
 
@@ -130,32 +139,53 @@ class Plain:
         return {**state_of(self), **sample}
 
 
-def _buffers(start: Start) -> Buffers:
-    """Return the buffers of a run without an end, whose only knot is the end of the sample."""
-    made = equations(start.program)
+def prepared(start: Start) -> tuple[Buffers, Sample]:
+    """Return the buffers of a run without an end, and its first sample.
+
+    Parameters
+    ----------
+    start : Start
+        The system, with its inputs as corner tables.
+
+    Returns
+    -------
+    (Buffers, Sample)
+        Made of lists. The only knot is the end of the sample; what ticks goes on forever.
+    """
+    program, layout = start.program, start.program.layout
+    made, size = equations(program), layout.y.size
     b = hybrid.buffers(
         made, start.t_start, start.y, start.mode, math.inf, start.options, capacity=1
     )
-    return b._replace(plan=b.plan._replace(jumps=[], before_jumps=[], ticks=[], knots=[0.0]))
-
-
-def _sample(start: Start) -> Sample:
-    program, size = start.program, start.program.layout.y.size
-    (bank,), observed = program.layout.banks, program.layout.observed
-    return Sample(
+    ticking = clocks_of(start.system)
+    clocks = Clocks(
+        start=[start.t_start + offset for _, _, offset in ticking],
+        period=[period for _, period, _ in ticking],
+        made=[0 for _ in ticking],
+    )
+    two = [0.0] * 2 if ticking else []
+    plan = b.plan._replace(
+        jumps=[*two], before_jumps=[*two], ticks=[0] * len(two), knots=[start.t_start]
+    )
+    for _ in two:
+        next_tick(plan, clocks)
+    lines = [each for each in start.system.signals.values() if isinstance(each, Corners)]
+    sample = Sample(
         end=[start.t_start],
-        inputs=[[0.0, 0.0] for _ in start.system.signals],
+        inputs=[[0.0, 0.0] for _ in lines or (None,)],
         counts=[0, 0, 0, 0],
-        wanted=[observed.index(bank.of("F"))],
+        wanted=[layout.observed.index(layout.banks[0].of("F"))],
         force=[0.0, 0.0],
-        seen=[0.0] * observed.size,
+        seen=[0.0] * layout.observed.size,
         t=[0.0] * MOST_SWITCHES,
         machine=[0] * MOST_SWITCHES,
         edge=[0] * MOST_SWITCHES,
         before=[0.0] * size,
         middle=[0.0] * size,
         slope=[0.0] * size,
+        clocks=clocks,
     )
+    return b._replace(plan=plan), sample
 
 
 # --------------------------------------------------------------------------- machine code
@@ -181,7 +211,7 @@ class Machine:
         from integrators.machine_code.layout import Block
 
         self.code = machine_code(start)
-        arguments = _arguments(start)
+        arguments = arguments_of(start)
         self.block = Block(self.code.layout, arguments, words=None if memory is None else memory[0])
         self.block.update(self.block.contents)  # numbers; there are no columns
         contents = self.block.contents
@@ -236,9 +266,15 @@ def machine_code(start: Start) -> MachineCode:
     -------
     integrators.compiled.Stepper
         The same one for systems that differ in numbers only.
+
+    Raises
+    ------
+    MissingExtraError
+        If llvmlite is not installed.
     """
     from integrators import compiled as machine
 
+    compiled.check_llvmlite()
     program = start.program
     key = id(program.functions)
     made = _known.get(key, (None, None))[0]
@@ -246,14 +282,25 @@ def machine_code(start: Start) -> MachineCode:
         if len(_known) >= compiled.MOST_ENGINES:
             _known.clear()
         made = machine.stepper(
-            compiled.text_of(program), _arguments(start), compiled.store(), compiled.notify
+            compiled.text_of(program), arguments_of(start), compiled.store(), compiled.notify
         )
         _known[key] = made, program.functions  # kept, so that their `id` stays theirs
     return made
 
 
-def _arguments(start: Start) -> Any:
-    """Return the arguments of `integrators.stepping.step_to`, made of lists."""
+def arguments_of(start: Start) -> Any:
+    """Return the arguments of `integrators.stepping.step_to`, made of lists.
+
+    Parameters
+    ----------
+    start : Start
+        The system, with its inputs as corner tables.
+
+    Returns
+    -------
+    integrators.compiled.Step
+        An example for `integrators.machine_code.layout.Layout`.
+    """
     from integrators.compiled import Step
 
     made = compiled.functions(start.program)
@@ -261,6 +308,5 @@ def _arguments(start: Start) -> Any:
     return Step(
         Functions(made["flow"], made["arm"], made["margins"], made["normal"], p),
         Machines(made["switch"], made["act"], made["tick"], made["observe"]),
-        _buffers(start),
-        _sample(start),
+        *prepared(start),
     )

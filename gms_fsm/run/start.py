@@ -31,7 +31,7 @@ from gms_fsm.traces.scope import GuardValues, parameter_values
 from gms_fsm.traces.trace import Trace
 from integrators import Options
 
-__all__ = ["Start"]
+__all__ = ["Start", "clocks_of"]
 
 LATEST = 1e9  # s; one tick of a double is then 1e-7 s
 
@@ -361,10 +361,8 @@ def _ticks(system: System, origin: float, t_start: float, t_end: float) -> dict[
 
     Ticks are counted from the origin, which is earlier than t_start if the run continues another.
     """
-    clocks = [(each.name, each.period, each.offset) for each in system.sampled]
-    clocks += [(each.name, each.period, 0.0) for each in system.contacts if each.period is not None]
     found: dict[float, int] = {}
-    for bit, (name, period, offset) in enumerate(clocks):
+    for bit, (name, period, offset) in enumerate(clocks_of(system)):
         count = math.ceil((t_end - origin - offset) / period)
         first = max(0, math.floor((t_start - origin - offset) / period) - 1)
         if count - first > MOST_TICKS:
@@ -379,6 +377,24 @@ def _ticks(system: System, origin: float, t_start: float, t_end: float) -> dict[
         for time in times[begun & (times < t_end)].tolist():
             found[time] = found.get(time, 0) | 1 << bit
     return dict(sorted(found.items()))
+
+
+def clocks_of(system: System) -> list[tuple[str, float, float]]:
+    """Return what ticks: the samplers, then the contacts with a period.
+
+    Parameters
+    ----------
+    system : System
+        What runs.
+
+    Returns
+    -------
+    list of (str, float, float)
+        Name, period and offset [s]; bit k of a tick stands for the k-th of them.
+    """
+    found = [(each.name, each.period, each.offset) for each in system.sampled]
+    found += [(each.name, each.period, 0.0) for each in system.contacts if each.period is not None]
+    return found
 
 
 def _covered(system: System, t_start: float, t_end: float) -> float:

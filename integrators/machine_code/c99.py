@@ -7,7 +7,7 @@ code, if the mathematical functions come from the same library.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from integrators.machine_code.tree import (
     Address,
@@ -37,6 +37,7 @@ from integrators.machine_code.tree import (
     Statement,
     Table,
     While,
+    parts_of,
 )
 
 __all__ = ["c99_text"]
@@ -46,22 +47,25 @@ HEAD = """\
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
-
-static inline double min_f(double a, double b) { return b < a ? b : a; }
-static inline double max_f(double a, double b) { return b > a ? b : a; }
-static inline int64_t min_i(int64_t a, int64_t b) { return b < a ? b : a; }
-static inline int64_t max_i(int64_t a, int64_t b) { return b > a ? b : a; }
-static inline int64_t abs_i(int64_t a) { return a < 0 ? -a : a; }
+"""
+HELPERS = {
+    "min_f": "static inline double min_f(double a, double b) { return b < a ? b : a; }",
+    "max_f": "static inline double max_f(double a, double b) { return b > a ? b : a; }",
+    "min_i": "static inline int64_t min_i(int64_t a, int64_t b) { return b < a ? b : a; }",
+    "max_i": "static inline int64_t max_i(int64_t a, int64_t b) { return b > a ? b : a; }",
+    "abs_i": "static inline int64_t abs_i(int64_t a) { return a < 0 ? -a : a; }",
+    "mod_i": """\
 static inline int64_t mod_i(int64_t a, int64_t b)
 {
     int64_t r = a % b;
     return r && (r ^ b) < 0 ? r + b : r;
-}
+}""",
+    "div_i": """\
 static inline int64_t div_i(int64_t a, int64_t b)
 {
     return a / b - (a % b && (a ^ b) < 0);
+}""",
 }
-"""
 # How tightly operators bind in C, for as few brackets as compilers accept without a warning.
 _BINDS = {
     "*": 9, "/": 9, "+": 8, "-": 8, "<": 6, "<=": 6, ">": 6, ">=": 6, "==": 5, "!=": 5,
@@ -69,18 +73,22 @@ _BINDS = {
 _UNARY, _WHOLE = 10, 11
 
 
-def c99_text(module: Module) -> str:
+def c99_text(module: Module, taken: Iterable[str] = (), *, hidden: bool = False) -> str:
     """Return a module as one C99 text.
 
     Parameters
     ----------
     module : Module
         From `integrators.machine_code.translate.Translator`.
+    taken : iterable of str
+        Names that the text must not define.
+    hidden : bool
+        Whether entries are static, too.
 
     Returns
     -------
     str
-        The text; entries are not static.
+        The text. It gives no warning with ``-Wall -Wextra -Wpedantic``.
 
     Examples
     --------
@@ -101,15 +109,18 @@ def c99_text(module: Module) -> str:
     }
     """
     kinds = sorted({f.results for f in module.functions if len(f.results) > 1})
-    parts = [HEAD, *map(_structure, kinds), *map(_table, module.tables)]
+    parts = [*map(_structure, kinds), *map(_table, module.tables)]
     if module.callbacks:
         parts.append(f"double (*callbacks[{module.callbacks}])(double);")
     results = {f.name: f.results for f in module.functions}
-    taken = {*RESERVED.split(), *(table.name for table in module.tables)}
-    functions = _Names(taken - {f.name for f in module.functions if f.entry})
-    taken |= {functions(f.name) for f in module.functions}
-    parts += [_Writer(f, results, functions, _Names(taken)).text() for f in module.functions]
-    return "\n".join(parts)
+    known = {*RESERVED.split(), *taken, *(table.name for table in module.tables)}
+    functions = _Names(known - {f.name for f in module.functions if f.entry})
+    known |= {functions(f.name) for f in module.functions}
+    writers = [_Writer(f, results, functions, _Names(known)) for f in module.functions]
+    parts += [each.text(static=hidden or not each.function.entry) for each in writers]
+    text = "\n".join(parts)
+    used = [each for name, each in HELPERS.items() if re.search(rf"\b{name}\b", text)]
+    return "\n".join([HEAD, *used, text])
 
 
 def _structure(kinds: str) -> str:
@@ -161,9 +172,25 @@ RESERVED = """
     auto bool break callbacks case char const continue default do double else enum extern false
     float for goto if inline int long register restrict return short signed sizeof static struct
     switch true typedef union unsigned void volatile while
-    acos asin asinh atan atan2 cos cosh exp fabs gamma j0 j1 jn log main pow sin sinh sqrt tan tanh
-    y0 y1 yn abs_i div_i max_f max_i min_f min_i mod_i
+    acos asin asinh atan atan2 cos cosh exp fabs gamma j0 j1 jn log main nextafter pow sin sinh sqrt
+    tan tanh y0 y1 yn abs_i div_i max_f max_i min_f min_i mod_i
 """
+
+
+def _calls(expr: Expr) -> bool:
+    """Return whether an expression calls a function, which may have effects."""
+    return any(isinstance(part, Invoke | Callback) for part in parts_of(expr))
+
+
+def _loops(body: Iterable[Statement]) -> Iterator[For]:
+    """Yield all counted loops."""
+    for each in body:
+        if isinstance(each, For):
+            yield each
+        if isinstance(each, For | While | If):
+            yield from _loops(each.body)
+        if isinstance(each, If):
+            yield from _loops(each.orelse)
 
 
 class _Writer:
@@ -175,24 +202,43 @@ class _Writer:
         self.function, self.results = function, results
         self.functions, self.name = functions, locals_
         self.counter = 0  # of results with several parts
+        self.read = set[str]()
+        self.unread = self._unread()
 
-    def text(self) -> str:
+    def _unread(self) -> set[str]:
+        """Return the variables that are only written, which compilers warn of."""
+        self.unread = set[str]()
+        loops = {each.target.name for each in _loops(self.function.body)}
+        while True:
+            self.read.clear()
+            self.block(self.function.body, 1)
+            found = {v.name for v in self.function.variables} - self.read - loops
+            if found <= self.unread:
+                self.counter = 0
+                return found
+            self.unread = found
+
+    def text(self, *, static: bool) -> str:
         """Return its text."""
         function = self.function
         names = ", ".join(f"{_TYPES[p.kind]} {self.name(p.name)}" for p in function.parameters)
-        head = "" if function.entry else "static "
+        head = "static " if static else ""
         opening = (
             f"{head}{_result(function.results)} {self.functions(function.name)}({names or 'void'})"
         )
         lines = [opening, "{"]
         for kind in "fibp":
-            own = [self.name(v.name) for v in function.variables if v.kind == kind]
+            used = (v for v in function.variables if v.name not in self.unread)
+            own = [self.name(v.name) for v in used if v.kind == kind]
             if own:
                 star = ", *" if kind == "p" else ", "
                 lines.append(f"    {_TYPES[kind]} {star.join(own)};".replace("* ", "*"))
+        self.read.clear()
         body = self.block(function.body, 1)
         if body and body[-1] == "    return;":
             body.pop()
+        unused = [p.name for p in function.parameters if p.name not in self.read]
+        lines += [f"    (void){self.name(each)};" for each in unused]
         return "\n".join([*lines, *body, "}", ""])
 
     # ------------------------------------------------------------------ statements
@@ -205,6 +251,8 @@ class _Writer:
         space = "    " * depth
         match statement:
             case Set(target=target, value=value):
+                if target.name in self.unread:
+                    return [f"{space}{self.value(value)};"] if _calls(value) else []
                 return [f"{space}{self.name(target.name)} = {self.value(value)};"]
             case SetMany(targets=targets, call=call):
                 self.counter += 1
@@ -213,6 +261,7 @@ class _Writer:
                 parts = [
                     f"{space}{self.name(each.name)} = {whole}.v{k};"
                     for k, each in enumerate(targets)
+                    if each.name not in self.unread
                 ]
                 return [made, *parts]
             case Put(kind=kind, address=address, value=value):
@@ -262,6 +311,7 @@ class _Writer:
             case Const(value=value):
                 return str(value), _UNARY if value < 0 else _WHOLE
             case Local(name=name):
+                self.read.add(name)
                 return self.name(name), _WHOLE
             case Global(name=name):
                 return f"(char *){name}", _UNARY

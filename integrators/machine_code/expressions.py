@@ -48,7 +48,7 @@ __all__ = [
 FOREIGN: Mapping[Any, str] = {
     getattr(math, name): name
     for name in ("exp", "log", "sin", "cos", "tan", "tanh", "sinh", "cosh", "atan", "asinh", "pow",
-                 "atan2", "asin", "acos")
+                 "atan2", "asin", "acos", "nextafter")
 }  # fmt: skip
 _OPERATORS: Mapping[type[ast.AST], tuple[str, Callable[[Any, Any], Any]]] = {
     ast.Add: ("+", operator.add),

@@ -97,6 +97,7 @@ class Layout:
         self.arrays: list[_Place] = []
         self.columns: list[_Place] = []
         self.value = self._value(example, (), Local("p", "block"))
+        self._example = example
         self.look_at_numbers = _looker(example, [place.way for place in self.numbers])
         self.look_at_columns = _looker(example, [place.way for place in self.columns])
 
@@ -105,6 +106,44 @@ class Layout:
         """The ways to named tuples that contain arrays."""
         ways = [place.way for place in (*self.arrays, *self.columns)]
         return frozenset(way[:k] for way in ways for k in range(1, len(way)))
+
+    def offset(self, name: str) -> int:
+        """Return where a number or an array is inside the block.
+
+        Parameters
+        ----------
+        name : str
+            The fields on the way to it, with dots; those of an unnamed tuple by number.
+
+        Returns
+        -------
+        int
+            Its first word.
+
+        Examples
+        --------
+        >>> from integrators.step_size import Control
+        >>> control = Control(0.0, 0.0, 1e-6, [0.0, 0.0], 1.0, 0.0)
+        >>> Layout(control, lambda part: False).offset("rtol")
+        2
+        """
+        return self.offsets[name]
+
+    @functools.cached_property
+    def offsets(self) -> Mapping[str, int]:
+        """The first words of all numbers and arrays, by their names; see `offset`."""
+        places = (*self.numbers, *self.arrays)
+        return {_path(self._example, place.way): place.offset for place in places}
+
+    def kinds(self) -> list[str]:
+        """Return what is in each word: ``"f"``, ``"i"`` or, eight in each, ``"b"``."""
+        found = ["i"] * self.words
+        for place in self.numbers:
+            found[place.offset] = place.kind if place.kind == "f" else "i"
+        for place in self.arrays:
+            words = -(-place.dtype.itemsize * int(np.prod(place.shape or ())) // 8)
+            found[place.offset : place.offset + words] = [place.kind] * words
+        return found
 
     def _value(self, example: Any, way: tuple[int, ...], block: Expr) -> Record:
         names = getattr(example, "_fields", None) or tuple(map(str, range(len(example))))
@@ -304,6 +343,15 @@ def _dotted(example: Any, way: tuple[int, ...]) -> str:
         if not hasattr(example, "_fields"):
             return ""
         names.append(example._fields[k])
+        example = example[k]
+    return ".".join(names)
+
+
+def _path(example: Any, way: tuple[int, ...]) -> str:
+    """Return the names on a way, with dots; numbers where there are none."""
+    names = []
+    for k in way:
+        names.append(str(getattr(example, "_fields", range(len(example)))[k]))
         example = example[k]
     return ".".join(names)
 

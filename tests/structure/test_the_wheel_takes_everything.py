@@ -25,7 +25,9 @@ def test_there_are_files_of_all_three() -> None:
     assert {path.suffix for path in FILES} == {
         ".py",
         ".typed",
+        ".c",
         ".css",
+        ".h",
         ".tcss",
         ".html",
         ".js",

@@ -1,0 +1,376 @@
+"""The engine as C99: header and source of one friction, or of a system.
+
+The steps are `integrators.stepping.step_to`, translated; there is no rule in this module.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from string import Template
+
+import numpy as np
+
+from gms_fsm._version import __version__
+from gms_fsm.charts.stribeck import GAUSSIAN, dip_of, flat_of
+from gms_fsm.errors import ParameterError
+from gms_fsm.exporters._names import identifier
+from gms_fsm.exporters._plain_c import C_WORDS
+from gms_fsm.exporters._quantities import Quantity, outputs_of, parameters_of
+from gms_fsm.exporters._subject import Subject
+from gms_fsm.language import names_in, spell
+from gms_fsm.run._joint import FAILURES
+from gms_fsm.run._stepper import MOST_SWITCHES, arguments_of
+from gms_fsm.run.start import LATEST, Start
+from gms_fsm.systems._numbers import numbers_of
+from gms_fsm.systems.system import System
+from integrators.compiled import INLINE, is_known
+from integrators.machine_code.c99 import c99_text
+from integrators.machine_code.layout import Block, Layout
+from integrators.machine_code.translate import Translator
+from integrators.machine_code.tree import Local
+from integrators.machine_code.values import Number
+from integrators.stepping import FULL_LOG, RESUMED, SWITCHES, step_to
+
+__all__ = ["WORDS", "Engine", "engine_of", "filled"]
+
+FIELDS = ("t", "switches", "logged", "word")  # of the struct
+TEMPLATES = Path(__file__).parent / "_templates"
+WORDS = C_WORDS | {*FIELDS, "INFINITY", "NAN", "NULL"}
+BAD_ARGUMENT = -1
+
+
+@dataclass(frozen=True)
+class Engine:
+    """C99 text, and what it defines.
+
+    Parameters
+    ----------
+    name : str
+        Prefix of all names.
+    header, source : str
+        Contents of ``name.h`` and ``name.c``.
+    inputs : tuple of str
+        Of each call its value at the start and at the end is given.
+    outputs, parameters : tuple of Quantity
+        Fields of the struct, and enumerators for ``name_get`` and ``name_set``.
+    states : mapping of str to int
+        Names of the states; with several contacts these begin with the contact's.
+    edges : mapping of str to str
+        Names of the edges; those of the enumerators, which tell several sources apart, come first.
+    """
+
+    name: str
+    header: str
+    source: str
+    inputs: tuple[str, ...]
+    outputs: tuple[Quantity, ...]
+    parameters: tuple[Quantity, ...]
+    states: Mapping[str, int]
+    edges: Mapping[str, str]
+
+    @functools.cached_property
+    def lines(self) -> str:
+        """The arguments that are the inputs, in a prototype."""
+        return "".join(f"double {each}0, double {each}1, " for each in self.inputs)
+
+
+def engine_of(subject: Subject) -> Engine:
+    """Return the engine of what is exported.
+
+    Parameters
+    ----------
+    subject : Subject
+        A friction or a system.
+
+    Returns
+    -------
+    Engine
+        Its text.
+
+    Raises
+    ------
+    ParameterError
+        If a name cannot be one in C, or a default state is entered with what is not known yet.
+    """
+    start, alone = subject.start, not isinstance(subject.given, System)
+    _check_entries(start)
+    for each in subject.inputs:
+        identifier(each, WORDS, f"input {each!r}")
+    states: dict[str, int] = {}
+    edges: dict[str, str] = {}
+    for bank in start.program.layout.banks:
+        chart = start.system.contact(bank.name).chart
+        owner = "" if alone else f"{bank.name}_"
+        states |= {f"{owner}{each.name}": k for k, each in enumerate(chart.states)}
+        for edge in chart.transitions:  # one for each source
+            source = f"_from_{edge.source}" if len(edge.sources) > 1 else ""
+            edges[f"{owner}{edge.name}{source}"] = f"{owner}{edge.name}"
+    for each in (*states, *edges):
+        identifier(each, (), f"state or edge {each!r}")
+    outputs, parameters = outputs_of(start, alone, WORDS), parameters_of(start, alone, WORDS)
+    made = Engine(subject.name, "", "", subject.inputs, outputs, parameters, states, edges)
+    text = _Text(made, start, subject.title)
+    return replace(made, header=text.header(), source=text.source())
+
+
+def _check_entries(start: Start) -> None:
+    """Refuse initial values that depend on the inputs of the first call."""
+    for contact in start.system.contacts:
+        chart = contact.chart
+        given = {*chart.inputs, *chart.velocities, *chart.declared} - {*chart.variables}
+        given -= {*chart.parameter_names}
+        for name, tree in chart.assignments["entry", chart.default_state.name].items():
+            read = set(names_in(tree))
+            while (
+                more := {u for each in read & {*chart.lets} for u in names_in(chart.lets[each])}
+                - read
+            ):
+                read |= more
+            if late := sorted(read & given):
+                raise ParameterError(
+                    f"its default state begins with {name} = {spell(tree)}, and {late[0]} is known "
+                    "only in the first call",
+                    place=f"contact {contact.name!r}",
+                    advice="give the initial value of the variable as a number",
+                )
+
+
+class _Text:
+    """Writes header and source."""
+
+    def __init__(self, made: Engine, start: Start, title: str) -> None:
+        self.made, self.start, self.title, self.name = made, start, title, made.name
+        self.arguments = arguments_of(start)
+        self.layout = Layout(self.arguments, is_known)
+
+    def header(self) -> str:
+        """Return the header."""
+        name, made = self.name, self.made
+        fields = [
+            _field(each, "int64_t" if each.place == "mode" else "double") for each in made.outputs
+        ]
+        codes = [f"    {name}_{kind} = {code}," for code, kind in _codes()]
+        places = [
+            f"    {name}_parameter_{each.name} = {self._word(each)},{_comment(each)}"
+            for each in made.parameters
+        ]
+        edges = [f"    {name}_edge_{each} = {k}," for k, each in enumerate(made.edges)]
+        states = [f"    {name}_state_{each} = {k}," for each, k in made.states.items()]
+        return filled(
+            "engine.h",
+            name=name,
+            guard=f"{name.upper()}_H",
+            title=_safe(self.title),
+            version=__version__,
+            inputs=", ".join(made.inputs) or "none",
+            fields="\n".join(fields),
+            log_length=MOST_SWITCHES,
+            words=self.layout.words,
+            bad_argument=BAD_ARGUMENT,
+            codes=_closed(codes),
+            parameters=_closed(places),
+            states=_closed(states),
+            edges=f"\n/* Edges. */\nenum {{\n{_closed(edges)}\n}};\n" if edges else "",
+            t_start=repr(self.start.t_start),
+            both="".join(f" {each}0, {each}1:" for each in made.inputs),
+            lines=made.lines,
+        )
+
+    # ------------------------------------------------------------------ source
+    def source(self) -> str:
+        """Return the source."""
+        name, made, place = self.name, self.made, self.layout.offset
+        counts, curves = place("sample.counts"), self._curves()
+        given = [
+            f"    w[{place('sample.inputs') + 2 * k + j}].f = {each}{j};"
+            for k, each in enumerate(made.inputs)
+            for j in (0, 1)
+        ]
+        spans = [
+            f"(parameter >= {first} && parameter < {first + length})"
+            for first, length in self._spans()
+        ]
+        messages = [
+            f'    case {name}_{kind}: return "{_REASONS[code]}";' for code, kind in _codes()
+        ]
+        edges = [
+            f'    case {name}_edge_{each}: return "{text}";' for each, text in made.edges.items()
+        ]
+        return filled(
+            "engine.c",
+            name=name,
+            title=_safe(self.title),
+            version=__version__,
+            engine=self._translated(bool(curves)),
+            clock=place("buffers.now.clock"),
+            shown=self._shown(),
+            image=self._image(),
+            lines=made.lines,
+            names="".join(f"{each}0, {each}1, " for each in made.inputs),
+            unless_numbers="".join(
+                f"!is_number({each}{k}) || " for each in made.inputs for k in (0, 1)
+            ),
+            latest=repr(LATEST),
+            end=place("sample.end"),
+            given="\n".join(given),
+            resumed=counts + RESUMED,
+            switches=counts + SWITCHES,
+            full_log=FULL_LOG,
+            spans=" || ".join(spans),
+            curves=curves,
+            log_t=place("sample.t"),
+            log_element=place("sample.machine"),
+            log_edge=place("sample.edge"),
+            edge_names="\n".join(edges),
+            messages="\n".join(messages),
+        )
+
+    def _translated(self, curves: bool) -> str:
+        """Return the functions of the integrator and of the system."""
+        translator = Translator(INLINE)
+        translator.entry("step", step_to, list(self.layout.value.fields.values()))
+        if curves:
+            for each, function, count in (("dip", dip_of, 2), ("flat", flat_of, 4)):
+                numbers = [Number(Local("f", letter)) for letter in "abcd"[:count]]
+                translator.entry(each, function, numbers)
+        public = ("init", "advance", "advance_to", "get", "set", "switch", "edge", "message")
+        own = [f"{self.name}_{each}" for each in (*public, "state", "word")]
+        return c99_text(translator.module, [*own, "show", "is_number", "is_parameter"], hidden=True)
+
+    def _word(self, each: Quantity) -> int:
+        """Return the first word of a quantity."""
+        return self.layout.offset(_PLACES[each.place]) + each.index
+
+    def _shown(self) -> str:
+        lines = []
+        for each in self.made.outputs:
+            first, member = self._word(each), "i" if each.place == "mode" else "f"
+            if each.length is None:
+                lines.append(f"    s->{each.name} = w[{first}].{member};")
+            else:
+                loop = f"for (int k = 0; k < {each.length}; k++)"
+                lines.append(f"    {loop}\n        s->{each.name}[k] = w[{first} + k].{member};")
+        return "\n".join(lines)
+
+    def _image(self) -> str:
+        """Return assignments of all words that are not zero at the start."""
+        block = Block(self.layout, self.arguments)
+        block.update(block.contents)
+        kinds = self.layout.kinds()
+        names = {offset: name for name, offset in self.layout.offsets.items()}
+        lines = []
+        for k in np.flatnonzero(block.words).tolist():
+            note = f" /* {names[k]} */" if k in names else ""
+            if kinds[k] == "f":
+                value = _number(float(block.words[k : k + 1].view(np.float64)[0]))
+                lines.append(f"    w[{k}].f = {value};{note}")
+            elif kinds[k] == "i":
+                lines.append(f"    w[{k}].i = {int(block.words[k])};{note}")
+            else:
+                truths = block.words[k : k + 1].view(np.bool_)
+                lines += [f"    w[{k}].b[{j}] = true;{note}" for j in np.flatnonzero(truths)]
+        return "\n".join(lines)
+
+    def _spans(self) -> list[tuple[int, int]]:
+        """Return where parameters are: first word and length, joined where they touch."""
+        spans: list[tuple[int, int]] = []
+        for first, length in sorted((self._word(p), p.length or 1) for p in self.made.parameters):
+            if spans and sum(spans[-1]) == first:
+                spans[-1] = spans[-1][0], spans[-1][1] + length
+            else:
+                spans.append((first, length))
+        return spans
+
+    def _curves(self) -> str:
+        """Return the lines that compute what depends on the numbers of Stribeck curves."""
+        shared, _ = numbers_of(self.start.system)
+        first, lines = self.layout.offset(_PLACES["shared"]), []
+        where = {label: f"w[{first + k}].f" for k, label in enumerate(shared)}
+        for contact in self.start.system.contacts:
+            curve = f"{contact.name}.curve "
+            if f"{curve}v dip" in where:
+                F_c, F_s, v_s = (where[curve + each] for each in ("F_c", "F_s", "v_s"))
+                delta = where.get(f"{curve}delta", repr(GAUSSIAN))
+                lines.append(f"    {where[f'{curve}v dip']} = dip({v_s}, {delta});\n")
+                lines.append(
+                    f"    {where[f'{curve}v flat']} = flat({F_c}, {F_s}, {v_s}, {delta});\n"
+                )
+        return "".join(lines)
+
+
+_PLACES: Mapping[str, str] = {
+    "y": "buffers.now.y",
+    "mode": "buffers.now.mode",
+    "seen": "sample.seen",
+    "shared": "functions.p.0",
+    "own": "functions.p.1",
+}
+_REASONS = {code: reason for code, (_, reason) in FAILURES.items()}
+_KINDS = {
+    "LIVELOCK": "LivelockError",
+    "STEP_TOO_SMALL": "StepSizeError",
+    "TOO_MANY_STEPS": "StepLimitError",
+    "NOT_FINITE": "NotFiniteError",
+}
+
+
+def _codes() -> list[tuple[int, str]]:
+    """Return the error codes with their names."""
+    found: list[tuple[int, str]] = []
+    for code, (kind, _) in FAILURES.items():
+        name = next(each for each, error in _KINDS.items() if error == kind.__name__)
+        used = [each for _, each in found]
+        found.append((code, f"{name}_OF_A_COMPARISON" if name in used else name))
+    return found
+
+
+def filled(template: str, **holes: object) -> str:
+    """Return a template of this folder with its holes filled.
+
+    Parameters
+    ----------
+    template : str
+        File name in ``_templates``.
+    **holes : object
+        By name.
+
+    Returns
+    -------
+    str
+        The text.
+    """
+    text = (TEMPLATES / template).read_text(encoding="utf-8")
+    return Template(text).substitute(holes)
+
+
+def _field(each: Quantity, kind: str) -> str:
+    length = "" if each.length is None else f"[{each.length}]"
+    return f"    {kind} {each.name}{length};{_comment(each)}"
+
+
+def _comment(each: Quantity) -> str:
+    text = ", ".join(part for part in (each.unit, each.meaning) if part)
+    return f" /* {_safe(text)} */" if text else ""
+
+
+def _safe(text: str) -> str:
+    """Return a text that does not end a comment."""
+    return text.replace("*/", "* /").replace("/*", "/ *").replace("\n", " ")
+
+
+def _closed(lines: Sequence[str]) -> str:
+    """Return the lines of an enumeration, without the last comma."""
+    *before, last = lines
+    code, mark, comment = last.partition(" /*")
+    return "\n".join([*before, code.rstrip(",") + mark + comment])
+
+
+def _number(value: float) -> str:
+    if value != value:
+        return "NAN"
+    if value in (float("inf"), float("-inf")):
+        return "INFINITY" if value > 0 else "-INFINITY"
+    return repr(value)

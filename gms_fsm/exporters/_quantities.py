@@ -1,0 +1,186 @@
+"""The inputs, outputs and parameters of what is exported, with the names that C gives them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from gms_fsm.charts.parameters import QUANTITIES, SIGMA_2, STRIBECK, WEIGHTS, Parameter
+from gms_fsm.errors import ParameterError
+from gms_fsm.exporters._names import identifier
+from gms_fsm.run.start import Start
+from gms_fsm.systems._numbers import numbers_of
+from gms_fsm.systems.system import Contact, System
+
+__all__ = ["Quantity", "outputs_of", "parameters_of"]
+
+CURVE, MODEL, WEIGHT = "curve ", "model ", "threshold weight"
+DERIVED = ("v dip", "v flat")  # computed from the other numbers of a curve
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number, or one number per element of a contact.
+
+    Parameters
+    ----------
+    name : str
+        In C: ``z``, or ``bearing_z`` if there are several contacts or bodies.
+    label : str
+        What the trees call it: ``bearing.z``.
+    place : {"y", "seen", "mode", "shared", "own"}
+        Which array it is in.
+    index : int
+        Of its first value there.
+    length : int or None
+        Number of elements; None for a single number.
+    unit, meaning : str
+        Empty if unknown.
+    values : tuple of float
+        Of a parameter; of a state its initial values.
+    """
+
+    name: str
+    label: str
+    place: str
+    index: int
+    length: int | None
+    unit: str
+    meaning: str
+    values: tuple[float, ...] = ()
+
+
+def outputs_of(start: Start, alone: bool, words: Iterable[str]) -> tuple[Quantity, ...]:
+    """Return what an export shows: states, forces and what else is observed.
+
+    Parameters
+    ----------
+    start : Start
+        What is exported.
+    alone : bool
+        Whether it is one friction, whose name is then left out.
+    words : iterable of str
+        Names that it must not have.
+
+    Returns
+    -------
+    tuple of Quantity
+        The state vector, then what is observed, then the states of the elements.
+    """
+    layout = start.program.layout
+    found: list[Quantity] = []
+    for place, places in (("y", layout.y), ("seen", layout.observed)):
+        for label in dict.fromkeys(name for name, _ in places):
+            first, *others = places.all_of(label) if label in places.own else [places.index(label)]
+            count = 1 + len(others) if label in places.own else None
+            if any(each.label == label for each in found):
+                continue  # a position is in both
+            known = _declared(start.system, label)
+            values = tuple(start.y[k] for k in (first, *others)) if place == "y" else ()
+            what = known.unit, known.meaning
+            found.append(Quantity(_plain(label, alone), label, place, first, count, *what, values))
+    for bank in layout.banks:
+        label = bank.of("state")
+        initial = tuple(float(k) for k in start.mode[bank.elements])
+        states = ", ".join(
+            f"{k} {each.name}"
+            for k, each in enumerate(start.system.contact(bank.name).chart.states)
+        )
+        found.append(
+            Quantity(_plain(label, alone), label, "mode", bank.first, bank.n, "", states, initial)
+        )
+    _check([each.name for each in found], [each.label for each in found], words)
+    return tuple(found)
+
+
+def parameters_of(start: Start, alone: bool, words: Iterable[str]) -> tuple[Quantity, ...]:
+    """Return the numbers of an export.
+
+    Parameters
+    ----------
+    start, alone, words
+        As in `outputs_of`.
+
+    Returns
+    -------
+    tuple of Quantity
+        In the order of the arrays; without those that are computed from others.
+    """
+    shared, own = numbers_of(start.system)
+    found = [
+        _parameter(start.system, label, "shared", k, None, (value,), alone)
+        for k, (label, value) in enumerate(shared.items())
+        if not label.endswith(DERIVED) and not _replaced(label, shared, own)
+    ]
+    width = max((values.size for _, values in own.values()), default=0)
+    found += [
+        _parameter(start.system, label, "own", k * width, values.size, values.tolist(), alone)
+        for k, (label, (_, values)) in enumerate(own.items())
+    ]
+    _check([each.name for each in found], [each.label for each in found], words)
+    return tuple(found)
+
+
+def _replaced(label: str, shared: Iterable[str], own: Iterable[str]) -> bool:
+    """Return whether a number of all models is not used, because the chart has one of that name."""
+    return MODEL in label and label.replace(MODEL, "") in {*shared, *own}
+
+
+def _parameter(
+    system: System, label: str, place: str, index: int, length: int | None, values: Any, alone: bool
+) -> Quantity:
+    known, plain = _declared(system, label), label
+    for prefix in (CURVE, MODEL):
+        plain = plain.replace(f".{prefix}", ".")
+    plain = plain.replace(WEIGHT, WEIGHTS.name)
+    return Quantity(
+        _plain(plain, alone), label, place, index, length, known.unit, known.meaning, tuple(values)
+    )
+
+
+def _declared(system: System, label: str) -> Parameter:
+    """Return unit and meaning of a name in the trees."""
+    owner, _, name = label.rpartition(".")
+    contact = next((each for each in system.contacts if each.name == owner), None)
+    known: dict[str, Parameter] = {}
+    if contact is not None:
+        known = dict(_of_contact(contact))
+    elif name in {body.x for body in system.bodies}:
+        known = {name: Parameter(name, "m", meaning="position")}
+    elif name in {body.v for body in system.bodies}:
+        known = {name: Parameter(name, "m/s", meaning="velocity")}
+    return known.get(name, Parameter(re.sub(r"\W", "_", name)))
+
+
+def _of_contact(contact: Contact) -> Iterator[tuple[str, Parameter]]:
+    chart = contact.chart
+    units = {**QUANTITIES, **chart.declared}
+    yield from units.items()
+    yield "F_elements", Parameter("F_elements", "N", meaning="forces of the elements")
+    for name in chart.variables:
+        unit = chart.unit(name)
+        rate = "m/s" if unit == "m" else f"({unit})/s" if unit else ""
+        yield f"d{name}", Parameter(f"d{name}", rate, meaning=f"derivative of {name}")
+    yield from ((f"{CURVE}{each.name}", each) for each in STRIBECK)
+    yield f"{MODEL}sigma_2", SIGMA_2
+    yield WEIGHT, WEIGHTS
+
+
+def _plain(label: str, alone: bool) -> str:
+    """Return the name in C."""
+    name = label.partition(".")[2] if alone and "." in label else label
+    return re.sub(r"\W+", "_", name)
+
+
+def _check(names: list[str], labels: list[str], words: Iterable[str]) -> None:
+    """Refuse names that C cannot have, and equal ones."""
+    for name, label in zip(names, labels, strict=True):
+        identifier(name, words, f"name {label!r}")
+        if names.count(name) > 1:
+            raise ParameterError(
+                f"two quantities would be called {name!r}",
+                place=f"name {label!r}",
+                advice="give one of them another name",
+            )

@@ -1,0 +1,136 @@
+"""C99 with located switches: the engine itself, for any controller or simulator."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gms_fsm.errors import ParameterError
+from gms_fsm.exporters._c import WORDS, Engine, engine_of, filled
+from gms_fsm.exporters._plain_c import plain_c, plain_c_notes
+from gms_fsm.exporters._registry import Exporter, register
+from gms_fsm.exporters._subject import Subject
+from gms_fsm.lowering.scales import scales_of
+from gms_fsm.systems.signals import Corners
+from gms_fsm.systems.system import System
+
+__all__ = ["c99"]
+
+PERIOD, PERIODS, ROWS = 10.0, 2, 2000  # s; of the record that a single friction is given
+FAR, FAST = 3.0, 100.0  # its amplitude, in deflections; or its speed, in those of the guards
+SHOWN = 1000  # rows of 1 ms, of a system without records
+
+
+def c99(subject: Subject) -> dict[str, str]:
+    """Return header, source, a program that runs it on a record, that record, and a README.
+
+    Parameters
+    ----------
+    subject : Subject
+        A friction or a system.
+
+    Returns
+    -------
+    dict of str to str
+        Contents by file name.
+    """
+    made = engine_of(subject)
+    name = made.name
+    plain, notes = _plain(subject)
+    return {
+        **plain,
+        f"{name}.h": made.header,
+        f"{name}.c": made.source,
+        f"{name}_main.c": _main(made),
+        f"{name}_record.csv": _record(subject),
+        "README-c99.md": f"{_readme(subject, made)}\n{notes}",
+    }
+
+
+def _plain(subject: Subject) -> tuple[dict[str, str], str]:
+    """Return the files of the plain form, if there can be one, and what the README says of it."""
+    if isinstance(subject.given, System):
+        return {}, ""
+    try:
+        return plain_c(subject), f"## The plain form\n\n{plain_c_notes(subject)}"
+    except ParameterError as error:
+        return {}, f"There is no plain form: {error}\n"
+
+
+def _main(made: Engine) -> str:
+    name, heads, rows = made.name, [], []
+    for each in made.outputs:
+        kind = "%lld" if each.place == "mode" else "%.17g"
+        cast = "(long long)" if each.place == "mode" else ""
+        for k in range(each.length or 1):
+            heads.append(each.name if each.length is None else f"{each.name}[{k + 1}]")
+            value = f"s->{each.name}" + ("" if each.length is None else f"[{k}]")
+            rows.append(f'    printf(",{kind}", {cast}{value});')
+    names = range(len(made.inputs))
+    pairs = "".join(f"u{k}, w{k}, " for k in names)  # before, and now
+    before = "".join(f"    double u{k} = 0.0, w{k} = 0.0;\n" for k in names)
+    read = "".join(
+        f"        u{k} = w{k};\n"
+        f"        w{k} = strtod(end + (*end == ','), &end);\n"
+        f"        if (row == 2)\n            u{k} = w{k};\n"
+        for k in names
+    )
+    return filled(
+        "main.c",
+        name=name,
+        columns=",".join(("t", *made.inputs)),
+        heads=",".join(heads),
+        rows="\n".join(rows),
+        before=before,
+        read=read,
+        pairs=pairs,
+    )
+
+
+def _record(subject: Subject) -> str:
+    """Return a record for the inputs: that of the system, or a sine chosen by us."""
+    given = subject.given
+    if isinstance(given, System):
+        signals = {name: given.signals[name] for name in subject.inputs}
+        records = {name: each for name, each in signals.items() if isinstance(each, Corners)}
+        if not records:
+            t = subject.t_start + 1e-3 * np.arange(SHOWN + 1)
+        else:
+            t = np.unique(np.concatenate([each.times for each in records.values()]))
+            t = t[t >= subject.t_start]
+        columns = {name: np.interp(t, each.times, each.values) for name, each in records.items()}
+    else:
+        scales = scales_of(subject.start.system.contacts[0])
+        sizes = [u for row in scales.variables.values() for u in row if u > 0.0]
+        omega = 2.0 * math.pi / PERIOD
+        speed = max(FAR * max(sizes, default=0.1) * omega, FAST * scales.speed)
+        t = subject.t_start + PERIOD * PERIODS / ROWS * np.arange(ROWS + 1)
+        columns = {name: np.zeros(t.size) for name in subject.inputs}
+        columns["v"] = speed * np.sin(omega * t)
+    lines = [",".join(("t", *columns))]
+    rows = zip(t.tolist(), *(each.tolist() for each in columns.values()), strict=True)
+    return "\n".join([*lines, *(",".join(map(repr, row)) for row in rows), ""])
+
+
+def _readme(subject: Subject, made: Engine) -> str:
+    name = made.name
+    inputs = ", ".join(f"`{each}`" for each in made.inputs) or "none"
+    numbers = "\n".join(
+        f"- `{each.name}` = {', '.join(map(repr, each.values))} {each.unit}".rstrip()
+        for each in made.parameters
+    )
+    settings = subject.settings
+    return filled(
+        "c99.md",
+        name=name,
+        title=subject.title,
+        arguments="".join(f"{each}0, {each}1, " for each in made.inputs),
+        inputs=inputs,
+        method=settings.method_name,
+        rtol=repr(settings.rtol),
+        numbers=numbers,
+    )
+
+
+register(Exporter("c99", "C99 with located switches, and the plain form", c99, WORDS))

@@ -1,0 +1,158 @@
+"""Exported C programs: compiled, run on records, and compared with the engine."""
+
+from __future__ import annotations
+
+import ctypes
+import io
+import re
+import shutil
+import subprocess
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gms_fsm import GMSError, Model, Prescribed, System, Trace, export, simulate
+from gms_fsm.exporters import Subject
+from gms_fsm.exporters._c import Engine, engine_of
+from gms_fsm.systems.signals import Corners
+
+FLAGS = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
+COMPILERS = [each for each in ("gcc", "clang") if shutil.which(each)]
+
+
+@dataclass(frozen=True)
+class Output:
+    """What a program wrote: columns by name, switches as texts, and its complaint."""
+
+    columns: Mapping[str, np.ndarray]
+    switches: list[list[str]]
+    message: str
+
+
+def built(folder: Path, name: str, compiler: str = "cc", *flags: str) -> Path:
+    """Compile an exported program; every warning is an error."""
+    made = folder / f"{name}-{compiler}{''.join(flags)}"
+    command = [compiler, *FLAGS, *flags, f"{name}.c", f"{name}_main.c", "-o", made.name, "-lm"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return made
+
+
+def run(program: Path, t: np.ndarray, **inputs: np.ndarray) -> Output:
+    """Run a program on a record."""
+    rows = zip(t.tolist(), *(each.tolist() for each in inputs.values()), strict=True)
+    record = "\n".join([",".join(("t", *inputs)), *(",".join(map(repr, row)) for row in rows), ""])
+    log = program.with_suffix(".log")
+    done = subprocess.run(
+        [str(program), str(log)], input=record, capture_output=True, text=True, check=False
+    )
+    head, *_ = done.stdout.splitlines()
+    table = np.loadtxt(io.StringIO(done.stdout), delimiter=",", skiprows=1, ndmin=2)
+    columns = dict(zip(head.split(","), table.T, strict=True))
+    switches = [line.split(",") for line in log.read_text().splitlines()]
+    return Output(columns, switches, done.stderr)
+
+
+def same_bits(
+    given: Model | System,
+    folder: Path,
+    t: np.ndarray,
+    compilers: list[str],
+    initial: Mapping[str, Any] | None = None,
+    **inputs: np.ndarray,
+) -> int:
+    """Assert that a program computes what the engine does; return the number of switches."""
+    # What ticks at the very end of a run does not tick in it, but it does in a call.
+    wanted, options = t[:-1], {"t_eval": t[:-1], "output": "t_eval"}
+    trace: Trace | None
+    if isinstance(given, System):
+        records = {name: Corners(t, each, held=False) for name, each in inputs.items()}
+        given = replace(given, signals={**given.signals, **records})
+    try:
+        if isinstance(given, System):
+            # Steps end at the rows of a record; without one, give one that nobody reads.
+            rows = {} if inputs else {"nothing": Corners(t, 0.0 * t, held=False)}
+            stopped = replace(given, signals={**given.signals, **rows})
+            trace = simulate(stopped, t[-1], t_start=t[0], initial=initial, **options)
+        else:
+            trace = simulate(given, Prescribed((t, inputs["v"])), t[-1], **options)
+    except GMSError:
+        trace = None
+    export(given, "c99", folder, name="it", initial=initial, t_start=t[0])
+    made = engine_of(Subject.of(given, "c99", name="it", initial=initial, t_start=t[0]))
+    for compiler in compilers:
+        found = run(built(folder, "it", compiler), t, **inputs)
+        if trace is None:
+            assert found.message
+            continue
+        assert not found.message
+        places: Mapping[str, Any] = {"y": trace.rows.y, "mode": trace.rows.mode}
+        for each in made.outputs:
+            for k in range(each.length or 1):
+                name = each.name if each.length is None else f"{each.name}[{k + 1}]"
+                column = found.columns[name][: wanted.size]
+                if each.place in places:
+                    assert np.array_equal(column, places[each.place][:, each.index + k]), name
+                elif each.label.endswith(".F"):
+                    force = trace.contact(each.label[:-2]).F
+                    assert np.array_equal(column, force), name
+        log = trace.firings
+        names = list(made.edges.values())
+        theirs = [
+            [t, str(machine + 1), names[edge]]
+            for t, machine, edge in zip(
+                log.t.tolist(), log.machine.tolist(), log.edge.tolist(), strict=True
+            )
+        ]
+        ours = [[float(t), *rest] for t, *rest in found.switches]
+        end = wanted[-1]
+        assert [s for s in ours if s[0] <= end] == [s for s in theirs if s[0] <= end]
+    return 0 if trace is None else len(trace.firings.t)
+
+
+class Library:
+    """An exported engine, called from Python."""
+
+    def __init__(self, folder: Path, made: Engine, compiler: str = "cc") -> None:
+        self.made, name = made, made.name
+        path = folder / f"{name}-{compiler}.so"
+        command = [compiler, *FLAGS, "-fPIC", "-shared", f"{name}.c", "-o", path.name, "-lm"]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        found = ctypes.CDLL(str(path))
+        kinds = {True: ctypes.c_int64, False: ctypes.c_double}
+        fields: list[tuple[str, Any]] = [("t", ctypes.c_double)]
+        for each in made.outputs:
+            kind = kinds[each.place == "mode"]
+            fields.append((each.name, kind if each.length is None else kind * each.length))
+        fields += [("switches", ctypes.c_int64), ("logged", ctypes.c_int64)]
+        fields.append(("word", ctypes.c_int64 * int(re.search(r"word\[(\d+)\]", made.header)[1])))  # type: ignore[index]
+        self.State = type("State", (ctypes.Structure,), {"_fields_": fields})
+        pointer = ctypes.POINTER(self.State)
+        numbers = [ctypes.c_double] * (2 * len(made.inputs) + 1)
+        self.init = self._of(found, "init", None, pointer)
+        self.advance = self._of(found, "advance", ctypes.c_int, pointer, *numbers)
+        self.advance_to = self._of(found, "advance_to", ctypes.c_int, pointer, *numbers)
+        self.get = self._of(found, "get", ctypes.c_double, pointer, ctypes.c_int)
+        self.set = self._of(found, "set", ctypes.c_int, pointer, ctypes.c_int, ctypes.c_double)
+        self.message = self._of(found, "message", ctypes.c_char_p, ctypes.c_int)
+
+    def _of(self, found: ctypes.CDLL, name: str, result: Any, *arguments: Any) -> Any:
+        function = getattr(found, f"{self.made.name}_{name}")
+        function.restype, function.argtypes = result, arguments
+        return function
+
+    def begun(self) -> Any:
+        """Return a state at the start."""
+        state = self.State()
+        self.init(state)
+        return state
+
+    def place(self, name: str) -> int:
+        """Return the enumerator of a parameter."""
+        found = re.search(rf"_parameter_{name} = (\d+)", self.made.header)
+        assert found
+        return int(found[1])

@@ -1,0 +1,107 @@
+"""The struct of an exported engine is its whole state, and bad arguments change nothing of it."""
+
+from __future__ import annotations
+
+import ctypes
+import itertools
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gms_fsm import (
+    GMS,
+    Chart,
+    ChartModel,
+    FrictionState,
+    GMSParameters,
+    ParameterError,
+    State,
+    Stribeck,
+    export,
+)
+from gms_fsm.exporters import Subject
+from gms_fsm.exporters._c import engine_of
+from tests.exporters.c_programs import COMPILERS, Library
+
+pytestmark = pytest.mark.skipif(not COMPILERS, reason="there is no C compiler")
+
+
+def model(**curve: float) -> GMS:
+    given = {"F_c": 0.4, "F_s": 1.5, "v_s": 1e-3, "delta": 2.0} | curve
+    more = {"sigma_2": 0.1, "stribeck": Stribeck(**given), "v_c": 1e-6}
+    return GMS(GMSParameters([0.7, 0.9], [0.3, 0.4], [0.1, 0.05], **more), law="signed")
+
+
+def library(folder: Path, given: GMS) -> Library:
+    export(given, "c99", folder, name="it")
+    return Library(folder, engine_of(Subject.of(given, "c99", name="it")))
+
+
+VELOCITIES = np.cumsum(np.random.default_rng(3).normal(size=60)) * 0.3
+
+
+def forces(c: Library, state: object) -> list[float]:
+    found = []
+    for v0, v1 in itertools.pairwise(VELOCITIES):
+        assert c.advance(state, v0, v1, 0.1) == 0
+        found.append(state.F)  # type: ignore[attr-defined]
+    return found
+
+
+def test_the_engine_in_a_struct(tmp_path: Path) -> None:
+    c = library(tmp_path, model())
+    first, copied = c.begun(), c.State()
+    begun = forces(c, first)
+    ctypes.memmove(ctypes.byref(copied), ctypes.byref(first), ctypes.sizeof(first))
+    assert forces(c, first) == forces(c, copied)  # a copy goes on in the same way
+    assert forces(c, c.begun()) == begun  # and another one knows nothing of it
+    friction = FrictionState(model())
+    assert begun == [friction.advance(v0, v1, 0.1) for v0, v1 in itertools.pairwise(VELOCITIES)]
+    assert first.switches > 4
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [(math.nan, 0.0, 0.1), (0.0, math.inf, 0.1), (0.0, 0.0, -0.1), (0.0, 0.0, math.nan),
+     (0.0, 0.0, 1e-300), (0.0, 0.0, 1e10)],
+)  # fmt: skip
+def test_bad_arguments(numbers: tuple[float, ...], tmp_path: Path) -> None:
+    c = library(tmp_path, model())
+    state = c.begun()
+    assert c.advance(state, 0.1, 0.1, 5.0) == 0
+    before = bytes(state)
+    code = c.advance(state, *numbers)
+    assert code == -1
+    assert b"not finite" in c.message(code)
+    assert bytes(state) == before
+
+
+def test_numbers_are_set(tmp_path: Path) -> None:
+    c, other = library(tmp_path, model()), model(F_s=0.9, v_s=5e-3)
+    state = c.begun()
+    k = c.place("k")
+    assert [c.get(state, k), c.get(state, k + 1)] == [0.7, 0.9]
+    assert c.set(state, c.place("F_s"), 0.9) == 0
+    assert c.set(state, c.place("v_s"), 5e-3) == 0
+    friction = FrictionState(other)
+    pairs = list(itertools.pairwise(VELOCITIES))
+    wanted = [friction.advance(v0, v1, 0.1) for v0, v1 in pairs]
+    assert forces(c, state) == pytest.approx(wanted, rel=1e-5)  # tolerances are as exported
+    for place, value in ((-1, 1.0), (4, 1.0), (10**6, 1.0), (k, math.nan)):
+        assert c.set(state, place, value) == -1
+
+
+def test_what_only_the_first_call_knows_is_refused(tmp_path: Path) -> None:
+    chart = Chart(
+        "memory",
+        inputs=("v",),
+        variables=("z",),
+        let={"twice": "2 * v"},
+        states=(State("only", entry={"z": "twice"}),),
+        outputs={"F": "z"},
+    )
+    with pytest.raises(ParameterError, match="begins with z = twice, and v is known only"):
+        export(ChartModel(chart, {}), "c99", tmp_path)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,64 @@
+"""The exported C99 programs, compiled by gcc and by clang, compute the engine's bits."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gms_fsm.app.scenario import load_scenario
+from gms_fsm.charts.registry import registered
+from gms_fsm.systems.models import demonstration
+from gms_fsm.systems.signals import Corners
+from gms_fsm.systems.system import system_of
+from tests.exporters.c_cases import CASES, SCENARIOS, case, times, walk
+from tests.exporters.c_programs import COMPILERS, same_bits
+
+SEEDS = range(2, 8)
+FLAGS = "-std=c99 -O2 -ffp-contract=off -Wall -Wextra -Wpedantic -Werror"
+
+
+def version(compiler: str) -> str:
+    """Return a compiler with its version."""
+    text = subprocess.run([compiler, "-dumpversion"], capture_output=True, text=True, check=True)
+    return f"{compiler} {text.stdout.strip()}"
+
+
+def test_there_are_two_compilers() -> None:
+    assert COMPILERS == ["gcc", "clang"]
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("name", CASES)
+def test_random_records(name: str, compiler: str, tmp_path: Path, ran: Callable[..., None]) -> None:
+    switches = 0
+    for seed in SEEDS:
+        given, t, inputs = case(name, seed)
+        switches += same_bits(given, tmp_path, t, [compiler], **inputs)
+    what = f"{name}, {len(SEEDS)} random records"
+    ran("c99", version(compiler), what, f"{switches} switches, all bits equal, no warning")
+
+
+@pytest.mark.parametrize("name", [name for name, each in registered().items() if not each.wrong])
+def test_every_chart_without_locks(name: str, tmp_path: Path) -> None:
+    entry = registered()[name]
+    if any(entry.chart(law).locks for law in entry.laws or ("",)):
+        return  # such charts are parts of systems
+    for seed, law in enumerate(entry.laws or ("",)):
+        random = np.random.default_rng([seed, *name.encode()])
+        t = times(random, 2.0)
+        same_bits(demonstration(entry, law), tmp_path, t, COMPILERS, v=walk(random, t, 0.01))
+
+
+@pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.toml")), ids=lambda path: path.stem)
+def test_every_system(path: Path, tmp_path: Path) -> None:
+    loaded = load_scenario(path)
+    system = loaded.system or system_of(loaded.model, loaded.rig)
+    records = {name: each for name, each in system.signals.items() if isinstance(each, Corners)}
+    start, end = loaded.arguments["t_start"], loaded.arguments["t_end"]
+    t = np.linspace(start, min(end, start + 20.0), 1001)
+    inputs = {name: np.interp(t, each.times, each.values) for name, each in records.items()}
+    same_bits(system, tmp_path, t, COMPILERS, loaded.arguments.get("initial"), **inputs)
