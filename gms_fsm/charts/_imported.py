@@ -135,15 +135,13 @@ def built(states: list[str], edges: list[Edge], given: Texts, here: str) -> Char
                 place=edge.place,
                 advice=f"give one as text, guards={{{edge.name!r}: 'z > s'}}; 'True' for always",
             )
-    if isinstance(given.locked, str):
-        raise ChartError("give a tuple", place=f"{here}: locked", value=given.locked)
-    locked = dict.fromkeys(given.locked, "")
+    locked = dict.fromkeys(map(str, _several(given.locked, f"{here}: locked")))
     _check_known(locked, states, "state", f"{here}: locked")
     return Chart(
         given.name,
         given.inputs,
         given.variables,
-        tuple(_parameter(each, here) for each in _several(given.parameters, here)),
+        tuple(_parameter(each, here) for each in _several(given.parameters, f"{here}: parameters")),
         tuple(
             State(
                 name,
@@ -192,9 +190,9 @@ def _check_known(given: Mapping[str, object], names: list[str], kind: str, place
             )
 
 
-def _several(given: object, here: str) -> Iterable[Any]:
+def _several(given: object, place: str) -> Iterable[Any]:
     if isinstance(given, str | Mapping) or not isinstance(given, Iterable):
-        raise ChartError("give a tuple", place=f"{here}: parameters", value=given)
+        raise ChartError("give a tuple", place=place, value=given)
     return given
 
 

@@ -59,7 +59,6 @@ class PythonStateMachine:
 
 DRIVER = """
 const scxml = require('@scion-scxml/scxml');
-const lines = require('readline').createInterface({ input: process.stdin });
 const text = require('fs').readFileSync(process.argv[2], 'utf8');
 const fail = (error) => { if (error) { console.error(error); process.exit(1); } };
 scxml.documentStringToModel('', text, (error, model) => {
@@ -68,6 +67,8 @@ scxml.documentStringToModel('', text, (error, model) => {
     fail(failed);
     const chart = new scxml.core.Statechart(ready);
     chart.start();
+    // Not earlier: lines that come before somebody listens are lost.
+    const lines = require('readline').createInterface({ input: process.stdin });
     lines.on('line', (line) => {
       chart.gen({ name: 'values', data: JSON.parse(line) });
       chart.gen({ name: 'step' });
