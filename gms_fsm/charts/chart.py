@@ -376,7 +376,8 @@ class Chart:
         Examples
         --------
         >>> import tempfile
-        >>> from gms_fsm import GMS_ELEMENT, export
+        >>> from gms_fsm import export
+        >>> from gms_fsm.charts import GMS_ELEMENT
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     _ = export(GMS_ELEMENT["signed"], "scxml", folder, name="gms")
         ...     Chart.from_scxml(f"{folder}/gms.scxml") == GMS_ELEMENT["signed"]

@@ -40,7 +40,7 @@ def check_moved_from_outside(chart: Chart, known: Iterable[str], title: str) -> 
 
     Examples
     --------
-    >>> from gms_fsm.charts import KARNOPP
+    >>> from gms_fsm.charts.karnopp import KARNOPP
     >>> check_moved_from_outside(KARNOPP, (), "SCXML")
     Traceback (most recent call last):
     gms_fsm.errors.ParameterError: chart "Karnopp's model", state 'stuck': it locks the contact...
